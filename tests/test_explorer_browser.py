@@ -18,6 +18,7 @@ from urllib.parse import parse_qs, parse_qsl, urlsplit
 import explorer_addresses
 import numpy as np
 import pytest
+import trimesh
 from explorer_browser import Watched, chromium, flags, missing, tool
 
 import rocking
@@ -630,6 +631,79 @@ def test_a_link_whose_file_is_opened_again_is_the_same_case(opened, explorer):
         "pga", "0.4", "0.01", "m/s2", "ridgecrest-clc-up",
     ]  # fmt: skip
     assert page.text("#python").count("scaled_to(") == 1 and "dt=0.01, units='m/s2'" in page.text("#python")
+
+
+MESH = "mesh=statue&azimuth=30&motion=ridgecrest-clc-090&pga=0.6g"
+PLAN = "document.querySelector('.plan path.plan-rose')"
+INK = """() => { const {data} = document.getElementById('stage').getContext('2d').getImageData(0, 0, 2000, 360);
+  let count = 0;
+  for (let k = 3; k < data.length; k += 4) count += data[k - 3] === 0xcf && data[k - 2] === 0xc6;
+  return count; }"""
+
+
+def test_a_body_is_seen_from_above_and_turned(opened, explorer):
+    page = opened(MESH, allowed=["willReadFrequently"])
+    page.until(PLAN, "the plan is drawn")
+    assert "Towards 30°" in page.text("#derived") and "Towards 210°" in page.text("#derived")
+    assert "lifted first towards 90°, above 0.282 g" in page.text(".body")
+    assert "Planar rocking leaves out" in page.text(".body") and "Nothing had to be mended" in page.text(".body")
+    plan = page.page.locator(".plan").bounding_box()
+    page.rested(lambda: page.page.locator(".plan").click(position={"x": 0.95 * plan["width"], "y": plan["height"] / 2}))
+    assert query_of(page)["azimuth"] == "90"
+    assert page.js("document.getElementById('azimuth').value") == "90"
+    page.rested(lambda: page.page.locator("#azimuth-slider").press("ArrowRight"))
+    assert query_of(page)["azimuth"] == "91"
+    side = explorer.case({**dict(parse_qsl(MESH)), "azimuth": "91"}).header["block"]["sides"][0]
+    assert f"p = {side['p']:.3g} rad/s, α = {math.degrees(side['alpha']):.3g}°" in page.text("#derived")
+    assert ".block(91.0)" in page.text("#python") and "--pivots" in page.text("#command")
+    page.page.click("[data-view=block]")
+    page.until("document.getElementById('stage').dataset.shown")
+    statue_ink = page.js(INK)
+    page.rested(lambda: page.page.select_option("#shape", "pivots"))
+    page.until("document.getElementById('stage').dataset.shown")
+    assert 0 < statue_ink < 0.9 * page.js(INK)
+    assert page.js("document.querySelector('.plan').checkVisibility()") is False
+
+
+def test_a_mesh_is_dropped_read_otherwise_and_opened_again_by_its_link(opened, explorer):
+    page = opened(STATUE, allowed=["422"])
+    text = trimesh.exchange.obj.export_obj(trimesh.creation.box((200, 400, 1000)))
+    page.rested(lambda: page.js(DROP, ["my scan.OBJ", text]))
+    key = hashlib.sha256(text.encode()).hexdigest()[:24]
+    assert query_of(page)["mesh"] == f"file:{key}" and float(query_of(page)["azimuth"]) % 180 == 90
+    assert "the body is 1000 m high" in page.text("#notes")
+    page.page.click("summary:has-text('How the mesh is read')")
+    page.rested(lambda: page.page.select_option("#unit", "mm"))
+    assert "p = 3.8 rad/s, α = 11.3°" in page.text("#derived")
+    assert "Solid.from_mesh('my scan.OBJ', unit='mm').block(" in page.text("#python")
+    link = query_of(page)
+    explorer.uploads._files.clear()
+    page.page.goto(
+        page.page.url.split("?")[0] + f"?mesh=file:{key}&azimuth=0&unit=mm&motion=none&initial_rotation=2deg"
+    )
+    page.until("!document.getElementById('problem').hidden", "the mesh is not here")
+    assert page.text("#problem") == "this mesh is not here any more: drop its file on the page again"
+    page.rested(lambda: page.js(DROP, ["again.obj", text]))
+    assert {"mesh": link["mesh"], "azimuth": "0", "unit": "mm", "motion": "none"}.items() <= query_of(page).items()
+    page.js(DROP, ["broken.ply", "ply"])
+    page.until("document.getElementById('problem').textContent.startsWith('broken.ply: cannot be read')")
+    assert query_of(page)["mesh"] == link["mesh"]
+
+
+@pytest.mark.parametrize(("viewport", "scheme"), [(DESK, "dark"), (PHONE, "light")], ids=["desk", "phone"])
+def test_a_body_has_no_barrier_and_is_compared_with_itself_turned(opened, viewport, scheme):
+    axe = tool("axe-core/axe.min.js").read_text("utf-8")
+    page = opened(f"{MESH}&view=block", viewport, scheme, bypass_csp=True)
+    page.js(axe + "; 1")
+    page.until(PLAN, "the plan is drawn")
+    page.page.click("summary:has-text('How the mesh is read')")
+    found = page.js("axe.run(document, {resultTypes: ['violations']})")
+    assert [(each["id"], [node["target"] for node in each["nodes"]][:4]) for each in found["violations"]] == []
+    assert page.js("document.documentElement.scrollWidth") <= viewport["width"]
+    page.page.click("[data-view=compare]")
+    page.page.select_option("#compare-with", "block")
+    page.until("document.getElementById('compare-verdict').textContent.startsWith('The other')")
+    assert query_of(page)["other.azimuth"] == "120"
 
 
 def test_a_record_shakes_upwards_as_well(opened, tmp_path):

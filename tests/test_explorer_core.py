@@ -883,5 +883,5 @@ def test_names_of_texts_are_options_of_the_command():
 
     command = app["simulate"]
     options = {name for argument in command.assemble_argument_collection() for name in argument.names}
-    for name in set(NAMES) - {"gravity", "motion"}:
+    for name in set(NAMES) - {"gravity", "motion", "mesh", "azimuth", "up", "unit", "density", "tolerance"}:
         assert f"--{name.replace('_', '-')}" in options

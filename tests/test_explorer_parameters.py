@@ -21,11 +21,14 @@ from rocking.explorer.parameters import (
 from rocking.named_pulses import named_pulse
 
 #: What the command line takes as an argument, and what it does not do.
-NO_OPTIONS = {"motion", "gravity", "initial_rotation", "initial_velocity"}
+NO_OPTIONS = {"motion", "mesh", "gravity", "initial_rotation", "initial_velocity"}
+
+#: What `rocking mesh` takes; of its block `rocking simulate` is given the pivots.
+OF_MESHES = {"azimuth", "up", "unit", "density", "tolerance"}
 
 
 def in_shown_unit(parameter, value):
-    factor = {"°": math.pi / 180.0, "g": 9.80665}.get(parameter.unit, 1.0)
+    factor = {"°": math.pi / 180.0, "g": 9.80665}.get(parameter.unit, 1.0) if parameter.kind != "number" else 1.0
     return value / factor
 
 
@@ -42,10 +45,13 @@ def test_every_slider_starts_within_its_ends():
 
 
 def test_every_text_of_a_case_is_an_option_of_the_command_line(run):
-    _, shown, _ = run("simulate", "--help")
-    options = PARAMETERS.keys() - NO_OPTIONS
-    assert len(options) >= 20
-    assert [name for name in options if f"--{name.replace('_', '-')}" not in shown] == []
+    for command, options, floor in (
+        ("simulate", PARAMETERS.keys() - NO_OPTIONS - OF_MESHES, 20),
+        ("mesh", OF_MESHES & PARAMETERS.keys(), 5),
+    ):
+        _, shown, _ = run(command, "--help")
+        assert len(options) >= floor
+        assert [name for name in options if f"--{name.replace('_', '-')}" not in shown] == []
 
 
 def test_shapes_and_scalings_are_made_of_parameters_of_their_forms():
@@ -92,7 +98,7 @@ def test_the_page_reads_every_unit_as_the_program_does():
 def test_a_field_is_called_by_its_label_and_another_argument_by_its_name():
     assert field_label("gyration") == "“Radius of gyration”"
     assert field_label("cycles") == "“Cycles”"
-    assert field_label("tolerance") == "tolerance"
+    assert field_label("tolerances") == "tolerances"
 
 
 def test_a_parameter_of_a_pulse_is_called_as_that_pulse_has_it():

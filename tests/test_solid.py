@@ -1,6 +1,8 @@
 """A body from a mesh is the body that its surface encloses: against closed forms, and against numeric integration."""
 
+import io
 import itertools
+import json
 import math
 import runpy
 import sys
@@ -581,7 +583,10 @@ REFUSED = {
     "turn": (lambda: Solid.from_mesh(box(), turn=math.nan), "turn must be a finite number"),
     "no file": (lambda: Solid.from_mesh("nobody.obj"), "nobody.obj: there is no such file"),
     "no statue": (lambda: Solid.from_mesh("statu"), "the mesh that ships is statue"),
-    "no mesh": (lambda: Solid.from_mesh(3.0), "mesh must be the path of a file, or a mesh or scene of trimesh, not 3"),
+    "no mesh": (
+        lambda: Solid.from_mesh(3.0),
+        "mesh must be the path of a file, a binary stream that has a name, .*, not 3",
+    ),
     "inertia": (
         lambda: Solid([(1, 0), (0, 1), (-1, -1)], (0, 0, 1), np.diag([1.0, 1.0, 3.0])),
         "inertia_over_mass is the tensor of no body",
@@ -639,3 +644,35 @@ def test_a_body_of_no_likely_size_is_noted(unit, noted):
     notes = Solid.from_mesh(box(), unit=unit).notes
     assert len(notes) == noted
     assert all("are its coordinates in metres?" in note for note in notes)
+
+
+def named(data, name):
+    stream = io.BytesIO(data)
+    stream.name = name
+    return stream
+
+
+@pytest.mark.parametrize("name", ["one.stl", "one.ply", "two.obj", "two.glb"])
+def test_a_stream_is_the_same_body_as_its_file(name, tmp_path):
+    tall, low = box((0.4, 0.3, 1.2)), box((0.8, 0.6, 0.2))
+    tall.apply_translation((0.05, 0.0, 0.2))
+    scene = trimesh.Scene([tall] if name.startswith("one") else [low, tall])
+    if name.endswith("glb"):
+        scene.apply_transform(trimesh.transformations.rotation_matrix(-0.5 * math.pi, [1.0, 0.0, 0.0]))
+    scene.export(tmp_path / name)
+    with (tmp_path / name).open("rb") as stream:
+        found = Solid.from_mesh(stream)
+    assert found.to_dict() == Solid.from_mesh(tmp_path / name).to_dict()
+    assert found.height == pytest.approx(1.2 if name.startswith("one") else 1.4)
+
+
+def test_a_stream_names_no_other_file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "other.bin").write_bytes(bytes(120))
+    gltf = {"asset": {"version": "2.0"}, "buffers": [{"uri": "other.bin", "byteLength": 120}]}
+    for uri in ("other.bin", "/etc/passwd", "../other.bin", "http://127.0.0.1:9/other.bin", "file:///etc/passwd"):
+        gltf["buffers"][0]["uri"] = uri
+        with pytest.raises(InvalidBlock, match=f"a.gltf: names another file, '{uri}', which is not read"):
+            Solid.from_mesh(named(json.dumps(gltf).encode(), "a.gltf"))
+    scene = b"mtllib /etc/passwd\n" + trimesh.exchange.obj.export_obj(box()).encode()
+    assert Solid.from_mesh(named(scene, "a.obj")).volume == pytest.approx(box().volume)

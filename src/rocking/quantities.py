@@ -11,7 +11,7 @@ import numpy as np
 
 from rocking import checks
 from rocking.arrays import Floats
-from rocking.errors import InvalidOption
+from rocking.errors import InvalidOption, literal
 from rocking.motion.scaling import FACTOR, Measure
 from rocking.motion.units import Unit, accelerations, plain_spelling, times
 from rocking.tables import decimal
@@ -212,3 +212,24 @@ def _parts(text: str) -> tuple[float | None, str]:
     """Return number and unit; None where there is no number."""
     found = _WRITTEN.fullmatch(text)
     return (None, "") if found is None else (float(found[1]), found[2] or "")
+
+
+def densities(text: str, name: str) -> float | dict[str, float]:
+    """Return one density, kg/m^3, or those of parts by name, which are written as PART=NUMBER.
+
+    Examples
+    --------
+    >>> densities("2700", "density"), densities("plinth=2700, head=2650", "density")
+    (2700.0, {'plinth': 2700.0, 'head': 2650.0})
+    """
+    if "=" not in text:
+        return number(text, name)
+    found = {}
+    for each in text.split(","):
+        part, equals, value = each.rpartition("=")
+        if not equals:
+            raise InvalidOption(
+                f"{{}} takes a number, or PART=NUMBER with commas between, not {literal(repr(text))}", name
+            )
+        found[part.strip()] = number(value, name)
+    return found

@@ -10,10 +10,9 @@ from cyclopts import Parameter
 
 from rocking.block import Block
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results, write_tables
-from rocking.errors import InvalidOption
 from rocking.plausibility import block_notes
 from rocking.progress import note
-from rocking.quantities import length, number, sides, values
+from rocking.quantities import densities, length, number, sides, values
 from rocking.solid.solid import Solid
 from rocking.tables import text_table, write_csv
 
@@ -65,7 +64,7 @@ def mesh(
     with output.folder() as folder:
         solid = Solid.from_mesh(
             file,
-            density=None if density is None else _densities(density),
+            density=None if density is None else densities(density, "density"),
             support=None if support is None else [_numbers(corner, "support") for corner in support.split(";")],
             tolerance=None if tolerance is None else length(tolerance, "tolerance"),
             up=_numbers(up, "up") if up is not None and "," in up else up,
@@ -109,19 +108,6 @@ def _row(azimuth: float, block: Block) -> dict[str, float]:
             for sign, side in (("plus", plus), ("minus", minus))
         },
     }
-
-
-def _densities(text: str) -> float | dict[str, float]:
-    """Return one density, or those of parts by name."""
-    if "=" not in text:
-        return number(text, "density")
-    found = {}
-    for part in text.split(","):
-        name, equals, value = part.rpartition("=")
-        if not equals:
-            raise InvalidOption(f"{{}} takes a number, or PART=NUMBER with commas between, not {text!r}", "density")
-        found[name.strip()] = number(value, "density")
-    return found
 
 
 def _numbers(text: str, name: str) -> Sequence[float]:

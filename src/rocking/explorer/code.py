@@ -132,7 +132,8 @@ def case_as_command(case: Case) -> str | None:
     """
     if not case.words or "gravity" in case.texts:
         return None
-    options = {name: case.texts[name] for name in NAMES if name in case.texts and name not in ("motion", "vertical")}
+    left_out = {*BLOCK_NAMES, "motion", "vertical"}
+    options = {**case.block_options} | {name: case.texts[name] for name in NAMES if name in {*case.texts} - left_out}
     return _command(["rocking", "simulate", *case.words], options)
 
 
@@ -174,7 +175,7 @@ def map_as_command(grid: MapGrid) -> str | None:
         "amplitudes": _range(grid.y),
         "frequencies": _range(grid.x),
         **{each: value for each, value in written.items() if each not in ("amplitude", "frequency")},
-        **_block_options(texts),
+        **_block_options(grid.case),
     }
     return _command(["rocking", "map", name], options)
 
@@ -221,7 +222,7 @@ def sweep_as_command(sweep: Sweep) -> str | None:
         "along": f"{name}:{first!r}:{last!r}:{len(sweep.axis.values)}",
         "start": "0,0",
         "transient": str(PASSED - 1),
-        **_block_options(texts),
+        **_block_options(sweep.case),
     }
     return _command(["rocking", "bifurcation"], options)
 
@@ -231,9 +232,9 @@ def sweep_as_code(sweep: Sweep) -> dict[str, Any]:
     return {"python": sweep_as_python(sweep), "command": sweep_as_command(sweep)}
 
 
-def _block_options(texts: Mapping[str, str]) -> dict[str, str]:
+def _block_options(case: Case) -> dict[str, str]:
     """Options that describe the block and its model."""
-    return {each: texts[each] for each in NAMES if each in {*BLOCK_NAMES, "model"} and each in texts}
+    return {**case.block_options, **{each: case.texts[each] for each in ("model",) if each in case.texts}}
 
 
 def _command(words: list[str], options: Mapping[str, str]) -> str:

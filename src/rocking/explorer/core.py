@@ -19,9 +19,10 @@ from rocking.arrays import Floats, Integers
 from rocking.block import Block
 from rocking.chattering.episodes import chattering_episodes
 from rocking.dynamics.schemes import TREATMENTS, compare_schemes
-from rocking.errors import InvalidOption
+from rocking.errors import InvalidBlock, InvalidOption
 from rocking.explorer.code import case_as_command, case_as_python
 from rocking.explorer.inputs import Case, Texts, read_case
+from rocking.explorer.meshes import described
 from rocking.explorer.parameters import names_of
 from rocking.explorer.payload import Payload
 from rocking.explorer.uploads import UploadStore
@@ -91,6 +92,11 @@ class Simulated:
         return self.response
 
     @functools.cached_property
+    def outline(self) -> Floats | None:
+        """Trapezoids of the outline of a mesh, in the plane in which it rocks; None of another block."""
+        return None if self.case.body is None else self.case.body.across(self.case.azimuth)
+
+    @functools.cached_property
     def ground(self) -> Motion | None:
         """The motion whose displacement is drawn."""
         return None if self.case.motion is None else _steady(self.case.motion)
@@ -113,6 +119,22 @@ class Explorer:
         self._drawing = threading.Lock()
         self._kept: OrderedDict[tuple[tuple[str, str], ...], Simulated] = OrderedDict()
 
+    def take_record(self, name: str, data: bytes) -> dict[str, Any]:
+        """Keep a record file, and say what it is."""
+        return self.uploads.contents(self.uploads.add_file(name, data))
+
+    def take_mesh(self, name: str, data: bytes) -> dict[str, Any]:
+        """Keep a mesh, and say in which direction its body is lifted first; or what is wrong and may be corrected."""
+        uploads = self.uploads
+        key = uploads.add_mesh(name, data)
+        found = {"key": key, "name": uploads.file(key).name, "azimuth": 0.0}
+        try:
+            return found | {"azimuth": uploads.meshes.body(f"file:{key}", {}, None, None).solid.weakest_azimuth}
+        except InvalidBlock as error:
+            if error.argument is None:
+                raise
+            return found
+
     def show(self, texts: Texts) -> Simulated:
         """Return a case with its response."""
         key = tuple(sorted((name, value) for name, value in texts.items() if value))
@@ -134,7 +156,8 @@ class Explorer:
         response = shown.response
         start, end = active_span(response) if window is None else checked_window(window, response.duration)
         header = {**_facts(shown), "window": _window(shown, start, end)}
-        return Payload(header, {**_window_arrays(shown, start, end), **_whole_arrays(response)})
+        profile = {} if shown.outline is None else {"profile": shown.outline.ravel()}
+        return Payload(header, {**_window_arrays(shown, start, end), **_whole_arrays(response), **profile})
 
     def window(
         self, texts: Texts, window: tuple[float, float], *, ground: bool = False, points: int = _POINTS
@@ -167,6 +190,13 @@ class Explorer:
                 arrays |= {f"{name}_{key}": values for key, values in here.items()}
             arrays[f"{name}_rest"] = shown.response.rest_intervals.ravel()
         return Payload(header, arrays)
+
+    def body(self, texts: Texts) -> Payload:
+        """Return what is shown of the body of a mesh: its plan, its resistance in every direction, and words."""
+        case = self.show(texts).case
+        if case.body is None:
+            raise InvalidOption("this block is of no {}: open one", "mesh")
+        return described(case.body, case.azimuth)
 
     def summary(self, texts: Texts) -> list[tuple[str, str]]:
         """Return the summary of a response row by row: what, and how much."""
@@ -363,8 +393,9 @@ def _facts(shown: Simulated) -> dict[str, Any]:
             "sides": [vars(side) for side in block.sides],
             "symmetric": block.is_symmetric,
             "thresholds_g": [each / gravity for each in block.uplift_thresholds(case.model)],
-            "outline": _outline(block),
-            "notes": [*map(str, block_notes(block))],
+            "outline": _outline(block, shown.outline),
+            "notes": [*map(str, block_notes(block)), *(case.body.solid.notes if case.body else ())],
+            "body": None if case.body is None else case.body.plane(case.azimuth),
         },
         "motion": None if motion is None else _motion_facts(motion, gravity),
         "model": case.model,
@@ -388,7 +419,7 @@ def _facts(shown: Simulated) -> dict[str, Any]:
 
 
 def verdict(response: Response, thresholds: tuple[float, float]) -> str:
-    """Say in one sentence what becomes of a block that these ground accelerations (m/s^2) lift: first whether it falls."""
+    """Say in one sentence what becomes of a block lifted by these accelerations (m/s^2): first whether it falls."""
     if response.stopped:
         words = in_words(response, "")
         return f"{words[0].upper()}{words[1:]}."
@@ -409,7 +440,8 @@ def verdict(response: Response, thresholds: tuple[float, float]) -> str:
     unproven = rests - int(np.sum(np.isfinite(response.chattering["upper"])))
     doubt = "" if unproven == 0 else f" ({unproven} by the treatment, not proven)"
     resting = f"comes to rest {times}{doubt}" if rests else "does not come to rest"
-    return f"It stays up: it reaches {_percent(response.peak_over_slenderness)} of the overturning rotation, and {resting}."
+    share = _percent(response.peak_over_slenderness)
+    return f"It stays up: it reaches {share} of the overturning rotation, and {resting}."
 
 
 def _percent(share: float) -> str:
@@ -430,12 +462,18 @@ def _motion_facts(motion: Motion, gravity: float) -> dict[str, Any]:
     }
 
 
-def _outline(block: Block) -> dict[str, Any]:
-    """Corners of the block as it stands (m, pivots at height 0), its centre of mass at distance 0."""
+def _outline(block: Block, outline: Floats | None) -> dict[str, Any]:
+    """Corners of the block as it stands (m, pivots at height 0), its centre of mass at distance 0, and how far it goes.
+
+    ``outline`` are trapezoids, shape (n, 6), of a body that is no rectangle.
+    """
     right, left = (side.radius * math.sin(side.alpha) for side in block.sides)
     heights = [side.radius * math.cos(side.alpha) for side in block.sides]
     centre = 0.5 * (heights[0] + heights[1])
-    return {"left": left, "right": right, "centre": centre, "top": 2.0 * centre}
+    shape = {"left": left, "right": right, "centre": centre}
+    if outline is None:
+        return {**shape, "top": 2.0 * centre, "widest": max(left, right)}
+    return {**shape, "top": float(outline[:, 1].max()), "widest": float(np.abs(outline[:, 2:]).max())}
 
 
 def _steady(motion: Motion) -> Motion:

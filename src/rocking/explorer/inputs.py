@@ -18,6 +18,7 @@ from rocking import checks
 from rocking.block import Block
 from rocking.constants import STANDARD_GRAVITY, Model
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
+from rocking.explorer.meshes import Body, pivots_of
 from rocking.explorer.parameters import DEFAULT, PARAMETERS, PULSES, SCALINGS, SHAPES, names_of
 from rocking.explorer.uploads import UploadStore
 from rocking.motion import records
@@ -59,8 +60,9 @@ _ARGUMENTS: Final = {"pivots": "distances", "height_of_mass": "height", "gyratio
 class Case:
     """What `rocking.simulate` takes, with the texts from which it was read.
 
-    ``block_call`` and ``motion_call`` are the expressions that make block and motion; ``words`` are the arguments that
-    name the motion on the command line: none where it cannot be named.
+    ``block_call`` and ``motion_call`` are the expressions that make block and motion; ``block_options`` are the options
+    that describe the block on the command line, and ``words`` the arguments that name the motion: none where it cannot
+    be named. The block of a mesh has the ``body`` of which it is the plane of an ``azimuth``, degrees.
     """
 
     texts: Texts
@@ -72,6 +74,9 @@ class Case:
     initial_rotation: float
     initial_velocity: float
     block_call: str
+    block_options: Texts
+    body: Body | None
+    azimuth: float
     motion_call: str
     words: tuple[str, ...]
 
@@ -96,7 +101,8 @@ def read_case(texts: Texts, uploads: UploadStore) -> Case:
     texts : mapping of str to str
         Values by the names of `PARAMETERS`; empty ones count as not given. ``motion`` is the name of a shipped record,
         a pulse (``sine:amplitude=0.3g,frequency=1,cycles=2.5``), ``file:KEY``, ``given:KEY`` or ``none``; ``vertical``
-        is the name of a shipped record, ``file:KEY``, ``file:KEY#CHANNEL``, or a channel of the motion's own file.
+        is the name of a shipped record, ``file:KEY``, ``file:KEY#CHANNEL``, or a channel of the motion's own file;
+        ``mesh`` is the name of a shipped mesh, or ``file:KEY``.
     uploads : UploadStore
         Where the files and motions of keys are.
 
@@ -109,7 +115,8 @@ def read_case(texts: Texts, uploads: UploadStore) -> Case:
     """
     given = _given(texts)
     values = {name: PARAMETERS[name].read(text) for name, text in given.items()}
-    block, block_call = _block(values)
+    found_block = _block(given, values, uploads)
+    block = found_block.block
     found = _motion(given, values, uploads)
     if "duration" not in values and math.prod(side.restitution for side in block.sides) > _LIVELIEST:
         raise InvalidOption(
@@ -126,7 +133,10 @@ def read_case(texts: Texts, uploads: UploadStore) -> Case:
         duration=values.get("duration"),
         initial_rotation=values.get("initial_rotation", 0.0),
         initial_velocity=values.get("initial_velocity", 0.0),
-        block_call=block_call,
+        block_call=found_block.python,
+        block_options=found_block.options,
+        body=found_block.body,
+        azimuth=values.get("azimuth", 0.0),
         motion_call=found.python,
         words=found.words,
     )
@@ -178,21 +188,48 @@ def _given(texts: Texts) -> dict[str, str]:
     return given or dict(DEFAULT)
 
 
-def _block(values: Values) -> tuple[Block, str]:
-    """Make the block, and write the call of `rocking` that makes it."""
+class _FoundBlock(NamedTuple):
+    """A block, how `rocking` makes it in Python, its options on the command line, and the body that it is of."""
+
+    block: Block
+    python: str
+    options: Texts
+    body: Body | None = None
+
+
+def _block(given: Texts, values: Values, uploads: UploadStore) -> _FoundBlock:
+    """Make the block."""
     chosen = values.keys() & BLOCK_NAMES - {"restitution"}
     shape = next((each for each in SHAPES if {*each.needed} <= chosen <= {*each.needed, *each.optional}), None)
     if shape is None:
         raise InvalidBlock(
-            "a block has either {} and {} (m) and perhaps {}, or {} (rad/s) and {}, or {}, {} and {} (m)",
-            *(name for each in SHAPES for name in (*each.needed, *each.optional)),
+            "a block has either {} and {} (m) and perhaps {}, or {} (rad/s) and {}, or {}, {} and {} (m), or {} and "
+            "{} (degrees)",
+            *(name for each in SHAPES[:-1] for name in (*each.needed, *each.optional)),
+            *SHAPES[-1].needed,
         )
+    if shape.name == "mesh":
+        return _of_mesh(given, values, uploads)
     names = (*shape.needed, *shape.optional, "restitution", "gravity")
     arguments = {_ARGUMENTS.get(name, name): values[name] for name in names if name in values}
     if isinstance(arguments.get("distances"), float):
         arguments["distances"] = (arguments["distances"],) * 2
     make, name = _MAKERS[shape.name]
-    return make(**arguments), f"{name}({_written(arguments)})"
+    options = {each: given[each] for each in NAMES if each in BLOCK_NAMES and each in given}
+    return _FoundBlock(make(**arguments), f"{name}({_written(arguments)})", options)
+
+
+def _of_mesh(given: Texts, values: Values, uploads: UploadStore) -> _FoundBlock:
+    """Make the block that the body of a mesh is in the plane of an azimuth."""
+    body = uploads.meshes.body(given["mesh"], given, values.get("tolerance"), values.get("gravity"))
+    azimuth, restitution = values["azimuth"], values.get("restitution")
+    block = body.solid.block(azimuth, restitution=restitution)
+    distances, height, gyration = pivots_of(body, azimuth)
+    options = {"pivots": ",".join(map(repr, distances)), "height_of_mass": repr(height), "gyration": repr(gyration)}
+    if restitution is not None:
+        options["restitution"] = given["restitution"]
+    python = f"{body.call}.block({azimuth!r}" + ("" if restitution is None else f", restitution={restitution!r}") + ")"
+    return _FoundBlock(block, python, options, body)
 
 
 def _written(arguments: Mapping[str, Any]) -> str:

@@ -112,7 +112,7 @@ def _has_one_slenderness(case: Case) -> bool:
     Their restitution is Housner's where none is given; two p, pivots and eccentric sizes belong to another.
     """
     plus, minus = case.block.sides
-    return "restitution" in case.texts or (plus.p == minus.p and not {"pivots", "offset"} & case.texts.keys())
+    return "restitution" in case.texts or (plus.p == minus.p and not {"pivots", "offset", "mesh"} & case.texts.keys())
 
 
 def grid_of(case: Case, texts: Texts) -> MapGrid:
@@ -232,7 +232,8 @@ def _described(axis: Axis) -> dict[str, Any]:
 def _axis(which: str, case: Case, texts: Texts, points: int) -> Axis:
     name = texts.get(which, "")
     if name not in axes_of(case):
-        raise InvalidOption(f"this case is mapped over {', '.join(axes_of(case))}, not over {name[:20]!r}")
+        why = "; the slenderness of a mesh follows from its azimuth, which no map varies" if case.body else ""
+        raise InvalidOption(f"this case is mapped over {', '.join(axes_of(case))}, not over {name[:20]!r}{why}")
     if which == "x" and name in ("a", "pga"):
         raise InvalidOption("amplitudes go upwards: choose another parameter for the axis to the right")
     kind = AXES[name]
@@ -304,7 +305,9 @@ def _tasks(grid: MapGrid, factors: Floats) -> Iterator[Task]:
 
 def _change_block(texts: dict[str, str], grid: MapGrid, name: str, value: float) -> None:
     sides = grid.case.block.sides
-    if "alpha" not in (grid.x.name, grid.y.name) and (not grid.case.block.is_symmetric or "pivots" in texts):
+    if "alpha" not in (grid.x.name, grid.y.name) and (
+        not grid.case.block.is_symmetric or {"pivots", "mesh"} & texts.keys()
+    ):
         texts.setdefault("restitution", _both([side.restitution for side in sides]))
     if "p" not in texts:
         texts["p"], texts["alpha"] = (_both([getattr(side, each) for side in sides]) for each in ("p", "alpha"))

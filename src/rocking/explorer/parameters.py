@@ -29,6 +29,8 @@ from rocking.quantities import (
     sides,
     velocity,
 )
+from rocking.solid.reading import SHIPPED
+from rocking.solid.reading import UNITS as MESH_UNITS
 
 #: Parameters that one form sets together, and that a comparison replaces together.
 Group = Literal["block", "motion", "start", "model", "map", "sweep", "reading", "pulse", "treatment"]
@@ -61,7 +63,8 @@ class Parameter:
     ``name`` is that of the address, and of the command line's option; ``label`` is what the page calls it; ``kind``
     says how its text is read, ``unit`` what the page shows it in, ``default`` with which text its field starts. Its
     slider goes from ``low`` to ``high``, in ``unit``; where it is ``logarithmic``, equal distances are equal ratios.
-    ``values`` says whether the sides of a block may differ in it.
+    ``values`` says whether the sides of a block may differ in it, ``step`` by how much its slider moves where that is
+    no thousandth of its way.
     """
 
     name: str
@@ -74,6 +77,7 @@ class Parameter:
     high: float = 0.0
     logarithmic: bool = False
     values: Literal["one", "one or two", "two"] = "one"
+    step: float = 0.0
     explanation: str = ""
 
     def read(self, text: str) -> Any:
@@ -100,7 +104,12 @@ class Parameter:
 
     def described(self) -> dict[str, Any]:
         """Return all of it in plain values, as the page takes it."""
-        return {**asdict(self), "suffix": _SUFFIXES.get(self.unit, ""), "units": self._units()}
+        return {**asdict(self), "suffix": self._suffix, "units": self._units()}
+
+    @property
+    def _suffix(self) -> str:
+        """What is written behind a number in the unit that is shown; an azimuth is in degrees without it."""
+        return "" if self.kind == "number" else _SUFFIXES.get(self.unit, "")
 
     def _units(self) -> dict[str, float]:
         """Return what one of each unit is in the unit that is shown, by plain spellings as in `quantities.UNITS`."""
@@ -108,7 +117,7 @@ class Parameter:
         if kind == "text":
             return {}
         units = UNITS[kind]
-        shown = units[plain_spelling(_SUFFIXES.get(self.unit, ""))]
+        shown = units[plain_spelling(self._suffix)]
         return {each: unit.multiplier * shown.divisor / unit.divisor / shown.multiplier for each, unit in units.items()}
 
 
@@ -153,6 +162,16 @@ PARAMETERS: Final = _by_name(
         "gyration", "Radius of gyration", "block", "length", "m", "0.33", 0.02, 8.0, True,
         explanation="About the centre of mass: the square root of the moment of inertia over the mass.",
     ),
+    Parameter("mesh", "Mesh", "block", "text", default="statue"),
+    Parameter(
+        "azimuth", "Azimuth", "block", "number", "°", "90", 0.0, 360.0, step=1.0,
+        explanation="Direction of side + (to the right), in which the ground moves and the body rocks, clockwise from "
+        "north; x of the mesh is to the east, and y to the north.",
+    ),
+    Parameter("up", "Axis that points up", "block", "text"),
+    Parameter("unit", "Unit of the coordinates", "block", "text"),
+    Parameter("density", "Density, kg/m³", "block", "text"),
+    Parameter("tolerance", "Height of what still carries, m", "block", "length", "m"),
     Parameter(
         "restitution", "Restitution η", "block", "number", "", "0.93", 0.5, 0.99, False, "one or two",
         explanation="Angular speed just after an impact over the speed just before. Housner's value, 1 − 1.5 sin² α, "
@@ -220,6 +239,9 @@ SWEEP: Final = _by_name(
 #: What an address says about the time that is read.
 READING: Final = _by_name(Parameter("at", "Time", "reading", "duration", "s"))
 
+#: Kinds of files that are read as meshes, by the ends of their names.
+MESH_KINDS: Final = ("obj", "ply", "stl", "glb", "gltf")
+
 #: The case that is shown when nothing is asked for: it chatters, rests and rocks on several times.
 DEFAULT: Final = {name: PARAMETERS[name].default for name in ("width", "height", "motion", "pga")}
 
@@ -237,6 +259,7 @@ SHAPES: Final = (
     Shape("sizes", "width and height", ("width", "height"), ("offset",)),
     Shape("parameters", "p and α", ("p", "alpha")),
     Shape("pivots", "pivots and radius of gyration", ("pivots", "height_of_mass", "gyration")),
+    Shape("mesh", "a mesh and an azimuth", ("mesh", "azimuth"), ("up", "unit", "density", "tolerance")),
 )
 
 #: Parameters that scale a motion, of which a case has one at most; and how the page calls each.
@@ -385,7 +408,10 @@ def specification() -> dict[str, Any]:
             name: {**pulse, "parameters": [parameter.described() for parameter in pulse["parameters"]]}
             for name, pulse in PULSES.items()
         },
+        "meshes": [*SHIPPED],
+        "mesh_kinds": list(MESH_KINDS),
         "records": [_record(name) for name in records.names()],
+        "mesh_units": list(MESH_UNITS),
         "units": list(CHOICES),
         "models": [["nonlinear", "exact (nonlinear)"], ["linear", "slender block (linear)"]],
         "treatments": list(_TREATMENTS),

@@ -151,6 +151,7 @@ class App:
             "/api/phase": lambda query: readings.phase(explorer, query.texts(), query.numbers("from", "to")),
             "/api/at": lambda query: readings.at(explorer, query.texts(), query.given.get("at", ""), query.window),
             "/api/summary": lambda query: explorer.summary(query.texts()),
+            "/api/body": lambda query: explorer.body(query.texts()),
             "/api/code": lambda query: explorer.code(query.texts()),
             "/api/schemes": lambda query: explorer.schemes(query.texts()),
             "/api/compare": lambda query: explorer.compare(query.texts(), query.texts(OTHER), query.window),
@@ -175,7 +176,8 @@ class App:
                 Route("/api/map", self.map),
                 Route("/api/sweep", self.sweep),
                 Route("/api/export", self.export),
-                Route("/api/records", self.upload, methods=["POST"]),
+                Route("/api/records", self._receiving(explorer.take_record), methods=["POST"]),
+                Route("/api/meshes", self._receiving(explorer.take_mesh), methods=["POST"]),
                 Route("/api/records/{key}", self.record),
             ],
             exception_handlers={RockingError: _refusal, Exception: _failure},
@@ -298,22 +300,25 @@ class App:
         headers = {**_FRESH, "content-disposition": f"attachment; filename=rocking-response.{quote(form)}"}
         return Response(content, media_type=EXPORTS[form], headers=headers)
 
-    async def upload(self, request: Request) -> Response:
-        """Keep a record file, the raw body, and say what it is."""
-        stated = request.headers.get("content-length", "0")
-        if not stated.isdecimal() or int(stated) > LARGEST:
-            return _too_large()
-        data = bytearray()
-        try:
-            async for chunk in request.stream():
-                data += chunk
-                if len(data) > LARGEST:
-                    return _too_large()
-        except ClientDisconnect:
-            return Response(status_code=400)
-        name, uploads = request.query_params.get("name", ""), self.explorer.uploads
-        found = await self._in_thread(lambda: uploads.contents(uploads.add_file(name, bytes(data))))
-        return JSONResponse(found, headers=_FRESH)
+    def _receiving(self, take: Callable[[str, bytes], dict[str, Any]]) -> Callable[[Request], Awaitable[Response]]:
+        """Return what takes a file, the raw body, and says what it is."""
+
+        async def receive(request: Request) -> Response:
+            stated = request.headers.get("content-length", "0")
+            if not stated.isdecimal() or int(stated) > LARGEST:
+                return _too_large()
+            data = bytearray()
+            try:
+                async for chunk in request.stream():
+                    data += chunk
+                    if len(data) > LARGEST:
+                        return _too_large()
+            except ClientDisconnect:
+                return Response(status_code=400)
+            name = request.query_params.get("name", "")
+            return JSONResponse(await self._in_thread(lambda: take(name, bytes(data))), headers=_FRESH)
+
+        return receive
 
     async def record(self, request: Request) -> Response:
         """Say what a file that is kept is, read with the step and the units that are given now."""
@@ -364,7 +369,7 @@ def _problem(error: RockingError, motion: str) -> dict[str, str | None]:
 
 
 def _too_large() -> Response:
-    problem = f"a record file may be {LARGEST // 2**20} MiB large: cut it into smaller ones"
+    problem = f"a file may be {LARGEST // 2**20} MiB large: cut a record into smaller files, or make a mesh coarser"
     return JSONResponse({"problem": problem, "argument": None}, 413, headers={**_FRESH, "connection": "close"})
 
 

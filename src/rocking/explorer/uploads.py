@@ -1,4 +1,4 @@
-"""Records that the explorer was given: files in memory, so many at most, each known by a hash of its content."""
+"""Records and meshes that were given: files in memory, so many at most, each known by a hash of its content."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from typing import Any, Final, NamedTuple
 
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion, UnreadableRecord
+from rocking.explorer.meshes import MeshStore
+from rocking.explorer.parameters import MESH_KINDS
 from rocking.motion import formats
 from rocking.motion.formats.channel import Channel
 from rocking.motion.formats.source import Request
@@ -62,9 +64,10 @@ class UploadStore:
         self._files: OrderedDict[str, Upload] = OrderedDict()
         self._read: OrderedDict[tuple[str, ...], Motion] = OrderedDict()
         self._motions: dict[str, Motion] = {}
+        self.meshes = MeshStore(lambda key: self.file(key, "mesh"))
 
     def add_file(self, name: str, data: bytes) -> str:
-        """Keep a file, and return its key."""
+        """Keep a record, and return its key."""
         upload = Upload(bare_name(name), data)
         if len(data) > LARGEST:
             raise UnreadableRecord(
@@ -75,7 +78,20 @@ class UploadStore:
                 f"{lines} lines, of which at most {_MOST_LINES} are read here; cut the record into smaller files",
                 path=upload.name,
             )
-        key = hashlib.sha256(data).hexdigest()[:_HASH]
+        return self._kept(upload)
+
+    def add_mesh(self, name: str, data: bytes) -> str:
+        """Keep a mesh, and return its key."""
+        upload = Upload(bare_name(name), data)
+        if PurePosixPath(upload.name).suffix.lower().removeprefix(".") not in MESH_KINDS:
+            kinds = ", ".join(MESH_KINDS)
+            raise UnreadableRecord(f"is no mesh by its name: files of {kinds} are read here", path=upload.name)
+        if len(data) > LARGEST:
+            raise UnreadableRecord(f"larger than {LARGEST // 2**20} MiB; make the mesh coarser", path=upload.name)
+        return self._kept(upload)
+
+    def _kept(self, upload: Upload) -> str:
+        key = hashlib.sha256(upload.data).hexdigest()[:_HASH]
         with self._lock:
             _keep(self._files, key, upload)
         return key
@@ -99,11 +115,11 @@ class UploadStore:
             raise UnreadableRecord("this link names a motion of another program: open the page from there again")
         return self._motions[key]
 
-    def file(self, key: str) -> Upload:
+    def file(self, key: str, what: str = "record") -> Upload:
         """Return a file that is kept."""
         with self._lock:
             if key not in self._files:
-                raise UnreadableRecord("this record is not here any more: drop its file on the page again")
+                raise UnreadableRecord(f"this {what} is not here any more: drop its file on the page again")
             self._files.move_to_end(key)
             return self._files[key]
 

@@ -28,6 +28,9 @@ _TOLERANCE: Final = 1e-3
 _GROWS: Final = 0.02
 #: Between the names of parts that were joined.
 _AND: Final = " + "
+#: Sizes of a body, m, whose fifth powers can be computed with.
+_SMALLEST: Final = 1e-9
+_LARGEST: Final = 1e9
 #: Volumes below this part of the cube of the size are none, and supports may be this part of the size beyond the mesh.
 _FLAT: Final = 1e-9
 _BEYOND: Final = 1e-6
@@ -50,9 +53,17 @@ def properties(
     up: str | ArrayLike | None,
     unit: str | float,
     turn: float,
-) -> dict[str, Any]:
-    """Return what `Solid` is made from, by name; the arguments are those of `Solid.from_mesh`."""
-    found = parts_of(mesh)
+    most: int | None = None,
+) -> tuple[dict[str, Any], list[Surface]]:
+    """Return what `Solid` is made from, by name, and the closed surfaces of its parts, the lowest corner at height 0.
+
+    The arguments are those of `Solid.from_mesh`; a mesh of more than `most` triangles is refused.
+    """
+    found = parts_of(mesh, most)
+    with np.errstate(over="ignore"):
+        extent = max(float(np.ptp(part.vertices, axis=0).max()) for part in found.parts) * length_of(unit)
+    if extent and not _SMALLEST < extent < _LARGEST:
+        raise InvalidBlock(f"is {extent:.3g} m large, which no body is: correct {{}}", "unit", path=found.name)
     rotation = _turned(turn) @ upright(found.up if up is None else up) * length_of(unit)
     parts = [part._replace(vertices=part.vertices @ rotation.T) for part in found.parts]
     every = np.vstack([part.vertices[np.unique(part.faces)] for part in parts])
@@ -75,7 +86,7 @@ def properties(
             f"{{}} must be below the height of the mesh, {height:.4g} m, not {within:g}", "tolerance", value=tolerance
         )
     polygon, notes = _support(every, support, within, found.name)
-    return {
+    made = {
         "support": polygon,
         "centre": whole.centre - [0.0, 0.0, ground],
         "inertia_over_mass": whole.inertia_over_amount(),
@@ -86,6 +97,7 @@ def properties(
         "repairs": _all_repairs(names, surfaces),
         "notes": (*notes, *overlaps(names, surfaces), *height_notes(height), *density_notes(used)),
     }
+    return made, [surface._replace(vertices=surface.vertices - [0.0, 0.0, ground]) for surface in surfaces]
 
 
 def _turned(turn: object) -> Floats:

@@ -1,9 +1,9 @@
-"""Meshes from files and from trimesh: the parts of each, with a name, corners and triangles."""
+"""Meshes from files, streams and trimesh: the parts of each, with a name, corners and triangles."""
 
 from __future__ import annotations
 
 from os import PathLike
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -13,16 +13,21 @@ from rocking.arrays import Floats, Integers
 from rocking.errors import InvalidBlock, InvalidOption, literal
 
 if TYPE_CHECKING:
+    from typing import BinaryIO
+
     from trimesh import Scene, Trimesh
 
-    #: A file, the name of the mesh that ships with the package, or what trimesh has read.
-    Mesh = str | PathLike[str] | Trimesh | Scene
+    #: A file, the name of the mesh that ships with the package, a stream with a name, or what trimesh has read.
+    Mesh = str | PathLike[str] | BinaryIO | Trimesh | Scene
 
 #: The mesh that ships with the package, and its name.
 SHIPPED: Final = {"statue": Path(__file__).with_name("data") / "statue.obj"}
 
 #: Formats whose vertical axis is y, by their standard.
 _Y_UP: Final = frozenset({".glb", ".gltf"})
+
+#: Formats of one mesh without a name.
+_NAMELESS: Final = frozenset({".ply", ".stl"})
 
 #: Lengths of units, m.
 UNITS: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
@@ -44,8 +49,8 @@ class Parts(NamedTuple):
     up: str
 
 
-def parts_of(mesh: Mesh) -> Parts:
-    """Return the parts of a mesh, which share no name, in the order of their names."""
+def parts_of(mesh: Mesh, most: int | None = None) -> Parts:
+    """Return the parts of a mesh, which share no name, in the order of their names; of so many triangles at most."""
     name, up, path = type(mesh).__name__, "z", ""
     found: list[tuple[str, Any, Any]]
     if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
@@ -53,16 +58,27 @@ def parts_of(mesh: Mesh) -> Parts:
     else:
         scene: Any = mesh
         if not hasattr(mesh, "geometry"):
-            if not isinstance(mesh, (str, PathLike)):
+            file: PurePath
+            if isinstance(mesh, (str, PathLike)):
+                file = SHIPPED.get(str(mesh)) or Path(mesh)
+                path, scene = str(mesh), _read(file, str(mesh))
+            elif hasattr(mesh, "read") and isinstance(getattr(mesh, "name", None), str):
+                file = PurePath(mesh.name)
+                path, scene = file.name, _streamed(mesh, file.name)
+            else:
                 raise InvalidBlock(
-                    f"{{}} must be the path of a file, or a mesh or scene of trimesh, not {checks.shown(mesh)}", "mesh"
+                    "{} must be the path of a file, a binary stream that has a name, or a mesh or scene of trimesh, "
+                    f"not {checks.shown(mesh)}",
+                    "mesh",
                 )
-            file = SHIPPED.get(str(mesh)) or Path(mesh)
-            name, up, path = file.name, "y" if file.suffix.lower() in _Y_UP else "z", str(mesh)
-            scene = _read(file, path)
+            name, up = file.name, "y" if file.suffix.lower() in _Y_UP else "z"
         graph, geometry = scene.graph, scene.geometry
         placed = [(str(node), *graph[node]) for node in sorted(graph.nodes_geometry)]
         found = [(node, geometry[shape], transform) for node, transform, shape in placed]
+    if most is not None and (count := sum(len(getattr(each, "faces", ())) for _, each, _ in found)) > most:
+        raise InvalidBlock(
+            f"holds {count} triangles, of which at most {most} are read here: make the mesh coarser", path=path or name
+        )
     parts = tuple(_part(node, each, transform) for node, each, transform in found if len(getattr(each, "faces", ())))
     if not parts:
         raise InvalidBlock(
@@ -81,20 +97,53 @@ def _read(file: Path, named: str) -> Scene:
         raise InvalidBlock(f"there is no such file{known}", path=named)
     if not file.stat().st_size:
         raise InvalidBlock("this file is empty: export the mesh again", path=named)
+    return _loaded(file, named)
+
+
+class _NothingElse:
+    """What a stream may read beside itself: nothing, neither files nor addresses that it names."""
+
+    def __init__(self, file_name: str) -> None:
+        self.file_name = file_name
+
+    def __getitem__(self, other: str) -> bytes:
+        if other == "model.gltf":  # what trimesh looks for where a text is no JSON
+            raise ValueError("it is no JSON")
+        raise InvalidBlock(
+            f"names another file, {checks.shown(other[:60])}, which is not read: export the mesh as one file",
+            path=self.file_name,
+        )
+
+
+def _streamed(stream: BinaryIO, name: str) -> Scene:
+    """Read a stream; a mesh that the format gives no name has the stream's, as one that is read from a path."""
+    scene = _loaded(stream, name, resolver=_NothingElse(name))
+    if PurePath(name).suffix.lower() in _NAMELESS and len(scene.geometry) == 1:
+        (mesh,) = scene.geometry.values()
+        scene = type(scene)()
+        scene.add_geometry(mesh, node_name=name)
+    return scene
+
+
+def _loaded(source: Path | BinaryIO, named: str, **how: Any) -> Scene:
+    """Read a file or a stream with trimesh, with all that it names."""
     try:
         import trimesh
     except ImportError:
         raise InvalidOption(
             "meshes are read with trimesh, which is not installed: pip install 'rocking[mesh]'"
         ) from None
+    suffix = PurePath(source.name).suffix.lower().removeprefix(".")
     # Every object and group of an OBJ file is a part, whatever its material; corners stay as they are.
-    how: dict[str, Any] = {"split_objects": True, "split_groups": True, "skip_materials": True, "group_material": False}
+    how |= {"split_objects": True, "split_groups": True, "skip_materials": True, "group_material": False}
     try:
-        return trimesh.load_scene(file, process=False, **how)
+        return trimesh.load_scene(source, file_type=suffix, process=False, **how)
+    except InvalidBlock:
+        raise
     except Exception as error:  # what a reader of foreign files raises is of any kind
         formats = sorted(trimesh.available_formats())
         reason = f"{' '.join(str(error).split()) or type(error).__name__}; is it whole, and what its name says?"
-        if file.suffix.lower().removeprefix(".") not in formats:
+        if suffix not in formats:
             reason = f"is of no format that trimesh reads ({', '.join(formats)})"
         raise InvalidBlock(f"cannot be read: {literal(reason)}", path=named) from None
 

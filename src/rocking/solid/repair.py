@@ -78,7 +78,7 @@ def _edges(faces: Integers) -> Integers:
     return np.asarray(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2))
 
 
-def _components(count: int, pairs: Integers) -> Integers:
+def components(count: int, pairs: Integers) -> Integers:
     """Label each of so many things by the connected ones that it is among, from pairs of neighbours."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -105,10 +105,10 @@ def _against_neighbours(faces: Integers) -> Flags:
     left, right = one // 3, other // 3
     crossed = np.where(agree, 0, n)
     pairs = np.vstack([np.column_stack([left, right + crossed]), np.column_stack([left + n, right + n - crossed])])
-    label = _components(2 * n, pairs)
+    label = components(2 * n, pairs)
     if np.any(label[:n] == label[n:]):
         raise InvalidBlock("the surface of the mesh has one side only, as a Möbius strip: it encloses nothing")
-    patch = _components(n, np.column_stack([left, right]))
+    patch = components(n, np.column_stack([left, right]))
     root = np.unique(patch, return_index=True)[1][patch]
     turned = label[:n] != label[root]
     share = np.bincount(patch, weights=turned) / np.bincount(patch)
@@ -130,7 +130,7 @@ def _filled(vertices: Floats, faces: Integers) -> tuple[Floats, Integers, tuple[
     if not len(edges):
         return vertices, faces, ()
     corners, index = np.unique(edges, return_inverse=True)
-    hole = _components(len(corners), index.reshape(-1, 2))
+    hole = components(len(corners), index.reshape(-1, 2))
     count = int(hole.max()) + 1
     shares = np.bincount(hole)
     middle = np.column_stack([np.bincount(hole, weights=column) for column in vertices[corners].T]) / shares[:, None]
@@ -152,7 +152,7 @@ def _filled(vertices: Floats, faces: Integers) -> tuple[Floats, Integers, tuple[
 
 def shells_of(vertices: Floats, faces: Integers) -> Integers:
     """Label the triangles of each connected surface, from 0 up."""
-    label = _components(len(vertices), _edges(faces))[faces[:, 0]]
+    label = components(len(vertices), _edges(faces))[faces[:, 0]]
     return np.asarray(np.unique(label, return_inverse=True)[1].reshape(-1), dtype=np.int64)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -138,8 +138,9 @@ class Solid(Result):
 
         Parameters
         ----------
-        mesh : path, trimesh.Trimesh or trimesh.Scene
-            Triangles; "statue" is a mesh that ships with the package.
+        mesh : path, binary stream, trimesh.Trimesh or trimesh.Scene
+            Triangles; "statue" is a mesh that ships with the package. A stream has the file's name as its ``name``, as
+            an open file has; nothing is read beside it, while of a path files that it names are read, too.
         density : float or mapping of str to float, optional
             Density, kg/m^3: of all, or of each part (object, group, node) by its name. Without it all is of one
             density, and the mass not known. What parts have in common counts twice, and is noted.
@@ -186,7 +187,7 @@ class Solid(Result):
         >>> [round(side.alpha, 4) for side in statue.block(90.0).sides]
         [0.2758, 0.3248]
         """
-        made = properties(mesh, density, support, tolerance, up=up, unit=unit, turn=turn)
+        made, _ = properties(mesh, density, support, tolerance, up=up, unit=unit, turn=turn)
         return cls(gravity=gravity, **made)
 
     @property
@@ -232,19 +233,17 @@ class Solid(Result):
         >>> block.sides[0]
         <Side: p = 3.0024 rad/s, alpha = 0.27478 rad, restitution = 0.87204, R = 0.74035 m>
         """
-        towards = checks.finite(azimuth, "azimuth", InvalidBlock)
-        plus, minus = polygons.extents(self._about_centre, [towards, towards + 180.0]).distance.tolist()
-        squared, _ = about_axes(self.inertia_over_mass, np.array([towards]))
-        height = float(self.centre[2])
+        plane = plane_of(self, azimuth)
+        plus, minus = plane.pivots.distance.tolist()
         block = Block.from_pivots(
             (plus, minus),
-            height,
-            math.sqrt(float(squared[0])),
+            plane.height,
+            plane.gyration,
             restitution=restitution,
             mass=self.mass,
             gravity=self.gravity,
         )
-        text = f"{self.description} in the plane of {towards:.5g} deg"
+        text = f"{self.description} in the plane of {plane.azimuth:.5g} deg"
         return block_of_sides(Block.__new__(Block), block.sides, block.gravity, text, block.mass)
 
     def rose(self, azimuths: ArrayLike | None = None) -> Rose:
@@ -331,6 +330,33 @@ class Solid(Result):
             "repairs": [*self.repairs],
             "notes": [*self.notes],
         }
+
+
+class Plane(NamedTuple):
+    """A body in the vertical plane of an azimuth.
+
+    Attributes
+    ----------
+    azimuth : float
+        Degrees clockwise from north, of side +.
+    pivots : Extent
+        Where the support ends on side + and on side -.
+    height, gyration : float
+        Height of the centre of mass, and radius of gyration about the horizontal axis across the plane, m.
+    """
+
+    azimuth: float
+    pivots: polygons.Extent
+    height: float
+    gyration: float
+
+
+def plane_of(solid: Solid, azimuth: float) -> Plane:
+    """Return a body in the vertical plane of an azimuth."""
+    towards = checks.finite(azimuth, "azimuth", InvalidBlock)
+    pivots = polygons.extents(solid.support - solid.centre[:2], [towards, towards + 180.0])
+    squared, _ = about_axes(solid.inertia_over_mass, np.array([towards]))
+    return Plane(towards, pivots, float(solid.centre[2]), math.sqrt(float(squared[0])))
 
 
 def _of_density(region: Region) -> str:

@@ -2,6 +2,7 @@
 
 import {Latest, payload} from "./api.js";
 import {at} from "./histories.js";
+import {fillOutline} from "./plan.js";
 import {Recording} from "./recording.js";
 import {Clicks} from "./sound.js";
 import {colour, textSize, themed} from "./theme.js";
@@ -206,8 +207,8 @@ export class View {
 
   /** @param {CanvasRenderingContext2D} pen @param {number} width @param {number} height @param {any} outline @param {number} theta @param {number} moved */
   scene(pen, width, height, outline, theta, moved) {
-    const {left, right, centre, top} = outline;
-    const reach = Math.hypot(Math.max(left, right) * 2, top);
+    const {left, right, centre, top, widest} = outline;
+    const reach = Math.hypot(2 * widest, top);
     const floor = height - 40, above = textSize(13) > 13 ? 122 : 52; // what large text needs
     const scale = (floor - above) / Math.max(reach, 1e-9);
     const drawn = theta * this.larger();
@@ -227,13 +228,17 @@ export class View {
     pen.translate(middle + scale * pivot, floor);
     pen.rotate(drawn);
     pen.translate(-scale * pivot, 0);
-    pen.beginPath();
-    pen.rect(-scale * left, -scale * top, scale * (left + right), scale * top);
-    pen.fillStyle = colour("stone");
-    pen.fill();
-    pen.lineWidth = 1.5;
-    pen.strokeStyle = colour("ink");
-    pen.stroke();
+    const {profile} = this.page.shown.arrays;
+    if (profile) fillOutline(pen, profile, scale);
+    else {
+      pen.beginPath();
+      pen.rect(-scale * left, -scale * top, scale * (left + right), scale * top);
+      pen.fillStyle = colour("stone");
+      pen.fill();
+      pen.lineWidth = 1.5;
+      pen.strokeStyle = colour("ink");
+      pen.stroke();
+    }
     pen.beginPath();
     pen.arc(0, -scale * centre, 3.5, 0, 2 * Math.PI);
     pen.fillStyle = colour("ink");

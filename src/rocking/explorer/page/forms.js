@@ -1,6 +1,8 @@
 // Forms that change the texts of a case: its block, its motion, its model.
 
 import {json} from "./api.js";
+import {check, choice, offer} from "./controls.js";
+import {MeshFields} from "./mesh.js";
 import {namesOf, parameter, specification} from "./parameters.js";
 import {explained, make, measured, one, shown, whole} from "./words.js";
 
@@ -19,11 +21,12 @@ class NumberControl {
   constructor(spec, form, prefix = "") {
     this.spec = spec;
     this.form = form;
+    this.steps = spec.step ? (spec.high - spec.low) / spec.step : STEPS;
     /** Whether somebody types in the field: what arrives meanwhile leaves it as it is. */
     this.typing = false;
     const id = `${prefix}${spec.name}`;
     this.slider = /** @type {HTMLInputElement} */ (make("input", {
-      type: "range", id: `${id}-slider`, min: "0", max: String(STEPS), step: "1", "aria-label": `${spec.label}, slider`, on: {input: () => this.slid()},
+      type: "range", id: `${id}-slider`, min: "0", max: String(this.steps), step: "1", "aria-label": `${spec.label}, slider`, on: {input: () => this.slid()},
     }));
     this.field = /** @type {HTMLInputElement} */ (make("input", {type: "text", id, inputMode: "decimal", size: 6, "data-argument": spec.name, on: {input: () => { this.typing = true; }, change: () => this.typed(), blur: () => { this.typing = false; }}}));
     const [button, words] = spec.explanation ? explained(spec.explanation, spec.label) : [];
@@ -49,14 +52,14 @@ class NumberControl {
     }
     const {low, high, logarithmic} = this.spec;
     const part = logarithmic ? Math.log(Math.max(value, 1e-300) / low) / Math.log(high / low) : (value - low) / (high - low);
-    this.slider.value = String(Math.round(STEPS * Math.min(1, Math.max(0, part))));
+    this.slider.value = String(Math.round(this.steps * Math.min(1, Math.max(0, part))));
     const written = shown(value);
     if (!this.typing) this.field.value = written;
     this.slider.setAttribute("aria-valuetext", `${written} ${this.spec.unit}`.trim());
   }
 
   slid() {
-    const part = Number(this.slider.value) / STEPS;
+    const part = Number(this.slider.value) / this.steps;
     const {low, high, logarithmic, suffix, unit} = this.spec;
     const number = String(Number((logarithmic ? low * (high / low) ** part : low + part * (high - low)).toPrecision(3)));
     this.text = number + suffix;
@@ -77,24 +80,6 @@ class NumberControl {
   }
 }
 
-/** @param {string} prefix @param {string} name @param {string} label @param {string[][]} options values and labels @param {(value: string) => void} changed */
-function choice(prefix, name, label, options, changed) {
-  const id = prefix + name;
-  const select = /** @type {HTMLSelectElement} */ (make("select", {id, "data-argument": name, on: {change: () => changed(select.value)}}));
-  const element = make("div", {className: "choice"}, [make("label", {className: "field", for: id}, [label]), select]);
-  offer(select, options);
-  return {select, element};
-}
-
-/** @param {HTMLSelectElement} select @param {string[][]} options values and labels */
-const offer = (select, options) => select.replaceChildren(...options.map(([value, text]) => make("option", {value}, [text])));
-
-/** @param {string} id @param {string} label @param {() => void} changed */
-function check(id, label, changed) {
-  const box = /** @type {HTMLInputElement} */ (make("input", {type: "checkbox", id, on: {change: changed}}));
-  return {box, element: make("label", {className: "check"}, [box, ` ${label}`])};
-}
-
 export class BlockForm {
   /** @param {HTMLElement} element @param {Changed} changed @param {string} [prefix] */
   constructor(element, changed, prefix = "") {
@@ -108,7 +93,8 @@ export class BlockForm {
     this.shape = choice(prefix, "shape", "Given by", specification.shapes.map((/** @type {any} */ each) => [each.name, each.label]), () => this.reshape());
     this.two = check(`${prefix}two`, "Two different sides", () => this.separate());
     this.housner = check(`${prefix}housner`, "Restitution from angular momentum", () => { this.showFields(); this.tell(); });
-    this.specs = BLOCK.map(parameter);
+    this.mesh = new MeshFields(prefix, () => this.tell(), (azimuth) => { this.put("azimuth", [azimuth]); this.tell(); });
+    this.specs = BLOCK.filter((name) => !this.mesh.names.includes(name)).map(parameter);
     /** Controls by name: one for both sides, and one for each. @type {Record<string, {both: NumberControl, pair: NumberControl[]}>} */
     this.controls = Object.fromEntries(this.specs.map((spec) => [spec.name, {
       both: new NumberControl(spec, this, prefix),
@@ -116,9 +102,9 @@ export class BlockForm {
         new NumberControl({...spec, label: `${spec.label}, ${side}`, explanation: k ? "" : spec.explanation}, this, `${prefix}${k}`)),
     }]));
     const before = /** @type {Record<string, HTMLElement>} */ ({p: this.two.element, restitution: this.housner.element});
-    element.replaceChildren(this.shape.element, ...this.specs.flatMap(({name}) => {
+    element.replaceChildren(this.shape.element, this.mesh.element, ...this.specs.flatMap(({name}) => {
       const {both, pair} = this.controls[name];
-      return [...(before[name] ? [before[name]] : []), both.element, ...pair.map((each) => each.element)];
+      return [...(before[name] ? [before[name]] : []), both.element, ...pair.map((each) => each.element), ...(name === "azimuth" ? [this.mesh.picture] : [])];
     }));
   }
 
@@ -130,6 +116,7 @@ export class BlockForm {
     this.shape.select.value = shape.name;
     this.two.box.checked = shape.name === "parameters" && this.specs.some(({name}) => (texts[name] ?? "").includes(","));
     this.housner.box.checked = !("restitution" in texts);
+    this.mesh.show(texts);
     for (const {name} of this.specs) {
       const text = texts[name] ?? (name === "offset" ? "0" : "");
       if (text) this.put(name, text.split(","));
@@ -148,7 +135,7 @@ export class BlockForm {
   /** Names of the parameters that describe the block as it is chosen. @returns {string[]} */
   names() {
     const {needed, optional} = specification.shapes.find((/** @type {any} */ each) => each.name === this.shape.select.value);
-    return [...needed, ...optional, ...(this.housner.box.checked ? [] : ["restitution"])];
+    return [...needed, ...optional].filter((name) => name in this.controls).concat(...(this.housner.box.checked ? [] : ["restitution"]));
   }
 
   /** Whether each side has a value of its own. @param {Parameter} spec */
@@ -167,6 +154,7 @@ export class BlockForm {
       both.element.hidden = !seen || sided;
       for (const each of pair) each.element.hidden = !seen || !sided;
     }
+    this.mesh.element.hidden = this.mesh.picture.hidden = this.shape.select.value !== "mesh";
     this.two.element.hidden = this.shape.select.value !== "parameters";
   }
 
@@ -212,7 +200,16 @@ export class BlockForm {
       return [name, this.sided(both.spec) ? pair.map((each) => each.text).join(",") : both.text];
     }));
     if (Number(texts.offset) === 0) delete texts.offset;
-    this.changed(texts, BLOCK);
+    this.changed(this.mesh.element.hidden ? texts : {...this.mesh.texts(), ...texts}, BLOCK);
+  }
+
+  /** Take a mesh that the server keeps. @param {any} file */
+  take(file) {
+    const linked = this.mesh.take(file, this.texts);
+    if (!linked) this.put("azimuth", [String(Number(file.azimuth.toPrecision(6)))]);
+    this.shape.select.value = "mesh";
+    this.showFields();
+    this.tell();
   }
 }
 

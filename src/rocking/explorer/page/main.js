@@ -93,6 +93,7 @@ const afterPause = new Latest(async () => {
   if (state.view === "response") chattering.draw(page.shown, texts);
   phase.update();
   cursor.show();
+  await forms.block.mesh.learn(header.block.body, texts);
   if (!ofOwn(state.view)) {
     showFiles(state, problem);
     const {python, command} = await json("/api/code", texts);
@@ -186,7 +187,10 @@ function draw() {
   const [plus, minus] = header.block.thresholds_g;
   const [right, left] = header.block.sides.map((/** @type {any} */ side, /** @type {number} */ k) =>
     `p = ${short(side.p)} rad/s, α = ${short((side.alpha * 180) / Math.PI)}°, η = ${short(side.restitution)}; lifts above ${short([plus, minus][k])} g`);
-  put(one("derived"), right === left ? `${right}.` : `To the right ${right}. To the left ${left}.`);
+  const {body} = header.block;
+  const [to, fro] = body ? [`Towards ${short(body.azimuth, 4)}°`, `Towards ${short((body.azimuth + 180) % 360, 4)}°`] : ["To the right", "To the left"];
+  put(one("derived"), right === left ? `${right}.` : `${to} ${right}. ${fro} ${left}.`);
+  forms.block.mesh.turn(body);
   if (state.view === "response" || state.view === "block") {
     const lines = /** @type {any} */ (arrays);
     histories.draw(header, {lines, rest: arrays.rest, uplift: arrays.uplift, block: header.block});
@@ -267,11 +271,12 @@ one("in-words").addEventListener("toggle", () => chattering.words(state.texts));
 if (coarse()) one("cursor").textContent = "Tap the plots to read them.";
 one("settings").addEventListener("submit", (event) => event.preventDefault());
 makeCopying();
-acceptFiles(async (file, upwards) => {
+acceptFiles(async (file, use) => {
   try {
     const found = await file();
-    forms.motion.take(found, upwards);
-    say(`${found.name} was read as ${found.format}.`);
+    if (use === "mesh") forms.block.take(found);
+    else forms.motion.take(found, use === "vertical");
+    say(use === "mesh" ? `${found.name} is the body now.` : `${found.name} was read as ${found.format}.`);
     problem(null);
   } catch (error) {
     problem(error);

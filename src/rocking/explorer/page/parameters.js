@@ -7,7 +7,7 @@ import {one} from "./words.js";
 /** @typedef {import("./api.js").Texts} Texts */
 /** @typedef {{view: string, texts: Texts, other: Texts, compare: string, window: [number, number] | null, at: number | null, lecture: boolean, map: Texts, sweep: Texts, good: Good}} State */
 /** What was answered last of each part of the state: it alone enters the address. @typedef {{texts: Texts, other: Texts, compare: string, map: Texts, sweep: Texts}} Good */
-/** @typedef {{name: string, label: string, group: string, unit: string, suffix: string, default: string, units: Record<string, number>, low: number, high: number, logarithmic: boolean, values: string, explanation: string}} Parameter */
+/** @typedef {{name: string, label: string, group: string, unit: string, suffix: string, default: string, units: Record<string, number>, low: number, high: number, logarithmic: boolean, step: number, values: string, explanation: string}} Parameter */
 
 /** @type {any} */
 export const specification = await json("/api/start", {}).catch(stop);
@@ -59,7 +59,7 @@ export function readAddress() {
 function complete(texts) {
   const {width, height} = specification.default;
   if (!Object.keys(texts).length) return {...specification.default};
-  return ["width", "p", "pivots"].some((name) => name in texts) ? texts : {width, height, ...texts};
+  return ["width", "p", "pivots", "mesh"].some((name) => name in texts) ? texts : {width, height, ...texts};
 }
 
 /** The window as texts. @param {State} state @returns {Texts} */

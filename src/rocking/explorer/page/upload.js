@@ -1,28 +1,39 @@
-// Record files: chosen, or dropped anywhere on the page.
+// Records and meshes: chosen, or dropped anywhere on the page.
 
 import {Problem, json} from "./api.js";
+import {specification} from "./parameters.js";
 import {one} from "./words.js";
 
 const LARGEST = 16 * 2 ** 20;
 
-/** @param {File} file */
-async function sendFile(file) {
-  if (file.size > LARGEST) throw new Problem(`${file.name}: it is larger than 16 MiB; cut the record into smaller files`);
-  return json("/api/records", {name: file.name}, {method: "POST", body: file});
+/** @typedef {"record" | "vertical" | "mesh"} Use */
+
+/** What a file is for: one that is called as meshes are is a mesh, wherever it was chosen. @param {File} file @param {Use} use @returns {Use} */
+const useOf = (file, use) => (specification.mesh_kinds.some((/** @type {string} */ kind) => file.name.toLowerCase().endsWith(`.${kind}`)) ? "mesh" : use);
+
+/** @param {File} file @param {Use} use */
+async function sendFile(file, use) {
+  if (file.size > LARGEST) throw new Problem(`${file.name}: it is larger than 16 MiB; ${use === "mesh" ? "make the mesh coarser" : "cut the record into smaller files"}`);
+  return json(use === "mesh" ? "/api/meshes" : "/api/records", {name: file.name}, {method: "POST", body: file});
 }
 
-/** @param {(file: () => Promise<any>, upwards: boolean) => Promise<void>} take */
+/** @param {(file: () => Promise<any>, use: Use) => Promise<void>} take */
 export function acceptFiles(take) {
   const input = /** @type {HTMLInputElement} */ (one("file"));
   const dropping = one("dropping");
-  let upwards = false;
-  for (const button of [one("choose-file"), one("choose-vertical")]) {
-    button.addEventListener("click", () => { upwards = button.id === "choose-vertical"; input.click(); });
-  }
+  /** @type {Use} */
+  let chosen = "record";
+  const buttons = /** @type {Record<string, Use>} */ ({"choose-file": "record", "choose-vertical": "vertical", "choose-mesh": "mesh"});
+  const send = (/** @type {File | undefined} */ file, /** @type {Use} */ wanted) => {
+    if (!file) return;
+    const use = useOf(file, wanted);
+    void take(() => sendFile(file, use), use);
+  };
+  for (const [id, use] of Object.entries(buttons)) one(id).addEventListener("click", () => { chosen = use; input.click(); });
   input.addEventListener("change", () => {
     const file = input.files?.[0];
     input.value = "";
-    if (file) void take(() => sendFile(file), upwards);
+    send(file, chosen);
   });
   // Text and links that are dragged are nothing to open, and the browser shall not go where they lead.
   const brings = (/** @type {DragEvent} */ event) => event.dataTransfer?.types.includes("Files") ?? false;
@@ -37,7 +48,6 @@ export function acceptFiles(take) {
     event.preventDefault();
     depth = 0;
     dropping.hidden = true;
-    const file = event.dataTransfer?.files?.[0];
-    if (file) void take(() => sendFile(file), false);
+    send(event.dataTransfer?.files?.[0], "record");
   });
 }

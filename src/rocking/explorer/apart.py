@@ -1,0 +1,125 @@
+"""A mesh of a foreign file, read by a process of its own: it has so much time and memory, and nothing beside the file.
+
+Readers of meshes are many, and what hostile files make of them is not known; a process can be ended.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from rocking import errors
+from rocking.errors import InvalidBlock, RockingError
+from rocking.solid.building import Region, properties
+from rocking.solid.sections import Piece, Sections, sections_of
+
+if TYPE_CHECKING:
+    from rocking.solid.reading import Mesh
+
+#: Triangles of a mesh at most: some six seconds of work.
+MOST_TRIANGLES: Final = 500_000
+
+#: Processor time, s, and memory, bytes, that the process has; and how long it is waited for, s.
+_SECONDS: Final = 20
+_MEMORY: Final = 2 * 2**30
+_PATIENCE: Final = 60.0
+
+#: Libraries that would take memory for every processor.
+_ONE_THREAD: Final = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+
+#: Digits that a drawing has.
+_DIGITS: Final = 6
+
+#: What `rocking.Solid` is made from, and the sections of its outline.
+Made = tuple[dict[str, Any], Sections]
+
+
+def made_here(mesh: Mesh, options: Mapping[str, Any]) -> Made:
+    """Read a mesh with some arguments of `rocking.Solid.from_mesh`; it has `MOST_TRIANGLES` at most."""
+    given = {"density": None, "support": None, "tolerance": None, "up": None, "unit": "m", "turn": 0.0, **options}
+    made, surfaces = properties(mesh, **given, most=MOST_TRIANGLES)
+    return made, sections_of(surfaces)
+
+
+def made_apart(name: str, data: bytes, options: Mapping[str, Any]) -> Made:
+    """Read the content of a file in a process that ends after so much time or memory."""
+    head = json.dumps({"name": name, "options": dict(options)}).encode()
+    places = os.pathsep.join(each for each in sys.path if each)
+    environment = {**os.environ, **dict.fromkeys(_ONE_THREAD, "1"), "PYTHONPATH": places}
+    try:
+        done = subprocess.run(
+            [sys.executable, "-P", "-m", __name__],
+            input=head + b"\n" + data,
+            capture_output=True,
+            timeout=_PATIENCE,
+            env=environment,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        raise _too_much(name) from None
+    if done.returncode:
+        raise _too_much(name)
+    return _found(done.stdout)
+
+
+def _found(answer: str | bytes) -> Made:
+    """Read what the process has answered."""
+    found = json.loads(answer)
+    if "error" in found:
+        kind = getattr(errors, found["error"])
+        raise kind(found["template"], *found["arguments"], path=found["path"])
+    made = found["made"]
+    arrays = {each: np.array(made[each]) for each in ("support", "centre", "inertia_over_mass")}
+    regions = [Region(*each) for each in made["regions"]]
+    pieces = tuple(Piece(section, np.array(corners)) for section, corners in found["pieces"])
+    return {**made, **arrays, "regions": regions}, Sections(np.array(found["heights"]), pieces)
+
+
+def _too_much(name: str) -> InvalidBlock:
+    return InvalidBlock(
+        f"takes more than {_SECONDS} s or {_MEMORY // 2**30} GiB to read: make the mesh coarser, or use it in Python",
+        path=name,
+    )
+
+
+def _answer(data: bytes) -> dict[str, Any]:
+    """Read what `made_apart` sends, and return what it reads."""
+    head, _, content = data.partition(b"\n")
+    asked = json.loads(head)
+    stream = io.BytesIO(content)
+    stream.name = asked["name"]
+    try:
+        made, sections = made_here(stream, asked["options"])
+    except RockingError as error:
+        return {
+            "error": type(error).__name__,
+            "template": error.message.template,
+            "arguments": error.message.arguments,
+            "path": error.path,
+        }
+    plain = {name: each.tolist() if isinstance(each, np.ndarray) else each for name, each in made.items()}
+    pieces = [(section, np.round(corners, _DIGITS).tolist()) for section, corners in sections.pieces]
+    return {"made": plain, "heights": sections.heights.tolist(), "pieces": pieces}
+
+
+def _main() -> None:
+    with contextlib.suppress(ImportError):  # Windows has no limits: there only the time is waited for
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
+        resource.setrlimit(resource.RLIMIT_CPU, (_SECONDS, _SECONDS + 1))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    out, sys.stdout = sys.stdout, sys.stderr
+    json.dump(_answer(sys.stdin.buffer.read()), out)
+
+
+if __name__ == "__main__":
+    _main()

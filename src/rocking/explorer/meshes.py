@@ -1,0 +1,189 @@
+"""Bodies of meshes: read once, and what the page draws and says of them. They know no web."""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from rocking import checks
+from rocking.arrays import Floats
+from rocking.constants import STANDARD_GRAVITY
+from rocking.errors import InvalidBlock, RockingError
+from rocking.explorer.apart import made_apart, made_here
+from rocking.explorer.payload import Payload
+from rocking.quantities import densities, number
+from rocking.solid import Rose, Solid
+from rocking.solid.reading import SHIPPED
+from rocking.solid.solid import Plane, plane_of
+from rocking.solid.support import directions
+
+if TYPE_CHECKING:
+    from rocking.solid.sections import Sections
+
+#: Bodies that are kept.
+_KEPT: Final = 12
+
+#: Name and content of a file.
+_File = tuple[str, bytes]
+
+#: Azimuths of the rose, degrees.
+_AZIMUTHS: Final = np.arange(0.0, 360.0, 2.0)
+
+#: Pieces of sections that the plan has at most.
+_PLANNED: Final = 40
+
+#: Parts that are named at most.
+_NAMED: Final = 6
+
+#: What a case says of a body, and how each text is read as an argument of `rocking.Solid.from_mesh`.
+_READERS: Final[Mapping[str, Callable[[str], Any]]] = {
+    "density": lambda text: densities(text, "density"),
+    "up": str,
+    "unit": lambda text: text if text.isalpha() else number(text, "unit"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A body of a mesh, the name of its file, and its outline.
+
+    ``call`` is the expression that makes it, of names of `rocking`.
+    """
+
+    solid: Solid
+    sections: Sections
+    call: str
+
+    @cached_property
+    def rose(self) -> Rose:
+        """Its resistance in every direction."""
+        return self.solid.rose(_AZIMUTHS)
+
+    def across(self, azimuth: float) -> Floats:
+        """Return its outline as it is seen along the axis across an azimuth, from its centre of mass; shape (n, 6)."""
+        outline = self.sections.across(azimuth)
+        outline[:, 2:] -= float(self.solid.centre[:2] @ _towards(azimuth))
+        return outline
+
+    def plane(self, azimuth: float) -> dict[str, Any]:
+        """Say where it is cut by the plane of an azimuth: the edges that it rocks about, from its centre of mass, m."""
+        plane = plane_of(self.solid, azimuth)
+        distance, low, high = (np.asarray(each).tolist() for each in plane.pivots)
+        return {
+            "name": self.solid.description,
+            "azimuth": plane.azimuth,
+            "edges": [list(each) for each in zip(distance, low, high, strict=True)],
+        }
+
+
+def described(body: Body, azimuth: float) -> Payload:
+    """Return what the page shows of a body: its plan, its rose, and what is said of it; m from its centre of mass."""
+    solid, rose = body.solid, body.rose
+    pieces = body.sections.pieces[:: -(-len(body.sections.pieces) // _PLANNED)]
+    corners = np.vstack([piece.corners for piece in pieces]) - solid.centre[:2]
+    support = solid.support - solid.centre[:2]
+    parts = [each.name for each in solid.regions]
+    header = {
+        "name": solid.description,
+        "about": _about(solid),
+        "parts": parts,
+        "left_out": _left_out(solid, azimuth),
+        "repaired": f"Mended in the mesh: {'; '.join(solid.repairs)}."
+        if solid.repairs
+        else "Nothing had to be mended in the mesh.",
+        "weakest_azimuth": rose.data.weakest_azimuth,
+        "weakest": rose.data.weakest_acceleration,
+        "height_of_mass": float(solid.centre[2]),
+    }
+    arrays = {
+        "azimuth": _AZIMUTHS,
+        "acceleration": rose.data.acceleration.values,
+        "support": support.ravel(),
+        "plan": corners.ravel(),
+        "piece": np.cumsum([len(piece.corners) for piece in pieces], dtype=float),
+    }
+    return Payload(header, arrays)
+
+
+def pivots_of(body: Body, azimuth: float) -> tuple[tuple[float, float], float, float]:
+    """Return the distances of its pivots, the height of its centre of mass and its radius of gyration in a plane, m."""
+    plane: Plane = plane_of(body.solid, azimuth)
+    plus, minus = plane.pivots.distance.tolist()
+    return (plus, minus), plane.height, plane.gyration
+
+
+class MeshStore:
+    """Bodies of files that are kept; safe to use from several threads. One file is read at a time.
+
+    Parameters
+    ----------
+    file : callable
+        Returns a file that is kept by its key.
+    """
+
+    def __init__(self, file: Callable[[str], _File]) -> None:
+        self._file = file
+        self._reading = threading.Lock()
+        self._known: OrderedDict[str, Body | RockingError] = OrderedDict()
+
+    def body(self, name: str, texts: Mapping[str, str], tolerance: float | None, gravity: float | None) -> Body:
+        """Return the body of a mesh, ``statue`` or ``file:KEY``, read with the texts that a case has of it."""
+        key = name.removeprefix("file:")
+        upload = self._file(key) if name.startswith("file:") else None
+        if upload is None:
+            checks.one_of(name, "mesh", InvalidBlock, [*SHIPPED])
+        given = {each: read(texts[each]) for each, read in _READERS.items() if each in texts}
+        given |= {each: value for each, value in (("tolerance", tolerance), ("gravity", gravity)) if value is not None}
+        request = json.dumps([name, upload and upload[0], given])
+        found = self._known.get(request)
+        if found is None:
+            with self._reading:
+                found = self._known.get(request) or _read(name, upload, given)
+                self._known[request] = found
+                while len(self._known) > _KEPT:
+                    self._known.popitem(last=False)
+        if isinstance(found, RockingError):
+            raise found
+        return found
+
+
+def _read(name: str, upload: _File | None, given: Mapping[str, Any]) -> Body | RockingError:
+    """Read a mesh; what is wrong with it is kept, too, as it would take as long again."""
+    options = {each: value for each, value in given.items() if each != "gravity"}
+    written = "".join(f", {each}={value!r}" for each, value in given.items())
+    try:
+        made, sections = made_here(name, options) if upload is None else made_apart(*upload, options)
+        solid = Solid(gravity=given.get("gravity", STANDARD_GRAVITY), **made)
+    except RockingError as error:
+        return error
+    return Body(solid, sections, f"Solid.from_mesh({upload[0] if upload else name!r}{written})")
+
+
+def _about(solid: Solid) -> str:
+    """Say what a body is."""
+    mass = "" if solid.mass is None else f", {solid.mass:.4g} kg"
+    count = len(solid.regions)
+    parts = f" of {count} parts ({', '.join(each.name for each in solid.regions[:_NAMED])}{', ...' * (count > _NAMED)})"
+    return f"{solid.description}{parts * (count > 1)}: {solid.height:.4g} m high, {solid.volume:.4g} m³{mass}."
+
+
+def _left_out(solid: Solid, azimuth: float) -> str:
+    """Say what planar rocking leaves out towards an azimuth."""
+    data = solid.rose([azimuth]).data
+    coupling, aside, gap = (float(data[name][0]) for name in ("coupling", "aside", "gap"))
+    return (
+        f"Planar rocking leaves out turning about the vertical and rolling over corners. Towards {azimuth:.4g}° the "
+        f"products of inertia are {coupling:.2g} of the moment of inertia, the edge lies {aside:.2g} m to the side of "
+        f"the centre of mass, and the two edges are {gap:.2g} m from facing each other."
+    )
+
+
+def _towards(azimuth: float) -> Floats:
+    return np.asarray(directions(azimuth)[0])

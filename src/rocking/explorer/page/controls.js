@@ -1,0 +1,21 @@
+// Choices of a form: one of several, and yes or no.
+
+import {make} from "./words.js";
+
+/** @param {string} prefix @param {string} name @param {string} label @param {string[][]} options values and labels @param {(value: string) => void} changed */
+export function choice(prefix, name, label, options, changed) {
+  const id = prefix + name;
+  const select = /** @type {HTMLSelectElement} */ (make("select", {id, "data-argument": name, on: {change: () => changed(select.value)}}));
+  const element = make("div", {className: "choice"}, [make("label", {className: "field", for: id}, [label]), select]);
+  offer(select, options);
+  return {select, element};
+}
+
+/** @param {HTMLSelectElement} select @param {string[][]} options values and labels */
+export const offer = (select, options) => select.replaceChildren(...options.map(([value, text]) => make("option", {value}, [text])));
+
+/** @param {string} id @param {string} label @param {() => void} changed */
+export function check(id, label, changed) {
+  const box = /** @type {HTMLInputElement} */ (make("input", {type: "checkbox", id, on: {change: changed}}));
+  return {box, element: make("label", {className: "check"}, [box, ` ${label}`])};
+}

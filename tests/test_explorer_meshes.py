@@ -1,0 +1,364 @@
+"""Bodies of meshes in the explorer: the block of an azimuth, its picture, its code; and files of any content."""
+
+import json
+import math
+import runpy
+import shlex
+import struct
+import sys
+import threading
+
+import numpy as np
+import pytest
+import trimesh
+from explorer_client import Client, clients, let_in
+
+import rocking
+from rocking.errors import InvalidBlock, InvalidOption, RockingError, UnreadableRecord
+from rocking.explorer import apart, maps, meshes
+from rocking.explorer.authentication import RequestAuthentication
+from rocking.explorer.code import case_as_command, case_as_python, map_as_command, map_as_python, sweep_as_command
+from rocking.explorer.core import Explorer
+from rocking.explorer.inputs import read_case
+from rocking.explorer.server import App
+from rocking.explorer.sweeps import sweep_of
+from rocking.explorer.uploads import LARGEST, MOST, UploadStore
+from rocking.solid.reading import SHIPPED
+
+STATUE = {"mesh": "statue", "azimuth": "30", "motion": "ridgecrest-clc-090", "pga": "0.6g"}
+DENSITY = "plinth=2700,figure=2650,head=2650"
+DENSITIES = {"plinth": 2700.0, "figure": 2650.0, "head": 2650.0}
+
+
+def box(sizes=(0.3, 0.2, 1.0)):
+    made = trimesh.creation.box(sizes)
+    made.apply_translation([0.0, 0.0, 0.5 * sizes[2]])
+    return made
+
+
+def content(mesh, kind="stl"):
+    found = mesh.export(file_type=kind)
+    return found if isinstance(found, bytes) else found.encode()
+
+
+@pytest.fixture
+def here(monkeypatch):
+    """Read files in this process: what reads them apart is tested by itself."""
+
+    def made(name, data, options):
+        found = apart._answer(json.dumps({"name": name, "options": dict(options)}).encode() + b"\n" + data)
+        return apart._found(json.dumps(found))
+
+    monkeypatch.setattr(meshes, "made_apart", made)
+
+
+def test_a_case_of_a_mesh_is_the_packages_block_of_that_azimuth():
+    for texts, given in (
+        ({}, {}),
+        ({"density": DENSITY, "tolerance": "2mm"}, {"density": DENSITIES, "tolerance": 0.002}),
+        ({"unit": "ft", "gravity": "3.7", "restitution": "0.7,0.8"}, {"unit": "ft", "gravity": 3.7}),
+    ):  # fmt: skip
+        case = read_case({**STATUE, **texts}, UploadStore())
+        solid = rocking.Solid.from_mesh("statue", **given)
+        assert case.block.sides == solid.block(30.0, restitution=[0.7, 0.8] if "restitution" in texts else None).sides
+        assert case.block.gravity == given.get("gravity", 9.80665)
+        assert case.body.solid.to_dict() == solid.to_dict()
+
+
+def test_code_of_a_mesh_has_the_same_bits(run, tmp_path, monkeypatch, here):
+    monkeypatch.chdir(tmp_path)
+    data = content(box((300.0, 200.0, 1000.0)))
+    (tmp_path / "-my block.STL").write_bytes(data)
+    store = UploadStore()
+    key = store.add_mesh("C:\\scans\\-my block.STL", data)
+    judged = 0
+    for texts in (
+        STATUE,
+        {**STATUE, "azimuth": "200.5", "density": DENSITY, "restitution": "0.8"},
+        {**STATUE, "mesh": f"file:{key}", "unit": "mm"},
+    ):
+        case = read_case(texts, store)
+        (tmp_path / "case.py").write_text(case_as_python(case), "utf-8")
+        response = case.simulate()
+        again = runpy.run_path("case.py")["response"]
+        assert np.array_equal(again.impacts, response.impacts)
+        assert len(response.impacts) > 10
+        code, out, err = run(*shlex.split(case_as_command(case))[1:], "--json")
+        assert (code, err) == (0, "")
+        peak = float(out.split('"peak_rotation_rad": ')[1].split(",")[0])
+        assert peak == response.peak_rotation == again.peak_rotation
+        judged += 1
+    assert judged == 3
+    assert "Solid.from_mesh('-my block.STL', unit='mm').block(30.0)" in case_as_python(case)
+
+
+def test_the_picture_of_a_body_is_of_its_plane():
+    explorer = Explorer()
+    solid = rocking.Solid.from_mesh("statue")
+    for azimuth in (0.0, 30.0, 90.0, 271.0):
+        texts = {**STATUE, "azimuth": repr(azimuth)}
+        payload = explorer.case(texts)
+        plus, minus = solid.block(azimuth).sides
+        block, profile = payload.header["block"], payload.arrays["profile"].reshape(-1, 6)
+        assert block["body"]["azimuth"] == azimuth
+        edges = np.array(block["body"]["edges"])
+        assert np.allclose(edges[:, 0], [side.radius * math.sin(side.alpha) for side in (plus, minus)], rtol=1e-14)
+        # The plinth stands on the support, so that the outline ends at the pivots on the ground.
+        assert np.allclose(profile[0, :4], [0.0, 0.2, -edges[1, 0], edges[0, 0]], atol=1e-6)
+        assert profile[:, 1].max() == pytest.approx(solid.height, rel=1e-9) == block["outline"]["top"]
+        assert block["outline"]["widest"] >= edges[:, 0].max() - 1e-6
+    plain = explorer.case({"width": "0.3", "height": "1", "motion": "none", "initial_rotation": "1deg"})
+    assert "profile" not in plain.arrays
+    assert plain.header["block"]["body"] is None
+
+
+def test_what_is_said_of_a_body_are_its_own_numbers():
+    explorer = Explorer()
+    found = explorer.body({**STATUE, "density": DENSITY})
+    solid = rocking.Solid.from_mesh("statue", density=DENSITIES)
+    rose = solid.rose(found.arrays["azimuth"])
+    assert np.array_equal(found.arrays["acceleration"], rose.data.acceleration.values)
+    assert len(found.arrays["azimuth"]) == 180
+    assert (found.header["weakest_azimuth"], found.header["weakest"]) == (90.0, rose.data.weakest_acceleration)
+    assert found.header["about"] == "statue.obj of 3 parts (figure, head, plinth): 1.73 m high, 0.1711 m³, 455.4 kg."
+    assert "Towards 30° the products of inertia are" in found.header["left_out"]
+    assert found.header["repaired"] == "Nothing had to be mended in the mesh."
+    assert np.allclose(found.arrays["support"].reshape(-1, 2), solid.support - solid.centre[:2])
+    assert found.arrays["piece"][-1] == len(found.arrays["plan"]) / 2 > 100
+    with pytest.raises(InvalidOption, match="this block is of no mesh"):
+        explorer.body({"width": "0.3", "height": "1"})
+
+
+def test_what_was_mended_is_said_and_what_looks_wrong_is_noted(here):
+    explorer = Explorer()
+    scan = box((300.0, 200.0, 1000.0))
+    scan.update_faces(scan.triangles_center[:, 2] > 0.0)
+    scan.invert()
+    taken = explorer.take_mesh("scan.obj", content(scan, "obj"))
+    texts = {**STATUE, "mesh": f"file:{taken['key']}", "azimuth": str(taken["azimuth"])}
+    assert explorer.body(texts).header["repaired"].startswith("Mended in the mesh: 1 hole filled")
+    assert "the body is 1000 m high" in explorer.case(texts).header["block"]["notes"][-1]
+    assert explorer.case({**texts, "unit": "mm"}).header["block"]["notes"] == []
+
+
+def test_meshes_are_known_by_their_content_and_so_many_at_most(here):
+    store = UploadStore()
+    data = content(box())
+    key = store.add_mesh("box.stl", data)
+    first = read_case({**STATUE, "mesh": f"file:{key}"}, store).block
+    others = [store.add_file(f"{k}.txt", str(k).encode()) for k in range(MOST)]
+    with pytest.raises(UnreadableRecord, match="this mesh is not here any more: drop its file on the page again"):
+        read_case({**STATUE, "mesh": f"file:{key}"}, store)
+    assert len({*others, key}) == MOST + 1
+    assert store.add_mesh("again.stl", data) == key
+    assert read_case({**STATUE, "mesh": f"file:{key}"}, store).block.sides == first.sides
+
+
+def test_a_body_that_is_known_does_not_wait_for_a_file_that_is_read(monkeypatch):
+    store, going, free = UploadStore(), threading.Event(), threading.Event()
+    known = read_case(STATUE, store).block
+
+    def slow(name, data, options):
+        going.set()
+        assert free.wait(30.0)
+        return apart.made_here("statue", options)
+
+    monkeypatch.setattr(meshes, "made_apart", slow)
+    key = store.add_mesh("box.stl", content(box()))
+    reader = threading.Thread(target=lambda: read_case({**STATUE, "mesh": f"file:{key}"}, store))
+    reader.start()
+    assert going.wait(30.0)
+    assert read_case({**STATUE, "pga": "0.5g"}, store).block.sides == known.sides
+    free.set()
+    reader.join()
+
+
+def gltf(**changed):
+    """A glTF file in which all is inside, or that names, claims or nests something else."""
+    whole = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "buffers": [],
+        "bufferViews": [],
+        "accessors": [
+            {"componentType": 5126, "count": 10**10, "type": "VEC3"},
+            {"componentType": 5125, "count": 3 * 10**10, "type": "SCALAR"},
+        ],
+    }
+    return json.dumps({**whole, **changed}).encode()
+
+
+FLAT = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], process=False)
+HUGE = b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+HUGE += b"element face 700000\nproperty list uchar uchar vertex_indices\nend_header\n"
+HUGE += struct.pack("<9f", 0, 0, 0, 1, 0, 0, 0, 1, 0) + bytes([3, 0, 1, 2]) * 700_000
+
+HOSTILE = {
+    "other.gltf": (gltf(buffers=[{"uri": "../secret.bin", "byteLength": 9}]), "names another file, '../secret.bin'"),
+    "web.gltf": (gltf(buffers=[{"uri": "http://127.0.0.1:9/a", "byteLength": 9}]), "names another file, 'http:"),
+    "bomb.gltf": (gltf(), "cannot be read"),
+    "deep.gltf": (b'{"a":' + b"[" * 200_000, "cannot be read"),
+    "cut.glb": (b"glTF\x02\x00\x00\x00" + b"\xff" * 40, "cannot be read"),
+    "zip.glb": (b"PK\x03\x04" + bytes(100), "cannot be read"),
+    "nan.stl": (content(box())[:96] + struct.pack("<f", math.nan) + content(box())[100:], "are not finite"),
+    "inf.obj": (content(box(), "obj").replace(b"0.15000000", b"1e999", 1), "(cannot be read|are not finite)"),
+    "wide.obj": (content(box(), "obj").replace(b"0.15000000", b"1e20", 1), "m large, which no body is"),
+    "text.obj": (b"hello\n" * 9, "(cannot be read|holds no faces)"),
+    "empty.stl": (b"", "(cannot be read|holds no faces)"),
+    "flat.obj": (content(FLAT, "obj"), "encloses no volume"),
+    "point.obj": (b"v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n", "all corners of the mesh are at one place"),
+    "far.obj": (content(FLAT, "obj") + b"f 1 2 99\n", "(cannot be read|no volume)"),
+    "huge.ply": (HUGE, "holds 700000 triangles, of which at most 500000 are read here"),
+    "count.ply": (HUGE.replace(b"700000", b"9" * 15), "cannot be read"),
+}
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_hostile_mesh_is_answered_in_one_sentence(name, here, tmp_path, monkeypatch):
+    (tmp_path / "secret.bin").write_bytes(bytes(9))
+    (tmp_path / "folder").mkdir()
+    monkeypatch.chdir(tmp_path / "folder")
+    data, words = HOSTILE[name]
+    explorer = Explorer()
+    with pytest.raises(InvalidBlock, match=words) as caught:
+        taken = explorer.take_mesh(name, data)
+        explorer.case({**STATUE, "mesh": f"file:{taken['key']}"})  # what a choice on the page may correct is taken
+    said = str(caught.value)
+    assert said.startswith(f"{name}: ") or name == "point.obj"
+    assert "\n" not in said and str(tmp_path) not in said
+    assert len(said) < 300
+
+
+def test_files_that_are_no_meshes_or_too_large_are_refused():
+    store = UploadStore()
+    for name in ("a.zip", "a.3mf", "a.tar.gz", "a.obj.zip", "a", "obj", "a.dae", "a.json"):
+        with pytest.raises(UnreadableRecord, match="is no mesh by its name: files of obj, ply, stl, glb, gltf"):
+            store.add_mesh(name, b"PK")
+    with pytest.raises(UnreadableRecord, match="larger than 16 MiB; make the mesh coarser"):
+        store.add_mesh("a.stl", bytes(LARGEST + 1))
+    for name in ("statu", "../statue", "/etc/passwd", "statue.obj"):
+        with pytest.raises(InvalidBlock, match=r"must be (one of )?.?statue|did you mean"):
+            read_case({**STATUE, "mesh": name}, store)
+
+
+def test_a_mesh_that_does_not_stand_as_its_format_has_it_may_be_turned(here):
+    explorer = Explorer()
+    lying = box((0.2, 1.0, 3.0))
+    lying.vertices[lying.vertices[:, 2] < 0.1] *= [0.1, 0.1, 1.0]
+    lying.vertices[:, 1] += np.where(lying.vertices[:, 2] > 0.1, 0.6, 0.0)
+    taken = explorer.take_mesh("lying.stl", content(lying))
+    assert taken["azimuth"] == 0.0
+    texts = {**STATUE, "mesh": f"file:{taken['key']}"}
+    with pytest.raises(InvalidBlock, match="does not stand"):
+        explorer.case(texts)
+    assert explorer.case({**texts, "up": "-z", "azimuth": "0"}).header["block"]["body"]["name"] == "lying.stl"
+
+
+def test_a_file_is_read_apart_to_the_same_bits_and_within_limits(monkeypatch):
+    data = SHIPPED["statue"].read_bytes()
+    made, sections = apart.made_apart("statue.obj", data, {"unit": "ft"})
+    assert rocking.Solid(**made).to_dict() == rocking.Solid.from_mesh("statue", unit="ft").to_dict()
+    assert np.abs(sections.across(30.0) - apart.made_here("statue", {"unit": "ft"})[1].across(30.0)).max() < 1e-5
+    monkeypatch.setattr(apart, "_PATIENCE", 0.05)
+    with pytest.raises(
+        InvalidBlock, match=r"statue\.obj: takes more than 20 s or 2 GiB to read: make the mesh coarser"
+    ):
+        apart.made_apart("statue.obj", data, {})
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of a process are those of Linux")
+def test_a_process_that_takes_too_much_is_ended(tmp_path, monkeypatch):
+    (tmp_path / "sitecustomize.py").write_text("import resource\nresource.setrlimit(resource.RLIMIT_CPU, (0, 1))\n")
+    monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
+    with pytest.raises(InvalidBlock, match="takes more than"):
+        apart.made_apart("statue.obj", SHIPPED["statue"].read_bytes(), {})
+
+
+def test_what_reads_meshes_may_be_missing(here, monkeypatch):
+    monkeypatch.setitem(sys.modules, "trimesh", None)
+    with pytest.raises(InvalidOption, match=r"trimesh, which is not installed: pip install 'rocking\[mesh\]'"):
+        Explorer().take_mesh("box.stl", content(box()))
+
+
+def test_maps_and_sweeps_of_a_mesh_are_of_its_block(run, tmp_path):
+    store = UploadStore()
+    sine = {**STATUE, "motion": "sine:amplitude=0.5g,frequency=1,cycles=2.5"}
+    del sine["pga"]
+    case = read_case(sine, store)
+    with pytest.raises(InvalidOption, match="not over 'alpha'; the slenderness of a mesh follows from its azimuth"):
+        maps.grid_of(case, {"x": "alpha", "y": "a"})
+    for x in ("omega", "p"):
+        grid = maps.grid_of(case, {"x": x, "y": "a", "points": "8"})
+        texts = maps.texts_at(grid, float(grid.x.values[3]), float(grid.y.values[5]))
+        point = read_case(texts, store).block
+        assert [side.alpha for side in point.sides] == pytest.approx([side.alpha for side in case.block.sides])
+        assert [side.restitution for side in point.sides] == [side.restitution for side in case.block.sides]
+        assert ("mesh" in texts) == (x == "omega")
+    grid = maps.grid_of(case, {"x": "omega", "y": "a", "points": "8", "x_to": "6", "y_to": "3"})
+    found = {
+        point: values for part in maps.parts(grid) for point, values in zip(part.points, part.values.T, strict=True)
+    }
+    (tmp_path / "map.py").write_text(map_as_python(grid, "mode"), "utf-8")
+    modes = runpy.run_path(str(tmp_path / "map.py"))["found"].data.mode.values.ravel()
+    assert sorted(found) == list(range(64))
+    mapped = np.array([found[k][3] for k in range(64)])
+    assert np.array_equal(np.where(mapped == maps.Mode.OVERTURNS_AFTER_REST, 0, mapped), modes)
+    assert len(np.unique(modes)) > 3
+    for command in (map_as_command(grid), sweep_as_command(sweep_of(case, {"sweep": "a", "sweep_points": "8"}))):
+        assert "--pivots" in command and "--mesh" not in command and "--azimuth" not in command
+    code, _, err = run(*shlex.split(map_as_command(grid))[1:], "--quiet")
+    assert (code, err) == (0, "")
+
+
+@pytest.fixture(scope="module")
+def page():
+    with clients() as portal:
+        application = RequestAuthentication(App(Explorer(), {}).asgi, 8123)
+        yield let_in(Client(portal, application, "http://127.0.0.1:8123"), application.new_token())
+
+
+def test_the_server_takes_a_mesh_and_shows_it(page, here):
+    taken = page.post("/api/meshes", params={"name": "../box.stl"}, content=content(box((0.2, 0.4, 1.0)))).json()
+    assert (taken["name"], taken["azimuth"] % 180.0) == ("box.stl", 90.0)
+    texts = {**STATUE, "mesh": f"file:{taken['key']}", "azimuth": "90"}
+    answer = page.get("/api/case", params=texts).content
+    header = json.loads(answer[4 : 4 + struct.unpack("<I", answer[:4])[0]])
+    expected = rocking.Block(width=0.2, height=1.0)
+    assert [side["alpha"] for side in header["block"]["sides"]] == pytest.approx([expected.alpha] * 2, rel=1e-6)
+    assert [side["p"] for side in header["block"]["sides"]] == pytest.approx([expected.p] * 2, rel=1e-6)
+    assert header["block"]["body"]["name"] == "box.stl"
+    assert page.get("/api/body", params=texts).headers["content-type"] == "application/octet-stream"
+    for path, params, words in (
+        ("/api/case", {**texts, "mesh": "file:0123"}, "this mesh is not here any more"),
+        ("/api/case", {**texts, "unit": "yard"}, "“Unit of the coordinates” must be one of"),
+        ("/api/case", {**texts, "up": "north"}, "“Axis that points up” must be one of"),
+        ("/api/case", {**texts, "density": "stone"}, "“Density, kg/m³”"),
+        ("/api/case", {**texts, "azimuth": "nan"}, "azimuth"),
+        ("/api/body", {"width": "1", "height": "2"}, "this block is of no “Mesh”"),
+    ):
+        refused = page.get(path, params=params)
+        assert refused.status_code == 422
+        assert words.lower() in refused.json()["problem"].lower()
+    assert page.post("/api/meshes", params={"name": "a.zip"}, content=b"PK").status_code == 422
+    large = {"content-length": str(LARGEST + 1)}
+    assert page.post("/api/meshes", params={"name": "a.stl"}, content=b"", headers=large).status_code == 413
+
+
+def test_no_text_of_a_mesh_fails_otherwise_than_by_a_sentence():
+    random = np.random.default_rng(3)
+    store, answered = UploadStore(), 0
+    wild = ["", "nan", "inf", "-1", "0", "1e308", "x", "{}", "a=b=c", "plinth=", "=1", "0,0,1", "'", "file:", "9" * 40]
+    for _ in range(60):
+        texts = {
+            **STATUE,
+            random.choice(["mesh", "azimuth", "up", "unit", "density", "tolerance"]): random.choice(wild),
+        }
+        try:
+            read_case(texts, store)
+        except RockingError as error:
+            assert "\n" not in str(error)
+            answered += 1
+    assert answered >= 25
