@@ -1,4 +1,4 @@
-"""Records that the explorer was given: files in memory, so many at most, each known by a hash of its content."""
+"""Records that the explorer was given: files in memory within bounds, each known by a hash of its content."""
 
 from __future__ import annotations
 
@@ -22,11 +22,15 @@ from rocking.plausibility import motion_notes
 #: Largest file, bytes: twenty times a long record of three channels.
 LARGEST: Final = 16 * 2**20
 
-#: Files that are kept; the one that was not used for longest is the first to go.
-MOST: Final = 12
+#: Files that are kept, forty stations of three components, and their bytes; more are refused, since none goes unseen.
+MOST: Final = 120
+ALL: Final = 256 * 2**20
 
 #: Samples of one channel at most: an hour and a half at a hundred a second. A motion takes some 120 bytes for each.
 LONGEST: Final = 500_000
+
+#: Samples of the motions that stay in memory once they are read, of 120 bytes each; those used longest ago go first.
+READ: Final = 3_000_000
 
 #: Lines of a file at most: two such channels with a line for each sample. Samples that may be compressed in one.
 _MOST_LINES, _MOST_SAMPLES = 2 * LONGEST, 8 * LONGEST
@@ -61,6 +65,7 @@ class UploadStore:
         self._lock = threading.Lock()
         self._files: OrderedDict[str, Upload] = OrderedDict()
         self._read: OrderedDict[tuple[str, ...], Motion] = OrderedDict()
+        self._told: dict[tuple[str, ...], dict[str, Any]] = {}
         self._motions: dict[str, Motion] = {}
 
     def add_file(self, name: str, data: bytes) -> str:
@@ -77,8 +82,35 @@ class UploadStore:
             )
         key = hashlib.sha256(data).hexdigest()[:_HASH]
         with self._lock:
-            _keep(self._files, key, upload)
+            others = [each for known, each in self._files.items() if known != key]
+            if len(others) >= MOST or len(data) + sum(len(each.data) for each in others) > ALL:
+                raise UnreadableRecord(
+                    f"there is no room for it: {MOST} files and {ALL // 2**20} MiB are kept at most; take some out of "
+                    "the list of records first",
+                    path=upload.name,
+                )
+            self._files[key] = upload
         return key
+
+    def remove(self, key: str) -> None:
+        """Forget a file, and all that was made of it."""
+        self.file(key)
+        with self._lock:
+            self._files.pop(key, None)
+            for store in (self._read, self._told):
+                for request in [each for each in store if each[0] == key]:
+                    store.pop(request, None)
+
+    def kept(self) -> tuple[str, ...]:
+        """Return the keys of the files that are kept, in the order in which they came."""
+        with self._lock:
+            return tuple(self._files)
+
+    def room(self) -> dict[str, int]:
+        """Say how many files are kept, of how many bytes, and how many may be."""
+        with self._lock:
+            held = sum(len(each.data) for each in self._files.values())
+            return {"files": len(self._files), "bytes": held, "most_files": MOST, "most_bytes": ALL}
 
     def add_motion(self, motion: Motion) -> str:
         """Keep a motion of the program's own, and return its key."""
@@ -104,7 +136,6 @@ class UploadStore:
         with self._lock:
             if key not in self._files:
                 raise UnreadableRecord("this record is not here any more: drop its file on the page again")
-            self._files.move_to_end(key)
             return self._files[key]
 
     def read(self, key: str, channel: str | None, dt: float | None, units: str | None) -> Motion:
@@ -117,12 +148,24 @@ class UploadStore:
             return known
         motion = _shown(upload, formats.chosen(upload.stream(), _request(dt, units, channel)))
         with self._lock:
-            _keep(self._read, request, motion)
+            self._read[request] = motion
+            self._read.move_to_end(request)
+            while len(self._read) > 1 and sum(_samples(each) for each in self._read.values()) > READ:
+                self._read.popitem(last=False)
         return motion
 
     def contents(self, key: str, dt: float | None = None, units: str | None = None) -> dict[str, Any]:
         """Say what a file is: its format, its channels, and which arguments it needs before it can be read."""
-        upload = self.file(key)
+        upload, request = self.file(key), (key, str(dt), str(units))
+        if request not in self._told:
+            told = self._contents(key, upload, dt, units)
+            with self._lock:
+                if len(self._told) >= 4 * MOST:
+                    self._told.clear()
+                self._told[request] = told
+        return self._told[request]
+
+    def _contents(self, key: str, upload: Upload, dt: float | None, units: str | None) -> dict[str, Any]:
         given: dict[str, Any] = {"dt": dt, "units": units}
         missing: list[str] = []
         while True:
@@ -141,10 +184,25 @@ class UploadStore:
             "format": identification.format,
             "reason": identification.reason,
             "missing": missing,
-            "channels": [
-                {"number": each.number, "name": each.name, **_told(_shown(upload, each), missing)} for each in channels
-            ],
+            "channels": [{**_about(each), **_told(_shown(upload, each), missing)} for each in channels],
         }
+
+
+def _samples(motion: Motion) -> int:
+    return len(motion.breakpoints)
+
+
+def _about(channel: Channel) -> dict[str, Any]:
+    """Return what the file says of a channel."""
+    return {
+        "number": channel.number,
+        "name": channel.name,
+        "station": channel.station,
+        "event": channel.event,
+        "azimuth": channel.azimuth,
+        "samples": len(channel.acceleration),
+        "step": channel.dt,
+    }
 
 
 def _request(dt: float | None, units: str | None, channel: str | None = None) -> Request:
@@ -162,7 +220,7 @@ def _shown(upload: Upload, channel: Channel) -> Motion:
 def _told(motion: Motion, missing: list[str]) -> dict[str, Any]:
     """Say what looks like a mistake in a channel; or what it would be with each choice of what is missing."""
     if not missing:
-        return {"notes": list(motion_notes(motion)), "choices": {}}
+        return {"notes": list(motion_notes(motion)), "choices": {}, "measures": measures(motion)}
     choices: dict[str, list[list[str]]] = {}
     if "units" in missing:
         units = {name: unit for name in CHOICES if (unit := find_unit(name)) is not None}
@@ -171,7 +229,17 @@ def _told(motion: Motion, missing: list[str]) -> dict[str, Any]:
     if "dt" in missing:
         steps = motion.duration / _STAND_INS["dt"]
         choices["dt"] = [[f"{step:g}", f"{step:g} s: it lasts {steps * step:.4g} s"] for step in _STEPS]
-    return {"notes": [], "choices": choices}
+    return {"notes": [], "choices": choices, "measures": None}
+
+
+def measures(motion: Motion) -> dict[str, float]:
+    """Return what a list of records shows of each: PGA (m/s^2), PGV (m/s), 5-95 % duration and whole duration (s)."""
+    return {
+        "pga": motion.pga,
+        "pgv": motion.pgv,
+        "significant": motion.significant_duration(0.05, 0.95),
+        "duration": motion.duration,
+    }
 
 
 def bare_name(name: str) -> str:
@@ -185,11 +253,3 @@ def bare_name(name: str) -> str:
     last = PurePosixPath(PureWindowsPath(name).name).name
     shown = "".join(letter for letter in last if letter.isprintable()).strip()
     return shown[-_NAME:] or "record"
-
-
-def _keep(store: OrderedDict[Any, Any], key: object, value: object) -> None:
-    """Put a value at the end of a store, and drop the first ones of too many."""
-    store[key] = value
-    store.move_to_end(key)
-    while len(store) > MOST:
-        store.popitem(last=False)
