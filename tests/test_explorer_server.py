@@ -278,6 +278,8 @@ def test_a_list_of_records_is_assessed_part_by_part_and_a_file_taken_out(page):
     answered = page.get("/api/list", params={"answers": f"key={key}&dt=0.01&units=m/s2"}).json()
     (row,) = [row for group in answered["groups"] for row in group["rows"] if row["key"] == key]
     assert row["measures"]["pga"] == 1.0 and answered["room"]["files"] >= 1
+    assert page.post("/api/records", params={"name": "x.at2"}, content=AT2[:300] + b"x").status_code == 422
+    assert page.get("/api/list").json()["room"] == answered["room"]
     records = "motion=el-centro-meloland-270;motion=el-centro-meloland-360"
     params = {**STATUE, "records": records, "levels": "4", "level_from": "0.2g", "level_to": "0.8g"}
     first, *found = frames(page.get("/api/assessment", params=params).content)

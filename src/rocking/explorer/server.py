@@ -317,7 +317,7 @@ class App:
         except ClientDisconnect:
             return Response(status_code=400)
         name, uploads = request.query_params.get("name", ""), self.explorer.uploads
-        found = await self._in_thread(lambda: uploads.contents(uploads.add_file(name, bytes(data))))
+        found = await self._in_thread(lambda: uploads.take(name, bytes(data)))
         return JSONResponse(found, headers=_FRESH)
 
     async def record(self, request: Request) -> Response:

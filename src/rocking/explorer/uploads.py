@@ -11,7 +11,7 @@ from pathlib import PurePosixPath, PureWindowsPath
 from typing import Any, Final, NamedTuple
 
 from rocking.constants import STANDARD_GRAVITY
-from rocking.errors import InvalidMotion, UnreadableRecord
+from rocking.errors import InvalidMotion, RockingError, UnreadableRecord
 from rocking.motion import formats
 from rocking.motion.formats.channel import Channel
 from rocking.motion.formats.source import Request
@@ -91,6 +91,15 @@ class UploadStore:
                 )
             self._files[key] = upload
         return key
+
+    def take(self, name: str, data: bytes) -> dict[str, Any]:
+        """Keep a file, and say what it is; one that cannot be read is not kept."""
+        key = self.add_file(name, data)
+        try:
+            return self.contents(key)
+        except RockingError:
+            self.remove(key)
+            raise
 
     def remove(self, key: str) -> None:
         """Forget a file, and all that was made of it."""

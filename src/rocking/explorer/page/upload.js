@@ -6,23 +6,28 @@ import {one} from "./words.js";
 const LARGEST = 16 * 2 ** 20;
 
 /** @param {File} file */
-async function sendFile(file) {
+export async function sendFile(file) {
   if (file.size > LARGEST) throw new Problem(`${file.name}: it is larger than 16 MiB; cut the record into smaller files`);
   return json("/api/records", {name: file.name}, {method: "POST", body: file});
 }
 
-/** @param {(file: () => Promise<any>, upwards: boolean) => Promise<void>} take */
-export function acceptFiles(take) {
+/** @param {(file: () => Promise<any>, upwards: boolean) => Promise<void>} take @param {(files: File[]) => Promise<void>} list takes several at once */
+export function acceptFiles(take, list) {
   const input = /** @type {HTMLInputElement} */ (one("file"));
   const dropping = one("dropping");
   let upwards = false;
+  /** @param {File[]} files @param {boolean} up */
+  const taken = (files, up) => {
+    if (files.length > 1 && !up) void list(files);
+    else if (files.length) void take(() => sendFile(files[0]), up);
+  };
   for (const button of [one("choose-file"), one("choose-vertical")]) {
-    button.addEventListener("click", () => { upwards = button.id === "choose-vertical"; input.click(); });
+    button.addEventListener("click", () => { upwards = button.id === "choose-vertical"; input.multiple = !upwards; input.click(); });
   }
   input.addEventListener("change", () => {
-    const file = input.files?.[0];
+    const files = [...(input.files ?? [])];
     input.value = "";
-    if (file) void take(() => sendFile(file), upwards);
+    taken(files, upwards);
   });
   // Text and links that are dragged are nothing to open, and the browser shall not go where they lead.
   const brings = (/** @type {DragEvent} */ event) => event.dataTransfer?.types.includes("Files") ?? false;
@@ -37,7 +42,6 @@ export function acceptFiles(take) {
     event.preventDefault();
     depth = 0;
     dropping.hidden = true;
-    const file = event.dataTransfer?.files?.[0];
-    if (file) void take(() => sendFile(file), false);
+    taken([...(event.dataTransfer?.files ?? [])], false);
   });
 }
