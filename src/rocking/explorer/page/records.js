@@ -71,6 +71,7 @@ export class View {
 
   render() {
     const {list} = this;
+    if (!list.ticked) delete this.page.state.assessment.records; // what was not chosen one by one is all that is known now
     const wanted = /** @type {HTMLInputElement} */ (one("records-search")).value.toLowerCase().split(/\s+/).filter(Boolean);
     const seen = (/** @type {Group} */ group, /** @type {Row} */ row) => wanted.every((word) => `${group.title} ${row.title} ${row.label}`.toLowerCase().includes(word));
     const groups = list.groups.map((/** @type {Group} */ group) => ({...group, rows: group.rows.filter((row) => seen(group, row))})).filter((/** @type {Group} */ group) => group.rows.length);
