@@ -13,7 +13,7 @@ import sys
 import threading
 from contextlib import contextmanager
 from pathlib import Path
-from urllib.parse import parse_qs, parse_qsl, urlsplit
+from urllib.parse import parse_qs, parse_qsl, urlencode, urlsplit
 
 import explorer_addresses
 import numpy as np
@@ -1196,6 +1196,117 @@ def test_two_blocks_or_two_motions_are_compared(opened, what):
     page.until(f"document.getElementById('compare-verdict').textContent.includes({words!r})")
 
 
+# Records, assessment, units, paper
+
+
+def dropped(page, files):
+    """Drop files on the page at once: texts by their names."""
+    page.js(
+        """(files) => {
+            const carried = new DataTransfer();
+            for (const [name, text] of Object.entries(files)) carried.items.add(new File([text], name));
+            window.dispatchEvent(new DragEvent("drop", {dataTransfer: carried, cancelable: true}));
+        }""",
+        files,
+    )
+    page.until("document.body.dataset.added", "all files are in the list")
+
+
+def test_many_files_are_dropped_asked_about_once_sorted_searched_and_shake_the_block(opened, explorer):
+    for key in explorer.uploads.kept():
+        explorer.uploads.remove(key)
+    page = opened("width=0.24&height=1.1&motion=ridgecrest-clc-090")
+    level = np.random.default_rng(5).normal(size=600)
+    names = [f"station{k}_{part}.txt" for k in (1, 2) for part in ("ns", "ew", "up")]
+    dropped(page, {name: "\n".join(map(str, (k + 1) * 0.05 * level)) for k, name in enumerate(names)})
+    assert query_of(page)["view"] == "records" and page.text("#records-said") == "6 of 6 files were read."
+    asked = page.text("#records-missing")
+    assert asked.count("6 files of one drop do not say") == 2 and "PGA" in asked
+    assert page.page.locator("tr.station").count() == 5
+    assert page.page.locator("[data-record]:disabled").count() == 6
+    for button in ("all g", "all 0.01 s"):
+        page.page.locator("#records-missing button", has_text=re.compile(f"^{button}$")).click()
+        page.until(f"!document.getElementById('records-missing').textContent.includes('{button}')")
+    assert not page.page.is_visible("#records-missing")
+    page.page.fill("#records-search", "station2")
+    assert page.page.locator("[data-record]").all_text_contents() == names[3:]
+    page.page.locator(".sorting", has_text="PGA").click()
+    assert page.page.locator("[data-record]").all_text_contents() == [names[4], names[3], names[5]]
+    assert page.page.get_attribute("#records-table th[aria-sort]", "aria-sort") == "descending"
+    page.page.check("#records-vertical")
+    page.rested(lambda: page.page.click(f"[data-record]:text-is('{names[4]}')"))
+    query = query_of(page)
+    assert query["motion"].startswith("file:") and query["vertical"].startswith("file:")
+    assert (query["units"], query["dt"]) == ("g", "0.01") and query["vertical"] != query["motion"]
+    assert page.page.get_attribute("[data-record][aria-current]", "data-record") == f"{query['motion']}#"
+    page.page.fill("#records-search", "china lake 360")
+    page.rested(lambda: page.page.click("[data-record]"))
+    assert query_of(page)["motion"] == "ridgecrest-clc-360"
+    page.page.fill("#records-search", "station")
+    for left in (1, 0):
+        page.page.locator("tr.station button").first.click()
+        page.until(f"document.querySelectorAll('tr.station').length === {left}")
+
+
+def test_an_assessment_is_the_packages_fragility_and_stops_when_the_reader_goes(opened):
+    records = "motion=el-centro-meloland-270;motion=el-centro-meloland-360;motion=ridgecrest-clc-360"
+    query = {"view": "assessment", "records": records, "levels": "6", "level_from": "0.2g", "level_to": "0.9g"}
+    page = opened(f"{STATUE}&{urlencode({**query, 'friction': '0.2'})}")
+    page.until("document.body.dataset.assessment === 'complete'", "the assessment is complete")
+    motions = [rocking.records.load(part.removeprefix("motion=")) for part in records.split(";")]
+    block, levels = rocking.Block(width=0.24, height=1.1), np.linspace(0.2, 0.9, 6) * 9.80665
+    curve = rocking.fragility(block, motions, levels=levels, polarity="both", progress=False).curves[0]
+    assert f"at {curve.median / 9.80665:.3g} g (with 90 % confidence" in page.text("#assessment-verdict")
+    assert page.page.locator("#assessment-records tbody tr").count() == 3
+    assert "slides before it rocks" in page.text("#assessment-figures")
+    assert "may overturn under 3 of 3" in page.text("#assessment-rules")
+    assert "rocking.fragility(block" in page.text("#python") and "rocking fragility el-centro" in page.text("#command")
+    assert query_of(page)["records"] == records
+    page.page.fill("#levels", "60")
+    page.page.press("#levels", "Enter")
+    page.until("document.body.dataset.assessment === 'running'")
+    done = page.js("document.body.dataset.assessed")
+    page.page.click("[data-view=response]")
+    page.page.wait_for_timeout(500)
+    assert page.js("document.body.dataset.assessed") == done and not page.page.is_visible("#problem")
+
+
+def test_units_are_chosen_once_and_in_the_address(opened):
+    page = opened(f"{STATUE}&length_in=cm&angle_in=rad&acceleration_in=m/s2")
+    assert page.page.input_value("#width") == "24" and page.page.input_value("#pga") == "3.923"
+    assert "α = 0.215 rad" in page.text("#derived") and "lifts above 2.14 m/s²" in page.text("#derived")
+    assert "0.0569 rad at" in page.text("#figures") and peak_shown(page) == pytest.approx(0.265, abs=1e-3)
+    page.rested(lambda: (page.page.fill("#width", "25"), page.page.press("#width", "Enter")))
+    query = query_of(page)
+    assert (query["width"], query["length_in"], query["acceleration_in"]) == ("25cm", "cm", "m/s2")
+    with page.page.expect_event("load"):
+        page.page.select_option("#length_in", "in")
+    page.until("document.body.dataset.rested", "the page is there again")
+    assert page.page.input_value("#width") == "9.843" and query_of(page)["length_in"] == "in"
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_plain_case_is_printed_on_one_light_page_without_controls(opened, scheme):
+    page = opened(STATUE, scheme=scheme)
+    page.js("window.print = () => { document.body.dataset.printed = '1'; }; 1")
+    page.page.click("#print")
+    page.until("document.body.dataset.printed", "the page is ready to be printed")
+    figure = f"{MODELS}.find((each) => each.type === 'Figure').background_fill_color"
+    assert page.js(figure) == "#ffffff"
+    paper = page.page.pdf(prefer_css_page_size=True)
+    assert len(re.findall(rb"/Type\s*/Page\b", paper)) == 1
+    page.page.emulate_media(media="print")
+    controls = page.page.query_selector_all("button, select, input")
+    assert len(controls) > 50 and not any(each.is_visible() for each in controls)
+    head = page.text("#print-head")
+    for part in ("0.24 m x 1.1 m", "ridgecrest-clc-090", "nonlinear", "certified", rocking.__version__, "pga=0.4g"):
+        assert part in head
+    assert "rocks and does not overturn" in page.text("#print-summary")
+    page.page.emulate_media(media="screen")
+    page.js("window.dispatchEvent(new Event('afterprint'))")
+    assert (page.js(figure) == "#ffffff") == (scheme == "light")
+
+
 # People
 
 
@@ -1221,6 +1332,8 @@ def test_no_view_has_a_barrier(opened, viewport, scheme):
             page.until("document.body.dataset.sweep === 'complete'")
         if view == "compare":
             page.until("document.querySelectorAll('#schemes tbody tr').length > 5")
+        if view == "assessment":
+            page.until("document.body.dataset.assessment === 'complete'")
         page.page.wait_for_timeout(300)
         assert barriers(page) == [], view
         assert page.js("document.documentElement.scrollWidth") <= viewport["width"], view

@@ -526,9 +526,11 @@ def test_messages_about_a_file_name_it_and_no_path(explorer):
 def test_files_are_known_by_their_content_and_so_many_at_most():
     uploads = UploadStore()
     assert uploads.add_file("a.txt", b"1 2 3") == uploads.add_file("b.txt", b"1 2 3")
-    for k in range(3 * MOST):
+    for k in range(MOST - 1):
         uploads.add_file("x", str(k).encode())
-    assert len(uploads._files) == MOST
+    with pytest.raises(UnreadableRecord, match="x: it cannot be kept: 120 files and 256 MiB are kept at most"):
+        uploads.add_file("x", b"another")
+    assert uploads.add_file("c.txt", b"1 2 3") in uploads.kept() and len(uploads.kept()) == MOST
     with pytest.raises(UnreadableRecord, match="larger than 16 MiB"):
         uploads.add_file("big", bytes(LARGEST + 1))
 

@@ -146,10 +146,14 @@ def test_meshes_are_known_by_their_content_and_so_many_at_most(here):
     data = content(box())
     key = store.add_mesh("box.stl", data)
     first = read_case({**STATUE, "mesh": f"file:{key}"}, store).block
+    store.remove(key)
     others = [store.add_file(f"{k}.txt", str(k).encode()) for k in range(MOST)]
+    with pytest.raises(UnreadableRecord, match=f"{MOST} files and 256 MiB are kept at most"):
+        store.add_mesh("box.stl", data)
     with pytest.raises(UnreadableRecord, match="this mesh is not here any more: drop its file on the page again"):
         read_case({**STATUE, "mesh": f"file:{key}"}, store)
     assert len({*others, key}) == MOST + 1
+    store.remove(others[0])
     assert store.add_mesh("again.stl", data) == key
     assert read_case({**STATUE, "mesh": f"file:{key}"}, store).block.sides == first.sides
 

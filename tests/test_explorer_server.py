@@ -295,6 +295,28 @@ def test_a_record_is_uploaded_told_about_and_simulated(page):
     assert page.get(f"/api/records/{found['key']}", params={"dt": "0.01", "units": "g"}).json()["missing"] == []
 
 
+def test_a_list_of_records_is_assessed_part_by_part_and_a_file_taken_out(page):
+    key = page.post("/api/records", params={"name": "b_ns.txt"}, content=b"0\n1\n-1\n0\n" * 99).json()["key"]
+    rows = [row for group in page.get("/api/list").json()["groups"] for row in group["rows"]]
+    assert next(row for row in rows if row["key"] == key)["measures"] is None
+    answered = page.get("/api/list", params={"answers": f"key={key}&dt=0.01&units=m/s2"}).json()
+    (row,) = [row for group in answered["groups"] for row in group["rows"] if row["key"] == key]
+    assert row["measures"]["pga"] == 1.0 and answered["usage"]["files"] >= 1
+    assert page.post("/api/records", params={"name": "x.at2"}, content=AT2[:300] + b"x").status_code == 422
+    assert page.get("/api/list").json()["usage"] == answered["usage"]
+    records = "motion=el-centro-meloland-270;motion=el-centro-meloland-360"
+    params = {**STATUE, "records": records, "levels": "4", "level_from": "0.2g", "level_to": "0.8g"}
+    first, *found = frames(page.get("/api/assessment", params=params).content)
+    about = json.loads(first)
+    assert about["problem"] is None and len(about["records"]) == 2 and "rocking.fragility" in about["python"]
+    shares = [unpacked(part)[0]["share"] for part in found]
+    assert len(shares) == 3 and shares[-1] == 1.0 and shares == sorted(shares)
+    assert page.get("/api/assessment", params=STATUE).status_code == 422
+    assert page.request("DELETE", f"/api/records/{key}").status_code == 200
+    assert page.get(f"/api/records/{key}").status_code == 422
+    assert page.request("DELETE", f"/api/records/{key}").status_code == 422
+
+
 @pytest.mark.parametrize("name", ["nga.at2", "single.v2c", "two.v1", "two.v2", "knet.ns", "esm.asc", "even.smc"])
 def test_files_of_many_formats_are_taken(page, name):
     content = (Path(__file__).parent / "data" / "formats" / name).read_bytes()
@@ -374,6 +396,7 @@ def test_a_compressed_record_is_refused_before_it_is_unpacked(monkeypatch):
     key = store.add_file("x", packed.getvalue())
     assert len(store.contents(key)["channels"]) == 1
     monkeypatch.setattr(uploads, "_MOST_SAMPLES", 399_999)
+    store._told.clear()
     peak, words = memory_of(lambda: store.contents(key))
     assert "400000 samples, of which at most 399999 are read here" in words
     assert peak < 2 * quiet.nbytes
@@ -454,6 +477,9 @@ def test_malformed_files_links_and_headers_are_refused_in_words(page, explorer, 
         "given:x",
         "file:" + "f" * 24,
         "1deg",
+        "motion=none;motion=file:x",
+        "motion=ridgecrest-clc-090&vertical=x",
+        "key=x&units=furlong",
         "velocity=-1",
         "ricker:amplitude=1,frequency=1e9,kind=x",
     ]
@@ -468,6 +494,8 @@ def test_malformed_files_links_and_headers_are_refused_in_words(page, explorer, 
         "/api/export",
         "/api/study",
         "/api/records/x",
+        "/api/list",
+        "/api/assessment",
     ]
     keys = [
         *STATUE,
@@ -487,6 +515,9 @@ def test_malformed_files_links_and_headers_are_refused_in_words(page, explorer, 
         "at_y",
         "initial_rotation",
         "other.width",
+        "records",
+        "answers",
+        "levels",
     ]
     statuses = set()
     for _ in range(count // 3):
@@ -578,7 +609,11 @@ def test_the_server_answers_over_a_socket_and_compiles_ahead(running, browser):
 
 @pytest.mark.parametrize(
     ("path", "axes"),
-    [("map", {"x": "omega", "y": "a", "points": "400"}), ("sweep", {"sweep": "a", "sweep_points": "400"})],
+    [
+        ("map", {"x": "omega", "y": "a", "points": "400"}),
+        ("sweep", {"sweep": "a", "sweep_points": "400"}),
+        ("assessment", {"records": "motion=ridgecrest-clc-090;" * 90, "levels": "60"}),
+    ],
 )
 def test_a_map_that_nobody_reads_any_more_stops(running, browser, path, axes):
     base = f"http://127.0.0.1:{running.port}"

@@ -134,7 +134,7 @@ def case_as_command(case: Case) -> str | None:
         return None
     left_out = {*BLOCK_NAMES, "motion", "vertical"}
     options = {**case.block_options} | {name: case.texts[name] for name in NAMES if name in {*case.texts} - left_out}
-    return _command(["rocking", "simulate", *case.words], options)
+    return command_line(["rocking", "simulate", *case.words], options)
 
 
 def map_as_python(grid: MapGrid, quantity: str) -> str:
@@ -175,9 +175,9 @@ def map_as_command(grid: MapGrid) -> str | None:
         "amplitudes": _range(grid.y),
         "frequencies": _range(grid.x),
         **{each: value for each, value in written.items() if each not in ("amplitude", "frequency")},
-        **_block_options(grid.case),
+        **block_options(grid.case),
     }
-    return _command(["rocking", "map", name], options)
+    return command_line(["rocking", "map", name], options)
 
 
 def map_as_code(grid: MapGrid) -> dict[str, Any]:
@@ -222,9 +222,9 @@ def sweep_as_command(sweep: Sweep) -> str | None:
         "along": f"{name}:{first!r}:{last!r}:{len(sweep.axis.values)}",
         "start": "0,0",
         "transient": str(PASSED - 1),
-        **_block_options(sweep.case),
+        **block_options(sweep.case),
     }
-    return _command(["rocking", "bifurcation"], options)
+    return command_line(["rocking", "bifurcation"], options)
 
 
 def sweep_as_code(sweep: Sweep) -> dict[str, Any]:
@@ -232,12 +232,13 @@ def sweep_as_code(sweep: Sweep) -> dict[str, Any]:
     return {"python": sweep_as_python(sweep), "command": sweep_as_command(sweep)}
 
 
-def _block_options(case: Case) -> dict[str, str]:
+def block_options(case: Case) -> dict[str, str]:
     """Options that describe the block and its model."""
     return {**case.block_options, **{each: case.texts[each] for each in ("model",) if each in case.texts}}
 
 
-def _command(words: list[str], options: Mapping[str, str]) -> str:
+def command_line(words: list[str], options: Mapping[str, str]) -> str:
+    """Write a command with its options, as a shell takes it."""
     return shlex.join([*words, *itertools.chain.from_iterable(itertools.starmap(as_option, options.items()))])
 
 

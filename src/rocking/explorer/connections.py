@@ -43,7 +43,7 @@ class BoundedProtocol(H11Protocol):
         """Begin to wait for a head."""
         super().connection_made(transport)
         self._wait(HEAD)
-        self._make_room()
+        self._drop_oldest()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Wait no more."""
@@ -65,20 +65,20 @@ class BoundedProtocol(H11Protocol):
         """Wait for the next head, and until the answer is taken."""
         self._wait(ANSWER if self.transport.get_write_buffer_size() else HEAD)
         super().on_response_complete()
-        self._make_room()
+        self._drop_oldest()
 
     def pause_writing(self) -> None:
         """Note since when the other end does not read."""
         self._since = self.loop.time()
         super().pause_writing()
-        self._make_room()
+        self._drop_oldest()
 
     def _wait(self, limit: float) -> None:
         self._stop()
         self._since, self._unsent = self.loop.time(), self.transport.get_write_buffer_size()
         self._timer = self.loop.call_later(limit, self._expire)
 
-    def _make_room(self) -> None:
+    def _drop_oldest(self) -> None:
         """End the connection that has waited for longest, if too many wait."""
         waiting = [each for each in self.connections if isinstance(each, BoundedProtocol) and each.waits]
         if len(waiting) > MOST:

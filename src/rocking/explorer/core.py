@@ -121,7 +121,7 @@ class Explorer:
 
     def take_record(self, name: str, data: bytes) -> dict[str, Any]:
         """Keep a record file, and say what it is."""
-        return self.uploads.contents(self.uploads.add_file(name, data))
+        return self.uploads.take(name, data)
 
     def take_mesh(self, name: str, data: bytes) -> dict[str, Any]:
         """Keep a mesh, and say in which direction its body is lifted first; or what is wrong and may be corrected."""

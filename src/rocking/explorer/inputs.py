@@ -237,7 +237,7 @@ def _written(arguments: Mapping[str, Any]) -> str:
     return ", ".join(f"{name}={value!r}" for name, value in arguments.items())
 
 
-class _Found(NamedTuple):
+class Found(NamedTuple):
     """A motion, how Python makes it, and how the command line names it."""
 
     motion: Motion | None
@@ -245,7 +245,13 @@ class _Found(NamedTuple):
     words: tuple[str, ...]
 
 
-def _motion(given: Texts, values: Values, uploads: UploadStore) -> _Found:
+def read_motion(texts: Texts, uploads: UploadStore) -> Found:
+    """Read the texts of a motion alone, as `read_case` does those of a case."""
+    given = {name: text for name, text in _given(texts).items() if name in names_of("motion")}
+    return _motion(given, {name: PARAMETERS[name].read(text) for name, text in given.items()}, uploads)
+
+
+def _motion(given: Texts, values: Values, uploads: UploadStore) -> Found:
     target = scaling({name: given[name] for name in SCALINGS if name in given}, _level)
     name = values.get("motion", DEFAULT["motion"])
     found = _unscaled(name, values, uploads)
@@ -255,7 +261,7 @@ def _motion(given: Texts, values: Values, uploads: UploadStore) -> _Found:
         return found
     if found.motion is None:
         raise InvalidOption("there is no motion to scale: choose one, or leave the scaling out")
-    return _Found(_scaled(found.motion, *target), f"{found.python}.{_scaling_as_python(*target)}", found.words)
+    return Found(_scaled(found.motion, *target), f"{found.python}.{_scaling_as_python(*target)}", found.words)
 
 
 def _level(text: str, name: str) -> float:
@@ -275,7 +281,7 @@ _together = functools.lru_cache(maxsize=4)(Motion.with_vertical)
 _shipped = functools.cache(records.load)
 
 
-def _with_vertical(found: _Found, horizontal: str, values: Values, uploads: UploadStore) -> _Found:
+def _with_vertical(found: Found, horizontal: str, values: Values, uploads: UploadStore) -> Found:
     """Add the vertical component, which is read with the same step and units as the motion."""
     name, (kind, _, key) = values["vertical"], horizontal.partition(":")
     if found.motion is None or is_pulse(horizontal) or kind == "given":
@@ -290,38 +296,38 @@ def _with_vertical(found: _Found, horizontal: str, values: Values, uploads: Uplo
         vertical, words = _from_file(key, values, name, uploads), (name,)
     else:
         raise InvalidOption(f"{{}}: there is no shipped record {name[:40]!r}", "vertical", value=name)
-    return _Found(
+    return Found(
         _together(found.motion, vertical.motion),
         f"{found.python}.with_vertical({vertical.python})",
         (*found.words, *as_option("vertical", *words)) if found.words and words else (),
     )
 
 
-def _unscaled(name: str, values: Values, uploads: UploadStore) -> _Found:
+def _unscaled(name: str, values: Values, uploads: UploadStore) -> Found:
     kind, _, key = name.partition(":")
     if name == "none":
-        return _Found(None, "None", ())
+        return Found(None, "None", ())
     if is_pulse(name):
         call = pulse_call(name, {parameter: repr(value) for parameter, value in arguments_of(name).items()})
-        return _Found(pulse_of(name), call, ("--pulse", name))
+        return Found(pulse_of(name), call, ("--pulse", name))
     if kind == "given":
         motion = uploads.motion(key)
         name = "".join(
             letter for letter in motion.name if letter.isprintable()
         )  # one that ends the line ends the comment
-        return _Found(motion, f"...  # {name}: the motion that this page was opened with", ())
+        return Found(motion, f"...  # {name}: the motion that this page was opened with", ())
     if kind == "file":
         return _from_file(key, values, values.get("channel"), uploads)
-    return _Found(_shipped(name), f"rocking.records.load({name!r})", (name,))
+    return Found(_shipped(name), f"rocking.records.load({name!r})", (name,))
 
 
-def _from_file(key: str, values: Values, channel: str | None, uploads: UploadStore) -> _Found:
+def _from_file(key: str, values: Values, channel: str | None, uploads: UploadStore) -> Found:
     """Read a channel of a file with the step and the units that the texts give."""
     given: dict[str, Any] = {"channel": channel, "dt": values.get("dt"), "units": values.get("units")}
     file = uploads.file(key).name
     arguments = _written({name: value for name, value in given.items() if value is not None})
     call = f"rocking.read({file!r}{', ' if arguments else ''}{arguments})"
-    return _Found(uploads.read(key, **given), call, (as_path(file),))
+    return Found(uploads.read(key, **given), call, (as_path(file),))
 
 
 def as_path(name: str) -> str:

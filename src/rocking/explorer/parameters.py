@@ -33,7 +33,9 @@ from rocking.solid.reading import SHIPPED
 from rocking.solid.reading import UNITS as MESH_UNITS
 
 #: Parameters that one form sets together, and that a comparison replaces together.
-Group = Literal["block", "motion", "start", "model", "map", "sweep", "reading", "pulse", "treatment"]
+Group = Literal[
+    "block", "motion", "start", "model", "map", "sweep", "reading", "assessment", "pulse", "treatment",
+]  # fmt: skip
 
 Kind = Literal[
     "text", "number", "length", "position", "angle", "rate", "duration", "velocity", "frequency", "acceleration",
@@ -241,6 +243,23 @@ READING: Final = _by_name(Parameter("at", "Time", "reading", "duration", "s"))
 
 #: Kinds of files that are read as meshes, by the ends of their names.
 MESH_KINDS: Final = ("obj", "ply", "stl", "glb", "gltf")
+#: What an address says about an assessment, and about the list of records it is made of.
+ASSESSMENT: Final = _by_name(
+    Parameter("records", "records", "assessment", "text"),
+    Parameter("measure", "Intensity", "assessment", "text", default="pga"),
+    Parameter("measure_period", "at a period of", "assessment", "duration", "s", "1"),
+    Parameter("level_from", "Levels from", "assessment", "acceleration", "g"),
+    Parameter("level_to", "Levels to", "assessment", "acceleration", "g"),
+    Parameter("levels", "Levels", "assessment", default="16"),
+    Parameter("friction", "Friction coefficient of the base", "assessment"),
+)
+
+#: Units that the page shows lengths, angles and accelerations in, and the default of each first.
+SHOWN_IN: Final[Mapping[str, tuple[str, ...]]] = {
+    "length_in": ("m", "cm", "ft", "in"),
+    "angle_in": ("deg", "rad"),
+    "acceleration_in": ("g", "m/s2"),
+}
 
 #: The case that is shown when nothing is asked for: it chatters, rests and rocks on several times.
 DEFAULT: Final = {name: PARAMETERS[name].default for name in ("width", "height", "motion", "pga")}
@@ -380,7 +399,7 @@ def field_label(name: str, motion: str = "") -> str:
     ('“Amplitude”', '“Velocity amplitude”')
     """
     shown = PULSES.get(motion.partition(":")[0])
-    known = PARAMETERS | MAP | SWEEP | READING | _by_name(_PERIOD)
+    known = PARAMETERS | MAP | SWEEP | READING | ASSESSMENT | _by_name(_PERIOD)
     labels = {
         each.label
         for pulse in (PULSES.values() if shown is None else [shown])
@@ -401,6 +420,8 @@ def specification() -> dict[str, Any]:
         "parameters": [parameter.described() for parameter in PARAMETERS.values()],
         "map": list(MAP),
         "sweep": list(SWEEP),
+        "assessment": list(ASSESSMENT),
+        "shown_in": {name: list(units) for name, units in SHOWN_IN.items()},
         "shapes": [shape._asdict() for shape in SHAPES],
         "scalings": [["", "as it is"], *SCALINGS.items()],
         "period": _PERIOD.described(),
@@ -421,4 +442,10 @@ def specification() -> dict[str, Any]:
 
 def _record(name: str) -> dict[str, str]:
     record = records.info(name)
-    return {"name": name, "event": record.event, "station": record.station, "direction": record.direction}
+    return {
+        "name": name,
+        "title": record.title,
+        "event": record.event,
+        "station": record.station,
+        "direction": record.direction,
+    }

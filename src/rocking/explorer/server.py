@@ -24,8 +24,9 @@ from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
 from rocking.errors import InvalidOption, RockingError
-from rocking.explorer import maps, periodic, readings, sweeps
+from rocking.explorer import assessment, maps, periodic, readings, sweeps
 from rocking.explorer.background import Compilation, low_priority
+from rocking.explorer.catalogue import entries_of, listing
 from rocking.explorer.code import map_as_code, sweep_as_code
 from rocking.explorer.core import EXPORTS, Explorer
 from rocking.explorer.inputs import Case, read_case
@@ -161,6 +162,7 @@ class App:
             ),
             "/api/orbit": lambda query: periodic.orbit(self._case(query)),
             "/api/sweep/point": self._point_of_sweep,
+            "/api/list": lambda query: listing(explorer.uploads, entries_of(query.given.get("answers", ""))),
             "/api/study": lambda query: self._study().slice(query.others),
             "/api/study/point": lambda query: self._study().texts_at(query.others, explorer.uploads),
             "/api/study/response": lambda query: readings.thumbnail(
@@ -175,10 +177,12 @@ class App:
                 *(Route(path, self._answering(work)) for path, work in answers.items()),
                 Route("/api/map", self.map),
                 Route("/api/sweep", self.sweep),
+                Route("/api/assessment", self.assessment),
                 Route("/api/export", self.export),
                 Route("/api/records", self._receiving(explorer.take_record), methods=["POST"]),
                 Route("/api/meshes", self._receiving(explorer.take_mesh), methods=["POST"]),
                 Route("/api/records/{key}", self.record),
+                Route("/api/records/{key}", self.forget, methods=["DELETE"]),
             ],
             exception_handlers={RockingError: _refusal, Exception: _failure},
             lifespan=self._lifespan,
@@ -274,6 +278,15 @@ class App:
 
         return await self._streamed(request, begun)
 
+    async def assessment(self, request: Request) -> Response:
+        """Stream an assessment: what it is of, then what each record adds to it, each a payload."""
+
+        def begun(query: Query) -> _Stream:
+            found = assessment.assessment_of(self._case(query), query.others, self.explorer.uploads)
+            return _Stream(assessment.described(found), assessment.parts(found), pack)
+
+        return await self._streamed(request, begun)
+
     async def _streamed(self, request: Request, begin: Callable[[Query], _Stream]) -> Response:
         stream = await self._in_thread(lambda: begin(Query(request.query_params)))
         return StreamingResponse(
@@ -326,6 +339,11 @@ class App:
         key, units = request.path_params["key"], query.given.get("units") or None
         found = await self._in_thread(lambda: uploads.contents(key, query.number("dt"), units))
         return JSONResponse(found, headers=_FRESH)
+
+    async def forget(self, request: Request) -> Response:
+        """Forget a file that is kept."""
+        await self._in_thread(lambda: self.explorer.uploads.remove(request.path_params["key"]))
+        return JSONResponse(self.explorer.uploads.usage(), headers=_FRESH)
 
 
 class _Stream(NamedTuple):

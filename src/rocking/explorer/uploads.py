@@ -1,4 +1,4 @@
-"""Records and meshes that were given: files in memory, so many at most, each known by a hash of its content."""
+"""Records and meshes that were given: files in memory within bounds, each known by a hash of its content."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import PurePosixPath, PureWindowsPath
 from typing import Any, Final, NamedTuple
 
 from rocking.constants import STANDARD_GRAVITY
-from rocking.errors import InvalidMotion, UnreadableRecord
+from rocking.errors import InvalidMotion, RockingError, UnreadableRecord
 from rocking.explorer.meshes import MeshStore
 from rocking.explorer.parameters import MESH_KINDS
 from rocking.motion import formats
@@ -24,11 +24,15 @@ from rocking.plausibility import motion_notes
 #: Largest file, bytes: twenty times a long record of three channels.
 LARGEST: Final = 16 * 2**20
 
-#: Files that are kept; the one that was not used for longest is the first to go.
-MOST: Final = 12
+#: Files that are kept, forty stations of three components, and their bytes; more are refused, since none goes unseen.
+MOST: Final = 120
+ALL: Final = 256 * 2**20
 
 #: Samples of one channel at most: an hour and a half at a hundred a second. A motion takes some 120 bytes for each.
 LONGEST: Final = 500_000
+
+#: Samples of the motions that stay in memory once they are read, of 120 bytes each; those used longest ago go first.
+READ: Final = 3_000_000
 
 #: Lines of a file at most: two such channels with a line for each sample. Samples that may be compressed in one.
 _MOST_LINES, _MOST_SAMPLES = 2 * LONGEST, 8 * LONGEST
@@ -63,6 +67,7 @@ class UploadStore:
         self._lock = threading.Lock()
         self._files: OrderedDict[str, Upload] = OrderedDict()
         self._read: OrderedDict[tuple[str, ...], Motion] = OrderedDict()
+        self._told: dict[tuple[str, ...], dict[str, Any]] = {}
         self._motions: dict[str, Motion] = {}
         self.meshes = MeshStore(lambda key: self.file(key, "mesh"))
 
@@ -83,7 +88,7 @@ class UploadStore:
     def add_mesh(self, name: str, data: bytes) -> str:
         """Keep a mesh, and return its key."""
         upload = Upload(bare_name(name), data)
-        if PurePosixPath(upload.name).suffix.lower().removeprefix(".") not in MESH_KINDS:
+        if not _is_mesh(upload.name):
             kinds = ", ".join(MESH_KINDS)
             raise UnreadableRecord(f"is no mesh by its name: files of {kinds} are read here", path=upload.name)
         if len(data) > LARGEST:
@@ -93,8 +98,44 @@ class UploadStore:
     def _kept(self, upload: Upload) -> str:
         key = hashlib.sha256(upload.data).hexdigest()[:_HASH]
         with self._lock:
-            _keep(self._files, key, upload)
+            others = [each for known, each in self._files.items() if known != key]
+            if len(others) >= MOST or len(upload.data) + sum(len(each.data) for each in others) > ALL:
+                raise UnreadableRecord(
+                    f"it cannot be kept: {MOST} files and {ALL // 2**20} MiB are kept at most; take some out of "
+                    "the list of records first",
+                    path=upload.name,
+                )
+            self._files[key] = upload
         return key
+
+    def take(self, name: str, data: bytes) -> dict[str, Any]:
+        """Keep a file, and say what it is; one that cannot be read is not kept."""
+        key = self.add_file(name, data)
+        try:
+            return self.contents(key)
+        except RockingError:
+            self.remove(key)
+            raise
+
+    def remove(self, key: str) -> None:
+        """Forget a file, and all that was made of it."""
+        self.file(key)
+        with self._lock:
+            self._files.pop(key, None)
+            for store in (self._read, self._told):
+                for request in [each for each in store if each[0] == key]:
+                    store.pop(request, None)
+
+    def kept(self) -> tuple[str, ...]:
+        """Return the keys of the records that are kept, in the order in which they came."""
+        with self._lock:
+            return tuple(key for key, each in self._files.items() if not _is_mesh(each.name))
+
+    def usage(self) -> dict[str, int]:
+        """Say how many files are kept, of how many bytes, and how many may be."""
+        with self._lock:
+            held = sum(len(each.data) for each in self._files.values())
+            return {"files": len(self._files), "bytes": held, "most_files": MOST, "most_bytes": ALL}
 
     def add_motion(self, motion: Motion) -> str:
         """Keep a motion of the program's own, and return its key."""
@@ -120,7 +161,6 @@ class UploadStore:
         with self._lock:
             if key not in self._files:
                 raise UnreadableRecord(f"this {what} is not here any more: drop its file on the page again")
-            self._files.move_to_end(key)
             return self._files[key]
 
     def read(self, key: str, channel: str | None, dt: float | None, units: str | None) -> Motion:
@@ -133,12 +173,24 @@ class UploadStore:
             return known
         motion = _shown(upload, formats.chosen(upload.stream(), _request(dt, units, channel)))
         with self._lock:
-            _keep(self._read, request, motion)
+            self._read[request] = motion
+            self._read.move_to_end(request)
+            while len(self._read) > 1 and sum(_samples(each) for each in self._read.values()) > READ:
+                self._read.popitem(last=False)
         return motion
 
     def contents(self, key: str, dt: float | None = None, units: str | None = None) -> dict[str, Any]:
         """Say what a file is: its format, its channels, and which arguments it needs before it can be read."""
-        upload = self.file(key)
+        upload, request = self.file(key), (key, str(dt), str(units))
+        if request not in self._told:
+            told = self._contents(key, upload, dt, units)
+            with self._lock:
+                if len(self._told) >= 4 * MOST:
+                    self._told.clear()
+                self._told[request] = told
+        return self._told[request]
+
+    def _contents(self, key: str, upload: Upload, dt: float | None, units: str | None) -> dict[str, Any]:
         given: dict[str, Any] = {"dt": dt, "units": units}
         missing: list[str] = []
         while True:
@@ -157,10 +209,25 @@ class UploadStore:
             "format": identification.format,
             "reason": identification.reason,
             "missing": missing,
-            "channels": [
-                {"number": each.number, "name": each.name, **_told(_shown(upload, each), missing)} for each in channels
-            ],
+            "channels": [{**_about(each), **_told(_shown(upload, each), missing)} for each in channels],
         }
+
+
+def _samples(motion: Motion) -> int:
+    return len(motion.breakpoints)
+
+
+def _about(channel: Channel) -> dict[str, Any]:
+    """Return what the file says of a channel."""
+    return {
+        "number": channel.number,
+        "name": channel.name,
+        "station": channel.station,
+        "event": channel.event,
+        "azimuth": channel.azimuth,
+        "samples": len(channel.acceleration),
+        "step": channel.dt,
+    }
 
 
 def _request(dt: float | None, units: str | None, channel: str | None = None) -> Request:
@@ -178,7 +245,7 @@ def _shown(upload: Upload, channel: Channel) -> Motion:
 def _told(motion: Motion, missing: list[str]) -> dict[str, Any]:
     """Say what looks like a mistake in a channel; or what it would be with each choice of what is missing."""
     if not missing:
-        return {"notes": list(motion_notes(motion)), "choices": {}}
+        return {"notes": list(motion_notes(motion)), "choices": {}, "measures": measures(motion)}
     choices: dict[str, list[list[str]]] = {}
     if "units" in missing:
         units = {name: unit for name in CHOICES if (unit := find_unit(name)) is not None}
@@ -187,7 +254,21 @@ def _told(motion: Motion, missing: list[str]) -> dict[str, Any]:
     if "dt" in missing:
         steps = motion.duration / _STAND_INS["dt"]
         choices["dt"] = [[f"{step:g}", f"{step:g} s: it lasts {steps * step:.4g} s"] for step in _STEPS]
-    return {"notes": [], "choices": choices}
+    return {"notes": [], "choices": choices, "measures": None}
+
+
+def measures(motion: Motion) -> dict[str, float]:
+    """Return what a list of records shows of each: PGA (m/s^2), PGV (m/s), 5-95 % duration and whole duration (s)."""
+    return {
+        "pga": motion.pga,
+        "pgv": motion.pgv,
+        "significant": motion.significant_duration(0.05, 0.95),
+        "duration": motion.duration,
+    }
+
+
+def _is_mesh(name: str) -> bool:
+    return PurePosixPath(name).suffix.lower().removeprefix(".") in MESH_KINDS
 
 
 def bare_name(name: str) -> str:
@@ -201,11 +282,3 @@ def bare_name(name: str) -> str:
     last = PurePosixPath(PureWindowsPath(name).name).name
     shown = "".join(letter for letter in last if letter.isprintable()).strip()
     return shown[-_NAME:] or "record"
-
-
-def _keep(store: OrderedDict[Any, Any], key: object, value: object) -> None:
-    """Put a value at the end of a store, and drop the first ones of too many."""
-    store[key] = value
-    store.move_to_end(key)
-    while len(store) > MOST:
-        store.popitem(last=False)

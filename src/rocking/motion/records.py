@@ -8,6 +8,7 @@ channel has a near-fault pulse. The values are exactly those published.
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import dataclass
 from importlib import resources
 from importlib.resources.abc import Traversable
@@ -62,6 +63,21 @@ class Record:
     denominator: int
     source: str
     terms: str
+
+    @property
+    def title(self) -> str:
+        """Place and year of the event, station and direction, in few words.
+
+        Examples
+        --------
+        >>> info("ridgecrest-clc-090").title, info("el-centro-meloland-up").title
+        ('Ridgecrest 2019, China Lake, 090', 'Imperial Valley 1979, El Centro Meloland overpass, up')
+        """
+        year = re.search(r"(?:19|20)\d{2}", self.event)
+        place, *more = re.sub(r"^(?:[A-Z]{2}\.\w+|\d+) ", "", self.station).split(", ")
+        crossing = [part.partition(" / ")[2] for part in more if " / " in part]
+        event = self.event.partition(",")[0] + (f" {year[0]}" if year else "")
+        return f"{event}, {' '.join([place, *crossing])}, {self.direction}"
 
 
 def names() -> tuple[str, ...]:

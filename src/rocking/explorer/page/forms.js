@@ -235,7 +235,7 @@ export class MotionForm {
     /** @param {string} name */
     const field = (name) => parameter(name).label;
     this.kind = choice(prefix, "kind", "Shaken by", KINDS, shaken);
-    this.record = choice(prefix, "record", field("motion"), specification.records.map((/** @type {any} */ each) => [each.name, each.name]), another);
+    this.record = choice(prefix, "record", field("motion"), specification.records.map((/** @type {any} */ each) => [each.name, each.title]), another);
     this.about = make("p", {className: "derived"});
     this.pulse = choice(prefix, "pulse", "Pulse", Object.entries(specification.pulses).map(([name, each]) => [name, each.label]), (name) => { this.showPulse(name); chosen(); });
     this.numbers = make("div");

@@ -1,4 +1,4 @@
-// Lecture mode: the stage large, with large text, the plots beside it where there is room, and nothing else on the screen.
+// Lecture mode: the stage large, with large text, the plots beside it where the screen is wide, and nothing else on the screen.
 
 import {enlarge} from "./theme.js";
 import {one} from "./words.js";

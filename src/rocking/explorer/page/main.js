@@ -10,7 +10,10 @@ import {Histories} from "./histories.js";
 import {PhasePanel} from "./phase.js";
 import {Lecture} from "./lecture.js";
 import {Sheet} from "./sheet.js";
+import {RecordList} from "./list.js";
+import {makePrinting} from "./print.js";
 import {coarse} from "./theme.js";
+import {angle, ofG, unitFields} from "./units.js";
 import {acceptFiles} from "./upload.js";
 import {counted, fixed, legend, make, one, say, short} from "./words.js";
 
@@ -19,8 +22,8 @@ import {counted, fixed, legend, make, one, say, short} from "./words.js";
 const state = readAddress();
 
 /** What the views share.
- * @type {{state: import("./parameters.js").State, shown: import("./api.js").Payload | null, go: typeof go, problem: typeof problem, restate: typeof restate, follow: typeof follow, remember: (parts: Partial<import("./parameters.js").Good>) => void}} */
-const page = {state, shown: null, go, problem, restate, follow, remember: (parts) => accepted(state, parts)};
+ * @type {{state: import("./parameters.js").State, shown: import("./api.js").Payload | null, go: typeof go, problem: typeof problem, restate: typeof restate, follow: typeof follow, list: RecordList, remember: (parts: Partial<import("./parameters.js").Good>) => void}} */
+const page = {state, shown: null, go, problem, restate, follow, list: new RecordList(state), remember: (parts) => accepted(state, parts)};
 /** @type {Record<string, any>} */
 const views = {};
 
@@ -147,20 +150,23 @@ function restate(texts) {
 }
 
 /** Whether a view shows something else than a response, with files and code of its own. @param {string} name */
-const ofOwn = (name) => name === "map" || name === "periodic";
+const ofOwn = (name) => name === "map" || name === "periodic" || name === "assessment";
 
 /** Show another view. @param {string} name */
 async function go(name) {
   state.view = name;
   for (const button of document.querySelectorAll("[data-view]")) {
-    if (/** @type {HTMLElement} */ (button).dataset.view === name) button.setAttribute("aria-current", "page");
+    if (/** @type {HTMLElement} */ (button).dataset.view === name) {
+      button.setAttribute("aria-current", "page");
+      button.scrollIntoView({block: "nearest", inline: "nearest"});
+    }
     else button.removeAttribute("aria-current");
   }
   const parts = {
-    summary: !ofOwn(name), "view-histories": name === "response" || name === "block", "view-response": name === "response",
+    summary: !ofOwn(name) || name === "assessment", "view-histories": name === "response" || name === "block", "view-response": name === "response",
     "view-phase": name === "response" || name === "block",
     "view-block": name === "block", "view-map": name === "map", "view-periodic": name === "periodic",
-    "view-compare": name === "compare",
+    "view-compare": name === "compare", "view-records": name === "records", "view-assessment": name === "assessment",
   };
   for (const [id, shown] of Object.entries(parts)) one(id).hidden = !shown;
   one("figures").hidden = one("at-slider").hidden = name === "block";
@@ -186,7 +192,7 @@ function draw() {
   showFigures(header);
   const [plus, minus] = header.block.thresholds_g;
   const [right, left] = header.block.sides.map((/** @type {any} */ side, /** @type {number} */ k) =>
-    `p = ${short(side.p)} rad/s, α = ${short((side.alpha * 180) / Math.PI)}°, η = ${short(side.restitution)}; lifts above ${short([plus, minus][k])} g`);
+    `p = ${short(side.p)} rad/s, α = ${angle(side.alpha)}, η = ${short(side.restitution)}; lifts above ${ofG([plus, minus][k])}`);
   const {body} = header.block;
   const [to, fro] = body ? [`Towards ${short(body.azimuth, 4)}°`, `Towards ${short((body.azimuth + 180) % 360, 4)}°`] : ["To the right", "To the left"];
   put(one("derived"), right === left ? `${right}.` : `${to} ${right}. ${fro} ${left}.`);
@@ -202,8 +208,8 @@ function draw() {
 function entitle({block, motion}) {
   const view = document.querySelector("[data-view][aria-current]")?.textContent;
   const {study} = specification, [{p, alpha}] = block.sides;
-  const shaken = motion ? `${motion.name} ${short(motion.pga_g)} g` : "no ground motion";
-  const shown = study && state.view === "map" ? `study ${study.name}` : `p = ${short(p)} rad/s, α = ${short((alpha * 180) / Math.PI)}°, ${shaken}`;
+  const shaken = motion ? `${motion.name} ${ofG(motion.pga_g)}` : "no ground motion";
+  const shown = study && state.view === "map" ? `study ${study.name}` : `p = ${short(p)} rad/s, α = ${angle(alpha)}, ${shaken}`;
   document.title = `${view}: ${shown} – rocking explorer`;
 }
 
@@ -216,16 +222,15 @@ function put(node, text) {
 function showLegend({motion, overturned, peak_over_slenderness: peak}) {
   const vertical = motion?.vertical;
   const entries = [["line", "rotation"], ["rest", "at rest"], ["impact", "impact"], ["uplift", "uplift"], ["ground", "ground acceleration"], ["beyond", "beyond the threshold of uplift"]];
-  if (vertical) entries.push(["up", `vertical acceleration (${vertical.name}, peak ${short(vertical.pga_g)} g), with which the thresholds move`]);
+  if (vertical) entries.push(["up", `vertical acceleration (${vertical.name}, peak ${ofG(vertical.pga_g)}), with which the thresholds move`]);
   if (overturned || peak > 0.9) entries.push(["over", "rotation at which it would overturn on still ground"]);
   legend("legend", entries);
 }
 
 /** @param {any} header */
 function showFigures(header) {
-  const degrees = (header.peak_rotation * 180) / Math.PI;
   const rows = [
-    ["Peak rotation", header.overturned ? "overturns" : `${short(header.peak_over_slenderness)} α`, header.overturned ? `at ${fixed(header.overturn_time, 3)} s` : `${short(degrees)}° at ${fixed(header.peak_time, 2)} s`],
+    ["Peak rotation", header.overturned ? "overturns" : `${short(header.peak_over_slenderness)} α`, header.overturned ? `at ${fixed(header.overturn_time, 3)} s` : `${angle(header.peak_rotation)} at ${fixed(header.peak_time, 2)} s`],
     ["Comes to rest", `${header.rests} ×`, header.rests ? (header.proven === header.rests ? "each time proven" : `${header.proven} proven`) : "not at all"],
     ["Impacts", String(header.impacts), "resolved one by one"],
     ["At rest", header.share_at_rest === null ? "–" : `${short(100 * header.share_at_rest, 2)} %`, "of the strong shaking"],
@@ -281,7 +286,12 @@ acceptFiles(async (file, use) => {
   } catch (error) {
     problem(error);
   }
+}, async (files) => {
+  await go("records");
+  await views.records.add(files);
 });
+makePrinting(page, problem);
+unitFields(() => { writeAddress(state); window.setTimeout(() => location.reload(), 250); });
 for (const form of Object.values(forms)) form.show(state.texts);
 void watchCompilation();
 await (state.lecture ? lecture.enter() : go(state.view));

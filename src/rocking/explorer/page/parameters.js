@@ -2,15 +2,20 @@
 // address has it: whoever opens the link sees the same.
 
 import {Problem, json} from "./api.js";
+import {inUnits, readUnits, unitsChosen} from "./units.js";
 import {one} from "./words.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
-/** @typedef {{view: string, texts: Texts, other: Texts, compare: string, window: [number, number] | null, at: number | null, lecture: boolean, map: Texts, sweep: Texts, good: Good}} State */
-/** What was answered last of each part of the state: it alone enters the address. @typedef {{texts: Texts, other: Texts, compare: string, map: Texts, sweep: Texts}} Good */
+/** @typedef {{view: string, texts: Texts, other: Texts, compare: string, window: [number, number] | null, at: number | null, lecture: boolean, map: Texts, sweep: Texts, assessment: Texts, good: Good}} State */
+/** What was answered last of each part of the state: it alone enters the address. @typedef {{texts: Texts, other: Texts, compare: string, map: Texts, sweep: Texts, assessment: Texts}} Good */
 /** @typedef {{name: string, label: string, group: string, unit: string, suffix: string, default: string, units: Record<string, number>, low: number, high: number, logarithmic: boolean, step: number, values: string, explanation: string}} Parameter */
 
 /** @type {any} */
 export const specification = await json("/api/start", {}).catch(stop);
+
+readUnits(specification.shown_in, new URLSearchParams(location.search));
+specification.parameters = specification.parameters.map(inUnits);
+for (const pulse of Object.values(specification.pulses)) pulse.parameters = pulse.parameters.map(inUnits);
 
 /** Say why the page cannot open, and wait for ever: without what the server says of the parameters there is no page.
  * @param {unknown} error @returns {Promise<never>} */
@@ -28,7 +33,7 @@ export const parameter = (name) => specification.parameters.find((/** @type {Par
 export const namesOf = (...groups) =>
   specification.parameters.filter((/** @type {Parameter} */ each) => !groups.length || groups.includes(each.group)).map((/** @type {Parameter} */ each) => each.name);
 
-const VIEWS = ["response", "block", "map", "periodic", "compare"];
+const VIEWS = ["response", "block", "map", "periodic", "compare", "records", "assessment"];
 const COMPARED = ["treatment", "block", "motion"];
 
 /** @returns {State} */
@@ -43,7 +48,7 @@ export function readAddress() {
   const from = Number(given.get("from") ?? NaN), to = Number(given.get("to") ?? NaN), time = Number(given.get("at") || NaN);
   const parts = {
     texts: complete(Object.keys(texts).length ? texts : opening), other: those(namesOf(), "other."),
-    compare: COMPARED.find((each) => each === given.get("compare")) ?? COMPARED[0], map: those(specification.map), sweep: those(specification.sweep),
+    compare: COMPARED.find((each) => each === given.get("compare")) ?? COMPARED[0], map: those(specification.map), sweep: those(specification.sweep), assessment: those(specification.assessment),
   };
   return {
     ...parts,
@@ -90,6 +95,8 @@ export function writeAddress(state) {
     }
     if (state.view === "map") put(good.map, specification.map);
     if (state.view === "periodic") put(good.sweep, specification.sweep);
+    if (state.view === "records" || state.view === "assessment") put(good.assessment, specification.assessment);
+    for (const [name, unit] of unitsChosen()) given.set(name, unit);
     put(ends(state), ["from", "to"]);
     if (state.at !== null && (state.view === "response" || state.view === "block")) given.set("at", String(state.at));
     if (state.lecture) given.set("lecture", "1");

@@ -2,7 +2,7 @@
 
 import {Latest, payload} from "./api.js";
 import {Scale, at} from "./histories.js";
-import {bokeh, colour, figure, themed} from "./theme.js";
+import {bokeh, colour, figure, showPlot, themed} from "./theme.js";
 import {counted, legend, one, short} from "./words.js";
 
 /** What leaves the frame: past it a block only falls. */
@@ -95,8 +95,8 @@ export class PhasePanel {
     line(this.energy, "total", "ink", {line_width: 1.6});
     this.cursor = span(this.energy, "height", "accent", {level: "overlay", visible: false});
     this.energy.on_event("tap", (/** @type {any} */ event) => this.pick(this.scale.time(event.x)));
-    B.Plotting.show(this.plane, one("case-plane"));
-    B.Plotting.show(this.energy, one("energy"));
+    void showPlot(this.plane, one("case-plane"));
+    void showPlot(this.energy, one("energy"));
     legend("phase-legend", [
       ["line", "response; total energy"], ["jump", "impact: the velocity jumps, and the total drops"], ["uplift", "uplift"], ["rest", "rest"], ["balance", "overturns beyond, if nothing shakes"],
       ["potential", "potential"], ["second", "kinetic"],

@@ -39,6 +39,15 @@ export function themed(follow) {
   follow();
 }
 
+let printed = false;
+/** Draw in light, for paper, or in the system's colours again. @param {boolean} on */
+export function lit(on) {
+  if (printed === on) return;
+  printed = on;
+  document.documentElement.classList.toggle("lit", on);
+  followers.forEach((follow) => follow());
+}
+
 /** Bokeh, which a script before this one has loaded. @returns {any} */
 export const bokeh = () => /** @type {any} */ (window).Bokeh;
 

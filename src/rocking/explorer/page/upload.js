@@ -11,29 +11,33 @@ const LARGEST = 16 * 2 ** 20;
 /** What a file is for: one that is called as meshes are is a mesh, wherever it was chosen. @param {File} file @param {Use} use @returns {Use} */
 const useOf = (file, use) => (specification.mesh_kinds.some((/** @type {string} */ kind) => file.name.toLowerCase().endsWith(`.${kind}`)) ? "mesh" : use);
 
-/** @param {File} file @param {Use} use */
-async function sendFile(file, use) {
+/** @param {File} file @param {Use} [use] */
+export async function sendFile(file, use = "record") {
   if (file.size > LARGEST) throw new Problem(`${file.name}: it is larger than 16 MiB; ${use === "mesh" ? "make the mesh coarser" : "cut the record into smaller files"}`);
   return json(use === "mesh" ? "/api/meshes" : "/api/records", {name: file.name}, {method: "POST", body: file});
 }
 
-/** @param {(file: () => Promise<any>, use: Use) => Promise<void>} take */
-export function acceptFiles(take) {
+/** @param {(file: () => Promise<any>, use: Use) => Promise<void>} take @param {(files: File[]) => Promise<void>} list takes several records at once */
+export function acceptFiles(take, list) {
   const input = /** @type {HTMLInputElement} */ (one("file"));
   const dropping = one("dropping");
   /** @type {Use} */
   let chosen = "record";
   const buttons = /** @type {Record<string, Use>} */ ({"choose-file": "record", "choose-vertical": "vertical", "choose-mesh": "mesh"});
-  const send = (/** @type {File | undefined} */ file, /** @type {Use} */ wanted) => {
-    if (!file) return;
-    const use = useOf(file, wanted);
-    void take(() => sendFile(file, use), use);
+  /** @param {File[]} files @param {Use} wanted */
+  const taken = async (files, wanted) => {
+    const [meshes, records] = [true, false].map((each) => files.filter((file) => (useOf(file, wanted) === "mesh") === each));
+    if (meshes.length) await take(() => sendFile(meshes[0], "mesh"), "mesh");
+    if (records.length > 1 && wanted === "record") await list(records);
+    else if (records.length) await take(() => sendFile(records[0], wanted), wanted);
   };
-  for (const [id, use] of Object.entries(buttons)) one(id).addEventListener("click", () => { chosen = use; input.click(); });
+  for (const [id, use] of Object.entries(buttons)) {
+    one(id).addEventListener("click", () => { chosen = use; input.multiple = use === "record"; input.click(); });
+  }
   input.addEventListener("change", () => {
-    const file = input.files?.[0];
+    const files = [...(input.files ?? [])];
     input.value = "";
-    send(file, chosen);
+    void taken(files, chosen);
   });
   // Text and links that are dragged are nothing to open, and the browser shall not go where they lead.
   const brings = (/** @type {DragEvent} */ event) => event.dataTransfer?.types.includes("Files") ?? false;
@@ -48,6 +52,6 @@ export function acceptFiles(take) {
     event.preventDefault();
     depth = 0;
     dropping.hidden = true;
-    send(event.dataTransfer?.files?.[0], "record");
+    void taken([...(event.dataTransfer?.files ?? [])], "record");
   });
 }

@@ -1,0 +1,320 @@
+"""An assessment of a case's block: fragility over the records of a list, friction, rules of thumb, margin; no web."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator, Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+
+from rocking.analysis.fragility.fit import fit_fragility
+from rocking.analysis.levels import simulate_levels
+from rocking.analysis.rules.criteria import overturning_velocity, rate
+from rocking.arrays import Flags, Floats
+from rocking.bisection import bisected
+from rocking.block import Blocks
+from rocking.constants import STANDARD_GRAVITY
+from rocking.errors import InvalidOption, Unfitted
+from rocking.explorer.catalogue import entries_of, title_of
+from rocking.explorer.code import block_options, command_line
+from rocking.explorer.inputs import Case, Found, Texts, read_motion
+from rocking.explorer.parameters import ASSESSMENT
+from rocking.explorer.payload import Payload
+from rocking.explorer.uploads import UploadStore
+from rocking.motion.motion import Motion
+from rocking.motion.scaling import Measure
+from rocking.quantities import number
+from rocking.response.contact import friction_coefficient
+from rocking.simulation import simulate
+
+#: Levels of a fragility, and points of its curve.
+_LEAST, _MOST = 2, 60
+_POINTS: Final = 121
+
+#: The highest level stands for this share of the sudden velocity that overturns the block at one blow.
+_STRONG: Final = 2.0
+
+#: The margin is looked for up to these factors on the case's motion, in halves and doubles, and then closed in on.
+_FACTORS: Final = 2.0**8
+_HALVINGS: Final = 24
+
+#: Rules of thumb that are shown, what each says, and where it comes from.
+RULES: Final[Mapping[str, tuple[str, str, str]]] = {
+    "uplift": (
+        "Uplift",
+        "The block begins to rock where the ground acceleration passes g tan α. Overturning needs more.",
+        "Housner (1963), Bull. Seism. Soc. Am. 53(2), 403–417",
+    ),
+    "west": (
+        "West",
+        "The same g tan α, taken for the acceleration that overturns.",
+        "Milne and Omori (1893), Seism. J. Japan 1, 59–86",
+    ),
+    "ishiyama": (
+        "Ishiyama",
+        "Overturning needs a PGA above g tan α and also a PGV above 0.4 of the sudden velocity that just overturns.",
+        "Ishiyama (1982), Earthq. Eng. Struct. Dyn. 10(5), 635–650",
+    ),
+}
+
+_PYTHON: Final = """\
+import numpy as np
+
+import rocking
+
+block = rocking.{block}
+motions = [
+{motions}
+]
+found = rocking.fragility(block, motions, measure={measure}, levels={levels}, polarity="both"{options})
+print(found.summary())
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Assessment:
+    """A case, the entries of its list of records, and to which levels of which measure each is scaled."""
+
+    case: Case
+    entries: list[dict[str, str]]
+    uploads: UploadStore
+    measure: Measure
+    levels: Floats
+    friction: float | None
+
+    def record(self, k: int) -> Found:
+        """Read one record; the list is not held in memory as a whole."""
+        return read_motion(self.entries[k], self.uploads)
+
+    def motion(self, k: int) -> Motion:
+        """Return the motion of one record."""
+        return _motion(self.entries[k], self.uploads)
+
+
+def assessment_of(case: Case, texts: Texts, uploads: UploadStore) -> Assessment:
+    """Read what is assessed: ``records`` as `catalogue.entries_of`, ``measure``, its levels, and ``friction``.
+
+    Raises
+    ------
+    InvalidOption
+        If the list is empty, or a text is out of range.
+    """
+    given = {name: texts[name].strip() for name in ASSESSMENT if texts.get(name, "").strip()}
+    entries = entries_of(given.get("records", ""))
+    if not entries:
+        raise InvalidOption("an assessment needs {}: tick one or more in the list", "records")
+    measure = _measure(given)
+    count = number(given.get("levels", "16"), "levels")
+    if not (_LEAST <= count <= _MOST and count == int(count)):
+        raise InvalidOption(f"{{}} are from {_LEAST} to {_MOST} in number, not {count:g}", "levels")
+    known = {end: float(ASSESSMENT[end].read(given[end])) for end in ("level_from", "level_to") if end in given}
+    found = (math.nan, math.nan)
+    if len(known) < 2:
+        found = _range(case, measure, (_motion(entry, uploads) for entry in entries))
+    low, high = known.get("level_from", found[0]), known.get("level_to", found[1])
+    if not 0.0 < low < high < math.inf:
+        raise InvalidOption("{} must be positive, and below the last of the levels", "level_from")
+    friction = friction_coefficient(number(given["friction"], "friction")) if "friction" in given else None
+    return Assessment(case, entries, uploads, measure, np.linspace(low, high, int(count)), friction)
+
+
+def _measure(given: Texts) -> Measure:
+    if given.get("measure", "pga") == "pga":
+        return Measure("pga")
+    if given["measure"] != "sa":
+        raise InvalidOption(f"{{}} is pga or sa, not {given['measure'][:20]!r}", "measure")
+    return Measure("sa", ASSESSMENT["measure_period"].read(given.get("measure_period", "1")))
+
+
+def described(assessment: Assessment) -> dict[str, Any]:
+    """Say what is assessed, and what is known before anything is computed."""
+    case, measure = assessment.case, assessment.measure
+    block = case.block
+    notes = []
+    if not block.is_symmetric:
+        notes.append("Each record counts in both polarities, since the sides of the block differ.")
+    else:
+        notes.append("Each record counts once: a symmetric block does the same under a record and its mirror image.")
+    if any(entry.get("vertical") for entry in assessment.entries):
+        notes.append("Vertical components are scaled with their records.")
+    if case.initial_rotation or case.initial_velocity or case.duration is not None:
+        notes.append("Every simulation begins at rest and goes on to its end, other than the case that is shown.")
+    return {
+        "measure": measure.name,
+        "label": measure.quantity,
+        "period": measure.period,
+        "levels": assessment.levels.tolist(),
+        "records": [title_of(entry, assessment.uploads) for entry in assessment.entries],
+        "thresholds": list(block.uplift_thresholds(case.model)),
+        "friction_to_rock": max(block.uplift_thresholds(case.model)) / block.gravity,
+        "friction": assessment.friction,
+        "overturning_velocity": _sudden(case),
+        "rules": [
+            {"name": name, "title": title, "says": says, "source": source}
+            for name, (title, says, source) in RULES.items()
+        ],
+        "case": None if case.motion is None else _rated(case, case.motion),
+        "notes": notes,
+        "python": as_python(assessment),
+        "command": as_command(assessment),
+    }
+
+
+def parts(assessment: Assessment) -> Generator[Payload]:
+    """Simulate one record after the other, fit what has come so far, and find the margin of the case in the end."""
+    case, count = assessment.case, len(assessment.entries)
+    fallen: list[Flags] = []
+    for k in range(count):
+        motion = assessment.motion(k)
+        fallen.append(_stripes(assessment, motion))
+        row = _row(assessment, motion) | {"number": k, "overturned_levels": fallen[-1].mean(axis=1).tolist()}
+        yield _part({"share": (k + 1) / (count + 1), "row": row}, assessment, fallen)
+    yield _part({"share": 1.0, "margin": _margin(case)}, assessment, fallen)
+
+
+def _stripes(assessment: Assessment, motion: Motion) -> Flags:
+    """Return whether the block overturns, at each level and in each polarity."""
+    case = assessment.case
+    many = Blocks.of(case.block)
+    table = simulate_levels(
+        many, [motion], assessment.measure, assessment.levels, model=case.model, chattering=case.treatment,
+        polarity="+" if many.is_symmetric else "both", progress=False,
+    )  # fmt: skip
+    if "polarity" not in table.dims:
+        table = table.expand_dims("polarity")
+    found: Flags = table.overturned.transpose("level", "polarity", "motion", "block").values[:, :, 0, 0]
+    return found
+
+
+def _part(header: dict[str, Any], assessment: Assessment, fallen: list[Flags]) -> Payload:
+    """Return what is sent with a part: the curve through all outcomes so far, as `rocking.fragility` fits it."""
+    outcomes = np.stack(fallen, axis=1)  # level, motion, polarity, in the order of `rocking.fragility`
+    levels = np.broadcast_to(assessment.levels[:, None, None], outcomes.shape).ravel()
+    clusters = np.broadcast_to(np.arange(len(fallen))[None, :, None], outcomes.shape).ravel()
+    arrays = {"seen": outcomes.mean(axis=(1, 2))}
+    try:
+        fitted = fit_fragility(levels, outcomes.ravel(), clusters=clusters, measure=assessment.measure)
+    except Unfitted as refused:
+        words = f"No curve can be fitted yet: {refused}."
+        return Payload({**header, "fit": None, "why": words, "outcomes": outcomes.size}, arrays)
+    curve, at = fitted.curves[0], np.linspace(0.0, assessment.levels[-1], _POINTS)
+    lower, upper = curve.band(at) if curve.bounded else (np.zeros_like(at), np.ones_like(at))
+    fit = {
+        "median": curve.median,
+        "median_interval": list(curve.median_interval),
+        "dispersion": curve.dispersion,
+        "dispersion_interval": list(curve.dispersion_interval),
+        "confidence": curve.confidence,
+        "bounded": curve.bounded,
+        "exceeded": int(curve.exceeded.sum()),
+        "notes": list(replace(fitted, source="motion").notes),
+    }
+    header = {**header, "fit": fit, "why": None, "outcomes": outcomes.size}
+    return Payload(header, {**arrays, "at": at, "probability": curve.probability(at), "lower": lower, "upper": upper})
+
+
+def _row(assessment: Assessment, motion: Motion) -> dict[str, Any]:
+    """Say what a record does as it is: what becomes of the block, and which friction it needs."""
+    case = assessment.case
+    response = simulate(case.block, motion, model=case.model, chattering=case.treatment)
+    friction = assessment.friction
+    return {
+        **_rated(case, motion),
+        "measure": assessment.measure.value(motion),
+        "overturns": response.overturned,
+        "peak_over_slenderness": response.peak_over_slenderness,
+        "friction_needed": response.required_friction,
+        "sliding_time": None if friction is None else response.sliding_time(friction),
+    }
+
+
+def _rated(case: Case, motion: Motion) -> dict[str, Any]:
+    """Measures of a motion, and demand over capacity by every rule."""
+    ratings = rate(case.block, motion, ["west", "ishiyama"])
+    found = {name: float(rating.ratio[0]) for name, rating in ratings.items()}
+    uplift = motion.pga / min(case.block.uplift_thresholds(case.model))
+    return {"pga": motion.pga, "pgv": motion.pgv, "ratios": {"uplift": uplift, **found}}
+
+
+def _margin(case: Case) -> dict[str, Any] | None:
+    """Return a factor on the case's motion from which on it overturns the block, next to one that does not."""
+    motion = case.motion
+    if motion is None or motion.pga == 0.0:
+        return None
+
+    def falls(factor: float) -> bool:
+        return simulate(case.block, motion * factor, model=case.model).overturned
+
+    high = 1.0
+    if falls(high):
+        while high > 1.0 / _FACTORS and falls(high / 2.0):
+            high /= 2.0
+    else:
+        while not falls(high := 2.0 * high):
+            if high >= _FACTORS:
+                return {"factor": None, "pga": None}
+    factor = bisected(high / 2.0, high, falls, halvings=_HALVINGS)[1]
+    return {"factor": factor, "pga": factor * motion.pga}
+
+
+def _motion(entry: Texts, uploads: UploadStore) -> Motion:
+    found = read_motion(entry, uploads).motion
+    if found is None or found.pga == 0.0:
+        raise InvalidOption(f"{title_of(entry, uploads)} shakes nothing: take it out of {{}}", "records")
+    return found
+
+
+def _sudden(case: Case) -> float:
+    """Sudden ground velocity after which the block just overturns, of the weaker side, m/s."""
+    return float(overturning_velocity(Blocks.of(case.block)).min())
+
+
+def _range(case: Case, measure: Measure, motions: Iterable[Motion]) -> tuple[float, float]:
+    """Levels from where the first record lifts the block to where half of them are strong enough to overturn it."""
+    lifting, sudden = min(case.block.uplift_thresholds(case.model)), _STRONG * _sudden(case)
+    values = [(measure.value(motion), motion.pga, motion.pgv) for motion in motions]
+    low = min(lifting * value / pga for value, pga, _ in values)
+    high = float(np.median([sudden * value / pgv for value, _, pgv in values]))
+    return _rounded(low, math.floor), _rounded(max(high, 3.0 * low), math.ceil)
+
+
+def _rounded(level: float, towards: Any) -> float:
+    """Return an acceleration of two digits, in g."""
+    step = 10.0 ** (math.floor(math.log10(level / STANDARD_GRAVITY)) - 1)
+    return float(f"{towards(level / STANDARD_GRAVITY / step) * step:.6g}") * STANDARD_GRAVITY
+
+
+def as_python(assessment: Assessment) -> str:
+    """Write a script that computes the same curve; it runs as it stands."""
+    case, measure = assessment.case, assessment.measure
+    given = {"model": None if case.model == "nonlinear" else case.model, "chattering": case.texts.get("chattering")}
+    return _PYTHON.format(
+        block=case.block_call,
+        motions="\n".join(f"    {assessment.record(k).python}," for k in range(len(assessment.entries))),
+        measure=repr(measure.name) if measure.period is None else f'rocking.Measure("sa", period={measure.period!r})',
+        levels=f"np.linspace({assessment.levels[0]!s}, {assessment.levels[-1]!s}, {len(assessment.levels)})",
+        options="".join(f", {name}={value!r}" for name, value in given.items() if value is not None),
+    )
+
+
+def as_command(assessment: Assessment) -> str | None:
+    """Write the command that computes the same curve; None where its options hold not for all records alike."""
+    case, levels, measure = assessment.case, assessment.levels, assessment.measure
+    alike = {tuple(entry.get(name, "") for name in ("dt", "units", "channel")) for entry in assessment.entries}
+    beyond = {name for entry in assessment.entries for name in entry} - {"motion", "dt", "units", "channel"}
+    words = [assessment.record(k).words for k in range(len(assessment.entries))]
+    if beyond or len(alike) > 1 or "gravity" in case.texts or not all(len(each) == 1 for each in words):
+        return None
+    first = assessment.entries[0]
+    options = {
+        **block_options(case),
+        **{name: case.texts[name] for name in ("chattering",) if name in case.texts},
+        **{name: first[name] for name in ("dt", "units", "channel") if name in first},
+        "measure": measure.name,
+        **({} if measure.period is None else {"period": repr(measure.period)}),
+        "levels": f"{levels[0]!s}:{levels[-1]!s}:{len(levels)}",
+        "polarity": "both",
+    }
+    return command_line(["rocking", "fragility", *(each[0] for each in words)], options)

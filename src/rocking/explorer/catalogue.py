@@ -1,0 +1,219 @@
+"""The list of records: those that ship and the files of the page, their measures, and what belongs to one station."""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import PurePath
+from typing import Any, Final
+from urllib.parse import parse_qsl
+
+from rocking.errors import InvalidOption
+from rocking.explorer.inputs import Texts
+from rocking.explorer.parameters import PARAMETERS, names_of
+from rocking.explorer.uploads import UploadStore, measures
+from rocking.motion import records
+
+#: Entries of a list in an address at most, and their letters: forty records of two components, and as many again.
+MOST: Final = 160
+_LETTERS: Final = 40_000
+
+#: Components of one station are as long as each other up to this share.
+_AS_LONG: Final = 0.01
+
+#: What names a component at the end of a file's name or of a channel: azimuths, directions, codes of instruments.
+_UP: Final = r"up|ud[12]?|dwn|down|vrt|vert(?:ical)?|u-d|[behls][hln]z|z|v"
+_LEVEL: Final = r"ns[12]?|ew[12]?|n-s|e-w|[behls][hln][ne123xy]|[nexy]|[nsew]\d{1,3}[nsew]|h[12]|[0-3]\d\d"
+_COMPONENT: Final = re.compile(
+    rf"(?i)(?:^|[-_. ]|(?<=[a-z])(?=\d\d\d))(?:(?P<up>{_UP})|(?P<level>{_LEVEL}))(?: ?deg)?$"
+)
+
+
+@dataclass
+class Component:
+    """A row of the list: texts that make it the case's motion, what it is called, and what is known of it."""
+
+    texts: Texts
+    title: str
+    label: str
+    is_up: bool
+    measures: Mapping[str, float] | None
+    event: str = ""
+    station: str = ""
+    stem: str = ""
+    samples: int = 0
+    step: float | None = None
+    key: str = ""
+    file: str = ""
+    missing: list[str] = field(default_factory=list)
+    choices: Mapping[str, Any] = field(default_factory=dict)
+    vertical: str = ""
+
+    def described(self) -> dict[str, Any]:
+        """Return what the page shows of it."""
+        names = ("texts", "title", "label", "is_up", "measures", "key", "file", "missing", "choices", "vertical")
+        return {name: getattr(self, name) for name in names}
+
+
+def entries_of(text: str) -> list[dict[str, str]]:
+    """Read a list from an address: entries with ; between, each the texts of a motion as a query.
+
+    Raises
+    ------
+    InvalidOption
+        If it is too long, or an entry has texts that are not those of a motion.
+
+    Examples
+    --------
+    >>> entries_of("motion=ridgecrest-clc-090&vertical=ridgecrest-clc-up;motion=ridgecrest-clc-360")
+    [{'motion': 'ridgecrest-clc-090', 'vertical': 'ridgecrest-clc-up'}, {'motion': 'ridgecrest-clc-360'}]
+    """
+    parts = [part for part in text.split(";") if part]
+    if len(text) > _LETTERS or len(parts) > MOST:
+        raise InvalidOption(
+            f"a list of {{}} has {MOST} entries and {_LETTERS} letters at most: take some out", "records"
+        )
+    found = [dict(parse_qsl(part)) for part in parts]
+    wrong = {name for entry in found for name in entry.keys() - {*names_of("motion"), "key"}}
+    if wrong:
+        raise InvalidOption(
+            f"an entry of the list of {{}} has {', '.join(names_of('motion'))}, not {min(wrong)[:20]!r}", "records"
+        )
+    return found
+
+
+def listing(uploads: UploadStore, answers: Iterable[Texts] = ()) -> dict[str, Any]:
+    """Return all records in groups, each of one station, and how much of what may be kept is in use.
+
+    ``answers`` say with which ``dt`` and ``units`` the file of each ``key`` is read.
+    """
+    known = {answer["key"]: answer for answer in answers if "key" in answer}
+    files = [component for key in uploads.kept() for component in _of_file(uploads, key, known.get(key, {}))]
+    groups = [_described(group, "shipped") for group in _by_station(_shipped())]
+    groups += [_described(group, _reason(group)) for group in _by_station(files)]
+    return {"groups": groups, "usage": uploads.usage()}
+
+
+def title_of(texts: Texts, uploads: UploadStore) -> str:
+    """Return what the list calls the record of an entry."""
+    name, _, key = texts.get("motion", "").partition(":")
+    if name != "file":
+        return records.info(name).title if name in records.names() else texts.get("motion", "")
+    file = uploads.contents(key, PARAMETERS["dt"].read(texts["dt"]) if "dt" in texts else None, texts.get("units"))
+    channels = file["channels"]
+    chosen = [each for each in channels if str(each["number"]) == texts.get("channel")] if len(channels) > 1 else []
+    return f"{file['name']}, {chosen[0]['name']}" if chosen else str(file["name"])
+
+
+@functools.cache
+def _shipped() -> tuple[Component, ...]:
+    found = []
+    for name in records.names():
+        record = records.info(name)
+        place, up = record.title.rpartition(", ")[0], record.direction == "up"
+        component = Component({"motion": name}, record.title, record.direction, up, measures(records.load(name)))
+        found.append(replace(component, station=place, stem=name.rpartition("-")[0]))
+    return tuple(found)
+
+
+def _of_file(uploads: UploadStore, key: str, answer: Texts) -> list[Component]:
+    """Return the channels of a file, read with what was answered."""
+    dt = PARAMETERS["dt"].read(answer["dt"]) if answer.get("dt") else None
+    given = {name: answer[name] for name in ("dt", "units") if answer.get(name)}
+    told = uploads.contents(key, dt, answer.get("units") or None)
+    needed = uploads.contents(key)["missing"]
+    name, several = told["name"], len(told["channels"]) > 1
+    found = []
+    for each in told["channels"]:
+        texts = {"motion": f"file:{key}"} | ({"channel": str(each["number"])} if several else {})
+        texts |= {one: given[one] for one in needed if one in given}
+        stem, label, is_up = _parted(name, each["name"], each["azimuth"], several)
+        component = Component(texts, f"{name}, {each['name']}" if several else name, label, is_up, each["measures"])
+        found.append(
+            replace(
+                component,
+                **{fact: each[fact] for fact in ("event", "station", "samples", "step", "choices")},
+                stem=key if several else stem,
+                key=key,
+                file=name,
+                missing=told["missing"],
+            )
+        )
+    return found
+
+
+def _parted(name: str, channel: str, azimuth: float | None, several: bool) -> tuple[str, str, bool]:
+    """Return a file's name without its component, what the component is called, and whether it is the vertical one."""
+    path = PurePath(name)
+    whole = path.stem
+    found = None
+    for text in (path.suffix.removeprefix("."), whole):
+        found = found or (_COMPONENT.search(text) if not several else None)
+    stem = whole[: found.start()] if found is not None and found.string == whole else whole
+    said = _COMPONENT.search(channel.strip())
+    up = azimuth is None and any(each is not None and each["up"] for each in (said, found))
+    label = channel if found is None or azimuth is not None else found[0].strip("-_. ")
+    return stem.lower(), label, up
+
+
+def _by_station(components: Iterable[Component]) -> list[list[Component]]:
+    """Put together what belongs to one station: horizontal components, two at most, and a vertical one after them."""
+    groups: list[list[Component]] = []
+    for each in components:
+        home = next((group for group in groups if _belongs(each, group)), None)
+        if home is None:
+            groups.append([each])
+        else:
+            home.append(each)
+    for group in groups:
+        group.sort(key=lambda each: each.is_up)
+        upward = next((each for each in group if each.is_up), None)
+        for each in group:
+            if upward is not None and not each.is_up:
+                each.vertical = _as_vertical(upward, each)
+    return groups
+
+
+def _belongs(one: Component, group: list[Component]) -> bool:
+    """Whether a component belongs to those of a group."""
+    first = group[0]
+    if bool(one.key) != bool(first.key) or sum(each.is_up == one.is_up for each in group) >= (1 if one.is_up else 2):
+        return False
+    if not one.key or one.key == first.key:
+        return one.stem == first.stem
+    if one.missing != first.missing or one.step != first.step or any(each.key == one.key for each in group):
+        return False
+    if abs(one.samples - first.samples) > _AS_LONG * max(one.samples, first.samples):
+        return False
+    if one.station and first.station and (one.station, one.event) != (first.station, first.event):
+        return False
+    heads = bool(one.station) and (one.station, one.event) == (first.station, first.event)
+    return heads or (bool(one.stem) and one.stem == first.stem and one.label != first.label)
+
+
+def _as_vertical(upward: Component, beside: Component) -> str:
+    """Return the text with which a component is the vertical one of another."""
+    name, channel = upward.texts["motion"], upward.texts.get("channel")
+    if channel is None:
+        return name
+    return channel if upward.key == beside.key else f"{name}#{channel}"
+
+
+def _reason(group: list[Component]) -> str:
+    """Say by what the components of files were put together."""
+    first = group[0]
+    if len(group) == 1:
+        return ""
+    if len({each.key for each in group}) == 1:
+        return "channels of one file"
+    step = "" if first.step is None or "dt" in first.missing else f" and step of {first.step:g} s"
+    by = "headings" if first.station and first.station == group[1].station else "names"
+    return f"put together by their {by}, with the same length{step}"
+
+
+def _described(group: list[Component], reason: str) -> dict[str, Any]:
+    first = group[0]
+    place = ", ".join(part for part in (first.event, first.station) if part)
+    return {"title": place or first.stem or first.file, "reason": reason, "rows": [each.described() for each in group]}

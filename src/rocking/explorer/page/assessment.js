@@ -1,0 +1,243 @@
+// What the records of the list say of the case's block: fragility as it is computed, friction, rules of thumb, the margin.
+
+import {Latest, frames, unpacked} from "./api.js";
+import {showExports, withLegend} from "./exports.js";
+import {bokeh, colour, figure, showPlot, themed} from "./theme.js";
+import {acceleration, accelerationAxis, velocity, withUnit} from "./units.js";
+import {counted, fill, fixed, legend, make, one, short} from "./words.js";
+
+/** @typedef {import("./api.js").Texts} Texts */
+
+const FIELDS = ["measure", "measure_period", "level_from", "level_to", "levels", "friction"];
+const ACCELERATIONS = ["level_from", "level_to"];
+/** How long the case must stay as it is before it is assessed, ms. */
+const PAUSE = 500;
+const F = (/** @type {string} */ field) => ({field});
+
+export class View {
+  /** @param {any} page */
+  constructor(page) {
+    this.page = page;
+    this.work = new Latest(() => this.stream(), (error) => page.problem(error, "view-assessment"));
+    /** @type {AbortController | null} */
+    this.running = null;
+    /** @type {any} */
+    this.about = null;
+    /** @type {any} */
+    this.last = null;
+    /** @type {any} */
+    this.sources = null;
+    /** @type {any[]} */
+    this.rows = [];
+    this.key = "";
+    this.waiting = 0;
+    for (const name of FIELDS) one(name).addEventListener("change", () => this.chosen(name));
+    one("to-records").addEventListener("click", () => page.go("records"));
+  }
+
+  enter() { this.update(0); }
+
+  leave() {
+    window.clearTimeout(this.waiting);
+    this.running?.abort();
+    this.key = "";
+  }
+
+  /** The case has changed. @param {number} [pause] */
+  update(pause = PAUSE) {
+    window.clearTimeout(this.waiting);
+    this.waiting = window.setTimeout(() => {
+      const key = JSON.stringify([this.page.state.texts, this.page.state.assessment]);
+      if (key === this.key) return;
+      this.running?.abort();
+      this.key = key;
+      void this.work.ask();
+    }, pause);
+  }
+
+  /** @param {string} name */
+  chosen(name) {
+    const {assessment} = this.page.state;
+    const text = /** @type {HTMLInputElement} */ (one(name)).value.trim().replace(",", ".");
+    if (text) assessment[name] = ACCELERATIONS.includes(name) ? withUnit(text) : text; else delete assessment[name];
+    if (name === "measure") for (const each of ACCELERATIONS) delete assessment[each];
+    this.update(0);
+  }
+
+  async stream() {
+    this.running = new AbortController();
+    const {signal} = this.running, {key} = this;
+    const {texts, assessment} = this.page.state;
+    const body = document.body.dataset;
+    body.assessment = "running";
+    this.about = this.last = null;
+    this.rows = [];
+    try {
+      if (!assessment.records) {
+        await this.page.list.load();
+        assessment.records = this.page.list.entries();
+        this.key = JSON.stringify([texts, assessment]);
+      }
+      for await (const frame of frames("/api/assessment", {...texts, ...assessment}, signal)) {
+        if (!this.about) {
+          this.about = JSON.parse(new TextDecoder().decode(frame));
+          this.page.remember({assessment: {...assessment}});
+          this.fill();
+          this.facts();
+          showExports("assessment", this.about.python, this.about.command, []);
+          continue;
+        }
+        this.last = unpacked(/** @type {ArrayBuffer} */ (frame.buffer));
+        const {header} = this.last;
+        if (header.row) this.rows.push(header.row);
+        /** @type {HTMLProgressElement} */ (one("assessment-progress")).value = header.share;
+        this.paint();
+      }
+    } catch (error) {
+      if (this.key === key) this.key = "";
+      throw error;
+    }
+    showExports("assessment", this.about.python, this.about.command, [
+      ["rocking-fragility.svg", "Figure, SVG", () => this.picture("svg")], ["rocking-fragility.png", "Figure, PNG", () => this.picture("png")],
+      ["rocking-fragility.csv", "Curve, CSV", async () => new Blob([this.curve()], {type: "text/csv"})],
+      ["rocking-records.csv", "Records, CSV", async () => new Blob([this.table()], {type: "text/csv"})],
+    ]);
+    body.assessment = "complete";
+    counted("assessed");
+  }
+
+  /** Show what the fields stand for. */
+  fill() {
+    const {measure, period, levels, friction} = this.about;
+    /** @type {Texts} */
+    const found = {measure, measure_period: String(period ?? 1), levels: String(levels.length), friction: friction === null ? "" : String(friction)};
+    const scale = accelerationAxis()[0];
+    found.level_from = short(levels[0] * scale, 4);
+    found.level_to = short(levels[levels.length - 1] * scale, 4);
+    for (const name of FIELDS) {
+      const input = /** @type {HTMLInputElement} */ (one(name));
+      if (document.activeElement !== input || name === "measure") input.value = found[name];
+    }
+    one("measure-period").hidden = measure !== "sa";
+    for (const each of document.querySelectorAll("#view-assessment .of-level")) each.textContent = accelerationAxis()[1];
+  }
+
+  /** What is known before anything is computed, and what each rule says of the case's own motion. */
+  facts() {
+    const {records, notes} = this.about;
+    one("assessment-about").textContent = `${records.length} ${records.length === 1 ? "record" : "records"} of the list. ${notes.join(" ")}`;
+    this.rules();
+    this.base(null);
+  }
+
+  paint() {
+    if (!this.plot) this.build();
+    const {header, arrays} = this.last, {fit, why, outcomes} = header;
+    const [scale, unit] = accelerationAxis();
+    const by = (/** @type {Float64Array} */ values) => Float64Array.from(values, (each) => each * scale);
+    const bounded = fit?.bounded;
+    const empty = new Float64Array(0);
+    const at = fit ? by(arrays.at) : empty;
+    this.sources.band.data = bounded ? {x: at, lower: arrays.lower, upper: arrays.upper} : {x: empty, lower: empty, upper: empty};
+    this.sources.line.data = {x: at, y: fit ? arrays.probability : empty};
+    const {levels, label} = this.about;
+    this.sources.seen.data = {x: by(levels), y: arrays.seen};
+    this.plot.below[0].axis_label = `${label}, ${unit}`;
+    this.plot.x_range.setv({start: 0, end: 1.02 * levels[levels.length - 1] * scale});
+    const interval = (/** @type {(number | null)[]} */ ends, /** @type {(value: number | null) => string} */ written) => `${written(ends[0])} to ${ends[1] === null ? "∞" : written(ends[1])}`;
+    const sentence = fit
+      ? `Half of the records overturn the block at ${acceleration(fit.median)}${bounded ? ` (with ${100 * fit.confidence} % confidence ${interval(fit.median_interval, acceleration)})` : ""}; `
+        + `the dispersion is ${short(fit.dispersion)}${bounded ? ` (${interval(fit.dispersion_interval, (value) => fixed(value, 2))})` : ""}.`
+      : why;
+    one("assessment-verdict").textContent = sentence;
+    one("assessment-notes").textContent = fit ? `${fit.exceeded} of ${outcomes} simulations overturn the block, of ${this.rows.length} records so far.`
+      .replace(this.rows.length === this.about.records.length ? " so far" : "", "") + fit.notes.map((/** @type {string} */ note) => ` ${note[0].toUpperCase()}${note.slice(1)}.`).join("") : "";
+    this.plot.html_attributes = {role: "img", "aria-label": `Probability of overturning over ${label}. ${sentence}`};
+    this.records();
+    this.rules();
+    this.base(header.margin);
+  }
+
+  /** What each record does as it is. */
+  records() {
+    const {friction} = this.about;
+    const rows = this.rows.map((row) => [
+      this.about.records[row.number], acceleration(row.pga), velocity(row.pgv), row.overturns ? "overturns" : `${short(row.peak_over_slenderness)} α`,
+      row.friction_needed === null ? "leaves the ground" : fixed(row.friction_needed, 3),
+      ...(friction === null ? [] : [row.sliding_time === null ? "holds" : `slides at ${fixed(row.sliding_time, 2)} s`]),
+      `${Math.round(100 * row.overturned_levels.reduce((/** @type {number} */ sum, /** @type {number} */ each) => sum + each, 0) / row.overturned_levels.length)} %`,
+    ]);
+    fill(/** @type {HTMLTableElement} */ (one("assessment-records")), ["Record as it is", "PGA", "PGV", "Peak rotation", "Friction needed", ...(friction === null ? [] : [`With ${short(friction)}`]), "Levels that overturn"], rows);
+  }
+
+  /** What rules of thumb say beside what is computed. */
+  rules() {
+    const {rules, thresholds, overturning_velocity: sudden} = this.about;
+    const overturned = this.rows.filter(({overturns}) => overturns).length;
+    const has = /** @type {Record<string, string>} */ ({
+      uplift: acceleration(Math.min(...thresholds)), west: acceleration(Math.min(...thresholds)), ishiyama: `${acceleration(Math.min(...thresholds))} and ${velocity(0.4 * sudden)}`,
+    });
+    const told = (/** @type {string} */ name, /** @type {number} */ ratio) => `${short(ratio, 2)} of it: ${name === "uplift" ? (ratio > 1 ? "rocks" : "stays") : ratio >= 1 ? "may overturn" : "stands"}`;
+    fill(/** @type {HTMLTableElement} */ (one("assessment-rules")), ["Rule", "This block", "This case", "The list", "Source"], rules.map((/** @type {any} */ rule) => [
+      make("span", {}, [make("b", {}, [rule.title]), ` ${rule.says}`]), has[rule.name],
+      this.about.case ? told(rule.name, this.about.case.ratios[rule.name]) : "–",
+      this.rows.length ? `${rule.name === "uplift" ? "rocks under" : "may overturn under"} ${this.rows.filter(({ratios}) => ratios[rule.name] >= 1).length} of ${this.rows.length}; computed: ${overturned} overturn` : "…",
+      rule.source,
+    ]));
+  }
+
+  /** Uplift, friction and margin of the case. @param {{factor: number | null, pga: number | null} | null | undefined} margin */
+  base(margin) {
+    const {thresholds, friction_to_rock: needed, friction} = this.about;
+    const largest = this.rows.reduce((most, {friction_needed: each}) => Math.max(most, each ?? Infinity), 0);
+    const holds = friction === null ? "" : friction < needed ? `with ${short(friction)} it slides before it rocks: nothing here holds` : `with ${short(friction)} it rocks`;
+    const {header} = this.page.shown ?? {};
+    const rows = [
+      ["Uplift at the base", thresholds[0] === thresholds[1] ? acceleration(thresholds[0]) : `${acceleration(thresholds[0])} and ${acceleration(thresholds[1])}`, "g tan α: the block rocks above it"],
+      ["Friction to rock", short(needed), holds || "below this coefficient it slides in place of rocking"],
+      ["Friction over the list", !this.rows.length ? "…" : Number.isFinite(largest) ? fixed(largest, 3) : "∞", "largest that sticking needs, each record as it is"],
+      ["Margin of this case", margin === undefined || (margin === null && !this.last?.header.share) ? "…" : margin?.factor ? `× ${short(margin.factor)}` : "–",
+        margin?.factor ? `overturns from ${acceleration(margin.pga)} on${header?.overturned ? "; it overturns as it is" : ""}` : margin ? "no factor up to 256 overturns it" : this.last?.header.share === 1 ? "nothing shakes it" : "computed at last"],
+    ];
+    one("assessment-figures").replaceChildren(...rows.map(([name, value, more]) => make("div", {}, [make("dt", {}, [name]), make("dd", {}, [value, make("small", {}, [more])])])));
+  }
+
+  build() {
+    const B = bokeh();
+    this.plot = figure({height: 380, x_range: new B.Range1d({start: 0, end: 1}), y_range: new B.Range1d({start: -0.03, end: 1.03}), min_border_bottom: 46}, "Fragility");
+    this.plot.left[0].axis_label = "probability of overturning";
+    /** @param {any} glyph @param {string[]} fields @param {() => Record<string, any>} colours */
+    const add = (glyph, fields, colours) => {
+      const source = new B.ColumnDataSource({data: Object.fromEntries(fields.map((each) => [each, []]))});
+      this.plot.add_renderers(new B.GlyphRenderer({data_source: source, glyph}));
+      themed(() => glyph.setv(colours()));
+      return source;
+    };
+    this.sources = {
+      band: add(new B.VArea({x: F("x"), y1: F("lower"), y2: F("upper")}), ["x", "lower", "upper"], () => ({fill_color: colour("rest")})),
+      line: add(new B.Line({x: F("x"), y: F("y"), line_width: 2}), ["x", "y"], () => ({line_color: colour("accent")})),
+      seen: add(new B.Scatter({x: F("x"), y: F("y"), size: 7}), ["x", "y"], () => ({fill_color: colour("ink"), line_color: null})),
+    };
+    void showPlot(this.plot, one("fragility"));
+    legend("assessment-legend", [["curve", "fitted lognormal"], ["rest", "confidence band, 90 %"], ["seen", "share of simulations that overturn, at each level"]]);
+  }
+
+  /** @param {"svg" | "png"} form @returns {Promise<Blob>} */
+  async picture(form) {
+    const drawn = bokeh().index.find_one(this.plot).export(form);
+    return withLegend(await drawn.to_blob(), [["fitted lognormal", colour("accent")], ["confidence band, 90 %", colour("rest")], ["share of simulations", colour("ink")]], this.plot.outer_width, this.plot.outer_height);
+  }
+
+  /** The curve with its band, in SI units. */
+  curve() {
+    const {at, probability, lower, upper} = this.last.arrays;
+    const rows = Array.from(at ?? [], (/** @type {number} */ each, /** @type {number} */ k) => [each, probability[k], lower[k], upper[k]]);
+    return [[`${this.about.measure}_m_s2`, "probability", "lower", "upper"], ...rows].map((row) => `${row.join(",")}\n`).join("");
+  }
+
+  /** What each record does, in SI units. */
+  table() {
+    const rows = this.rows.map((row) => [JSON.stringify(this.about.records[row.number]), row.pga, row.pgv, row.overturns, row.peak_over_slenderness ?? "inf", row.friction_needed ?? "inf", row.sliding_time ?? ""]);
+    return [["record", "pga_m_s2", "pgv_m_s", "overturns", "peak_over_alpha", "friction_needed", "sliding_time_s"], ...rows].map((row) => `${row.join(",")}\n`).join("");
+  }
+}

@@ -1,0 +1,67 @@
+// Units in which the page shows lengths, angles and accelerations: chosen once, and part of the address.
+
+import {make, one, short} from "./words.js";
+
+/** What one SI unit is in each unit, and how the page writes that. @type {Record<string, [number, string, string]>} */
+const KNOWN = {
+  m: [1, "m", "m/s"], cm: [100, "cm", "cm/s"], ft: [1 / 0.3048, "ft", "ft/s"], in: [1 / 0.0254, "in", "in/s"],
+  deg: [180 / Math.PI, "°", ""], rad: [1, " rad", ""], g: [1 / 9.80665, "g", ""], "m/s2": [1, "m/s²", ""],
+};
+const LABELS = /** @type {Record<string, string>} */ ({length_in: "Lengths", angle_in: "Angles", acceleration_in: "Accelerations"});
+const KINDS = /** @type {Record<string, string>} */ ({
+  length: "length_in", position: "length_in", angle: "angle_in", acceleration: "acceleration_in", "acceleration at a period": "acceleration_in",
+});
+
+/** Chosen units by name. @type {Record<string, string>} */
+const chosen = {};
+/** Units by name, the default of each first. @type {Record<string, string[]>} */
+let offered = {};
+
+/** Read the units of the address. @param {Record<string, string[]>} choices @param {URLSearchParams} given */
+export function readUnits(choices, given) {
+  offered = choices;
+  for (const [name, units] of Object.entries(choices)) chosen[name] = units.find((each) => each === given.get(name)) ?? units[0];
+}
+
+/** What the address says of the units: nothing of those that are the default. @returns {[string, string][]} */
+export const unitsChosen = () => Object.entries(chosen).filter(([name, unit]) => unit !== offered[name][0]);
+
+/** A parameter as a field shows it, in the chosen unit. @template {{kind?: string, unit: string, suffix: string, units: Record<string, number>, low: number, high: number}} P
+ * @param {P} spec @returns {P} */
+export function inUnits(spec) {
+  const name = KINDS[spec.kind ?? ""];
+  const unit = name && chosen[name];
+  const scale = unit && spec.units[unit.replace("/", "")];
+  if (!unit || !scale || unit === offered[name][0]) return spec;
+  const units = Object.fromEntries(Object.entries(spec.units).map(([each, size]) => [each, size / scale]));
+  return {...spec, units, unit: KNOWN[unit][1].trim(), suffix: unit, low: spec.low / scale, high: spec.high / scale};
+}
+
+/** @param {string} name @param {number | null} value in SI units @param {number} [digits] @param {1 | 2} [which] */
+function written(name, value, digits = 3, which = 1) {
+  const [scale] = KNOWN[chosen[name]], unit = KNOWN[chosen[name]][which];
+  if (value === null || !Number.isFinite(value)) return "–";
+  return `${short(value * scale, digits)}${/^[° ]/.test(unit) ? unit : ` ${unit}`}`;
+}
+
+/** @param {number | null} value in m/s² @param {number} [digits] */
+export const acceleration = (value, digits) => written("acceleration_in", value, digits);
+/** @param {number} value in g @param {number} [digits] */
+export const ofG = (value, digits) => acceleration(value * 9.80665, digits);
+/** @param {number} value in rad @param {number} [digits] */
+export const angle = (value, digits) => written("angle_in", value, digits);
+/** @param {number | null} value in m/s @param {number} [digits] */
+export const velocity = (value, digits) => written("length_in", value, digits, 2);
+/** An acceleration as the axis of a figure has it: what one m/s² is, and the unit. @returns {[number, string]} */
+export const accelerationAxis = () => [KNOWN[chosen.acceleration_in][0], KNOWN[chosen.acceleration_in][1]];
+/** A field's text, with the chosen unit where it is a bare number. @param {string} text */
+export const withUnit = (text) => (text && !Number.isNaN(Number(text)) ? `${Number(text)}${chosen.acceleration_in}` : text);
+
+/** Fields that choose the units; another choice loads the page again, so that all of it is in them. @param {() => void} write writes the address */
+export function unitFields(write) {
+  one("units-form").replaceChildren(...Object.entries(offered).map(([name, units]) => {
+    const options = units.map((each) => make("option", {value: each, selected: each === chosen[name]}, [KNOWN[each][1].trim()]));
+    const select = /** @type {HTMLSelectElement} */ (make("select", {id: name, on: {change: () => { chosen[name] = select.value; write(); }}}, options));
+    return make("label", {className: "field"}, [`${LABELS[name]} in `, select]);
+  }));
+}

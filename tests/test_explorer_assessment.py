@@ -1,0 +1,123 @@
+"""The assessment of a case's block: the package's own fragility bit for bit, friction, rules of thumb, margin."""
+
+import shlex
+
+import numpy as np
+import pytest
+
+import rocking
+from rocking.explorer.assessment import assessment_of, described, parts
+from rocking.explorer.inputs import read_case
+from rocking.explorer.uploads import UploadStore
+
+STATUE = {"width": "0.24", "height": "1.1", "motion": "el-centro-meloland-270"}
+LEANING = {"width": "0.24", "height": "1.1", "offset": "0.01", "model": "linear", "motion": "none"}
+PLAIN = "motion=el-centro-meloland-270;motion=el-centro-meloland-360;motion=ridgecrest-clc-360"
+RISING = "motion=el-centro-meloland-270&vertical=el-centro-meloland-up;" + PLAIN
+LEVELS = {"level_from": "0.2g", "level_to": "0.9g", "levels": "6"}
+
+
+def assessed(case, **texts):
+    store = UploadStore()
+    return assessment_of(read_case(case, store), texts, store)
+
+
+def last(found):
+    *_, part = parts(found)
+    return part
+
+
+@pytest.mark.parametrize(
+    ("case", "texts"),
+    [
+        (STATUE, {"records": RISING, **LEVELS}),
+        (LEANING, {"records": PLAIN, **LEVELS, "measure": "sa", "measure_period": "0.5"}),
+    ],
+    ids=["vertical", "two sides"],
+)
+def test_the_curve_is_that_of_the_script_to_the_last_bit(case, texts):
+    found = assessed(case, **texts)
+    names = {}
+    exec(described(found)["python"], names)
+    curve, part = names["found"].curves[0], last(found)
+    fit = part.header["fit"]
+    assert (fit["median"], fit["dispersion"]) == (curve.median, curve.dispersion)
+    assert fit["median_interval"] == [*curve.median_interval]
+    assert fit["dispersion_interval"] == [*curve.dispersion_interval]
+    at = part.arrays["at"]
+    assert np.array_equal(part.arrays["probability"], curve.probability(at))
+    lower, upper = curve.band(at)
+    assert np.array_equal(part.arrays["lower"], lower) and np.array_equal(part.arrays["upper"], upper)
+    assert part.header["outcomes"] == len(names["found"].outcomes) and fit["exceeded"] == curve.exceeded.sum()
+    assert 0 < fit["exceeded"] < part.header["outcomes"]
+    assert fit["notes"] == [*names["found"].notes]
+
+
+def test_the_command_computes_the_same_curve_and_is_none_where_there_is_none(run):
+    found = assessed(STATUE, records=PLAIN, **LEVELS)
+    code, out, _ = run(*shlex.split(described(found)["command"])[1:], "--json")
+    assert code == 0
+    fit = last(found).header["fit"]
+    assert f'"median_m_s2": {fit["median"]!r}' in out or f"{fit['median']!r}" in out
+    assert described(assessed(STATUE, records=RISING, **LEVELS))["command"] is None
+
+
+def test_every_record_adds_a_row_of_its_own_and_the_curve_so_far():
+    found = assessed(STATUE, records=RISING, friction="0.22", **LEVELS)
+    block, rows = rocking.Block(width=0.24, height=1.1), [part.header for part in parts(found)]
+    assert [row["share"] for row in rows] == [0.2, 0.4, 0.6, 0.8, 1.0]
+    up = rocking.records.load("el-centro-meloland-up")
+    motions = [rocking.records.load(name) for name in ("el-centro-meloland-270",) * 2 + ("el-centro-meloland-360",)]
+    judged = 0
+    for motion, header in zip([motions[0].with_vertical(up), *motions[1:]], rows[:3], strict=True):
+        row, response = header["row"], rocking.simulate(block, motion)
+        assert row["overturns"] == response.overturned
+        assert row["friction_needed"] == response.required_friction
+        assert row["sliding_time"] == pytest.approx(response.sliding_time(0.22), nan_ok=True)
+        assert row["ratios"]["west"] == rocking.rules.west(block, motion).ratio[0]
+        assert row["ratios"]["ishiyama"] == rocking.rules.ishiyama(block, motion).ratio[0]
+        assert len(row["overturned_levels"]) == 6
+        judged += 1
+    assert judged == 3
+    about = described(found)
+    assert about["friction_to_rock"] == pytest.approx(0.24 / 1.1, rel=1e-12)
+    assert about["thresholds"] == list(block.uplift_thresholds())
+    assert "once" in about["notes"][0] and "Vertical" in about["notes"][1]
+    assert {rule["name"] for rule in about["rules"]} == {*about["case"]["ratios"]} == {"uplift", "west", "ishiyama"}
+
+
+def test_the_margin_is_the_critical_scale():
+    margin = last(assessed(STATUE, records=PLAIN, **LEVELS)).header["margin"]
+    block, motion = rocking.Block(width=0.24, height=1.1), rocking.records.load("el-centro-meloland-270")
+    assert rocking.simulate(block, motion * margin["factor"]).overturned
+    assert not rocking.simulate(block, motion * (margin["factor"] * (1.0 - 1e-6))).overturned
+    assert margin["pga"] == pytest.approx(margin["factor"] * motion.pga)
+    assert last(assessed(LEANING, records=PLAIN, **LEVELS)).header["margin"] is None
+
+
+def test_levels_go_from_where_a_record_lifts_the_block_to_where_most_overturn_it():
+    for measure in ("pga", "sa"):
+        found = assessed(STATUE, records=PLAIN, measure=measure, levels="4")
+        assert len(found.levels) == 4 and 0.0 < found.levels[0] < found.levels[-1]
+        seen = last(found).arrays["seen"]
+        assert seen[0] == 0.0 and seen[-1] > 0.5
+    weak = last(assessed(STATUE, records=PLAIN, level_from="0.01g", level_to="0.02g"))
+    assert weak.header["fit"] is None and "No curve can be fitted yet" in weak.header["why"]
+
+
+@pytest.mark.parametrize(
+    ("texts", "words"),
+    [
+        ({}, "tick one or more"),
+        ({"records": PLAIN, "measure": "pgd"}, "pga or sa"),
+        ({"records": PLAIN, "levels": "61"}, "from 2 to 60"),
+        ({"records": PLAIN, "levels": "nan"}, "from 2 to 60"),
+        ({"records": PLAIN, "level_from": "2g", "level_to": "1g"}, "below the last"),
+        ({"records": PLAIN, "friction": "7"}, "coefficient"),
+        ({"records": "motion=none"}, "shakes nothing"),
+        ({"records": "motion=file:00"}, "not here any more"),
+    ],
+)
+def test_what_cannot_be_assessed_is_refused_in_a_sentence(texts, words):
+    with pytest.raises(rocking.RockingError, match=words):
+        assessed(STATUE, **texts)

@@ -1,0 +1,142 @@
+"""The list of records: what belongs to one station, what is known of each, how many files are kept."""
+
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rocking
+from rocking.errors import InvalidOption, UnreadableRecord
+from rocking.explorer import uploads
+from rocking.explorer.catalogue import entries_of, listing, title_of
+from rocking.explorer.inputs import read_motion
+from rocking.explorer.uploads import UploadStore
+
+FORMATS = Path(__file__).parent / "data" / "formats"
+
+
+def samples(seed, count=400):
+    return "\n".join(f"{value:.6g}" for value in np.random.default_rng(seed).normal(size=count))
+
+
+def groups_of(store, answers=()):
+    return [group for group in listing(store, answers)["groups"] if group["rows"][0]["key"]]
+
+
+def test_shipped_records_are_listed_by_station_with_their_measures():
+    groups = listing(UploadStore())["groups"]
+    assert [group["title"] for group in groups] == [
+        "Ridgecrest 2019, China Lake", "Ridgecrest 2019, Tower 2", "Imperial Valley 1979, El Centro Meloland overpass",
+    ]  # fmt: skip
+    judged = 0
+    for group in groups:
+        assert [row["is_up"] for row in group["rows"]] == [False, False, True]
+        for row in group["rows"]:
+            motion = rocking.records.load(row["texts"]["motion"])
+            assert row["measures"]["pga"] == motion.pga and row["measures"]["pgv"] == motion.pgv
+            assert row["measures"]["significant"] == motion.significant_duration(0.05, 0.95)
+            assert row["vertical"] == ("" if row["is_up"] else group["rows"][2]["texts"]["motion"])
+            judged += 1
+    assert judged == 9 and groups[0]["rows"][0]["title"] == "Ridgecrest 2019, China Lake, 090"
+
+
+@pytest.mark.parametrize(
+    ("names", "found"),
+    [
+        (["RSN6_I-ELC180.txt", "RSN6_I-ELC270.txt", "RSN6_I-ELC-UP.txt"], [("180", "270", "UP")]),
+        (["a_ns.txt", "b_ns.txt", "a_ew.txt", "a_ud.txt"], [("ns", "ew", "ud"), ("",)]),
+        (["quake1.txt", "quake2.txt", "quake3.txt"], [("",), ("",), ("",)]),
+        (["n.NS", "n.EW", "n.UD"], [("NS", "EW", "UD")]),
+        (["s-000.txt", "s-090.txt", "s-180.txt"], [("000", "090"), ("",)]),
+        (["t.HNE", "t.HNN", "t.HNZ"], [("HNE", "HNN", "HNZ")]),
+    ],
+)
+def test_components_of_one_station_are_found_by_the_names_of_files(names, found):
+    store = UploadStore()
+    for seed, name in enumerate(names):
+        store.add_file(name, samples(seed).encode())
+    groups = groups_of(store)
+    assert [len(group["rows"]) for group in groups] == [len(labels) for labels in found]
+    for group, labels in zip(groups, found, strict=True):
+        if len(labels) > 1:
+            assert tuple(row["label"] for row in group["rows"]) == labels
+            assert "by their names" in group["reason"]
+            ups = [row for row in group["rows"] if row["is_up"]]
+            assert all(row["vertical"] == (ups[0]["texts"]["motion"] if ups else "") for row in group["rows"][:2])
+
+
+def test_another_length_or_step_is_another_station_and_headings_are_believed():
+    store = UploadStore()
+    store.add_file("a_ns.txt", samples(1).encode())
+    store.add_file("a_ew.txt", samples(2, 300).encode())
+    assert [len(group["rows"]) for group in groups_of(store)] == [1, 1]
+    store = UploadStore()
+    east = (FORMATS / "knet.ns").read_bytes()
+    for direction in (b"N-S", b"E-W", b"U-D"):
+        store.add_file(direction.decode()[0].lower(), east.replace(b"N-S", direction))
+    (group,) = groups_of(store)
+    assert [row["label"] for row in group["rows"]] == ["N-S", "E-W", "U-D"] and "headings" in group["reason"]
+    store = UploadStore()
+    key = store.add_file("two.v2", (FORMATS / "two.v2").read_bytes())
+    (group,) = groups_of(store)
+    assert group["reason"] == "channels of one file" and len(group["rows"]) == 2
+    assert title_of(group["rows"][1]["texts"], store) == "two.v2, 90 Deg"
+    assert read_motion(group["rows"][1]["texts"], store).motion.pga == group["rows"][1]["measures"]["pga"]
+    assert store.kept() == (key,)
+
+
+def test_nothing_is_said_of_a_file_before_its_units_and_step_are_answered():
+    store = UploadStore()
+    key = store.add_file("a.txt", samples(1).encode())
+    (row,) = groups_of(store)[0]["rows"]
+    assert set(row["missing"]) == {"dt", "units"} and row["measures"] is None and "units" not in row["texts"]
+    assert row["choices"]["units"][0][0] == "g"
+    (row,) = groups_of(store, [{"key": key, "dt": "0.02", "units": "gal"}])[0]["rows"]
+    assert row["missing"] == [] and row["texts"] == {"motion": f"file:{key}", "dt": "0.02", "units": "gal"}
+    assert row["measures"]["pga"] == read_motion(row["texts"], store).motion.pga
+
+
+def test_entries_of_an_address_are_those_of_motions_and_not_too_many():
+    assert entries_of("") == []
+    with pytest.raises(InvalidOption, match="not 'width'"):
+        entries_of("motion=none&width=1")
+    with pytest.raises(InvalidOption, match="has 160 entries"):
+        entries_of("motion=none;" * 161)
+
+
+def test_a_file_that_finds_no_room_is_refused_until_one_is_taken_out(monkeypatch):
+    store = UploadStore()
+    monkeypatch.setattr(uploads, "MOST", 3)
+    keys = [store.add_file(f"{seed}.txt", samples(seed).encode()) for seed in range(3)]
+    with pytest.raises(UnreadableRecord, match="3 files and 256 MiB are kept at most; take some out of the list"):
+        store.add_file("4.txt", samples(4).encode())
+    assert store.add_file("again.txt", samples(1).encode()) == keys[1]
+    store.contents(keys[0])
+    store.read(keys[0], None, 0.01, "g")
+    store.remove(keys[0])
+    assert not store._told and not store._read and store.usage()["files"] == 2
+    with pytest.raises(UnreadableRecord, match="not here any more"):
+        store.file(keys[0])
+    monkeypatch.setattr(uploads, "ALL", store.usage()["bytes"] + 10)
+    with pytest.raises(UnreadableRecord, match="cannot be kept"):
+        store.add_file("4.txt", samples(4).encode())
+
+
+def test_forty_records_of_three_components_are_kept_and_few_motions_of_them_in_memory(monkeypatch):
+    store, count = UploadStore(), 100
+    monkeypatch.setattr(uploads, "READ", 20 * count)
+    for station in range(40):
+        for part, direction in enumerate(("ns", "ew", "ud")):
+            store.add_file(f"s{station}_{direction}.txt", samples(3 * station + part, count).encode())
+    found = groups_of(store, [{"key": key, "dt": "0.01", "units": "g"} for key in store.kept()])
+    assert len(found) == 40 and all(len(group["rows"]) == 3 for group in found)
+    rows = [row["texts"] for group in found for row in group["rows"]]
+    read_motion(rows[0], store)
+    tracemalloc.start()
+    for texts in rows[1:60]:
+        read_motion(texts, store)
+    held = tracemalloc.get_traced_memory()[0]
+    tracemalloc.stop()
+    assert sum(len(motion.breakpoints) for motion in store._read.values()) <= 20 * count
+    assert len(store._read) == 20 and held < 200 * uploads.READ
