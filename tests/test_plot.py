@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from rocking import Block, records, simulate
 from rocking.plot.response import DrawnSequence, response_figure
 
 NO_TIMES = np.array([])
@@ -162,6 +163,14 @@ def test_the_zoom_shows_every_interval_against_the_time_to_rest():
     assert zoom.get_xscale() == zoom.get_yscale() == "log"
     assert "9.800000" in zoom.get_title(loc="left")
     assert len(figure_of().axes) == 2
+
+
+def test_the_zoom_says_how_far_the_rest_is_known_before_the_bracket_of_the_computation():
+    response = simulate(Block(width=0.24, height=1.1), records.load("ridgecrest-clc-090"))
+    title = response.plot(longest_sequence=True).axes[2].get_title(loc="left")
+    change = abs(response.sensitivity.events["motion"][-1])
+    assert title.startswith(f"A: at rest at 239.91668 s, ± {1e-6 * change:.0e} s if the motion is off by a millionth; ")
+    assert title.split("; ")[1].startswith("bracket of the computation ")
 
 
 def test_a_narrow_figure_has_the_sequence_below_and_a_wide_one_beside():

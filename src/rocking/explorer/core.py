@@ -28,8 +28,7 @@ from rocking.explorer.uploads import UploadStore
 from rocking.motion.motion import Motion
 from rocking.plausibility import block_notes, motion_notes
 from rocking.response import Response, active_span, in_words, trail_of
-from rocking.response.sensitivity import driving
-from rocking.response.summary import KNOWN
+from rocking.response.sensitivity import KNOWN, driving
 from rocking.treatment import Certified
 
 #: Times at which a rotation is evaluated across a window, and points of a line that are sent.

@@ -38,11 +38,16 @@ _Y_LABELS: Final = {"slenderness": "rotation / {}", "rad": "rotation (rad)", "de
 
 
 class DrawnSequence(NamedTuple):
-    """One chattering sequence: the times of its impacts and the bracket on the time of rest, s."""
+    """One chattering sequence: the times of its impacts and the bracket on the time of rest, s.
+
+    ``off`` says by how much (s) the rest moves if what drives the body (``driver``) is off by a millionth.
+    """
 
     impact_times: Floats
     rest_lower: float
     rest_upper: float
+    off: float = 0.0
+    driver: str = "the motion"
 
 
 class _Scale(NamedTuple):
@@ -267,7 +272,10 @@ def _draw_sequence(axes: Axes, sequence: DrawnSequence) -> None:
     add_labels(axes, "time to rest (s)", "interval to next impact (s)")
     axes.grid()
     width = sequence.rest_upper - sequence.rest_lower
-    axes.set_title(f"A: at rest at {rest:.6f} s, bracket {width:.0e} s wide", color=ABOVE, loc="left", wrap=True)
+    decimals = 6 if sequence.off < 1e-6 else max(0, -math.floor(math.log10(sequence.off)))
+    known = f"± {sequence.off:.0e} s if {sequence.driver} is off by a millionth; " if sequence.off >= 1e-6 else ""
+    title = f"A: at rest at {rest:.{decimals}f} s, {known}bracket of the computation {width:.0e} s wide"
+    axes.set_title(title, color=ABOVE, loc="left", wrap=True)
 
 
 def motion_figure(

@@ -16,7 +16,8 @@ from rocking.plot.response import RotationUnits
 from rocking.problem import thresholds_of
 from rocking.response.answers import Answers, history_of
 from rocking.response.history import even_times
-from rocking.tables import named, rows_of
+from rocking.response.sensitivity import KNOWN, driving
+from rocking.tables import as_written, named, rows_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -157,8 +158,7 @@ def figure(
     if units == "slenderness" and any(map(math.isinf, balance)):
         units = "rad"
     sequence = _longest_sequence(response, start, end) if longest_sequence else None
-    # A dollar in a name begins no formula.
-    shaken = "no motion" if motion is None else motion.label.replace("$", r"\$")
+    shaken = "no motion" if motion is None else motion.label
     return response_figure(
         time=times,
         rotation=response.states(times)[:, 0],
@@ -176,7 +176,7 @@ def figure(
         chattering=None if sequence is None else DrawnSequence(*sequence),
         units=units,
         label="" if coordinate.unit == "rad" else f"{coordinate.name} ({coordinate.unit})",
-        title=title or f"{title_of(body)} under {shaken}",
+        title=title or as_written(f"{title_of(body)} under {shaken}"),
         ax=ax,
         figsize=figsize,
     )
@@ -211,14 +211,16 @@ def _checked(window: Sequence[float], duration: float) -> tuple[float, float]:
     return float(ends[0]), float(ends[1])
 
 
-def _longest_sequence(response: Answers, start: float, end: float) -> tuple[Floats, float, float] | None:
-    """Impact times of the chattering sequence with the most impacts in the stretch, and the bracket on its rest."""
+def _longest_sequence(response: Answers, start: float, end: float) -> tuple[Floats, float, float, float, str] | None:
+    """Impact times of the chattering sequence with the most impacts in the stretch, and how far its rest is known."""
     shown = response.chattering[(response.chattering["start"] >= start) & (response.chattering["end"] <= end)]
     longest = max(shown, key=lambda row: row["impacts"], default=None)
     if longest is None:
         return None
     times = _within(response.impacts["time"], longest["start"], longest["end"])
-    return times, float(longest["lower"]), float(longest["upper"])
+    change = driving(response.sensitivity)[1][response.events["time"] == longest["end"]]
+    driver = "the initial state" if response.motion is None else "the motion"
+    return times, float(longest["lower"]), float(longest["upper"]), KNOWN * float(change.max(initial=0.0)), driver
 
 
 def _within(times: Floats, start: float, end: float) -> Floats:
