@@ -272,10 +272,12 @@ def _draw_sequence(axes: Axes, sequence: DrawnSequence) -> None:
     add_labels(axes, "time to rest (s)", "interval to next impact (s)")
     axes.grid()
     width = sequence.rest_upper - sequence.rest_lower
-    decimals = 6 if sequence.off < 1e-6 else max(0, -math.floor(math.log10(sequence.off)))
-    known = f"± {sequence.off:.0e} s if {sequence.driver} is off by a millionth; " if sequence.off >= 1e-6 else ""
-    title = f"A: at rest at {rest:.{decimals}f} s, {known}bracket of the computation {width:.0e} s wide"
-    axes.set_title(title, color=ABOVE, loc="left", wrap=True)
+    decimals = 6 if sequence.off < 1e-6 else max(0, math.floor(-math.log10(sequence.off)))
+    axes.set_title(f"A: at rest at {rest:.{decimals}f} s", color=ABOVE, loc="left", wrap=True)
+    known = f"± {sequence.off:.0e} s if\n{sequence.driver} is off\nby a millionth;\n" if sequence.off >= 1e-6 else ""
+    # Below the falling line there is room.
+    words = f"{known}bracket of the\ncomputation\n{width:.0e} s"
+    axes.text(0.04, 0.03, words, color=ABOVE, fontsize=7.0, transform=axes.transAxes, ha="left", va="bottom")
 
 
 def motion_figure(
