@@ -813,6 +813,35 @@ def test_a_study_that_varies_too_little_is_refused_with_a_sentence(tmp_path):
         StudyView(tmp_path / "few")
 
 
+@pytest.mark.parametrize("align", ["start", "uplift", "arias"])
+def test_two_records_are_laid_over_each_other_at_a_moment_of_both(explorer, align):
+    other = {"motion": "el-centro-meloland-270", "pga": "0.4g"}
+    payload = explorer.compare(STATUE, other, align=align)
+    header, arrays = payload.header, payload.arrays
+    first, second = explorer.show(STATUE).response, explorer.show({**STATUE, **other}).response
+    moments = {"start": (0.0, 0.0), "uplift": [each.events["time"][0] for each in (first, second)]}
+    moments["arias"] = [each.motion.duration - each.motion.significant_duration(0.05, 1.0) for each in (first, second)]
+    assert header["shift"] == pytest.approx(moments[align][0] - moments[align][1], abs=1e-9)
+    times = arrays["second_time"] + header["window"]["from"] - header["shift"]
+    inside = (times >= 0.0) & (times <= second.duration)
+    assert np.allclose(arrays["second_rotation"][inside], second.rotation(times[inside]), rtol=0.0, atol=1e-9)
+    assert inside.sum() > 500
+    rows = explorer.compared_as_csv(STATUE, other, ("statue", "the other"), align=align).decode().splitlines()
+    assert {row.split(",")[0] for row in rows[1:]} == {"statue", "the other"}
+    common, own = map(float, rows[-1].split(",")[1:3])
+    assert common - own == pytest.approx(header["shift"], abs=1e-9)
+
+
+def test_another_case_is_compared_with_as_a_whole(explorer):
+    texts = {**STATUE, "model": "linear"}
+    header = explorer.compare(texts, STATUE, whole=True).header
+    assert [case["peak_rotation"] for case in header["cases"]] == [
+        explorer.show(each).response.peak_rotation for each in (texts, STATUE)
+    ]
+    with pytest.raises(InvalidOption, match="align"):
+        explorer.compare(texts, STATUE, align="toString")
+
+
 def _mapped(texts, axes):
     grid = maps.grid_of(read_case(texts, UploadStore()), {"points": "8", **axes})
     found = np.empty((len(maps.QUANTITIES), 64), np.float32)

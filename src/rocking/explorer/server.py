@@ -52,6 +52,9 @@ TYPES: Final = {
     ".svg": "image/svg+xml",
 }
 
+#: Letters of a name in a table.
+_LONGEST_NAME: Final = 120
+
 #: Files of the plotting library, in the order in which they are loaded.
 LIBRARY: Final = ("bokeh.min.js", "bokeh-api.min.js")
 
@@ -97,6 +100,16 @@ class Query:
     def others(self) -> dict[str, str]:
         """All that does not belong to the case."""
         return {name: value for name, value in self.given.items() if name not in PARAMETERS}
+
+    @property
+    def compared(self) -> tuple[dict[str, str], dict[str, str]]:
+        """Texts of two cases, or of one and what the other has in their place."""
+        return self.texts(), self.texts(OTHER)
+
+    @property
+    def comparison(self) -> dict[str, Any]:
+        """How two cases are compared: which moments are laid over each other, and whether the other is a whole case."""
+        return {"align": self.given.get("align") or "start", "whole": self.given.get("compare") == "case"}
 
     def number(self, name: str) -> float | None:
         """Return a finite number; None where it is not given."""
@@ -151,7 +164,7 @@ class App:
             "/api/summary": lambda query: explorer.summary(query.texts()),
             "/api/code": lambda query: explorer.code(query.texts()),
             "/api/schemes": lambda query: explorer.schemes(query.texts()),
-            "/api/compare": lambda query: explorer.compare(query.texts(), query.texts(OTHER), query.window),
+            "/api/compare": lambda query: explorer.compare(*query.compared, query.window, **query.comparison),
             "/api/map/point": lambda query: maps.texts_at(self._grid(query), *query.numbers("at_x", "at_y")),
             "/api/orbit": lambda query: periodic.orbit(self._case(query)),
             "/api/sweep/point": self._point_of_sweep,
@@ -167,6 +180,7 @@ class App:
                 Route("/api/map", self.map),
                 Route("/api/sweep", self.sweep),
                 Route("/api/export", self.export),
+                Route("/api/compare/table", self.compared),
                 Route("/api/records", self.upload, methods=["POST"]),
                 Route("/api/records/{key}", self.record),
             ],
@@ -289,6 +303,16 @@ class App:
         content = await self._in_thread(lambda: self.explorer.export(query.texts(), form, query.window))
         headers = {**_FRESH, "content-disposition": f"attachment; filename=rocking-response.{quote(form)}"}
         return Response(content, media_type=EXPORTS[form], headers=headers)
+
+    async def compared(self, request: Request) -> Response:
+        """Return two cases as one table."""
+        query = Query(request.query_params)
+        first, second = (query.given.get(name, name)[:_LONGEST_NAME] for name in ("first", "second"))
+        content = await self._in_thread(
+            lambda: self.explorer.compared_as_csv(*query.compared, (first, second), **query.comparison)
+        )
+        headers = {**_FRESH, "content-disposition": "attachment; filename=rocking-compare.csv"}
+        return Response(content, media_type=EXPORTS["csv"], headers=headers)
 
     async def upload(self, request: Request) -> Response:
         """Keep a record file, the raw body, and say what it is."""

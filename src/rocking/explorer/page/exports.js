@@ -19,7 +19,7 @@ export function showFiles(state, problem) {
 
 /** @typedef {[string, string, () => Promise<Blob>][]} Files names, labels, and what makes them */
 /** Buttons that save files. @param {Files} files @param {(error: unknown) => void} [problem] is told what went wrong */
-function offer(files, problem) {
+export function offer(files, problem) {
   one("exports").replaceChildren(...files.map(([name, label, content]) => make("button", {type: "button", on: {click: async () => {
     try { save(name, await content()); } catch (error) { if (problem) problem(error); else throw error; }
   }}}, [label])));

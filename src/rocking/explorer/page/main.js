@@ -5,10 +5,13 @@ import {Latest, Problem, json, payload} from "./api.js";
 import {ChatteringPanel} from "./chattering.js";
 import {makeCopying, showCode, showFiles} from "./exports.js";
 import {BlockForm, ModelForm, MotionForm} from "./forms.js";
+import {Ghosts} from "./ghosts.js";
 import {Histories} from "./histories.js";
+import {Snapshots} from "./snapshots.js";
 import {coarse} from "./theme.js";
 import {acceptFiles} from "./upload.js";
-import {counted, fixed, legend, make, one, say, short} from "./words.js";
+import {begin, settle} from "./visits.js";
+import {caseName, counted, fixed, legend, make, one, say, short} from "./words.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
 
@@ -27,6 +30,8 @@ const forms = {
 };
 const histories = new Histories(one("histories"), {window: showWindow, cursor: (text) => { one("cursor").textContent = text; }, pick: (time) => views.block?.seek(time)});
 const chattering = new ChatteringPanel(showWindow);
+const ghosts = new Ghosts(histories);
+new Snapshots({now: () => (page.shown ? {name: caseName(page.shown.header), texts: {...state.good.texts}} : null), open: restate, changed: () => views.compare?.repinned()});
 
 /** What is wrong at each place of the page, by its id. @type {Record<string, string | null>} */
 const problems = {};
@@ -80,7 +85,7 @@ const afterPause = new Latest(async () => {
   chattering.window(header.window);
   if (state.view === "response") chattering.draw(page.shown, texts);
   if (!ofOwn(state.view)) {
-    showFiles(state, problem);
+    if (state.view !== "compare") showFiles(state, problem);
     const {python, command} = await json("/api/code", texts);
     if (state.texts === texts && !ofOwn(state.view)) showCode("case", python, command);
   }
@@ -118,9 +123,24 @@ function changed(texts, replaced) {
 
 /** Other texts altogether: show them in the forms, too. @param {Texts} texts */
 function restate(texts) {
+  begin();
   state.window = null;
-  for (const form of Object.values(forms)) form.show(texts);
+  showForms(texts);
   changed(texts, Object.keys(state.texts));
+}
+
+/** @param {Texts} texts */
+function showForms(texts) {
+  for (const form of Object.values(forms)) form.show(texts);
+}
+
+/** Go back or forward in the browser's history. */
+function revisit() {
+  settle();
+  Object.assign(state, readAddress());
+  showForms(state.texts);
+  views[state.view]?.restore?.();
+  void go(state.view);
 }
 
 /** Whether a view shows something else than a response, with files and code of its own. @param {string} name */
@@ -166,6 +186,7 @@ function draw() {
   put(one("derived"), right === left ? `${right}.` : `To the right ${right}. To the left ${left}.`);
   if (state.view === "response" || state.view === "block") {
     const lines = /** @type {any} */ (arrays);
+    ghosts.next(header, lines);
     histories.draw(header, {lines, rest: arrays.rest, uplift: arrays.uplift, block: header.block});
   }
   views[state.view]?.draw?.();
@@ -174,9 +195,8 @@ function draw() {
 /** Name the view and the case, for tabs and bookmarks. @param {any} header */
 function entitle({block, motion}) {
   const view = document.querySelector("[data-view][aria-current]")?.textContent;
-  const {study} = specification, [{p, alpha}] = block.sides;
-  const shaken = motion ? `${motion.name} ${short(motion.pga_g)} g` : "no ground motion";
-  const shown = study && state.view === "map" ? `study ${study.name}` : `p = ${short(p)} rad/s, α = ${short((alpha * 180) / Math.PI)}°, ${shaken}`;
+  const {study} = specification;
+  const shown = study && state.view === "map" ? `study ${study.name}` : caseName({block, motion});
   document.title = `${view}: ${shown} – rocking explorer`;
 }
 
@@ -229,7 +249,7 @@ async function watchCompilation() {
   one("compiling").hidden = true;
 }
 
-for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => go(/** @type {any} */ (button).dataset.view));
+for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => { begin(); void go(/** @type {any} */ (button).dataset.view); });
 for (const button of document.querySelectorAll("[data-zoom]")) button.addEventListener("click", () => histories.zoom(/** @type {any} */ (button).dataset.zoom));
 for (const button of document.querySelectorAll("button.what[aria-controls]")) {
   button.addEventListener("click", () => {
@@ -252,7 +272,8 @@ acceptFiles(async (file, upwards) => {
     problem(error);
   }
 });
-for (const form of Object.values(forms)) form.show(state.texts);
+window.addEventListener("popstate", revisit);
+showForms(state.texts);
 void watchCompilation();
 await go(state.view);
 document.body.dataset.ready = String(performance.now());

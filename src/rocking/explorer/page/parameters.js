@@ -2,11 +2,12 @@
 // address has it: whoever opens the link sees the same.
 
 import {Problem, json} from "./api.js";
+import {write} from "./visits.js";
 import {one} from "./words.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
-/** @typedef {{view: string, texts: Texts, other: Texts, compare: string, window: [number, number] | null, map: Texts, sweep: Texts, good: Good}} State */
-/** What was answered last of each part of the state: it alone enters the address. @typedef {{texts: Texts, other: Texts, compare: string, map: Texts, sweep: Texts}} Good */
+/** @typedef {{view: string, texts: Texts, other: Texts, compare: string, window: [number, number] | null, map: Texts, sweep: Texts, align: string, good: Good}} State */
+/** What was answered last of each part of the state: it alone enters the address. @typedef {{texts: Texts, other: Texts, compare: string, map: Texts, sweep: Texts, align: string}} Good */
 /** @typedef {{name: string, label: string, group: string, unit: string, suffix: string, default: string, units: Record<string, number>, low: number, high: number, logarithmic: boolean, values: string, explanation: string}} Parameter */
 
 /** @type {any} */
@@ -29,7 +30,9 @@ export const namesOf = (...groups) =>
   specification.parameters.filter((/** @type {Parameter} */ each) => !groups.length || groups.includes(each.group)).map((/** @type {Parameter} */ each) => each.name);
 
 const VIEWS = ["response", "block", "map", "periodic", "compare"];
-const COMPARED = ["treatment", "block", "motion"];
+const COMPARED = ["treatment", "block", "motion", "case"];
+/** Which moments of two responses are laid over each other. */
+const ALIGNED = ["start", "uplift", "arias"];
 
 /** @returns {State} */
 export function readAddress() {
@@ -43,7 +46,7 @@ export function readAddress() {
   const from = Number(given.get("from") ?? NaN), to = Number(given.get("to") ?? NaN);
   const parts = {
     texts: complete(Object.keys(texts).length ? texts : opening), other: those(namesOf(), "other."),
-    compare: COMPARED.find((each) => each === given.get("compare")) ?? COMPARED[0], map: those(specification.map), sweep: those(specification.sweep),
+    compare: COMPARED.find((each) => each === given.get("compare")) ?? COMPARED[0], align: ALIGNED.find((each) => each === given.get("align")) ?? ALIGNED[0], map: those(specification.map), sweep: those(specification.sweep),
   };
   return {
     ...parts,
@@ -84,11 +87,12 @@ export function writeAddress(state) {
     put(good.texts, namesOf());
     if (state.view === "compare") {
       given.set("compare", good.compare);
+      if (good.align !== ALIGNED[0]) given.set("align", good.align);
       put(good.other, namesOf(), "other.");
     }
     if (state.view === "map") put(good.map, specification.map);
     if (state.view === "periodic") put(good.sweep, specification.sweep);
     put(ends(state), ["from", "to"]);
-    history.replaceState(null, "", `?${given}`);
+    write(given.toString());
   }, 150);
 }

@@ -60,6 +60,14 @@ export function counted(name) {
   dataset[name] = String(Number(dataset[name] ?? 0) + 1);
 }
 
+/** What a case is called, from what the server says of it. @param {any} header */
+export function caseName({block: {sides: [{p, alpha}]}, motion}) {
+  return `p = ${short(p)} rad/s, α = ${short((alpha * 180) / Math.PI)}°, ${motion ? `${motion.name} ${short(motion.pga_g)} g` : "no ground motion"}`;
+}
+
+/** A name as part of a file's. @param {string} name */
+export const slug = (name) => name.replace(/[^\p{L}\d.]+/gu, "-").slice(0, 60);
+
 /** Say something to those who listen. @param {string} text */
 export function say(text) { one("said").textContent = text; }
 
