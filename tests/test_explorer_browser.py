@@ -227,6 +227,15 @@ def test_another_description_is_the_same_block(opened, more):
     )
 
 
+def test_tracks_end_where_the_other_fields_let_the_block_end(opened):
+    page = opened(STATUE + "&offset=0.05")
+    slider = page.page.locator("#offset-slider")
+    page.rested(lambda: (slider.focus(), slider.press("End")))
+    assert query_of(page)["offset"] == "0.06" and page.js("document.getElementById('problem').hidden")
+    first, here = page.js("['min', 'value'].map((name) => Number(document.getElementById('width-slider')[name]))")
+    assert first == here > 0  # a narrower block has no centre of mass there
+
+
 def test_a_number_that_is_being_typed_stays_when_a_response_arrives(opened):
     page = opened(STATUE)
     width, move = page.page.locator("#width"), "document.getElementById('pga-slider')"

@@ -32,6 +32,7 @@ from rocking.explorer.inputs import Case, read_case
 from rocking.explorer.parameters import PARAMETERS, field_label, specification
 from rocking.explorer.payload import Payload, pack
 from rocking.explorer.studies import StudyView
+from rocking.explorer.tracks import tracks
 from rocking.explorer.uploads import LARGEST
 from rocking.quantities import number
 from rocking.tables import plain
@@ -163,6 +164,7 @@ class App:
             "/api/window": self._window,
             "/api/summary": lambda query: explorer.summary(query.texts()),
             "/api/code": lambda query: explorer.code(query.texts()),
+            "/api/tracks": lambda query: tracks(query.texts()),
             "/api/schemes": lambda query: explorer.schemes(query.texts()),
             "/api/compare": lambda query: explorer.compare(*query.compared, query.window, **query.comparison),
             "/api/map/point": lambda query: maps.texts_at(self._grid(query), *query.numbers("at_x", "at_y")),

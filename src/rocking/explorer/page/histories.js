@@ -216,7 +216,7 @@ export class Histories {
   /** Both plots as they are drawn, and what their colours mean. @param {"svg" | "png"} form @param {[string, string][]} entries */
   async picture(form, entries) {
     const drawn = bokeh().index.find_one(this.grid).export(form);
-    return withLegend(await drawn.to_blob(), entries, this.rotation.outer_width, this.rotation.outer_height + this.ground.outer_height);
+    return withLegend(await drawn.to_blob(), entries, this.rotation.outer_width, this.rotation.outer_height + this.ground.outer_height, 1);
   }
 
   drawGhosts() {

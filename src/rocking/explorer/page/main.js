@@ -80,6 +80,8 @@ const afterPause = new Latest(async () => {
   if (!page.shown) return;
   const {header} = page.shown, {texts} = state;
   forms.block.show(texts, header.block.sides);
+  const found = await json("/api/tracks", texts);
+  if (state.texts === texts) forms.block.tracks(found);
   showNotes(header);
   showLegend(header.motion?.vertical);
   chattering.window(header.window);
