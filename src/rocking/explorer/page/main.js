@@ -80,8 +80,7 @@ const afterPause = new Latest(async () => {
   if (!page.shown) return;
   const {header} = page.shown, {texts} = state;
   forms.block.show(texts, header.block.sides);
-  const found = await json("/api/tracks", texts);
-  if (state.texts === texts) forms.block.tracks(found);
+  const asked = json("/api/tracks", texts).catch(() => ({}));
   showNotes(header);
   showLegend(header.motion?.vertical);
   chattering.window(header.window);
@@ -91,6 +90,8 @@ const afterPause = new Latest(async () => {
     const {python, command} = await json("/api/code", texts);
     if (state.texts === texts && !ofOwn(state.view)) showCode("case", python, command);
   }
+  const found = await asked;
+  if (state.texts === texts) forms.block.tracks(found);
   counted("rested");
 }, problem);
 
