@@ -110,7 +110,7 @@ def test_balls_and_blocks_are_bodies():
         assert isinstance(body, Body) and isinstance(body.alone(), Bodies)
         assert not isinstance(body, Bodies) and not isinstance(body.alone(), Body)
     for other in (0.4, "block", rocking.Block, [block]):
-        with pytest.raises(InvalidBlock, match="a Block is needed"):
+        with pytest.raises(InvalidBlock, match="a Block or another body is needed"):
             simulate(other, None)
 
 

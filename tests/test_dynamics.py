@@ -198,6 +198,12 @@ def test_many_bodies_as_one_by_one():
             "from -0.1 to 0.1 m",
         ),
         (lambda: dynamics.simulate(dynamics.BouncingBall(0.5), None, initial_velocity=-1.0), InvalidOption, "into it"),
+        (
+            lambda: dynamics.simulate(dynamics.BouncingBall(0.5), None, chattering="velocity=-1"),
+            InvalidOption,
+            "a positive number, in m/s, or of a block",
+        ),
+        (lambda: dynamics.simulate_many(3, None), InvalidBlock, "of rocking.dynamics is needed, not int"),
         (lambda: dynamics.simulate(dynamics.ImpactOscillator(1.0, 0.5, stop=0.1), None), InvalidOption, "duration"),
         (lambda: dynamics.simulate(rocking.Block(width=0.2, height=1.0), None), InvalidBlock, "rocking.simulate"),
         (

@@ -103,6 +103,21 @@ def test_counts_and_times_are_those_of_the_response(records):
     assert judged >= 10
 
 
+def test_times_of_uplift_and_rest_are_those_of_the_response(records):
+    blocks = random_blocks(30, 6)
+    result = simulate_many(blocks, records[0], times=True)
+    assert not {"first_uplift", "first_rest", "last_rest"} & {*simulate_many(blocks[0], records[0]).data_vars}
+    rested = 0
+    for b in range(30):
+        events, cell = simulate(blocks[b], records[0]).events, result.isel(motion=0, block=b)
+        uplifts, rests = ([*events["time"][events["kind"] == kind]] for kind in ("uplift", "rest"))
+        expected = [*(uplifts[:1] or [0.0]), *(rests[:1] or [0.0]), *(rests[-1:] or [0.0])]
+        found = [float(cell[name]) for name in ("first_uplift", "first_rest", "last_rest")]
+        assert np.allclose(found, expected, rtol=0.0, atol=1e-9), b
+        rested += bool(rests)
+    assert rested >= 4
+
+
 def test_reversing_the_motion_mirrors_the_blocks(records):
     blocks = random_blocks(70, 6, two_sided=True)
     mirrored = Blocks(blocks.p[:, ::-1], blocks.alpha[:, ::-1], blocks.restitution[:, ::-1])

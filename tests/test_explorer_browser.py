@@ -230,6 +230,15 @@ def test_another_description_is_the_same_block(opened, more):
     )
 
 
+def test_tracks_end_where_the_other_fields_let_the_block_end(opened):
+    page = opened(STATUE + "&offset=0.05")
+    slider = page.page.locator("#offset-slider")
+    page.rested(lambda: (slider.focus(), slider.press("End")))
+    assert query_of(page)["offset"] == "0.06" and page.js("document.getElementById('problem').hidden")
+    first, here = page.js("['min', 'value'].map((name) => Number(document.getElementById('width-slider')[name]))")
+    assert first == here > 0  # a narrower block has no centre of mass there
+
+
 def test_a_number_that_is_being_typed_stays_when_a_response_arrives(opened):
     page = opened(STATUE)
     width, move = page.page.locator("#width"), "document.getElementById('pga-slider')"
@@ -1696,6 +1705,88 @@ def test_a_browser_without_the_link_is_told_so(browser, here):
         page.page.goto("about:blank")
     assert page.complaints == []
     context.close()
+
+
+# Back and forward, pinned cases, curves that were
+
+
+def test_back_and_forward_go_from_change_to_change_and_show_an_unchanged_map_at_once(opened):
+    page = opened(SINE + "&view=map&points=24")
+    page.until("document.body.dataset.map === 'complete'")
+    took = page.js("document.body.dataset.mapTook")
+    page.rested(lambda: page.page.click("#map-open"))
+    page.until("new URLSearchParams(location.search).get('view') === null")
+    opened_at = query_of(page)
+    width = page.page.locator("#restitution")
+    page.rested(lambda: (width.fill("0.9"), width.press("Enter")))
+    assert query_of(page)["restitution"] == "0.9"
+    page.page.go_back()
+    page.until("new URLSearchParams(location.search).get('restitution') === '0.92'")
+    assert query_of(page) == opened_at and width.input_value() == "0.92"
+    page.page.go_back()
+    page.until("document.querySelector('[data-view=map]').getAttribute('aria-current')")
+    page.page.wait_for_timeout(100)
+    assert page.js("[document.body.dataset.map, document.body.dataset.mapTook]") == ["complete", took]
+    assert "a" in page.text("#map-at") and query_of(page)["view"] == "map"
+    page.page.go_forward()
+    page.until("new URLSearchParams(location.search).get('view') === null")
+    page.page.reload()
+    page.until("document.body.dataset.ready && document.body.dataset.rested")
+    assert query_of(page) == opened_at
+
+
+def test_a_drag_is_one_entry_and_leaves_curves_behind_for_a_second(opened):
+    page = opened(STATUE)
+    before = page.js("history.length")
+    slider = page.page.locator("#pga-slider")
+    box = slider.bounding_box()
+    page.page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 0.5 * box["height"])
+    page.page.mouse.down()
+    for k in range(1, 8):
+        drawn = page.js("Number(document.body.dataset.drawn)")
+        page.page.mouse.move(box["x"] + (0.6 + 0.02 * k) * box["width"], box["y"] + 0.5 * box["height"])
+        page.until(f"Number(document.body.dataset.drawn) > {drawn}")
+    source = "Bokeh.documents.map((each) => each.get_model_by_name('histories-ghosts')).filter(Boolean)[0]"
+    shades = f"{source}.data.xs.length"
+    assert page.js(shades) == 5
+    page.page.mouse.up()
+    page.until(f"{shades} === 0", "the curves go")
+    moved = query_of(page)["pga"]
+    assert moved != "0.4g" and page.js("history.length") == before + 1
+    page.page.go_back()
+    page.until("document.getElementById('pga').value === '0.4'")
+
+
+def test_a_pinned_case_is_returned_to_compared_with_and_kept(opened):
+    page = opened(STATUE)
+    page.page.click("#pin")
+    page.page.fill("#pin-name", "as found")
+    page.page.click("#pin")
+    width = page.page.locator("#width")
+    page.rested(lambda: (width.fill("0.3"), width.press("Enter")))
+    page.page.reload()
+    page.until("document.body.dataset.ready && document.body.dataset.rested")
+    page.page.click("[data-view=compare]")
+    page.page.select_option("#compare-with", "case")
+    page.until("document.body.dataset.compared")
+    page.until("new URLSearchParams(location.search).get('compare') === 'case'")
+    found = query_of(page)
+    assert (found["width"], found["other.width"], found["other.pga"]) == ("0.3", "0.24", "0.4g")
+    assert page.page.locator("#other-case option").all_text_contents() == ["as found"]
+    page.page.select_option("#compare-align", "uplift")
+    page.until("new URLSearchParams(location.search).get('align') === 'uplift'")
+    saved = {}
+    for label in ("Both, SVG", "Both, PNG", "Both, histories, CSV"):
+        with page.page.expect_download() as download:
+            page.page.click(f"text={label}")
+        saved[label] = Path(download.value.path()).read_bytes()
+        assert "ridgecrest-clc-090" in download.value.suggested_filename
+    assert saved["Both, PNG"].startswith(b"\x89PNG") and b"the other: p = 3.61" in saved["Both, SVG"]
+    assert saved["Both, histories, CSV"].startswith(b"case,common_time_s,time_s")
+    page.rested(lambda: page.page.click(".chip button"))
+    assert query_of(page)["width"] == "0.24"
+    page.page.click(".chip .remove")
+    assert page.js("localStorage.getItem('rocking-snapshots')") == "[]"
 
 
 # The modules

@@ -36,7 +36,8 @@ TEXTS = {"ink": "paper desk", "soft": "paper desk", "accent": "paper", "wrong": 
 
 def palettes():
     """Colours of the light page and of the dark one."""
-    light, dark = (dict(re.findall(r"--([a-z]+): (#[0-9a-f]{6});", each)) for each in re.split(r":root(?:, :root\.lit)? \{", STYLE)[1:3])
+    rules = re.split(r":root(?:, :root\.lit)? \{", STYLE)[1:3]
+    light, dark = (dict(re.findall(r"--([a-z]+): (#[0-9a-f]{6});", each)) for each in rules)
     return {"light": light, "dark": dark}
 
 

@@ -819,6 +819,35 @@ def test_a_study_that_varies_too_little_is_refused_with_a_sentence(tmp_path):
         StudyView(tmp_path / "few")
 
 
+@pytest.mark.parametrize("align", ["start", "uplift", "arias"])
+def test_two_records_are_laid_over_each_other_at_a_moment_of_both(explorer, align):
+    other = {"motion": "el-centro-meloland-270", "pga": "0.4g"}
+    payload = explorer.compare(STATUE, other, align=align)
+    header, arrays = payload.header, payload.arrays
+    first, second = explorer.show(STATUE).response, explorer.show({**STATUE, **other}).response
+    moments = {"start": (0.0, 0.0), "uplift": [each.events["time"][0] for each in (first, second)]}
+    moments["arias"] = [each.motion.duration - each.motion.significant_duration(0.05, 1.0) for each in (first, second)]
+    assert header["shift"] == pytest.approx(moments[align][0] - moments[align][1], abs=1e-9)
+    times = arrays["second_time"] + header["window"]["from"] - header["shift"]
+    inside = (times >= 0.0) & (times <= second.duration)
+    assert np.allclose(arrays["second_rotation"][inside], second.rotation(times[inside]), rtol=0.0, atol=1e-9)
+    assert inside.sum() > 500
+    rows = explorer.compared_as_csv(STATUE, other, ("statue", "the other"), align=align).decode().splitlines()
+    assert {row.split(",")[0] for row in rows[1:]} == {"statue", "the other"}
+    common, own = map(float, rows[-1].split(",")[1:3])
+    assert common - own == pytest.approx(header["shift"], abs=1e-9)
+
+
+def test_another_case_is_compared_with_as_a_whole(explorer):
+    texts = {**STATUE, "model": "linear"}
+    header = explorer.compare(texts, STATUE, whole=True).header
+    assert [case["peak_rotation"] for case in header["cases"]] == [
+        explorer.show(each).response.peak_rotation for each in (texts, STATUE)
+    ]
+    with pytest.raises(InvalidOption, match="align"):
+        explorer.compare(texts, STATUE, align="toString")
+
+
 def _mapped(texts, axes):
     grid = maps.grid_of(read_case(texts, UploadStore()), {"points": "8", **axes})
     found = np.empty((len(maps.QUANTITIES), 64), np.float32)
@@ -827,7 +856,7 @@ def _mapped(texts, axes):
     return grid, dict(zip(maps.QUANTITIES, found.reshape(-1, 8, 8), strict=True))
 
 
-def test_a_map_of_overturning_is_a_command_and_a_script(run, tmp_path):
+def test_a_map_of_overturning_is_a_command(run):
     texts = {**SINE, "motion": "ricker:amplitude=3,frequency=1,kind=antisymmetric", "model": "nonlinear"}
     axes = {"x": "omega", "x_from": "3", "x_to": "5", "y": "a", "y_from": "0.7", "y_to": "9"}
     grid, found = _mapped(texts, axes)
@@ -836,34 +865,32 @@ def test_a_map_of_overturning_is_a_command_and_a_script(run, tmp_path):
     assert code == 0
     assert np.array_equal(np.array(json.loads(out)["mode"]), modes)
     assert len(np.unique(modes)) > 2
-    script = tmp_path / "map.py"
-    script.write_text(map_as_python(grid, "mode"), "utf-8")
-    assert np.array_equal(runpy.run_path(str(script))["found"].data.mode.values, modes)
 
 
-@pytest.mark.parametrize(
-    ("texts", "axes"),
-    [
-        (SINE, {"x": "omega", "x_from": "2.5", "x_to": "4", "y": "a", "y_from": "1", "y_to": "1.12"}),
-        (SINE, {"x": "restitution", "y": "omega"}),
-        ({**SINE, "restitution": "0.9,0.92"}, {"x": "p", "y": "a", "y_from": "1.1", "y_to": "2"}),
-        ({**STATUE, "motion": "el-centro-meloland-270"}, {"x": "alpha", "y": "pga"}),
-    ],
-)
-@pytest.mark.parametrize("quantity", ["outcome", "peak"])
-def test_every_map_is_a_script(texts, axes, quantity, tmp_path):
-    grid, found = _mapped(texts, axes)
+#: Cases and axes of maps: over records and pulses, of one side and two, with each kind of axis.
+_MAPS = [
+    (SINE, {"x": "omega", "x_from": "2.5", "x_to": "4", "y": "a", "y_from": "1", "y_to": "1.12"}),
+    ({**SINE, "model": "nonlinear"}, {"x": "omega", "x_from": "3", "x_to": "5", "y": "a", "y_to": "9"}),
+    (SINE, {"x": "restitution", "y": "omega"}),
+    (SINE, {"x": "omega", "y": "pga", "y_from": "0.2", "y_to": "2"}),
+    ({**SINE, "restitution": "0.9,0.92"}, {"x": "p", "y": "a", "y_from": "1.1", "y_to": "2"}),
+    (SINE, {"x": "alpha", "y": "a", "y_from": "1", "y_to": "5"}),
+    ({**STATUE, "motion": "el-centro-meloland-270"}, {"x": "alpha", "y": "pga"}),
+    ({**STATUE, "offset": "0.03", "motion": "el-centro-meloland-270"}, {"x": "p", "y": "pga", "y_to": "2"}),
+]
+
+
+@pytest.mark.parametrize(("texts", "axes"), _MAPS)
+def test_every_map_is_a_script_that_computes_the_same(texts, axes, tmp_path):
+    grid, mapped = _mapped(texts, axes)
     script = tmp_path / "map.py"
-    script.write_text(map_as_python(grid, quantity), "utf-8")
-    ran = runpy.run_path(str(script))["found"]
-    if quantity == "outcome":
-        assert np.array_equal(ran.data.outcome.values, found["outcome"])
-        time = (ran.data.rest - ran.data.uplift).values
-        assert np.allclose(time, found["rest"], rtol=1e-5, equal_nan=True)
-    else:
-        if not isinstance(ran, np.ndarray):
-            ran = np.where(ran.data.mode >= 0, np.inf, ran.data.peak_rotation / 0.2)
-        assert np.allclose(ran, found["peak"], rtol=1e-5)
+    for quantity in maps.QUANTITIES:
+        script.write_text(map_as_python(grid, quantity), "utf-8")
+        found = runpy.run_path(str(script))["found"]
+        if quantity == "outcome":
+            found = found.data.outcome.values
+        assert np.array_equal(np.float32(found), mapped[quantity], equal_nan=True), quantity
+    assert len(np.unique(mapped["mode"])) > 1
 
 
 @pytest.mark.parametrize(

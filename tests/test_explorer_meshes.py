@@ -306,7 +306,7 @@ def test_maps_and_sweeps_of_a_mesh_are_of_its_block(run, tmp_path):
         point: values for part in maps.parts(grid) for point, values in zip(part.points, part.values.T, strict=True)
     }
     (tmp_path / "map.py").write_text(map_as_python(grid, "mode"), "utf-8")
-    modes = runpy.run_path(str(tmp_path / "map.py"))["found"].data.mode.values.ravel()
+    modes = runpy.run_path(str(tmp_path / "map.py"))["found"].ravel()
     assert sorted(found) == list(range(64))
     mapped = np.array([found[k][3] for k in range(64)])
     assert np.array_equal(np.where(mapped == maps.Mode.OVERTURNS_AFTER_REST, 0, mapped), modes)

@@ -1,5 +1,8 @@
 """Figures of studies: what they show is explained, and no text leaves them at the widths that journals print."""
 
+import dataclasses
+import re
+
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -7,6 +10,8 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
+import rocking
+from rocking import dynamics
 from rocking.plot.basins import basins_figure, erosion_figure
 from rocking.plot.bifurcation import bifurcation_figure
 from rocking.plot.calibration import Parameter, factors_figure, measured_figure, outcomes_figure
@@ -534,3 +539,34 @@ def test_dots_of_a_fragility_say_what_they_pool():
     marks = [line for line in figure.axes[0].lines if line.get_marker() != "None" and len(line.get_xdata())]
     np.testing.assert_allclose(marks[0].get_xdata(), np.linspace(0.0, 8.0, 50)[[9, 19, 29]])
     assert len({mark.get_marker() for mark in marks}) == 2
+
+
+def test_dollars_in_names_begin_no_formula():
+    sine = rocking.pulses.sine(3.0, 1.0, cycles=2)
+    named = [dataclasses.replace(sine, name=name) for name in ("$a_b$ $c^d$", "$40 and $50")]
+    block = rocking.Block(width=0.3, height=1.2)
+    oscillator = dynamics.ImpactOscillator(1.0, 0.8, damping_ratio=0.05, stop=0.01)
+
+    def case(damping):
+        return dataclasses.replace(oscillator, stop=damping), named[0]
+
+    diagram = dynamics.bifurcation_diagram(case, [0.1, 0.2], (0.0, 0.0), transient=3, kept=2, parameter="first_stop")
+    figures = {
+        "response": rocking.simulate(block, named[0]).plot(),
+        "motion": named[0].plot(),
+        "ida": rocking.incremental_dynamic_analysis(block, named, levels=[1.0, 2.0], measure="pga").plot(),
+        "spectrum": rocking.rocking_spectrum(rocking.Blocks.grid(alpha=[0.2], p=[2.0, 3.0, 4.0]), named).plot(),
+        "diagram": diagram.plot(),
+    }
+    seen = 0
+    for kind, figure in figures.items():
+        texts = [text.get_text() for text in figure.findobj(Text)]
+        assert not [text for text in texts if re.search(r"(?<!\\)\$(?!10\^)", text)], kind
+        assert not [text for text in texts if re.search(r"[a-z]_[a-z]{2}", text)], kind
+        seen += any("\\$" in text for text in texts)
+    assert seen >= 4
+    assert "damping ratio = 0.05" in as_title(figures["diagram"])
+
+
+def as_title(figure):
+    return " ".join(figure._suptitle.get_text().split())

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from rocking import Block, records, simulate
 from rocking.plot.response import DrawnSequence, response_figure
 
 NO_TIMES = np.array([])
@@ -133,14 +134,16 @@ def test_impacts_uplifts_and_rests_are_marked_at_their_times():
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_an_overturned_block_leaves_the_frame_and_its_fall_is_marked_at_its_time(side):
+def test_the_fall_of_an_overturned_block_is_marked_where_its_curve_leaves_the_frame(side):
     time = np.linspace(0.0, 10.0, 1001)
     figure = figure_of(rotation=side * np.exp(time) * 1e-4, overturn_time=9.75)
     axes = figure.axes[0]
     low, high = axes.get_ylim()
     assert high - low < 5.0
     mark = labelled(axes, "overturned at 9.750 s")
-    assert [mark.get_xdata()[0], mark.get_ydata()[0]] == [9.75, high if side > 0.0 else low]
+    at, height = mark.get_xdata()[0], mark.get_ydata()[0]
+    assert height == (high if side > 0.0 else low)  # where the curve leaves the frame, on its way to the fall
+    assert np.interp(at, time, axes.lines[0].get_ydata()) == pytest.approx(height, rel=1e-3) and at < 9.75
     assert mark.get_marker() != labelled(axes, "uplift").get_marker()
     assert "overturned at 9.750 s" in legend_of(figure)
 
@@ -162,6 +165,16 @@ def test_the_zoom_shows_every_interval_against_the_time_to_rest():
     assert zoom.get_xscale() == zoom.get_yscale() == "log"
     assert "9.800000" in zoom.get_title(loc="left")
     assert len(figure_of().axes) == 2
+
+
+def test_the_zoom_says_how_far_the_rest_is_known_before_the_bracket_of_the_computation():
+    response = simulate(Block(width=0.24, height=1.1), records.load("ridgecrest-clc-090"))
+    zoom = response.plot(longest_sequence=True).axes[2]
+    change = abs(response.sensitivity.events["motion"][-1])
+    assert zoom.get_title(loc="left") == "A: at rest at 239.9167 s"
+    first, second = zoom.texts[0].get_text().replace("\n", " ").split("; ")
+    assert first == f"± {1e-6 * change:.0e} s if the motion is off by a millionth"
+    assert second.startswith("bracket of the computation ")
 
 
 def test_a_narrow_figure_has_the_sequence_below_and_a_wide_one_beside():

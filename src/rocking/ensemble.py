@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, Literal
 
@@ -52,6 +52,13 @@ VARIABLES: Final[Mapping[str, tuple[str, str]]] = {
         "1",
         "whether the duration ended it while the block moved or the motion went on, and left the verdict open",
     ),
+}
+
+#: Times that are kept besides where they are asked for, likewise.
+TIMES: Final[Mapping[str, tuple[str, str]]] = {
+    "first_uplift": ("s", "time of the first uplift; 0 without one"),
+    "first_rest": ("s", "time at which the block first came to rest; 0 if it never did"),
+    "last_rest": ("s", "time at which the block last came to rest; 0 if it never did"),
 }
 
 
@@ -235,7 +242,8 @@ def dataset_of(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
 
     dimensions = ("motion", "scale", "polarity", "block")
     gone = {"scale": product.scales.measure is None, "polarity": product.polarity != "both"}
-    described = {name: {"units": units, "long_name": meaning} for name, (units, meaning) in VARIABLES.items()}
+    kept = {**VARIABLES, **TIMES}
+    described = {name: {"units": units, "long_name": meaning} for name, (units, meaning) in kept.items()}
     for name, (_, what) in {**OF_BLOCKS, **BETWEEN_STOPS}.items():
         described[name] = {"units": "rad", "long_name": f"change of the peak per relative change of {what}"}
     variables = {name: (dimensions, values, described.get(name, {})) for name, values in outcomes.items()}
@@ -288,6 +296,7 @@ def simulate_many(
     polarity: Polarity = "+",
     duration: float | None = None,
     derivatives: bool = False,
+    times: bool = False,
     threads: int | None = None,
     progress: bool | None = None,
 ) -> xr.Dataset:
@@ -315,6 +324,8 @@ def simulate_many(
     derivatives : bool
         Whether to differentiate the peaks. Each body that rocks and stands is then followed
         once more, alone, which takes some twenty times as long.
+    times : bool
+        Whether to keep the times of the first uplift and of the first and the last rest.
     threads : int, optional
         Number of threads; by default one for every core.
     progress : bool, optional
@@ -330,7 +341,8 @@ def simulate_many(
         overturned is open). With `derivatives` also peak_by_motion, peak_by_p, peak_by_alpha and peak_by_restitution:
         the change of the peak (rad) per relative change of each of these, as `Response.sensitivity` has it; NaN where
         there is none, since the block overturns, the simulation was not finished, or rounding decides whether a block
-        that nothing weighs down touches the ground. Coordinates name the motions and hold the blocks' parameters.
+        that nothing weighs down touches the ground. With `times` also first_uplift, first_rest and last_rest (s; 0 for
+        what never happened). Coordinates name the motions and hold the blocks' parameters.
 
     Raises
     ------
@@ -356,7 +368,8 @@ def simulate_many(
     """
     product = product_of(blocks, motions, levels, measure, polarity, model, chattering, duration)
     by = OF_BLOCKS if checks.flag(derivatives, "derivatives", InvalidOption) else None
-    return dataset_of(product, outcomes_of(product, setup_of(product), threads, progress, by))
+    names = (*VARIABLES, *(TIMES if checks.flag(times, "times", InvalidOption) else ()))
+    return dataset_of(product, outcomes_of(product, setup_of(product), threads, progress, by, names))
 
 
 def outcomes_of(
@@ -365,10 +378,11 @@ def outcomes_of(
     threads: int | None,
     progress: bool | None,
     by: By | None = None,
+    names: Iterable[str] = tuple(VARIABLES),
 ) -> dict[str, NDArray[np.generic]]:
-    """Simulate a whole product, and return arrays of its shape by the names of `VARIABLES`, and of changes of peaks."""
+    """Simulate a whole product, and return arrays of its shape by names of `OUTCOME`, and of changes of peaks."""
     count = cores() if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
-    results: dict[str, NDArray[np.generic]] = {name: np.empty(product.shape, dtype=OUTCOME[name]) for name in VARIABLES}
+    results: dict[str, NDArray[np.generic]] = {name: np.empty(product.shape, dtype=OUTCOME[name]) for name in names}
     done = []
     with Progress("simulating", math.prod(product.shape), show=progress) as bar:
         for task, outcomes in simulate_tasks(setup, _tasks(product), threads=count):

@@ -24,6 +24,9 @@ from rocking.treatment import Treatment
 #: Fastest initial velocity, rad/s or m/s: beyond all sense, and squares and fourth powers of it are far from overflow.
 FASTEST = 1e6
 
+#: What is needed where any body will do.
+_NEEDED = "a Block or another body"
+
 
 @functools.lru_cache(maxsize=8)
 def ground_of(motion: Motion | None, gravity: float, factor: float = 1.0) -> Ground:
@@ -54,7 +57,7 @@ def step_of(motion: Motion) -> float | None:
 def bodies_of(given: Bodies | Body | Iterable[Body]) -> Bodies:
     """Return bodies as they are, and single ones of one kind as `Bodies` of that kind."""
     if isinstance(given, type):  # has what its objects have, but is none
-        return Blocks.of(cast("Iterable[Block]", given))
+        one_block(cast("Block", given), _NEEDED)
     if isinstance(given, Bodies):
         return given
     if isinstance(given, Body):
@@ -62,6 +65,8 @@ def bodies_of(given: Bodies | Body | Iterable[Body]) -> Bodies:
     several = list(given) if isinstance(given, Iterable) and not isinstance(given, str) else given
     if isinstance(several, list) and several and isinstance(several[0], Body) and not isinstance(several[0], type):
         return KINDS[several[0].alone().kind].of(several)
+    for each in several if isinstance(several, list) else [several]:
+        one_block(cast("Block", each), _NEEDED)
     return Blocks.of(cast("Iterable[Block]", several))
 
 
@@ -93,7 +98,7 @@ def one_body(body: Body) -> Body:
     """Return the body, or say that it is none."""
     if isinstance(body, Block) or (isinstance(body, Body) and not isinstance(body, type)):  # a protocol is slow to ask
         return body
-    return one_block(cast("Block", body))
+    return one_block(cast("Block", body), _NEEDED)
 
 
 def set_start(

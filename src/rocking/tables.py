@@ -117,6 +117,17 @@ def named(quantity: str, unit: str) -> str:
     return quantity if unit == "1" else f"{quantity}_{unit.replace('/', '_').replace('^', '')}"
 
 
+def as_written(text: str) -> str:
+    r"""Write a text so that a figure shows it as it is: a dollar in a name begins no formula.
+
+    Examples
+    --------
+    >>> print(as_written("$40 a night"))
+    \$40 a night
+    """
+    return text.replace("$", r"\$")
+
+
 def decimal(value: float) -> float:
     """Return a number without the rounding in its last digit, so that it is written as people write it."""
     written = float(f"{value:.12g}")

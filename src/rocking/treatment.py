@@ -272,7 +272,7 @@ class VelocityThreshold(Treatment):
     threshold: float = 5e-10
 
     def __post_init__(self) -> None:
-        checks.positive(self.threshold, "threshold", InvalidOption, "fractions of p alpha")
+        checks.positive(self.threshold, "threshold", InvalidOption, "m/s, or of a block fractions of p alpha")
 
     @property
     def label(self) -> str:

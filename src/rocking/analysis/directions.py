@@ -22,7 +22,7 @@ from rocking.progress import Progress
 from rocking.result import DatasetResult, variable
 from rocking.solid.rose import checked_azimuths
 from rocking.solid.solid import Solid
-from rocking.tables import counted, text_table
+from rocking.tables import as_written, counted, text_table
 from rocking.treatment import Treatment
 
 if TYPE_CHECKING:
@@ -233,7 +233,7 @@ class ResponseRose(DatasetResult):
             azimuth=around[order],
             shares=np.concatenate([shares, shares[:, new]], axis=1)[:, order],
             labels=[names[k] for k in chosen],
-            title=title or self._headline(),
+            title=title or as_written(self._headline()),
             ax=ax,
             figsize=figsize,
         )

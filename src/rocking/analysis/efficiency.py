@@ -21,7 +21,7 @@ from rocking.motion.named import Motions, several_motions
 from rocking.motion.scaling import Measure
 from rocking.problem import bodies_of, slenderness_of
 from rocking.result import DatasetResult, variable
-from rocking.tables import counted, text_table
+from rocking.tables import as_written, counted, text_table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -214,7 +214,7 @@ class MeasureComparison(DatasetResult):
             dispersion=data.dispersion.values[order],
             low=data.dispersion_low.values[order],
             high=data.dispersion_high.values[order],
-            title=title or f"{data.blocks}, {data.model} model, {counted(data.sizes['motion'], 'motion')}",
+            title=title or as_written(f"{data.blocks}, {data.model} model, {counted(data.sizes['motion'], 'motion')}"),
             ax=ax,
             figsize=figsize,
         )

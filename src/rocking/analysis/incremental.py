@@ -33,7 +33,7 @@ from rocking.motion.named import Motions, several_motions
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.problem import bodies_of, slenderness_of, thresholds_of
 from rocking.result import DatasetResult
-from rocking.tables import counted, named, text_table
+from rocking.tables import as_written, counted, named, text_table
 from rocking.treatment import Certified
 
 if TYPE_CHECKING:
@@ -314,7 +314,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         return ida_figure(
             motions=motions,
             level_label=data.level.label,
-            title=title or f"{what}, {data.model} model",
+            title=title or as_written(f"{what}, {data.model} model"),
             ax=ax,
             figsize=figsize,
         )

@@ -25,7 +25,7 @@ from rocking.named_pulses import pulse_family
 from rocking.progress import Progress
 from rocking.result import DatasetResult, table_of_some, variable
 from rocking.simulation import simulate
-from rocking.tables import cell, named, text_table
+from rocking.tables import as_written, cell, named, text_table
 from rocking.treatment import Certified
 
 if TYPE_CHECKING:
@@ -285,7 +285,7 @@ class OverturningMap(DatasetResult):
             names={int(mode): mode_name(int(mode)) for mode in np.union1d(modes, data.mode_above.values)},
             x_label="2πf/p, with the frequency f of the pulse",
             y_label="amplitude over the smallest that lifts the block",
-            title=title or f"{self.data.pulse_name}, {self._proportions}, {data.model} model",
+            title=title or as_written(f"{self.data.pulse_name}, {self._proportions}, {data.model} model"),
             ax=ax,
             figsize=figsize,
         )

@@ -20,7 +20,7 @@ from rocking.block import Block, housner_restitution, impact_restitution, one_bl
 from rocking.constants import MODELS, Model
 from rocking.errors import InvalidOption
 from rocking.result import DrawnResult
-from rocking.tables import counted, text_table
+from rocking.tables import as_written, counted, text_table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -146,7 +146,7 @@ class RestitutionComparison(DrawnResult):
             factor=self.factors,
             deviation=self.deviations,
             curves=dict([*curves.items()][:_DRAWN]),
-            title=title or self._headline(),
+            title=title or as_written(self._headline()),
             ax=ax,
             figsize=figsize,
         )

@@ -24,7 +24,7 @@ from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
 from rocking.result import DrawnResult
-from rocking.tables import counted, known_digits, text_table
+from rocking.tables import as_written, counted, known_digits, text_table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -310,7 +310,7 @@ class Risk(DrawnResult):
                 for one, curve in zip(self.rates, self.curves, strict=True)
             ],
             intensity_label=self.hazard.measure.label,
-            title=title or self.description,
+            title=title or as_written(self.description),
             ax=ax,
             figsize=figsize,
         )

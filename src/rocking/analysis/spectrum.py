@@ -25,6 +25,7 @@ from rocking.motion.motion import Motion
 from rocking.motion.named import Motions, several_motions
 from rocking.problem import bodies_of
 from rocking.result import DatasetResult, table_of_some, variable
+from rocking.tables import as_written
 from rocking.treatment import Treatment
 
 if TYPE_CHECKING:
@@ -286,8 +287,10 @@ class RockingSpectrum(DatasetResult):
             motions=labels_of(self.data),
             x_label={"p": "p (rad/s)", "period": "2π/p (s)", "size": "half diagonal R (m)"}[against],
             title=title
-            or ", ".join(
-                [motions_in_words(self.data), *([named_curves[0][0]] if alone else []), f"{self.data.model} model"]
+            or as_written(
+                ", ".join(
+                    [motions_in_words(self.data), *([named_curves[0][0]] if alone else []), f"{self.data.model} model"]
+                )
             ),
             ax=ax,
             figsize=figsize,

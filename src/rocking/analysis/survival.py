@@ -16,7 +16,7 @@ from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
 from rocking.result import DrawnResult
-from rocking.tables import counted, known_digits, text_table
+from rocking.tables import as_written, counted, known_digits, text_table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -177,7 +177,7 @@ class Survival(DrawnResult):
             f"({100.0 * self.confidence:g} %)",
             hazard=None if self.hazard is None else hazard_line(self.hazard, at),
             intensity_label=self.measure.label,
-            title=title or self.description,
+            title=title or as_written(self.description),
             ax=ax,
             figsize=figsize,
         )

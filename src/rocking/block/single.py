@@ -507,15 +507,15 @@ class Block:
         return self.gravity * steepness(self.sides[0].alpha), self.gravity * steepness(self.sides[1].alpha)
 
 
-def one_block(block: Block) -> Block:
-    """Return the block, or say that it is none."""
+def one_block(block: Block, needed: str = "a Block") -> Block:
+    """Return the block, or say that it is none, and what is needed."""
     if not isinstance(block, Block):
         how = "make one with Block(width=, height=), in m"
         if hasattr(block, "restraints"):
             how = "here a block is free; among restrained ones, RestrainedBlock(block) is"
         elif hasattr(block, "rose"):
             how = "block(azimuth) of a Solid is what it is in a plane"
-        raise InvalidBlock(f"a Block is needed, not a {type(block).__name__}: {how}")
+        raise InvalidBlock(f"{needed} is needed, not a {type(block).__name__}: {how}")
     return block
 
 

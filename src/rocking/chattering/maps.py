@@ -25,7 +25,7 @@ from rocking.progress import Progress
 from rocking.response import Response, trail_of
 from rocking.result import DatasetResult
 from rocking.simulation import simulate
-from rocking.tables import text_table
+from rocking.tables import as_written, text_table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -253,7 +253,7 @@ class ChatteringMap(DatasetResult):
             later=self._later(),
             x_label=written.get(str(second), str(second)),
             y_label=written.get(str(first), str(first)),
-            title=title or f"end of the first rocking under {self.data.attrs['case']}",
+            title=title or as_written(f"end of the first rocking under {self.data.attrs['case']}"),
             ax=ax,
             figsize=figsize,
         )

@@ -22,7 +22,7 @@ from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.progress import note
 from rocking.result import DatasetResult
-from rocking.tables import counted, text_table
+from rocking.tables import as_written, counted, text_table
 from rocking.treatment import Treatment
 
 if TYPE_CHECKING:
@@ -142,7 +142,7 @@ class Basins(DatasetResult):
             orbits=np.stack([data.orbit_coordinate.values, data.orbit_velocity.values], axis=-1),
             x_label=f"{x.name} at the start of a period ({x.units})",
             y_label=f"{str(v.name).replace('_', ' ')} ({v.units})",
-            title=title or f"{data.body} under {data.motion}, {data.model} model",
+            title=title or as_written(f"{data.body} under {data.motion}, {data.model} model"),
             ax=ax,
             figsize=figsize,
         )

@@ -25,7 +25,7 @@ from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.progress import Progress
 from rocking.result import DatasetResult, table_of_some, variable
-from rocking.tables import counted
+from rocking.tables import as_written, counted
 from rocking.treatment import Treatment
 
 if TYPE_CHECKING:
@@ -148,9 +148,9 @@ class BifurcationDiagram(DatasetResult):
                 for way in data.direction.values.tolist()
             },
             overturned=(data.period.values == -1).all(axis=(0, 2)),
-            x_label=data.parameter,
+            x_label=as_written(data.parameter.replace("_", " ")),
             y_label=f"{data.coordinate.attrs['long_name']} ({data.coordinate.units})",
-            title=title or data.cases,
+            title=title or as_written(data.cases),
             ax=ax,
             figsize=figsize,
         )

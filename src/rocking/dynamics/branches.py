@@ -20,7 +20,7 @@ from rocking.dynamics.orbits import NEUTRAL, PeriodicOrbit, orbit_at
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.result import DrawnResult, TableResult
-from rocking.tables import cell, counted, named, text_table
+from rocking.tables import as_written, cell, counted, named, text_table
 from rocking.treatment import Treatment
 
 if TYPE_CHECKING:
@@ -280,7 +280,7 @@ class Branch(DrawnResult, TableResult):
                 for at in each.bifurcations
             ],
             labels=(f"{self.name}{unit}", f"{what} ({coordinate.unit})"),
-            title=title or f"{title_of(body)}, {headline.replace('^2', '²')}",
+            title=title or as_written(f"{title_of(body)}, {headline.replace('^2', '²')}"),
             ax=ax,
             figsize=figsize,
         )

@@ -14,7 +14,7 @@ from rocking.body import title_of
 from rocking.dynamics.stepping import SteppedResponse, TimeStepping
 from rocking.response import Response
 from rocking.result import DrawnResult, TableResult
-from rocking.tables import counted, named, rows_of, text_table
+from rocking.tables import as_written, counted, named, rows_of, text_table
 from rocking.treatment import AsymptoticTime, Certified, IntervalThreshold, Treatment
 
 if TYPE_CHECKING:
@@ -287,7 +287,7 @@ class SchemeComparison(DrawnResult, TableResult):
             curves=curves,
             certified=self.certified.processor_time if self._is_timed else self.certified.cost,
             cost_label="processor time (s)" if self._is_timed else "arcs or steps",
-            title=title or f"{title_of(response.body)}{shaken}",
+            title=title or as_written(f"{title_of(response.body)}{shaken}"),
             ax=ax,
             figsize=figsize,
         )

@@ -21,6 +21,7 @@ from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.progress import Progress, note
 from rocking.result import DatasetResult, table_of_some, variable
+from rocking.tables import as_written
 from rocking.treatment import Treatment
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ class BasinErosion(DatasetResult):
             safe=data.safe.values,
             error=data.standard_error.values,
             x_label="factor on the motion",
-            title=title or f"{data.body} under multiples of {data.motion}, {data.model} model",
+            title=title or as_written(f"{data.body} under multiples of {data.motion}, {data.model} model"),
             ax=ax,
             figsize=figsize,
         )

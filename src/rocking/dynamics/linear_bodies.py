@@ -62,7 +62,7 @@ class LinearBody(ABC):
     @property
     def sides(self) -> Sequence[object]:
         """Its parameters, as text."""
-        return (", ".join(f"{name} = {value:.5g}{unit}" for name, value, unit in self._given()),)
+        return (", ".join(f"{name.replace('_', ' ')} = {value:.5g}{unit}" for name, value, unit in self._given()),)
 
     @property
     def stops(self) -> tuple[float, float]:

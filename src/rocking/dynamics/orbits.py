@@ -19,7 +19,7 @@ from rocking.dynamics.symmetry import is_symmetric
 from rocking.motion.motion import Motion
 from rocking.response import Response
 from rocking.result import DrawnResult, Row, TableResult, dictionary_of, text_of
-from rocking.tables import counted, named
+from rocking.tables import as_written, counted, named
 from rocking.treatment import Treatment
 
 if TYPE_CHECKING:
@@ -180,7 +180,7 @@ class PeriodicOrbit(DrawnResult, TableResult):
             impact_times=self.response.impacts["time"] / self._map.period,
             states=self.states,
             labels=(f"{coordinate.name} ({coordinate.unit})", f"velocity ({coordinate.unit}/s)"),
-            title=title or f"{title_of(self.body)}, {self._kind}",
+            title=title or as_written(f"{title_of(self.body)}, {self._kind}"),
             ax=ax,
             figsize=figsize,
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
@@ -194,7 +194,7 @@ def simulate_many(
     >>> found.restitution.values.tolist(), bool((found.peak_position > 0.0).all())
     ([0.3, 0.6, 0.9], True)
     """
-    given = [bodies] if isinstance(bodies, LinearBody) else bodies
+    given = bodies if isinstance(bodies, Iterable) else [bodies]
     gathered = given if isinstance(given, LinearBodies) else LinearBodies([_one_body(each) for each in given])
     product = product_of(gathered, motions, None, "factor", "+", "linear", chattering, duration)
     for motion in product.motions:

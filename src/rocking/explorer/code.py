@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import shlex
 from collections.abc import Mapping
 from typing import Any, Final
@@ -18,13 +19,13 @@ from rocking.named_pulses import pulse_values
 #: Quantities of a map of overturning.
 _OVERTURNING: Final = ("peak", "mode")
 
-_HEAD: Final = """\
+_CHATTERING: Final = """\
 import math
 
 import numpy as np
 
 import rocking
-from rocking.chattering import {names}
+from rocking.chattering import chattering_map, families
 
 
 def case({y}, {x}):
@@ -32,33 +33,51 @@ def case({y}, {x}):
     motion = {motion}
     return families.SimulationInput(block, motion, {model!r})
 
-"""
 
-_CHATTERING: Final = """
 found = chattering_map(case, {{"{y}": {ys}, "{x}": {xs}}})
 print(found.summary())
 """
 
-_PEAKS: Final = """
-def peak({y}, {x}):
-    block, motion, model = case({y}, {x})
-    response = rocking.simulate(block, motion, model=model)
-    return math.inf if response.overturned else response.peak_over_slenderness
-
-
-found = np.array([[peak({y}, {x}) for {x} in {xs}] for {y} in {ys}])
-print(found)
-"""
-
-_MODES: Final = """\
+_MANY: Final = """\
 import numpy as np
 
 import rocking
 
-block = rocking.{block}
-found = rocking.overturning_map({arguments})
-print(found.summary())
+motion = {motion}
+xs, ys = {xs}, {ys}
+
+
+def block_at({names}):
+    return rocking.{block}
+
+
+blocks = {blocks}
+{outcomes}
+
+
+def kept(name):
+    return {kept}
+
+
+{found}
+print(found)
 """
+
+#: What is made of the outcomes of many simulations, as the map has it.
+_FOUND: Final = {
+    "rest": """\
+# Time, s, from the first uplift to the first rest; NaN where the block never rests.
+found = np.where(kept("rests") > 0, kept("first_rest") - kept("first_uplift"), np.nan){in_seconds}""",
+    "peak": """\
+slenderness = np.array([min(side.alpha for side in block.sides) for block in blocks]).reshape(-1, len(xs))
+found = np.where(kept("overturned"), np.inf, kept("peak_rotation") / slenderness)""",
+    "mode": """\
+# -4: overturns after a rest; -3: no uplift; -2: rests before the motion is over; -1: rocks; else overturns, and after
+# how many impacts.
+rested = (kept("uplifts") > 1) | ((kept("rests") > 0) & (kept("last_rest") <= motion.duration))
+found = np.where(kept("uplifts") == 0, -3, np.where(rested, -2, -1))
+found = np.where(kept("overturned"), np.where(kept("uplifts") > 1, -4, kept("impacts")), found)""",
+}
 
 _SWEEP: Final = """\
 {imports}import numpy as np
@@ -140,29 +159,36 @@ def case_as_command(case: Case) -> str | None:
 def map_as_python(grid: MapGrid, quantity: str) -> str:
     """Write a script that computes a quantity of a map; it runs as it stands.
 
-    Chattering is mapped by `chattering_map`, overturning by `overturning_map` where the map is over frequency and
-    amplitude of a pulse, everything else point by point.
+    How the first rocking ends is told by `chattering_map`, everything else by `simulate_many` to the bits of the map.
     """
-    texts = {
-        "x": grid.x.name,
-        "y": grid.y.name,
-        "xs": _values(grid.x),
-        "ys": _values(grid.y),
-        "block": _block(grid),
-        "motion": _motion(grid),
-        "model": grid.case.model,
-    }
-    if quantity in ("outcome", "rest"):
-        return (_HEAD + _CHATTERING).format(**texts, names="chattering_map, families")
-    if _is_overturning_map(grid):
-        name, _, numbers = _pulse(grid)
-        given = {name: value for name, value in numbers.items() if name not in ("amplitude", "frequency")}
-        if grid.case.model != "nonlinear":
-            given["model"] = grid.case.model
-        arguments = ["block", repr(name), f"amplitudes={texts['ys']}", f"frequencies={texts['xs']}"]
-        arguments += [f"{name}={value!r}" for name, value in given.items()]
-        return _MODES.format(block=texts["block"], arguments=", ".join(arguments))
-    return (_HEAD + _PEAKS).format(**texts, names="families")
+    texts = {"x": grid.x.name, "y": grid.y.name, "xs": _values(grid.x), "ys": _values(grid.y)}
+    if quantity == "outcome":
+        return _CHATTERING.format(**texts, block=_block(grid), motion=_motion(grid), model=grid.case.model)
+    model = grid.case.model
+    options = ", times=True" + (f", model={model!r}" if model != "nonlinear" else "")
+    levels = grid.y.name in ("a", "pga")
+    outcomes = f"outcomes = rocking.simulate_many(blocks, motion{options})"
+    kept = "outcomes[name].values.reshape(len(ys), len(xs))"
+    if levels:
+        lifting = f"min({{}}.uplift_thresholds({model!r}))" if grid.y.name == "a" else repr(STANDARD_GRAVITY)
+        many = f'rocking.simulate_many({{}}, motion, levels=ys * {lifting}, measure="pga"{options})'
+        outcomes = "outcomes = " + many.format("blocks", "blocks[0]")
+        if (grid.x.name, grid.y.name) == ("alpha", "a"):
+            # Each slenderness has a threshold of its own.
+            outcomes = f"outcomes = [{many.format('block', 'block')} for block in blocks]"
+            kept = "np.stack([each[name].values.ravel() for each in outcomes], axis=1)"
+    at = f"{grid.x.name}=x" if levels else f"{grid.y.name}=y, {grid.x.name}=x"
+    each = "for x in xs" if levels else "for y in ys for x in xs"
+    return _MANY.format(
+        **texts,
+        motion=grid.case.motion_call,
+        names=grid.x.name if levels else f"{grid.y.name}, {grid.x.name}",
+        block=_block(grid, by_size=True),
+        blocks=f"[block_at({at}) {each}]",
+        outcomes=outcomes,
+        kept=kept,
+        found=_FOUND[quantity].format(in_seconds=_in_seconds(grid)),
+    )
 
 
 def map_as_command(grid: MapGrid) -> str | None:
@@ -263,15 +289,19 @@ def _range(axis: Axis) -> str:
     return f"{float(axis.values[0])!r}:{float(axis.values[-1])!r}:{len(axis.values)}"
 
 
-def _block(grid: MapGrid) -> str:
-    """Call that makes the block, with the names of the axes among its arguments."""
-    varied = {grid.x.name, grid.y.name} & {"p", "alpha", "restitution"}
+def _block(grid: MapGrid, *, by_size: bool = False) -> str:
+    """Call that makes the block, with the names of the axes among its arguments.
+
+    A pulse of another frequency is the same block of another p, in other units of time: ``by_size`` it is that.
+    """
+    varied = {grid.x.name, grid.y.name} & {"p", "alpha", "restitution", *(["omega"] if by_size else [])}
     texts, sides = grid.case.texts, grid.case.block.sides
     if not varied:
         return grid.case.block_call
     slowest = min(side.p for side in sides)
+    size = f"{_rate(grid)!r} / omega" if "omega" in varied else "p" if "p" in varied else ""
     arguments = {
-        "p": _pair([f"p * {side.p / slowest!r}" if "p" in varied else repr(side.p) for side in sides]),
+        "p": _pair([f"{size} * {side.p / slowest!r}" if size else repr(side.p) for side in sides]),
         "alpha": "np.radians(alpha)" if "alpha" in varied else _pair([repr(side.alpha) for side in sides]),
     }
     if "restitution" in varied:
@@ -281,6 +311,19 @@ def _block(grid: MapGrid) -> str:
     if "gravity" in texts:
         arguments["gravity"] = repr(grid.case.block.gravity)
     return f"Block.from_parameters({', '.join(f'{name}={value}' for name, value in arguments.items())})"
+
+
+def _rate(grid: MapGrid) -> float:
+    """Angular frequency of the pulse, rad/s."""
+    return float(2.0 * math.pi * arguments_of(grid.case.texts["motion"])["frequency"])
+
+
+def _in_seconds(grid: MapGrid) -> str:
+    """Factor that brings times of blocks of another size to those under a pulse of another frequency."""
+    if "omega" not in (grid.x.name, grid.y.name):
+        return ""
+    omega = "xs" if grid.x.name == "omega" else "ys[:, None]"
+    return f" * ({_rate(grid)!r} / {omega} / {min(side.p for side in grid.case.block.sides)!r})"
 
 
 def _pair(sides: list[str]) -> str:

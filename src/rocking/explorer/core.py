@@ -21,6 +21,7 @@ from rocking.chattering.episodes import chattering_episodes
 from rocking.dynamics.schemes import TREATMENTS, compare_schemes
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.explorer.code import case_as_command, case_as_python
+from rocking.explorer.comparing import as_csv, shift_of
 from rocking.explorer.inputs import Case, Texts, read_case
 from rocking.explorer.meshes import described
 from rocking.explorer.parameters import names_of
@@ -29,8 +30,7 @@ from rocking.explorer.uploads import UploadStore
 from rocking.motion.motion import Motion
 from rocking.plausibility import block_notes, motion_notes
 from rocking.response import Response, active_span, in_words, trail_of
-from rocking.response.sensitivity import driving
-from rocking.response.summary import KNOWN
+from rocking.response.sensitivity import KNOWN, driving
 from rocking.treatment import Certified
 
 #: Times at which a rotation is evaluated across a window, and points of a line that are sent.
@@ -170,25 +170,38 @@ class Explorer:
             arrays |= _ground_arrays(shown, start, end)
         return Payload({"window": _window(shown, start, end)}, arrays)
 
-    def compare(self, texts: Texts, changed: Texts, window: tuple[float, float] | None = None) -> Payload:
-        """Return two cases in one window: one, and the same with some texts changed; blocks and motions as a whole."""
-        first = self.show(texts)
-        second = self.show(_changed(first.case.texts, changed))
-        spans = [active_span(shown.response) for shown in (first, second)]
-        longest = max(first.response.duration, second.response.duration)
+    def compare(
+        self,
+        texts: Texts,
+        changed: Texts,
+        window: tuple[float, float] | None = None,
+        *,
+        align: str = "start",
+        whole: bool = False,
+    ) -> Payload:
+        """Return two cases in one window of the first one's time, with chosen moments over each other (`ALIGNED`).
+
+        The second is another case as a ``whole``, or the first with some texts changed; blocks and motions go together.
+        """
+        first, second = self._compared(texts, changed, whole=whole)
+        shift = shift_of(first.response, second.response, align)
+        spans = [active_span(first.response), tuple(end + shift for end in active_span(second.response))]
+        longest = max(first.response.duration, second.response.duration + shift)
         if window is None:
-            start, end = min(span[0] for span in spans), max(span[1] for span in spans)
+            start, end = max(0.0, min(span[0] for span in spans)), max(span[1] for span in spans)
         else:
             start, end = checked_window(window, longest)
-        header: dict[str, Any] = {"window": _ends(start, end), "duration": longest, "cases": []}
+        header: dict[str, Any] = {"window": _ends(start, end), "duration": longest, "shift": shift, "cases": []}
         arrays: dict[str, Floats] = {}
-        for name, shown in (("first", first), ("second", second)):
+        for name, shown, by in (("first", first, 0.0), ("second", second, shift)):
             header["cases"].append(_facts(shown))
-            stop = min(end, shown.response.duration)
-            if start < stop:
-                here = _window_arrays(shown, start, stop)
+            begin, stop = max(start - by, 0.0), min(end - by, shown.response.duration)
+            if begin < stop:
+                here = _window_arrays(shown, begin, stop)
+                for key in ("time", "impact", "ground_time"):
+                    here[key] += begin + by - start
                 arrays |= {f"{name}_{key}": values for key, values in here.items()}
-            arrays[f"{name}_rest"] = shown.response.rest_intervals.ravel()
+            arrays[f"{name}_rest"] = shown.response.rest_intervals.ravel() + by
         return Payload(header, arrays)
 
     def body(self, texts: Texts) -> Payload:
@@ -197,6 +210,18 @@ class Explorer:
         if case.body is None:
             raise InvalidOption("this block is of no {}: open one", "mesh")
         return described(case.body, case.azimuth)
+
+    def compared_as_csv(
+        self, texts: Texts, changed: Texts, names: tuple[str, str], *, align: str = "start", whole: bool = False
+    ) -> bytes:
+        """Return the histories of two cases as one table, each under its name."""
+        first, second = (shown.response for shown in self._compared(texts, changed, whole=whole))
+        one, other = names if names[0] != names[1] else (names[0], f"{names[1]} (other)")
+        return as_csv({one: first, other: second}, shift_of(first, second, align)).encode()
+
+    def _compared(self, texts: Texts, changed: Texts, *, whole: bool) -> tuple[Simulated, Simulated]:
+        first = self.show(texts)
+        return first, self.show(changed if whole else _changed(first.case.texts, changed))
 
     def summary(self, texts: Texts) -> list[tuple[str, str]]:
         """Return the summary of a response row by row: what, and how much."""

@@ -258,13 +258,13 @@ def _points(grid: MapGrid) -> tuple[Blocks, Floats, Floats]:
     slowest = sides["p"].min(axis=1, keepdims=True)
     scale = np.ones(x.size)
     if "p" in at:
-        sides["p"] *= at["p"][:, None] / slowest
+        sides["p"] = at["p"][:, None] * (sides["p"] / slowest)
     if "omega" in at:
         # A pulse of another frequency is the same block of another p, in other units of time.
         frequency = arguments_of(case.texts["motion"])["frequency"]
-        resized = 2.0 * math.pi * frequency / at["omega"][:, None] / slowest
-        sides["p"] *= resized
-        scale = resized[:, 0]
+        resized = 2.0 * math.pi * frequency / at["omega"][:, None]
+        scale = (resized / slowest)[:, 0]
+        sides["p"] = resized * (sides["p"] / slowest)
     if "alpha" in at:
         sides["alpha"] = np.repeat(np.radians(at["alpha"])[:, None], 2, axis=1)
         if "restitution" not in case.texts:
@@ -315,7 +315,7 @@ def _change_block(texts: dict[str, str], grid: MapGrid, name: str, value: float)
             texts.pop(each, None)
     if name == "p":
         slowest = min(side.p for side in sides)
-        texts["p"] = _both([side.p * value / slowest for side in sides])
+        texts["p"] = _both([value * (side.p / slowest) for side in sides])
     elif name == "alpha":
         texts["alpha"] = f"{value!r}deg"
     else:

@@ -33,6 +33,7 @@ from rocking.explorer.inputs import Case, read_case
 from rocking.explorer.parameters import PARAMETERS, field_label, specification
 from rocking.explorer.payload import Payload, pack
 from rocking.explorer.studies import StudyView
+from rocking.explorer.tracks import tracks
 from rocking.explorer.uploads import LARGEST
 from rocking.quantities import number
 from rocking.tables import plain
@@ -52,6 +53,9 @@ TYPES: Final = {
     ".js": "text/javascript; charset=utf-8",
     ".svg": "image/svg+xml",
 }
+
+#: Letters of a name in a table.
+_LONGEST_NAME: Final = 120
 
 #: Files of the plotting library, in the order in which they are loaded.
 LIBRARY: Final = ("bokeh.min.js", "bokeh-api.min.js")
@@ -98,6 +102,16 @@ class Query:
     def others(self) -> dict[str, str]:
         """All that does not belong to the case."""
         return {name: value for name, value in self.given.items() if name not in PARAMETERS}
+
+    @property
+    def compared(self) -> tuple[dict[str, str], dict[str, str]]:
+        """Texts of two cases, or of one and what the other has in their place."""
+        return self.texts(), self.texts(OTHER)
+
+    @property
+    def comparison(self) -> dict[str, Any]:
+        """How two cases are compared: which moments are laid over each other, and whether the other is a whole case."""
+        return {"align": self.given.get("align") or "start", "whole": self.given.get("compare") == "case"}
 
     def number(self, name: str) -> float | None:
         """Return a finite number; None where it is not given."""
@@ -154,8 +168,9 @@ class App:
             "/api/summary": lambda query: explorer.summary(query.texts()),
             "/api/body": lambda query: explorer.body(query.texts()),
             "/api/code": lambda query: explorer.code(query.texts()),
+            "/api/tracks": lambda query: tracks(query.texts()),
             "/api/schemes": lambda query: explorer.schemes(query.texts()),
-            "/api/compare": lambda query: explorer.compare(query.texts(), query.texts(OTHER), query.window),
+            "/api/compare": lambda query: explorer.compare(*query.compared, query.window, **query.comparison),
             "/api/map/point": lambda query: maps.texts_at(self._grid(query), *query.numbers("at_x", "at_y")),
             "/api/map/response": lambda query: readings.thumbnail(
                 explorer, maps.texts_at(self._grid(query), *query.numbers("at_x", "at_y"))
@@ -179,6 +194,7 @@ class App:
                 Route("/api/sweep", self.sweep),
                 Route("/api/assessment", self.assessment),
                 Route("/api/export", self.export),
+                Route("/api/compare/table", self.compared),
                 Route("/api/records", self._receiving(explorer.take_record), methods=["POST"]),
                 Route("/api/meshes", self._receiving(explorer.take_mesh), methods=["POST"]),
                 Route("/api/records/{key}", self.record),
@@ -332,6 +348,16 @@ class App:
             return JSONResponse(await self._in_thread(lambda: take(name, bytes(data))), headers=_FRESH)
 
         return receive
+
+    async def compared(self, request: Request) -> Response:
+        """Return two cases as one table."""
+        query = Query(request.query_params)
+        first, second = (query.given.get(name, name)[:_LONGEST_NAME] for name in ("first", "second"))
+        content = await self._in_thread(
+            lambda: self.explorer.compared_as_csv(*query.compared, (first, second), **query.comparison)
+        )
+        headers = {**_FRESH, "content-disposition": "attachment; filename=rocking-compare.csv"}
+        return Response(content, media_type=EXPORTS["csv"], headers=headers)
 
     async def record(self, request: Request) -> Response:
         """Say what a file that is kept is, read with the step and the units that are given now."""

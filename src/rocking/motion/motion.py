@@ -19,6 +19,7 @@ from rocking.motion.directions import recorded_azimuths, shares
 from rocking.motion.floors import floor_pieces
 from rocking.motion.measures import DAMPING
 from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
+from rocking.tables import as_written
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -797,7 +798,7 @@ class Motion:
             time=times,
             acceleration_g=self.acceleration(times) / STANDARD_GRAVITY,
             vertical_g=None if self.vertical is None else self.vertical.acceleration(times) / STANDARD_GRAVITY,
-            title=title or self.label,
+            title=title or as_written(self.label),
             ax=ax,
             figsize=figsize,
         )

@@ -9,6 +9,7 @@ import numpy as np
 
 from rocking.arrays import Floats
 from rocking.plot.canvas import CURVES, GROUND, INK, add_labels, add_legend, figure_for, handles_of
+from rocking.tables import as_written
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -53,7 +54,7 @@ def fragility_figure(
         for k, line in enumerate(lines):
             style = CURVES[k % len(CURVES)]
             axes.fill_between(line.intensity, line.lower, line.upper, color=style["color"], alpha=0.18, linewidth=0.0)
-            axes.plot(line.intensity, line.probability, linewidth=1.5, label=line.label, **style)
+            axes.plot(line.intensity, line.probability, linewidth=1.5, label=as_written(line.label), **style)
             # Every limit state has a mark of its own.
             axes.plot(line.seen_at, line.seen, "os^D"[k % 4], color=style["color"], clip_on=False, **_DOT)
         if any(np.any(line.lower < line.upper) for line in lines):

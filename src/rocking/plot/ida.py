@@ -10,6 +10,7 @@ import numpy as np
 
 from rocking.arrays import Floats
 from rocking.plot.canvas import ABOVE, CURVES, GROUND, INK, add_labels, add_legend, figure_for
+from rocking.tables import as_written
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -117,7 +118,7 @@ def levels_reaching(motion: ScaledMotion, peaks: Floats) -> Floats:
 
 def _draw_motion(axes: Axes, motion: ScaledMotion, style: dict[str, Any]) -> None:
     peak = np.where(np.isfinite(motion.peak), motion.peak, np.nan)
-    axes.plot(peak, motion.levels, marker=".", markeredgewidth=0.0, label=motion.label, **style)
+    axes.plot(peak, motion.levels, marker=".", markeredgewidth=0.0, label=as_written(motion.label), **style)
 
 
 def _draw_ways(axes: Axes, motion: ScaledMotion, color: str) -> None:
@@ -175,7 +176,7 @@ def _name_strips(axes: Axes, motions: Sequence[ScaledMotion], *, few: bool) -> N
     axes.set_xlabel("overturns")
     if not few:
         width = _NAME_LINE if len(motions) <= _ROOMY else len(max((motion.label for motion in motions), key=len))
-        names = [textwrap.fill(motion.label, width) for motion in motions]
+        names = [textwrap.fill(as_written(motion.label), width) for motion in motions]
         axes.set_xticks(range(len(motions)), names, rotation=90, fontsize="x-small")
     elif len(motions) > 1:
         axes.set_xticks(range(len(motions)), [str(k + 1) for k in range(len(motions))])
@@ -187,7 +188,8 @@ def _handles(named: Sequence[ScaledMotion], *, with_strips: bool, with_arrows: b
     """Name the motions that have a style of their own, and say what else is drawn."""
     from matplotlib.lines import Line2D
 
-    names = [f"{k}: {motion.label}" if len(named) > 1 else motion.label for k, motion in enumerate(named, start=1)]
+    labels = [as_written(motion.label) for motion in named]
+    names = [f"{k}: {label}" if len(named) > 1 else label for k, label in enumerate(labels, start=1)]
     handles = [
         Line2D([], [], linewidth=1.1, label=name, **style) for name, style in zip(names, CURVES, strict=False)
     ] or [

@@ -14,6 +14,7 @@ from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.plot.boundaries import Stack, runs
 from rocking.plot.canvas import ABOVE, INK, add_labels, add_legend, figure_for, handles_of
+from rocking.tables import as_written
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -227,7 +228,7 @@ def blocks_figure(
                 each.scatter(x, y, s=area, marker="x", color=ABOVE, linewidth=0.7, label=missing_label)
             add_labels(each, "p (rad/s)", "slenderness (degrees)")
             if len(panels) > 1:
-                each.set_title(name, color=INK)
+                each.set_title(as_written(name), color=INK)
         for spare in axes[len(panels) :]:
             spare.remove()
         figure.colorbar(marks, ax=axes[: len(panels)], label=value_label, shrink=0.9)

@@ -38,11 +38,16 @@ _Y_LABELS: Final = {"slenderness": "rotation / {}", "rad": "rotation (rad)", "de
 
 
 class DrawnSequence(NamedTuple):
-    """One chattering sequence: the times of its impacts and the bracket on the time of rest, s."""
+    """One chattering sequence: the times of its impacts and the bracket on the time of rest, s.
+
+    ``off`` says by how much (s) the rest moves if what drives the body (``driver``) is off by a millionth.
+    """
 
     impact_times: Floats
     rest_lower: float
     rest_upper: float
+    off: float = 0.0
+    driver: str = "the motion"
 
 
 class _Scale(NamedTuple):
@@ -272,7 +277,12 @@ def _draw_sequence(axes: Axes, sequence: DrawnSequence) -> None:
     add_labels(axes, "time to rest (s)", "interval to next impact (s)")
     axes.grid()
     width = sequence.rest_upper - sequence.rest_lower
-    axes.set_title(f"A: at rest at {rest:.6f} s, bracket {width:.0e} s wide", color=ABOVE, loc="left", wrap=True)
+    decimals = 6 if sequence.off < 1e-6 else max(0, math.floor(-math.log10(sequence.off)))
+    axes.set_title(f"A: at rest at {rest:.{decimals}f} s", color=ABOVE, loc="left", wrap=True)
+    known = f"± {sequence.off:.0e} s if\n{sequence.driver} is off\nby a millionth;\n" if sequence.off >= 1e-6 else ""
+    # Below the falling line there is room.
+    words = f"{known}bracket of the\ncomputation\n{width:.0e} s"
+    axes.text(0.04, 0.03, words, color=ABOVE, fontsize=7.0, transform=axes.transAxes, ha="left", va="bottom")
 
 
 def motion_figure(

@@ -9,6 +9,7 @@ import numpy as np
 
 from rocking.arrays import Floats
 from rocking.plot.canvas import ABOVE, CURVES, GROUND, add_labels, add_legend, figure_for, handles_of, scale_by_ratio
+from rocking.tables import as_written
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -56,7 +57,7 @@ def risk_figure(
             _draw_hazard(axes, intensity, hazard)
         for k, line in enumerate(lines):
             style = CURVES[k % len(CURVES)]
-            shares.plot(intensity, line.share, linewidth=1.5, label=line.label, **style)
+            shares.plot(intensity, line.share, linewidth=1.5, label=as_written(line.label), **style)
             shares.fill_between(intensity, 0.0, line.share, color=style["color"], alpha=0.12, linewidth=0.0)
         shown = _inside(intensity, hazard.known)
         for line in lines:

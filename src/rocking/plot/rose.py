@@ -9,6 +9,7 @@ import numpy as np
 
 from rocking.arrays import Floats
 from rocking.plot.canvas import ABOVE, GROUND, INK, REST, add_labels, add_legend, figure_for, handles_of, styles_of
+from rocking.tables import as_written
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -85,7 +86,9 @@ def shares_figure(
         axes = ax or figure.add_subplot()
         _draw_circles(axes, 1.0)
         for share, label, style in zip(shares, labels, styles_of(len(labels)), strict=True):
-            axes.plot(*_around(azimuth, share), linewidth=1.4, marker="o", markersize=2.0, label=label, **style)
+            axes.plot(
+                *_around(azimuth, share), linewidth=1.4, marker="o", markersize=2.0, label=as_written(label), **style
+            )
         add_labels(axes, "share towards west and east", "share towards south and north")
         add_legend(figure, ax, handles_of(axes))
     return figure

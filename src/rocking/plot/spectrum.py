@@ -9,6 +9,7 @@ import numpy as np
 
 from rocking.arrays import Flags, Floats, evenly
 from rocking.plot.canvas import GROUND, INK, add_labels, add_legend, figure_for, scale_by_ratio, styles_of
+from rocking.tables import as_written
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -143,14 +144,16 @@ def _handles(curves: Sequence[SpectrumCurves], motions: Sequence[str], fractiles
     from matplotlib.lines import Line2D
 
     styles, shown = styles_of(len(curves)), evenly(len(curves), _NAMED)
-    each = [Line2D([], [], linewidth=1.4, label=curves[k].label, **styles[k]) for k in shown if curves[k].label]
+    each = [
+        Line2D([], [], linewidth=1.4, label=as_written(curves[k].label), **styles[k]) for k in shown if curves[k].label
+    ]
     if len(shown) < len(curves):
         each.append(Line2D([], [], linestyle="none", label=f"({len(shown)} of {len(curves)} curves are named)"))
     if len(motions) == 1:
         return each
     if len(motions) <= _FEW:
         named = zip(motions, _WIDTHS, strict=False)
-        return each + [Line2D([], [], color=INK, linewidth=width, label=name) for name, width in named]
+        return each + [Line2D([], [], color=INK, linewidth=width, label=as_written(name)) for name, width in named]
     if len(curves) <= _WITH_ALL_MOTIONS:
         each.append(Line2D([], [], color=GROUND, linewidth=0.5, label=f"each of {len(motions)} motions"))
     middle = _middle(fractiles)

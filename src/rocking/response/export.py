@@ -16,7 +16,8 @@ from rocking.plot.response import RotationUnits
 from rocking.problem import thresholds_of
 from rocking.response.answers import Answers, history_of
 from rocking.response.history import even_times
-from rocking.tables import named, rows_of
+from rocking.response.sensitivity import KNOWN, driving
+from rocking.tables import as_written, named, rows_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -182,9 +183,8 @@ def figure(
 
 def titled(response: Answers) -> str:
     """Return what was simulated, for the title of a figure."""
-    # A dollar in a name begins no formula.
-    shaken = "no motion" if response.motion is None else response.motion.label.replace("$", r"\$")
-    return f"{title_of(response.body)} under {shaken}"
+    shaken = "no motion" if response.motion is None else response.motion.label
+    return as_written(f"{title_of(response.body)} under {shaken}")
 
 
 def active_span(response: Answers) -> tuple[float, float]:
@@ -223,14 +223,16 @@ def checked_window(window: Sequence[float], duration: float) -> tuple[float, flo
     return float(ends[0]), float(ends[1])
 
 
-def _longest_sequence(response: Answers, start: float, end: float) -> tuple[Floats, float, float] | None:
-    """Impact times of the chattering sequence with the most impacts in the stretch, and the bracket on its rest."""
+def _longest_sequence(response: Answers, start: float, end: float) -> tuple[Floats, float, float, float, str] | None:
+    """Impact times of the chattering sequence with the most impacts in the stretch, and how far its rest is known."""
     shown = response.chattering[(response.chattering["start"] >= start) & (response.chattering["end"] <= end)]
     longest = max(shown, key=lambda row: row["impacts"], default=None)
     if longest is None:
         return None
     times = _within(response.impacts["time"], longest["start"], longest["end"])
-    return times, float(longest["lower"]), float(longest["upper"])
+    change = driving(response.sensitivity)[1][response.events["time"] == longest["end"]]
+    driver = "the initial state" if response.motion is None else "the motion"
+    return times, float(longest["lower"]), float(longest["upper"]), KNOWN * float(change.max(initial=0.0)), driver
 
 
 def _within(times: Floats, start: float, end: float) -> Floats:

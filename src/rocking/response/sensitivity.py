@@ -21,6 +21,10 @@ from rocking.tables import counted
 #: move its peak by more than this fraction, or one of its events or impacts by more than this many seconds.
 AMBIGUITY: Final = 1e-6
 
+#: What drives a body (the motion, or the initial state) is taken to be known to this part of itself, about what the
+#: usual record formats print: digits of times and of the peak that it would change are not shown.
+KNOWN: Final = 1e-6
+
 #: What a sensitivity is to.
 QUANTITIES: Final = ("motion", "initial_rotation", "initial_velocity", "p", "alpha", "restitution")
 

@@ -12,13 +12,9 @@ from rocking.body import Body
 from rocking.problem import thresholds_of
 from rocking.response.answers import Answers
 from rocking.response.export import records
-from rocking.response.sensitivity import driving
+from rocking.response.sensitivity import KNOWN, driving
 from rocking.result import Row
 from rocking.tables import counted, named
-
-#: What drives a body (the motion, or the initial state) is taken to be known to this part of itself, about what the
-#: usual record formats print: digits of times and of the peak that it would change are not shown.
-KNOWN: Final = 1e-6
 
 #: Decimals of a time, and digits of a peak, at most.
 _MOST_DECIMALS: Final = 9

@@ -14,7 +14,7 @@ from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.result import DatasetResult, table_of_some, variable
 from rocking.solid import support as polygons
-from rocking.tables import decimal
+from rocking.tables import as_written, decimal
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -106,7 +106,7 @@ class Rose(DatasetResult):
             p=data.p.values,
             support=np.column_stack([data.east.values, data.north.values]) / data.height_of_mass,
             weakest=(data.weakest_azimuth, data.weakest_acceleration),
-            title=title or self._headline(),
+            title=title or as_written(self._headline()),
             ax=ax,
             figsize=figsize,
         )

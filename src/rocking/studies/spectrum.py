@@ -23,7 +23,7 @@ from rocking.progress import Progress
 from rocking.result import DatasetResult, table_of_some
 from rocking.studies.inputs import require
 from rocking.studies.store import Store
-from rocking.tables import counted
+from rocking.tables import as_written, counted
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -243,7 +243,7 @@ class StudySpectrum(BlocksResult):
             panels={self._scale_name(i): one.values[i] for i in self._some_scales()},
             value_label=f"{100 * float(one.fractile):g} % fractile of peak rotation over slenderness",
             missing_label="so many motions overturn the block that there is none",
-            title=title or self._about(),
+            title=title or as_written(self._about()),
             ax=ax,
             figsize=figsize,
         )

@@ -31,7 +31,7 @@ from rocking.response.answers import history_of
 from rocking.response.sensitivity import changes_along
 from rocking.result import DrawnResult
 from rocking.simulation import simulate
-from rocking.tables import counted, text_table
+from rocking.tables import as_written, counted, text_table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -145,7 +145,7 @@ class HistoryCalibration(DrawnResult):
             residual=self.residuals,
             fitted_time=between,
             fitted=self.response.rotation(between),
-            title=title or self._estimates_text(),
+            title=title or as_written(self._estimates_text()),
             ax=ax,
             figsize=figsize,
         )

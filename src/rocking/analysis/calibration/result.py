@@ -27,7 +27,7 @@ from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.named import Motions
 from rocking.result import DrawnResult, TableResult
-from rocking.tables import counted, named, text_table
+from rocking.tables import as_written, counted, named, text_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -357,7 +357,7 @@ class Calibration(DrawnResult, TableResult):
             overturned=self.observed,
             parameters=[self._parameter(name) for name in self._evidence.candidates.space.unknown],
             weights=self.weights,
-            title=title or self._headline(),
+            title=title or as_written(self._headline()),
             ax=ax,
             figsize=figsize,
         )

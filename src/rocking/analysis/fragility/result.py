@@ -24,7 +24,7 @@ from rocking.errors import InvalidOption, Message
 from rocking.motion.scaling import Measure
 from rocking.progress import spelled
 from rocking.result import DrawnResult, TableResult
-from rocking.tables import counted, text_table
+from rocking.tables import as_written, counted, text_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -364,7 +364,7 @@ class Fragility(DrawnResult, TableResult):
             intensity_label=self.measure.label,
             band_label=band_text,
             probability_label=_probability_of([curve.limit_state for curve in self.curves]),
-            title=title or self.description,
+            title=title or as_written(self.description),
             ax=ax,
             figsize=figsize,
         )

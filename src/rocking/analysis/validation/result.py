@@ -11,7 +11,7 @@ import numpy as np
 from rocking.analysis.calibration.diagnostics import Scores
 from rocking.analysis.validation.scores import Score
 from rocking.result import DrawnResult, TableResult
-from rocking.tables import counted, named, text_table
+from rocking.tables import as_written, counted, named, text_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -301,7 +301,7 @@ class ModelValidation(DrawnResult, TableResult):
             overturned=np.array([test.overturned for test in self.tests]),
             ranks=_bars(Bars, self.ranks) if self.ranks else None,
             peaks=peaks,
-            title=title or self._headline(),
+            title=title or as_written(self._headline()),
             ax=ax,
             figsize=figsize,
         )

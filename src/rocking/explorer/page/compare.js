@@ -1,10 +1,14 @@
 // Two responses over each other: another treatment of chattering, another block, another motion.
 
-import {Latest, json, payload} from "./api.js";
+import {Latest, file, json, payload} from "./api.js";
 import {BlockForm, MotionForm, TreatmentForm} from "./forms.js";
 import {Histories} from "./histories.js";
+import {offer} from "./exports.js";
 import {ends, namesOf, parameter, specification} from "./parameters.js";
-import {counted, fill, legend, make, one, short} from "./words.js";
+import {snapshots} from "./snapshots.js";
+import {colour} from "./theme.js";
+import {caseName} from "./units.js";
+import {counted, fill, legend, make, one, short, slug} from "./words.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
 
@@ -13,15 +17,28 @@ export class View {
   constructor(page) {
     this.page = page;
     this.with = /** @type {HTMLSelectElement} */ (one("compare-with"));
-    this.with.value = page.state.compare;
     this.with.addEventListener("change", () => { page.state.compare = this.with.value; page.state.other = {}; this.form(); this.update(); });
+    this.align = /** @type {HTMLSelectElement} */ (one("compare-align"));
+    this.align.addEventListener("change", () => { page.state.align = this.align.value; page.state.window = null; this.update(); });
     this.histories = new Histories(one("compare-plots"), {window: (span) => { page.state.window = span; this.update(); }});
     this.known = "";
     this.load = new Latest(() => this.run(), (error) => page.problem(error, "view-compare"));
-    this.form();
+    this.restore();
   }
 
   enter() { this.update(); }
+
+  /** Show what the state says. */
+  restore() {
+    this.with.value = this.page.state.compare;
+    this.align.value = this.page.state.align;
+    this.form();
+  }
+
+  /** Other cases are pinned. */
+  repinned() {
+    if (this.with.value === "case") this.form();
+  }
 
   /** The form of what is other. */
   form() {
@@ -34,6 +51,7 @@ export class View {
     const kinds = {
       treatment: () => [new TreatmentForm(element, changed, {prefix: "other-", label: "Chattering of the other ends by"}), {chattering: "velocity=0.05"}],
       block: () => [new BlockForm(element, changed, "other-"), larger(texts)],
+      case: () => [new PinnedForm(element, changed), snapshots()[0]?.texts ?? {}],
       motion: () => [new MotionForm(element, changed, "other-"), {motion: specification.records.find((/** @type {any} */ each) => each.name !== texts.motion).name, pga: texts.pga ?? "0.4g"}],
     };
     const [form, first] = kinds[this.with.value]();
@@ -49,11 +67,13 @@ export class View {
 
   async run() {
     const {state} = this.page;
-    const {other: chosen, compare: kind} = state;
-    const other = Object.fromEntries(Object.entries(chosen).map(([name, value]) => [`other.${name}`, value]));
-    const {header, arrays} = await payload("/api/compare", {...state.texts, ...other, ...ends(state)});
-    this.page.remember({other: chosen, compare: kind});
+    const {other: chosen, compare: kind, align} = state;
+    if (!Object.keys(chosen).length) return;
+    const {header, arrays} = await payload("/api/compare", {...state.texts, ...this.asked(), ...ends(state)});
+    this.page.remember({other: chosen, compare: kind, align});
+    
     this.draw(header, arrays);
+    this.files(header);
     counted("compared");
     if (this.with.value === "treatment") await this.schemes();
   }
@@ -68,11 +88,31 @@ export class View {
       return {lines, rest: arrays[`${name}_rest`], uplift: none, block: header.cases[k].block};
     });
     first.lines.weight = arrays.first_weight;
-    if (this.with.value !== "motion") second.lines.ground_time = second.lines.ground_g = none;
+    if (!["motion", "case"].includes(this.with.value)) second.lines.ground_time = second.lines.ground_g = none;
     this.histories.draw(header, first, second);
     this.block?.show(this.page.state.other, other.block.sides);
     one("compare-verdict").textContent = `The other${this.with.value === "treatment" ? ` (${other.treatment})` : ""}: ${other.verdict} ${difference(one_, other)}`;
-    legend("compare-legend", [["line", "this case"], ["second", "the other"], ["rest", "this case at rest"], ["impact", "impacts: below, this case; above, the other"]]);
+    legend("compare-legend", [["line", "this case"], ["second", header.shift ? `the other, ${short(Math.abs(header.shift))} s ${header.shift > 0 ? "later" : "earlier"} than it was` : "the other"], ["rest", "this case at rest"], ["impact", "impacts: below, this case; above, the other"]]);
+  }
+
+  /** What may be saved: both cases, each under its name. @param {any} header */
+  files({cases: [first, other]}) {
+    const kind = this.with.value, {state} = this.page;
+    const [one_, second] = [caseName(first), kind === "treatment" ? `${caseName(other)}, ${other.treatment}` : caseName(other)];
+    const name = `rocking-compare-${slug(one_)}-and-${slug(second)}`;
+    const asked = {...state.texts, ...this.asked(), first: one_, second};
+    /** @type {[string, string][]} */
+    const entries = [[`this case: ${one_}`, colour("ink")], [`the other: ${second}`, colour("second")]];
+    const drawn = (/** @type {"svg" | "png"} */ form) => this.histories.picture(form, entries);
+    offer([
+      [`${name}.svg`, "Both, SVG", () => drawn("svg")], [`${name}.png`, "Both, PNG", () => drawn("png")], [`${name}.csv`, "Both, histories, CSV", () => file("/api/compare/table", asked)],
+    ], (error) => this.page.problem(error, "view-compare"));
+  }
+
+  /** What is asked of the server besides the case and the window. @returns {Texts} */
+  asked() {
+    const {other, compare, align} = this.page.state;
+    return {...Object.fromEntries(Object.entries(other).map(([name, value]) => [`other.${name}`, value])), compare, align};
   }
 
   async schemes() {
@@ -85,6 +125,22 @@ export class View {
       const sign = row.right === null ? "" : row.right ? "✓ " : "✗ ";
       return [button, row.label, `${sign}${row.verdict}${row.error ? ` (worst error of a rest ${short(row.error)} s)` : ""}`];
     }));
+  }
+}
+
+/** A choice among the pinned cases. */
+class PinnedForm {
+  /** @param {HTMLElement} element @param {(texts: Texts) => void} changed */
+  constructor(element, changed) {
+    this.select = /** @type {HTMLSelectElement} */ (make("select", {id: "other-case", on: {change: () => changed({...snapshots()[Number(this.select.value)].texts})}},
+      snapshots().map(({name}, k) => make("option", {value: String(k)}, [name]))));
+    element.append(snapshots().length ? make("label", {}, ["Pinned case ", this.select]) : "No case is pinned. Show one in the view Response, and pin it below its verdict.");
+  }
+
+  /** @param {Texts} texts */
+  show(texts) {
+    const found = snapshots().findIndex((each) => JSON.stringify(Object.entries(each.texts).sort()) === JSON.stringify(Object.entries(texts).sort()));
+    this.select.value = String(found);
   }
 }
 

@@ -19,7 +19,7 @@ export function showFiles(state, problem) {
 
 /** @typedef {[string, string, () => Promise<Blob>][]} Files names, labels, and what makes them */
 /** Buttons that save files. @param {Files} files @param {(error: unknown) => void} [problem] is told what went wrong */
-function offer(files, problem) {
+export function offer(files, problem) {
   one("exports").replaceChildren(...files.map(([name, label, content]) => make("button", {type: "button", on: {click: async () => {
     try { save(name, await content()); } catch (error) { if (problem) problem(error); else throw error; }
   }}}, [label])));
@@ -43,10 +43,11 @@ export function showCode(what, python, command) {
 const ROW = 22;
 
 /** A picture with what its colours mean below it. @param {Blob} picture @param {[string, string][]} entries @param {number} width @param {number} height
+ * @param {number} columns
  * @returns {Promise<Blob>} */
-export async function withLegend(picture, entries, width, height) {
-  const rows = entries.map(([text, ink], k) => ({text, ink, x: 62 + (k % 2) * 0.45 * width, y: height + 10 + ROW * Math.floor(k / 2)}));
-  const whole = height + ROW * Math.ceil(entries.length / 2) + 18;
+export async function withLegend(picture, entries, width, height, columns = 2) {
+  const rows = entries.map(([text, ink], k) => ({text, ink, x: 62 + (k % columns) * 0.45 * width, y: height + 10 + ROW * Math.floor(k / columns)}));
+  const whole = height + ROW * Math.ceil(entries.length / columns) + 18;
   const style = getComputedStyle(document.documentElement);
   const [paper, ink] = ["--paper", "--ink"].map((name) => style.getPropertyValue(name).trim());
   return picture.type === "image/png" ? onCanvas(picture, rows, width, height, whole, paper, ink) : inDrawing(picture, rows, width, height, whole, paper, ink);

@@ -1,5 +1,6 @@
 // Rotation over ground acceleration: one axis of time, which keeps its digits however far it is zoomed.
 
+import {withLegend} from "./exports.js";
 import {bokeh, coarse, colour, figure, showPlot, themed} from "./theme.js";
 
 /** @typedef {{time: Float64Array, rotation: Float64Array, ground_time: Float64Array, ground_g: Float64Array, weight?: Float64Array, impact: Float64Array}} Lines */
@@ -59,6 +60,8 @@ export class Histories {
     this.levels = {};
     /** @type {any[]} */
     this.cursors = [];
+    /** Curves that were shown before, the oldest first. @type {import("./ghosts.js").Ghost[]} */
+    this.ghosts = [];
     this.made = false;
     this.drawing = false;
     element.addEventListener("keydown", (event) => this.key(event));
@@ -75,8 +78,8 @@ export class Histories {
     for (const each of [this.rotation, this.ground]) this.addTools(each);
     this.glyphs();
     this.cursors = [this.rotation, this.ground].map((plot) => this.vertical(plot));
-    const grid = B.Plotting.gridplot([[this.rotation], [this.ground]], {sizing_mode: "stretch_width", toolbar_location: null, merge_tools: false});
-    void showPlot(grid, this.element);
+    this.grid = B.Plotting.gridplot([[this.rotation], [this.ground]], {sizing_mode: "stretch_width", toolbar_location: null, merge_tools: false});
+    void showPlot(this.grid, this.element);
     this.x.properties.start.change.connect(() => this.ranged());
     this.x.properties.end.change.connect(() => this.ranged());
     this.made = true;
@@ -132,6 +135,8 @@ export class Histories {
     const F = (/** @type {string} */ field) => ({field});
     add(this.rotation, new B.VStrip({x0: F("from"), x1: F("to"), line_width: 1}), this.source("rest", ["from", "to"]),
       (glyph) => glyph.setv({fill_color: colour("rest"), line_color: colour("edge")}));
+    add(this.rotation, new B.MultiLine({xs: F("xs"), ys: F("ys"), line_alpha: F("alpha"), line_width: 1}), this.source("ghosts", ["xs", "ys", "alpha"]),
+      (glyph) => { glyph.line_color = colour("ink"); });
     for (const [k, name] of [...NAMES.entries()].reverse()) {
       const [ink, ground] = k === 0 ? ["ink", "ground"] : ["second", "second"];
       if (k === 0) {
@@ -194,6 +199,7 @@ export class Histories {
       this.sources[name].data = {x: this.scale.all(lines.time, from), y};
       this.sources[`${name}-ground`].data = {x: this.scale.all(lines.ground_time, from), y: lines.ground_g};
     }
+    this.drawGhosts();
     this.drawThresholds(first.lines);
     this.frame(low, high);
     const rests = first.rest;
@@ -205,6 +211,21 @@ export class Histories {
     };
     for (const plot of [this.rotation, this.ground]) plot.hold_render = false;
     this.drawing = false;
+  }
+
+  /** Both plots as they are drawn, and what their colours mean. @param {"svg" | "png"} form @param {[string, string][]} entries */
+  async picture(form, entries) {
+    const drawn = bokeh().index.find_one(this.grid).export(form);
+    return withLegend(await drawn.to_blob(), entries, this.rotation.outer_width, this.rotation.outer_height + this.ground.outer_height, 1);
+  }
+
+  drawGhosts() {
+    const {ghosts} = this, source = this.sources.ghosts;
+    if (!ghosts.length && !source.data.xs.length) return;
+    source.data = {
+      xs: ghosts.map(({from, time}) => this.scale.all(time, from)), ys: ghosts.map(({y}) => y),
+      alpha: ghosts.map((_, k) => 0.08 + (0.24 * (k + 1)) / ghosts.length),
+    };
   }
 
   /** What of the ground motion is beyond the threshold of a side; under a vertical component, that and the thresholds, which it moves.

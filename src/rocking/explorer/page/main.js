@@ -6,15 +6,18 @@ import {ChatteringPanel} from "./chattering.js";
 import {makeCopying, showCode, showFiles} from "./exports.js";
 import {BlockForm, ModelForm, MotionForm} from "./forms.js";
 import {Cursor} from "./cursor.js";
+import {Ghosts} from "./ghosts.js";
 import {Histories} from "./histories.js";
 import {PhasePanel} from "./phase.js";
 import {Lecture} from "./lecture.js";
 import {Sheet} from "./sheet.js";
+import {Snapshots} from "./snapshots.js";
 import {RecordList} from "./list.js";
 import {makePrinting} from "./print.js";
 import {coarse} from "./theme.js";
-import {angle, ofG, unitFields} from "./units.js";
+import {angle, caseName, ofG, unitFields, unitsChosen} from "./units.js";
 import {acceptFiles} from "./upload.js";
+import {begin, settle} from "./visits.js";
 import {counted, fixed, legend, make, one, say, short} from "./words.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
@@ -40,6 +43,8 @@ const cursor = new Cursor(page, {mark: (time) => { histories.mark(time); phase.m
 const chattering = new ChatteringPanel(showWindow);
 const lecture = new Lecture(page, histories);
 new Sheet();
+const ghosts = new Ghosts(histories);
+new Snapshots({now: () => (page.shown ? {name: caseName(page.shown.header), texts: {...state.good.texts}} : null), open: restate, changed: () => views.compare?.repinned()});
 
 /** What is wrong at each place of the page, by its id. @type {Record<string, string | null>} */
 const problems = {};
@@ -90,6 +95,7 @@ const afterPause = new Latest(async () => {
   if (!page.shown) return;
   const {header} = page.shown, {texts} = state;
   forms.block.show(texts, header.block.sides);
+  const asked = json("/api/tracks", texts).catch(() => ({}));
   showNotes(header);
   showLegend(header);
   chattering.window(header.window);
@@ -98,10 +104,12 @@ const afterPause = new Latest(async () => {
   cursor.show();
   await forms.block.mesh.learn(header.block.body, texts);
   if (!ofOwn(state.view)) {
-    showFiles(state, problem);
+    if (state.view !== "compare") showFiles(state, problem);
     const {python, command} = await json("/api/code", texts);
     if (state.texts === texts && !ofOwn(state.view)) showCode("case", python, command);
   }
+  const found = await asked;
+  if (state.texts === texts) forms.block.tracks(found);
   counted("rested");
 }, problem);
 
@@ -144,9 +152,26 @@ function changed(texts, replaced) {
 
 /** Other texts altogether: show them in the forms, too. @param {Texts} texts */
 function restate(texts) {
+  begin();
   state.window = state.at = null;
-  for (const form of Object.values(forms)) form.show(texts);
+  showForms(texts);
   changed(texts, Object.keys(state.texts));
+}
+
+/** @param {Texts} texts */
+function showForms(texts) {
+  for (const form of Object.values(forms)) form.show(texts);
+}
+
+/** Go back or forward in the browser's history. */
+function revisit() {
+  settle();
+  const units = String(unitsChosen());
+  Object.assign(state, readAddress());
+  if (String(unitsChosen()) !== units) { location.reload(); return; } // every field has its unit from the start
+  showForms(state.texts);
+  views[state.view]?.restore?.();
+  void go(state.view);
 }
 
 /** Whether a view shows something else than a response, with files and code of its own. @param {string} name */
@@ -199,6 +224,7 @@ function draw() {
   forms.block.mesh.turn(body);
   if (state.view === "response" || state.view === "block") {
     const lines = /** @type {any} */ (arrays);
+    ghosts.next(header, lines);
     histories.draw(header, {lines, rest: arrays.rest, uplift: arrays.uplift, block: header.block});
   }
   views[state.view]?.draw?.();
@@ -207,9 +233,8 @@ function draw() {
 /** Name the view and the case, for tabs and bookmarks. @param {any} header */
 function entitle({block, motion}) {
   const view = document.querySelector("[data-view][aria-current]")?.textContent;
-  const {study} = specification, [{p, alpha}] = block.sides;
-  const shaken = motion ? `${motion.name} ${ofG(motion.pga_g)}` : "no ground motion";
-  const shown = study && state.view === "map" ? `study ${study.name}` : `p = ${short(p)} rad/s, α = ${angle(alpha)}, ${shaken}`;
+  const {study} = specification;
+  const shown = study && state.view === "map" ? `study ${study.name}` : caseName({block, motion});
   document.title = `${view}: ${shown} – rocking explorer`;
 }
 
@@ -263,7 +288,7 @@ async function watchCompilation() {
   one("compiling").hidden = true;
 }
 
-for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => go(/** @type {any} */ (button).dataset.view));
+for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => { begin(); void go(/** @type {any} */ (button).dataset.view); });
 for (const button of document.querySelectorAll("[data-zoom]")) button.addEventListener("click", () => histories.zoom(/** @type {any} */ (button).dataset.zoom));
 for (const button of document.querySelectorAll("button.what[aria-controls]")) {
   button.addEventListener("click", () => {
@@ -292,7 +317,8 @@ acceptFiles(async (file, use) => {
 });
 makePrinting(page, problem);
 unitFields(() => { writeAddress(state); window.setTimeout(() => location.reload(), 250); });
-for (const form of Object.values(forms)) form.show(state.texts);
+window.addEventListener("popstate", revisit);
+showForms(state.texts);
 void watchCompilation();
 await (state.lecture ? lecture.enter() : go(state.view));
 document.body.dataset.ready = String(performance.now());

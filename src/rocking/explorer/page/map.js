@@ -162,6 +162,12 @@ export class View {
   async stream(signal) {
     this.fill();
     const map = {...this.page.state.map};
+    if (this.complete && this.drawn === JSON.stringify(this.asked())) {
+      this.page.remember({map});
+      this.recolour();
+      this.offer();
+      return;
+    }
     const started = performance.now();
     const body = document.body.dataset;
     this.drawn = JSON.stringify(this.asked());

@@ -3,11 +3,13 @@
 
 import {Problem, json} from "./api.js";
 import {inUnits, readUnits, unitsChosen} from "./units.js";
+import {write} from "./visits.js";
 import {one} from "./words.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
-/** @typedef {{view: string, texts: Texts, other: Texts, compare: string, window: [number, number] | null, at: number | null, lecture: boolean, map: Texts, sweep: Texts, assessment: Texts, good: Good}} State */
-/** What was answered last of each part of the state: it alone enters the address. @typedef {{texts: Texts, other: Texts, compare: string, map: Texts, sweep: Texts, assessment: Texts}} Good */
+/** @typedef {{view: string, texts: Texts, other: Texts, compare: string, align: string, window: [number, number] | null, at: number | null, lecture: boolean, map: Texts, sweep: Texts, assessment: Texts, good: Good}} State */
+/** What was answered last of each part of the state: it alone enters the address.
+ * @typedef {{texts: Texts, other: Texts, compare: string, align: string, map: Texts, sweep: Texts, assessment: Texts}} Good */
 /** @typedef {{name: string, label: string, group: string, unit: string, suffix: string, default: string, units: Record<string, number>, low: number, high: number, logarithmic: boolean, step: number, values: string, explanation: string}} Parameter */
 
 /** @type {any} */
@@ -34,7 +36,9 @@ export const namesOf = (...groups) =>
   specification.parameters.filter((/** @type {Parameter} */ each) => !groups.length || groups.includes(each.group)).map((/** @type {Parameter} */ each) => each.name);
 
 const VIEWS = ["response", "block", "map", "periodic", "compare", "records", "assessment"];
-const COMPARED = ["treatment", "block", "motion"];
+const COMPARED = ["treatment", "block", "motion", "case"];
+/** Which moments of two responses are laid over each other. */
+const ALIGNED = ["start", "uplift", "arias"];
 
 /** @returns {State} */
 export function readAddress() {
@@ -48,7 +52,8 @@ export function readAddress() {
   const from = Number(given.get("from") ?? NaN), to = Number(given.get("to") ?? NaN), time = Number(given.get("at") || NaN);
   const parts = {
     texts: complete(Object.keys(texts).length ? texts : opening), other: those(namesOf(), "other."),
-    compare: COMPARED.find((each) => each === given.get("compare")) ?? COMPARED[0], map: those(specification.map), sweep: those(specification.sweep), assessment: those(specification.assessment),
+    compare: COMPARED.find((each) => each === given.get("compare")) ?? COMPARED[0], align: ALIGNED.find((each) => each === given.get("align")) ?? ALIGNED[0],
+    map: those(specification.map), sweep: those(specification.sweep), assessment: those(specification.assessment),
   };
   return {
     ...parts,
@@ -91,6 +96,7 @@ export function writeAddress(state) {
     put(good.texts, namesOf());
     if (state.view === "compare") {
       given.set("compare", good.compare);
+      if (good.align !== ALIGNED[0]) given.set("align", good.align);
       put(good.other, namesOf(), "other.");
     }
     if (state.view === "map") put(good.map, specification.map);
@@ -100,6 +106,6 @@ export function writeAddress(state) {
     put(ends(state), ["from", "to"]);
     if (state.at !== null && (state.view === "response" || state.view === "block")) given.set("at", String(state.at));
     if (state.lecture) given.set("lecture", "1");
-    history.replaceState(null, "", `?${given}`);
+    write(given.toString());
   }, 150);
 }

@@ -65,3 +65,8 @@ export function unitFields(write) {
     return make("label", {className: "field"}, [`${LABELS[name]} in `, select]);
   }));
 }
+
+/** What a case is called, from what the server says of it. @param {any} header */
+export function caseName({block: {sides: [{p, alpha}]}, motion}) {
+  return `p = ${short(p)} rad/s, α = ${angle(alpha)}, ${motion ? `${motion.name} ${ofG(motion.pga_g)}` : "no ground motion"}`;
+}

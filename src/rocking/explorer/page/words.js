@@ -60,6 +60,9 @@ export function counted(name) {
   dataset[name] = String(Number(dataset[name] ?? 0) + 1);
 }
 
+/** A name as part of a file's. @param {string} name */
+export const slug = (name) => name.replace(/[^\p{L}\d.]+/gu, "-").slice(0, 60);
+
 /** Say something to those who listen. @param {string} text */
 export function say(text) { one("said").textContent = text; }
 

@@ -1,0 +1,83 @@
+// Cases that somebody has pinned, each with a name: the storage of this origin keeps them, so that they outlive a reload.
+
+import {make, one, say} from "./words.js";
+
+/** @typedef {import("./api.js").Texts} Texts */
+/** @typedef {{name: string, texts: Texts}} Snapshot */
+
+const KEPT = "rocking-snapshots";
+const MOST = 8, LONGEST = 40;
+
+/** @param {any} each @returns {each is Snapshot} */
+const isSnapshot = (each) => typeof each?.name === "string" && each.texts !== null && typeof each.texts === "object" &&
+  Object.values(each.texts).every((text) => typeof text === "string");
+
+/** Where nothing can be kept, as in a frame of some browsers, they are known until the page is closed. @type {Snapshot[]} */
+let known = [];
+try {
+  const found = JSON.parse(localStorage.getItem(KEPT) ?? "[]");
+  known = Array.isArray(found) ? found.filter(isSnapshot).slice(0, MOST) : [];
+} catch { /* as said above */ }
+
+/** @returns {Snapshot[]} */
+export const snapshots = () => known;
+
+export class Snapshots {
+  /** @param {{now: () => Snapshot | null, open: (texts: Texts) => void, changed: () => void}} page the present case with a name for it, what
+   * opens another, and what is told that others are pinned */
+  constructor(page) {
+    this.page = page;
+    this.name = /** @type {HTMLInputElement} */ (make("input", {type: "text", id: "pin-name", maxLength: LONGEST, hidden: true, "aria-label": "Name of the pinned case",
+      on: {keydown: (/** @type {KeyboardEvent} */ event) => this.key(event)}}));
+    this.button = /** @type {HTMLButtonElement} */ (make("button", {type: "button", id: "pin", on: {click: () => this.pin()}}, ["Pin this case"]));
+    this.chips = make("span", {className: "chips"});
+    one("snapshots").replaceChildren(this.chips, this.name, this.button);
+    this.show();
+  }
+
+  /** Ask for a name, and with that keep the case. */
+  pin() {
+    const now = this.page.now();
+    if (!now) return;
+    if (this.name.hidden) {
+      this.name.value = now.name.slice(0, LONGEST);
+      this.name.hidden = false;
+      this.button.textContent = "Keep under this name";
+      this.name.select();
+      return;
+    }
+    const name = this.name.value.trim() || now.name;
+    this.keep([...known.filter((each) => each.name !== name), {name, texts: now.texts}]);
+    say(`${name} is pinned.`);
+    this.close();
+  }
+
+  close() {
+    this.name.hidden = true;
+    this.button.textContent = "Pin this case";
+    this.button.focus();
+  }
+
+  /** @param {KeyboardEvent} event */
+  key(event) {
+    if (event.key === "Enter") this.pin();
+    else if (event.key === "Escape") this.close();
+  }
+
+  /** @param {Snapshot[]} all */
+  keep(all) {
+    known = all.slice(-MOST);
+    try { localStorage.setItem(KEPT, JSON.stringify(known)); } catch { /* as said above */ }
+    this.show();
+    this.page.changed();
+  }
+
+  show() {
+    this.chips.replaceChildren(...known.map((each) => make("span", {className: "chip"}, [
+      make("button", {type: "button", title: "Return to this case", on: {click: () => this.page.open({...each.texts})}}, [each.name]),
+      make("button", {type: "button", className: "remove", "aria-label": `Remove ${each.name}`, on: {click: () => this.keep(known.filter((other) => other !== each))}}, ["×"]),
+    ])));
+    this.button.disabled = known.length >= MOST;
+    this.button.title = this.button.disabled ? `The page keeps ${MOST} cases: remove one to pin another` : "";
+  }
+}
