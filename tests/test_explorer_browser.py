@@ -705,10 +705,14 @@ def test_a_body_has_no_barrier_and_is_compared_with_itself_turned(opened, viewpo
     page = opened(f"{MESH}&view=block", viewport, scheme, bypass_csp=True)
     page.js(axe + "; 1")
     page.until(PLAN, "the plan is drawn")
+    if viewport is PHONE:
+        page.page.click("#to-settings")
     page.page.click("summary:has-text('How the mesh is read')")
     found = page.js("axe.run(document, {resultTypes: ['violations']})")
     assert [(each["id"], [node["target"] for node in each["nodes"]][:4]) for each in found["violations"]] == []
     assert page.js("document.documentElement.scrollWidth") <= viewport["width"]
+    if viewport is PHONE:
+        page.page.click("#to-settings")
     page.page.click("[data-view=compare]")
     page.page.select_option("#compare-with", "block")
     page.until("document.getElementById('compare-verdict').textContent.startsWith('The other')")
@@ -1355,9 +1359,15 @@ def test_no_view_has_a_barrier(opened, viewport, scheme):
     if viewport is PHONE:
         page.page.click("#to-settings")
         assert barriers(page) == [], "settings over the picture"
-    for button in page.page.locator("button.what:visible").all():
+    for button in page.page.locator("#settings button.what:visible").all():
+        button.click()
+    if viewport is PHONE:
+        page.page.click("#to-settings")
+    for button in page.page.locator("main button.what:visible").all():
         button.click()
     assert barriers(page) == [], "explanations"
+    if viewport is PHONE:
+        page.page.click("#to-settings")
     page.page.fill("#p", "-1")
     page.page.press("#p", "Enter")
     page.until("document.getElementById('main').classList.contains('old')")

@@ -57,6 +57,8 @@ def announce(seconds: int) -> None:
 
 def _watch_compiler() -> None:
     """Hear from numba's compiler when it works; numba is imported no earlier."""
+    # As a whole first: where two threads import it, one from a part of it on, each may wait for the other.
+    import numba  # noqa: F401
     from numba.core import event
 
     class Listener(event.Listener):  # type: ignore[misc]

@@ -35,7 +35,8 @@ def text_at(parameter: Parameter, step: int) -> str:
 def tracks(texts: Texts) -> dict[str, list[list[int]]]:
     """Return the first and the last step of each slider of a case's block, for both sides or for each.
 
-    Beyond them the block would be refused, all else unchanged. A field that the case leaves out has its default.
+    Beyond them the block would be refused, all else unchanged. A field that the case leaves out has its default; a mesh
+    has no such ends.
 
     Examples
     --------
@@ -46,6 +47,8 @@ def tracks(texts: Texts) -> dict[str, list[list[int]]]:
     ['-0.1', '0.1']
     """
     given = {name: text for name, text in texts.items() if name in _OF_BLOCKS and text}
+    if "mesh" in given:  # it is turned all the way round
+        return {}
     fields = {name: text for name, text in given.items() if PARAMETERS[name].group == "block"}
     if "width" in fields:
         fields.setdefault("offset", "0")

@@ -100,6 +100,7 @@ export class BlockForm {
     this.shape = choice(prefix, "shape", "Given by", specification.shapes.map((/** @type {any} */ each) => [each.name, each.label]), () => this.reshape());
     this.two = check(`${prefix}two`, "Two different sides", () => this.separate());
     this.housner = check(`${prefix}housner`, "Restitution from angular momentum", () => { this.showFields(); this.tell(); });
+    this.opener = prefix ? null : one("choose-mesh").parentElement;
     this.mesh = new MeshFields(prefix, () => this.tell(), (azimuth) => { this.put("azimuth", [azimuth]); this.tell(); });
     this.specs = BLOCK.filter((name) => !this.mesh.names.includes(name)).map(parameter);
     /** Controls by name: one for both sides, and one for each. @type {Record<string, {both: NumberControl, pair: NumberControl[]}>} */
@@ -170,6 +171,7 @@ export class BlockForm {
       for (const each of pair) each.element.hidden = !seen || !sided;
     }
     this.mesh.element.hidden = this.mesh.picture.hidden = this.shape.select.value !== "mesh";
+    if (this.opener) this.opener.hidden = this.mesh.element.hidden;
     this.two.element.hidden = this.shape.select.value !== "parameters";
   }
 
