@@ -1330,6 +1330,15 @@ def barriers(page):
     return [(each["id"], [node["target"] for node in each["nodes"]][:4]) for each in found["violations"]]
 
 
+#: What holds when a view has computed all that it shows.
+COMPUTED = {
+    "map": "document.body.dataset.map === 'complete'",
+    "periodic": "document.body.dataset.sweep === 'complete'",
+    "compare": "document.querySelectorAll('#schemes tbody tr').length > 5",
+    "assessment": "document.body.dataset.assessment === 'complete'",
+}
+
+
 @pytest.mark.parametrize(("viewport", "scheme"), [(DESK, "light"), (PHONE, "dark")], ids=["desk", "phone"])
 def test_no_view_has_a_barrier(opened, viewport, scheme):
     axe = tool("axe-core/axe.min.js").read_text("utf-8")
@@ -1339,14 +1348,7 @@ def test_no_view_has_a_barrier(opened, viewport, scheme):
     judged = []
     for view in VIEWS:
         page.page.click(f"[data-view={view}]")
-        if view == "map":
-            complete(page)
-        if view == "periodic":
-            page.until("document.body.dataset.sweep === 'complete'")
-        if view == "compare":
-            page.until("document.querySelectorAll('#schemes tbody tr').length > 5")
-        if view == "assessment":
-            page.until("document.body.dataset.assessment === 'complete'")
+        page.until(COMPUTED.get(view, "true"))
         page.page.wait_for_timeout(300)
         assert barriers(page) == [], view
         assert page.js("document.documentElement.scrollWidth") <= viewport["width"], view
@@ -1359,15 +1361,12 @@ def test_no_view_has_a_barrier(opened, viewport, scheme):
     if viewport is PHONE:
         page.page.click("#to-settings")
         assert barriers(page) == [], "settings over the picture"
-    for button in page.page.locator("#settings button.what:visible").all():
-        button.click()
-    if viewport is PHONE:
-        page.page.click("#to-settings")
-    for button in page.page.locator("main button.what:visible").all():
-        button.click()
+    for part in ("#settings", "main"):
+        for button in page.page.locator(f"{part} button.what:visible").all():
+            button.click()
+        if viewport is PHONE:
+            page.page.click("#to-settings")  # closed, and opened again
     assert barriers(page) == [], "explanations"
-    if viewport is PHONE:
-        page.page.click("#to-settings")
     page.page.fill("#p", "-1")
     page.page.press("#p", "Enter")
     page.until("document.getElementById('main').classList.contains('old')")
