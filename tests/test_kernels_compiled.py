@@ -1,5 +1,6 @@
 """Where compiled kernels are kept, and that they never are those of other sources."""
 
+import ast
 import os
 import shutil
 import subprocess
@@ -230,3 +231,19 @@ def test_a_change_in_a_kernel_that_others_call_is_seen(tmp_path: Path) -> None:
     after = finished(started(PROGRAM, source, cache))
     assert float(after.split()[0]) < 0.9 * float(before.split()[0])
     assert len(list(cache.iterdir())) == 2
+
+
+def test_numba_is_imported_as_a_whole_before_a_part_of_it() -> None:
+    """Two threads may import it at once; one that begins with a part holds it while it waits for the whole."""
+    judged = 0
+    for file in sorted((SOURCE / "rocking").rglob("*.py")):
+        tree = ast.parse(file.read_text("utf-8"))
+        for scope in [tree, *(each for each in ast.walk(tree) if isinstance(each, ast.FunctionDef))]:
+            names = []
+            for each in scope.body:
+                names += [each.module or ""] if isinstance(each, ast.ImportFrom) else []
+                names += [name.name for name in each.names] if isinstance(each, ast.Import) else []
+            of_numba = [name for name in names if name.partition(".")[0] == "numba"]
+            assert of_numba[:1] in ([], ["numba"]), f"{file}: import numba before {of_numba[0]}"
+            judged += len(of_numba) > 1
+    assert judged >= 2
