@@ -550,7 +550,7 @@ def test_compiling_is_said_once_for_each_work_and_not_where_it_is_short():
 @pytest.mark.thorough
 def test_a_cold_cache_is_announced_by_the_command_line(tmp_path):
     command = [sys.executable, "-c", "from rocking.cli import main; main(['critical', '2', '0.9'])"]
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "ROCKING_SHIPPED": "0"}
     for expected in (1, 0):
         done = subprocess.run(command, capture_output=True, text=True, env=environment, check=True)
         assert done.stderr.count("note: compiling") == expected
@@ -560,7 +560,7 @@ def test_a_cold_cache_is_announced_by_the_command_line(tmp_path):
 def test_a_cold_cache_is_announced_by_a_study(tmp_path):
     file, place = str(tmp_path / "few.toml"), str(tmp_path / "few")
     Path(file).write_text('[motions]\nrecords = ["el-centro-meloland-270"]\n[blocks]\np = 2.0\nalpha = 0.2\n', "utf-8")
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "ROCKING_SHIPPED": "0"}
     counts = []
     for command in (["create", file, place], ["run", place]):
         program = f"from rocking.cli import main; main({['study', *command]})"
