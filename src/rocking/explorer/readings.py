@@ -115,7 +115,7 @@ def thumbnail(explorer: Explorer, texts: Texts) -> Payload:
     >>> texts = {"p": "2", "alpha": "0.2", "motion": "none", "initial_rotation": "0.02"}
     >>> payload = thumbnail(Explorer(), texts)
     >>> payload.header["verdict"], len(payload.arrays["time"]) <= 300
-    ('It rocks, comes to rest once, and does not overturn.', True)
+    ('It stays up: it reaches 10 % of the overturning rotation, and comes to rest once.', True)
     """
     shown = explorer.show(texts)
     response = shown.response
