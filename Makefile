@@ -37,7 +37,7 @@ test-all: .venv/.all ## run them with more cases each (twice as long)
 	$(PYTEST) -m "not slow and not browser"
 
 browser: .venv/.all .page-tools/.installed ## drive the explorer's page in Chromium, which must be installed
-	ROCKING_BROWSER_REQUIRED=1 $(BIN)/python -m pytest --benchmark-disable -m browser
+	ROCKING_BROWSER_REQUIRED=1 $(PYTEST) -m browser
 
 slow: .venv/.all ## run the tests that take long: wider ranges, many digits, a hundred thousand pairs
 	$(PYTEST) -m slow

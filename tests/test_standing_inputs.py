@@ -68,7 +68,11 @@ WRONG = {
         r"finite (east, north) in m, of shape (n, 2)",
     ),
     "tolerance of all": (lambda: Solid.from_mesh(box(), tolerance=5.0), "tolerance", "below the height of the mesh"),
-    "points": (lambda: Solid.from_mesh(np.zeros((3, 3))), "mesh", "the path of a file, a binary stream that has a name, or a mesh or scene of trimesh"),
+    "points": (
+        lambda: Solid.from_mesh(np.zeros((3, 3))),
+        "mesh",
+        "the path of a file, a binary stream that has a name, or a mesh or scene of trimesh",
+    ),
     "azimuth of text": (lambda: Solid.from_mesh(box()).block("north"), "azimuth", "a finite number, not 'north'"),
     "gravity": (lambda: Solid.from_mesh(box(), gravity=0.0), "gravity", "positive number, in m/s^2, not 0"),
     "restitution of a solid": (
