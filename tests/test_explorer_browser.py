@@ -277,7 +277,12 @@ def test_a_link_reproduces_what_is_shown(opened):
 def test_whatever_an_address_says_the_page_has_no_fault(opened, here):
     page, draw, told = opened(allowed=["422", "404"]), random.Random(7), 0
     corners = [{"width": "0.24", "height": "1.1", "motion": "none"}, {"from": "0", "to": "1e-300"}]
-    corners += [{"motion": "constructor"}, {"chattering": "toString=1"}, {"view": "compare", "compare": "toString"}]
+    corners += [
+        {"example": "constructor", "step": "-1"},
+        {"motion": "constructor"},
+        {"chattering": "toString=1"},
+        {"view": "compare", "compare": "toString"},
+    ]
     for texts in [*corners, *(explorer_addresses.case(draw) | explorer_addresses.shown(draw) for _ in range(20))]:
         page.page.goto(here.link(texts))
         page.until("document.body.dataset.ready", texts)
@@ -1806,7 +1811,7 @@ def guided(page):
 
 
 def test_an_example_is_followed_by_keys_and_by_the_browsers_history(opened):
-    page = opened(STATUE)
+    page = opened(f"view=block&{STATUE}&at=232.686")
     keys = page.page.keyboard
     assert page.page.locator("#examples").is_hidden()
     page.page.focus("#to-examples")
@@ -1816,6 +1821,7 @@ def test_an_example_is_followed_by_keys_and_by_the_browsers_history(opened):
     keys.press("Tab")
     page.rested(lambda: keys.press("Enter"))
     assert guided(page) == ("Housner's water tank: step 1 of 3", "example-words", "1")
+    assert "at" not in query_of(page)  # a time of the case that was left
     keys.press("Tab")
     page.rested(lambda: keys.press("Enter"))
     assert guided(page) == ("Housner's water tank: step 2 of 3", "example-words", "2")
