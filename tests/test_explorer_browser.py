@@ -277,7 +277,12 @@ def test_a_link_reproduces_what_is_shown(opened):
 def test_whatever_an_address_says_the_page_has_no_fault(opened, here):
     page, draw, told = opened(allowed=["422", "404"]), random.Random(7), 0
     corners = [{"width": "0.24", "height": "1.1", "motion": "none"}, {"from": "0", "to": "1e-300"}]
-    corners += [{"motion": "constructor"}, {"chattering": "toString=1"}, {"view": "compare", "compare": "toString"}]
+    corners += [
+        {"example": "constructor", "step": "-1"},
+        {"motion": "constructor"},
+        {"chattering": "toString=1"},
+        {"view": "compare", "compare": "toString"},
+    ]
     for texts in [*corners, *(explorer_addresses.case(draw) | explorer_addresses.shown(draw) for _ in range(20))]:
         page.page.goto(here.link(texts))
         page.until("document.body.dataset.ready", texts)
@@ -717,8 +722,8 @@ def test_a_body_has_no_barrier_and_is_compared_with_itself_turned(opened, viewpo
         page.page.click("#to-settings")
     page.page.click("[data-view=compare]")
     page.page.select_option("#compare-with", "block")
-    page.until("document.getElementById('compare-verdict').textContent.startsWith('The other')")
-    assert query_of(page)["other.azimuth"] == "120"
+    page.until("new URLSearchParams(location.search).get('other.azimuth') === '120'")
+    assert page.text("#compare-verdict").startswith("The other: ")
 
 
 def test_a_record_shakes_upwards_as_well(opened, tmp_path):
@@ -1325,10 +1330,10 @@ def test_a_plain_case_is_printed_on_one_light_page_without_controls(opened, sche
 # People
 
 
-def barriers(page):
-    """What axe finds on the page as it is, with the sizes of targets (WCAG 2.2, AA)."""
+def barriers(page, where="document"):
+    """What axe finds on the page as it is, or in parts of it, with the sizes of targets (WCAG 2.2, AA)."""
     options = "{resultTypes: ['violations'], rules: {'target-size': {enabled: true}}}"
-    found = page.js(f"axe.run(document, {options})")
+    found = page.js(f"axe.run({where}, {options})")
     return [(each["id"], [node["target"] for node in each["nodes"]][:4]) for each in found["violations"]]
 
 
@@ -1802,6 +1807,68 @@ def test_a_pinned_case_is_returned_to_compared_with_and_kept(opened):
     assert query_of(page)["width"] == "0.24"
     page.page.click(".chip .remove")
     assert page.js("localStorage.getItem('rocking-snapshots')") == "[]"
+
+
+# Guided examples
+
+
+def guided(page):
+    return page.text("#examples-title"), page.js("document.activeElement.id"), query_of(page).get("step")
+
+
+def test_an_example_is_followed_by_keys_and_by_the_browsers_history(opened):
+    page = opened(f"view=block&{STATUE}&at=232.686")
+    keys = page.page.keyboard
+    assert page.page.locator("#examples").is_hidden()
+    page.page.focus("#to-examples")
+    keys.press("Enter")
+    page.until("document.activeElement.textContent === 'A statue in an earthquake'")
+    assert page.page.locator("#examples-list button").count() == 6
+    keys.press("Tab")
+    page.rested(lambda: keys.press("Enter"))
+    assert guided(page) == ("Housner's water tank: step 1 of 3", "example-words", "1")
+    assert "at" not in query_of(page)  # a time of the case that was left
+    keys.press("Tab")
+    page.rested(lambda: keys.press("Enter"))
+    assert guided(page) == ("Housner's water tank: step 2 of 3", "example-words", "2")
+    assert "23\u00a0%" in page.text("#example-words")
+    assert "23 % of the overturning" in page.text("#verdict") and page.page.locator("#example-left").is_hidden()
+    page.rested(lambda: page.page.go_back())
+    assert guided(page) == ("Housner's water tank: step 1 of 3", "example-words", "1")
+    assert page.text("#verdict") == "It overturns, 1.50 s after the start."
+    keys.press("Escape")
+    assert page.page.locator("#examples").is_hidden()
+    assert page.js("document.getElementById('to-examples').getAttribute('aria-expanded')") == "false"
+    assert page.js("document.activeElement.id") == "to-examples" and "example" not in query_of(page)
+
+
+def test_a_link_to_a_step_is_enough_also_on_a_phone_and_a_changed_case_is_said_to_be_another(opened):
+    page = opened("example=critical-sine&step=3", {"width": 320, "height": 700}, bypass_csp=True)
+    found = query_of(page)
+    assert (found["p"], found["model"], found["step"]) == ("1", "linear", "3")
+    assert page.js("document.documentElement.scrollWidth <= window.innerWidth")
+    assert page.js("document.getElementById('example-words').getAttribute('aria-live')") == "polite"
+    again = page.page.locator("#example-again")
+    assert again.is_hidden()
+    page.page.click("#to-settings")
+    restitution = page.page.locator("#restitution")
+    page.rested(lambda: (restitution.fill("0.9"), restitution.press("Enter")))
+    page.page.click("#to-settings")
+    assert again.is_visible() and query_of(page)["restitution"] == "0.9"
+    page.js(tool("axe-core/axe.min.js").read_text("utf-8") + "; 1")
+    assert barriers(page, "{include: ['#examples', 'header']}") == []
+    page.rested(lambda: again.click())
+    assert again.is_hidden() and query_of(page)["restitution"] == "0.92"
+
+
+def test_a_step_of_the_compare_view_shows_both_responses_that_it_tells_of(opened):
+    page = opened("example=threshold&step=1")
+    page.page.click("#example-next")
+    page.until("document.getElementById('compare-verdict').textContent.includes('overturns, 236.17 s')")
+    assert page.page.locator("#example-left").is_hidden() and "236.17\u00a0s" in page.text("#example-words")
+    page.page.select_option("#compare-with", "block")
+    page.until("!document.getElementById('example-left').hidden", "the case is said to be another")
+    assert page.page.locator("#example-next").is_enabled()
 
 
 # The modules

@@ -57,7 +57,7 @@ export class View {
     this.draw();
   }
 
-  leave() { this.stop(); }
+  leave() { if (this.playing) this.stop(); }
 
   draw() {
     const {header} = this.page.shown ?? {};

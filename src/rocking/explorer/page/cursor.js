@@ -52,7 +52,7 @@ export class Cursor {
     this.tell.mark(known ? at : null);
     window.clearTimeout(this.still);
     if (!known) {
-      one("cursor").textContent = at === null ? "" : "The response ends before this time.";
+      one("cursor").textContent = at === null || !shown ? "" : "The response ends before this time.";
       return;
     }
     const text = `${at.toFixed(decimals(this.width()))} s`;

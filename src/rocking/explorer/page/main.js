@@ -6,6 +6,7 @@ import {ChatteringPanel} from "./chattering.js";
 import {makeCopying, showCode, showFiles} from "./exports.js";
 import {BlockForm, ModelForm, MotionForm} from "./forms.js";
 import {Cursor} from "./cursor.js";
+import {Examples} from "./examples.js";
 import {Ghosts} from "./ghosts.js";
 import {Histories} from "./histories.js";
 import {PhasePanel} from "./phase.js";
@@ -26,7 +27,7 @@ const state = readAddress();
 
 /** What the views share.
  * @type {{state: import("./parameters.js").State, shown: import("./api.js").Payload | null, go: typeof go, problem: typeof problem, restate: typeof restate, follow: typeof follow, list: RecordList, remember: (parts: Partial<import("./parameters.js").Good>) => void}} */
-const page = {state, shown: null, go, problem, restate, follow, list: new RecordList(state), remember: (parts) => accepted(state, parts)};
+const page = {state, shown: null, go, problem, restate, follow, list: new RecordList(state), remember: (parts) => { accepted(state, parts); examples.check(); }};
 /** @type {Record<string, any>} */
 const views = {};
 
@@ -42,6 +43,7 @@ const phase = new PhasePanel(page, (time) => cursor.set(time));
 const cursor = new Cursor(page, {mark: (time) => { histories.mark(time); phase.mark(time); }, seek: (time) => { if (state.view === "block") views.block?.seek(time); }});
 const chattering = new ChatteringPanel(showWindow);
 const lecture = new Lecture(page, histories);
+const examples = new Examples(state, revisit, problem);
 new Sheet();
 const ghosts = new Ghosts(histories);
 new Snapshots({now: () => (page.shown ? {name: caseName(page.shown.header), texts: {...state.good.texts}} : null), open: restate, changed: () => views.compare?.repinned()});
@@ -118,6 +120,7 @@ const look = new Latest(async () => {
   if (!page.shown) return;
   if (!state.window) { await load.work(); return; }
   const {header, arrays} = await payload("/api/window", {...state.texts, ...ends(state)});
+  if (!page.shown) return; // another case is on its way
   page.shown.header.window = header.window;
   Object.assign(page.shown.arrays, arrays);
   draw();
@@ -147,6 +150,7 @@ function changed(texts, replaced) {
   const kept = Object.entries(state.texts).filter(([name]) => !replaced.includes(name));
   state.texts = {...Object.fromEntries(kept), ...texts};
   views[state.view]?.update?.();
+  examples.check();
   void load.ask();
 }
 
@@ -166,11 +170,15 @@ function showForms(texts) {
 /** Go back or forward in the browser's history. */
 function revisit() {
   settle();
-  const units = String(unitsChosen());
+  views[state.view]?.leave?.(); // what is under way belongs to the state that is left
+  const units = String(unitsChosen()), before = JSON.stringify(state.texts);
   Object.assign(state, readAddress());
+  if (JSON.stringify(state.texts) !== before) page.shown = null;
+  cursor.show();
   if (String(unitsChosen()) !== units) { location.reload(); return; } // every field has its unit from the start
   showForms(state.texts);
   views[state.view]?.restore?.();
+  void examples.show();
   void go(state.view);
 }
 
@@ -198,6 +206,7 @@ async function go(name) {
   if (name === "block") histories.size(190, 140);
   else if (name === "response") histories.size(290, 190);
   writeAddress(state);
+  examples.check();
   for (const [each, view] of Object.entries(views)) if (each !== name) { view.leave?.(); problem(null, `view-${each}`); }
   if (name !== "response" && !views[name]) {
     const module = await import(`./${name}.js`);
@@ -318,6 +327,7 @@ acceptFiles(async (file, use) => {
 makePrinting(page, problem);
 unitFields(() => { writeAddress(state); window.setTimeout(() => location.reload(), 250); });
 window.addEventListener("popstate", revisit);
+await examples.arrive();
 showForms(state.texts);
 void watchCompilation();
 await (state.lecture ? lecture.enter() : go(state.view));

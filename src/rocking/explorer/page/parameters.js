@@ -7,7 +7,7 @@ import {write} from "./visits.js";
 import {one} from "./words.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
-/** @typedef {{view: string, texts: Texts, other: Texts, compare: string, align: string, window: [number, number] | null, at: number | null, lecture: boolean, map: Texts, sweep: Texts, assessment: Texts, good: Good}} State */
+/** @typedef {{view: string, texts: Texts, other: Texts, compare: string, align: string, window: [number, number] | null, at: number | null, lecture: boolean, example: {name: string, step: number} | null, map: Texts, sweep: Texts, assessment: Texts, good: Good}} State */
 /** What was answered last of each part of the state: it alone enters the address.
  * @typedef {{texts: Texts, other: Texts, compare: string, align: string, map: Texts, sweep: Texts, assessment: Texts}} Good */
 /** @typedef {{name: string, label: string, group: string, unit: string, suffix: string, default: string, units: Record<string, number>, low: number, high: number, logarithmic: boolean, step: number, values: string, explanation: string}} Parameter */
@@ -62,6 +62,7 @@ export function readAddress() {
     window: from < to ? [from, to] : null,
     at: time >= 0 && time < Infinity ? time : null,
     lecture: given.get("lecture") === "1",
+    example: given.get("example") ? {name: given.get("example") ?? "", step: Number(given.get("step") ?? 1)} : null,
   };
 }
 
@@ -106,6 +107,7 @@ export function writeAddress(state) {
     put(ends(state), ["from", "to"]);
     if (state.at !== null && (state.view === "response" || state.view === "block")) given.set("at", String(state.at));
     if (state.lecture) given.set("lecture", "1");
+    if (state.example) { given.set("example", state.example.name); given.set("step", String(state.example.step)); }
     write(given.toString());
   }, 150);
 }

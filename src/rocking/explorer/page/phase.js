@@ -42,6 +42,7 @@ export class PhasePanel {
   }
 
   async bring() {
+    if (!this.page.shown) return;
     const wanted = this.wanted();
     const {window: {from, to}, duration} = this.page.shown.header;
     if (!(duration > from)) return;
