@@ -643,7 +643,7 @@ def test_the_case_at_a_point_of_a_map_is_what_the_map_shows(x, y):
 
 
 @pytest.mark.parametrize("block", ECCENTRIC)
-@pytest.mark.parametrize("x", ["p", "restitution"])
+@pytest.mark.parametrize("x", ["p", "restitution", "omega"])
 def test_the_case_at_a_point_of_a_map_of_an_eccentric_block(block, x):
     case = read_case({**block, "motion": "one-sine:amplitude=4,frequency=1"}, UploadStore())
     grid = maps.grid_of(case, {"x": x, "y": "a", "x_from": "0.7", "x_to": "0.95", "y_to": "3", "points": "8"})
@@ -801,6 +801,18 @@ def test_a_point_of_a_study_is_its_simulation(study):
     assert payload.arrays["values"].reshape(rows, columns)[1, column] == pytest.approx(
         response.peak_rotation, rel=1e-12
     )
+
+
+@pytest.mark.parametrize("motion", [0, 1])
+def test_a_point_of_a_study_has_the_polarity_that_is_chosen(study, motion):
+    at = {"x": "p", "y": "alpha", "at_x": "3.5", "at_y": "0.2", "scale_index": "1", "motion_index": str(motion)}
+    uploads = UploadStore()
+    one, reversed_one = (
+        read_case(study.texts_at({**at, "polarity_index": str(k)}, uploads), uploads).motion for k in (0, 1)
+    )
+    assert np.array_equal(reversed_one.coefficients, -one.coefficients)
+    base = study.study.product.motions[motion]
+    np.testing.assert_allclose(one.coefficients, base.coefficients * (one.pga / base.pga), rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize(

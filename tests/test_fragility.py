@@ -591,3 +591,16 @@ def test_outcomes_of_one_cluster_at_one_intensity_are_no_independent_trials():
     assert math.isnan(together.goodness.p_value)
     widths = [one.median_interval[1] / one.median_interval[0] for one in (independent, together)]
     assert widths[0] != pytest.approx(widths[1], rel=1e-3)
+
+
+def test_a_finite_limit_counts_in_the_smaller_slenderness_of_an_asymmetric_block():
+    block = rocking.Block.from_parameters(p=2.0, alpha=(0.3, 0.2), restitution=0.8)
+    motions = [
+        rocking.pulses.one_sine(size, frequency) for size in np.linspace(2.5, 6.0, 12) for frequency in (1.0, 1.5)
+    ]
+    result = fragility(block, motions, limits={"half": 0.5}, progress=False)
+    peaks = np.array([rocking.simulate(block, motion).peak_rotation for motion in motions])
+    exceeded = result.outcomes.exceeded_half.values
+    assert exceeded.tolist() == (peaks / 0.2 > 0.5).tolist()
+    assert 0 < np.sum(peaks / 0.3 > 0.5) < np.sum(exceeded) < len(motions)
+    assert result.outcomes.peak_over_alpha.values[peaks < 0.2] == pytest.approx(peaks[peaks < 0.2] / 0.2, rel=1e-9)
