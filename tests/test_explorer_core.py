@@ -655,6 +655,10 @@ def test_the_case_at_a_point_of_a_map_of_an_eccentric_block(block, x):
             assert [side.restitution for side in response.block.sides] == pytest.approx(
                 [side.restitution for side in case.block.sides], rel=1e-12
             )
+        if x == "omega":
+            frequency = dict(response.motion.description.parameters)["frequency"]
+            slower = min(side.p for side in case.block.sides)
+            assert frequency == pytest.approx(grid.x.values[column] * slower / (2.0 * math.pi), rel=1e-12)
         peak = np.inf if response.overturned else response.peak_rotation / min(side.alpha for side in case.block.sides)
         assert found["peak"][row, column] == pytest.approx(peak, rel=1e-5, abs=1e-12)
 
