@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 import rocking
 from rocking import Block, Motion, Response, simulate
 from rocking.response import trail_of
+from rocking.response.contact import friction_demand
 
 GRAVITY = 9.80665
 COUNT = 100
@@ -199,6 +200,21 @@ def test_a_block_slides_first_where_a_dense_look_finds_it(part: int) -> None:
         # Before it, nothing that a dense look would see.
         assert found >= (times[over[0] - 1] if over[0] else 0.0), seed
         assert np.isnan(response.sliding_time(most * (1.0 + 1e-9))) or most == np.inf, seed
+
+
+@pytest.mark.parametrize("share", [0.998, 0.9999, 0.999999])
+def test_a_level_between_the_highest_sample_of_a_step_and_its_peak_is_passed(share: float) -> None:
+    """A block at rest under a push c t^2 (1 - t): the friction that sticking needs is |a|/g, 4c/27g at two thirds."""
+    size = 0.2 * GRAVITY * 27.0 / 4.0
+    response = simulate(Block.from_parameters(p=2.0, alpha=0.4), Motion([0.0, 1.0], [[0.0, 0.0, size, -size]]))
+    contact = response._contact
+    seen = float(contact._measured(friction_demand, *contact._samples()).max())
+    level = share * 0.2
+    assert 0.99 * 0.2 < seen < level
+    assert response.required_friction == pytest.approx(0.2, rel=1e-12)
+    passing = np.roots([-1.0, 1.0, 0.0, -share * 4.0 / 27.0])
+    assert response.sliding_time(level) == pytest.approx(np.sort(passing.real)[1], rel=1e-9)
+    assert np.isnan(response.sliding_time(0.2 * (1.0 + 1e-9)))
 
 
 def test_a_base_lifts_off_where_the_normal_force_ends() -> None:

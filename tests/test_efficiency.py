@@ -9,6 +9,7 @@ from scipy.stats import chi2
 
 import rocking
 from rocking import compare_measures
+from rocking.analysis import efficiency
 from rocking.constants import STANDARD_GRAVITY as G
 
 SLENDER = rocking.Block.from_parameters(p=1.0, alpha=1e-3, restitution=0.5)
@@ -108,6 +109,43 @@ def test_a_block_of_weight_two_counts_as_two_blocks():
         assert weighted[name].values == pytest.approx(twice[name].values, rel=1e-9)
         assert weighted[name].values != pytest.approx(alike[name].values, rel=1e-3)
     assert "2 blocks, weighted" in weighted.summary()
+
+
+def test_dispersions_of_several_blocks_are_written_out_sums(monkeypatch):
+    """Weights 3 and 1, and a motion that does not overturn the second block: every sum written out."""
+    blocks = [rocking.Block.from_parameters(p=p, alpha=0.2, restitution=0.9) for p in (1.5, 3.0)]
+    motions = [rocking.pulses.one_sine(1.0, f) for f in (0.4, 0.7, 1.0)]
+    search = efficiency.incremental_dynamic_analysis
+
+    def without_one(*given, **options):
+        scaled = search(*given, **options)
+        level = scaled.overturning_level
+        level[{"motion": 2, "block": 1}] = math.nan
+        assert int(level.isnull().sum()) == 1
+        return scaled
+
+    monkeypatch.setattr(efficiency, "incremental_dynamic_analysis", without_one)
+    found = compare_measures(blocks, motions, periods=[1.0], weights=[3.0, 1.0], tolerance=1e-2, progress=False)
+    for k, values in enumerate(found.intensity.values):
+        x = np.log(values)
+        assert np.isnan(x).tolist() == [[False, False], [False, False], [False, True]]
+        first, second = x[:, 0], x[:2, 1]
+        shares = 1.5, 0.5  # 1 in the mean of the blocks
+        squares = [float(np.sum((one - one.mean()) ** 2)) for one in (first, second)]
+        own = math.sqrt((shares[0] * squares[0] + shares[1] * squares[1]) / (shares[0] * 2.0 + shares[1] * 1.0))
+        mean = (shares[0] * first.sum() + shares[1] * second.sum()) / (3 * shares[0] + 2 * shares[1])
+        total = shares[0] * np.sum((first - mean) ** 2) + shares[1] * np.sum((second - mean) ** 2)
+        one = found.isel(measure=k)
+        assert float(one.median_intensity) == pytest.approx(math.exp(mean), rel=1e-13)
+        assert float(one.dispersion) == pytest.approx(own, rel=1e-12)
+        assert float(one.dispersion_of_all) == pytest.approx(
+            math.sqrt(total / (3 * shares[0] + 2 * shares[1] - 1.0)), rel=1e-12
+        )
+        # Two motions remain that both blocks share: one degree of freedom, and no more.
+        ends = [math.sqrt(1.0 / chi2.ppf(share, 1)) * own for share in (0.95, 0.05)]
+        assert [float(one.dispersion_low), float(one.dispersion_high)] == pytest.approx(ends, rel=1e-12)
+    assert found.sizes["measure"] == 5
+    assert "left out: 1 pair of block and motion" in found.summary()
 
 
 def test_the_figure_has_the_order_of_the_table():

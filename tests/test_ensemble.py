@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
@@ -226,30 +225,46 @@ def test_nothing_to_simulate_is_refused(records):
 
 LONG = """
 import signal, numpy as np, rocking
+from rocking import engine
 signal.signal(signal.SIGINT, signal.default_int_handler)  # what runs in the background may have none
+simulate_task, begun = engine.simulate_task, []
+
+def noted(setup, task, stop):
+    begun.append(stop.is_set())
+    if len(begun) == 4:
+        print("begun", flush=True)
+    return simulate_task(setup, task, stop)
+
+engine.simulate_task = noted
 blocks = rocking.Blocks(p=np.linspace(1, 6, 20_000), alpha=0.2, restitution=0.9)
 motion = rocking.records.load("ridgecrest-tow2-090")
-rocking.simulate_many(blocks[0], motion)  # loads the kernels
-print("ready", flush=True)
-rocking.simulate_many(blocks, motion, levels=np.linspace(0.5, 3.0, 300), threads=2)  # minutes
+try:
+    rocking.simulate_many(blocks, motion, levels=np.linspace(0.5, 3.0, 300), threads=2)  # minutes
+except KeyboardInterrupt:
+    print(len(begun), sum(begun), 300 * len([*engine.parts_of(len(blocks), motion)]), flush=True)
+    raise
 """
 
 
 @pytest.mark.thorough  # `test_ends.py` interrupts another one
 @pytest.mark.skipif(os.name == "nt", reason="signals are sent the POSIX way")
 def test_an_interrupt_returns_at_once(records):
+    """As the tasks count that are begun after it, however slow the machine is."""
     simulate_many(
         Block(half_width=0.2, half_height=1.0), records[2]
     )  # so that the other process finds the kernels compiled
     command = [sys.executable, "-c", LONG]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        assert process.stdout.readline() == "ready\n"
-        time.sleep(0.2)
-        process.send_signal(signal.SIGINT)
         try:
-            assert "KeyboardInterrupt" in process.communicate(timeout=60)[1]
+            assert process.stdout.readline() == "begun\n"
+            process.send_signal(signal.SIGINT)
+            out, err = process.communicate()
         finally:
             process.kill()
+    assert "KeyboardInterrupt" in err
+    begun, late, tasks = map(int, out.split())
+    assert begun < tasks
+    assert late <= 2  # one for each thread, on its way when the interrupt came
 
 
 @pytest.mark.slow

@@ -8,7 +8,10 @@ from oracles.multiprecision import follow
 from oracles.problem import Problem
 
 import rocking
-from rocking import Blocks, Motion, simulate, simulate_many
+from rocking import Blocks, Motion, ensemble, simulate, simulate_many
+from rocking.ensemble import Scales
+from rocking.kernels.ground import components
+from rocking.problem import ground_of
 
 GRAVITY = 9.80665
 MODELS = pytest.mark.parametrize("model", ["linear", "nonlinear"])
@@ -176,6 +179,47 @@ def test_a_batch_of_one_gives_the_same_under_a_thousand_g(seed: int) -> None:
     alone = [simulate_many(block, motion) for block in blocks]
     for name in together.data_vars:
         assert_array_equal(together[name].values, [one[name].item() for one in alone])
+
+
+# --- factors --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("factor", [1.0, 2.0, -0.5, -3.0, 0.7])
+@pytest.mark.parametrize("errors", [None, (1e-3, 4e-3), (4e-3, 1e-3), (2e-3, 0.0)])
+def test_a_motion_times_a_factor_is_laid_out_as_the_scaled_motion(
+    factor: float, errors: tuple[float, float] | None
+) -> None:
+    """Its error and its vertical component, too, which keeps its sign; without a vertical component for None."""
+    rng = np.random.default_rng(4)
+    along, up = (np.cumsum(rng.uniform(0.1, 0.4, 40)) for _ in range(2))
+    horizontal, vertical = (
+        Motion(np.append(0.0, ends), rng.normal(size=(40, degree + 1)), error=error)
+        for ends, degree, error in zip((along, up), (2, 1), errors or (3e-3, 0.0), strict=True)
+    )
+    motion = horizontal if errors is None else horizontal.with_vertical(vertical)
+    found, expected = ground_of(motion, GRAVITY, factor), ground_of(motion.scaled(factor), GRAVITY)
+    assert found.error == pytest.approx(max(errors or (3e-3,)) * abs(factor) / GRAVITY, rel=1e-15)
+    assert found.error == pytest.approx(expected.error, rel=1e-15)
+    assert (found.columns, found.first) == (expected.columns, expected.first)
+    assert_allclose(found.pieces, expected.pieces, rtol=1e-14, atol=1e-15)
+    assert_allclose(found.stretches, expected.stretches, rtol=1e-13, atol=1e-14)
+    if errors is not None:
+        (_, lifts), (_, as_it_is) = (components(each, np.arange(30)) for each in (found, ground_of(motion, GRAVITY)))
+        assert np.abs(as_it_is).max() > 0.1
+        assert_allclose(lifts, abs(factor) * as_it_is, rtol=1e-14)
+
+
+def test_a_scale_that_makes_a_motion_too_strong_is_refused_before_anything_is_simulated(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    begun: list[object] = []
+    monkeypatch.setattr(ensemble, "simulate_tasks", lambda setup, tasks, **options: iter(map(begun.append, tasks)))
+    block, motion = rocking.Block.from_parameters(p=2.0, alpha=0.2), Motion([0.0, 0.5], [[2.0]])
+    for levels, measure in (([1.0, 1e50], "factor"), ([1.0, 1e51], "pga"), ([1.0, 1e308], "pga")):
+        with pytest.raises(rocking.InvalidMotion, match=r"must stay below 1e\+50 m/s\^2: check units and scale"):
+            simulate_many(block, motion, levels=levels, measure=measure)
+    assert not begun
+    assert Scales.of([1.0, 4e49], "factor").factors(motion).tolist() == [1.0, 4e49]
 
 
 # --- motions that are not samples -----------------------------------------------------------------------------

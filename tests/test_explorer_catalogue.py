@@ -140,3 +140,23 @@ def test_forty_records_of_three_components_are_kept_and_few_motions_of_them_in_m
     tracemalloc.stop()
     assert sum(len(motion.breakpoints) for motion in store._read.values()) <= 20 * count
     assert len(store._read) == 20 and held < 200 * uploads.READ
+
+
+def test_new_files_take_none_out_and_of_what_was_read_what_was_used_longest_ago_goes_first(monkeypatch):
+    """A motion that is asked for again stays, though it was read first; what goes is read anew from its file."""
+    store, count = UploadStore(), 100
+    monkeypatch.setattr(uploads, "READ", 3 * count)
+    keys = [store.add_file(f"{seed}.txt", samples(seed, count).encode()) for seed in range(5)]
+    assert store.kept() == tuple(keys)
+    first, *_ = [store.read(key, None, 0.01, "g") for key in keys[:3]]
+    assert store.read(keys[0], None, 0.01, "g") is first
+    for k, left in ((3, {2, 0, 3}), (4, {0, 3, 4})):
+        store.read(keys[k], None, 0.01, "g")
+        assert {keys.index(key) for key, *_ in store._read} == left
+    assert store.read(keys[0], None, 0.01, "g") is first
+    again = store.read(keys[1], None, 0.01, "g")
+    assert len(again.breakpoints) == count and keys[3] not in {key for key, *_ in store._read}
+    store.remove(keys[2])
+    assert store.kept() == (keys[0], keys[1], keys[3], keys[4])
+    assert store.add_file("2.txt", samples(2, count).encode()) == keys[2]
+    assert store.kept() == (keys[0], keys[1], keys[3], keys[4], keys[2])

@@ -17,7 +17,7 @@ from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingEr
 from rocking.explorer import maps
 from rocking.explorer.code import case_as_command, case_as_python, map_as_command, map_as_python
 from rocking.explorer.core import Explorer, extremes
-from rocking.explorer.inputs import NAMES, pulse_as_text, pulse_of, read_case, texts_of
+from rocking.explorer.inputs import NAMES, pulse_as_text, pulse_of, read_case, texts_of, texts_of_motion
 from rocking.explorer.parameters import DEFAULT
 from rocking.explorer.parameters import PULSES as OFFERED
 from rocking.explorer.payload import pack
@@ -156,6 +156,35 @@ def test_the_weight_on_moving_ground_says_when_the_block_is_lifted(explorer):
     # A sample at the very end of a stretch may be on either side of it.
     assert np.count_nonzero(beyond != inside) <= 2
     assert "weight" not in explorer.case(STATUE).arrays
+
+
+@pytest.mark.parametrize("factor", [1.0, 0.7, -1.5])
+def test_shipped_records_with_a_vertical_component_are_both_named(factor):
+    """In an address that any program can read, not by a key; another vertical component, or scale of it, by a key."""
+    horizontal, upwards = (rocking.records.load(f"ridgecrest-clc-{which}") for which in ("090", "up"))
+    motion = horizontal.with_vertical(upwards)
+    texts = texts_of_motion(motion if factor == 1.0 else motion.scaled(factor), UploadStore())
+    named = {"motion": "ridgecrest-clc-090", "vertical": "ridgecrest-clc-up"}
+    assert texts == named | ({} if factor == 1.0 else {"scale": repr(factor)})
+    again = read_case({**texts, "width": "0.24", "height": "1.1"}, UploadStore()).motion
+    assert np.array_equal(again.coefficients, factor * horizontal.coefficients)
+    assert np.array_equal(again.vertical.coefficients, abs(factor) * upwards.coefficients)
+    for other in (-upwards, upwards.scaled(0.5), rocking.pulses.one_sine(1.0, 1.0)):
+        store = UploadStore()
+        (key,) = texts_of_motion(horizontal.with_vertical(other), store).values()
+        assert np.array_equal(store.motion(key.removeprefix("given:")).vertical.coefficients, other.coefficients)
+
+
+def test_the_case_at_a_point_of_a_map_keeps_its_vertical_component():
+    case = read_case({**STATUE, "vertical": "ridgecrest-clc-up"}, UploadStore())
+    grid = maps.grid_of(case, {"x": "p", "y": "pga", "points": "8"})
+    texts = maps.texts_at(grid, float(grid.x.values[3]), float(grid.y.values[2]))
+    motion = read_case(texts, UploadStore()).motion
+    whole = rocking.records.load("ridgecrest-clc-090").with_vertical(rocking.records.load("ridgecrest-clc-up"))
+    expected = whole.scaled_to(float(grid.y.values[2]) * 9.80665)
+    assert texts["vertical"] == "ridgecrest-clc-up"
+    np.testing.assert_allclose(motion.vertical.coefficients, expected.vertical.coefficients, rtol=1e-12)
+    np.testing.assert_allclose(motion.coefficients, expected.coefficients, rtol=1e-12)
 
 
 def test_a_motion_that_is_no_pulse_any_more_is_not_written_as_one():
@@ -614,7 +643,7 @@ def test_the_case_at_a_point_of_a_map_is_what_the_map_shows(x, y):
 
 
 @pytest.mark.parametrize("block", ECCENTRIC)
-@pytest.mark.parametrize("x", ["p", "restitution"])
+@pytest.mark.parametrize("x", ["p", "restitution", "omega"])
 def test_the_case_at_a_point_of_a_map_of_an_eccentric_block(block, x):
     case = read_case({**block, "motion": "one-sine:amplitude=4,frequency=1"}, UploadStore())
     grid = maps.grid_of(case, {"x": x, "y": "a", "x_from": "0.7", "x_to": "0.95", "y_to": "3", "points": "8"})
@@ -626,6 +655,10 @@ def test_the_case_at_a_point_of_a_map_of_an_eccentric_block(block, x):
             assert [side.restitution for side in response.block.sides] == pytest.approx(
                 [side.restitution for side in case.block.sides], rel=1e-12
             )
+        if x == "omega":
+            frequency = dict(response.motion.description.parameters)["frequency"]
+            slower = min(side.p for side in case.block.sides)
+            assert frequency == pytest.approx(grid.x.values[column] * slower / (2.0 * math.pi), rel=1e-12)
         peak = np.inf if response.overturned else response.peak_rotation / min(side.alpha for side in case.block.sides)
         assert found["peak"][row, column] == pytest.approx(peak, rel=1e-5, abs=1e-12)
 
@@ -772,6 +805,18 @@ def test_a_point_of_a_study_is_its_simulation(study):
     assert payload.arrays["values"].reshape(rows, columns)[1, column] == pytest.approx(
         response.peak_rotation, rel=1e-12
     )
+
+
+@pytest.mark.parametrize("motion", [0, 1])
+def test_a_point_of_a_study_has_the_polarity_that_is_chosen(study, motion):
+    at = {"x": "p", "y": "alpha", "at_x": "3.5", "at_y": "0.2", "scale_index": "1", "motion_index": str(motion)}
+    uploads = UploadStore()
+    one, reversed_one = (
+        read_case(study.texts_at({**at, "polarity_index": str(k)}, uploads), uploads).motion for k in (0, 1)
+    )
+    assert np.array_equal(reversed_one.coefficients, -one.coefficients)
+    base = study.study.product.motions[motion]
+    np.testing.assert_allclose(one.coefficients, base.coefficients * (one.pga / base.pga), rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize(

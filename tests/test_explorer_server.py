@@ -761,20 +761,22 @@ def test_the_page_works_while_many_connections_wait(running, browser, data, coun
     ids=["head", "body", "answer"],
 )
 def test_what_comes_or_is_taken_too_slowly_ends(running, browser, monkeypatch, limit, data):
+    usual = getattr(connections, limit)
     monkeypatch.setattr(connections, limit, 0.2)
     running.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)  # so that the answer waits in the program
     secret = browser.headers["authorization"].encode()
     (slow,) = connected(running, data.replace(b"SECRET", secret), 1, unread=True)
-    start = time.monotonic()
+    start, ended = time.monotonic(), False
     with slow:
         slow.settimeout(5.0)
-        while time.monotonic() < start + 5.0:
+        while not ended and time.monotonic() < start + usual:
             try:
                 slow.sendall(b"x")
                 time.sleep(0.02)
             except OSError:
-                break
-    assert 0.15 < time.monotonic() - start < 3.0
+                ended = True
+    # Not before its time, and before the usual one: a busy machine may notice late.
+    assert ended and 0.15 < time.monotonic() - start < usual
 
 
 def test_a_map_may_take_longer_than_any_connection_may_wait(running, browser, monkeypatch):

@@ -4,6 +4,7 @@ import contextlib
 import io
 import os
 import pickle
+import re
 import sys
 import tempfile
 import tracemalloc
@@ -357,6 +358,47 @@ def test_knet_shorter_than_its_duration_is_refused(file: Callable[[str], Path]) 
         assert f"2 s at 100 Hz make 200 samples but {200 - short} follow" in complaint(path)
     for key, value in (("Scale Factor      3920", "Scale Factor      0"), ("100Hz", "0Hz"), ("100Hz", "fast")):
         assert "which is no positive number" in complaint(file("".join(lines).replace(key, value)))
+
+
+@pytest.mark.parametrize(
+    ("samples", "seconds", "says"),
+    [
+        (200, 3, "line 12: 3 s at 100 Hz make 300 samples but 200 follow; get the whole file again"),
+        (299, 3, "line 12: 3 s at 100 Hz make 300 samples but 299 follow; get the whole file again"),
+        (300, 3, ""),
+        (399, 3, ""),
+        (400, 3, "line 12: 3 s at 100 Hz make 300 samples but 400 follow; remove what does not belong to it"),
+    ],
+)
+def test_knet_lasts_its_whole_seconds_and_less_than_one_more(
+    file: Callable[[str], Path], samples: int, seconds: int, says: str
+) -> None:
+    text = written.knet([100 + k % 7 for k in range(samples)])
+    text = text.replace(f"{'Duration Time(s)':<18}{samples // 100}\n", f"{'Duration Time(s)':<18}{seconds}\n")
+    assert f"{'Duration Time(s)':<18}{seconds}\n" in text
+    if says:
+        assert says in complaint(file(text))
+    else:
+        assert len(read(file(text)).breakpoints) == samples
+
+
+@pytest.mark.parametrize(("seconds", "fits"), [(8, False), (9, True), (10, True), (11, True), (12, False)])
+def test_cosmos_may_be_one_second_off_its_duration(file: Callable[[str], Path], seconds: int, fits: bool) -> None:
+    text = written.cosmos(written.series(1, 2000)).replace("approx   10 secs", f"approx {seconds:4d} secs")
+    assert f"approx {seconds:4d} secs" in text
+    if fits:
+        assert read(file(text)).step == 0.005
+    else:
+        assert f"2000 points at 0.005 s do not last {seconds} s; correct the header" in complaint(file(text))
+
+
+def test_at2_one_second_short_of_its_points_is_refused(file: Callable[[str], Path]) -> None:
+    text = (written.FOLDER / "nga.at2").read_text()
+    stated = re.search(r"NPTS=\s*(\d+), DT=\s*([.\d]+)", text)
+    points, second = int(stated[1]), round(1.0 / float(stated[2]))
+    for more, advice in ((second, "get the whole file again"), (-1, "remove what does not belong to it")):
+        message = complaint(file(text.replace(stated[0], f"NPTS= {points + more}, DT= {stated[2]}")))
+        assert f"{points} follow; {advice}" in message
 
 
 @pytest.mark.parametrize(

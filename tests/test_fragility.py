@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy import stats
+from scipy import linalg, stats
 from scipy.optimize import minimize
 
 import rocking
@@ -160,6 +160,36 @@ def test_the_interval_of_the_likelihood_is_where_it_has_fallen_by_half_a_quantil
     # Where the band of the probability holds one half is the interval of the median.
     low, high = curve.band(curve.median_interval)
     assert (high[0], low[1]) == pytest.approx((0.5, 0.5), abs=1e-4)
+
+
+def test_the_region_of_clusters_has_the_covariance_of_leaving_each_out():
+    """Newton's step without each cluster, written out; the region is the likelihood's, stretched to their spread."""
+    intensity, exceeded, motion = striped(5, 20)
+    together = fit_fragility(intensity, exceeded, clusters=motion).curves[0]
+    z, (median, dispersion) = np.log(intensity), (together.median, together.dispersion)
+    a, b = -math.log(median) / dispersion, 1.0 / dispersion
+    score, information = np.zeros((20, 2)), np.zeros((20, 2, 2))
+    for k in range(20):
+        for x, yes in zip(z[motion == k], exceeded[motion == k], strict=True):
+            at = (a + b * x) * (1.0 if yes else -1.0)
+            mills = stats.norm.pdf(at) / stats.norm.cdf(at)
+            row = np.array([1.0, x])
+            score[k] += mills * row * (1.0 if yes else -1.0)
+            information[k] += mills * (mills + at) * np.outer(row, row)
+    total = information.sum(axis=0)
+    assert np.abs(score.sum(axis=0)).max() < 1e-6
+    moved = np.array([np.linalg.solve(total - information[k], score[k]) for k in range(20)])
+    robust = 19.0 / 20.0 * moved.T @ moved
+    # The map that makes one covariance of the other and turns nothing, of the region that independent outcomes have.
+    root = linalg.sqrtm(np.linalg.inv(total))
+    stretch = root @ linalg.sqrtm(np.linalg.inv(root) @ robust @ np.linalg.inv(root)) @ np.linalg.inv(root)
+    assert stretch @ np.linalg.inv(total) @ stretch.T == pytest.approx(robust, rel=1e-9)
+    assert np.linalg.norm(stretch - np.eye(2)) > 0.5
+    likewise = Band(confidence=float(stats.chi2.cdf(stats.t.ppf(0.95, 19) ** 2, 1)))
+    alone = fit_fragility(intensity, exceeded, band=likewise).curves[0]
+    region, plain = (np.column_stack(one._uncertainty.boundary) for one in (together, alone))
+    assert region.shape == (360, 2)
+    np.testing.assert_allclose(region, [a, b] + (plain - [a, b]) @ stretch.T, rtol=1e-6)
 
 
 def test_outcomes_that_hardly_depend_on_the_intensity_leave_the_dispersion_without_an_upper_end():
@@ -561,3 +591,16 @@ def test_outcomes_of_one_cluster_at_one_intensity_are_no_independent_trials():
     assert math.isnan(together.goodness.p_value)
     widths = [one.median_interval[1] / one.median_interval[0] for one in (independent, together)]
     assert widths[0] != pytest.approx(widths[1], rel=1e-3)
+
+
+def test_a_finite_limit_counts_in_the_smaller_slenderness_of_an_asymmetric_block():
+    block = rocking.Block.from_parameters(p=2.0, alpha=(0.3, 0.2), restitution=0.8)
+    motions = [
+        rocking.pulses.one_sine(size, frequency) for size in np.linspace(2.5, 6.0, 12) for frequency in (1.0, 1.5)
+    ]
+    result = fragility(block, motions, limits={"half": 0.5}, progress=False)
+    peaks = np.array([rocking.simulate(block, motion).peak_rotation for motion in motions])
+    exceeded = result.outcomes.exceeded_half.values
+    assert exceeded.tolist() == (peaks / 0.2 > 0.5).tolist()
+    assert 0 < np.sum(peaks / 0.3 > 0.5) < np.sum(exceeded) < len(motions)
+    assert result.outcomes.peak_over_alpha.values[peaks < 0.2] == pytest.approx(peaks[peaks < 0.2] / 0.2, rel=1e-9)

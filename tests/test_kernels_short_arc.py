@@ -250,6 +250,27 @@ def test_a_fall_is_left_to_a_closer_look(nonlinear: bool) -> None:
 
 
 @models
+@pytest.mark.parametrize("left", [1e-4, 1e-3])
+def test_a_fall_between_two_ends_that_stand_is_left_to_a_closer_look(nonlinear: bool, left: float) -> None:
+    """A push against the fall turns the block back, once it has passed the end of what is followed, or before."""
+    case = Case(nonlinear, 0, 2.0, 0.2, (20.0, 0.0))
+    psi = 0.2 - 0.5 * math.pi
+    pull = 4.0 * (math.sin(psi) + 20.0 * math.cos(psi) if nonlinear else 0.2 - 0.5 * math.pi + 20.0)
+    v = 0.49 * pull * left
+    summit = 0.5 * v * v / pull
+    for share, outcome, long in (
+        (0.5, Outcome.UNDECIDED, Outcome.OVERTURN),
+        (0.9, Outcome.UNDECIDED, Outcome.OVERTURN),
+        (1.5, Outcome.STEP, Outcome.STEP),
+    ):
+        start = state_of(0, 0.5 * math.pi - share * summit, v)
+        found = case.short(start, left)
+        assert (found.outcome, case.long(start, left)[0].outcome) == (outcome, long)
+        if outcome == Outcome.STEP:
+            assert found.u < start["u"] < found.peak < 0.5 * math.pi
+
+
+@models
 def test_a_balanced_block_is_left_to_a_closer_look(nonlinear: bool) -> None:
     case = Case(nonlinear, 0, 2.0, 0.2, (0.0, 0.0))
     assert case.short(state_of(0, 0.2, 0.0), 1e-3).outcome == Outcome.UNDECIDED

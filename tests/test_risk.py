@@ -255,6 +255,19 @@ def test_openquake_probabilities_become_rates(tmp_path: Path) -> None:
         HazardCurve.read(path, site=2)
 
 
+def test_an_openquake_curve_that_rises_once_keeps_what_falls_below_all_before(tmp_path: Path) -> None:
+    """Probabilities of sampled catalogues rise here and there: such a point says no more than the one before it."""
+    path = tmp_path / "hazard_curve-mean-PGA.csv"
+    path.write_text(
+        "#,,,,\"kind='mean', investigation_time=50.0, imt='PGA'\"\n"
+        "lon,lat,depth,poe-0.1,poe-0.2,poe-0.3,poe-0.4,poe-0.5,poe-0.6\n"
+        "10.0,45.0,0.0,0.5,0.3,0.4,0.35,0.3,0.2\n"
+    )
+    hazard = HazardCurve.read(path)
+    assert hazard.intensity == pytest.approx(np.array([0.1, 0.2, 0.6]) * G)
+    assert hazard.rate == pytest.approx(-np.log1p(-np.array([0.5, 0.3, 0.2])) / 50.0)
+
+
 @pytest.mark.parametrize(
     "text, said",
     [

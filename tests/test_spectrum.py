@@ -195,3 +195,18 @@ def test_a_grid_that_is_moved_or_weighted_is_an_ensemble():
     }  # fmt: skip
     for options in ({"p": [1.0]}, {"size": [1.0]}, {"weights": [1.0, 1.0, 2.0, 2.0]}):
         assert rocking_spectrum(grid, PULSES[0], **options).sizes["block"] == 4
+
+
+def test_peaks_of_asymmetric_blocks_count_in_their_smaller_slenderness():
+    block, p = rocking.Block.from_parameters(p=2.0, alpha=(0.2, 0.3), restitution=0.8), [2.0, 3.0]
+    found = rocking_spectrum([block], [rocking.pulses.one_sine(2.5, 1.5), rocking.pulses.one_sine(-3.0, 2.0)], p=p)
+    judged = 0
+    for over, peak, overturned in zip(
+        found.peak_over_alpha.values.ravel(),
+        found.peak_rotation.values.ravel(),
+        found.overturned.values.ravel(),
+        strict=True,
+    ):
+        assert over == (math.inf if overturned else pytest.approx(peak / 0.2, rel=1e-12))
+        judged += not overturned
+    assert judged >= 2

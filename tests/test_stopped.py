@@ -75,6 +75,26 @@ def test_a_block_at_rest_when_it_is_stopped_is_at_rest_until_then(record):
     assert "rocks and does not overturn" in after.summary()
 
 
+@pytest.mark.parametrize("model", ["linear", "nonlinear"])
+def test_a_block_that_still_rocks_when_the_motion_ends_is_stopped_there_and_not_decided(model, tmp_path):
+    """`duration` is that of the motion: nothing of it is to come, and yet the block may rest or fall."""
+    block, motion = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9), rocking.pulses.one_sine(3.0, 1.0)
+    response = simulate(block, motion, model=model, duration=motion.duration)
+    assert response.stopped and response.moves_at_end and not response.overturned
+    assert f"still rocking at {motion.duration:.6g} s, where the simulation was stopped" in response.summary()
+    assert "goes on" not in response.summary()
+    still = Block.from_parameters(p=2.0, alpha=0.4, restitution=0.9)
+    assert not simulate(still, motion, model=model, duration=motion.duration).stopped
+    options = {"levels": [0.5, 1.0], "model": model, "duration": motion.duration}
+    many = simulate_many([block, still], motion, **options)
+    assert many.stopped.values[0].tolist() == [[False, False], [True, False]]
+    assert not many.overturned.values.any()
+    study = rocking.study(tmp_path, Blocks(p=2.0, alpha=[0.2, 0.4], restitution=0.9), motion, **options)
+    study.run(threads=1, progress=False)
+    with pytest.raises(rocking.StudyError, match="their verdicts are not known: make the study without a duration"):
+        study.fragility()
+
+
 def test_free_rocking_is_stopped_where_the_block_still_moves(block):
     response = simulate(block, None, initial_rotation=0.1, duration=0.3)
     assert response.stopped

@@ -194,11 +194,12 @@ def test_the_first_signal_finishes_what_is_in_hand(tmp_path):
         stdout=subprocess.PIPE,
         text=True,
     ) as process:
-        process.stdout.readline()
-        time.sleep(0.05)
+        while not [*(tmp_path / "result").glob("c.*")]:  # once a unit is there, signals are taken note of
+            assert process.poll() is None
+            time.sleep(0.001)
         process.send_signal(signal.SIGTERM)
-        assert process.stdout.readline() == "end\n"
-        assert process.wait(timeout=30) == 0
+        assert process.stdout.read().splitlines() == ["ready", "end"]
+        assert process.wait() == 0
 
 
 class Interrupted(Exception):

@@ -108,12 +108,13 @@ def test_the_commands_take_a_url(url, run, tmp_path):
 def test_a_killed_run_loses_nothing_and_its_lock_is_taken_over(complete, url):
     study = made(url)
     script = (
-        "import sys, time, rocking\nstudy = rocking.study(sys.argv[1])\nput = study._store.put\n"
-        "def slow(key, data):\n    put(key, data)\n    print('stored', flush=True)\n    time.sleep(0.5)\n"
+        "import sys, rocking\nstudy = rocking.study(sys.argv[1])\nput = study._store.put\n"
+        "def slow(key, data):\n    put(key, data)\n    print('stored', flush=True)\n    sys.stdin.read()\n"
         "study._store.put = slow\nstudy.run()\n"
     )
-    with subprocess.Popen([sys.executable, "-c", script, url], stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout.readline() == "stored\n"
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen([sys.executable, "-c", script, url], **pipes, text=True) as process:
+        assert process.stdout.readline() == "stored\n"  # it goes no further until it is killed
         holder = study.status.running.holder
         assert holder.startswith(f"process {process.pid} on ")
         with pytest.raises(rocking.StudyError, match=f"is being run by {holder}, heard of"):
@@ -126,7 +127,7 @@ def test_a_killed_run_loses_nothing_and_its_lock_is_taken_over(complete, url):
     assert same(study, complete)
 
 
-def wait_until(true, seconds=30.0):
+def wait_until(true, seconds=300.0):  # far beyond what a busy machine takes: what is waited for comes
     end = time.monotonic() + seconds
     while not true():
         assert time.monotonic() < end

@@ -13,13 +13,16 @@ import numpy as np
 import pytest
 
 import rocking
+from rocking import simulate
+from rocking.engine import Setup
 from rocking.motion.exceedance import exceedances
 from rocking.progress import Progress
 from rocking.studies import read_study, refine
 from rocking.studies.inputs import OUTCOMES
 from rocking.studies.state import Log
 from rocking.studies.store import UnitArray
-from rocking.studies.units import name_of
+from rocking.studies.units import PointsWork, name_of
+from rocking.treatment import treatment
 
 TOLERANCE = 1e-3
 SCALES = np.linspace(4.0, 20.0, 9)
@@ -299,6 +302,23 @@ def test_chattering_that_was_cut_off_or_is_not_proven_is_no_verdict():
     }
     assert refine._finding("overturning", outcomes).tolist() == [-1, -1, -1, 1, 0, 0]
     assert refine._finding("complete_chattering", outcomes).tolist() == [-1, -1, 1, 0, 1, -1]
+
+
+def test_two_motions_of_one_factor_shake_each_its_own_points():
+    """Points stand in order of their motions and factors: where a factor stays, the motion may change."""
+    which, factors = np.array([0, 0, 1, 1, 1, 0]), np.array([2.0, 2.0, 2.0, 2.0, 3.0, 3.0])
+    setup = Setup(BLOCKS.select(np.arange(6)), "linear", treatment("certified"), None)
+    work = PointsWork(
+        setup=setup, motions=tuple(MOTIONS), which=which, factors=factors, unit=(6,), outcomes=("peak_rotation",)
+    )
+    tasks = [(where[0].start, where[0].stop, task.motion, task.factor) for where, task in work.parts()]
+    first, second = MOTIONS
+    assert tasks == [(0, 2, first, 2.0), (2, 4, second, 2.0), (4, 5, second, 3.0), (5, 6, first, 3.0)]
+    peaks = [
+        simulate(block, MOTIONS[motion].scaled(factor), model="linear").peak_rotation
+        for block, motion, factor in zip(setup.bodies, which, factors, strict=True)
+    ]
+    assert work.values(None)[0] == pytest.approx(peaks, rel=1e-12)
 
 
 def test_the_bar_says_which_round_it_is_and_what_is_counted(tmp_path, monkeypatch):

@@ -132,6 +132,18 @@ def test_both_polarities_of_symmetric_blocks_are_one_outcome(study, tmp_path):
     assert both.block_fragilities().data.identical(study.block_fragilities().data)
 
 
+def test_both_polarities_of_asymmetric_blocks_are_two_trials(tmp_path):
+    blocks = rocking.Blocks(p=[1.5, 2.0, 3.0], alpha=[[0.1, 0.15], [0.2, 0.15], [0.2, 0.3]], restitution=0.9)
+    study = rocking.study(tmp_path, blocks, MOTIONS, levels=LEVELS, measure="pga", polarity="both", unit_blocks=512)
+    study.run(progress=False)
+    for limits in ({"overturning": math.inf}, {"half": 0.5}):
+        found = study.fragility(limits=limits).curves[0]
+        reference = rocking.fragility(blocks, MOTIONS, levels=LEVELS, polarity="both", limits=limits).curves[0]
+        assert found.trials.sum() == reference.trials.sum() == 2 * 3 * len(MOTIONS) * len(LEVELS)
+        assert found.exceeded.sum() == reference.exceeded.sum()
+        assert (found.median, found.dispersion) == pytest.approx((reference.median, reference.dispersion), rel=1e-9)
+
+
 def test_a_block_that_no_curve_fits_says_why(tmp_path):
     blocks = rocking.Blocks(p=[2.0, 2.0], alpha=[0.2, 1.2], restitution=[0.9, 0.9])
     study = rocking.study(tmp_path, blocks, MOTIONS, levels=LEVELS, measure="pga", unit_blocks=512)

@@ -396,23 +396,37 @@ def pulse_as_text(motion: Motion) -> str | None:
 
 
 def texts_of_motion(motion: Motion, uploads: UploadStore) -> dict[str, str]:
-    """Text of a pulse, or of a shipped record and its scale, or else of the key under which the motion is kept."""
+    """Text of a pulse, or of shipped records and their scale, or else of the key under which the motion is kept."""
     pulse = pulse_as_text(motion)
     if pulse is not None:
         return {"motion": pulse}
-    if motion.name in records.names():
-        factor = _factor_of(motion, records.load(motion.name))
-        if factor is not None:
-            return {"motion": motion.name} | ({} if factor == 1.0 else {"scale": repr(factor)})
-    return {"motion": f"given:{uploads.add_motion(motion)}"}
+    shipped = _texts_of_shipped(motion)
+    return {"motion": f"given:{uploads.add_motion(motion)}"} if shipped is None else shipped
 
 
-def _factor_of(motion: Motion, base: Motion) -> float | None:
-    """Factor that makes one motion of the other, bit for bit; None if there is none."""
-    if motion.vertical is not None:
+def _texts_of_shipped(motion: Motion) -> dict[str, str] | None:
+    """Texts of a shipped record times a factor, its vertical component a shipped one as well; None of any other."""
+    components = [motion] if motion.vertical is None else [motion, motion.vertical]
+    if not all(each.name in records.names() for each in components):
         return None
-    if not np.array_equal(motion.breakpoints, base.breakpoints) or motion.coefficients.shape != base.coefficients.shape:
+    bases = [records.load(each.name) for each in components]
+    factor = _factor_of(motion, bases[0])
+    factors = factor, abs(factor)  # as `Motion.scaled` has it
+    if not all(map(_is_times, components, bases, factors)):
         return None
+    names = dict(zip(("motion", "vertical"), (each.name for each in components), strict=False))
+    return names if factor == 1.0 else names | {"scale": repr(factor)}
+
+
+def _factor_of(motion: Motion, base: Motion) -> float:
+    """Factor that may make one motion of the other; NaN if none can."""
+    if motion.coefficients.shape != base.coefficients.shape:
+        return math.nan
     largest = np.unravel_index(np.argmax(np.abs(base.coefficients)), base.coefficients.shape)
-    factor = float(motion.coefficients[largest] / base.coefficients[largest])
-    return factor if np.array_equal(base.coefficients * factor, motion.coefficients) else None
+    return float(motion.coefficients[largest] / base.coefficients[largest])
+
+
+def _is_times(motion: Motion, base: Motion, factor: float) -> bool:
+    """Whether a factor makes one motion of the other, bit for bit."""
+    same = np.array_equal(motion.breakpoints, base.breakpoints)
+    return same and np.array_equal(base.coefficients * factor, motion.coefficients)

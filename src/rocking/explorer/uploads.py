@@ -169,8 +169,9 @@ class UploadStore:
         request = (key, str(channel), str(dt), str(units))
         with self._lock:
             known = self._read.get(request)
-        if known is not None:
-            return known
+            if known is not None:
+                self._read.move_to_end(request)
+                return known
         motion = _shown(upload, formats.chosen(upload.stream(), _request(dt, units, channel)))
         with self._lock:
             self._read[request] = motion
