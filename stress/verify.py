@@ -50,10 +50,11 @@ def main() -> int:
     promises = [ALL[name] for name in given.promises or ALL]
     tables = given.tables or (ROOT / "docs" / "_tables" if given.parts == "full" else None)
     wanted = {promise.name: _parts(promise, given.parts) for promise in promises}
-    if not _judged(promises, wanted, given.kept, given.jobs):
+    folders = {promise.name: given.kept / f"{promise.name}-{key(promise)}" for promise in promises}
+    if not _judged(wanted, folders, given.jobs):
         print(f"stopped; what is done is kept in {given.kept}, and the same command goes on from there")
         return STOPPED
-    found = {promise.name: _together(promise, wanted[promise.name], given.kept) for promise in promises}
+    found = {promise.name: _together(folders[promise.name], wanted[promise.name]) for promise in promises}
     print(overview(promises, found))
     if tables:
         write(tables, promises, found)
@@ -83,16 +84,9 @@ def _version(library: str) -> str:
     return f"{library} {importlib.metadata.version(library)}"
 
 
-def _folder(promise: Promise, kept: Path) -> Path:
-    return kept / f"{promise.name}-{key(promise)}"
-
-
-def _judged(promises: list[Promise], wanted: dict[str, int], kept: Path, jobs: int) -> bool:
+def _judged(wanted: dict[str, int], folders: dict[str, Path], jobs: int) -> bool:
     """Judge the parts that are not kept yet; False if stopped on the way."""
-    files = []
-    for promise in promises:
-        folder = _folder(promise, kept)
-        files += [(promise.name, part, folder / f"{part}.json") for part in range(wanted[promise.name])]
+    files = [(name, part, folders[name] / f"{part}.json") for name in wanted for part in range(wanted[name])]
     missing = [each for each in files if not each[-1].exists()]
     # numba's threads do not survive a fork.
     context = multiprocessing.get_context("spawn")
@@ -126,8 +120,9 @@ def _judge_part(name: str, part: int, file: Path) -> str:
     return f"{name} {part}: {found.judged} of {found.cases} judged, {found.failures} failures, {found.seconds:.1f} s"
 
 
-def _together(promise: Promise, parts: int, kept: Path) -> Found:
-    found, folder = Found(), _folder(promise, kept)
+def _together(folder: Path, parts: int) -> Found:
+    """Add up what the parts have shown."""
+    found = Found()
     for part in range(parts):
         found.add(Found.of(json.loads((folder / f"{part}.json").read_text(encoding="utf-8"))))
     return found

@@ -3,9 +3,10 @@
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 import verify
-from promises import ALL, containment
+from promises import ALL, chattering, containment, events, exact
 from promises.promise import Found, Promise
 
 ROOT = Path(__file__).parents[1]
@@ -24,12 +25,53 @@ MADE_UP = Promise("made-up", "a promise made up", 4, 1, judge)
 
 @pytest.mark.thorough
 def test_responses_are_within_the_stated_error(monkeypatch):
-    monkeypatch.setattr(containment, "CASES", 20)
+    monkeypatch.setattr(containment, "CASES", 12)
     found = containment.judge(0)
     assert not found.told
-    assert found.judged >= 17
-    assert found.notes["rotations"] >= 50
+    assert found.judged >= 10
+    assert found.notes["rotations"] >= 30
     assert found.worst <= 1.0
+
+
+@pytest.mark.parametrize("cases", [2, pytest.param(12, marks=pytest.mark.thorough)])
+def test_no_event_is_missed_and_none_is_made_up(monkeypatch, cases):
+    monkeypatch.setattr(events, "CASES", cases)
+    found = events.judge(0)
+    assert not found.told
+    assert found.cases == cases * len(events.KINDS)
+    assert found.judged >= 0.7 * found.cases
+    assert found.worst <= 1.0
+
+
+def test_a_wrong_event_would_be_found(monkeypatch):
+    """What does not see the event at all, sees another or sees it late is told apart."""
+    asked = events.weight(np.random.default_rng(1))
+    (true,), (seen,) = asked.true, events.package(asked)[0]
+    assert [events._wrong(asked, times, limit=1.0) for times in ([], [seen], [seen, seen], [float(true) * 1.001])] == [
+        "missed",
+        "",
+        "spurious",
+        "off",
+    ]
+
+
+@pytest.mark.parametrize("cases", [3, pytest.param(15, marks=pytest.mark.thorough)])
+def test_every_rest_is_in_its_bracket_at_a_bounded_cost(monkeypatch, cases):
+    monkeypatch.setattr(chattering, "CASES", cases)
+    found = chattering.judge(0)
+    assert not found.told
+    assert found.judged == cases
+    resolved, followed = (found.notes[f"{row} at 1e-12"] for row in ("resolved", "one by one"))
+    assert resolved < 0.5 * followed
+
+
+def test_the_closed_form_of_a_rest_is_the_sum_of_its_impacts():
+    sides = exact.Side(2.0, 0.2, 0.6), exact.Side(3.0, 0.1, 0.5)
+    for number, (time, speed) in enumerate(exact.impacts(sides, 0.3, 0.2, 1)):
+        if number == 60:
+            assert abs(exact.rest(sides, 0.3, 0.2, 1) - time) < 10.0 * speed
+            assert abs(exact.rest(sides, 0.3, float(speed), 0) + time - exact.rest(sides, 0.3, 0.2, 1)) < 1e-30
+            return
 
 
 def test_parts_add_up_and_a_failure_is_told():

@@ -1,5 +1,5 @@
 """The promises of docs/reliability.md, a module each: a `Promise` made of parts that can be judged one by one."""
 
-from promises import containment
+from promises import chattering, containment, events
 
-ALL = {each.PROMISE.name: each.PROMISE for each in (containment,)}
+ALL = {each.PROMISE.name: each.PROMISE for each in (containment, events, chattering)}
