@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import verify
-from promises import ALL, chattering, containment, events, exact
+from promises import ALL, chattering, containment, events, exact, one_answer
 from promises.promise import Found, Promise
 
 ROOT = Path(__file__).parents[1]
@@ -63,6 +63,14 @@ def test_every_rest_is_in_its_bracket_at_a_bounded_cost(monkeypatch, cases):
     assert found.judged == cases
     resolved, followed = (found.notes[f"{row} at 1e-12"] for row in ("resolved", "one by one"))
     assert resolved < 0.5 * followed
+
+
+@pytest.mark.thorough
+def test_an_ensemble_has_one_answer(monkeypatch):
+    monkeypatch.setattr(one_answer, "BLOCKS", 30)
+    found = one_answer.judge(1)
+    assert not found.told
+    assert found.judged == 6
 
 
 def test_the_closed_form_of_a_rest_is_the_sum_of_its_impacts():
