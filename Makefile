@@ -13,7 +13,7 @@ EVERY_PART := $(addprefix tests/test_,reference.py result.py plot.py cli.py cli_
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help demo wheel quick test test-all browser slow lowest latest .bounds doctest lint types docs bench clean distclean
+.PHONY: help demo wheel quick test test-all browser slow verify lowest latest .bounds doctest lint types docs bench clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -41,6 +41,9 @@ browser: .venv/.all .page-tools/.installed ## drive the explorer's page in Chrom
 
 slow: .venv/.all ## run the tests that take long: wider ranges, many digits, a hundred thousand pairs
 	$(PYTEST) -m slow
+
+verify: .venv/.all ## hold the package to every promise of docs/reliability.md (under an hour; PARTS=small: a minute)
+	$(BIN)/python stress/verify.py --parts $(or $(PARTS),full)
 
 lowest: .venv-lowest/.installed ## run a test of every part with the oldest versions that pyproject.toml allows
 	@ROCKING_SHIPPED=0 $(MAKE) --no-print-directory .bounds ENVIRONMENT=.venv-lowest PACKAGE=.

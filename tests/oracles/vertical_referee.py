@@ -28,6 +28,8 @@ DIGITS = 40
 UNITS = 8.0
 """Errors are at most this many times what one unit in the last place of all that was given changes."""
 MOST_IMPACTS = 1500
+TIMES = 4
+"""Instants at which rotations are compared."""
 TIE = 2.0**-48
 """A motion that passes a threshold by less than this share of it may count as within it."""
 NOTHING = 2.0**-44
@@ -38,7 +40,7 @@ Pair = tuple[float, float]
 
 @dataclass(frozen=True)
 class Case:
-    """One block under one motion with a vertical component."""
+    """One block under one motion, with a vertical component or without."""
 
     seed: int
     number: int
@@ -77,8 +79,11 @@ class Case:
 # --- what is drawn --------------------------------------------------------------------------------------------
 
 
-def case(seed: int, number: int) -> Case:
-    """Case of that number: p 0.5 to 20 rad/s, alpha 0.02 to 0.6, restitution 0.3 to 0.95, motions of all kinds."""
+def case(seed: int, number: int, *, vertical: bool = True) -> Case:
+    """Case of that number: p 0.5 to 20 rad/s, alpha 0.02 to 0.6, restitution 0.3 to 0.95, motions of all kinds.
+
+    Without a vertical component the motion is a record or a pulse.
+    """
     rng = np.random.default_rng([seed, number])
     model = str(rng.choice(["linear", "nonlinear"]))
     p = _log_uniform(rng, 0.5, 20.0)
@@ -90,14 +95,16 @@ def case(seed: int, number: int) -> Case:
         _pair(rng, one, float(rng.uniform(0.3, 0.95)), float(rng.uniform(0.3, 0.95))),
     )
     threshold = GRAVITY * (min(sides[1]) if model == "linear" else tan(min(sides[1])))
-    across, up = str(rng.choice(list(ACROSS))), str(rng.choice(list(UP)))
+    across = str(rng.choice(list(ACROSS) if vertical else ["record", "pulse"]))
+    up = str(rng.choice(list(UP))) if vertical else "no vertical component"
     unit = 1.0 / p
     horizontal = ACROSS[across](rng, unit, threshold)
-    vertical = UP[up](rng, unit, horizontal)
+    lift = UP[up](rng, unit, horizontal) if vertical else None
     push = abs(horizontal.acceleration(0.0)) / threshold
-    pressed = 1.0 + vertical.acceleration(0.0) / GRAVITY - push
+    pressed = 1.0 + (lift.acceleration(0.0) / GRAVITY if lift else 0.0) - push
     rotation, velocity = _start(rng, sides, often=across in STILL, pressed=pressed)
-    return Case(seed, number, f"{across}, {up}", model, *sides, horizontal.with_vertical(vertical), rotation, velocity)
+    motion = horizontal.with_vertical(lift) if lift else horizontal
+    return Case(seed, number, f"{across}, {up}", model, *sides, motion, rotation, velocity)
 
 
 def _log_uniform(rng: Drawn, low: float, high: float) -> float:
@@ -310,6 +317,7 @@ class Verdict:
     overturned: int = 0
     never_up: int = 0
     impacts: int = 0
+    rotations: int = 0
     brackets: int = 0
     unproven: int = 0
     not_followed: int = 0
@@ -349,6 +357,7 @@ def judge(given: Case) -> Verdict:
 
 
 def _compare(given: Case, response: rocking.Response, verdict: Verdict) -> None:
+    times = _times_to_compare(given, response)
     for slack in (0.0, TIE):
         course = multiprecision.follow(
             given.problem,
@@ -358,6 +367,7 @@ def _compare(given: Case, response: rocking.Response, verdict: Verdict) -> None:
             closest=_closest(response),
             slack=slack,
             digits=DIGITS,
+            at=times,
         )
         judged = Verdict(judged=1, overturned=int(course.overturned), never_up=int(course.peak == 0))
         _Judge(given, response, course, judged).everything()
@@ -368,6 +378,12 @@ def _compare(given: Case, response: rocking.Response, verdict: Verdict) -> None:
             verdict.add(judged)
             return
     verdict.add(first)
+
+
+def _times_to_compare(given: Case, response: rocking.Response) -> list[float]:
+    """A few instants of the response, drawn from the case's own seed."""
+    shares = np.random.default_rng([given.seed, given.number, 1]).uniform(0.0, 1.0, TIMES)
+    return [float(share) * response.duration for share in shares]
 
 
 def _closest(response: rocking.Response) -> float:
@@ -416,6 +432,7 @@ class _Judge:
         self.given, self.response, self.course, self.verdict = given, response, course, verdict
         sensitivity = response.sensitivity
         cancels = max(_cancellation(given.motion), _cancellation(given.motion.vertical)) - 1.0
+        self.cancels = cancels
         self.peak, self.impacts, self.events = (
             np.sum([np.abs(table[name]) for name in table.dtype.names], axis=0)
             for table in (sensitivity.peak, sensitivity.impacts, sensitivity.events)
@@ -445,6 +462,28 @@ class _Judge:
             return
         for found, true in zip(*visible, strict=True):
             self.compare(found, true)
+        if not self.verdict.ties:
+            self.rotations()
+
+    def rotations(self) -> None:
+        """Rotations at a few times, but not where the last impacts before a rest are not followed one by one."""
+        response, course = self.response, self.course
+        times = np.array(_times_to_compare(self.given, response))
+        states, changes = response.states(times), response.sensitivity.rotation(times)
+        size = np.sum([np.abs(values) for values in changes.values()], axis=0)
+        # A time is known to a unit in its last place, and terms of a motion may cancel.
+        size += self.cancels * np.abs(changes["motion"]) + response.duration * np.abs(states[:, 1])
+        highest = max(response.peak_rotation, float(course.peak))
+        for time, (rotation, _, _), change in zip(times, states, size, strict=True):
+            if (true := course.states.get(float(time), (0, 0) if self.rests(time) else None)) is not None:
+                self.verdict.rotations += 1
+                self.value("rotation", float(rotation), true[0], change + highest)
+
+    def rests(self, time: float) -> bool:
+        """Whether the block is truly at rest at a time."""
+        before = [kind for at, kind, _ in self.course.events if at <= time]
+        starts_at_rest = self.given.rotation == self.given.velocity == 0.0
+        return before[-1] == "rest" if before else starts_at_rest
 
     def ensemble(self) -> None:
         """An ensemble of this block alone says the same, also where it steps in lanes."""

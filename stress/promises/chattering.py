@@ -1,0 +1,112 @@
+"""Times of rest in the linear model under a constant push, or none, against their closed form in 50 digits."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+import rocking
+from promises.exact import GRAVITY, Side, rest
+from promises.promise import Found, Promise
+from rocking.treatment import Certified
+
+#: Cases of a part, some ten seconds of processor time.
+CASES = 400
+
+#: Tolerances, s, whose costs are compared: the cost is the number of impacts that are resolved one by one.
+TOLERANCES = (1e-6, 1e-9, 1e-12, 1e-15)
+
+#: Impacts more than it takes to follow them one by one until the tolerance is left.
+MORE = 20
+
+_ULP = 2.0**-52
+
+
+def drawn(number: int) -> tuple[tuple[Side, Side], float, float]:
+    """Sides, push (m/s^2) and initial velocity (rad/s) of a case: half of them one block, a third without a push."""
+    rng = np.random.default_rng([31, number])
+    p, alpha, e = (
+        np.exp(rng.uniform(np.log(0.5), np.log(20.0), 2)),
+        rng.uniform(0.02, 0.6, 2),
+        rng.uniform(0.1, 0.97, 2),
+    )
+    sides = [Side(float(p[k]), float(alpha[k]), float(e[k])) for k in (0, 1)]
+    if rng.random() < 0.5:
+        sides[1] = sides[0]
+    near = 1.0 - 10.0 ** rng.uniform(-9.0, -0.1)
+    share = float(rng.choice([0.0, near, rng.uniform(0.0, 0.95)])) * float(rng.choice([-1.0, 1.0]))
+    push = share * GRAVITY * min(side.alpha for side in sides)
+    slowest = min(side.p * (side.alpha + sign * push / GRAVITY) for side, sign in zip(sides, (1, -1), strict=True))
+    velocity = slowest * 10.0 ** rng.uniform(-12.0, -0.02) * float(rng.choice([-1.0, 1.0]))
+    return (sides[0], sides[1]), push, float(velocity)
+
+
+def judge(part: int) -> Found:
+    """Judge the cases of a part."""
+    found = Found(parts=1)
+    for number in range(part * CASES, (part + 1) * CASES):
+        _judge_case(number, found)
+    return found
+
+
+def _judge_case(number: int, found: Found) -> None:
+    sides, push, velocity = drawn(number)
+    named: dict[str, Any] = {
+        name: tuple(getattr(side, name) for side in sides) for name in ("p", "alpha", "restitution")
+    }
+    block = rocking.Block.from_parameters(**named)
+    motion = rocking.Motion(np.array([0.0, 1e6]), np.array([[push]]))
+    true = rest(sides, push, abs(velocity), int(velocity < 0.0))
+    costs = []
+    found.cases += 1
+    found.judged += 1
+    for tolerance in TOLERANCES:
+        response = rocking.simulate(
+            block, motion, model="linear", chattering=Certified(tolerance), initial_velocity=velocity
+        )
+        costs.append(len(response.impacts))
+        what = f"case {number}, tolerance {tolerance:g} s"
+        if len(response.chattering) != 1 or [event["kind"] for event in response.events] != ["rest"]:
+            found.fail(f"{what}: events {response.events.tolist()}, not one rest")
+            return
+        sequence, last = response.chattering[0], response.impacts[-1:]
+        after = [(float(each["time"]), float(each["speed_after"]), int(each["side"] < 0)) for each in last]
+        time, speed, side = after[0] if after else (0.0, abs(velocity), int(velocity < 0.0))
+        proven = time + rest(sides, push, speed, side)
+        if not sequence["lower"] <= proven <= sequence["upper"]:
+            found.fail(f"{what}: rest at {float(proven)!r} s outside [{sequence['lower']!r}, {sequence['upper']!r}] s")
+        changes = response.sensitivity.events[0]
+        unit = _ULP * (sum(abs(float(changes[name])) for name in changes.dtype.names) + float(true))
+        error = max(0.0, abs(float(sequence["end"] - true)) - float(sequence["upper"] - sequence["lower"]))
+        found.worst = max(found.worst, error / (8.0 * unit))
+        if error > 8.0 * unit:
+            found.fail(f"{what}: rest at {sequence['end']!r} s, true {float(true)!r} s")
+    shrinks = -0.5 * math.log(sides[0].restitution * sides[1].restitution)
+    one_by_one = [MORE + max(0.0, math.log(float(true) / each)) / shrinks for each in TOLERANCES]
+    if any(cost > most for cost, most in zip(costs, one_by_one, strict=True)):
+        found.fail(f"case {number}: {costs} impacts resolved for tolerances of {TOLERANCES} s")
+    for each, cost, most in zip(TOLERANCES, costs, one_by_one, strict=True):
+        found.notes[f"one by one at {each:g}"] += round(most - MORE)
+        found.notes[f"resolved at {each:g}"] += cost
+
+
+def table(found: Found) -> str:
+    """Mean numbers of impacts that were resolved."""
+    head = "| tolerance, s | " + " | ".join(f"{each:g}" for each in TOLERANCES) + " |"
+    lines = [head, "|---" + "|--:" * len(TOLERANCES) + "|"]
+    for row in ("resolved", "one by one"):
+        means = (f"{found.notes[f'{row} at {each:g}'] / max(found.judged, 1):.1f}" for each in TOLERANCES)
+        lines.append(f"| impacts {row}, mean | " + " | ".join(means) + " |")
+    return "\n".join(lines) + "\n"
+
+
+PROMISE = Promise(
+    name="chattering",
+    says="rest inside its bracket, at a bounded cost",
+    parts=50,
+    small=1,
+    judge=judge,
+    table=table,
+)

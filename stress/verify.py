@@ -1,0 +1,170 @@
+"""Hold the package to every promise of docs/reliability.md, part by part.
+
+    python stress/verify.py --parts small      # a quick look, about a minute
+    python stress/verify.py                    # everything, and the tables of docs/reliability.md
+
+What a part has shown is kept in a folder under its promise and a hash of the sources, so that a run that was killed
+goes on where it was. Ctrl-C stops once the parts in hand are done; they are kept. Exits with status 1 if anything is
+not as promised, and with 130 if it was stopped.
+"""
+
+from __future__ import annotations
+
+import argparse
+import datetime
+import hashlib
+import importlib.metadata
+import json
+import multiprocessing
+import os
+import platform
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+
+from promises import ALL
+from promises.promise import Found, Promise
+
+import rocking
+from rocking.progress import Progress
+
+ROOT = Path(__file__).resolve().parents[1]
+LIBRARIES = ("numpy", "numba", "scipy", "python-flint")
+STOPPED = 130
+
+
+def main() -> int:
+    """Judge what is not yet kept, print, and write the tables."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("promises", nargs="*", choices=[*ALL, []], help="which; by default all")
+    parser.add_argument("--parts", default="full", help="full, small, or a number of parts of each")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes")
+    parser.add_argument("--kept", type=Path, default=ROOT / "out" / "verify", help="folder of what is kept")
+    parser.add_argument("--tables", type=Path, help="folder for the tables; by default docs/_tables of a full run")
+    given = parser.parse_args()
+    promises = [ALL[name] for name in given.promises or ALL]
+    tables = given.tables or (ROOT / "docs" / "_tables" if given.parts == "full" else None)
+    wanted = {promise.name: _parts(promise, given.parts) for promise in promises}
+    folders = {promise.name: given.kept / f"{promise.name}-{key(promise)}" for promise in promises}
+    if not _judged(wanted, folders, given.jobs):
+        print(f"stopped; what is done is kept in {given.kept}, and the same command goes on from there")
+        return STOPPED
+    found = {promise.name: _together(folders[promise.name], wanted[promise.name]) for promise in promises}
+    print(overview(promises, found))
+    if tables:
+        write(tables, promises, found)
+    faults = [fault for promise in promises for fault in promise.faults(found[promise.name])]
+    print("\n".join(faults) or "everything is as promised")
+    return 1 if faults else 0
+
+
+def _parts(promise: Promise, size: str) -> int:
+    known = {"full": promise.parts, "small": promise.small}
+    return known[size] if size in known else min(int(size), promise.parts)
+
+
+def key(promise: Promise) -> str:
+    """Hash of all that an answer hangs on: sources of package, oracles and promise, and versions."""
+    own = ROOT / "stress" / "promises"
+    files = [own / "promise.py", Path(sys.modules[promise.judge.__module__].__file__ or "")]
+    for folder in (Path(rocking.__file__).parent, ROOT / "tests" / "oracles"):
+        files += sorted(folder.rglob("*.py"))
+    total = hashlib.sha256(" ".join([sys.version, platform.machine(), *map(_version, LIBRARIES)]).encode())
+    for file in files:
+        total.update(file.name.encode() + b"\0" + file.read_bytes())
+    return total.hexdigest()[:16]
+
+
+def _version(library: str) -> str:
+    return f"{library} {importlib.metadata.version(library)}"
+
+
+def _judged(wanted: dict[str, int], folders: dict[str, Path], jobs: int) -> bool:
+    """Judge the parts that are not kept yet; False if stopped on the way."""
+    files = [(name, part, folders[name] / f"{part}.json") for name in wanted for part in range(wanted[name])]
+    missing = [each for each in files if not each[-1].exists()]
+    # numba's threads do not survive a fork.
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(jobs, mp_context=context, initializer=_deaf) as pool:
+        futures = [pool.submit(_judge_part, *each) for each in missing]
+        try:
+            with Progress("parts", len(files), done=len(files) - len(missing)) as bar:
+                for future in as_completed(futures):
+                    print(future.result(), flush=True)
+                    bar.advance(1)
+        except KeyboardInterrupt:
+            pool.shutdown(wait=True, cancel_futures=True)
+            return False
+    return True
+
+
+def _deaf() -> None:
+    """Leave Ctrl-C to the process that hands out the parts."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _judge_part(name: str, part: int, file: Path) -> str:
+    """Judge one part, keep what it has shown, and say so in a line."""
+    start = time.process_time()
+    found = ALL[name].judge(part)
+    found.seconds = time.process_time() - start
+    file.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = file.with_suffix(f".{os.getpid()}")
+    unfinished.write_text(json.dumps(vars(found)), encoding="utf-8")
+    unfinished.replace(file)
+    return f"{name} {part}: {found.judged} of {found.cases} judged, {found.failures} failures, {found.seconds:.1f} s"
+
+
+def _together(folder: Path, parts: int) -> Found:
+    """Add up what the parts have shown."""
+    found = Found()
+    for part in range(parts):
+        found.add(Found.of(json.loads((folder / f"{part}.json").read_text(encoding="utf-8"))))
+    return found
+
+
+def overview(promises: list[Promise], found: dict[str, Found]) -> str:
+    """Table of all promises."""
+    heads = ("promise", "parts", "cases", "judged", "failures", "worst", "processor time, s")
+    lines = ["| " + " | ".join(heads) + " |", "|---" + "|--:" * (len(heads) - 1) + "|"]
+    for promise in promises:
+        each = found[promise.name]
+        cells = (f"{each.parts} of {promise.parts}", each.cases, each.judged, each.failures, f"{each.worst:.2g}")
+        lines.append(f"| {promise.says} | " + " | ".join(map(str, cells)) + f" | {each.seconds:.0f} |")
+    return "\n".join(lines) + "\n"
+
+
+def made() -> str:
+    """Say when, with what and on what this was judged."""
+    libraries = ", ".join(map(_version, LIBRARIES))
+    return (
+        f"Judged on {datetime.date.today().isoformat()}: rocking {rocking.__version__} with {libraries} and Python "
+        f"{platform.python_version()}, on {_processor()}.\n"
+    )
+
+
+def _processor() -> str:
+    cpu = Path("/proc/cpuinfo")
+    names = [line.partition(":")[2].strip() for line in _lines(cpu) if line.startswith("model name")]
+    return f"{os.cpu_count()} cores, {names[0] if names else platform.processor() or platform.machine()}"
+
+
+def _lines(file: Path) -> Iterator[str]:
+    return iter(file.read_text(encoding="utf-8").splitlines() if file.exists() else [])
+
+
+def write(folder: Path, promises: list[Promise], found: dict[str, Found]) -> None:
+    """Write the overview, and the table of each promise that has one."""
+    texts = {"all": overview(promises, found), "made": made()}
+    texts |= {each.name: each.table(found[each.name]) for each in promises if each.table}
+    for name, text in texts.items():
+        (folder / f"reliability-{name}.txt").write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
