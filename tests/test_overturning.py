@@ -120,7 +120,7 @@ def test_nothing_moves_below_an_amplitude_of_one():
     assert np.all(dataset.peak_rotation.values[0] == 0.0)
 
 
-def test_an_overturned_block_counts_the_impacts_since_its_last_uplift():
+def test_a_block_that_overturns_after_a_rest_is_told_so():
     # A weak lobe, after which the block comes to rest in the pause, then a strong one.
     def pulse(amplitude, frequency):
         return rocking.pulses.n_lobe([0.35 * amplitude, 0.0, 0.0, amplitude], frequency)
@@ -131,7 +131,11 @@ def test_an_overturned_block_counts_the_impacts_since_its_last_uplift():
     assert response.overturned
     assert response.events["kind"].tolist() == ["uplift", "rest", "uplift", "overturn"]
     assert len(response.impacts) > 0
-    assert dataset.mode.values[0, 0] == 0
+    assert dataset.mode.values[0, 0] == -4
+    assert mode_name(-4) in dataset.summary()
+    assert "3 or less" in dataset.summary()
+    (legend,) = dataset.plot().legends
+    assert [text.get_text() for text in legend.get_texts()] == [mode_name(-4)]
 
 
 def test_only_ratios_count():

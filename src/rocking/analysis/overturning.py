@@ -14,9 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
 from rocking.analysis.levels import Boundaries, boundaries
-from rocking.arrays import Floats, Integers
+from rocking.arrays import Flags, Floats, Integers
 from rocking.block import Block, Blocks, one_block
-from rocking.body import Body
 from rocking.constants import VERSION, Model
 from rocking.engine import OUTCOME, Setup, simulate_each
 from rocking.errors import InvalidOption
@@ -24,7 +23,6 @@ from rocking.motion.motion import Motion
 from rocking.named_pulses import pulse_family
 from rocking.progress import Progress
 from rocking.result import DatasetResult, table_of_some, variable
-from rocking.simulation import simulate
 from rocking.tables import as_written, cell, named, text_table
 from rocking.treatment import Certified
 
@@ -40,7 +38,7 @@ class Mode(IntEnum):
     Attributes
     ----------
     OVERTURNS_AFTER_REST
-        It overturns after it has been at rest; the maps of `overturning_map` count its impacts since then instead.
+        It overturns after it has been at rest.
     NO_UPLIFT
         The pulse does not lift it.
     RESTS
@@ -197,13 +195,16 @@ def mode_name(mode: int) -> str:
 
 
 def modes_of(ends: NDArray[np.void], duration: float) -> Integers:
-    """Modes of blocks under a motion of some duration (s), from what the engine keeps of each.
-
-    They are those of `OverturningMap`, but count all impacts of a block that overturns after it has been at rest.
-    """
+    """Modes of blocks under a motion of some duration (s), from what the engine keeps of each."""
     rested = (ends["uplifts"] > 1) | ((ends["rests"] > 0) & (ends["last_rest"] <= duration))
     modes = np.where(ends["uplifts"] == 0, Mode.NO_UPLIFT, np.where(rested, Mode.RESTS, Mode.ROCKS))
-    return np.where(ends["overturned"], ends["impacts"], modes)
+    overturns = np.where(ends["uplifts"] > 1, Mode.OVERTURNS_AFTER_REST, ends["impacts"])
+    return np.where(ends["overturned"], overturns, modes)
+
+
+def _overturns(modes: Integers) -> Flags:
+    found: Flags = (modes >= 0) | (modes == Mode.OVERTURNS_AFTER_REST)
+    return found
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -221,7 +222,7 @@ class OverturningMap(DatasetResult):
 
         A mode is a whole number (`mode_name` says it in words). -3: no uplift. -2: rests, that is complete chattering
         brings the block to rest at least once before the pulse is over. -1: rocks until the pulse is over, that is it
-        comes to rest only after it. n >= 0: overturns, after n impacts since it last uplifted.
+        comes to rest only after it. n >= 0: overturns, after n impacts. -4: overturns after it has been at rest.
     """
 
     TABLES = MappingProxyType(
@@ -251,7 +252,7 @@ class OverturningMap(DatasetResult):
         lowest, amplitudes = float(self.data.overturning_amplitude[k]), self.data.amplitude.values
         if not math.isnan(lowest):
             return cell(lowest)
-        is_open_below = self.data.mode.values[0, k] >= 0
+        is_open_below = _overturns(self.data.mode.values[0, k])
         return f"{amplitudes[0]:g} or less" if is_open_below else f"none of those up to {amplitudes[-1]:g}"
 
     def to_dict(self) -> dict[str, Any]:
@@ -331,16 +332,7 @@ class _PulseProblem:
         for task, outcomes in simulate_each(setup, self.unit, self.threshold * level, threads=self.threads):
             ends[task.bodies] = outcomes
             done(len(outcomes))
-        modes = modes_of(ends, self.unit.duration)
-        for k in np.flatnonzero(ends["overturned"] & (ends["uplifts"] > 1)):
-            modes[k] = self._last_impacts(setup.bodies[int(k)], float(level[k]))
-        return modes, ends["peak_rotation"]
-
-    def _last_impacts(self, block: Body, level: float) -> int:
-        """Impacts since the last uplift, of a block that had been at rest in between."""
-        response = simulate(block, self.unit.scaled(self.threshold * level), model=self.setup.model)
-        uplifts = response.events["time"][response.events["kind"] == "uplift"]
-        return int(np.sum(response.impacts["time"] >= uplifts[-1]))
+        return modes_of(ends, self.unit.duration), ends["peak_rotation"]
 
 
 def _unit_pulse(pulse: str | Callable[[float, float], Motion], frequency: float, parameters: dict[str, Any]) -> Motion:
@@ -372,10 +364,13 @@ def _dataset(
     import xarray as xr
 
     lowest = np.full(ratios.size, np.inf)
-    overturns = (edges.above >= 0) & (edges.below < 0)
+    overturns = _overturns(edges.above) & ~_overturns(edges.below)
     np.minimum.at(lowest, edges.column[overturns], edges.level[overturns])
-    lowest[np.isinf(lowest) | (modes[0] >= 0)] = np.nan
-    meaning = "-3: no uplift, -2: rests before the pulse is over, -1: rocks, n >= 0: overturns after n impacts"
+    lowest[np.isinf(lowest) | _overturns(modes[0])] = np.nan
+    meaning = (
+        "-4: overturns after a rest, -3: no uplift, -2: rests before the pulse is over, -1: rocks, "
+        "n >= 0: overturns after n impacts"
+    )
     over = "over the smallest acceleration that lifts the block"
     return xr.Dataset(
         {

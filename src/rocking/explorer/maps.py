@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.analysis.overturning import Mode, modes_of
+from rocking.analysis.overturning import modes_of
 from rocking.arrays import Floats, Integers
 from rocking.block import Blocks
 from rocking.block.restitution import housner_restitution
@@ -152,12 +152,11 @@ def parts(grid: MapGrid, threads: int | None = None) -> Generator[Part]:
                 last[passed] = last_exceedance(grid.motion, *passed)
             outcome[here] = outcomes_of(ends[here], last[passed])
         rest = (ends["first_rest"] - ends["first_uplift"]) * scale[chosen]
-        after_rest = ends["overturned"] & (ends["uplifts"] > 1)
         quantities = {
             "outcome": outcome,
             "rest": np.where(ends["rests"] > 0, rest, np.nan),
             "peak": np.where(ends["overturned"], np.inf, ends["peak_rotation"] / alpha.min(axis=1)),
-            "mode": np.where(after_rest, Mode.OVERTURNS_AFTER_REST, modes_of(ends, grid.motion.duration)),
+            "mode": modes_of(ends, grid.motion.duration),
         }
         values = np.array([quantities[name] for name in QUANTITIES], np.float32)
         yield Part(task.key[0], chosen, values)

@@ -31,6 +31,7 @@ _LATER: Final = "#b0390c"
 #: from darkest to lightest: hatched, so that none is taken for one of the others in grey. The second one of those in
 #: which it stays is the darkest, as it is often a strip and must be seen between the others.
 _STAYS: Final = (("#ffffff", ""), ("#5d7da6", ""), ("#dde7f0", ""))
+_OVERTURNS_AFTER_REST: Final = ("#b0390c", "ooo")
 _OVERTURNS: Final = (
     ("#7d2706", ""),
     ("#d9692a", "////"),
@@ -155,7 +156,10 @@ def regions_figure(
 
 
 def _look(region: int) -> tuple[str, str]:
-    return _STAYS[region + 3] if region < 0 else _OVERTURNS[min(region, len(_OVERTURNS) - 1)]
+    """Colour and hatch of a region: from -4, overturns after a rest, and -3, no uplift, to n impacts."""
+    if region < 0:
+        return (_OVERTURNS_AFTER_REST, *_STAYS)[region + 4]
+    return _OVERTURNS[min(region, len(_OVERTURNS) - 1)]
 
 
 def _patches(polygons: Mapping[int, Sequence[Floats]], names: Mapping[int, str], frame: float) -> list[Patch]:
