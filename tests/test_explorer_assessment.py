@@ -83,7 +83,7 @@ def test_every_record_adds_a_row_of_its_own_and_the_curve_so_far():
     about = described(found)
     assert about["friction_to_rock"] == pytest.approx(0.24 / 1.1, rel=1e-12)
     assert about["thresholds"] == list(block.uplift_thresholds())
-    assert "once" in about["notes"][0] and "Vertical" in about["notes"][1]
+    assert [each["phrase"] for each in about["notes"]] == ["assessment.symmetric", "assessment.vertical"]
     assert {rule["name"] for rule in about["rules"]} == {*about["case"]["ratios"]} == {"uplift", "west", "ishiyama"}
 
 

@@ -58,7 +58,7 @@ def test_every_text_of_a_case_is_an_option_of_the_command_line(run):
 def test_shapes_and_scalings_are_made_of_parameters_of_their_forms():
     described = {name for shape in SHAPES for name in (*shape.needed, *shape.optional)}
     assert described == {*names_of("block")} - {"restitution"}
-    assert SCALINGS.keys() <= {*names_of("motion")}
+    assert {*SCALINGS} <= {*names_of("motion")}
     assert DEFAULT.keys() <= PARAMETERS.keys()
     assert not MAP.keys() & PARAMETERS.keys()
 
