@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 import rocking.explorer
+from rocking.explorer.phrases import english
 
 PAGE = Path(rocking.explorer.__file__).parent / "page"
 STYLE = (PAGE / "style.css").read_text("utf-8")
@@ -95,9 +96,10 @@ def test_neighbours_on_a_map_differ_or_a_line_parts_them():
 def test_orange_means_overturning_and_nothing_else():
     for scheme, colours in palettes().items():
         assert [name for name, ink in colours.items() if is_orange(ink)] == ["over"], scheme
-    words = re.findall(r'\[[-\w]+, "([^"]*)", "(#[0-9a-f]{6})"', OUTCOMES)
-    assert len(words) >= 7
-    for text, ink in words:
+    modes = re.findall(r'\[(-?\d|AFTER_REST), "(#[0-9a-f]{6})"\]', OUTCOMES.partition("VERDICTS")[0])
+    assert len(modes) >= 7
+    for mode, ink in modes:
+        text = english()[f"mode.{mode.replace('AFTER_REST', '-4')}"]
         assert is_orange(ink) == text.startswith("overturns"), text
     assert [is_orange(ink) for ink in constant("OUTCOMES")] == [False] * 4 + [True, False]
     assert not any(map(is_orange, constant("RAMP")[:-1]))

@@ -18,6 +18,7 @@ from rocking.explorer.parameters import (
     names_of,
     specification,
 )
+from rocking.explorer.phrases import english
 from rocking.named_pulses import named_pulse
 
 #: What the command line takes as an argument, and what it does not do.
@@ -57,7 +58,7 @@ def test_every_text_of_a_case_is_an_option_of_the_command_line(run):
 def test_shapes_and_scalings_are_made_of_parameters_of_their_forms():
     described = {name for shape in SHAPES for name in (*shape.needed, *shape.optional)}
     assert described == {*names_of("block")} - {"restitution"}
-    assert SCALINGS.keys() <= {*names_of("motion")}
+    assert {*SCALINGS} <= {*names_of("motion")}
     assert DEFAULT.keys() <= PARAMETERS.keys()
     assert not MAP.keys() & PARAMETERS.keys()
 
@@ -105,7 +106,7 @@ def test_a_parameter_of_a_pulse_is_called_as_that_pulse_has_it():
     judged = 0
     for name, pulse in PULSES.items():
         for parameter in pulse["parameters"]:
-            assert field_label(parameter.name, f"{name}:frequency=1") == f"“{parameter.label}”"
+            assert field_label(parameter.name, f"{name}:frequency=1") == f"“{english()[f'field.{parameter.text}']}”"
             judged += 1
     assert judged >= 20
     assert field_label("amplitude") == "amplitude"  # of the acceleration, or of the velocity
@@ -114,7 +115,7 @@ def test_a_parameter_of_a_pulse_is_called_as_that_pulse_has_it():
 def test_the_page_is_given_every_parameter_with_its_label():
     given = specification()["parameters"]
     assert [each["name"] for each in given] == [*PARAMETERS]
-    assert all(each["label"] for each in given)
+    assert all(english()[f"field.{each['text']}"] for each in given)
     assert {each["name"]: each["suffix"] for each in given if each["suffix"]} == {
         "alpha": "deg", "pga": "g", "sa": "g", "initial_rotation": "deg",
     }  # fmt: skip

@@ -164,7 +164,7 @@ def test_phase_plane_and_instant_are_answered_or_refused_by_name(page):
 def test_what_a_case_settles_on_comes_as_header_and_arrays(page):
     texts = {**SINE, "motion": "sine:amplitude=3,frequency=0.5,cycles=2"}
     header, arrays = unpacked(page.get("/api/orbit", params=texts).content)
-    assert header["offer"] is None and header["sentence"].startswith("It ")
+    assert header["offer"] is None and header["sentence"]["phrase"].startswith("orbit.")
     assert len(arrays["rotation"]) == len(arrays["velocity"]) > 1000
     header, arrays = unpacked(page.get("/api/orbit", params=STATUE).content)
     assert header["offer"]["motion"].startswith("sine:") and not arrays

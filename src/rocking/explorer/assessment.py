@@ -22,6 +22,7 @@ from rocking.explorer.code import block_options, command_line
 from rocking.explorer.inputs import Case, Found, Texts, read_motion
 from rocking.explorer.parameters import ASSESSMENT
 from rocking.explorer.payload import Payload
+from rocking.explorer.phrases import phrase
 from rocking.explorer.uploads import UploadStore
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
@@ -41,22 +42,10 @@ _FACTORS: Final = 2.0**8
 _HALVINGS: Final = 24
 
 #: Rules of thumb that are shown, what each says, and where it comes from.
-RULES: Final[Mapping[str, tuple[str, str, str]]] = {
-    "uplift": (
-        "Uplift",
-        "The block begins to rock where the ground acceleration passes g tan α. Overturning needs more.",
-        "Housner (1963), Bull. Seism. Soc. Am. 53(2), 403–417",
-    ),
-    "west": (
-        "West",
-        "The same g tan α, taken for the acceleration that overturns.",
-        "Milne and Omori (1893), Seism. J. Japan 1, 59–86",
-    ),
-    "ishiyama": (
-        "Ishiyama",
-        "Overturning needs a PGA above g tan α and also a PGV above 0.4 of the sudden velocity that just overturns.",
-        "Ishiyama (1982), Earthq. Eng. Struct. Dyn. 10(5), 635–650",
-    ),
+RULES: Final[Mapping[str, str]] = {
+    "uplift": "Housner (1963), Bull. Seism. Soc. Am. 53(2), 403–417",
+    "west": "Milne and Omori (1893), Seism. J. Japan 1, 59–86",
+    "ishiyama": "Ishiyama (1982), Earthq. Eng. Struct. Dyn. 10(5), 635–650",
 }
 
 _PYTHON: Final = """\
@@ -134,13 +123,13 @@ def described(assessment: Assessment) -> dict[str, Any]:
     block = case.block
     notes = []
     if not block.is_symmetric:
-        notes.append("Each record counts in both polarities, since the sides of the block differ.")
+        notes.append(phrase("assessment.polarities"))
     else:
-        notes.append("Each record counts once: a symmetric block does the same under a record and its mirror image.")
+        notes.append(phrase("assessment.symmetric"))
     if any(entry.get("vertical") for entry in assessment.entries):
-        notes.append("Vertical components are scaled with their records.")
+        notes.append(phrase("assessment.vertical"))
     if case.initial_rotation or case.initial_velocity or case.duration is not None:
-        notes.append("Every simulation begins at rest and goes on to its end, other than the case that is shown.")
+        notes.append(phrase("assessment.begins"))
     return {
         "measure": measure.name,
         "label": measure.quantity,
@@ -151,10 +140,7 @@ def described(assessment: Assessment) -> dict[str, Any]:
         "friction_to_rock": max(block.uplift_thresholds(case.model)) / block.gravity,
         "friction": assessment.friction,
         "overturning_velocity": _sudden(case),
-        "rules": [
-            {"name": name, "title": title, "says": says, "source": source}
-            for name, (title, says, source) in RULES.items()
-        ],
+        "rules": [{"name": name, "source": source} for name, source in RULES.items()],
         "case": None if case.motion is None else _rated(case, case.motion),
         "notes": notes,
         "python": as_python(assessment),
@@ -197,7 +183,7 @@ def _part(header: dict[str, Any], assessment: Assessment, fallen: list[Flags]) -
     try:
         fitted = fit_fragility(levels, outcomes.ravel(), clusters=clusters, measure=assessment.measure)
     except Unfitted as refused:
-        words = f"No curve can be fitted yet: {refused}."
+        words = phrase("assessment.no_fit", reason=str(refused))
         return Payload({**header, "fit": None, "why": words, "outcomes": outcomes.size}, arrays)
     curve, at = fitted.curves[0], np.linspace(0.0, assessment.levels[-1], _POINTS)
     lower, upper = curve.band(at) if curve.bounded else (np.zeros_like(at), np.ones_like(at))

@@ -13,6 +13,7 @@ from urllib.parse import parse_qsl
 from rocking.errors import InvalidOption
 from rocking.explorer.inputs import Texts
 from rocking.explorer.parameters import PARAMETERS, names_of
+from rocking.explorer.phrases import phrase
 from rocking.explorer.uploads import UploadStore, measures
 from rocking.motion import records
 
@@ -91,7 +92,7 @@ def listing(uploads: UploadStore, answers: Iterable[Texts] = ()) -> dict[str, An
     """
     known = {answer["key"]: answer for answer in answers if "key" in answer}
     files = [component for key in uploads.kept() for component in _of_file(uploads, key, known.get(key, {}))]
-    groups = [_described(group, "shipped") for group in _by_station(_shipped())]
+    groups = [_described(group, "") for group in _by_station(_shipped())]
     groups += [_described(group, _reason(group)) for group in _by_station(files)]
     return {"groups": groups, "usage": uploads.usage()}
 
@@ -201,19 +202,20 @@ def _as_vertical(upward: Component, beside: Component) -> str:
     return channel if upward.key == beside.key else f"{name}#{channel}"
 
 
-def _reason(group: list[Component]) -> str:
+def _reason(group: list[Component]) -> dict[str, Any] | str:
     """Say by what the components of files were put together."""
     first = group[0]
     if len(group) == 1:
         return ""
     if len({each.key for each in group}) == 1:
-        return "channels of one file"
-    step = "" if first.step is None or "dt" in first.missing else f" and step of {first.step:g} s"
-    by = "headings" if first.station and first.station == group[1].station else "names"
-    return f"put together by their {by}, with the same length{step}"
+        return phrase("records.channels")
+    headings = bool(first.station) and first.station == group[1].station
+    if first.step is None or "dt" in first.missing:
+        return phrase("records.by_headings" if headings else "records.by_names")
+    return phrase("records.by_headings_step" if headings else "records.by_names_step", step=first.step)
 
 
-def _described(group: list[Component], reason: str) -> dict[str, Any]:
+def _described(group: list[Component], reason: dict[str, Any] | str) -> dict[str, Any]:
     first = group[0]
     place = ", ".join(part for part in (first.event, first.station) if part)
     return {"title": place or first.stem or first.file, "reason": reason, "rows": [each.described() for each in group]}

@@ -11,7 +11,8 @@ from typing import Any, Final
 from rocking.analysis.overturning import PULSES
 from rocking.constants import STANDARD_GRAVITY
 from rocking.explorer.inputs import BLOCK_NAMES, NAMES, Case, arguments_of, as_option, is_pulse, pulse_call
-from rocking.explorer.maps import QUANTITIES, Axis, MapGrid
+from rocking.explorer.maps import Axis, MapGrid
+from rocking.explorer.parameters import QUANTITIES
 from rocking.explorer.periodic import KEPT, PASSED
 from rocking.explorer.sweeps import Sweep, call_at
 from rocking.named_pulses import pulse_values

@@ -26,6 +26,7 @@ from rocking.explorer.inputs import Case, Texts, read_case
 from rocking.explorer.meshes import described
 from rocking.explorer.parameters import names_of
 from rocking.explorer.payload import Payload
+from rocking.explorer.phrases import phrase
 from rocking.explorer.uploads import UploadStore
 from rocking.motion.motion import Motion
 from rocking.plausibility import block_notes, motion_notes
@@ -109,8 +110,8 @@ class Explorer:
     --------
     >>> explorer = Explorer()
     >>> payload = explorer.case({"p": "2", "alpha": "0.2", "motion": "none", "initial_rotation": "0.02"})
-    >>> payload.header["verdict"]
-    'It stays up: it reaches 10 % of the overturning rotation, and comes to rest once.'
+    >>> payload.header["verdict"]["phrase"], payload.header["verdict"]["values"]["resting"]
+    ('verdict.stays', {'phrase': 'verdict.rests', 'values': {'count': 1}})
     """
 
     def __init__(self) -> None:
@@ -443,35 +444,39 @@ def _facts(shown: Simulated) -> dict[str, Any]:
     }
 
 
-def verdict(response: Response, thresholds: tuple[float, float]) -> str:
+def verdict(response: Response, thresholds: tuple[float, float]) -> dict[str, Any] | str:
     """Say in one sentence what becomes of a block lifted by these accelerations (m/s^2): first whether it falls."""
     if response.stopped:
         words = in_words(response, "")
         return f"{words[0].upper()}{words[1:]}."
     if not len(response.events) and not len(response.impacts) and response.peak_rotation == 0.0:
         if response.motion is None:
-            return "It does not move: nothing shakes it, and it is released upright and at rest."
+            return phrase("verdict.still")
         lifting = min(thresholds) / response.block.gravity
         if response.motion.vertical is not None:
-            return "It does not move: the ground acceleration never passes what would lift it."
-        return f"It does not move: the ground acceleration never passes {lifting:.3g} g, which would lift it."
+            return phrase("verdict.unlifted")
+        return phrase("verdict.below", lifting=lifting)
     rests = int(np.sum(response.events["kind"] == "rest"))
-    times = {1: "once", 2: "twice"}.get(rests, f"{rests} times")
     if response.overturned:
-        before = f", after it has come to rest {times}" if rests else ""
-        return f"It overturns, {response.overturn_time:.2f} s after the start{before}."
+        time = response.overturn_time
+        return (
+            phrase("verdict.overturns_later", time=time, count=rests)
+            if rests
+            else phrase("verdict.overturns", time=time)
+        )
     if response.unfinished:
-        return f"It rocks on: the simulation was given up at {response.duration:.2f} s, after too many steps."
+        return phrase("verdict.given_up", time=response.duration)
     unproven = rests - int(np.sum(np.isfinite(response.chattering["upper"])))
-    doubt = "" if unproven == 0 else f" ({unproven} by the treatment, not proven)"
-    resting = f"comes to rest {times}{doubt}" if rests else "does not come to rest"
-    share = _percent(response.peak_over_slenderness)
-    return f"It stays up: it reaches {share} of the overturning rotation, and {resting}."
+    resting = phrase("verdict.rests", count=rests) if rests else phrase("verdict.no_rest")
+    if unproven:
+        resting = phrase("verdict.unproven", rests=resting, unproven=unproven)
+    return phrase("verdict.stays", share=_percent(response.peak_over_slenderness), resting=resting)
 
 
-def _percent(share: float) -> str:
+def _percent(share: float) -> dict[str, Any]:
     """Write a share in percent: two digits, and four about the whole, where they decide."""
-    return f"{100.0 * share:.{2 if share < 0.99 else 4}g} %"
+    value = 100.0 * share
+    return phrase("verdict.percent", value=value) if share < 0.99 else phrase("verdict.near_percent", value=value)
 
 
 @functools.lru_cache(maxsize=4)

@@ -20,6 +20,8 @@ from rocking.constants import STANDARD_GRAVITY
 from rocking.engine import Setup, Task, simulate_tasks
 from rocking.errors import InvalidOption
 from rocking.explorer.inputs import BLOCK_NAMES, Case, Texts, arguments_of, is_pulse, pulse_of
+from rocking.explorer.parameters import QUANTITIES
+from rocking.explorer.phrases import phrase
 from rocking.motion.motion import Motion
 from rocking.quantities import number
 from rocking.treatment import FITTED_FREQUENCIES, FITTED_RESTITUTIONS, Certified
@@ -30,19 +32,15 @@ _FEWEST, _MOST = 8, 400
 #: Steps between the points of each level, coarse to fine.
 _STRIDES: Final = (8, 4, 2, 1)
 
-#: What is kept of each point, in this order.
-QUANTITIES: Final = ("outcome", "rest", "peak", "mode")
-
 
 @dataclass(frozen=True)
 class AxisKind:
-    """A parameter that a map may vary: its name on the page, its unit, and the ranges that are shown first.
+    """A parameter that a map may vary: its name, its unit, and the ranges that are shown first.
 
     The close range is for chattering, the wide one for overturning.
     """
 
     name: str
-    label: str
     unit: str
     close: tuple[float, float]
     wide: tuple[float, float]
@@ -51,12 +49,12 @@ class AxisKind:
 AXES: Final = {
     kind.name: kind
     for kind in (
-        AxisKind("omega", "Frequency of the pulse, 2πf/p", "", (0.5, 8.0), (0.5, 8.0)),
-        AxisKind("p", "Frequency parameter p", "rad/s", (1.0, 6.0), (1.0, 6.0)),
-        AxisKind("alpha", "Slenderness α", "°", (5.0, 25.0), (5.0, 25.0)),
-        AxisKind("restitution", "Restitution η", "", (0.5, 0.97), (0.5, 0.97)),
-        AxisKind("a", "Amplitude a over the uplift threshold", "", (1.0, 1.1), (0.5, 8.0)),
-        AxisKind("pga", "Peak ground acceleration", "g", (0.1, 1.0), (0.1, 2.0)),
+        AxisKind("omega", "", (0.5, 8.0), (0.5, 8.0)),
+        AxisKind("p", "rad/s", (1.0, 6.0), (1.0, 6.0)),
+        AxisKind("alpha", "°", (5.0, 25.0), (5.0, 25.0)),
+        AxisKind("restitution", "", (0.5, 0.97), (0.5, 0.97)),
+        AxisKind("a", "", (1.0, 1.1), (0.5, 8.0)),
+        AxisKind("pga", "g", (0.1, 1.0), (0.1, 2.0)),
     )
 }
 
@@ -218,14 +216,14 @@ def described(grid: MapGrid) -> dict[str, Any]:
         "x": _described(grid.x),
         "y": _described(grid.y),
         "quantities": list(QUANTITIES),
-        "outcomes": [outcome.words for outcome in Outcome],
+        "outcomes": [outcome.name.lower() for outcome in Outcome],
         "curves": {name: [None if math.isnan(v) else v for v in values] for name, values in curves(grid).items()},
     }
 
 
 def _described(axis: Axis) -> dict[str, Any]:
     kind = AXES[axis.name]
-    return {"name": axis.name, "label": kind.label, "unit": kind.unit, "values": axis.values.tolist()}
+    return {"name": axis.name, "label": phrase(f"axis.{kind.name}"), "unit": kind.unit, "values": axis.values.tolist()}
 
 
 def _axis(which: str, case: Case, texts: Texts, points: int) -> Axis:

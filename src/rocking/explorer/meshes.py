@@ -18,6 +18,7 @@ from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidBlock, RockingError
 from rocking.explorer.apart import made_apart, made_here
 from rocking.explorer.payload import Payload
+from rocking.explorer.phrases import phrase
 from rocking.quantities import densities, number
 from rocking.solid import Rose, Solid
 from rocking.solid.reading import SHIPPED
@@ -95,9 +96,9 @@ def described(body: Body, azimuth: float) -> Payload:
         "about": _about(solid),
         "parts": parts,
         "left_out": _left_out(solid, azimuth),
-        "repaired": f"Mended in the mesh: {'; '.join(solid.repairs)}."
+        "repaired": phrase("body.repaired", repairs="; ".join(solid.repairs))
         if solid.repairs
-        else "Nothing had to be mended in the mesh.",
+        else phrase("body.sound"),
         "weakest_azimuth": rose.data.weakest_azimuth,
         "weakest": rose.data.weakest_acceleration,
         "height_of_mass": float(solid.centre[2]),
@@ -166,23 +167,21 @@ def _read(name: str, upload: _File | None, given: Mapping[str, Any]) -> Body | R
     return Body(solid, sections, f"Solid.from_mesh({upload[0] if upload else name!r}{written})")
 
 
-def _about(solid: Solid) -> str:
+def _about(solid: Solid) -> dict[str, Any]:
     """Say what a body is."""
-    mass = "" if solid.mass is None else f", {solid.mass:.4g} kg"
-    count = len(solid.regions)
-    parts = f" of {count} parts ({', '.join(each.name for each in solid.regions[:_NAMED])}{', ...' * (count > _NAMED)})"
-    return f"{solid.description}{parts * (count > 1)}: {solid.height:.4g} m high, {solid.volume:.4g} m³{mass}."
+    count, name, size = len(solid.regions), solid.description, {"height": solid.height, "volume": solid.volume}
+    names = ", ".join(each.name for each in solid.regions[:_NAMED]) + ", ..." * (count > _NAMED)
+    whole = phrase("body.parts", name=name, count=count, names=names) if count > 1 else name
+    if solid.mass is None:
+        return phrase("body.is", name=whole, **size)
+    return phrase("body.is_heavy", name=whole, mass=solid.mass, **size)
 
 
-def _left_out(solid: Solid, azimuth: float) -> str:
+def _left_out(solid: Solid, azimuth: float) -> dict[str, Any]:
     """Say what planar rocking leaves out towards an azimuth."""
     data = solid.rose([azimuth]).data
     coupling, aside, gap = (float(data[name][0]) for name in ("coupling", "aside", "gap"))
-    return (
-        f"Planar rocking leaves out turning about the vertical and rolling over corners. Towards {azimuth:.4g}° the "
-        f"products of inertia are {coupling:.2g} of the moment of inertia, the edge lies {aside:.2g} m to the side of "
-        f"the centre of mass, and the two edges are {gap:.2g} m from facing each other."
-    )
+    return phrase("body.left_out", azimuth=azimuth, coupling=coupling, aside=aside, gap=gap)
 
 
 def _towards(azimuth: float) -> Floats:

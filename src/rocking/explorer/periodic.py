@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +14,7 @@ from rocking.dynamics.maps import Fate, StroboscopicMap, stroboscopic_map
 from rocking.dynamics.orbits import multipliers_of
 from rocking.explorer.inputs import Case, arguments_of, is_pulse, pulse_of
 from rocking.explorer.payload import Payload
+from rocking.explorer.phrases import phrase
 from rocking.motion import pulses
 from rocking.motion.motion import Motion
 from rocking.response import Response
@@ -153,13 +154,14 @@ def settled_case(case: Case, sine: Sine) -> tuple[Settled, StroboscopicMap]:
 def orbit(case: Case) -> Payload:
     """Return the phase plane of a case whose sine never ends, in units of slenderness, and what it settles on in words.
 
-    For another motion the header has nothing but ``offer``: the text of the nearest sine, and that in words.
+    For another motion the header has nothing but ``offer``: the text of the nearest sine, its amplitude (g) and its
+    frequency (Hz).
     """
     sine = sine_of(case)
     if sine is None:
         near = nearest_sine(case)
-        words = f"{near.amplitude / case.block.gravity:.3g} g at {near.frequency:.3g} Hz"
-        return Payload({"offer": {"motion": near.text, "words": words}})
+        offer = {"motion": near.text, "amplitude": near.amplitude / case.block.gravity, "frequency": near.frequency}
+        return Payload({"offer": offer})
     found, rock = settled_case(case, sine)
     response = _followed(case, sine, *found.course)
     header = {
@@ -185,38 +187,41 @@ def _followed(case: Case, sine: Sine, start: Floats, periods: int) -> Response:
     )
 
 
-def sentence(found: Settled, response: Response) -> str:
+def sentence(found: Settled, response: Response) -> dict[str, Any]:
     """Say what a case settles on; the response is that of one period of it."""
     if found.fate == Fate.OVERTURNED:
-        return f"It overturns in period {found.after}."
+        return phrase("orbit.overturns", after=found.after)
     if found.fate == Fate.UNFINISHED:
-        return f"It was given up in period {found.after}, after too many steps."
+        return phrase("orbit.given_up", after=found.after)
     if found.fate == Fate.RESTS_FOR_EVER:
-        return "It stays at rest: the sine never lifts it."
+        return phrase("orbit.still")
     if not found.period:
-        return f"No period up to {LONGEST} was found within {found.after} periods."
-    every = "every period" if found.period == 1 else f"every {found.period} periods"
-    times = {1: "once", 2: "twice"}
+        return phrase("orbit.no_period", longest=LONGEST, after=found.after)
     rests = int(np.sum(response.events["kind"] == "rest"))
-    if rests:
-        return f"It repeats {every}, and rests {times.get(rests, f'{rests} times')} in each repetition."
-    impacts = len(response.impacts)
-    return f"It repeats {every}, with {impacts} impact{'' if impacts == 1 else 's'} in each repetition."
+    each = (
+        phrase("orbit.with_rests", count=rests) if rests else phrase("orbit.with_impacts", count=len(response.impacts))
+    )
+    return phrase("orbit.repeats", every=phrase("orbit.every", count=found.period), each=each)
 
 
-def _about(case: Case, sine: Sine, found: Settled, rock: StroboscopicMap) -> str:
+def _about(case: Case, sine: Sine, found: Settled, rock: StroboscopicMap) -> dict[str, Any]:
     """Say how stable that is, and how it began."""
     released = case.initial_rotation or case.initial_velocity
-    start = f"{case.initial_rotation:.4g} rad and {case.initial_velocity:.4g} rad/s" if released else "rest"
-    words = f"One period of the sine lasts {1.0 / sine.frequency:.4g} s and repeats for ever, from {start}"
+    start = phrase("orbit.from_rest")
+    if released:
+        start = phrase("orbit.from_state", rotation=case.initial_rotation, velocity=case.initial_velocity)
+    begins = phrase("orbit.begins", period=1.0 / sine.frequency, start=start)
     if not found.period or found.fate == Fate.RESTS_FOR_EVER:
-        return f"{words}."
+        return begins
     if found.rests:
-        return f"{words}. A rest forgets what was before it: both multipliers are zero."
+        return phrase("orbit.forgets", begins=begins)
     _, change = rock.derivative(found.states[-1], found.period)
-    first, second = multipliers_of(change)
-    pair = f"{first.real:.4g} ± {abs(first.imag):.4g}i" if first.imag else f"{first.real:.4g} and {second.real:.4g}"
-    return f"{words}. The multipliers of a small departure in one repetition are {pair}."
+    first, second = (complex(each) for each in multipliers_of(change))
+    if first.imag:
+        pair = phrase("orbit.complex_pair", real=first.real, imaginary=abs(first.imag))
+    else:
+        pair = phrase("orbit.real_pair", first=first.real, second=second.real)
+    return phrase("orbit.multipliers", begins=begins, pair=pair)
 
 
 def scaled(case: Case, states: Floats) -> Floats:

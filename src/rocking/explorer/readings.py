@@ -11,6 +11,7 @@ from rocking.explorer.core import Explorer, Simulated, checked_window, extremes,
 from rocking.explorer.inputs import Texts
 from rocking.explorer.parameters import READING
 from rocking.explorer.payload import Payload
+from rocking.explorer.phrases import phrase
 from rocking.response import Response, active_span
 from rocking.response.phase import boundary_of, course_of, marked, needed_of
 
@@ -62,8 +63,8 @@ def at(explorer: Explorer, texts: Texts, time: str, window: tuple[float, float] 
     --------
     >>> texts = {"p": "2", "alpha": "0.2", "motion": "none", "initial_rotation": "0.02"}
     >>> found = at(Explorer(), texts, "0 ms")
-    >>> found["rotation"], round(found["over_slenderness"], 12), found["state"]
-    (0.02, 0.1, 'leans to the right')
+    >>> found["rotation"], round(found["over_slenderness"], 12), found["state"]["phrase"]
+    (0.02, 0.1, 'state.right')
     """
     shown = explorer.show(texts)
     seconds = READING["at"].read(time)
@@ -90,14 +91,14 @@ def at(explorer: Explorer, texts: Texts, time: str, window: tuple[float, float] 
     }
 
 
-def _state(response: Response, time: float, rotation: float) -> str:
+def _state(response: Response, time: float, rotation: float) -> dict[str, Any]:
     """Say what the block does at a time."""
     rests = response.rest_intervals
     if np.any((rests[:, 0] <= time) & (time < rests[:, 1])):
-        return "is at rest"
+        return phrase("state.rests")
     if rotation == 0.0:
-        return "stands on both corners"
-    return "leans to the right" if rotation > 0.0 else "leans to the left"
+        return phrase("state.stands")
+    return phrase("state.right") if rotation > 0.0 else phrase("state.left")
 
 
 def _ground(shown: Simulated, time: float) -> dict[str, float | None]:
@@ -114,8 +115,8 @@ def thumbnail(explorer: Explorer, texts: Texts) -> Payload:
     --------
     >>> texts = {"p": "2", "alpha": "0.2", "motion": "none", "initial_rotation": "0.02"}
     >>> payload = thumbnail(Explorer(), texts)
-    >>> payload.header["verdict"], len(payload.arrays["time"]) <= 300
-    ('It stays up: it reaches 10 % of the overturning rotation, and comes to rest once.', True)
+    >>> payload.header["verdict"]["phrase"], len(payload.arrays["time"]) <= 300
+    ('verdict.stays', True)
     """
     shown = explorer.show(texts)
     response = shown.response

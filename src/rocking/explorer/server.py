@@ -32,6 +32,7 @@ from rocking.explorer.core import EXPORTS, Explorer
 from rocking.explorer.inputs import Case, read_case
 from rocking.explorer.parameters import PARAMETERS, field_label, specification
 from rocking.explorer.payload import Payload, pack
+from rocking.explorer.phrases import ENGLISH, file_name, filled, phrase, preferred
 from rocking.explorer.studies import StudyView
 from rocking.explorer.tracks import tracks
 from rocking.explorer.uploads import LARGEST
@@ -39,6 +40,7 @@ from rocking.quantities import number
 from rocking.tables import plain
 
 T = TypeVar("T")
+_Naming = Callable[[str], str]
 
 #: Prefix of the texts of the case that is compared with.
 OTHER: Final = "other."
@@ -157,6 +159,7 @@ class App:
         self.framed_by = framed_by
         self.compilation = Compilation()
         self.files = page_files()
+        self._pages: dict[str, str] = {}
         self.library = {name: (library_folder() / name).read_bytes() for name in LIBRARY}
         self._threads = anyio.CapacityLimiter(_THREADS)
         self._maps = anyio.CapacityLimiter(_MAPS)
@@ -201,7 +204,7 @@ class App:
                 Route("/api/records/{key}", self.record),
                 Route("/api/records/{key}", self.forget, methods=["DELETE"]),
             ],
-            exception_handlers={RockingError: _refusal, Exception: _failure},
+            exception_handlers={RockingError: self._refusal, Exception: _failure},
             lifespan=self._lifespan,
         )
         self.asgi.router.redirect_slashes = False
@@ -211,20 +214,46 @@ class App:
         self.compilation.start()
         yield
 
-    async def page(self, _: Request) -> Response:
-        """Return the page, with a nonce of its own."""
+    async def page(self, request: Request) -> Response:
+        """Return the page in the language of the browser, with a nonce of its own."""
         nonce = secrets.token_urlsafe(16)
         policy = (
             "default-src 'none'; script-src 'self'; connect-src 'self'; "
             f"style-src 'self' 'nonce-{nonce}'; img-src 'self' data:; base-uri 'none'; form-action 'none'; "
             f"frame-ancestors {self.framed_by}"
         )
-        html = self.files["index.html"].replace(b"NONCE", nonce.encode())
+        html = self._page(self._language(request)).replace("NONCE", nonce)
         return Response(html, media_type="text/html", headers={**_FRESH, "content-security-policy": policy})
 
     async def file(self, request: Request) -> Response:
-        """Return one of the page's own files."""
-        return _static(self.files, request.path_params["name"], {**_SENT_WITH_ALL, "cache-control": "no-cache"})
+        """Return one of the page's own files, in the language of the browser where it has texts."""
+        name = request.path_params["name"]
+        there = file_name(name, self._language(request))
+        return _static(
+            self.files, there if there in self.files else name, {**_SENT_WITH_ALL, "cache-control": "no-cache"}
+        )
+
+    def _language(self, request: Request) -> str:
+        return preferred(request.headers.get("accept-language", ""), self.files)
+
+    def _texts(self, language: str) -> dict[str, Any]:
+        """Return the texts in a language, in English where they are not translated yet."""
+        found: dict[str, Any] = json.loads(self.files["texts.json"])
+        return found if language == ENGLISH else found | json.loads(self.files[file_name("texts.json", language)])
+
+    def _naming(self, request: Request) -> _Naming:
+        """Return what calls an argument as the page does: the label of its field, under the motion of the request."""
+        motion, texts = request.query_params.get("motion", ""), self._texts(self._language(request))
+        return lambda name: field_label(name, motion, texts)
+
+    async def _refusal(self, request: Request, error: Exception) -> Response:
+        assert isinstance(error, RockingError)
+        return JSONResponse(_problem(error, self._naming(request)), 422, headers=_FRESH)
+
+    def _page(self, language: str) -> str:
+        if language not in self._pages:
+            self._pages[language] = filled(self.files["index.html"].decode(), language, self._texts(language))
+        return self._pages[language]
 
     async def script(self, request: Request) -> Response:
         """Return a file of the plotting library."""
@@ -248,7 +277,7 @@ class App:
         """Return the specification of the page, what it opens with, and how far the compiling has come."""
         return {
             **specification(),
-            "axes": [asdict(axis) for axis in maps.AXES.values()],
+            "axes": [asdict(axis) | {"label": phrase(f"axis.{axis.name}")} for axis in maps.AXES.values()],
             "opening": self.opening,
             "study": None if self.study is None else self.study.describe(),
             "compilation": self.compilation.state(),
@@ -307,16 +336,16 @@ class App:
     async def _streamed(self, request: Request, begin: Callable[[Query], _Stream]) -> Response:
         stream = await self._in_thread(lambda: begin(Query(request.query_params)))
         return StreamingResponse(
-            self._parts(stream, _motion_of(request)), media_type="application/octet-stream", headers=_FRESH
+            self._parts(stream, self._naming(request)), media_type="application/octet-stream", headers=_FRESH
         )
 
-    async def _parts(self, stream: _Stream, motion: str) -> AsyncIterator[bytes]:
+    async def _parts(self, stream: _Stream, naming: _Naming) -> AsyncIterator[bytes]:
         """Parts of a stream as bytes; the work ends with the reader."""
         yield _framed(json.dumps({**stream.about, "problem": None}).encode())
         async with self._maps:
             with low_priority() as executor:
                 try:
-                    while (part := await asyncio.wrap_future(executor.submit(_next, stream, motion))) is not None:
+                    while (part := await asyncio.wrap_future(executor.submit(_next, stream, naming))) is not None:
                         yield part
                 finally:
                     with anyio.CancelScope(shield=True):
@@ -381,12 +410,12 @@ class _Stream(NamedTuple):
     written: Callable[[Any], bytes]
 
 
-def _next(stream: _Stream, motion: str) -> bytes | None:
+def _next(stream: _Stream, naming: _Naming) -> bytes | None:
     """Return the next part as bytes, or what went wrong; None when all have come."""
     try:
         part = next(stream.parts, None)
     except RockingError as error:
-        return _framed(json.dumps(_problem(error, motion)).encode())
+        return _framed(json.dumps(_problem(error, naming)).encode())
     return None if part is None else _framed(stream.written(part))
 
 
@@ -408,23 +437,14 @@ def _static(files: Mapping[str, bytes], name: str, headers: Mapping[str, str]) -
     return Response(files[name], media_type=TYPES[suffix], headers=dict(headers))
 
 
-def _problem(error: RockingError, motion: str) -> dict[str, str | None]:
-    """Return the sentence of an error, with the labels of fields under a motion, and the argument that is wrong."""
-    return {"problem": error.text(lambda name: field_label(name, motion)), "argument": error.argument}
+def _problem(error: RockingError, naming: _Naming) -> dict[str, str | None]:
+    """Return the sentence of an error, in which fields are called as the page calls them, and the argument."""
+    return {"problem": error.text(naming), "argument": error.argument}
 
 
 def _too_large() -> Response:
     problem = f"a file may be {LARGEST // 2**20} MiB large: cut a record into smaller files, or make a mesh coarser"
     return JSONResponse({"problem": problem, "argument": None}, 413, headers={**_FRESH, "connection": "close"})
-
-
-async def _refusal(request: Request, error: Exception) -> Response:
-    assert isinstance(error, RockingError)
-    return JSONResponse(_problem(error, _motion_of(request)), 422, headers=_FRESH)
-
-
-def _motion_of(request: Request) -> str:
-    return request.query_params.get("motion", "")
 
 
 async def _failure(_: Request, error: Exception) -> Response:

@@ -16,8 +16,8 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption, StudyError
 from rocking.explorer.inputs import as_path, texts_of_motion
-from rocking.explorer.parameters import PARAMETERS
 from rocking.explorer.payload import Payload
+from rocking.explorer.phrases import phrase
 from rocking.explorer.uploads import UploadStore
 from rocking.motion.scaling import FACTOR
 from rocking.quantities import number
@@ -35,13 +35,7 @@ _PARAMETERS: Final = {"p": "rad/s", "alpha": "rad", "restitution": ""}
 OPEN: Final = -1.0
 
 #: Quantities of a study that are drawn.
-QUANTITIES: Final = {
-    "overturned": "Overturns",
-    "peak_rotation": "Peak rotation, rad",
-    "impacts": "Resolved impacts",
-    "rests": "Rests",
-    "time_at_rest": "Time at rest, s",
-}
+QUANTITIES: Final = ("overturned", "peak_rotation", "impacts", "rests", "time_at_rest")
 
 
 class StudyView:
@@ -61,7 +55,7 @@ class StudyView:
         if not self.study.status.done:
             raise StudyError(f"nothing of the study in {folder} is done yet: rocking study run {folder}")
         kept = self.study.outcomes
-        self.quantities = {name: label for name, label in QUANTITIES.items() if name in kept}
+        self.quantities = [name for name in QUANTITIES if name in kept]
         if not self.quantities:
             raise StudyError(
                 f"the study in {folder} keeps only {', '.join(kept)}; a map needs one of {', '.join(QUANTITIES)}. See "
@@ -100,7 +94,7 @@ class StudyView:
             "scales": self._scales.tolist(),
             "motions": self._names("motion"),
             "polarities": ["+" if sign > 0 else "-" for sign in product.signs],
-            "quantities": [{"name": name, "label": label} for name, label in self.quantities.items()],
+            "quantities": self.quantities,
         }
 
     def slice(self, texts: Mapping[str, str]) -> Payload:
@@ -113,7 +107,7 @@ class StudyView:
         x, y = (texts.get(which, "") for which in ("x", "y"))
         for which, name in {"x": x, "y": y}.items():
             checks.one_of(name, which, InvalidOption, [*axes])
-        quantity = texts.get("quantity", next(iter(self.quantities)))
+        quantity = texts.get("quantity", self.quantities[0])
         checks.one_of(quantity, "quantity", InvalidOption, [*self.quantities])
         if x == y:
             raise InvalidOption("{} and {} must be two different parameters of the study", "x", "y")
@@ -190,11 +184,9 @@ class StudyView:
             )
         return int(wanted)
 
-    def _label(self, name: str) -> tuple[str, str]:
-        if name in _PARAMETERS:
-            return PARAMETERS[name].label, _PARAMETERS[name]
+    def _label(self, name: str) -> tuple[dict[str, Any] | str, str]:
         if name != "scale":
-            return f"{name.capitalize()}, by its number", ""
+            return phrase(f"axis.{name}"), _PARAMETERS.get(name, "")
         measure = self.study.product.scales.measure or FACTOR
         return measure.quantity.capitalize(), "" if measure.units == "1" else measure.units
 

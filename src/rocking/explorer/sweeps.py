@@ -30,6 +30,7 @@ from rocking.explorer.periodic import (
     slowest,
     values_of,
 )
+from rocking.explorer.phrases import phrase
 from rocking.quantities import number
 
 #: Values of a sweep, the steps between those of each level, and how many come at once.
@@ -140,20 +141,21 @@ def part_payload(sweep: Sweep, part: Part) -> Payload:
     return Payload(header, {"states": states.ravel(), "drawn": scaled(sweep.case, states)[:, 0]})
 
 
-def _in_words(found: Settled) -> str:
+def _in_words(found: Settled) -> dict[str, Any]:
     if found.fate in (Fate.OVERTURNED, Fate.UNFINISHED):
-        return f"{'overturns' if found.fate == Fate.OVERTURNED else 'is given up'} in period {found.after}"
+        key = "sweep.overturns" if found.fate == Fate.OVERTURNED else "sweep.given_up"
+        return phrase(key, after=found.after)
     if found.fate == Fate.RESTS_FOR_EVER:
-        return "stays at rest"
+        return phrase("sweep.still")
     if not found.period:
-        return f"no period up to {LONGEST}"
-    return f"period {found.period}{', with a rest' if found.rests else ''}"
+        return phrase("sweep.no_period", longest=LONGEST)
+    return phrase("sweep.period_rest" if found.rests else "sweep.period", period=found.period)
 
 
 def described(sweep: Sweep) -> dict[str, Any]:
     """Say what is swept."""
     kind = AXES[sweep.axis.name]
-    return {"name": kind.name, "label": kind.label, "values": sweep.axis.values.tolist()}
+    return {"name": kind.name, "label": phrase(f"axis.{kind.name}"), "values": sweep.axis.values.tolist()}
 
 
 def texts_at(sweep: Sweep, value: float, state: tuple[float, float] | None) -> dict[str, str]:

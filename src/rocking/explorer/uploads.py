@@ -247,14 +247,14 @@ def _told(motion: Motion, missing: list[str]) -> dict[str, Any]:
     """Say what looks like a mistake in a channel; or what it would be with each choice of what is missing."""
     if not missing:
         return {"notes": list(motion_notes(motion)), "choices": {}, "measures": measures(motion)}
-    choices: dict[str, list[list[str]]] = {}
+    choices: dict[str, list[tuple[str, dict[str, float]]]] = {}
     if "units" in missing:
         units = {name: unit for name in CHOICES if (unit := find_unit(name)) is not None}
         peaks = {name: motion.pga * unit.multiplier / unit.divisor / STANDARD_GRAVITY for name, unit in units.items()}
-        choices["units"] = [[name, f"{name}: PGA {peak:.3g} g"] for name, peak in peaks.items()]
+        choices["units"] = [(name, {"peak": peak}) for name, peak in peaks.items()]
     if "dt" in missing:
         steps = motion.duration / _STAND_INS["dt"]
-        choices["dt"] = [[f"{step:g}", f"{step:g} s: it lasts {steps * step:.4g} s"] for step in _STEPS]
+        choices["dt"] = [(f"{step:g}", {"lasts": steps * step}) for step in _STEPS]
     return {"notes": [], "choices": choices, "measures": None}
 
 

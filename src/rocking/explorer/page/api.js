@@ -1,6 +1,7 @@
 // Requests to the server: one at a time for each purpose, and the latest wins.
 
 import {headers} from "./secret.js";
+import {phrase} from "./texts.js";
 
 /** @typedef {Record<string, string>} Texts */
 /** @typedef {{header: any, arrays: Record<string, Float64Array>}} Payload */
@@ -27,7 +28,7 @@ async function answer(path, texts, options) {
     response = await fetch(address(path, texts), {...options, headers});
   } catch (error) {
     if (error instanceof DOMException) throw error;
-    throw new Problem("The explorer does not answer: was it ended? Start it again with rocking explore.");
+    throw new Problem(phrase("page.silent"));
   }
   if (response.ok) return response;
   const text = await response.text();

@@ -4,7 +4,9 @@ import {Latest, frames, unpacked} from "./api.js";
 import {showExports, withLegend} from "./exports.js";
 import {bokeh, colour, figure, showPlot, themed} from "./theme.js";
 import {acceleration, accelerationAxis, velocity, withUnit} from "./units.js";
-import {counted, fill, fixed, legend, make, one, short} from "./words.js";
+import {counted, fill, legend, make, one} from "./words.js";
+import {NONE, fixed, short, shown, typed} from "./numbers.js";
+import {inWords, phrase} from "./texts.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
 
@@ -58,7 +60,7 @@ export class View {
   /** @param {string} name */
   chosen(name) {
     const {assessment} = this.page.state;
-    const text = /** @type {HTMLInputElement} */ (one(name)).value.trim().replace(",", ".");
+    const text = typed(/** @type {HTMLInputElement} */ (one(name)).value);
     if (text) assessment[name] = ACCELERATIONS.includes(name) ? withUnit(text) : text; else delete assessment[name];
     if (name === "measure") for (const each of ACCELERATIONS) delete assessment[each];
     this.update(0);
@@ -98,9 +100,9 @@ export class View {
       throw error;
     }
     showExports("assessment", this.about.python, this.about.command, [
-      ["rocking-fragility.svg", "Figure, SVG", () => this.picture("svg")], ["rocking-fragility.png", "Figure, PNG", () => this.picture("png")],
-      ["rocking-fragility.csv", "Curve, CSV", async () => new Blob([this.curve()], {type: "text/csv"})],
-      ["rocking-records.csv", "Records, CSV", async () => new Blob([this.table()], {type: "text/csv"})],
+      ["rocking-fragility.svg", phrase("save.svg"), () => this.picture("svg")], ["rocking-fragility.png", phrase("save.png"), () => this.picture("png")],
+      ["rocking-fragility.csv", phrase("assessment.curve"), async () => new Blob([this.curve()], {type: "text/csv"})],
+      ["rocking-records.csv", phrase("assessment.table"), async () => new Blob([this.table()], {type: "text/csv"})],
     ]);
     body.assessment = "complete";
     counted("assessed");
@@ -112,8 +114,8 @@ export class View {
     /** @type {Texts} */
     const found = {measure, measure_period: String(period ?? 1), levels: String(levels.length), friction: friction === null ? "" : String(friction)};
     const scale = accelerationAxis()[0];
-    found.level_from = short(levels[0] * scale, 4);
-    found.level_to = short(levels[levels.length - 1] * scale, 4);
+    found.level_from = shown(levels[0] * scale);
+    found.level_to = shown(levels[levels.length - 1] * scale);
     for (const name of FIELDS) {
       const input = /** @type {HTMLInputElement} */ (one(name));
       if (document.activeElement !== input || name === "measure") input.value = found[name];
@@ -125,7 +127,7 @@ export class View {
   /** What is known before anything is computed, and what each rule says of the case's own motion. */
   facts() {
     const {records, notes} = this.about;
-    one("assessment-about").textContent = `${records.length} ${records.length === 1 ? "record" : "records"} of the list. ${notes.join(" ")}`;
+    one("assessment-about").textContent = phrase("assessment.listed", {count: records.length, notes: notes.map(inWords).join(" ")});
     this.rules();
     this.base(null);
   }
@@ -140,19 +142,21 @@ export class View {
     const at = fit ? by(arrays.at) : empty;
     this.sources.band.data = bounded ? {x: at, lower: arrays.lower, upper: arrays.upper} : {x: empty, lower: empty, upper: empty};
     this.sources.line.data = {x: at, y: fit ? arrays.probability : empty};
-    const {levels, label} = this.about;
+    const {levels} = this.about, label = inWords(this.about.label);
     this.sources.seen.data = {x: by(levels), y: arrays.seen};
-    this.plot.below[0].axis_label = `${label}, ${unit}`;
+    this.plot.below[0].axis_label = phrase("assessment.axis", {label, unit});
     this.plot.x_range.setv({start: 0, end: 1.02 * levels[levels.length - 1] * scale});
-    const interval = (/** @type {(number | null)[]} */ ends, /** @type {(value: number | null) => string} */ written) => `${written(ends[0])} to ${ends[1] === null ? "∞" : written(ends[1])}`;
+    const interval = (/** @type {(number | null)[]} */ ends, /** @type {(value: number | null) => string} */ written) => phrase("assessment.interval", {low: written(ends[0]), high: ends[1] === null ? "∞" : written(ends[1])});
     const sentence = fit
-      ? `Half of the records overturn the block at ${acceleration(fit.median)}${bounded ? ` (with ${100 * fit.confidence} % confidence ${interval(fit.median_interval, acceleration)})` : ""}; `
-        + `the dispersion is ${short(fit.dispersion)}${bounded ? ` (${interval(fit.dispersion_interval, (value) => fixed(value, 2))})` : ""}.`
-      : why;
+      ? (bounded ? phrase("assessment.fit_bounded", {
+        median: acceleration(fit.median), confidence: short(100 * fit.confidence), interval: interval(fit.median_interval, acceleration),
+        dispersion: short(fit.dispersion), range: interval(fit.dispersion_interval, (value) => fixed(value, 2)),
+      }) : phrase("assessment.fit", {median: acceleration(fit.median), dispersion: short(fit.dispersion)}))
+      : inWords(why);
+    const counts = fit && {exceeded: fit.exceeded, count: outcomes, records: this.rows.length};
     one("assessment-verdict").textContent = sentence;
-    one("assessment-notes").textContent = fit ? `${fit.exceeded} of ${outcomes} simulations overturn the block, of ${this.rows.length} records so far.`
-      .replace(this.rows.length === this.about.records.length ? " so far" : "", "") + fit.notes.map((/** @type {string} */ note) => ` ${note[0].toUpperCase()}${note.slice(1)}.`).join("") : "";
-    this.plot.html_attributes = {role: "img", "aria-label": `Probability of overturning over ${label}. ${sentence}`};
+    one("assessment-notes").textContent = fit ? (this.rows.length === this.about.records.length ? phrase("assessment.exceeded", counts) : phrase("assessment.exceeded_so_far", counts)) + fit.notes.map((/** @type {string} */ note) => ` ${note[0].toUpperCase()}${note.slice(1)}.`).join("") : "";
+    this.plot.html_attributes = {role: "img", "aria-label": phrase("assessment.plot_about", {label, sentence})};
     this.records();
     this.rules();
     this.base(header.margin);
@@ -162,12 +166,13 @@ export class View {
   records() {
     const {friction} = this.about;
     const rows = this.rows.map((row) => [
-      this.about.records[row.number], acceleration(row.pga), velocity(row.pgv), row.overturns ? "overturns" : `${short(row.peak_over_slenderness)} α`,
-      row.friction_needed === null ? "leaves the ground" : fixed(row.friction_needed, 3),
-      ...(friction === null ? [] : [row.sliding_time === null ? "holds" : `slides at ${fixed(row.sliding_time, 2)} s`]),
-      `${Math.round(100 * row.overturned_levels.reduce((/** @type {number} */ sum, /** @type {number} */ each) => sum + each, 0) / row.overturned_levels.length)} %`,
+      this.about.records[row.number], acceleration(row.pga), velocity(row.pgv), row.overturns ? phrase("assessment.overturns") : `${short(row.peak_over_slenderness)} α`,
+      row.friction_needed === null ? phrase("assessment.leaves") : fixed(row.friction_needed, 3),
+      ...(friction === null ? [] : [row.sliding_time === null ? phrase("assessment.holds") : phrase("assessment.slides", {time: fixed(row.sliding_time, 2)})]),
+      phrase("assessment.percent", {share: fixed(100 * row.overturned_levels.reduce((/** @type {number} */ sum, /** @type {number} */ each) => sum + each, 0) / row.overturned_levels.length, 0)}),
     ]);
-    fill(/** @type {HTMLTableElement} */ (one("assessment-records")), ["Record as it is", "PGA", "PGV", "Peak rotation", "Friction needed", ...(friction === null ? [] : [`With ${short(friction)}`]), "Levels that overturn"], rows);
+    fill(/** @type {HTMLTableElement} */ (one("assessment-records")), [phrase("assessment.as_is"), phrase("assessment.pga"), phrase("assessment.pgv"), phrase("assessment.peak"), phrase("assessment.friction_needed"),
+      ...(friction === null ? [] : [phrase("assessment.with_friction", {friction: short(friction)})]), phrase("assessment.overturned_levels")], rows);
   }
 
   /** What rules of thumb say beside what is computed. */
@@ -175,13 +180,21 @@ export class View {
     const {rules, thresholds, overturning_velocity: sudden} = this.about;
     const overturned = this.rows.filter(({overturns}) => overturns).length;
     const has = /** @type {Record<string, string>} */ ({
-      uplift: acceleration(Math.min(...thresholds)), west: acceleration(Math.min(...thresholds)), ishiyama: `${acceleration(Math.min(...thresholds))} and ${velocity(0.4 * sudden)}`,
+      uplift: acceleration(Math.min(...thresholds)), west: acceleration(Math.min(...thresholds)), ishiyama: phrase("assessment.both", {first: acceleration(Math.min(...thresholds)), second: velocity(0.4 * sudden)}),
     });
-    const told = (/** @type {string} */ name, /** @type {number} */ ratio) => `${short(ratio, 2)} of it: ${name === "uplift" ? (ratio > 1 ? "rocks" : "stays") : ratio >= 1 ? "may overturn" : "stands"}`;
-    fill(/** @type {HTMLTableElement} */ (one("assessment-rules")), ["Rule", "This block", "This case", "The list", "Source"], rules.map((/** @type {any} */ rule) => [
-      make("span", {}, [make("b", {}, [rule.title]), ` ${rule.says}`]), has[rule.name],
-      this.about.case ? told(rule.name, this.about.case.ratios[rule.name]) : "–",
-      this.rows.length ? `${rule.name === "uplift" ? "rocks under" : "may overturn under"} ${this.rows.filter(({ratios}) => ratios[rule.name] >= 1).length} of ${this.rows.length}; computed: ${overturned} overturn` : "…",
+    const told = (/** @type {string} */ name, /** @type {number} */ value) => {
+      const ratio = short(value, 2);
+      if (name === "uplift") return value > 1 ? phrase("assessment.ratio_rocks", {ratio}) : phrase("assessment.ratio_stays", {ratio});
+      return value >= 1 ? phrase("assessment.ratio_overturns", {ratio}) : phrase("assessment.ratio_stands", {ratio});
+    };
+    const listed = (/** @type {string} */ name) => {
+      const counts = {under: this.rows.filter(({ratios}) => ratios[name] >= 1).length, count: this.rows.length, overturned};
+      return name === "uplift" ? phrase("assessment.list_rocks", counts) : phrase("assessment.list_overturns", counts);
+    };
+    fill(/** @type {HTMLTableElement} */ (one("assessment-rules")), [phrase("assessment.rule"), phrase("assessment.this_block"), phrase("assessment.this_case"), phrase("assessment.the_list"), phrase("assessment.source")], rules.map((/** @type {any} */ rule) => [
+      make("span", {}, [make("b", {}, [phrase(`rule.${rule.name}`)]), ` ${phrase(`rule.${rule.name}_says`)}`]), has[rule.name],
+      this.about.case ? told(rule.name, this.about.case.ratios[rule.name]) : NONE,
+      this.rows.length ? listed(rule.name) : phrase("assessment.waits"),
       rule.source,
     ]));
   }
@@ -190,22 +203,23 @@ export class View {
   base(margin) {
     const {thresholds, friction_to_rock: needed, friction} = this.about;
     const largest = this.rows.reduce((most, {friction_needed: each}) => Math.max(most, each ?? Infinity), 0);
-    const holds = friction === null ? "" : friction < needed ? `with ${short(friction)} it slides before it rocks: nothing here holds` : `with ${short(friction)} it rocks`;
+    const holds = friction === null ? "" : friction < needed ? phrase("assessment.slides_first", {friction: short(friction)}) : phrase("assessment.rocks_first", {friction: short(friction)});
     const {header} = this.page.shown ?? {};
     const rows = [
-      ["Uplift at the base", thresholds[0] === thresholds[1] ? acceleration(thresholds[0]) : `${acceleration(thresholds[0])} and ${acceleration(thresholds[1])}`, "g tan α: the block rocks above it"],
-      ["Friction to rock", short(needed), holds || "below this coefficient it slides in place of rocking"],
-      ["Friction over the list", !this.rows.length ? "…" : Number.isFinite(largest) ? fixed(largest, 3) : "∞", "largest that sticking needs, each record as it is"],
-      ["Margin of this case", margin === undefined || (margin === null && !this.last?.header.share) ? "…" : margin?.factor ? `× ${short(margin.factor)}` : "–",
-        margin?.factor ? `overturns from ${acceleration(margin.pga)} on${header?.overturned ? "; it overturns as it is" : ""}` : margin ? "no factor up to 256 overturns it" : this.last?.header.share === 1 ? "nothing shakes it" : "computed at last"],
+      [phrase("assessment.uplift"), thresholds[0] === thresholds[1] ? acceleration(thresholds[0]) : phrase("assessment.both", {first: acceleration(thresholds[0]), second: acceleration(thresholds[1])}), phrase("assessment.uplift_about")],
+      [phrase("assessment.to_rock"), short(needed), holds || phrase("assessment.below")],
+      [phrase("assessment.over_list"), !this.rows.length ? phrase("assessment.waits") : Number.isFinite(largest) ? fixed(largest, 3) : "∞", phrase("assessment.over_list_about")],
+      [phrase("assessment.margin"), margin === undefined || (margin === null && !this.last?.header.share) ? phrase("assessment.waits") : margin?.factor ? phrase("assessment.factor", {factor: short(margin.factor)}) : NONE,
+        margin?.factor ? (header?.overturned ? phrase("assessment.margin_as_is", {level: acceleration(margin.pga)}) : phrase("assessment.margin_from", {level: acceleration(margin.pga)}))
+          : margin ? phrase("assessment.no_margin") : this.last?.header.share === 1 ? phrase("assessment.not_shaken") : phrase("assessment.at_last")],
     ];
     one("assessment-figures").replaceChildren(...rows.map(([name, value, more]) => make("div", {}, [make("dt", {}, [name]), make("dd", {}, [value, make("small", {}, [more])])])));
   }
 
   build() {
     const B = bokeh();
-    this.plot = figure({height: 380, x_range: new B.Range1d({start: 0, end: 1}), y_range: new B.Range1d({start: -0.03, end: 1.03}), min_border_bottom: 46}, "Fragility");
-    this.plot.left[0].axis_label = "probability of overturning";
+    this.plot = figure({height: 380, x_range: new B.Range1d({start: 0, end: 1}), y_range: new B.Range1d({start: -0.03, end: 1.03}), min_border_bottom: 46}, phrase("assessment.plot"));
+    this.plot.left[0].axis_label = phrase("assessment.probability");
     /** @param {any} glyph @param {string[]} fields @param {() => Record<string, any>} colours */
     const add = (glyph, fields, colours) => {
       const source = new B.ColumnDataSource({data: Object.fromEntries(fields.map((each) => [each, []]))});
@@ -219,13 +233,13 @@ export class View {
       seen: add(new B.Scatter({x: F("x"), y: F("y"), size: 7}), ["x", "y"], () => ({fill_color: colour("ink"), line_color: null})),
     };
     void showPlot(this.plot, one("fragility"));
-    legend("assessment-legend", [["curve", "fitted lognormal"], ["rest", "confidence band, 90 %"], ["seen", "share of simulations that overturn, at each level"]]);
+    legend("assessment-legend", [["curve", phrase("assessment.fitted")], ["rest", phrase("assessment.band")], ["seen", phrase("assessment.seen")]]);
   }
 
   /** @param {"svg" | "png"} form @returns {Promise<Blob>} */
   async picture(form) {
     const drawn = bokeh().index.find_one(this.plot).export(form);
-    return withLegend(await drawn.to_blob(), [["fitted lognormal", colour("accent")], ["confidence band, 90 %", colour("rest")], ["share of simulations", colour("ink")]], this.plot.outer_width, this.plot.outer_height);
+    return withLegend(await drawn.to_blob(), [[phrase("assessment.fitted"), colour("accent")], [phrase("assessment.band"), colour("rest")], [phrase("assessment.seen_short"), colour("ink")]], this.plot.outer_width, this.plot.outer_height);
   }
 
   /** The curve with its band, in SI units. */

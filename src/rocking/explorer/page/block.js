@@ -6,7 +6,9 @@ import {fillOutline} from "./plan.js";
 import {Recording} from "./recording.js";
 import {Clicks} from "./sound.js";
 import {colour, textSize, themed} from "./theme.js";
-import {decimals, one, say, short} from "./words.js";
+import {one, say} from "./words.js";
+import {decimals, fixed, short} from "./numbers.js";
+import {phrase} from "./texts.js";
 
 /** Wall-clock seconds that an interval between impacts takes at least where playing slows down for them. */
 const SEEN = 0.22;
@@ -70,10 +72,11 @@ export class View {
     }
     this.seek(Math.min(Math.max(this.time, 0), header.duration));
     const larger = this.larger();
-    one("magnify").querySelectorAll("option")[0].textContent = `by its peak, ${this.byPeak() === 1 ? "to scale" : `${this.byPeak()} × larger`}`;
-    one("stage-about").textContent = "The block turns about the corner that it stands on"
-      + (larger > 1 ? `, and its rotation is drawn ${larger} times larger` : "")
-      + (still.matches ? "; the ground is drawn still, since the system asks for little motion." : header.motion?.filtered ? "; the ground's displacement is drawn without periods above 10 s, with which a record's would drift away." : ".");
+    one("magnify").querySelectorAll("option")[0].textContent = this.byPeak() === 1 ? phrase("stage.by_peak_true") : phrase("stage.by_peak_larger", {times: this.byPeak()});
+    one("stage-about").textContent = phrase("stage.turns", {
+      larger: larger > 1 ? phrase("stage.turns_larger", {times: larger}) : "",
+      ground: still.matches ? phrase("stage.still_ground") : header.motion?.filtered ? phrase("stage.filtered") : "",
+    });
   }
 
   /** Times as large as it is that the largest rotation can be drawn without standing beyond its balance. */
@@ -101,18 +104,18 @@ export class View {
     if (this.playing) { this.stop(); return; }
     if (this.time >= this.right() - 1e-9) this.seek(this.left());
     this.playing = true;
-    one("play").textContent = "Pause";
+    one("play").textContent = phrase("stage.pause");
     one("play").setAttribute("aria-pressed", "true");
     this.before = performance.now();
     requestAnimationFrame((now) => this.tick(now));
   }
 
   stop() {
-    if (this.playing) say(`The animation stands at ${one("clock").textContent}.`);
+    if (this.playing) say(phrase("stage.stands", {time: one("clock").textContent ?? ""}));
     this.playing = false;
     this.recording.stop();
     this.scrubber.setAttribute("aria-valuetext", one("clock").textContent ?? "");
-    one("play").textContent = "Play";
+    one("play").textContent = phrase("stage.play");
     one("play").setAttribute("aria-pressed", "false");
     if (this.page.shown) this.page.follow(this.time, false);
   }
@@ -159,7 +162,7 @@ export class View {
     this.paint();
     const shown = this.right() - this.left();
     this.scrubber.value = String(Math.round((10000 * (this.time - this.left())) / shown));
-    const said = `${this.time.toFixed(decimals(Math.min(1, this.pace)))} s`;
+    const said = phrase("time.seconds", {time: fixed(this.time, decimals(Math.min(1, this.pace)))});
     if (!this.playing) this.scrubber.setAttribute("aria-valuetext", said);
     one("clock").textContent = said;
     this.recording.progress();
@@ -222,7 +225,7 @@ export class View {
     pen.fillStyle = colour("ink");
     pen.font = `${textSize(12)}px system-ui, sans-serif`;
     pen.textAlign = "right";
-    pen.fillText(`grid ${short(step)} m`, width - 10, height - 8);
+    pen.fillText(phrase("stage.grid", {step: short(step)}), width - 10, height - 8);
     pen.save();
     const pivot = drawn >= 0 ? right : -left;
     pen.translate(middle + scale * pivot, floor);
@@ -300,11 +303,11 @@ export class View {
     pen.font = `${size}px system-ui, sans-serif`;
     pen.textAlign = "left";
     const alpha = this.page.shown.header.block.sides[theta >= 0 ? 0 : 1].alpha;
-    const rows = [`rotation ${short((theta * 180) / Math.PI)}° = ${short(theta / alpha)} α`, `ground ${short(ground, 2)} g, moved ${short(100 * moved, 2)} cm`];
+    const rows = [phrase("stage.rotation", {degrees: short((theta * 180) / Math.PI), share: short(theta / alpha)}), phrase("stage.ground", {acceleration: short(ground, 2), moved: short(100 * moved, 2)})];
     const larger = this.larger();
-    if (larger > 1) rows.push(`rotation drawn ${larger} × larger`);
+    if (larger > 1) rows.push(phrase("stage.larger", {times: larger}));
     rows.forEach((row, k) => pen.fillText(row, 12, 9 + size * (1 + 1.4 * k)));
     pen.textAlign = "right";
-    if (this.playing && this.pace < 0.999 * Number(this.speed.value)) pen.fillText(`slowed to ${short(this.pace, 2)} ×`, width - 12, 9 + size);
+    if (this.playing && this.pace < 0.999 * Number(this.speed.value)) pen.fillText(phrase("stage.slowed", {pace: short(this.pace, 2)}), width - 12, 9 + size);
   }
 }

@@ -2,7 +2,9 @@
 
 import {json} from "./api.js";
 import {bokeh, colour, figure, showPlot, themed} from "./theme.js";
-import {fill, fixed, make, one, short, span} from "./words.js";
+import {fill, make, one} from "./words.js";
+import {NONE, fixed, short, span} from "./numbers.js";
+import {phrase} from "./texts.js";
 
 export class ChatteringPanel {
   /** @param {(ends: [number, number]) => void} go */
@@ -48,13 +50,13 @@ export class ChatteringPanel {
     one("sequence-tools").hidden = !this.sequences.length;
     one("ratios").hidden = !this.sequences.length;
     if (!this.sequences.length) {
-      table.replaceChildren(make("caption", {}, ["No sequence of impacts ends at rest: chattering, if any, is incomplete."]));
+      table.replaceChildren(make("caption", {}, [phrase("chattering.none")]));
       return;
     }
-    fill(table, ["", "Uplift, s", "Complete from, s", "At rest, s, as computed", "Off, if the motion is by a millionth", "Bracket of the computation", "Impacts"], this.sequences.map((each, k) => {
+    fill(table, ["", phrase("chattering.uplift"), phrase("chattering.complete"), phrase("chattering.rest"), phrase("chattering.off"), phrase("chattering.bracket"), phrase("chattering.impacts")], this.sequences.map((each, k) => {
       const proven = Number.isFinite(each.upper);
-      const button = make("button", {type: "button", "aria-pressed": String(k === this.chosen), on: {click: () => { this.chosen = k; this.list(); this.plot(); this.showSequence(each); }}}, [`Show ${k + 1}`]);
-      return [button, fixed(each.uplift, 3), proven ? fixed(each.start, 4) : "not proven", fixed(each.end, 9), Number.isFinite(each.off) ? `± ${span(each.off)}` : "–", proven ? `± ${span(0.5 * (each.upper - each.lower))}` : "–", String(this.count(each))];
+      const button = make("button", {type: "button", "aria-pressed": String(k === this.chosen), on: {click: () => { this.chosen = k; this.list(); this.plot(); this.showSequence(each); }}}, [phrase("chattering.show", {number: String(k + 1)})]);
+      return [button, fixed(each.uplift, 3), proven ? fixed(each.start, 4) : phrase("chattering.unproven"), fixed(each.end, 9), Number.isFinite(each.off) ? phrase("chattering.within", {span: span(each.off)}) : NONE, proven ? phrase("chattering.within", {span: span(0.5 * (each.upper - each.lower))}) : NONE, fixed(this.count(each), 0)];
     }));
   }
 
@@ -76,19 +78,19 @@ export class ChatteringPanel {
 
   /** @param {{from: number, to: number, impacts: number, unresolved: number | null}} window */
   window({from, to, impacts, unresolved}) {
-    one("depth").textContent = `${span(to - from)} shown, with ${impacts} impact${impacts === 1 ? "" : "s"}.`
-      + (unresolved ? ` The infinitely many in the last ${span(unresolved)} before the rest are summed by the proof and not drawn.` : "");
+    one("depth").textContent = phrase("chattering.window", {span: span(to - from), count: impacts})
+      + (unresolved ? ` ${phrase("chattering.unresolved", {span: span(unresolved)})}` : "");
   }
 
   build() {
     const B = bokeh();
     // Ranges that follow the data by themselves would paint everything twice.
     this.x = new B.Range1d({start: 0, end: 1});
-    this.intervals = figure({height: 210, x_range: this.x, y_range: new B.Range1d({start: 1e-3, end: 1}), y_axis_type: "log", min_border_bottom: 44}, "Interval to the next impact, by number of the impact");
-    this.ratios = figure({height: 232, x_range: this.x, y_range: new B.Range1d({start: 0, end: 1}), min_border_bottom: 44}, "Ratio of intervals, by number of the impact");
-    this.intervals.left[0].axis_label = "interval (s)";
-    this.ratios.left[0].axis_label = "interval ratio";
-    for (const plot of [this.intervals, this.ratios]) plot.below[0].axis_label = "impact since uplift";
+    this.intervals = figure({height: 210, x_range: this.x, y_range: new B.Range1d({start: 1e-3, end: 1}), y_axis_type: "log", min_border_bottom: 44}, phrase("chattering.interval_plot"));
+    this.ratios = figure({height: 232, x_range: this.x, y_range: new B.Range1d({start: 0, end: 1}), min_border_bottom: 44}, phrase("chattering.ratio_plot"));
+    this.intervals.left[0].axis_label = phrase("chattering.interval");
+    this.ratios.left[0].axis_label = phrase("chattering.ratio");
+    for (const plot of [this.intervals, this.ratios]) plot.below[0].axis_label = phrase("chattering.number");
     this.sources = [this.intervals, this.ratios].map((plot) => {
       const source = new B.ColumnDataSource({data: {x: [], y: []}});
       const glyph = new B.Scatter({x: {field: "x"}, y: {field: "y"}, size: 4, line_width: 1});
@@ -134,7 +136,7 @@ export class ChatteringPanel {
     /** @type {any} */ (this.sources)[0].data = intervals;
     /** @type {any} */ (this.sources)[1].data = ratios;
     if (this.eta) this.eta.location = eta;
-    this.label?.setv({text: `line: η² = ${short(eta, 4)}`});
+    this.label?.setv({text: phrase("chattering.eta", {eta: short(eta, 4)})});
   }
 
   /** All numbers, once somebody wants to read them. @param {Record<string, string>} texts */

@@ -8,7 +8,9 @@ import {ends, namesOf, parameter, specification} from "./parameters.js";
 import {snapshots} from "./snapshots.js";
 import {colour} from "./theme.js";
 import {caseName} from "./units.js";
-import {counted, fill, legend, make, one, short, slug} from "./words.js";
+import {counted, fill, legend, make, one, slug} from "./words.js";
+import {short} from "./numbers.js";
+import {inWords, phrase} from "./texts.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
 
@@ -49,7 +51,7 @@ export class View {
     const changed = (/** @type {Texts} */ other) => { state.other = other; this.update(); };
     /** @type {Record<string, () => [any, Texts]>} the form of each kind, and the texts with which it starts */
     const kinds = {
-      treatment: () => [new TreatmentForm(element, changed, {prefix: "other-", label: "Chattering of the other ends by"}), {chattering: "velocity=0.05"}],
+      treatment: () => [new TreatmentForm(element, changed, {prefix: "other-", label: phrase("compare.ends_by")}), {chattering: "velocity=0.05"}],
       block: () => [new BlockForm(element, changed, "other-"), larger(texts)],
       case: () => [new PinnedForm(element, changed), snapshots()[0]?.texts ?? {}],
       motion: () => [new MotionForm(element, changed, "other-"), {motion: specification.records.find((/** @type {any} */ each) => each.name !== texts.motion).name, pga: texts.pga ?? "0.4g"}],
@@ -91,21 +93,22 @@ export class View {
     if (!["motion", "case"].includes(this.with.value)) second.lines.ground_time = second.lines.ground_g = none;
     this.histories.draw(header, first, second);
     this.block?.show(this.page.state.other, other.block.sides);
-    one("compare-verdict").textContent = `The other${this.with.value === "treatment" ? ` (${other.treatment})` : ""}: ${other.verdict} ${difference(one_, other)}`;
-    legend("compare-legend", [["line", "this case"], ["second", header.shift ? `the other, ${short(Math.abs(header.shift))} s ${header.shift > 0 ? "later" : "earlier"} than it was` : "the other"], ["rest", "this case at rest"], ["impact", "impacts: below, this case; above, the other"]]);
+    one("compare-verdict").textContent = (this.with.value === "treatment" ? phrase("compare.verdict_treated", {treatment: other.treatment, verdict: inWords(other.verdict), difference: difference(one_, other)})
+      : phrase("compare.verdict", {verdict: inWords(other.verdict), difference: difference(one_, other)})).trim();
+    legend("compare-legend", [["line", phrase("compare.this")], ["second", shifted(header.shift)], ["rest", phrase("compare.at_rest")], ["impact", phrase("compare.impacts")]]);
   }
 
   /** What may be saved: both cases, each under its name. @param {any} header */
   files({cases: [first, other]}) {
     const kind = this.with.value, {state} = this.page;
-    const [one_, second] = [caseName(first), kind === "treatment" ? `${caseName(other)}, ${other.treatment}` : caseName(other)];
+    const [one_, second] = [caseName(first), kind === "treatment" ? phrase("compare.treated", {name: caseName(other), treatment: other.treatment}) : caseName(other)];
     const name = `rocking-compare-${slug(one_)}-and-${slug(second)}`;
     const asked = {...state.texts, ...this.asked(), first: one_, second};
     /** @type {[string, string][]} */
-    const entries = [[`this case: ${one_}`, colour("ink")], [`the other: ${second}`, colour("second")]];
+    const entries = [[phrase("compare.entry_this", {name: one_}), colour("ink")], [phrase("compare.entry_other", {name: second}), colour("second")]];
     const drawn = (/** @type {"svg" | "png"} */ form) => this.histories.picture(form, entries);
     offer([
-      [`${name}.svg`, "Both, SVG", () => drawn("svg")], [`${name}.png`, "Both, PNG", () => drawn("png")], [`${name}.csv`, "Both, histories, CSV", () => file("/api/compare/table", asked)],
+      [`${name}.svg`, phrase("compare.svg"), () => drawn("svg")], [`${name}.png`, phrase("compare.png"), () => drawn("png")], [`${name}.csv`, phrase("compare.csv"), () => file("/api/compare/table", asked)],
     ], (error) => this.page.problem(error, "view-compare"));
   }
 
@@ -120,10 +123,10 @@ export class View {
     if (this.known === key) return;
     this.known = key;
     const rows = await json("/api/schemes", this.page.state.texts);
-    fill(/** @type {HTMLTableElement} */ (one("schemes")), ["", "Treatment", "What it makes of the case"], rows.map((/** @type {any} */ row) => {
-      const button = make("button", {type: "button", disabled: row.right === null, "aria-label": `Compare with ${row.label}`, on: {click: () => { this.page.state.other = {chattering: row.text}; this.form(); this.update(); }}}, ["Compare"]);
+    fill(/** @type {HTMLTableElement} */ (one("schemes")), ["", phrase("compare.treatment_head"), phrase("compare.makes")], rows.map((/** @type {any} */ row) => {
+      const button = make("button", {type: "button", disabled: row.right === null, "aria-label": phrase("compare.button_about", {name: row.label}), on: {click: () => { this.page.state.other = {chattering: row.text}; this.form(); this.update(); }}}, [phrase("compare.button")]);
       const sign = row.right === null ? "" : row.right ? "✓ " : "✗ ";
-      return [button, row.label, `${sign}${row.verdict}${row.error ? ` (worst error of a rest ${short(row.error)} s)` : ""}`];
+      return [button, row.label, sign + (row.error ? phrase("compare.worst", {verdict: row.verdict, error: short(row.error)}) : row.verdict)];
     }));
   }
 }
@@ -134,7 +137,7 @@ class PinnedForm {
   constructor(element, changed) {
     this.select = /** @type {HTMLSelectElement} */ (make("select", {id: "other-case", on: {change: () => changed({...snapshots()[Number(this.select.value)].texts})}},
       snapshots().map(({name}, k) => make("option", {value: String(k)}, [name]))));
-    element.append(snapshots().length ? make("label", {}, ["Pinned case ", this.select]) : "No case is pinned. Show one in the view Response, and pin it below its verdict.");
+    element.append(snapshots().length ? make("label", {}, [`${phrase("compare.pinned")} `, this.select]) : phrase("compare.none_pinned"));
   }
 
   /** @param {Texts} texts */
@@ -153,8 +156,14 @@ function larger(texts) {
   return Object.fromEntries(namesOf("block").filter((name) => texts[name]).map((name) => [name, resized(texts[name], factors[parameter(name).unit])]));
 }
 
+/** What the other response is called, where it was moved in time. @param {number} by s */
+function shifted(by) {
+  const time = short(Math.abs(by));
+  return by > 0 ? phrase("compare.other_later", {time}) : by < 0 ? phrase("compare.other_earlier", {time}) : phrase("compare.other");
+}
+
 /** @param {any} first @param {any} second */
 function difference(first, second) {
   if (first.overturned || second.overturned) return "";
-  return `Its peak is ${short(second.peak_over_slenderness)} α, that of this case ${short(first.peak_over_slenderness)} α.`;
+  return phrase("compare.difference", {other: short(second.peak_over_slenderness), this: short(first.peak_over_slenderness)});
 }

@@ -2,7 +2,9 @@
 
 import {Latest, json} from "./api.js";
 import {writeAddress} from "./parameters.js";
-import {decimals, one, say, short} from "./words.js";
+import {one, say} from "./words.js";
+import {decimals, fixed, short, typed} from "./numbers.js";
+import {inWords, phrase} from "./texts.js";
 
 /** How long the time must stay before it is read from the response, and before it is spoken, ms. */
 const STILL = 60, QUIET = 600;
@@ -52,13 +54,13 @@ export class Cursor {
     this.tell.mark(known ? at : null);
     window.clearTimeout(this.still);
     if (!known) {
-      one("cursor").textContent = at === null || !shown ? "" : "The response ends before this time.";
+      one("cursor").textContent = at === null || !shown ? "" : phrase("reading.late");
       return;
     }
-    const text = `${at.toFixed(decimals(this.width()))} s`;
-    if (document.activeElement !== this.field) this.field.value = text.slice(0, -2);
+    const digits = decimals(this.width());
+    if (document.activeElement !== this.field) this.field.value = at.toFixed(digits);
     this.slider.value = String(Math.round((STEPS * (at - this.left())) / this.width()));
-    this.slider.setAttribute("aria-valuetext", text);
+    this.slider.setAttribute("aria-valuetext", phrase("time.seconds", {time: fixed(at, digits)}));
     this.ask(String(at));
   }
 
@@ -77,7 +79,7 @@ export class Cursor {
 
   /** A time was typed, with a unit or without. */
   async typed() {
-    const text = this.field.value.trim().replace("−", "-").replace(",", ".");
+    const text = typed(this.field.value);
     if (!text) {
       this.page.state.at = null;
       writeAddress(this.page.state);
@@ -106,11 +108,12 @@ export class Cursor {
     const digits = decimals(this.width());
     const degrees = (/** @type {number} */ radians) => short((radians * 180) / Math.PI);
     const parts = [
-      `rotation ${degrees(found.rotation)}° = ${short(found.over_slenderness)} α`, `velocity ${short(found.velocity)} rad/s`,
-      ...(found.ground_g === null ? [] : [`ground ${short(found.ground_g)} g`]), ...(found.vertical_g === null ? [] : [`upwards ${short(found.vertical_g)} g`]),
-      `energy ${short(found.energy)} of what overturns it`,
+      phrase("reading.rotation", {degrees: degrees(found.rotation), share: short(found.over_slenderness)}), phrase("reading.velocity", {velocity: short(found.velocity)}),
+      ...(found.ground_g === null ? [] : [phrase("reading.ground", {acceleration: short(found.ground_g)})]),
+      ...(found.vertical_g === null ? [] : [phrase("reading.upwards", {acceleration: short(found.vertical_g)})]),
+      phrase("reading.energy", {energy: short(found.energy)}),
     ];
-    const words = `At ${found.time.toFixed(digits)} s the block ${found.state}: ${parts.join(", ")}.`;
+    const words = phrase("reading.is", {time: fixed(found.time, digits), state: inWords(found.state), parts: parts.join(", ")});
     one("cursor").textContent = words;
     one("cursor").dataset.time = String(found.time);
     window.clearTimeout(this.quiet);

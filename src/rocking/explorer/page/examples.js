@@ -6,6 +6,7 @@ import {namesOf, readAddress, writeAddress} from "./parameters.js";
 import {unitsChosen} from "./units.js";
 import {begin} from "./visits.js";
 import {counted, make, one} from "./words.js";
+import {phrase} from "./texts.js";
 
 /** @typedef {{name: string, title: string, about: string, source?: string, steps: {query: string, words: string}[]}} Example */
 
@@ -119,7 +120,8 @@ export class Examples {
     this.button.setAttribute("aria-expanded", String(!this.panel.hidden));
     one("example").hidden = one("example-all").hidden = one("example-next").hidden = one("example-previous").hidden = !now;
     one("examples-list").hidden = Boolean(now);
-    one("examples-title").textContent = now ? `${now.example.title}: step ${this.state.example?.step} of ${now.example.steps.length}` : "Examples";
+    one("examples-title").textContent = now
+      ? phrase("examples.step", {title: now.example.title, step: this.state.example?.step ?? 1, count: now.example.steps.length}) : phrase("examples.title");
     if (now) {
       one("example-words").textContent = now.step.words.replace(/(\d) (?=[%a-zµH])/g, "$1\u00a0"); // numbers stay with their units
       one("example-source").hidden = !now.example.source;

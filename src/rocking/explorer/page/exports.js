@@ -3,10 +3,11 @@
 import {ends} from "./parameters.js";
 import {file} from "./api.js";
 import {make, one, say} from "./words.js";
+import {phrase} from "./texts.js";
 
 const FORMS = /** @type {[string, string, boolean][]} */ ([
-  ["svg", "Figure, SVG", true], ["png", "Figure, PNG", true], ["csv", "Histories, CSV", false], ["events.csv", "Events, CSV", false],
-  ["impacts.csv", "Impacts, CSV", false], ["nc", "All, NetCDF", false],
+  ["svg", phrase("save.svg"), true], ["png", phrase("save.png"), true], ["csv", phrase("save.csv"), false], ["events.csv", phrase("save.events"), false],
+  ["impacts.csv", phrase("save.impacts"), false], ["nc", phrase("save.netcdf"), false],
 ]);
 
 /** Files of a case, which the server makes; figures show its window. @param {import("./parameters.js").State} state
@@ -34,9 +35,9 @@ export function showExports(what, python, command, files) {
 
 /** @param {string} what @param {string} python @param {string | null} command */
 export function showCode(what, python, command) {
-  one("python-title").textContent = `This ${what} as Python`;
+  one("python-title").textContent = phrase(`save.${what}_python`);
   one("python").textContent = python;
-  one("command").textContent = command ?? `The command line does not do this ${what}; Python does.`;
+  one("command").textContent = command ?? phrase(`save.no_${what}_command`);
   /** @type {HTMLButtonElement} */ (document.querySelector("[data-copy=command]")).disabled = !command;
 }
 
@@ -103,7 +104,7 @@ export function save(name, content) {
   const link = /** @type {HTMLAnchorElement} */ (make("a", {href: URL.createObjectURL(content), download: name}));
   link.click();
   window.setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
-  say(`${name} is saved.`);
+  say(phrase("save.saved", {name}));
 }
 
 export function makeCopying() {
@@ -112,13 +113,13 @@ export function makeCopying() {
       const source = one(/** @type {HTMLElement} */ (button).dataset.copy ?? "");
       try {
         await navigator.clipboard.writeText(source.textContent ?? "");
-        button.textContent = "Copied";
-        say("Copied.");
+        button.textContent = phrase("save.copied");
+        say(phrase("save.said_copied"));
       } catch {
         getSelection()?.selectAllChildren(source);
-        button.textContent = "Selected";
+        button.textContent = phrase("save.selected");
       }
-      window.setTimeout(() => { button.textContent = "Copy"; }, 1500);
+      window.setTimeout(() => { button.textContent = phrase("save.copy"); }, 1500);
     });
   }
 }

@@ -4,7 +4,9 @@ import {json} from "./api.js";
 import {check, choice, offer} from "./controls.js";
 import {MeshFields} from "./mesh.js";
 import {namesOf, parameter, specification} from "./parameters.js";
-import {explained, make, measured, one, shown, whole} from "./words.js";
+import {explained, make, one} from "./words.js";
+import {measured, shown, typed, whole} from "./numbers.js";
+import {phrase} from "./texts.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
 /** @typedef {import("./parameters.js").Parameter} Parameter */
@@ -26,7 +28,7 @@ class NumberControl {
     this.typing = false;
     const id = `${prefix}${spec.name}`;
     this.slider = /** @type {HTMLInputElement} */ (make("input", {
-      type: "range", id: `${id}-slider`, min: "0", max: String(this.steps), step: "1", "aria-label": `${spec.label}, slider`, on: {input: () => this.slid()},
+      type: "range", id: `${id}-slider`, min: "0", max: String(this.steps), step: "1", "aria-label": phrase("form.slider", {label: spec.label}), on: {input: () => this.slid()},
     }));
     this.field = /** @type {HTMLInputElement} */ (make("input", {type: "text", id, inputMode: "decimal", size: 6, "data-argument": spec.name, on: {input: () => { this.typing = true; }, change: () => this.typed(), blur: () => { this.typing = false; }}}));
     const [button, words] = spec.explanation ? explained(spec.explanation, spec.label) : [];
@@ -77,7 +79,7 @@ class NumberControl {
 
   typed() {
     this.typing = false;
-    const given = this.field.value.trim().replace("−", "-").replace(",", ".");
+    const given = typed(this.field.value);
     if (given === "") {
       this.show(this.text);
       return;
@@ -97,17 +99,17 @@ export class BlockForm {
     this.known = undefined;
     /** Whether the restitution followed from angular momentum before the sides were told apart. @type {boolean | undefined} */
     this.byMomentum = undefined;
-    this.shape = choice(prefix, "shape", "Given by", specification.shapes.map((/** @type {any} */ each) => [each.name, each.label]), () => this.reshape());
-    this.two = check(`${prefix}two`, "Two different sides", () => this.separate());
-    this.housner = check(`${prefix}housner`, "Restitution from angular momentum", () => { this.showFields(); this.tell(); });
+    this.shape = choice(prefix, "shape", phrase("form.shape"), specification.shapes.map((/** @type {any} */ {name}) => [name, phrase(`shape.${name}`)]), () => this.reshape());
+    this.two = check(`${prefix}two`, phrase("form.two"), () => this.separate());
+    this.housner = check(`${prefix}housner`, phrase("form.housner"), () => { this.showFields(); this.tell(); });
     this.opener = prefix ? null : one("choose-mesh").parentElement;
     this.mesh = new MeshFields(prefix, () => this.tell(), (azimuth) => { this.put("azimuth", [azimuth]); this.tell(); });
     this.specs = BLOCK.filter((name) => !this.mesh.names.includes(name)).map(parameter);
     /** Controls by name: one for both sides, and one for each. @type {Record<string, {both: NumberControl, pair: NumberControl[]}>} */
     this.controls = Object.fromEntries(this.specs.map((spec) => [spec.name, {
       both: new NumberControl(spec, this, prefix),
-      pair: spec.values === "one" ? [] : ["right (side +)", "left (side −)"].map((side, k) =>
-        new NumberControl({...spec, label: `${spec.label}, ${side}`, explanation: k ? "" : spec.explanation}, this, `${prefix}${k}`)),
+      pair: spec.values === "one" ? [] : [phrase("form.right", {label: spec.label}), phrase("form.left", {label: spec.label})].map((label, k) =>
+        new NumberControl({...spec, label, explanation: k ? "" : spec.explanation}, this, `${prefix}${k}`)),
     }]));
     const before = /** @type {Record<string, HTMLElement>} */ ({p: this.two.element, restitution: this.housner.element});
     element.replaceChildren(this.shape.element, this.mesh.element, ...this.specs.flatMap(({name}) => {
@@ -230,10 +232,7 @@ export class BlockForm {
   }
 }
 
-const KINDS = [
-  ["record", "a shipped record"], ["pulse", "a pulse"], ["file", "a file of yours"], ["given", "the motion of the notebook"],
-  ["none", "nothing: released from a rotation"],
-];
+const KINDS = ["record", "pulse", "file", "given", "none"].map((name) => [name, phrase(`kind.${name}`)]);
 
 export class MotionForm {
   /** @param {HTMLElement} element @param {Changed} changed @param {string} [prefix] */
@@ -251,26 +250,26 @@ export class MotionForm {
     const shaken = () => { this.release(); another(); };
     /** @param {string} name */
     const field = (name) => parameter(name).label;
-    this.kind = choice(prefix, "kind", "Shaken by", KINDS, shaken);
+    this.kind = choice(prefix, "kind", phrase("form.kind"), KINDS, shaken);
     this.record = choice(prefix, "record", field("motion"), specification.records.map((/** @type {any} */ each) => [each.name, each.title]), another);
     this.about = make("p", {className: "derived"});
-    this.pulse = choice(prefix, "pulse", "Pulse", Object.entries(specification.pulses).map(([name, each]) => [name, each.label]), (name) => { this.showPulse(name); chosen(); });
+    this.pulse = choice(prefix, "pulse", phrase("form.pulse"), Object.keys(specification.pulses).map((name) => [name, phrase(`pulse.${name}`)]), (name) => { this.showPulse(name); chosen(); });
     this.numbers = make("div");
     this.channel = choice(prefix, "channel", field("channel"), [], chosen);
-    this.vertical = choice(prefix, "vertical", field("vertical"), [["", "none"]], (value) => { this.upwards = value; chosen(); });
-    this.units = choice(prefix, "units", field("units"), [["", "not chosen yet"], ...specification.units.map((/** @type {string} */ each) => [each, each])], chosen);
+    this.vertical = choice(prefix, "vertical", field("vertical"), [["", phrase("form.none")]], (value) => { this.upwards = value; chosen(); });
+    this.units = choice(prefix, "units", field("units"), [["", phrase("form.no_units")], ...specification.units.map((/** @type {string} */ each) => [each, each])], chosen);
     this.units.select.dataset.argument = "units";
     /** What is missing of a file, with what each choice would make of it. */
-    this.missing = make("div", {className: "missing", role: "group", "aria-label": "What the file does not say", hidden: true});
+    this.missing = make("div", {className: "missing", role: "group", "aria-label": phrase("file.missing"), hidden: true});
     /** Texts that were shown and not changed here since. @type {Texts | null} */
     this.linked = null;
     const {label, unit} = parameter("dt");
     const dt = /** @type {HTMLInputElement} */ (make("input", {type: "text", inputMode: "decimal", id: `${prefix}dt`, "data-argument": "dt", on: {change: chosen}}));
-    this.dt = {field: dt, element: make("div", {className: "choice"}, [make("label", {className: "field", for: dt.id}, [`${label}, ${unit}`]), dt])};
+    this.dt = {field: dt, element: make("div", {className: "choice"}, [make("label", {className: "field", for: dt.id}, [phrase("form.with_unit", {label, unit})]), dt])};
     this.starts = namesOf("start").map((name) => new NumberControl(parameter(name), this, prefix));
-    this.scale = choice(prefix, "scaled", "Scaled", specification.scalings, chosen);
+    this.scale = choice(prefix, "scaled", phrase("form.scaled"), specification.scalings.map((/** @type {string} */ name) => [name, phrase(`scaled.${name || "none"}`)]), chosen);
     /** @type {NumberControl[]} */
-    this.scales = specification.scalings.slice(1).map((/** @type {string[]} */ [name]) => new NumberControl(parameter(name), this, prefix));
+    this.scales = specification.scalings.slice(1).map((/** @type {string} */ name) => new NumberControl(parameter(name), this, prefix));
     this.period = new NumberControl(specification.period, this, prefix);
     element.replaceChildren(
       this.kind.element, this.record.element, this.pulse.element, this.numbers, this.about, this.channel.element, this.missing, this.vertical.element, this.units.element,
@@ -286,7 +285,7 @@ export class MotionForm {
     /** @type {NumberControl[]} */
     this.controls = parameters.map((/** @type {Parameter} */ spec) => new NumberControl(spec, this, `${this.prefix}pulse-`));
     this.choices = Object.entries(choices ?? {}).map(([each, values]) => ({
-      name: each, ...choice(`${this.prefix}pulse-`, each, "Kind", values.map((/** @type {string} */ value) => [value, value]), () => this.tell()),
+      name: each, ...choice(`${this.prefix}pulse-`, each, phrase("form.kind_of_pulse"), values.map((/** @type {string} */ value) => [value, phrase(`ricker.${value}`)]), () => this.tell()),
     }));
     this.numbers.replaceChildren(...[...this.controls, ...this.choices].map((each) => each.element));
   }
@@ -370,10 +369,10 @@ export class MotionForm {
     const used = kind === "file" ? this.file : null;
     /** @type {string[][]} */
     const found = [];
-    for (const {number, name} of used?.channels ?? []) if (String(number) !== this.channel.select.value) found.push([String(number), `channel ${number}: ${name}`]);
+    for (const {number, name} of used?.channels ?? []) if (String(number) !== this.channel.select.value) found.push([String(number), phrase("form.channel", {number: String(number), name})]);
     for (const file of this.files.filter((each) => each.key !== used?.key)) {
       if (file.channels.length < 2) found.push([`file:${file.key}`, file.name]);
-      else for (const {number, name} of file.channels) found.push([`file:${file.key}#${number}`, `${file.name}, channel ${number}: ${name}`]);
+      else for (const {number, name} of file.channels) found.push([`file:${file.key}#${number}`, phrase("form.file_channel", {file: file.name, number: String(number), name})]);
     }
     /** Those of the same station first. @param {string} name */
     const station = (name) => name.slice(0, name.lastIndexOf("-"));
@@ -384,7 +383,7 @@ export class MotionForm {
     const {select, element} = this.vertical;
     element.hidden = kind !== "record" && kind !== "file";
     if (!this.prefix) one("choose-vertical").hidden = element.hidden;
-    offer(select, [["", "none"], ...found]);
+    offer(select, [["", phrase("form.none")], ...found]);
     select.value = this.upwards;
   }
 
@@ -405,25 +404,26 @@ export class MotionForm {
     for (const each of this.scales) each.element.hidden = !scalable || scaled !== each.spec.name;
     this.period.element.hidden = !scalable || scaled !== "sa";
     const record = kind === "record" && specification.records.find((/** @type {any} */ each) => each.name === this.record.select.value);
-    const direction = record && (record.direction === "up" ? "vertical component, used as a horizontal motion" : `${record.direction}°`);
-    this.about.textContent = record ? `${record.event}; ${record.station}, ${direction}.` : file ? `${file.name}: ${file.format}, since ${file.reason}.` : "";
+    const {event, station, direction} = record ?? {};
+    this.about.textContent = record ? (direction === "up" ? phrase("form.upward", {event, station}) : phrase("form.horizontal", {event, station, direction}))
+      : file ? phrase("file.about", {name: file.name, format: file.format, reason: file.reason}) : "";
     this.about.hidden = !this.about.textContent;
   }
 
   /** Ask for what a file does not say, by what each choice would make of it. */
   showMissing() {
-    /** @type {[string, string, HTMLInputElement | HTMLSelectElement][]} */
-    const asked = [["units", "units", this.units.select], ["dt", "sampling step", this.dt.field]];
-    const open = asked.flatMap(([name, words, input]) => {
+    /** @type {[string, HTMLInputElement | HTMLSelectElement][]} */
+    const asked = [["units", this.units.select], ["dt", this.dt.field]];
+    const open = asked.flatMap(([name, input]) => {
       const file = this.needing(name);
       if (!file || input.value) return [];
       const channel = file === this.file ? file.channels.find((/** @type {any} */ each) => String(each.number) === this.channel.select.value) : null;
-      const choices = (channel ?? file.channels[0]).choices[name].map((/** @type {string[]} */ [value, says]) => make("button", {type: "button", on: {click: () => {
+      const choices = (channel ?? file.channels[0]).choices[name].map((/** @type {any} */ [value, figures]) => make("button", {type: "button", on: {click: () => {
         input.value = value;
         this.showFields();
         this.tell();
-      }}}, [says]));
-      return [make("p", {className: "derived"}, [`${file.name} does not say its ${words}. Choose what is true:`]), make("div", {className: "toolbar"}, choices)];
+      }}}, [phrase(`file.${name}`, {value, ...figures})]));
+      return [make("p", {className: "derived"}, [phrase(`file.no_${name}`, {name: file.name})]), make("div", {className: "toolbar"}, choices)];
     });
     this.missing.replaceChildren(...open);
     this.missing.hidden = !open.length;
@@ -468,7 +468,7 @@ export class TreatmentForm {
   constructor(element, changed, {prefix = "", label = parameter("chattering").label} = {}) {
     this.changed = changed;
     const {treatments} = specification;
-    this.kind = choice(prefix, "treatment", label, treatments.map((/** @type {any} */ each) => [each.name, each.label]), () => { this.showFields(); this.tell(); });
+    this.kind = choice(prefix, "treatment", label, treatments.map((/** @type {any} */ {name}) => [name, phrase(`treatment.${name}`)]), () => { this.showFields(); this.tell(); });
     this.kind.select.dataset.argument = "chattering";
     this.about = make("p", {className: "derived"});
     /** @type {Record<string, NumberControl>} */
@@ -488,7 +488,7 @@ export class TreatmentForm {
 
   showFields() {
     const name = this.kind.select.value;
-    this.about.textContent = specification.treatments.find((/** @type {any} */ each) => each.name === name)?.explanation ?? "";
+    this.about.textContent = phrase(`treatment.${name}_about`);
     for (const [each, control] of Object.entries(this.limits)) control.element.hidden = each !== name;
   }
 
@@ -502,9 +502,9 @@ export class TreatmentForm {
 export class ModelForm {
   /** @param {HTMLElement} element @param {Changed} changed */
   constructor(element, changed) {
-    this.model = choice("", "model", parameter("model").label, specification.models,
+    this.model = choice("", "model", parameter("model").label, specification.models.map((/** @type {string} */ name) => [name, phrase(`model.${name}`)]),
       (value) => changed(/** @type {Texts} */ (value === "nonlinear" ? {} : {model: value}), ["model"]));
-    const [button, words] = explained("It is exact, or linear for slender blocks: then α and the rotation stand for their own sines and tangents.", "the equation of motion");
+    const [button, words] = explained(phrase("form.model_about"), phrase("form.model_what"));
     this.model.element.querySelector("label")?.append(" ", button);
     element.replaceChildren(this.model.element, words);
     this.treatment = new TreatmentForm(element, changed);

@@ -2,6 +2,8 @@
 
 import {withLegend} from "./exports.js";
 import {bokeh, coarse, colour, figure, showPlot, themed} from "./theme.js";
+import {fixed} from "./numbers.js";
+import {phrase} from "./texts.js";
 
 /** @typedef {{time: Float64Array, rotation: Float64Array, ground_time: Float64Array, ground_g: Float64Array, weight?: Float64Array, impact: Float64Array}} Lines */
 /** @typedef {{lines: Lines, rest: Float64Array, uplift: Float64Array, block: {sides: {alpha: number}[], thresholds_g: number[]}}} Drawn */
@@ -18,14 +20,14 @@ export class Scale {
   constructor(from, to) {
     const width = to - from;
     if (width >= WIDE) {
-      [this.origin, this.unit, this.label] = [0, 1, "time (s)"];
+      [this.origin, this.unit, this.label] = [0, 1, phrase("histories.time")];
       return;
     }
     const [unit, name] = UNITS.find(([each]) => width >= 2 * each) ?? UNITS[UNITS.length - 1];
     const step = 10 ** Math.floor(Math.log10(width));
     this.origin = Number((Math.floor(from / step) * step).toFixed(14));
     this.unit = unit;
-    this.label = `time after ${this.origin.toFixed(Math.max(0, Math.round(-Math.log10(step))))} s (${name})`;
+    this.label = phrase("histories.time_after", {origin: fixed(this.origin, Math.max(0, Math.round(-Math.log10(step)))), unit: name});
   }
 
   /** @param {number} time */
@@ -70,10 +72,10 @@ export class Histories {
   build() {
     const B = bokeh();
     this.x = new B.Range1d({start: 0, end: 1});
-    this.rotation = figure({height: 290, x_range: this.x, y_range: new B.Range1d({start: -1, end: 1})}, "Rotation over slenderness, over time");
-    this.ground = figure({height: 190, x_range: this.x, y_range: new B.Range1d({start: -1, end: 1}), min_border_bottom: 44}, "Ground acceleration over time");
-    this.rotation.left[0].axis_label = "rotation / slenderness";
-    this.ground.left[0].axis_label = "ground (g)";
+    this.rotation = figure({height: 290, x_range: this.x, y_range: new B.Range1d({start: -1, end: 1})}, phrase("histories.rotation_plot"));
+    this.ground = figure({height: 190, x_range: this.x, y_range: new B.Range1d({start: -1, end: 1}), min_border_bottom: 44}, phrase("histories.ground_plot"));
+    this.rotation.left[0].axis_label = phrase("histories.rotation");
+    this.ground.left[0].axis_label = phrase("histories.ground");
     this.rotation.below[0].visible = false;
     for (const each of [this.rotation, this.ground]) this.addTools(each);
     this.glyphs();

@@ -2,6 +2,7 @@
 
 import {enlarge} from "./theme.js";
 import {one} from "./words.js";
+import {phrase} from "./texts.js";
 
 /** Text of the plots in lecture mode, times as large: 24 px. */
 const LARGER = 2;
@@ -72,7 +73,7 @@ export class Lecture {
   }
 
   named() {
-    one("lecture").textContent = this.on ? "Leave the lecture" : "Lecture";
+    one("lecture").textContent = phrase(this.on ? "stage.leave_lecture" : "stage.lecture");
     one("lecture").setAttribute("aria-pressed", String(this.on));
     one("magnify").dispatchEvent(new Event("change"));
   }

@@ -6,8 +6,8 @@ import {namesOf} from "./parameters.js";
 /** @typedef {import("./api.js").Texts} Texts */
 /** @typedef {{pga: number, pgv: number, significant: number, duration: number}} Measures */
 /** @typedef {{texts: Texts, title: string, label: string, is_up: boolean, measures: Measures | null, key: string, file: string, missing: string[],
- * choices: Record<string, string[][]>, vertical: string}} Row */
-/** @typedef {{title: string, reason: string, rows: Row[]}} Group */
+ * choices: Record<string, [string, Record<string, number>][]>, vertical: string}} Row */
+/** @typedef {{title: string, reason: string | import("./texts.js").Message, rows: Row[]}} Group */
 
 /** What tells a record from others. @param {Texts} texts */
 export const idOf = ({motion, channel}) => `${motion}#${channel ?? ""}`;

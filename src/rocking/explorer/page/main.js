@@ -19,7 +19,9 @@ import {coarse} from "./theme.js";
 import {angle, caseName, ofG, unitFields, unitsChosen} from "./units.js";
 import {acceptFiles} from "./upload.js";
 import {begin, settle} from "./visits.js";
-import {counted, fixed, legend, make, one, say, short} from "./words.js";
+import {counted, legend, make, one, say} from "./words.js";
+import {NONE, fixed, short} from "./numbers.js";
+import {inWords, phrase} from "./texts.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
 
@@ -56,7 +58,7 @@ function problem(error, place = "settings") {
   if (error instanceof DOMException && error.name === "AbortError") return;
   if (!error && !problems[place]) return;
   if (error && !(error instanceof Problem)) console.error(error);
-  problems[place] = error instanceof Problem ? error.message : error ? `The page has a fault: ${error}` : null;
+  problems[place] = error instanceof Problem ? error.message : error ? phrase("page.fault", {error: String(error)}) : null;
   for (const each of one(place).querySelectorAll("[aria-invalid]")) each.removeAttribute("aria-invalid");
   for (const each of one(place).querySelectorAll("[data-problem]")) each.removeAttribute("data-problem");
   const argument = error instanceof Problem && error.argument;
@@ -222,14 +224,14 @@ function draw() {
   if (!page.shown) return;
   const {header, arrays} = page.shown;
   entitle(header);
-  put(one("verdict"), header.verdict);
+  put(one("verdict"), inWords(header.verdict));
   showFigures(header);
   const [plus, minus] = header.block.thresholds_g;
   const [right, left] = header.block.sides.map((/** @type {any} */ side, /** @type {number} */ k) =>
-    `p = ${short(side.p)} rad/s, α = ${angle(side.alpha)}, η = ${short(side.restitution)}; lifts above ${ofG([plus, minus][k])}`);
+    phrase("block.side", {p: short(side.p), alpha: angle(side.alpha), eta: short(side.restitution), threshold: ofG([plus, minus][k])}));
   const {body} = header.block;
-  const [to, fro] = body ? [`Towards ${short(body.azimuth, 4)}°`, `Towards ${short((body.azimuth + 180) % 360, 4)}°`] : ["To the right", "To the left"];
-  put(one("derived"), right === left ? `${right}.` : `${to} ${right}. ${fro} ${left}.`);
+  put(one("derived"), right === left ? phrase("block.same", {side: right})
+    : body ? phrase("block.towards", {to: short(body.azimuth, 4), fro: short((body.azimuth + 180) % 360, 4), right, left}) : phrase("block.differing", {right, left}));
   forms.block.mesh.turn(body);
   if (state.view === "response" || state.view === "block") {
     const lines = /** @type {any} */ (arrays);
@@ -241,10 +243,10 @@ function draw() {
 
 /** Name the view and the case, for tabs and bookmarks. @param {any} header */
 function entitle({block, motion}) {
-  const view = document.querySelector("[data-view][aria-current]")?.textContent;
+  const view = document.querySelector("[data-view][aria-current]")?.textContent ?? "";
   const {study} = specification;
-  const shown = study && state.view === "map" ? `study ${study.name}` : caseName({block, motion});
-  document.title = `${view}: ${shown} – rocking explorer`;
+  const shown = study && state.view === "map" ? phrase("page.study", {name: study.name}) : caseName({block, motion});
+  document.title = phrase("page.case_title", {view, shown});
 }
 
 /** Write a text where it is another one. @param {Node} node @param {string} text */
@@ -255,19 +257,22 @@ function put(node, text) {
 /** @param {any} header */
 function showLegend({motion, overturned, peak_over_slenderness: peak}) {
   const vertical = motion?.vertical;
-  const entries = [["line", "rotation"], ["rest", "at rest"], ["impact", "impact"], ["uplift", "uplift"], ["ground", "ground acceleration"], ["beyond", "beyond the threshold of uplift"]];
-  if (vertical) entries.push(["up", `vertical acceleration (${vertical.name}, peak ${ofG(vertical.pga_g)}), with which the thresholds move`]);
-  if (overturned || peak > 0.9) entries.push(["over", "rotation at which it would overturn on still ground"]);
+  const entries = [["line", phrase("legend.rotation")], ["rest", phrase("legend.rest")], ["impact", phrase("legend.impact")], ["uplift", phrase("legend.uplift")],
+    ["ground", phrase("legend.ground")], ["beyond", phrase("legend.beyond")]];
+  if (vertical) entries.push(["up", phrase("legend.vertical", {name: vertical.name, peak: ofG(vertical.pga_g)})]);
+  if (overturned || peak > 0.9) entries.push(["over", phrase("legend.over")]);
   legend("legend", entries);
 }
 
 /** @param {any} header */
 function showFigures(header) {
   const rows = [
-    ["Peak rotation", header.overturned ? "overturns" : `${short(header.peak_over_slenderness)} α`, header.overturned ? `at ${fixed(header.overturn_time, 3)} s` : `${angle(header.peak_rotation)} at ${fixed(header.peak_time, 2)} s`],
-    ["Comes to rest", `${header.rests} ×`, header.rests ? (header.proven === header.rests ? "each time proven" : `${header.proven} proven`) : "not at all"],
-    ["Impacts", String(header.impacts), "resolved one by one"],
-    ["At rest", header.share_at_rest === null ? "–" : `${short(100 * header.share_at_rest, 2)} %`, "of the strong shaking"],
+    [phrase("figure.peak"), header.overturned ? phrase("figure.overturns") : `${short(header.peak_over_slenderness)} α`,
+      header.overturned ? phrase("figure.overturn_time", {time: fixed(header.overturn_time, 3)}) : phrase("figure.peak_at", {angle: angle(header.peak_rotation), time: fixed(header.peak_time, 2)})],
+    [phrase("figure.rests"), phrase("figure.times", {count: header.rests}),
+      header.rests ? (header.proven === header.rests ? phrase("figure.all_proven") : phrase("figure.proven", {count: header.proven})) : phrase("figure.no_rest")],
+    [phrase("figure.impacts"), fixed(header.impacts, 0), phrase("figure.resolved")],
+    [phrase("figure.share"), header.share_at_rest === null ? NONE : phrase("figure.percent", {share: short(100 * header.share_at_rest, 2)}), phrase("figure.strong")],
   ];
   const list = one("figures");
   if (!list.childNodes.length) list.append(...rows.map(([name]) => make("div", {}, [make("dt", {}, [name]), make("dd", {}, ["", make("small")])])));
@@ -307,7 +312,7 @@ for (const button of document.querySelectorAll("button.what[aria-controls]")) {
   });
 }
 one("in-words").addEventListener("toggle", () => chattering.words(state.texts));
-if (coarse()) one("cursor").textContent = "Tap the plots to read them.";
+if (coarse()) one("cursor").textContent = phrase("reading.tap");
 one("settings").addEventListener("submit", (event) => event.preventDefault());
 makeCopying();
 acceptFiles(async (file, use) => {
@@ -315,7 +320,7 @@ acceptFiles(async (file, use) => {
     const found = await file();
     if (use === "mesh") forms.block.take(found);
     else forms.motion.take(found, use === "vertical");
-    say(use === "mesh" ? `${found.name} is the body now.` : `${found.name} was read as ${found.format}.`);
+    say(use === "mesh" ? phrase("file.is_body", {name: found.name}) : phrase("file.is_record", {name: found.name, format: found.format}));
     problem(null);
   } catch (error) {
     problem(error);

@@ -2,8 +2,11 @@
 
 import {withLegend} from "./exports.js";
 import {AFTER_REST, AROUND, MARK, MODES, OUTCOMES, OVERTURNS, RAMP, STRIPES, UNKNOWN, VERDICTS, picture, rgba} from "./outcomes.js";
+import {plain} from "./ticks.js";
 import {bokeh, coarse, colour, figure, showPlot, themed} from "./theme.js";
-import {make, one, short} from "./words.js";
+import {make, one} from "./words.js";
+import {short} from "./numbers.js";
+import {inWords, phrase} from "./texts.js";
 
 export class MapPicture {
   /** @param {{over: (x: number, y: number) => void, chosen: (x: number, y: number) => void, zoomed: (box: number[]) => void}} tell is told where the
@@ -21,7 +24,7 @@ export class MapPicture {
 
   build() {
     const B = bokeh();
-    this.plot = figure({height: 500, x_range: new B.Range1d({start: 0, end: 1}), y_range: new B.Range1d({start: 0, end: 1}), min_border_bottom: 46}, "Map of outcomes over two parameters");
+    this.plot = figure({height: 500, x_range: new B.Range1d({start: 0, end: 1}), y_range: new B.Range1d({start: 0, end: 1}), min_border_bottom: 46}, phrase("map.plot"));
     for (const grid of this.plot.center) grid.visible = false;
     this.image = new B.ColumnDataSource({data: {image: [], x: [], y: [], dw: [], dh: []}});
     const F = (/** @type {string} */ field) => ({field});
@@ -40,7 +43,7 @@ export class MapPicture {
     for (const [size, ink] of /** @type {[number, string][]} */ ([[17, AROUND], [14, MARK]])) {
       this.plot.add_renderers(new B.GlyphRenderer({data_source: this.mark, glyph: new B.Scatter({x: F("x"), y: F("y"), size, line_width: size > 15 ? 4 : 2, line_color: ink, fill_alpha: 0, marker: {value: "circle_cross"}})}));
     }
-    this.bar = new B.ColorBar({color_mapper: new B.LinearColorMapper({palette: RAMP, low: 0, high: 1}), width: 12, padding: 6, visible: false});
+    this.bar = new B.ColorBar({color_mapper: new B.LinearColorMapper({palette: RAMP, low: 0, high: 1}), width: 12, padding: 6, visible: false, formatter: plain(new B.BasicTickFormatter())});
     this.plot.add_layout(this.bar, "right");
     // The bar's own title would stand beside it, on its head.
     this.plot.title.setv({align: "right", offset: -44, text_font_size: "12px", text_font_style: "normal", text_font: "system-ui, sans-serif"});
@@ -63,7 +66,7 @@ export class MapPicture {
     this.about = about;
     if (!this.plot) this.build();
     const {x, y} = about;
-    const label = (/** @type {any} */ axis) => (axis.unit ? `${axis.label} (${axis.unit})` : axis.label);
+    const label = (/** @type {any} */ axis) => (axis.unit ? phrase("map.axis_unit", {label: inWords(axis.label), unit: axis.unit}) : inWords(axis.label));
     this.plot.below[0].axis_label = label(x);
     this.plot.left[0].axis_label = label(y);
     const [x0, x1, y0, y1] = this.box();
@@ -140,8 +143,8 @@ export class MapPicture {
       });
       this.bar.visible = false;
       this.plot.title.text = "";
-      const share = (/** @type {number} */ value) => (this.complete ? `, ${short((100 * (seen.get(value) ?? 0)) / values.length, 2)} %` : "");
-      this.legend(kinds.filter(([value]) => seen.has(value)).map(([value, text, ink]) => [text + share(value), ink]), later?.some(Boolean) ? later.filter(Boolean).length / values.length : 0);
+      const share = (/** @type {string} */ outcome, /** @type {number} */ value) => this.shared(outcome, (seen.get(value) ?? 0) / values.length);
+      this.legend(kinds.filter(([value]) => seen.has(value)).map(([value, text, ink]) => [share(text, value), ink]), later?.some(Boolean) ? later.filter(Boolean).length / values.length : 0);
       return {inks: out, kinds: new Set(known.values()), hatched: later};
     }
     const finite = values.filter((each) => Number.isFinite(each));
@@ -166,17 +169,17 @@ export class MapPicture {
     const kind = logarithmic ? "LogColorMapper" : "LinearColorMapper";
     if (this.bar.color_mapper.type === kind) this.bar.color_mapper.setv(ends);
     else this.bar.color_mapper = new (bokeh()[kind])({palette: RAMP, ...ends});
-    const title = {rest: "uplift to rest (s)", peak: "peak / α"}[quantity] ?? label;
+    const title = {rest: phrase("map.bar_rest"), peak: phrase("map.bar_peak")}[quantity] ?? label;
     this.bar.visible = true;
     this.plot.title.text = title;
-    const extra = quantity === "peak" ? [["overturns", OVERTURNS]] : mode ? [["overturns without a rest", OVERTURNS], ["never lifts, or is not at rest when the simulation ends", UNKNOWN]] : [];
+    const extra = quantity === "peak" ? [[phrase("outcome.overturns"), OVERTURNS]] : mode ? [[phrase("map.no_rest"), OVERTURNS], [phrase("map.never"), UNKNOWN]] : [];
     this.legend(/** @type {[string, string][]} */ (extra));
     return {inks: out, kinds: new Set([rgba(OVERTURNS), rgba(UNKNOWN)]), hatched: null};
   }
 
   /** @param {string} quantity @returns {[number, string, string][] | null} */
   kinds(quantity) {
-    if (quantity === "outcome") return this.about.outcomes.map((/** @type {string} */ text, /** @type {number} */ k) => [k, text, OUTCOMES[k]]);
+    if (quantity === "outcome") return (this.about.outcomes ?? []).map((/** @type {string} */ name, /** @type {number} */ k) => [k, phrase(`outcome.${name}`), OUTCOMES[k]]);
     if (quantity === "mode") return MODES;
     if (quantity === "overturned") return VERDICTS;
     return null;
@@ -189,16 +192,19 @@ export class MapPicture {
     return Array.from(mode, (each, k) => (each >= 0 || each === AFTER_REST) && outcome[k] !== this.about.outcomes.indexOf("overturns"));
   }
 
+  /** An outcome, with its share once all points are computed. @param {string} outcome @param {number} share */
+  shared(outcome, share) { return this.complete ? phrase("map.share_of", {outcome, share: short(100 * share, 2)}) : outcome; }
+
   /** @param {[string, string][]} entries @param {number} [later] share of the points that overturn later */
   legend(entries, later = 0) {
-    if (later) entries = [...entries, [`hatched: overturns later${this.complete ? `, ${short(100 * later, 2)} %` : ""}`, STRIPES[0]]];
+    if (later) entries = [...entries, [this.shared(phrase("map.hatched"), later), STRIPES[0]]];
     this.entries = entries;
     const parts = entries.map(([text, ink]) => {
       const key = make("i", {className: "key swatch"});
       key.style.background = ink;
       return make("span", {}, [key, text]);
     });
-    if (this.about.curves.exact) parts.push(make("span", {}, [make("i", {className: "key exact"}), "exact critical amplitude (slender block)"]), make("span", {}, [make("i", {className: "key eq76"}), "Eq. 76"]));
+    if (this.about.curves.exact) parts.push(make("span", {}, [make("i", {className: "key exact"}), phrase("map.exact")]), make("span", {}, [make("i", {className: "key eq76"}), phrase("map.eq76")]));
     one("map-legend").replaceChildren(...parts);
   }
 
@@ -208,7 +214,7 @@ export class MapPicture {
     for (const each of marks) each.visible = false;
     const drawn = bokeh().index.find_one(this.plot).export(form);
     for (const each of marks) each.visible = true;
-    const curves = /** @type {[string, string][]} */ (this.about.curves.exact ? [["critical amplitude: exact (solid), Eq. 76 (dashed)", MARK]] : []);
+    const curves = /** @type {[string, string][]} */ (this.about.curves.exact ? [[phrase("map.curves"), MARK]] : []);
     return withLegend(await drawn.to_blob(), [...(this.entries ?? []), ...curves], this.plot.outer_width, this.plot.outer_height);
   }
 }

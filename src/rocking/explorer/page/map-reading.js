@@ -2,7 +2,9 @@
 
 import {payload} from "./api.js";
 import {colour} from "./theme.js";
-import {make, one, say, short} from "./words.js";
+import {make, one, say} from "./words.js";
+import {short} from "./numbers.js";
+import {inWords, phrase} from "./texts.js";
 
 /** How long pointer or mark must lie still before a response is asked for, ms. */
 const STILL = 120;
@@ -64,7 +66,7 @@ export class MapReading {
       const {header, arrays} = await payload(path, texts, {signal: running.signal});
       if (running.signal.aborted) return;
       this.show(point, header, arrays);
-      if (this.spoken) say(header.verdict);
+      if (this.spoken) say(inWords(header.verdict));
       this.spoken = false;
     } catch (error) {
       if (!running.signal.aborted) this.view.page.problem(error, "view-map");
@@ -75,7 +77,7 @@ export class MapReading {
   show([x, y], header, arrays) {
     const small = one("map-small"), map = one("map");
     const [right, down] = this.view.picture.pixels(x, y);
-    this.words.textContent = `${header.verdict} Shown: ${short(header.to - header.from)} s.`;
+    this.words.textContent = phrase("map.shown", {verdict: inWords(header.verdict), time: short(header.to - header.from)});
     small.hidden = false;
     small.dataset.at = `${x},${y}`;
     const {offsetWidth: width, offsetHeight: height} = small;
@@ -123,22 +125,24 @@ export class MapReading {
   point(x, y) {
     if (!this.view.about || !this.view.values) return;
     const [row, column] = this.place(x, y);
-    const written = (/** @type {any} */ axis, /** @type {number} */ k) => `${axis.label} ${short(axis.values[k])}${axis.names ? ` (${axis.names[k]})` : ""}`;
-    const at = `${written(this.view.about.x, column)}, ${written(this.view.about.y, row)}`;
+    const written = (/** @type {any} */ axis, /** @type {number} */ k) => {
+      const label = inWords(axis.label), value = short(axis.values[k]);
+      return axis.names ? phrase("map.coordinate_named", {label, value, name: axis.names[k]}) : phrase("map.coordinate", {label, value});
+    };
     const index = row * this.view.about.shape[1] + column;
     const said = this.view.about.quantities.map((/** @type {string} */ name, /** @type {number} */ q) => this.said(name, /** @type {Float32Array[]} */ (this.view.values)[q][index])).filter(Boolean);
-    one("map-at").textContent = `${at}: ${said.join("; ")}.`;
+    one("map-at").textContent = phrase("map.at", {x: written(this.view.about.x, column), y: written(this.view.about.y, row), what: said.join("; ")});
   }
 
   /** @param {string} name @param {number} value */
   said(name, value) {
     if (Number.isNaN(value)) return "";
     const kinds = this.view.picture.kinds(name);
-    if (name === "mode" && value > 1) return `overturns after ${value} impacts`;
+    if (name === "mode" && value > 1) return phrase("map.overturns_after", {count: value});
     if (kinds) return kinds.find((/** @type {[number, string, string]} */ [each]) => each === value)?.[1] ?? "";
-    if (name === "rest") return `rests ${short(value)} s after uplift`;
-    if (name === "peak") return value === Infinity ? "" : `peak ${short(value)} α`;
-    return `${name} ${short(value)}`;
+    if (name === "rest") return phrase("map.rests_after", {time: short(value)});
+    if (name === "peak") return value === Infinity ? "" : phrase("map.peak", {peak: short(value)});
+    return phrase("map.value", {name: phrase(`quantity.${name}`), value: short(value)});
   }
 
   /** @param {number} x @param {number} y */

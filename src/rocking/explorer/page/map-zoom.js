@@ -1,6 +1,7 @@
 // Into a map and back out: a rectangle that is drawn, or keys about the mark; its ends become those of the axes.
 
 import {one, say} from "./words.js";
+import {phrase} from "./texts.js";
 
 const ENDS = ["x_from", "x_to", "y_from", "y_to"];
 
@@ -36,7 +37,7 @@ export class MapZoom {
       const width = kept[k - (k % 2) + 1] - kept[k - (k % 2)];
       state.map[end] = String(Number(kept[k].toFixed(Math.min(12, Math.max(0, 3 - Math.floor(Math.log10(width)))))));
     });
-    this.move("The map is computed between closer ends.");
+    this.move(phrase("map.closer"));
   }
 
   /** Go back to what was shown before the last step in, or to the ends that the map has by itself. */
@@ -50,7 +51,7 @@ export class MapZoom {
     }
     const ends = this.before.pop() ?? {};
     for (const end of ENDS) if (ends[end]) state.map[end] = ends[end]; else delete state.map[end];
-    this.move("The map is computed between wider ends.");
+    this.move(phrase("map.wider"));
   }
 
   /** @param {string} words */

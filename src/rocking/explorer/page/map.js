@@ -7,6 +7,8 @@ import {MapReading} from "./map-reading.js";
 import {MapZoom} from "./map-zoom.js";
 import {namesOf, specification} from "./parameters.js";
 import {make, one} from "./words.js";
+import {short, typed} from "./numbers.js";
+import {inWords, phrase} from "./texts.js";
 
 const ENDS = ["x_from", "x_to", "y_from", "y_to"];
 
@@ -54,15 +56,15 @@ export class View {
     const slice = (name, label, values) => {
       if (values.length < 2) return;
       const select = /** @type {HTMLSelectElement} */ (make("select", {on: {change: () => { this.page.state.map[name] = select.value; this.update(); }}},
-        values.map((value, k) => make("option", {value: name.startsWith("fix_") ? value : String(k)}, [value]))));
+        values.map((value, k) => make("option", {value: name.startsWith("fix_") ? value : String(k)}, [value.trim() && Number.isFinite(Number(value)) ? short(Number(value), 12) : value]))));
       select.value = this.page.state.map[name] ?? select.value;
       this.slices[name] = make("label", {}, [`${label} `, select]);
       tools.append(this.slices[name]);
     };
-    tools.append(make("strong", {}, [`Study ${this.study.name}`]), make("span", {className: "cursor"}, [this.study.status]));
-    slice("motion_index", "motion", this.study.motions);
-    slice("polarity_index", "polarity", this.study.polarities);
-    slice("scale_index", "scale", this.study.scales.map(String));
+    tools.append(make("strong", {}, [phrase("map.study", {name: this.study.name})]), make("span", {className: "cursor"}, [this.study.status]));
+    slice("motion_index", phrase("map.motion"), this.study.motions);
+    slice("polarity_index", phrase("map.polarity"), this.study.polarities);
+    slice("scale_index", phrase("map.scale"), this.study.scales.map(String));
     for (const [name, values] of Object.entries(this.study.fixed)) slice(`fix_${name}`, name, /** @type {number[]} */ (values).map(String));
     for (const name of ["x-from", "x-to", "y-from", "y-to", "points"]) /** @type {HTMLElement} */ (one(`map-${name}`).parentElement).hidden = true;
   }
@@ -83,13 +85,13 @@ export class View {
   /** What is asked of the server: all but the quantity, since it sends all of them.
    * @returns {Record<string, string>} */
   asked() {
-    const ends = Object.fromEntries(ENDS.map((end) => [end, /** @type {HTMLInputElement} */ (one(`map-${end.replace("_", "-")}`)).value]));
+    const ends = Object.fromEntries(ENDS.map((end) => [end, typed(/** @type {HTMLInputElement} */ (one(`map-${end.replace("_", "-")}`)).value)]));
     const {x, y, points} = this.page.state.map;
     return {...this.page.state.texts, x, y, ...ends, points: points ?? "200"};
   }
 
   ends() {
-    for (const end of ENDS) this.page.state.map[end] = /** @type {HTMLInputElement} */ (one(`map-${end.replace("_", "-")}`)).value;
+    for (const end of ENDS) this.page.state.map[end] = typed(/** @type {HTMLInputElement} */ (one(`map-${end.replace("_", "-")}`)).value);
     this.update();
   }
 
@@ -130,14 +132,14 @@ export class View {
     const {names, right} = this.axes();
     for (const [name, slice] of Object.entries(this.slices)) slice.hidden = [map.x, map.y].some((axis) => name === `fix_${axis}` || name === `${axis}_index`);
     const offered = this.study ? this.study.axes : specification.axes;
-    const label = (/** @type {string} */ name) => offered.find((/** @type {any} */ each) => each.name === name).label;
+    const label = (/** @type {string} */ name) => inWords(offered.find((/** @type {any} */ each) => each.name === name).label);
     for (const [name, values] of Object.entries({x: right, y: names})) {
       this.select(name).replaceChildren(...values.map((/** @type {string} */ value) => make("option", {value}, [label(value)])));
       this.select(name).value = map[name];
     }
     const quantities = this.study ? this.study.quantities : specification.quantities;
-    this.select("quantity").replaceChildren(...quantities.map((/** @type {any} */ each) => make("option", {value: each.name}, [each.label])));
-    if (!quantities.some((/** @type {any} */ each) => each.name === map.quantity)) map.quantity = this.first(quantities);
+    this.select("quantity").replaceChildren(...quantities.map((/** @type {any} */ each) => make("option", {value: each}, [phrase(`quantity.${each}`)])));
+    if (!quantities.includes(map.quantity)) map.quantity = this.first(quantities);
     this.select("quantity").value = map.quantity;
     this.select("points").value = map.points ?? "200";
     if (this.study) return;
@@ -152,10 +154,10 @@ export class View {
   }
 
   /** The quantity with which a map begins: under a pulse how the first rocking ends; a record goes on, and what counts is the end.
-   * @param {any[]} quantities @returns {string} */
+   * @param {string[]} quantities @returns {string} */
   first(quantities) {
     const family = (this.page.state.texts.motion ?? "").split(":")[0];
-    return this.study || Object.hasOwn(specification.pulses, family) ? quantities[0].name : "mode";
+    return this.study || Object.hasOwn(specification.pulses, family) ? quantities[0] : "mode";
   }
 
   /** @param {AbortSignal} signal */
@@ -236,8 +238,8 @@ export class View {
     const name = this.study ? "rocking-study" : "rocking-map";
     const {quantity} = this.page.state.map;
     showExports("map", this.study ? python : python[quantity], (this.study ? command : command[quantity]) ?? null, !this.complete ? [] : [
-      [`${name}.svg`, "Figure, SVG", () => this.picture.file("svg")], [`${name}.png`, "Figure, PNG", () => this.picture.file("png")],
-      [`${name}.csv`, "Numbers, CSV", async () => new Blob([this.table()], {type: "text/csv"})],
+      [`${name}.svg`, phrase("save.svg"), () => this.picture.file("svg")], [`${name}.png`, phrase("save.png"), () => this.picture.file("png")],
+      [`${name}.csv`, phrase("save.numbers"), async () => new Blob([this.table()], {type: "text/csv"})],
     ]);
   }
 
@@ -280,7 +282,7 @@ export class View {
     this.fill();
     const {header, arrays} = await payload("/api/study", this.page.state.map);
     this.page.remember({map: this.page.state.map});
-    this.about = {...header, quantities: [header.quantity], curves: {}, outcomes: []};
+    this.about = {...header, quantities: [header.quantity], curves: {}};
     this.values = [Float32Array.from(arrays.values)];
     this.drawAxes();
     this.complete = true;

@@ -5,10 +5,11 @@ import {choice, offer} from "./controls.js";
 import {namesOf, parameter, specification} from "./parameters.js";
 import {Plan} from "./plan.js";
 import {make} from "./words.js";
+import {phrase} from "./texts.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
 
-const UP = [["", "as its format has it"], ...["z", "y", "x", "-z", "-y", "-x"].map((axis) => [axis, axis.replace("-", "−")])];
+const UP = [["", phrase("mesh.as_format")], ...["z", "y", "x", "-z", "-y", "-x"].map((axis) => [axis, axis.replace("-", "−")])];
 
 export class MeshFields {
   /** @param {string} prefix @param {() => void} tell a field has changed @param {(azimuth: string) => void} turned an azimuth was chosen */
@@ -17,7 +18,7 @@ export class MeshFields {
     /** Names of the texts that are set here. @type {string[]} */
     this.names = [needed[0], ...optional];
     /** Names of the files that are known, by their texts. @type {Record<string, string>} */
-    this.files = Object.fromEntries(specification.meshes.map((/** @type {string} */ name) => [name, `${name} (a shipped mesh)`]));
+    this.files = Object.fromEntries(specification.meshes.map((/** @type {string} */ name) => [name, phrase("mesh.shipped", {name})]));
     this.file = choice(prefix, "mesh", parameter("mesh").label, Object.entries(this.files), tell);
     this.unit = choice(prefix, "unit", parameter("unit").label, [["", "m"], ...specification.mesh_units.filter((/** @type {string} */ each) => each !== "m").map((/** @type {string} */ each) => [each, each])], tell);
     this.up = choice(prefix, "up", parameter("up").label, UP, tell);
@@ -28,8 +29,8 @@ export class MeshFields {
       this.typed[name] = /** @type {HTMLInputElement} */ (make("input", {type: "text", id, placeholder: hint, "data-argument": name, on: {change: tell}}));
       return make("div", {className: "choice"}, [make("label", {className: "field", for: id}, [parameter(name).label]), this.typed[name]]);
     };
-    this.more = make("details", {}, [make("summary", {}, ["How the mesh is read"]), this.unit.element, this.up.element,
-      field("density", "the same throughout"), field("tolerance", "a thousandth of the height")]);
+    this.more = make("details", {}, [make("summary", {}, [phrase("mesh.read")]), this.unit.element, this.up.element,
+      field("density", phrase("mesh.same_density")), field("tolerance", phrase("mesh.thousandth"))]);
     this.element = make("div", {hidden: true}, [this.file.element, this.more]);
     this.asked = "";
     this.plan = prefix ? null : new Plan(turned);
@@ -39,7 +40,7 @@ export class MeshFields {
   /** @param {Texts} texts */
   show(texts) {
     if (!texts.mesh) return;
-    if (!Object.hasOwn(this.files, texts.mesh)) this.know(texts.mesh, "the file of the link");
+    if (!Object.hasOwn(this.files, texts.mesh)) this.know(texts.mesh, phrase("mesh.linked"));
     this.file.select.value = texts.mesh;
     for (const {select, name} of [{...this.unit, name: "unit"}, {...this.up, name: "up"}]) {
       const value = texts[name] ?? "";
@@ -84,7 +85,7 @@ export class MeshFields {
     this.asked = asked;
     if (texts.mesh !== this.file.select.value) return;
     if (texts.mesh.startsWith("file:") && this.files[texts.mesh] !== found.header.name) this.know(texts.mesh, found.header.name);
-    this.typed.density.title = `Parts: ${found.header.parts.join(", ")}; of each as PART=NUMBER`;
+    this.typed.density.title = phrase("mesh.parts", {names: found.header.parts.join(", ")});
     this.plan.draw(found);
     this.plan.turn(body);
   }

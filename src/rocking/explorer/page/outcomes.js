@@ -1,18 +1,18 @@
 // Colours of maps: one for each outcome, the same on light and dark paper. Orange stands for overturning, whatever the map shows,
 // and for nothing else. More outcomes than four cannot all differ by 3:1, so a line parts neighbours that do not.
 
+import {phrase} from "./texts.js";
+
 /** No uplift, complete chattering, rests later, rests at last, overturns, unproven. */
 export const OUTCOMES = ["#ffffff", "#c9dcf0", "#7fa3cf", "#1d3f73", "#d4660f", "#b0b0b0"];
 export const OVERTURNS = OUTCOMES[4], UNKNOWN = OUTCOMES[5];
 /** What overturns after a rest, as a mode. */
 export const AFTER_REST = -4;
 export const MODES = /** @type {[number, string, string][]} */ ([
-  [-3, "no uplift", "#ffffff"], [-1, "rocks", "#c9dcf0"], [-2, "rests before the motion is over", "#7fa3cf"],
-  [0, "overturns without impact", "#5e2404"], [1, "overturns after 1 impact", "#b0480a"], [2, "overturns after 2 impacts or more", "#f08c2e"],
-  [AFTER_REST, "overturns after a rest", "#ffc58a"],
-]);
+  [-3, "#ffffff"], [-1, "#c9dcf0"], [-2, "#7fa3cf"], [0, "#5e2404"], [1, "#b0480a"], [2, "#f08c2e"], [AFTER_REST, "#ffc58a"],
+].map(([value, ink]) => [value, phrase(`mode.${value}`), ink]));
 /** Whether a block of a study overturns, or what is known of it. */
-export const VERDICTS = /** @type {[number, string, string][]} */ ([[0, "stays", "#c9dcf0"], [1, "overturns", OVERTURNS], [-1, "not known: ended before its verdict", UNKNOWN]]);
+export const VERDICTS = /** @type {[number, string, string][]} */ ([[0, "#c9dcf0"], [1, OVERTURNS], [-1, UNKNOWN]].map(([value, ink]) => [value, phrase(`overturned.${value}`), ink]));
 /** Stripes over what overturns later than in the first rocking: on light colours, and on dark ones. */
 export const STRIPES = ["#8a3405", "#ffb366"];
 /** Dark to light, even steps of lightness. */

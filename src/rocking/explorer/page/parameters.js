@@ -5,6 +5,7 @@ import {Problem, json} from "./api.js";
 import {inUnits, readUnits, unitsChosen} from "./units.js";
 import {write} from "./visits.js";
 import {one} from "./words.js";
+import {known, phrase} from "./texts.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
 /** @typedef {{view: string, texts: Texts, other: Texts, compare: string, align: string, window: [number, number] | null, at: number | null, lecture: boolean, example: {name: string, step: number} | null, map: Texts, sweep: Texts, assessment: Texts, good: Good}} State */
@@ -16,8 +17,16 @@ import {one} from "./words.js";
 export const specification = await json("/api/start", {}).catch(stop);
 
 readUnits(specification.shown_in, new URLSearchParams(location.search));
-specification.parameters = specification.parameters.map(inUnits);
-for (const pulse of Object.values(specification.pulses)) pulse.parameters = pulse.parameters.map(inUnits);
+specification.parameters = specification.parameters.map(inUnits).map(named);
+specification.period = named(specification.period);
+for (const pulse of Object.values(specification.pulses)) pulse.parameters = pulse.parameters.map(inUnits).map(named);
+for (const treatment of specification.treatments) if (treatment.limit) treatment.limit = named(treatment.limit);
+
+/** A parameter with what the page calls it and says of it. @param {any} spec @returns {Parameter} */
+function named(spec) {
+  const {text} = spec;
+  return {...spec, label: phrase(`field.${text}`), explanation: known(`about.${text}`) ? phrase(`about.${text}`) : ""};
+}
 
 /** Say why the page cannot open, and wait for ever: without what the server says of the parameters there is no page.
  * @param {unknown} error @returns {Promise<never>} */

@@ -4,7 +4,9 @@ import {Latest, frames, json, payload, unpacked} from "./api.js";
 import {showExports, withLegend} from "./exports.js";
 import {specification} from "./parameters.js";
 import {bokeh, colour, figure, showPlot, themed} from "./theme.js";
-import {counted, legend, one, short} from "./words.js";
+import {counted, legend, one} from "./words.js";
+import {short, typed} from "./numbers.js";
+import {inWords, phrase} from "./texts.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
 /** What a sweep found at a value: how large its steps were, rotations over slenderness, states, and in words.
@@ -55,7 +57,7 @@ export class View {
   /** @param {string} name */
   chosen(name) {
     const {sweep} = this.page.state;
-    sweep[name] = /** @type {HTMLInputElement} */ (one(name)).value;
+    sweep[name] = typed(/** @type {HTMLInputElement} */ (one(name)).value);
     if (name === "sweep") { delete sweep.sweep_from; delete sweep.sweep_to; }
     this.update();
   }
@@ -70,14 +72,14 @@ export class View {
     if (this.offer) {
       this.running?.abort();
       this.key = "";
-      one("orbit-verdict").textContent = "This view needs a sine: one period of it repeats for ever.";
+      one("orbit-verdict").textContent = phrase("orbit.no_sine");
       one("orbit-about").textContent = "";
-      one("orbit-sine").textContent = `Shake it by the nearest sine, ${this.offer.words}`;
+      one("orbit-sine").textContent = phrase("orbit.offer", {amplitude: this.offer.amplitude, frequency: this.offer.frequency});
       return;
     }
     if (!this.plane) this.build();
-    one("orbit-verdict").textContent = header.sentence;
-    one("orbit-about").textContent = header.about;
+    one("orbit-verdict").textContent = inWords(header.sentence);
+    one("orbit-about").textContent = inWords(header.about);
     /** @type {Record<string, number>} */
     this.at = header.at;
     this.drawPlane(header, arrays);
@@ -144,7 +146,7 @@ export class View {
     indices.forEach((/** @type {number} */ index, /** @type {number} */ k) => {
       for (let other = index - stride + 1; other < index + stride; other += 1) if ((found.get(other)?.stride ?? 0) > stride) found.delete(other);
       const end = at + counts[k];
-      found.set(index, {stride, drawn: drawn.subarray(at, end), states: states.subarray(2 * at, 2 * end), words: words[k], overturned: overturned[k]});
+      found.set(index, {stride, drawn: drawn.subarray(at, end), states: states.subarray(2 * at, 2 * end), words: inWords(words[k]), overturned: overturned[k]});
       at = end;
     });
   }
@@ -175,10 +177,10 @@ export class View {
     const filled = (/** @type {string} */ ink) => () => ({fill_color: colour(ink), line_color: null});
     const hollow = (/** @type {string} */ ink) => () => ({fill_color: null, line_color: colour(ink)});
 
-    this.plane = made("Phase plane");
-    this.plane.below[0].axis_label = "rotation / slenderness";
+    this.plane = made(phrase("phase.plane"));
+    this.plane.below[0].axis_label = phrase("histories.rotation");
     this.plane.below[0].ticker.desired_num_ticks = 5;
-    this.plane.left[0].axis_label = "velocity / (p · slenderness)";
+    this.plane.left[0].axis_label = phrase("phase.velocity");
     const line = new B.Line({x: F("x"), y: F("y"), line_width: 1.2}), jump = new B.Segment({x0: 0, x1: 0, y0: F("before"), y1: F("after"), line_width: 1.6, line_dash: [2, 3]});
     this.jumps = add(this.plane, jump, ["before", "after"], () => ({line_color: colour("ground")}));
     this.line = add(this.plane, line, ["x", "y"], () => ({line_color: colour("ink")}));
@@ -186,8 +188,8 @@ export class View {
     this.dots = add(this.plane, this.dot, ["x", "y"], filled("accent"));
     this.here = marks(6);
 
-    this.plot = made("Bifurcation diagram");
-    this.plot.left[0].axis_label = "rotation / slenderness, once a period";
+    this.plot = made(phrase("orbit.diagram"));
+    this.plot.left[0].axis_label = phrase("orbit.once");
     this.case = new B.Span({dimension: "height", location: 0, line_width: 1.2, line_dash: [4, 3]});
     this.plot.add_layout(this.case);
     themed(() => this.case.setv({line_color: colour("accent")}));
@@ -204,8 +206,8 @@ export class View {
     void showPlot(this.plane, one("phase-plane"));
     void showPlot(this.plot, one("diagram"));
     legend("orbit-legend", [
-      ["line", "trajectory"], ["jump", "impact: the velocity jumps"], ["dot", "start of each period"], ["at", "this case"],
-      ["up-dot", "swept upwards"], ["down-ring", "swept downwards"], ["cross", "at the top: overturns"],
+      ["line", phrase("orbit.trajectory")], ["jump", phrase("orbit.jump")], ["dot", phrase("orbit.start")], ["at", phrase("orbit.case")],
+      ["up-dot", phrase("orbit.upwards")], ["down-ring", phrase("orbit.downwards")], ["cross", phrase("orbit.cross")],
     ]);
   }
 
@@ -221,12 +223,12 @@ export class View {
       const [low, high] = around(parts);
       range.setv({start: low, end: high});
     }
-    this.plane.html_attributes = {role: "img", "aria-label": `Phase plane, velocity over rotation. ${sentence}`};
+    this.plane.html_attributes = {role: "img", "aria-label": phrase("orbit.plane_about", {sentence})};
   }
 
   drawAxes() {
     const {label, values} = this.about;
-    this.plot.below[0].axis_label = label;
+    this.plot.below[0].axis_label = inWords(label);
     const half = 0.5 * (values[1] - values[0]);
     this.plot.x_range.setv({start: values[0] - half, end: values[values.length - 1] + half});
     this.mark = null;
@@ -308,9 +310,9 @@ export class View {
     const {label, values} = this.about;
     const words = DIRECTIONS.map((each) => {
       const found = this.found[each].get(index);
-      return found && `swept ${each}wards: ${found.words}`;
+      return found && phrase(`orbit.found_${each}`, {found: found.words});
     });
-    one("sweep-at").textContent = `${label} ${short(values[index])}, ${words.filter(Boolean).join("; ") || "not computed yet"}.`;
+    one("sweep-at").textContent = phrase("orbit.at", {label: inWords(label), value: short(values[index]), found: words.filter(Boolean).join("; ") || phrase("orbit.nothing")});
   }
 
   /** @param {KeyboardEvent} event */
@@ -351,15 +353,15 @@ export class View {
   offerFiles() {
     const {python, command} = this.about;
     showExports("diagram", python, command, !this.complete ? [] : [
-      ["rocking-diagram.svg", "Figure, SVG", () => this.picture("svg")], ["rocking-diagram.png", "Figure, PNG", () => this.picture("png")],
-      ["rocking-diagram.csv", "Numbers, CSV", async () => new Blob([this.table()], {type: "text/csv"})],
+      ["rocking-diagram.svg", phrase("save.svg"), () => this.picture("svg")], ["rocking-diagram.png", phrase("save.png"), () => this.picture("png")],
+      ["rocking-diagram.csv", phrase("save.numbers"), async () => new Blob([this.table()], {type: "text/csv"})],
     ]);
   }
 
   /** @param {"svg" | "png"} form @returns {Promise<Blob>} */
   async picture(form) {
     const drawn = bokeh().index.find_one(this.plot).export(form);
-    return withLegend(await drawn.to_blob(), [["swept upwards", colour("ink")], ["swept downwards", colour("ground")], ["this case", colour("accent")]], this.plot.outer_width, this.plot.outer_height);
+    return withLegend(await drawn.to_blob(), [[phrase("orbit.upwards"), colour("ink")], [phrase("orbit.downwards"), colour("ground")], [phrase("orbit.case"), colour("accent")]], this.plot.outer_width, this.plot.outer_height);
   }
 
   /** Every state of the diagram; none where the block overturns. */

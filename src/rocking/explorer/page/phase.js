@@ -3,7 +3,9 @@
 import {Latest, payload} from "./api.js";
 import {Scale, at} from "./histories.js";
 import {bokeh, colour, figure, showPlot, themed} from "./theme.js";
-import {counted, legend, one, short} from "./words.js";
+import {counted, legend, one} from "./words.js";
+import {short} from "./numbers.js";
+import {phrase} from "./texts.js";
 
 /** What leaves the frame: past it a block only falls. */
 const FARTHEST = 1.6;
@@ -75,10 +77,10 @@ export class PhasePanel {
       return drawn;
     };
 
-    this.plane = made("Phase plane");
-    this.plane.below[0].axis_label = "rotation / slenderness";
+    this.plane = made(phrase("phase.plane"));
+    this.plane.below[0].axis_label = phrase("histories.rotation");
     this.plane.below[0].ticker.desired_num_ticks = 5;
-    this.plane.left[0].axis_label = "velocity / (p · slenderness)";
+    this.plane.left[0].axis_label = phrase("phase.velocity");
     for (const dimension of ["width", "height"]) span(this.plane, dimension, "grid");
     line(this.plane, "boundary", "accent", {line_dash: [7, 3, 2, 3]});
     add(this.plane, "jumps", ["before", "after"], new B.Segment({x0: 0, x1: 0, y0: F("before"), y1: F("after"), line_width: 1.6, line_dash: [2, 3]}), () => ({line_color: colour("ground")}));
@@ -87,8 +89,8 @@ export class PhasePanel {
     add(this.plane, "uplift", ["x", "y"], mark("triangle", 7), () => ({fill_color: colour("accent"), line_color: null}));
     add(this.plane, "now", ["x", "y"], mark("circle", 9), () => ({fill_color: colour("second"), line_color: colour("paper")}));
 
-    this.energy = made("Energy over time");
-    this.energy.left[0].axis_label = "energy / least that overturns";
+    this.energy = made(phrase("phase.energy_plot"));
+    this.energy.left[0].axis_label = phrase("phase.energy");
     this.levels = [0, 1].map(() => span(this.energy, "width", "accent", {line_dash: [7, 3, 2, 3], visible: false}));
     add(this.energy, "impact", ["x", "y"], new B.Scatter({x: F("x"), y: F("y"), angle: Math.PI / 2, size: 9, line_width: 1, marker: {value: "dash"}}), () => ({line_color: colour("ink")}));
     line(this.energy, "potential", "ground");
@@ -99,8 +101,8 @@ export class PhasePanel {
     void showPlot(this.plane, one("case-plane"));
     void showPlot(this.energy, one("energy"));
     legend("phase-legend", [
-      ["line", "response; total energy"], ["jump", "impact: the velocity jumps, and the total drops"], ["uplift", "uplift"], ["rest", "rest"], ["balance", "overturns beyond, if nothing shakes"],
-      ["potential", "potential"], ["second", "kinetic"],
+      ["line", phrase("phase.legend_course")], ["jump", phrase("phase.legend_jump")], ["uplift", phrase("legend.uplift")], ["rest", phrase("phase.legend_rest")],
+      ["balance", phrase("phase.legend_balance")], ["potential", phrase("phase.legend_potential")], ["second", phrase("phase.legend_kinetic")],
     ]);
   }
 
@@ -128,10 +130,10 @@ export class PhasePanel {
     this.energy.y_range.setv({start: -0.06 * top, end: top});
     this.energy.x_range.setv({start: this.scale.plotted(from), end: this.scale.plotted(to)});
     sources.impact.data = {x: Float64Array.from(before, (k) => times[k]), y: new Float64Array(before.length).fill(-0.03 * top)};
-    const said = `the greatest energy here is ${short(ends(this.total)[1])} of what overturns the block`;
-    this.plane.html_attributes = {role: "img", "aria-label": "Phase plane, velocity over rotation, with impacts as jumps."};
-    this.energy.html_attributes = {role: "img", "aria-label": `Energy over time: ${said}.`};
-    one("energy-about").textContent = `${said[0].toUpperCase()}${said.slice(1)} if nothing shakes it; ${before.length ? `${before.length} impacts take energy.` : "no impact takes any."}`;
+    const share = short(ends(this.total)[1]);
+    this.plane.html_attributes = {role: "img", "aria-label": phrase("phase.plane_about")};
+    this.energy.html_attributes = {role: "img", "aria-label": phrase("phase.energy_about", {share})};
+    one("energy-about").textContent = phrase("phase.greatest", {share, impacts: before.length ? phrase("phase.impacts", {count: before.length}) : phrase("phase.no_impact")});
     this.mark(this.time);
   }
 

@@ -1,7 +1,9 @@
 // A body of a mesh as it is seen from above, with its resistance in every direction; and its outline from one side.
 
 import {colour} from "./theme.js";
-import {make, short} from "./words.js";
+import {make} from "./words.js";
+import {short} from "./numbers.js";
+import {inWords, phrase} from "./texts.js";
 
 /** Width of the plan, pixels, and of what is free around it. */
 const SIZE = 252, MARGIN = 16;
@@ -17,7 +19,7 @@ function shape(name, given, inside = []) {
 export class Plan {
   /** @param {(azimuth: string) => void} turned is told the azimuth that is chosen */
   constructor(turned) {
-    this.svg = shape("svg", {viewBox: `0 0 ${SIZE} ${SIZE}`, class: "plan", role: "img", "aria-label": "Plan of the body, and the acceleration that lifts it in every direction"});
+    this.svg = shape("svg", {viewBox: `0 0 ${SIZE} ${SIZE}`, class: "plan", role: "img", "aria-label": phrase("plan.picture")});
     this.svg.addEventListener("click", (event) => {
       const {left, top, width, height} = this.svg.getBoundingClientRect();
       const {clientX, clientY} = /** @type {MouseEvent} */ (event);
@@ -29,7 +31,7 @@ export class Plan {
     this.svg.append(this.still, this.moving);
     this.words = make("div", {className: "derived"});
     this.legend = make("p", {className: "legend"});
-    this.element = make("div", {}, [this.svg, make("p", {className: "derived"}, ["Click the plan to turn to another azimuth."]), this.legend, this.words]);
+    this.element = make("div", {}, [this.svg, make("p", {className: "derived"}, [phrase("plan.turn")]), this.legend, this.words]);
     this.scale = 0;
   }
 
@@ -63,12 +65,12 @@ export class Plan {
       ...rings.slice(-2).map((level) => shape("text", {x: SIZE / 2, y: (SIZE / 2 + this.scale * height * level + 4).toFixed(2), class: "plan-text"}, [`${short(level)} g`])),
       shape("path", {d: this.path(support), class: "plan-support"}),
       shape("path", {d: this.path(rose), class: "plan-rose"}),
-      ...[["N", 0, -1], ["E", 1, 0]].map(([name, x, y]) => shape("text", {x: SIZE / 2 + Number(x) * (SIZE / 2 - 7), y: SIZE / 2 + Number(y) * (SIZE / 2 - 9) + 4, class: "plan-compass"}, [String(name)])),
+      ...[[phrase("plan.north"), 0, -1], [phrase("plan.east"), 1, 0]].map(([name, x, y]) => shape("text", {x: SIZE / 2 + Number(x) * (SIZE / 2 - 7), y: SIZE / 2 + Number(y) * (SIZE / 2 - 9) + 4, class: "plan-compass"}, [String(name)])),
     );
-    const entries = [["plan-key-body", "the body from above"], ["line", "its support"], ["plan-key-rose", "the acceleration that lifts it, in every direction"], ["plan-key-edge", "the edges, or corners, about which it rocks"]];
+    const entries = [["plan-key-body", phrase("plan.body")], ["line", phrase("plan.support")], ["plan-key-rose", phrase("plan.rose")], ["plan-key-edge", phrase("plan.edges")]];
     this.legend.replaceChildren(...entries.map(([kind, words]) => make("span", {}, [make("i", {className: `key ${kind}`}), words])));
-    const weakest = `It is lifted first towards ${short(header.weakest_azimuth, 4)}°, above ${short(header.weakest)} g.`;
-    this.words.replaceChildren(...[`${header.about} ${weakest}`, header.left_out, header.repaired].map((words) => make("p", {}, [words])));
+    const about = phrase("plan.about", {body: inWords(header.about), azimuth: short(header.weakest_azimuth, 4), acceleration: short(header.weakest)});
+    this.words.replaceChildren(...[about, inWords(header.left_out), inWords(header.repaired)].map((words) => make("p", {}, [words])));
   }
 
   /** Show the direction, and the edges about which the body rocks. @param {any} body */

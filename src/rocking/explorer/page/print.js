@@ -4,7 +4,9 @@ import {json} from "./api.js";
 import {specification} from "./parameters.js";
 import {lit} from "./theme.js";
 import {angle, ofG} from "./units.js";
-import {fill, make, one, short} from "./words.js";
+import {fill, make, one} from "./words.js";
+import {short} from "./numbers.js";
+import {phrase} from "./texts.js";
 
 /** @param {any} page @param {(error: unknown) => void} problem */
 export function makePrinting(page, problem) {
@@ -46,14 +48,17 @@ export function makePrinting(page, problem) {
 function head({state, shown}) {
   if (!shown) return;
   const {block, motion, model, treatment} = shown.header;
-  const sides = block.sides.map((/** @type {any} */ side, /** @type {number} */ k) => `p = ${short(side.p)} rad/s, α = ${angle(side.alpha)}, η = ${short(side.restitution)}, lifts above ${ofG(block.thresholds_g[k])}`);
+  const sides = block.sides.map((/** @type {any} */ side, /** @type {number} */ k) => phrase("print.side", {p: short(side.p), alpha: angle(side.alpha), eta: short(side.restitution), threshold: ofG(block.thresholds_g[k])}));
   const rows = [
-    ["Block", `${block.description}. ${sides[0] === sides[1] ? sides[0] : `To the right ${sides[0]}. To the left ${sides[1]}`}.`],
-    ["Ground motion", motion ? `${motion.name}, PGA ${ofG(motion.pga_g)}${motion.vertical ? `, with ${motion.vertical.name}, ${ofG(motion.vertical.pga_g)}` : ""}` : "none"],
-    ["Model", `${specification.models.find((/** @type {string[]} */ [name]) => name === model)?.[1] ?? model}; chattering ends by: ${treatment}`],
-    ["Computed by", `rocking ${specification.version}, ${new Date().toISOString().slice(0, 10)}`],
-    ["Address", `?${location.search.slice(1)}`],
+    [phrase("print.block"), sides[0] === sides[1] ? phrase("print.one_side", {description: block.description, side: sides[0]})
+      : phrase("print.two_sides", {description: block.description, right: sides[0], left: sides[1]})],
+    [phrase("print.motion"), !motion ? phrase("print.no_motion") : motion.vertical
+      ? phrase("print.of_both", {name: motion.name, pga: ofG(motion.pga_g), vertical: motion.vertical.name, peak: ofG(motion.vertical.pga_g)})
+      : phrase("print.of_motion", {name: motion.name, pga: ofG(motion.pga_g)})],
+    [phrase("print.model"), phrase("print.ends", {model: phrase(`model.${model}`), treatment})],
+    [phrase("print.computed"), `rocking ${specification.version}, ${new Date().toISOString().slice(0, 10)}`],
+    [phrase("print.address"), `?${location.search.slice(1)}`],
   ];
-  if (state.view === "assessment" && state.assessment.records) rows[4][1] = `?${new URLSearchParams(state.texts)}&view=assessment, with its list of records`;
+  if (state.view === "assessment" && state.assessment.records) rows[4][1] = phrase("print.listed", {address: `?${new URLSearchParams(state.texts)}&view=assessment`});
   one("print-head").replaceChildren(...rows.map(([name, text]) => make("div", {}, [make("dt", {}, [name]), make("dd", {}, [text])])));
 }

@@ -1,7 +1,9 @@
 // A video of the stage as it plays, in whatever form the browser writes.
 
 import {save} from "./exports.js";
-import {one, say, short} from "./words.js";
+import {one, say} from "./words.js";
+import {short} from "./numbers.js";
+import {phrase} from "./texts.js";
 
 const FORMS = /** @type {[string, string][]} */ ([
   ["video/webm;codecs=vp9,opus", "webm"], ["video/webm;codecs=vp8,opus", "webm"], ["video/webm", "webm"], ["video/mp4", "mp4"],
@@ -20,7 +22,7 @@ export class Recording {
     this.form = "MediaRecorder" in window ? FORMS.find(([type]) => MediaRecorder.isTypeSupported(type)) : undefined;
     if (!this.form) {
       /** @type {HTMLButtonElement} */ (this.button).disabled = true;
-      this.button.title = "This browser does not record videos.";
+      this.button.title = phrase("stage.no_recording");
     }
     this.button.addEventListener("click", () => { if (this.recorder) this.view.stop(); else this.start(); });
   }
@@ -38,17 +40,17 @@ export class Recording {
     const recorder = new MediaRecorder(stream, {mimeType: type, videoBitsPerSecond: RATE});
     recorder.addEventListener("dataavailable", ({data}) => { if (data.size) parts.push(data); });
     recorder.addEventListener("stop", () => {
-      if (!parts.length) { say("Nothing was recorded, since it played too short a time."); return; }
+      if (!parts.length) { say(phrase("stage.nothing_recorded")); return; }
       save(`rocking-animation.${ending}`, new Blob(parts, {type: type.split(";")[0]}));
     });
     this.recorder = recorder;
-    this.button.textContent = "Stop recording";
+    this.button.textContent = phrase("stage.stop_recording");
     one("recorded").hidden = false;
     recorder.start(500);
     if (!this.view.playing) this.view.toggle();
     this.from = this.view.time;
     this.progress();
-    say("The animation is recorded.");
+    say(phrase("stage.is_recorded"));
   }
 
   /** Say how much of the window has been recorded. */
@@ -56,7 +58,7 @@ export class Recording {
     if (!this.recorder) return;
     const {view, from = 0} = this, whole = view.right() - from;
     /** @type {HTMLProgressElement} */ (one("record-progress")).value = whole > 0 ? (view.time - from) / whole : 1;
-    one("record-words").textContent = `${short(view.time - from, 2)} of ${short(whole, 2)} s recorded`;
+    one("record-words").textContent = phrase("stage.recorded", {done: short(view.time - from, 2), whole: short(whole, 2)});
   }
 
   /** The animation has stopped: what was recorded is saved. */
@@ -64,7 +66,7 @@ export class Recording {
     if (!this.recorder) return;
     this.recorder.stop();
     this.recorder = null;
-    this.button.textContent = "Record a video";
+    this.button.textContent = phrase("stage.record");
     one("recorded").hidden = true;
   }
 }

@@ -4,15 +4,17 @@ import {Latest, json} from "./api.js";
 import {idOf} from "./list.js";
 import {sendFile} from "./upload.js";
 import {acceleration, velocity} from "./units.js";
-import {counted, make, one, say, short} from "./words.js";
+import {counted, make, one, say} from "./words.js";
+import {short} from "./numbers.js";
+import {inWords, phrase} from "./texts.js";
 
 /** @typedef {import("./list.js").Row} Row */
 /** @typedef {import("./list.js").Group} Group */
 
 /** What a heading sorts by. @type {[string, (row: Row) => number | string][]} */
 const COLUMNS = [
-  ["Record", (row) => row.title], ["PGA", (row) => row.measures?.pga ?? -1], ["PGV", (row) => row.measures?.pgv ?? -1],
-  ["Duration, 5–95 %", (row) => row.measures?.significant ?? -1], ["Length", (row) => row.measures?.duration ?? -1],
+  [phrase("records.record"), (row) => row.title], [phrase("records.pga"), (row) => row.measures?.pga ?? -1], [phrase("records.pgv"), (row) => row.measures?.pgv ?? -1],
+  [phrase("records.significant"), (row) => row.measures?.significant ?? -1], [phrase("records.length"), (row) => row.measures?.duration ?? -1],
 ];
 
 export class View {
@@ -50,13 +52,13 @@ export class View {
     /** @type {unknown[]} */
     const refused = [];
     for (const [k, file] of files.entries()) {
-      one("records-said").textContent = `Reading ${k + 1} of ${files.length} files: ${file.name}`;
+      one("records-said").textContent = phrase("records.reading", {number: k + 1, count: files.length, name: file.name});
       try { keys.push((await sendFile(file)).key); } catch (error) { refused.push(error); }
     }
     if (keys.length) this.list.drops.push(keys);
     await this.list.load();
     this.render();
-    const words = `${keys.length} of ${files.length} files were read.`;
+    const words = phrase("records.read", {done: keys.length, count: files.length});
     one("records-said").textContent = words;
     say(words);
     if (refused.length) this.page.problem(refused[0], "view-records");
@@ -84,8 +86,10 @@ export class View {
       ...groups.map((/** @type {Group} */ group) => this.body(group)),
     );
     const {usage} = list;
-    one("records-usage").textContent = `${groups.reduce((/** @type {number} */ sum, /** @type {Group} */ each) => sum + each.rows.length, 0)} of ${list.rows().length} records are shown. `
-      + `${usage.files} of at most ${usage.most_files} files are kept, ${short(usage.bytes / 2 ** 20, 2)} of ${short(usage.most_bytes / 2 ** 20)} MiB.`;
+    one("records-usage").textContent = phrase("records.shown", {
+      shown: groups.reduce((/** @type {number} */ sum, /** @type {Group} */ each) => sum + each.rows.length, 0), count: list.rows().length,
+      files: usage.files, most: usage.most_files, size: short(usage.bytes / 2 ** 20, 2), most_size: short(usage.most_bytes / 2 ** 20),
+    });
     this.ask();
     this.mark();
   }
@@ -113,16 +117,16 @@ export class View {
     const {list} = this;
     const [{key}] = rows;
     const head = make("tr", {className: "station"}, [make("th", {scope: "rowgroup", colSpan: 6}, [
-      title, ...(reason && reason !== "shipped" ? [make("small", {}, [` ${reason}`])] : []),
-    ]), make("td", {}, key ? [make("button", {type: "button", "aria-label": `Take ${title} out of the list`, on: {click: () => this.remove(rows)}}, ["Take out"])] : [])]);
+      title, ...(reason ? [make("small", {}, [` ${inWords(reason)}`])] : []),
+    ]), make("td", {}, key ? [make("button", {type: "button", "aria-label": phrase("records.take_out_about", {name: title}), on: {click: () => this.remove(rows)}}, [phrase("records.take_out")])] : [])]);
     return make("tbody", {}, [head, ...rows.map((row) => {
       const {measures} = row;
-      const box = /** @type {HTMLInputElement} */ (make("input", {type: "checkbox", checked: list.has(row), disabled: !measures, "aria-label": `Assess ${row.title}`, on: {change: () => {
+      const box = /** @type {HTMLInputElement} */ (make("input", {type: "checkbox", checked: list.has(row), disabled: !measures, "aria-label": phrase("records.assess_one", {name: row.title}), on: {change: () => {
         list.tick([row], box.checked);
         this.remember();
       }}}));
       const open = make("button", {type: "button", className: "record", disabled: !measures, "data-record": idOf(row.texts), on: {click: () => this.open(row)}}, [row.title]);
-      const values = measures ? [acceleration(measures.pga), velocity(measures.pgv), `${short(measures.significant)} s`, `${short(measures.duration)} s`] : ["?", "?", "?", "?"];
+      const values = measures ? [acceleration(measures.pga), velocity(measures.pgv), phrase("time.seconds", {time: short(measures.significant)}), phrase("time.seconds", {time: short(measures.duration)})] : ["?", "?", "?", "?"];
       return make("tr", {}, [box, open, ...values, ""].map((cell) => make("td", {}, [cell])));
     })]);
   }
@@ -130,7 +134,7 @@ export class View {
   /** Let a record shake the block. @param {Row} row */
   open(row) {
     this.page.restate(this.list.casePut(row));
-    say(`${row.title} shakes the block.`);
+    say(phrase("records.shakes", {name: row.title}));
   }
 
   /** Mark the case's own motion. */
@@ -159,15 +163,14 @@ export class View {
       const asked = [...new Map(rows.filter((row) => keys.includes(row.key) && row.missing.includes(name)).map((row) => [row.key, row])).values()];
       if (!asked.length) return [];
       const choices = asked[0].choices[name].map(([value]) => value);
-      const words = name === "units" ? "units" : "sampling step";
-      const heads = choices.map((value) => make("th", {scope: "col"}, [make("button", {type: "button", on: {click: () => this.answer(asked, name, value)}}, [
-        `${asked.length > 1 ? "all " : ""}${value}${name === "dt" ? " s" : ""}`,
-      ])]));
+      const dt = name === "dt", all = asked.length > 1;
+      const named = (/** @type {string} */ value) => (dt ? phrase(all ? "records.all_dt" : "records.one_dt", {value}) : all ? phrase("records.all_units", {value}) : value);
+      const heads = choices.map((value) => make("th", {scope: "col"}, [make("button", {type: "button", on: {click: () => this.answer(asked, name, value)}}, [named(value)])]));
       const lines = asked.map((row) => make("tr", {}, [make("th", {scope: "row"}, [row.file]),
-        ...row.choices[name].map(([, says]) => make("td", {}, [says.slice(says.indexOf(": ") + 2).replace("it lasts ", "")]))]));
+        ...row.choices[name].map(([, figures]) => make("td", {}, [phrase(`file.of_${name}`, figures)]))]));
       return [
-        make("p", {className: "derived"}, [`${asked.length === 1 ? "1 file does" : `${asked.length} files of one drop do`} not say the ${words}. Choose what is true; each column says what it makes of each file:`]),
-        make("div", {className: "scroll"}, [make("table", {className: "rows asked"}, [make("thead", {}, [make("tr", {}, [make("th", {scope: "col"}, ["File"]), ...heads])]), make("tbody", {}, lines)])]),
+        make("p", {className: "derived"}, [phrase(`records.${name}_missing`, {count: asked.length})]),
+        make("div", {className: "scroll"}, [make("table", {className: "rows asked"}, [make("thead", {}, [make("tr", {}, [make("th", {scope: "col"}, [phrase("records.file")]), ...heads])]), make("tbody", {}, lines)])]),
       ];
     }));
     one("records-missing").replaceChildren(...open);

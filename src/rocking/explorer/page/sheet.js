@@ -1,6 +1,7 @@
 // On a phone the settings are a sheet over the lower half of the page, so that the picture is seen while they are changed.
 
 import {one} from "./words.js";
+import {phrase} from "./texts.js";
 
 const PICTURES = ["stage-frame", "histories", "map", "orbit", "compare-plots"];
 
@@ -29,6 +30,6 @@ export class Sheet {
 
   named() {
     this.button.setAttribute("aria-expanded", String(this.open));
-    this.button.textContent = this.open ? "Close the settings" : "Change block and motion";
+    this.button.textContent = phrase(this.open ? "settings.close" : "settings.open");
   }
 }

@@ -1,6 +1,7 @@
 // Cases that somebody has pinned, each with a name: the storage of this origin keeps them, so that they outlive a reload.
 
 import {make, one, say} from "./words.js";
+import {phrase} from "./texts.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
 /** @typedef {{name: string, texts: Texts}} Snapshot */
@@ -27,9 +28,9 @@ export class Snapshots {
    * opens another, and what is told that others are pinned */
   constructor(page) {
     this.page = page;
-    this.name = /** @type {HTMLInputElement} */ (make("input", {type: "text", id: "pin-name", maxLength: LONGEST, hidden: true, "aria-label": "Name of the pinned case",
+    this.name = /** @type {HTMLInputElement} */ (make("input", {type: "text", id: "pin-name", maxLength: LONGEST, hidden: true, "aria-label": phrase("snapshots.name"),
       on: {keydown: (/** @type {KeyboardEvent} */ event) => this.key(event)}}));
-    this.button = /** @type {HTMLButtonElement} */ (make("button", {type: "button", id: "pin", on: {click: () => this.pin()}}, ["Pin this case"]));
+    this.button = /** @type {HTMLButtonElement} */ (make("button", {type: "button", id: "pin", on: {click: () => this.pin()}}, [phrase("snapshots.pin")]));
     this.chips = make("span", {className: "chips"});
     one("snapshots").replaceChildren(this.chips, this.name, this.button);
     this.show();
@@ -42,19 +43,19 @@ export class Snapshots {
     if (this.name.hidden) {
       this.name.value = now.name.slice(0, LONGEST);
       this.name.hidden = false;
-      this.button.textContent = "Keep under this name";
+      this.button.textContent = phrase("snapshots.keep");
       this.name.select();
       return;
     }
     const name = this.name.value.trim() || now.name;
     this.keep([...known.filter((each) => each.name !== name), {name, texts: now.texts}]);
-    say(`${name} is pinned.`);
+    say(phrase("snapshots.pinned", {name}));
     this.close();
   }
 
   close() {
     this.name.hidden = true;
-    this.button.textContent = "Pin this case";
+    this.button.textContent = phrase("snapshots.pin");
     this.button.focus();
   }
 
@@ -74,10 +75,10 @@ export class Snapshots {
 
   show() {
     this.chips.replaceChildren(...known.map((each) => make("span", {className: "chip"}, [
-      make("button", {type: "button", title: "Return to this case", on: {click: () => this.page.open({...each.texts})}}, [each.name]),
-      make("button", {type: "button", className: "remove", "aria-label": `Remove ${each.name}`, on: {click: () => this.keep(known.filter((other) => other !== each))}}, ["×"]),
+      make("button", {type: "button", title: phrase("snapshots.return"), on: {click: () => this.page.open({...each.texts})}}, [each.name]),
+      make("button", {type: "button", className: "remove", "aria-label": phrase("snapshots.remove", {name: each.name}), on: {click: () => this.keep(known.filter((other) => other !== each))}}, ["×"]),
     ])));
     this.button.disabled = known.length >= MOST;
-    this.button.title = this.button.disabled ? `The page keeps ${MOST} cases: remove one to pin another` : "";
+    this.button.title = this.button.disabled ? phrase("snapshots.full", {count: MOST}) : "";
   }
 }

@@ -1,5 +1,7 @@
 // Numbers at the ticks of an axis, as people write them: 0.003, and powers of ten only where zeros would fill the axis.
 
+import {fixed} from "./numbers.js";
+
 /** Exponents beyond which a power of ten is written. */
 const SMALLEST = -5, LARGEST = 6;
 const RAISED = "⁰¹²³⁴⁵⁶⁷⁸⁹";
@@ -25,7 +27,7 @@ export function written(values) {
   const scaled = power ? all.map((each) => Number((each / 10 ** exponent).toPrecision(12))) : all;
   const count = decimals(scaled);
   return scaled.map((each) => {
-    const text = (count || power ? each.toFixed(count) : String(Math.round(each))).replace("-", "−");
+    const text = fixed(each, count);
     return Number(each.toFixed(count)) === 0 ? "0" : power ? `${text}·10${raised(exponent)}` : text;
   });
 }

@@ -1,13 +1,14 @@
 // Units in which the page shows lengths, angles and accelerations: chosen once, and part of the address.
 
-import {make, one, short} from "./words.js";
+import {make, one} from "./words.js";
+import {NONE, short} from "./numbers.js";
+import {phrase} from "./texts.js";
 
 /** What one SI unit is in each unit, and how the page writes that. @type {Record<string, [number, string, string]>} */
 const KNOWN = {
   m: [1, "m", "m/s"], cm: [100, "cm", "cm/s"], ft: [1 / 0.3048, "ft", "ft/s"], in: [1 / 0.0254, "in", "in/s"],
   deg: [180 / Math.PI, "°", ""], rad: [1, " rad", ""], g: [1 / 9.80665, "g", ""], "m/s2": [1, "m/s²", ""],
 };
-const LABELS = /** @type {Record<string, string>} */ ({length_in: "Lengths", angle_in: "Angles", acceleration_in: "Accelerations"});
 const KINDS = /** @type {Record<string, string>} */ ({
   length: "length_in", position: "length_in", angle: "angle_in", acceleration: "acceleration_in", "acceleration at a period": "acceleration_in",
 });
@@ -40,7 +41,7 @@ export function inUnits(spec) {
 /** @param {string} name @param {number | null} value in SI units @param {number} [digits] @param {1 | 2} [which] */
 function written(name, value, digits = 3, which = 1) {
   const [scale] = KNOWN[chosen[name]], unit = KNOWN[chosen[name]][which];
-  if (value === null || !Number.isFinite(value)) return "–";
+  if (value === null || !Number.isFinite(value)) return NONE;
   return `${short(value * scale, digits)}${/^[° ]/.test(unit) ? unit : ` ${unit}`}`;
 }
 
@@ -62,11 +63,11 @@ export function unitFields(write) {
   one("units-form").replaceChildren(...Object.entries(offered).map(([name, units]) => {
     const options = units.map((each) => make("option", {value: each, selected: each === chosen[name]}, [KNOWN[each][1].trim()]));
     const select = /** @type {HTMLSelectElement} */ (make("select", {id: name, on: {change: () => { chosen[name] = select.value; write(); }}}, options));
-    return make("label", {className: "field"}, [`${LABELS[name]} in `, select]);
+    return make("label", {className: "field"}, [`${phrase(`units.${name}`)} `, select]);
   }));
 }
 
 /** What a case is called, from what the server says of it. @param {any} header */
 export function caseName({block: {sides: [{p, alpha}]}, motion}) {
-  return `p = ${short(p)} rad/s, α = ${angle(alpha)}, ${motion ? `${motion.name} ${ofG(motion.pga_g)}` : "no ground motion"}`;
+  return phrase("case.name", {p: short(p), alpha: angle(alpha), motion: motion ? phrase("case.motion", {name: motion.name, pga: ofG(motion.pga_g)}) : phrase("case.still")});
 }

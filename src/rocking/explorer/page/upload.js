@@ -3,6 +3,7 @@
 import {Problem, json} from "./api.js";
 import {specification} from "./parameters.js";
 import {one} from "./words.js";
+import {phrase} from "./texts.js";
 
 const LARGEST = 16 * 2 ** 20;
 
@@ -13,7 +14,7 @@ const useOf = (file, use) => (specification.mesh_kinds.some((/** @type {string} 
 
 /** @param {File} file @param {Use} [use] */
 export async function sendFile(file, use = "record") {
-  if (file.size > LARGEST) throw new Problem(`${file.name}: it is larger than 16 MiB; ${use === "mesh" ? "make the mesh coarser" : "cut the record into smaller files"}`);
+  if (file.size > LARGEST) throw new Problem(phrase(use === "mesh" ? "file.large_mesh" : "file.large_record", {name: file.name}));
   return json(use === "mesh" ? "/api/meshes" : "/api/records", {name: file.name}, {method: "POST", body: file});
 }
 

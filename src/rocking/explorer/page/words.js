@@ -1,4 +1,6 @@
-// Numbers and texts for people.
+// Elements of the page, and what is said in them.
+
+import {phrase} from "./texts.js";
 
 /** @template {HTMLElement} T @param {string} id @returns {T} */
 export const one = (id) => /** @type {T} */ (document.getElementById(id));
@@ -14,45 +16,6 @@ export function make(name, given = {}, inside = []) {
   made.append(...inside);
   return made;
 }
-
-/** A number to so many digits, without needless zeros and with a real minus. @param {number} value @param {number} [digits] */
-export function short(value, digits = 3) {
-  if (!Number.isFinite(value)) return "–";
-  const size = Math.abs(value);
-  const text = size !== 0 && (size < 1e-4 || size >= 1e6) ? value.toExponential(digits - 1) : String(Number(value.toPrecision(digits)));
-  return text.replace("-", "−");
-}
-
-/** A number as its field shows it; its text is sent whole. @param {number} value */
-export const shown = (value) => String(Number(value.toPrecision(4)));
-
-/** A number that was computed, without the last digits, which the computation rounds. @param {number} value */
-export const whole = (value) => String(Number(value.toPrecision(15)));
-
-const WRITTEN = /^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)\s*(\D.*?)?\s*$/i;
-
-/** The number of a text with one of these units, in the unit that is shown; NaN where there is none. Units are spelled as
- * the command line reads them. @param {string} text @param {Record<string, number>} units */
-export function measured(text, units) {
-  const [, number, spelling = ""] = WRITTEN.exec(text) ?? [];
-  const plain = spelling.toLowerCase().replaceAll("²", "2").replaceAll("⁻", "-").replace(/[\s^*._/·'’]/g, "").replaceAll("sec", "s").replaceAll("s-2", "s2");
-  return number !== undefined && Object.hasOwn(units, plain) ? Number(number) * units[plain] : NaN;
-}
-
-/** A number with so many decimals, or a dash where there is none. @param {number | null | undefined} value @param {number} digits */
-export const fixed = (value, digits) => (Number.isFinite(value) ? /** @type {number} */ (value).toFixed(digits) : "–");
-
-const UNITS = /** @type {[number, string][]} */ ([[1, "s"], [1e-3, "ms"], [1e-6, "µs"], [1e-9, "ns"], [1e-12, "ps"]]);
-
-/** A short time with its unit. @param {number} seconds */
-export function span(seconds) {
-  if (seconds === 0) return "0 s";
-  const [unit, name] = UNITS.find(([each]) => Math.abs(seconds) >= 0.9995 * each) ?? UNITS[UNITS.length - 1];
-  return `${short(seconds / unit)} ${name}`;
-}
-
-/** Decimals of times in a window of this width. @param {number} width */
-export const decimals = (width) => Math.min(15, Math.max(2, 3 - Math.floor(Math.log10(width))));
 
 /** Count on the page how often something was done, for those who wait for it. @param {string} name */
 export function counted(name) {
@@ -70,7 +33,7 @@ export function say(text) { one("said").textContent = text; }
 export function explained(words, about) {
   const text = make("p", {className: "words", hidden: true}, [words]);
   const button = make("button", {
-    type: "button", className: "what", "aria-expanded": "false", "aria-label": `What is ${about}?`,
+    type: "button", className: "what", "aria-expanded": "false", "aria-label": phrase("form.what", {what: about}),
     on: {click: () => { text.hidden = !text.hidden; button.setAttribute("aria-expanded", String(!text.hidden)); }},
   }, ["?"]);
   return [button, text];
