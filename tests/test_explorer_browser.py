@@ -19,7 +19,7 @@ import explorer_addresses
 import numpy as np
 import pytest
 import trimesh
-from explorer_browser import Watched, chromium, flags, missing, tool
+from explorer_browser import Watched, launched, missing, only_chromium, tool
 
 import rocking
 from rocking import quantities
@@ -49,7 +49,7 @@ def browser():
     except ImportError:
         missing("playwright is not installed: pip install 'rocking[browser]'")
     with sync_playwright() as player:
-        started = player.chromium.launch(executable_path=chromium(), args=flags())
+        started = launched(player)
         yield started
         started.close()
 
@@ -73,6 +73,10 @@ def contexts(browser):
     made = {}
 
     def context_with(**options):
+        if options.get("color_scheme") == "dark":
+            only_chromium("prefer dark colours")
+        if "is_mobile" in options:
+            only_chromium("be that of a phone")
         key = json.dumps(options, sort_keys=True)
         if key not in made:
             made[key] = browser.new_context(**options)
@@ -805,6 +809,7 @@ def test_the_copied_command_and_the_script_have_the_same_peak(opened, tmp_path):
 
 
 def test_every_file_can_be_taken_away(opened):
+    only_chromium("hand over what it has saved")
     page = opened(f"{SINE}&from=0.5&to=2")
     files = page.page.locator("#exports button")
     starts = {
@@ -965,6 +970,7 @@ def test_a_small_response_is_shown_where_the_pointer_lies_still(opened, explorer
 
 
 def test_a_map_is_taken_away_and_computed_again(opened, tmp_path):
+    only_chromium("hand over what it has saved")
     page = opened(f"view=map&{SINE}&points=8&x=omega&x_from=1&x_to=4&y=a&y_from=1&y_to=8&quantity=mode")
     complete(page)
     assert page.text("#python-title") == "This map as Python"
@@ -1137,6 +1143,7 @@ def test_a_diagram_is_read_by_keys_and_swept_over_the_frequency(opened):
 
 
 def test_a_diagram_is_taken_away_and_computed_again(opened, tmp_path):
+    only_chromium("hand over what it has saved")
     page = periodic(opened, f"{CASCADE}&sweep_points=100&sweep_from=1&sweep_to=7.2")
     assert page.text("#python-title") == "This diagram as Python"
     saved = {}
@@ -1307,6 +1314,7 @@ def test_units_are_chosen_once_and_in_the_address(opened):
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_a_plain_case_is_printed_on_one_light_page_without_controls(opened, scheme):
+    only_chromium("show what is printed")
     page = opened(STATUE, scheme=scheme)
     page.js("window.print = () => { document.body.dataset.printed = '1'; }; 1")
     page.page.click("#print")
@@ -1385,6 +1393,7 @@ def test_no_view_has_a_barrier(opened, viewport, scheme):
 
 
 def test_the_page_follows_the_systems_colours(opened):
+    only_chromium("prefer other colours")
     page = opened(STATUE)
     fill = f"{MODELS}.find((each) => each.type === 'Figure').background_fill_color"
     light = page.js(fill)
@@ -1480,6 +1489,11 @@ def test_every_control_shows_its_focus_and_is_large_enough(opened):
             small.add(name)
     assert len(seen) > 35
     assert faint == set() and small == set()
+
+
+def test_forced_colours_are_those_of_the_plots(opened):
+    only_chromium("force colours")
+    page = opened(f"view=block&{STATUE}")
     page.page.emulate_media(forced_colors="active")
     paper = f"{MODELS}.find((each) => each.type === 'Figure').background_fill_color"
     page.until(f"{paper}.startsWith('rgb')")
@@ -1537,6 +1551,7 @@ def test_a_lecture_shows_the_stage_large_and_says_how_much_larger_the_rotation_i
 
 
 def test_impacts_click_louder_the_faster_they_are_and_a_video_is_recorded(opened):
+    only_chromium("hand over what it has saved")
     page = opened(f"view=block&{STATUE}&from=232&to=239.7")
     page.js(
         """() => {
@@ -1778,6 +1793,7 @@ def test_a_drag_is_one_entry_and_leaves_curves_behind_for_a_second(opened):
 
 
 def test_a_pinned_case_is_returned_to_compared_with_and_kept(opened):
+    only_chromium("hand over what it has saved")
     page = opened(STATUE)
     page.page.click("#pin")
     page.page.fill("#pin-name", "as found")
