@@ -71,3 +71,57 @@ def case(draw):
 def shown(draw):
     """What an address says besides of what is shown, drawn likewise."""
     return {name: draw.choice(choices) for name, choices in _SHOWN.items() if draw.random() < 0.4}
+
+
+_SIDED = {"p": (1.5, 5.0), "alpha": (0.1, 0.35), "restitution": (0.6, 0.95)}
+_SCALINGS = ("pga", "pgv", "sa", "scale", "")
+_PULSES = (
+    "sine:amplitude={a}g,frequency={f},cycles={c},phase={d}deg", "half-sine:amplitude={a}g,frequency={f}",
+    "one-sine:amplitude={a}g,frequency={f}", "one-cosine:amplitude={a}g,frequency={f}",
+    "ricker:amplitude={a}g,frequency={f},kind=antisymmetric", "rectangular:amplitude={a}g,duration={c}",
+    "triangular:amplitude={a}g,duration={c}",
+    "mavroeidis-papageorgiou:amplitude={a},frequency={f},phase={d}deg,gamma={c}",
+)  # fmt: skip
+_HORIZONTAL = ("ridgecrest-clc-090", "ridgecrest-clc-360", "el-centro-meloland-270", "el-centro-meloland-360")
+
+
+def sound(draw, number):
+    """Texts of a case that the command line does, too: blocks and motions of every kind in turn, by a number."""
+
+    def between(low, high):
+        return repr(draw.uniform(low, high))
+
+    def pair(name):
+        return ",".join(between(*_SIDED[name]) for _ in range(2))
+
+    width = draw.uniform(0.15, 0.5)
+    block = (
+        lambda: {"width": repr(width), "height": between(0.8, 2.5)},
+        lambda: {"width": repr(width), "height": between(0.8, 2.5), "offset": repr(draw.uniform(-0.2, 0.2) * width)},
+        lambda: {name: between(*ends) for name, ends in _SIDED.items()},
+        lambda: {name: pair(name) for name in _SIDED},
+        lambda: {"pivots": f"{between(0.1, 0.2)},{between(0.1, 0.2)}", "height_of_mass": between(0.5, 0.9),
+                 "gyration": between(0.3, 0.5)},
+        lambda: {"mesh": "statue", "azimuth": repr(float(draw.randrange(360)))},
+    )[number % 6]()  # fmt: skip
+    if number % 2:
+        values = {"a": between(0.15, 0.5), "f": between(0.8, 2.5), "c": between(1.0, 2.5), "d": between(0.0, 90.0)}
+        motion = {"motion": _PULSES[number // 2 % len(_PULSES)].format(**values)}
+    else:
+        motion = {"motion": draw.choice(_HORIZONTAL)}
+        scaling = _SCALINGS[number // 2 % len(_SCALINGS)]
+        level = between(0.2, 0.7)
+        if scaling:
+            motion[scaling] = {"pga": f"{level}g", "sa": f"{level}g@{between(0.3, 1.5)}"}.get(scaling, level)
+        if number // 2 % 3 != 1:
+            motion["vertical"] = motion["motion"][:-3] + "up"
+    more = {}
+    if draw.random() < 0.4:
+        more["model"] = "linear"
+    if draw.random() < 0.3:
+        more["chattering"] = draw.choice(("velocity=0.02", "interval=0.001"))
+    if draw.random() < 0.4:
+        more |= {"initial_rotation": between(-0.04, 0.04), "initial_velocity": between(-0.2, 0.2)}
+    if number % 2 and draw.random() < 0.2:
+        more["duration"] = between(3.0, 9.0)
+    return block | motion | more

@@ -1,14 +1,27 @@
-"""Headless Chromium for tests of the explorer's page: found, started, and watched for whatever it complains of."""
+"""A headless browser for tests of the explorer's page: found, started, and watched for whatever it complains of."""
 
 import os
+import shlex
 import shutil
+import sys
+import tempfile
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 #: Set by `make browser`: then what is missing is a failure.
 REQUIRED = "ROCKING_BROWSER_REQUIRED" in os.environ
+
+#: Which browser drives the page, and the names that its program may have.
+BROWSER = os.environ.get("ROCKING_BROWSER", "chromium")
+_PROGRAMS = {
+    "chromium": ("chromium", "chromium-browser", "google-chrome"),
+    "firefox": ("firefox-esr", "firefox"),
+    "webkit": ("WebKitWebDriver",),
+}
+_PACKAGES = {"chromium": "chromium", "firefox": "firefox-esr", "webkit": "webkit2gtk-driver xvfb"}
 
 _FLAGS = (
     "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
@@ -23,18 +36,65 @@ def missing(sentence):
     pytest.skip(sentence)
 
 
-def chromium():
+def program():
     """Path of the browser."""
-    for name in ("chromium", "chromium-browser", "google-chrome"):
+    if BROWSER not in _PROGRAMS:
+        pytest.fail(f"ROCKING_BROWSER is {BROWSER!r}; it may be {', '.join(_PROGRAMS)}")
+    for name in _PROGRAMS[BROWSER]:
         found = shutil.which(name)
         if found:
             return found
-    return missing("no Chromium was found: install it (on Debian: apt install chromium)")
+    return missing(f"no {BROWSER} was found: install it (on Debian: apt install {_PACKAGES[BROWSER]})")
 
 
-def flags():
-    """Arguments of the browser; root has no sandbox."""
-    return [*_FLAGS, *(["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else [])]
+@contextmanager
+def launched():
+    """The browser, driven by Playwright."""
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError:
+        missing("playwright is not installed: pip install 'rocking[browser]'")
+    with sync_playwright() as player:
+        started = _launched(player)
+        yield started
+        started.close()
+
+
+def _launched(player):
+    """Start the browser; root has no sandbox in Chromium, and Firefox is driven as it was installed."""
+    if BROWSER == "firefox":
+        from playwright.sync_api import Locator, Page
+
+        typing(Locator)
+        typing(Page)
+        relay = Path(tempfile.mkdtemp()) / "firefox"
+        words = (sys.executable, Path(__file__).with_name("explorer_firefox.py"), program())
+        relay.write_text(f'#!/bin/sh\nexec {shlex.join(map(str, words))} "$@"\n', "utf-8")
+        relay.chmod(0o755)
+        light = {"layout.css.prefers-color-scheme.content-override": 1}
+        return player.firefox.launch(channel="moz-firefox", executable_path=relay, firefox_user_prefs=light)
+    if BROWSER == "webkit":
+        pytest.skip("Playwright drives no WebKit that comes from a distribution; see test_explorer_webkit.py")
+    root = hasattr(os, "geteuid") and os.geteuid() == 0
+    return player.chromium.launch(executable_path=program(), args=[*_FLAGS, *(["--no-sandbox"] if root else [])])
+
+
+def typing(locator):
+    """Let a class of Playwright fill fields by keys where else no `change` follows, as it does when a person types."""
+
+    def fill(here, *where_and_text):
+        *where, text = where_and_text
+        field = here.locator(*where) if where else here
+        field.press("Control+a")
+        field.press("Delete") if text == "" else field.press_sequentially(text)
+
+    locator.fill = fill
+
+
+def only_chromium(what):
+    """Leave a test out in a browser that cannot be told to do something."""
+    if BROWSER != "chromium":
+        pytest.skip(f"{BROWSER.capitalize()} cannot be told to {what}")
 
 
 def tool(path):

@@ -19,7 +19,7 @@ import explorer_addresses
 import numpy as np
 import pytest
 import trimesh
-from explorer_browser import Watched, chromium, flags, missing, tool
+from explorer_browser import Watched, launched, only_chromium, tool
 from explorer_texts import in_english
 
 import rocking
@@ -36,23 +36,21 @@ pytestmark = pytest.mark.browser
 STATUE = "width=0.24&height=1.1&motion=ridgecrest-clc-090&pga=0.4g"
 SINE = "p=2&alpha=0.2&restitution=0.92&motion=sine:amplitude%3D2.02,frequency%3D0.6366197723675814,cycles%3D2.5"
 DESK, PHONE = {"width": 1280, "height": 900}, {"width": 390, "height": 844}
+RECORDS = "%3B".join(
+    f"motion%3D{name}" for name in ("el-centro-meloland-270", "el-centro-meloland-360", "ridgecrest-clc-360")
+)
 #: All models of the plotting library on the page.
 MODELS = "Bokeh.documents.flatMap((each) => [...each._all_models.values()])"
 VIEWS = ("response", "block", "map", "periodic", "compare")
+READY = "document.body?.dataset.ready && document.body.dataset.rested"
 #: Fields that are marked as wrong.
 MARKED = "Array.from(document.querySelectorAll('[aria-invalid=true]'), (each) => each.id)"
 
 
 @pytest.fixture(scope="module")
 def browser():
-    try:
-        from playwright.sync_api import sync_playwright
-    except ImportError:
-        missing("playwright is not installed: pip install 'rocking[browser]'")
-    with sync_playwright() as player:
-        started = player.chromium.launch(executable_path=chromium(), args=flags())
+    with launched() as started:
         yield started
-        started.close()
 
 
 @pytest.fixture(scope="module")
@@ -74,6 +72,10 @@ def contexts(browser):
     made = {}
 
     def context_with(**options):
+        if options.get("color_scheme") == "dark":
+            only_chromium("prefer dark colours")
+        if "is_mobile" in options:
+            only_chromium("be that of a phone")
         key = json.dumps(options, sort_keys=True)
         if key not in made:
             made[key] = browser.new_context(**options)
@@ -805,7 +807,34 @@ def test_the_copied_command_and_the_script_have_the_same_peak(opened, tmp_path):
     assert peak_shown(page) == pytest.approx(json.loads(ran.stdout)["peak_over_slenderness"], rel=2e-3)
 
 
+def test_ten_random_states_show_what_their_commands_print(opened, here, run):
+    page, judged = opened(STATUE), 0
+    for number in range(10):
+        texts = explorer_addresses.sound(random.Random(number), number)
+        page.page.goto(here.link(texts))
+        page.until(READY, texts)
+        asked = "import('/page/api.js').then(({payload}) => payload('/api/case', %s)).then(({header}) => header)"
+        header = page.js(asked % "Object.fromEntries(new URLSearchParams(location.search))")
+        page.page.click("#in-words summary")
+        page.until("document.querySelectorAll('#words tr').length > 5")
+        words = (
+            "Array.from(document.querySelectorAll('#words tr'), (row) => Array.from(row.cells, (e) => e.textContent))"
+        )
+        command = shlex.split(page.until("document.getElementById('command').textContent"))
+        found = run(*command[1:], "--json", "--quiet")
+        assert found[0] == 0 and found[2] == "", texts
+        assert json.loads(found[1])["peak_rotation_rad"] == header["peak_rotation"], texts
+        assert page.text("#verdict") == in_english(header["verdict"]), texts
+        printed = " ".join(run(*command[1:])[1].split())
+        # A mesh is written as its pivots, so that its block is called otherwise.
+        rows = page.js(words)[1 if "mesh" in texts else 0 :]
+        assert printed.endswith(" ".join(" ".join(row).strip() for row in rows)), texts
+        judged += 1
+    assert judged == 10
+
+
 def test_every_file_can_be_taken_away(opened):
+    only_chromium("hand over what it has saved")
     page = opened(f"{SINE}&from=0.5&to=2")
     files = page.page.locator("#exports button")
     starts = {
@@ -966,6 +995,7 @@ def test_a_small_response_is_shown_where_the_pointer_lies_still(opened, explorer
 
 
 def test_a_map_is_taken_away_and_computed_again(opened, tmp_path):
+    only_chromium("hand over what it has saved")
     page = opened(f"view=map&{SINE}&points=8&x=omega&x_from=1&x_to=4&y=a&y_from=1&y_to=8&quantity=mode")
     complete(page)
     assert page.text("#python-title") == "This map as Python"
@@ -1138,6 +1168,7 @@ def test_a_diagram_is_read_by_keys_and_swept_over_the_frequency(opened):
 
 
 def test_a_diagram_is_taken_away_and_computed_again(opened, tmp_path):
+    only_chromium("hand over what it has saved")
     page = periodic(opened, f"{CASCADE}&sweep_points=100&sweep_from=1&sweep_to=7.2")
     assert page.text("#python-title") == "This diagram as Python"
     saved = {}
@@ -1308,6 +1339,7 @@ def test_units_are_chosen_once_and_in_the_address(opened):
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_a_plain_case_is_printed_on_one_light_page_without_controls(opened, scheme):
+    only_chromium("show what is printed")
     page = opened(STATUE, scheme=scheme)
     page.js("window.print = () => { document.body.dataset.printed = '1'; }; 1")
     page.page.click("#print")
@@ -1328,6 +1360,22 @@ def test_a_plain_case_is_printed_on_one_light_page_without_controls(opened, sche
     assert (page.js(figure) == "#ffffff") == (scheme == "light")
 
 
+@pytest.mark.parametrize(
+    "query", [f"view=assessment&levels=6&records={RECORDS}", "view=block"], ids=["assessment", "block"]
+)
+def test_an_assessment_and_a_block_are_printed_on_one_page_with_their_keys(opened, query):
+    only_chromium("show what is printed")
+    page = opened(f"{STATUE}&{query}")
+    page.until("document.body.dataset.assessment === 'complete'" if "records" in query else "true")
+    page.js("window.print = () => { document.body.dataset.printed = '1'; }; 1")
+    page.page.click("#print")
+    page.until("document.body.dataset.printed", "the page is ready to be printed")
+    assert len(re.findall(rb"/Type\s*/Page\b", page.page.pdf(prefer_css_page_size=True))) == 1
+    page.page.emulate_media(media="print")
+    keys = "Array.from(document.querySelectorAll('.key'), (each) => getComputedStyle(each).printColorAdjust)"
+    assert set(page.js(keys)) == {"exact"}
+
+
 # People
 
 
@@ -1344,6 +1392,7 @@ COMPUTED = {
     "periodic": "document.body.dataset.sweep === 'complete'",
     "compare": "document.querySelectorAll('#schemes tbody tr').length > 5",
     "assessment": "document.body.dataset.assessment === 'complete'",
+    "records": "document.querySelectorAll('[data-record]').length > 5",
 }
 
 
@@ -1354,7 +1403,7 @@ def test_no_view_has_a_barrier(opened, viewport, scheme):
     page = opened(f"view=response&points=24&{SINE}", viewport, scheme, bypass_csp=True, allowed=["422"])
     page.js(axe + "; 1")
     judged = []
-    for view in VIEWS:
+    for view in (*VIEWS, "records", "assessment"):
         page.page.click(f"[data-view={view}]")
         page.until(COMPUTED.get(view, "true"))
         page.page.wait_for_timeout(300)
@@ -1382,10 +1431,17 @@ def test_no_view_has_a_barrier(opened, viewport, scheme):
         page.page.click(f"[data-view={view}]")
         assert barriers(page) == [], f"{view}, dimmed"
         judged.append(view)
-    assert len(judged) == 2 * len(VIEWS)
+    page.page.click("#to-examples")
+    page.until("document.querySelectorAll('#examples-list button').length > 5")
+    assert barriers(page) == [], "examples"
+    page.page.click("#examples-list button")
+    page.until("!document.getElementById('example').hidden")
+    assert barriers(page) == [], "a step of an example"
+    assert len(judged) == 2 * len(VIEWS) + 2
 
 
 def test_the_page_follows_the_systems_colours(opened):
+    only_chromium("prefer other colours")
     page = opened(STATUE)
     fill = f"{MODELS}.find((each) => each.type === 'Figure').background_fill_color"
     light = page.js(fill)
@@ -1481,6 +1537,11 @@ def test_every_control_shows_its_focus_and_is_large_enough(opened):
             small.add(name)
     assert len(seen) > 35
     assert faint == set() and small == set()
+
+
+def test_forced_colours_are_those_of_the_plots(opened):
+    only_chromium("force colours")
+    page = opened(f"view=block&{STATUE}")
     page.page.emulate_media(forced_colors="active")
     paper = f"{MODELS}.find((each) => each.type === 'Figure').background_fill_color"
     page.until(f"{paper}.startsWith('rgb')")
@@ -1538,6 +1599,7 @@ def test_a_lecture_shows_the_stage_large_and_says_how_much_larger_the_rotation_i
 
 
 def test_impacts_click_louder_the_faster_they_are_and_a_video_is_recorded(opened):
+    only_chromium("hand over what it has saved")
     page = opened(f"view=block&{STATUE}&from=232&to=239.7")
     page.js(
         """() => {
@@ -1679,8 +1741,6 @@ def test_a_foreign_page_cannot_show_the_explorer_in_a_frame(browser, here, opene
 
 # The secret
 
-READY = "document.body?.dataset.ready && document.body.dataset.rested"
-
 
 def test_a_reload_another_tab_and_the_way_back_know_the_secret_and_no_other_port_is_told(browser, here):
     context = browser.new_context(viewport=DESK)
@@ -1779,6 +1839,7 @@ def test_a_drag_is_one_entry_and_leaves_curves_behind_for_a_second(opened):
 
 
 def test_a_pinned_case_is_returned_to_compared_with_and_kept(opened):
+    only_chromium("hand over what it has saved")
     page = opened(STATUE)
     page.page.click("#pin")
     page.page.fill("#pin-name", "as found")

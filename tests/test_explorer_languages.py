@@ -5,7 +5,7 @@ import re
 from urllib.parse import parse_qsl, urlencode
 
 import pytest
-from explorer_browser import Watched, chromium, flags, missing
+from explorer_browser import Watched, launched
 
 import rocking
 from rocking.explorer.assessment import RULES
@@ -63,14 +63,8 @@ def marked(text):
 
 @pytest.fixture(scope="module")
 def browser():
-    try:
-        from playwright.sync_api import sync_playwright
-    except ImportError:
-        missing("playwright is not installed: pip install 'rocking[browser]'")
-    with sync_playwright() as player:
-        started = player.chromium.launch(executable_path=chromium(), args=flags())
+    with launched() as started:
         yield started
-        started.close()
 
 
 @pytest.fixture

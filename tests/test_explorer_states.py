@@ -1,0 +1,56 @@
+"""States of the page drawn at random: what it shows is what the command that it hands out prints, to the last digit."""
+
+import json
+import random
+import shlex
+
+import explorer_addresses
+import pytest
+
+from rocking.explorer.core import Explorer
+
+#: Numbers of the page, and what the command's result calls them.
+NUMBERS = {
+    "peak_rotation": "peak_rotation_rad",
+    "peak_over_slenderness": "peak_over_slenderness",
+    "peak_time": "peak_time_s",
+    "overturned": "overturned",
+    "overturn_time": "overturn_time_s",
+    "tipping_time": "tipping_time_s",
+    "unfinished": "unfinished",
+    "duration": "duration_s",
+    "impacts": "impacts_resolved",
+    "time_at_rest": "time_at_rest_s",
+}
+
+
+@pytest.fixture(scope="module")
+def explorer():
+    return Explorer()
+
+
+@pytest.mark.parametrize(
+    "numbers",
+    [range(10), pytest.param(range(10, 90), marks=pytest.mark.thorough)],
+    ids=["ten states", "many states"],
+)
+def test_random_states_are_what_their_commands_print(explorer, run, numbers):
+    judged, fates = 0, set()
+    for number in numbers:
+        texts = explorer_addresses.sound(random.Random(number), number)
+        header = explorer.case(texts).header
+        words = shlex.split(explorer.code(texts)["command"])
+        code, out, err = run(*words[1:], "--json", "--quiet")
+        assert (words[0], code, err) == ("rocking", 0, ""), texts
+        result = json.loads(out)
+        # JSON has no number for what is not finite: it is none in a result, and a header is sent so, too.
+        shown = json.loads(json.dumps({name: _finite(header[name]) for name in NUMBERS}))
+        assert shown == {name: result[called] for name, called in NUMBERS.items()}, texts
+        assert header["rests"] == sum(each["kind"] == "rest" for each in result["events"]), texts
+        fates.add((header["overturned"], header["rests"] > 0, header["impacts"] > 0))
+        judged += 1
+    assert judged == len(numbers) >= 10 and len(fates) >= 3
+
+
+def _finite(value):
+    return None if isinstance(value, float) and not abs(value) < float("inf") else value
