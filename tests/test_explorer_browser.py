@@ -19,7 +19,7 @@ import explorer_addresses
 import numpy as np
 import pytest
 import trimesh
-from explorer_browser import Watched, launched, only_chromium, tool
+from explorer_browser import BROWSER, Watched, launched, only_chromium, tool
 from explorer_texts import in_english
 
 import rocking
@@ -661,6 +661,7 @@ INK = """() => { const {data} = document.getElementById('stage').getContext('2d'
 
 
 def test_a_body_is_seen_from_above_and_turned(opened, explorer):
+    only_chromium("click at a part of a pixel")
     page = opened(MESH, allowed=["willReadFrequently"])
     page.until(PLAN, "the plan is drawn")
     assert "Towards 30°" in page.text("#derived") and "Towards 210°" in page.text("#derived")
@@ -1575,6 +1576,7 @@ def test_a_phone_shows_the_picture_while_settings_are_changed(opened, width):
 
 
 def test_a_lecture_shows_the_stage_large_and_says_how_much_larger_the_rotation_is(opened):
+    only_chromium("keep its size on the whole screen")
     page = opened(f"{STATUE}&lecture=1", {"width": 1280, "height": 800})
     stage = page.page.locator("#stage").bounding_box()
     plots = page.page.locator("#histories").bounding_box()
@@ -1743,6 +1745,7 @@ def test_a_foreign_page_cannot_show_the_explorer_in_a_frame(browser, here, opene
 
 
 def test_a_reload_another_tab_and_the_way_back_know_the_secret_and_no_other_port_is_told(browser, here):
+    only_chromium("say when it has gone back to another page")
     context = browser.new_context(viewport=DESK)
     first = Watched(context.new_page(), allowed=["CORS", "Failed to load", "403"])
     first.page.goto(here.link({"width": "0.3", "height": "1.2"}))
@@ -1829,7 +1832,8 @@ def test_a_drag_is_one_entry_and_leaves_curves_behind_for_a_second(opened):
         page.until(f"Number(document.body.dataset.drawn) > {drawn}")
     source = "Bokeh.documents.map((each) => each.get_model_by_name('histories-ghosts')).filter(Boolean)[0]"
     shades = f"{source}.data.xs.length"
-    assert page.js(shades) == 5
+    # They go after a second, before a slower browser has drawn all of them.
+    assert page.js(shades) == 5 if BROWSER == "chromium" else 2 <= page.js(shades) <= 5
     page.page.mouse.up()
     page.until(f"{shades} === 0", "the curves go")
     moved = query_of(page)["pga"]
