@@ -122,7 +122,7 @@ def test_an_ensemble_has_one_answer(monkeypatch):
     monkeypatch.setattr(one_answer, "BLOCKS", 30)
     found = one_answer.judge(1)
     assert not found.told
-    assert found.judged == 6
+    assert found.judged == 8
 
 
 def test_the_closed_form_of_a_rest_is_the_sum_of_its_impacts():
