@@ -89,6 +89,19 @@ def test_without_a_place_kernels_are_compiled_all_the_same(places: Path) -> None
     assert twice(21.0) == 42.0
 
 
+def test_a_process_whose_sources_have_changed_keeps_nothing(places: Path) -> None:
+    """What it compiles then is of the old sources, and would lie in the folder of the new ones."""
+    source = places / "package" / "twice.py"
+    source.write_text("def twice(x): return 2.0 * x")
+    assert compiled.cache_folder() is not None
+    source.write_text("def twice(x): return 3.0 * x")
+    compiled.cache_folder.cache_clear()
+    assert compiled.cache_folder() is None
+    source.write_text("def twice(x): return 2.0 * x")
+    compiled.cache_folder.cache_clear()
+    assert compiled.cache_folder() is not None
+
+
 def test_the_fingerprint_changes_with_the_content_of_any_kernel(places: Path) -> None:
     package = places / "package"
     shutil.copytree(KERNELS, package, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))

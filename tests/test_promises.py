@@ -6,7 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import verify
-from promises import ALL, chattering, containment, events, exact, one_answer
+from oracles import leapfrog, multiprecision
+from oracles.problem import Problem, linear_record
+from promises import ALL, chattering, containment, cross_code, events, exact, one_answer
 from promises.promise import Found, Promise
 
 ROOT = Path(__file__).parents[1]
@@ -66,11 +68,61 @@ def test_every_rest_is_in_its_bracket_at_a_bounded_cost(monkeypatch, cases):
 
 
 @pytest.mark.thorough
+def test_another_code_agrees_on_whole_analyses(monkeypatch):
+    monkeypatch.setattr(cross_code, "BLOCKS", 30)
+    found = cross_code.judge(3)
+    found.add(cross_code.judge(4))
+    assert not found.told
+    assert found.judged >= 55
+    assert sum(found.notes[f"{row}: impacts"] for row in ("record, nonlinear", "noise, linear")) >= 1000
+    assert found.worst <= 1.0
+
+
+@pytest.mark.parametrize(("change", "says"), [("peak", "peak"), ("overturned", "overturned")])
+def test_another_answer_of_another_code_would_be_found(monkeypatch, change, says):
+    """Whatever the other code says of blocks that stay, another peak, or another verdict, is told."""
+    monkeypatch.setattr(cross_code, "BLOCKS", 2)
+    blocks, shaking, model = cross_code.drawn(2)
+    still = cross_code.Shaking("noise", shaking.step, 1e-3 * shaking.across, shaking.up)
+    monkeypatch.setattr(cross_code, "drawn", lambda part: (blocks, still, model))
+    answer = {"overturned": False, "peak": 0.0, "impacts": 0, "rests": 0}
+    monkeypatch.setattr(leapfrog, "follow", lambda *given, **more: leapfrog.Outcome(**answer))
+    assert not cross_code.judge(2).told
+    answer[change] = {"peak": 1e-6, "overturned": True}[change]
+    found = cross_code.judge(2)
+    assert found.failures == 4  # two blocks, alone and in an ensemble
+    assert all(says in told for told in found.told)
+
+
+@pytest.mark.thorough
+def test_the_other_code_agrees_with_many_digits():
+    """Short records of all kinds; what does not overturn has the same peak to some thousand units of rounding."""
+    worst, moved, fell = 0.0, 0, 0
+    for number in range(24):
+        rng = np.random.default_rng([67, number])
+        p, alpha, e = (tuple(rng.uniform(low, high, 2).tolist()) for low, high in ((1, 6), (0.1, 0.3), (0.5, 0.9)))
+        step, count, model = 0.05, int(rng.integers(10, 40)), ("linear", "nonlinear")[number % 2]
+        across = 9.80665 * min(alpha) * np.append(rng.normal(0.0, rng.uniform(0.8, 2.0), count), 0.0)
+        up = 9.80665 * np.append(rng.uniform(-0.5, 0.5, count) * (number % 3 == 0), 0.0)
+        found = leapfrog.follow(model, p, alpha, e, step, across, up)
+        problem = Problem(model, p, alpha, e, *linear_record(across, step), vertical=linear_record(up, step))
+        true = multiprecision.follow(problem, closest=1e-6, digits=32)
+        assert found.overturned == true.overturned
+        assert found.rests == sum(event[1] == "rest" for event in true.events)
+        moved, fell = moved + (true.peak > 0), fell + true.overturned
+        if not true.overturned:
+            worst = max(worst, abs(found.peak - float(true.peak)))
+    assert moved >= 20
+    assert fell >= 2
+    assert worst < 1e-12
+
+
+@pytest.mark.thorough
 def test_an_ensemble_has_one_answer(monkeypatch):
     monkeypatch.setattr(one_answer, "BLOCKS", 30)
     found = one_answer.judge(1)
     assert not found.told
-    assert found.judged == 6
+    assert found.judged == 8
 
 
 def test_the_closed_form_of_a_rest_is_the_sum_of_its_impacts():

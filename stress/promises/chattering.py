@@ -105,7 +105,7 @@ def table(found: Found) -> str:
 PROMISE = Promise(
     name="chattering",
     says="rest inside its bracket, at a bounded cost",
-    parts=50,
+    parts=26,
     small=1,
     judge=judge,
     table=table,

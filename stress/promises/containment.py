@@ -1,4 +1,4 @@
-"""Rotation, event times, peaks and brackets of random responses, against 40 digits.
+"""Rotation, event times, peaks and brackets of random responses, against 32 digits.
 
 What is drawn, and what is compared, is in `tests/oracles/vertical_referee.py`: every other case has a vertical
 component. An error may be 8 times what one unit in the last place of everything given changes, by the response's own
@@ -11,7 +11,7 @@ from oracles import vertical_referee
 
 from promises.promise import Found, Promise
 
-#: Cases of a part, some ten seconds of processor time.
+#: Cases of a part, some six seconds of processor time.
 CASES = 200
 
 
@@ -43,7 +43,7 @@ def table(found: Found) -> str:
     counts = found.notes
     return (
         f"Of {found.cases} cases {counts['ambiguous']} call themselves ambiguous and {counts['skipped']} were refused "
-        f"or could not be followed in 40 digits; of the others {counts['overturned']} overturn and {counts['still']} "
+        f"or could not be followed in 32 digits; of the others {counts['overturned']} overturn and {counts['still']} "
         f"never lift off. Compared were {counts['impacts']} times of impacts, {counts['rotations']} rotations and "
         f"{counts['brackets']} brackets.\n"
     )
@@ -52,7 +52,7 @@ def table(found: Found) -> str:
 PROMISE = Promise(
     name="containment",
     says="rotation, times and peak within the stated error",
-    parts=150,
+    parts=500,
     small=3,
     judge=judge,
     least=0.85,

@@ -313,7 +313,7 @@ def table(found: Found) -> str:
 PROMISE = Promise(
     name="events",
     says="no event missed, none made up",
-    parts=40,
+    parts=72,
     small=1,
     judge=judge,
     least=0.85,

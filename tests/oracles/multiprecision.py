@@ -32,6 +32,7 @@ HIGHEST_ORDER = 400
 MOST_STEPS = 20_000
 GRID = np.unique(np.concatenate([[0.0], 2.0 ** -np.arange(1.0, 60.0), np.linspace(0.0, 1.0, 257)]))
 """Where series are first looked at, in shares of a span: an arc can end long before its series loses reach."""
+POWERS = GRID[:, np.newaxis] ** np.arange(HIGHEST_ORDER + 2)
 FINER = 64
 """Into so many parts an interval of the grid is divided where a curve may dip below zero between its ends."""
 
@@ -244,8 +245,7 @@ class _Follower:
         speed = abs(float(v))
         radius = min(longest, 4.0 / p) / self.reach
         while True:
-            most = arm * np.polynomial.polynomial.polyval(radius, weights)
-            most += arms * np.polynomial.polynomial.polyval(radius, pushes)
+            most = arm * _horner(weights, radius) + arms * _horner(pushes, radius)
             if speed * radius + 0.5 * p * p * most * radius * radius <= 0.99:
                 return float(radius)
             radius *= 0.8
@@ -331,11 +331,14 @@ class _Remainder:
 
     def is_negligible(self, series: list[arb]) -> bool:
         """Of the velocity times the span; beside its largest term, or beside (a digit to the power of) two."""
-        while self.order < len(series) - 1:
+        count = len(series)
+        left_out = count * self.ratio + log(2.0 * (count + 1))
+        if left_out > self.wanted:  # no term is larger than one
+            return False
+        while self.order < count - 1:
             self.order += 1
             self.power *= self.span
             self.largest = max(self.largest, self.order * abs(float(series[self.order])) * self.power)
-        left_out = (self.order + 1) * self.ratio + log(2.0 * (self.order + 2))
         return left_out <= max(self.wanted + log(self.largest) if self.largest > 0.0 else -inf, 2.5 * self.wanted)
 
 
@@ -381,6 +384,13 @@ def _shifted(coefficients: NDArray[np.float64], offset: arb) -> list[arb]:
     return shifted
 
 
+def _horner(coefficients: list[float], x: float) -> float:
+    total = 0.0
+    for c in reversed(coefficients):
+        total = total * x + c
+    return total
+
+
 def _derivative(series: list[arb]) -> list[arb]:
     return [n * c for n, c in enumerate(series)][1:]
 
@@ -421,7 +431,7 @@ def _fallings(series: list[arb], span: arb) -> list[tuple[arb, arb]]:
     if size == 0:
         return []
     doubles = np.array([float(c / size) for c in scaled])
-    values = np.polynomial.polynomial.polyval(GRID, doubles)
+    values = POWERS[:, : len(doubles)] @ doubles
     values[0] = 1.0 if values[1] > 0.0 else values[0]
     grid, values = _refined(doubles, values)
     falling = np.flatnonzero((values[:-1] > 0.0) & (values[1:] <= 0.0))

@@ -1,7 +1,7 @@
 """Random blocks under horizontal and vertical motion, and single responses judged by many digits.
 
 A case is drawn from a seed and a number: `case(seed, number)` gives the same one again. `judge` simulates it, follows
-it in 40 digits by `multiprecision`, and compares all that a response says. Errors may be as large as a few units in
+it in 32 digits by `multiprecision`, and compares all that a response says. Errors may be as large as a few units in
 the last place of what was given explain, by the response's own sensitivity; what calls itself ambiguous is not judged.
 """
 
@@ -23,7 +23,7 @@ from oracles.problem import Problem
 
 GRAVITY = 9.80665
 ULP = 2.0**-52
-DIGITS = 40
+DIGITS = 32
 """Errors of the oracle grow along a response as the response's own do: by less than 1e10 unless it is ambiguous."""
 UNITS = 8.0
 """Errors are at most this many times what one unit in the last place of all that was given changes."""
@@ -487,7 +487,7 @@ class _Judge:
 
     def ensemble(self) -> None:
         """An ensemble of this block alone says the same, also where it steps in lanes."""
-        together = rocking.simulate_many(self.given.block, self.given.motion, model=self.given.model)
+        together = rocking.simulate_many(self.given.block, self.given.motion, model=self.given.model, threads=1)
         overturned, peak = bool(together.overturned.item()), float(together.peak_rotation.item())
         if overturned != self.course.overturned:
             self.fault("verdict of an ensemble", overturned, self.course.overturned)

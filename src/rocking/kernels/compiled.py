@@ -34,6 +34,9 @@ before_compiling: list[Callable[[], None]] = []
 
 _ONE_AT_A_TIME = threading.RLock()
 
+#: Sources of kernels, by their folder, as they were when this process began to import them.
+_imported = {_HERE: sources(_HERE)}
+
 
 class OnUse:
     """A function that is compiled when it is first needed, by a call or by a kernel that calls it."""
@@ -138,12 +141,16 @@ def _part(function: F, *, inline: bool) -> F:
 
 @functools.cache
 def cache_folder() -> Path | None:
-    """Folder for what is compiled from exactly these sources; None where nothing can be written.
+    """Folder for what is compiled from exactly these sources; None where nothing can be written, or they have changed.
 
     numba checks the file of an entry point only, and would use old code when another kernel that it calls has changed.
     So the folder's name is a hash of all of them. numba writes its files under another name and renames them, so that
-    any number of processes may share the folder.
+    any number of processes may share the folder. A process that has imported what the files no longer say keeps
+    nothing: others would take it for code of the new sources.
     """
+    now = sources(_HERE)
+    if _imported.setdefault(_HERE, now) != now:
+        return None
     name = f"kernels-{fingerprint()}"
     for parent in _parents():
         folder = parent / name
