@@ -1,12 +1,15 @@
 """Promises on files, the page's server, interrupts and full disks at a small size; and what they once found."""
 
 import io
+import itertools
 import random
+import sys
 
 import numpy as np
 import pytest
 from oracles import record_files, spoilt_files, stated_records
-from promises import reading
+from promises import reading, serving, soak
+from promises.promise import Found
 
 import rocking
 from rocking.analysis.input_tables import read_tests
@@ -104,3 +107,42 @@ def test_a_rate_of_an_endless_intensity_is_refused_without_a_warning(tmp_path):
     file.write_text("pga_g,annual_rate\n0.1,0.1\n1e308,0.01\n")
     with pytest.raises(InvalidOption):
         rocking.HazardCurve.read(file)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are looked at as Linux shows them")
+@pytest.mark.thorough
+def test_the_server_answers_as_its_table_says(monkeypatch):
+    monkeypatch.setattr(serving, "REQUESTS", 60)
+    monkeypatch.setattr(serving, "NAMES", 8)
+    monkeypatch.setattr(serving, "CONNECTIONS", 0)
+    found = serving.judge(0)
+    assert not found.told
+    assert found.judged >= 60 + 8 * 3
+
+
+def test_the_table_of_the_server_names_every_kind_of_answer():
+    drawn = itertools.product(["GET", "POST"], serving.ROUTES, serving._HOSTS, serving._ORIGINS, serving._CARRIED)
+    answers = {serving.specified(*each) for each in drawn}
+    assert answers == {200, 403, 404, 405, 421, 422}
+    assert serving.specified("GET", "/", "evil.example:{}", None, None) == 421
+    assert serving.specified("GET", "/api/start", "localhost:{}", None, None) == 403
+    assert serving.specified("POST", "/api/start", "localhost:{}", "own", "Bearer {secret}") == 405
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is looked at as Linux shows it")
+def test_memory_and_descriptors_that_grow_are_told(tmp_path):
+    kept, opened = [], []
+
+    def grows(_):
+        kept.append(np.ones(2**19))
+        opened.append((tmp_path / "file").open("w"))
+        return 1
+
+    found = Found()
+    soak._judge_rounds(found, "work", grows, "self", 8)
+    for file in opened:
+        file.close()
+    assert len(found.told) == 2
+    calm = Found()
+    soak._judge_rounds(calm, "work", lambda _: 1, "self", 8)
+    assert not calm.told and calm.judged == 2 and calm.notes["work"] == 8

@@ -1,5 +1,7 @@
 """The promises of docs/reliability.md, a module each: a `Promise` made of parts that can be judged one by one."""
 
-from promises import chattering, containment, events, one_answer, reading
+from promises import chattering, containment, events, one_answer, reading, serving, soak
 
-ALL = {each.PROMISE.name: each.PROMISE for each in (containment, events, chattering, one_answer, reading)}
+_MODULES = (containment, events, chattering, one_answer, reading, serving, soak)
+
+ALL = {each.PROMISE.name: each.PROMISE for each in _MODULES}
