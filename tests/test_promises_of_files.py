@@ -8,14 +8,15 @@ import sys
 import numpy as np
 import pytest
 from oracles import record_files, spoilt_files, stated_records
-from promises import reading, serving, soak
+from promises import commands, full_disk, interrupts, reading, serving, soak
 from promises.promise import Found
 
 import rocking
 from rocking.analysis.input_tables import read_tests
-from rocking.errors import InvalidOption, RockingError, UnreadableRecord
+from rocking.errors import InvalidOption, OutputError, RockingError, UnreadableRecord
 from rocking.quantities import values
 from rocking.studies import read_study
+from rocking.tables import write_text
 
 
 @pytest.mark.parametrize("cases", [60, pytest.param(600, marks=pytest.mark.thorough)])
@@ -146,3 +147,53 @@ def test_memory_and_descriptors_that_grow_are_told(tmp_path):
     calm = Found()
     soak._judge_rounds(calm, "work", lambda _: 1, "self", 8)
     assert not calm.told and calm.judged == 2 and calm.notes["work"] == 8
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processor time of another process is read as on Linux")
+@pytest.mark.thorough
+def test_an_interrupt_ends_a_command_with_one_sentence(tmp_path):
+    found = Found()
+    one = interrupts.ended("simulate", tmp_path, 0.5)
+    interrupts._judge_end(found, "simulate", one, tmp_path / "out", {})
+    assert not found.told
+    assert found.notes["interrupted"] == 1
+
+
+def test_an_end_that_is_not_as_promised_is_told(tmp_path):
+    (tmp_path / "result.json").write_text('{"half"')
+    (tmp_path / ".response.part.csv").write_text("")
+    found = Found()
+    one = interrupts.Ended(1, b"", b"Traceback\nKeyboardInterrupt\n", 9.0, 8.0)
+    interrupts._judge_end(found, "simulate", one, tmp_path, {"result.json": b"{}"})
+    assert found.failures == 4  # too late, a file left, one that does not open, and no sentence
+
+
+def test_whole_files_are_told_from_damaged_ones(tmp_path):
+    whole = {"a.json": b"{}", "a.csv": b"x,y\n1,2\n", "a.png": b"IEND\xaeB\x60\x82", "a.pdf": b"%%EOF\n"}
+    for name, content in whole.items():
+        (tmp_path / name).write_bytes(content)
+    assert commands.faults(tmp_path, whole) == []
+    for name, content in whole.items():
+        (tmp_path / name).write_bytes(content[: len(content) // 2])
+    assert len(commands.faults(tmp_path, whole)) == len(whole)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="where a descriptor leads is read as on Linux")
+@pytest.mark.parametrize("kind", full_disk.KINDS)
+def test_a_full_disk_is_met_at_the_call_that_was_chosen(tmp_path, kind):
+    disk = full_disk.FullDisk(tmp_path, kind, 3 if kind == "open" else 2)  # a file is opened to flush it as well
+    with disk.in_place():
+        write_text(tmp_path / "first.txt", "one")
+        with pytest.raises(OutputError, match="No space left on device"):
+            write_text(tmp_path / "second.txt", "two")
+    assert disk.failed
+    assert [path.name for path in tmp_path.iterdir()] == ["first.txt"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="where a descriptor leads is read as on Linux")
+@pytest.mark.thorough
+def test_a_study_goes_on_after_a_full_disk(monkeypatch):
+    monkeypatch.setattr(full_disk, "MOST", 1)
+    found = full_disk.judge([*commands.COMMANDS].index("study run"))
+    assert not found.told
+    assert found.judged == len(full_disk.KINDS)

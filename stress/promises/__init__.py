@@ -1,7 +1,17 @@
 """The promises of docs/reliability.md, a module each: a `Promise` made of parts that can be judged one by one."""
 
-from promises import chattering, containment, events, one_answer, reading, serving, soak
+from promises import (
+    chattering,
+    containment,
+    events,
+    full_disk,
+    interrupts,
+    one_answer,
+    reading,
+    serving,
+    soak,
+)
 
-_MODULES = (containment, events, chattering, one_answer, reading, serving, soak)
+_MODULES = (containment, events, chattering, one_answer, reading, serving, soak, interrupts, full_disk)
 
 ALL = {each.PROMISE.name: each.PROMISE for each in _MODULES}
