@@ -14,6 +14,7 @@ import pytest
 
 import rocking
 from rocking.cli import app
+from rocking.errors import INTERRUPTED
 
 BLOCK = ["--half-width", "0.12", "--half-height", "0.55"]
 RECORD = "el-centro-meloland-270"
@@ -170,6 +171,19 @@ def test_a_closed_pipe_is_no_traceback():
         assert b"Traceback" not in process.stderr.read()
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
+@pytest.mark.parametrize("is_small", [True, False])
+def test_a_full_disk_behind_the_output_is_one_sentence(is_small):
+    """What is printed is written when it is much, or else at the end."""
+    little = "main(['pulses'])"
+    much = "app.command(lambda: print('x' * 100_000), name='much'); main(['much'])"
+    program = f"from rocking.cli import app, main; {little if is_small else much}"
+    with open("/dev/full", "w") as full:  # noqa: PTH123
+        done = subprocess.run([sys.executable, "-c", program], stdout=full, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 2
+    assert done.stderr == "rocking: the output cannot be written: No space left on device; send it elsewhere\n"
+
+
 def test_an_interrupt_while_the_command_line_is_imported_is_no_traceback():
     probe = (
         "import sys\n"
@@ -182,7 +196,7 @@ def test_an_interrupt_while_the_command_line_is_imported_is_no_traceback():
         "main()\n"
     )
     done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (130, "")
+    assert (done.returncode, done.stderr) == (130, f"{INTERRUPTED}\n")
     project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text("utf-8"))
     assert project["project"]["scripts"]["rocking"] == "rocking.__main__:main"
     done = subprocess.run([sys.executable, "-m", "rocking", "--version"], capture_output=True, text=True, check=True)

@@ -1,4 +1,4 @@
-"""The program `rocking`: an interrupt while the command line is being imported ends it as quietly as one later."""
+"""The program `rocking`: an interrupt while the command line is being imported ends it as one later does."""
 
 import sys
 
@@ -8,6 +8,9 @@ def main() -> None:
     try:
         from rocking.cli import main as run
     except KeyboardInterrupt:
+        from rocking.errors import INTERRUPTED
+
+        print(INTERRUPTED, file=sys.stderr)
         sys.exit(130)
     run()
 

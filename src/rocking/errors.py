@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 #: Where a name of an argument stands in a template; or "{}" itself, as `literal` writes it.
 _PLACE: Final = re.compile(r"\{\{\}\}|\{\}")
 
+#: What a command says that Ctrl-C has ended.
+INTERRUPTED: Final = "rocking: this was interrupted; every file that it wrote is whole"
+
 #: How a name of an argument is written: the command line writes its option, a page the label of its field.
 Spelling = Callable[[str], str]
 

@@ -155,6 +155,8 @@ def values(text: str, name: str, quantity: Quantity = number) -> Floats:
     if not 2 <= count <= _MOST:
         sentence = f"{{}} takes a range START:STOP:COUNT with a COUNT from 2 to {_MOST}, not {text!r}"
         raise InvalidOption(sentence, name)
+    if not math.isfinite(stop - start):
+        raise InvalidOption(f"{{}}: a range needs finite ends, not {text!r}", name)
     if len(parts) == 3:
         return _decimals(np.linspace(start, stop, count))
     if not (0.0 < start < math.inf and 0.0 < stop < math.inf):

@@ -263,7 +263,8 @@ def _from_table(lines: list[str], period: float | None) -> tuple[Floats, Floats,
     if kind == "sa" and period is None:
         raise InvalidOption("{} must be given, in s, for a spectral acceleration", "period")
     measure = Measure("sa", period) if kind == "sa" else Measure(kind)
-    return factor * intensity, rate, measure
+    with np.errstate(over="ignore"):  # what becomes infinite is refused as such
+        return factor * intensity, rate, measure
 
 
 def _from_openquake(lines: list[str], site: int) -> tuple[Floats, Floats, Measure]:

@@ -19,7 +19,7 @@ from rocking.block import Blocks
 from rocking.constants import Model
 from rocking.errors import InvalidOption, RockingError, UnreadableRecord
 from rocking.motion.motion import Motion
-from rocking.motion.named import named_motion, named_vertical
+from rocking.motion.named import is_there, named_motion, named_vertical
 from rocking.motion.scaling import Measure
 from rocking.named_pulses import FAMILIES, named_pulse
 from rocking.tables import counted, csv_rows, named
@@ -214,7 +214,7 @@ def _motion_of(table: Path, name: str, vertical: str, *, several: bool, **about:
 def _beside(table: Path, name: str) -> str:
     """Name a file relative to a table's folder, where there is one there."""
     beside = table.parent / name
-    return str(beside) if beside.exists() else name
+    return str(beside) if is_there(beside) else name
 
 
 def _finite(text: str) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import errno
 import os
 import sys
 from collections.abc import Sequence
@@ -11,7 +12,7 @@ from pathlib import Path
 from cyclopts import App, CycloptsError
 
 from rocking.cli import wording
-from rocking.errors import RockingError
+from rocking.errors import INTERRUPTED, RockingError
 from rocking.progress import notes_for
 
 app = App(
@@ -75,7 +76,20 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print(f"rocking: {wording.of(error, app, given)}", file=sys.stderr)
         sys.exit(2)
     except KeyboardInterrupt:
+        print(INTERRUPTED, file=sys.stderr)
         sys.exit(130)
     except BrokenPipeError:
         # The reader of our output has gone; so must Python's own last flush.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _close_output()
+    except OSError as error:
+        # Files have their own sentence: this is what is printed, to a disk that is full.
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO):
+            raise
+        _close_output()
+        print(f"rocking: the output cannot be written: {os.strerror(error.errno)}; send it elsewhere", file=sys.stderr)
+        sys.exit(2)
+
+
+def _close_output() -> None:
+    """Send to nowhere what is still to be printed."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

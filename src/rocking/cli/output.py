@@ -127,8 +127,10 @@ def output_folder(folder: Path) -> Iterator[Path]:
     try:
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            probe.touch()
-            probe.unlink()
+            try:
+                probe.touch()
+            finally:
+                probe.unlink(missing_ok=True)
         except OSError as error:
             sentence = f"this folder cannot be written to: {error.strerror}; choose another {{}}"
             raise OutputError(sentence, "out", path=str(folder)) from error

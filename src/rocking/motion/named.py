@@ -145,9 +145,9 @@ def named_vertical(
     That file is `record`, and `channel` the horizontal motion in it. There are two motions then, so `dt` and `units`
     are for the one that does not say its own.
     """
-    if Path(name).is_file() or name in records.names():
+    if os.path.isfile(name) or name in records.names():  # noqa: PTH113 - see `is_there`
         return named_motion(name, dt=dt, units=units, several=True)
-    if record == STANDARD_INPUT or not Path(record).exists():
+    if record == STANDARD_INPUT or not is_there(record):
         raise UnreadableRecord(
             f"there is no file or shipped record {name!r} for the vertical motion, and {record} has no channels; check "
             "the name"
@@ -164,9 +164,14 @@ def refuse_what_is_known(name: str, **said: object) -> None:
             )
 
 
+def is_there(name: str | Path) -> bool:
+    """Whether there is a file or folder of a name, which may be one that none can have, as it is too long."""
+    return os.path.exists(name)  # noqa: PTH110 - Path.exists() raises then
+
+
 def is_shipped(name: str) -> bool:
     """Whether a name is that of a shipped record, and not of a file."""
-    if name == STANDARD_INPUT or Path(name).exists():
+    if name == STANDARD_INPUT or is_there(name):
         return False
     if name in records.names():
         return True
@@ -191,12 +196,12 @@ def expanded(names: Iterable[str]) -> list[str]:
 
 
 def _files(name: str) -> list[str]:
-    if Path(name).is_dir():
+    if os.path.isdir(name):  # noqa: PTH112 - see `is_there`
         files = sorted(str(path) for path in Path(name).iterdir() if path.is_file() and not path.name.startswith("."))
         if not files:
             raise UnreadableRecord("this folder holds no file; name one that holds records", path=name)
         return files
-    if not glob.has_magic(name) or Path(name).exists():
+    if not glob.has_magic(name) or is_there(name):
         return [name]
     matching = sorted(path for path in glob.glob(name, recursive=True) if Path(path).is_file())  # noqa: PTH207 - any root
     matching = matching or fnmatch.filter(records.names(), name)

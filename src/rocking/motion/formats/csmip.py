@@ -146,7 +146,9 @@ def _read_v1(source: Source, first: Line, request: Request) -> list[Channel]:
 
 def _v1_channel(source: Source, request: Request, start: int, ordinal: int) -> tuple[Channel, int]:
     lines = source.lines(start, _V1_HEADER_LINES)
-    for index, line in enumerate(lines[_V1_TEXT_LINES:], _V1_TEXT_LINES):
+    for index, line in enumerate(lines):
+        if index and V1_TITLE.search(line.text):
+            break  # what follows is the next channel's
         stated = _V1_DATA_LINE.match(line.text)
         if stated:
             return _v1_samples(source, request, lines[: index + 1], stated, ordinal)
@@ -229,6 +231,7 @@ _V2_DATA_LINE = re.compile(
 )
 _V2_UNITS = re.compile(r"(?:units:|\bin)\s*([A-Za-z0-9/^]+)", re.IGNORECASE)
 _V2_NEXT_QUANTITY = re.compile(r"^\s*\d+\s+points\s+of\s+(?:veloc|displ)", re.IGNORECASE)
+_V2_DATA = re.compile(rb"(?im)^[ \t]*\d{1,12}[ \t]+points[ \t]+of[ \t]+accel")
 _V2_TITLE = re.compile(rb"(?im)^[ \t]*corrected accelerogram")
 
 
@@ -240,12 +243,17 @@ def _read_v2(source: Source, first: Line, request: Request) -> list[Channel]:
         found.append(channel)
         title = _V2_TITLE.search(source.data, end)
         start = None if title is None else title.start()
+        lost = _V2_DATA.search(source.data, end, len(source.data) if start is None else start)
+        if lost is not None:
+            raise source.error("this channel's header lacks its title; get the whole file again", lost.start())
     return found
 
 
 def _v2_channel(source: Source, request: Request, start: int, ordinal: int) -> tuple[Channel, int]:
     lines = source.lines(start, _V2_HEADER_LINES)
     for index, line in enumerate(lines):
+        if index and V2_TITLE.search(line.text):
+            break  # what follows is the next channel's
         stated = _V2_DATA_LINE.match(line.text)
         if stated:
             return _v2_acceleration(source, request, lines[: index + 1], stated, ordinal)

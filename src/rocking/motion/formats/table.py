@@ -53,6 +53,9 @@ _MISTAKEN = str.maketrans("OolI", "0011")
 _DIGIT_OR_POINT = re.compile(r"[\d.]|[Oo]$")
 _DATE = re.compile(r"\d+[-/:]\d+[-/:T]\S*|\d{1,2}\.\d{1,2}\.\d{2}(?:\d\d)?")
 
+#: No word of a heading is longer.
+_LONGEST_WORD = 300
+
 #: No row of numbers is longer; what is, is refused before it is split.
 _ROW_LIMIT = 1024
 _WITHOUT_POINT = re.compile(r"[+-]?\d+(?:,\d+)?(?:[EeDd][+-]?\d+)?")
@@ -302,7 +305,8 @@ def _damaged_in(tokens: list[bytes], columns: int = 0) -> bytes:
     """Return the first piece that is no number, of a line of numbers and what stands in place of some; or nothing."""
     damaged = [token for token in tokens if parse(token) is None]
     numbers = len(tokens) - len(damaged)
-    fits = numbers > 0 or len(tokens) == columns
+    # What is that long is a number or nothing, and what follows it on its line is not seen.
+    fits = numbers > 0 or len(tokens) == columns or max(map(len, tokens), default=0) > _LONGEST_WORD
     return damaged[0] if damaged and fits and all(map(_like_number, damaged)) else b""
 
 

@@ -12,7 +12,7 @@ from rocking.ensemble import Scales
 from rocking.errors import InvalidMotion, UnreadableRecord
 from rocking.motion.formats.source import Request
 from rocking.motion.motion import Motion
-from rocking.motion.named import expanded, named_motion, named_vertical
+from rocking.motion.named import expanded, is_there, named_motion, named_vertical
 from rocking.named_pulses import pulse_family
 from rocking.plausibility import vertical_notes
 from rocking.progress import note
@@ -66,12 +66,12 @@ def _record(tables: Tables, path: str, *, several: bool) -> Motion:
 def _beside(tables: Tables, name: str) -> str:
     """Path of a file that lies beside the study's own, or the name of anything else."""
     path = str(tables.file.parent / name)
-    return path if Path(path).exists() or any(mark in name for mark in "*?[") else name
+    return path if is_there(path) or any(mark in name for mark in "*?[") else name
 
 
 def _as_written(tables: Tables, path: str) -> str:
     """Return the path of a record relative to the file, as it names those beside it."""
-    beside = Path(path).is_relative_to(tables.file.parent) and Path(path).exists()
+    beside = Path(path).is_relative_to(tables.file.parent) and is_there(path)
     return str(Path(path).relative_to(tables.file.parent)) if beside else path
 
 

@@ -1,0 +1,199 @@
+"""Promises on files, the page's server, interrupts and full disks at a small size; and what they once found."""
+
+import io
+import itertools
+import random
+import sys
+
+import numpy as np
+import pytest
+from oracles import record_files, spoilt_files, stated_records
+from promises import commands, full_disk, interrupts, reading, serving, soak
+from promises.promise import Found
+
+import rocking
+from rocking.analysis.input_tables import read_tests
+from rocking.errors import InvalidOption, OutputError, RockingError, UnreadableRecord
+from rocking.quantities import values
+from rocking.studies import read_study
+from rocking.tables import write_text
+
+
+@pytest.mark.parametrize("cases", [60, pytest.param(600, marks=pytest.mark.thorough)])
+def test_a_spoilt_file_is_refused_or_read_as_it_states(monkeypatch, cases):
+    monkeypatch.setattr(reading, "CASES", cases)
+    monkeypatch.setattr(reading, "PARTS", 1000)
+    monkeypatch.setattr(reading, "_TRACED", 10**9)
+    found = reading.judge(7)
+    assert not found.told
+    assert found.cases >= 100 + cases
+    assert found.notes["compared"] >= cases // 20
+    assert found.notes["refused"] >= cases // 2
+
+
+def test_what_a_sound_file_states_is_what_is_read():
+    judged = 0
+    for name in stated_records.READINGS:
+        given = {"dt": 0.01} if name == "column.txt" else {}
+        said = stated_records.stated(name, reading.records()[name])
+        if name.startswith("velocity") or name in ("nga.vt2", "nga.dt2"):
+            continue
+        assert said
+        for one, channel in zip(said, reading.read_record(name, reading.records()[name], given), strict=True):
+            assert not stated_records.contradiction(one, channel.acceleration, channel.dt, channel.times)
+            changed = np.array(channel.acceleration)
+            changed[3] *= 1.001
+            assert stated_records.contradiction(one, changed, channel.dt, channel.times)
+            assert stated_records.contradiction(one, changed[1:], channel.dt, channel.times)
+            judged += 1
+    assert judged >= 15
+
+
+def test_every_mishap_changes_files():
+    rng, files = random.Random(1), [*reading.records().values()]
+    for operation in spoilt_files.OPERATIONS:
+        assert sum(operation(file, rng) != file for file in files) >= 3, operation.__doc__
+
+
+def lost(text, start, end):
+    """A text without the lines from the one that begins so, after the first, up to the first that begins otherwise."""
+    lines = text.splitlines(keepends=True)
+    first = next(k for k, line in enumerate(lines) if start in line)
+    last = next(k for k, line in enumerate(lines) if k > first and end in line)
+    return "".join(lines[:first] + lines[last:])
+
+
+@pytest.mark.parametrize("form", ["v1", "v2"])
+def test_a_channel_whose_header_has_lost_lines_does_not_pass_for_the_next_one(form):
+    channels = [(1, " 90 Deg", [0.1, 0.2, -0.3]), (2, "Up", [0.05, -0.02, 0.01])]
+    if form == "v1":
+        short = lost(record_files.csmip_v1(channels), "Station No.", "Accelerogram points")
+        found = reading.read_record("a", short.encode(), {})
+        assert [len(each.acceleration) for each in found] == [3, 3]
+        assert found[0].acceleration == pytest.approx([0.980665, 1.96133, -2.941995])
+        none = lost(record_files.csmip_v1(channels), "Accelerogram points", "/&")
+    else:
+        none = lost(record_files.csmip_v2(channels), "points of accel", "points of veloc")
+        untitled = record_files.csmip_v2(channels).rpartition("Corrected accelerogram")
+        with pytest.raises(UnreadableRecord, match="lacks its title"):
+            reading.read_record("a", (untitled[0] + untitled[2]).encode(), {})
+    with pytest.raises(UnreadableRecord, match=r"ends this channel's header|says 6 values but 0 follow"):
+        reading.read_record("a", none.encode(), {})
+
+
+@pytest.mark.parametrize("first", ["9" * 3000 + ",0.1", "0." + "0" * 600 + ",0.1"])
+def test_a_first_row_of_endless_digits_is_no_heading(first):
+    text = f"time (s), a (g)\n{first}\n0.01,0.2\n0.02,0.1\n0.03,0.0\n"
+    with pytest.raises(UnreadableRecord, match="line 2"):
+        rocking.read(io.BytesIO(text.encode()))
+
+
+def test_a_name_that_no_file_can_have_is_refused_in_a_sentence(tmp_path):
+    name, table, study = "9" * 3000, tmp_path / "tests.csv", tmp_path / "study.toml"
+    table.write_text(f"motion,overturned,vertical\n{name},1,\nel-centro-meloland-270,1,{name}\n")
+    study.write_text(f'[blocks]\np = 2.0\nalpha = 0.2\n[motions]\nrecords = ["{name}"]\n')
+    for read, file in ((read_tests, table), (read_study, study)):
+        with pytest.raises(RockingError, match=r"could not be read|there is no such file"):
+            read(file)
+
+
+@pytest.mark.parametrize("text", ["1:1e999:5", "-1e308:1e308:3", "1:1e999:5:log"])
+def test_a_range_without_finite_ends_is_refused(text):
+    with pytest.raises(InvalidOption, match=r"finite ends|positive ends"):
+        values(text, "p")
+
+
+def test_a_rate_of_an_endless_intensity_is_refused_without_a_warning(tmp_path):
+    file = tmp_path / "hazard.csv"
+    file.write_text("pga_g,annual_rate\n0.1,0.1\n1e308,0.01\n")
+    with pytest.raises(InvalidOption):
+        rocking.HazardCurve.read(file)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are looked at as Linux shows them")
+@pytest.mark.thorough
+def test_the_server_answers_as_its_table_says(monkeypatch):
+    monkeypatch.setattr(serving, "REQUESTS", 60)
+    monkeypatch.setattr(serving, "NAMES", 8)
+    monkeypatch.setattr(serving, "CONNECTIONS", 0)
+    found = serving.judge(0)
+    assert not found.told
+    assert found.judged >= 60 + 8 * 3
+
+
+def test_the_table_of_the_server_names_every_kind_of_answer():
+    drawn = itertools.product(["GET", "POST"], serving.ROUTES, serving._HOSTS, serving._ORIGINS, serving._CARRIED)
+    answers = {serving.specified(*each) for each in drawn}
+    assert answers == {200, 403, 404, 405, 421, 422}
+    assert serving.specified("GET", "/", "evil.example:{}", None, None) == 421
+    assert serving.specified("GET", "/api/start", "localhost:{}", None, None) == 403
+    assert serving.specified("POST", "/api/start", "localhost:{}", "own", "Bearer {secret}") == 405
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is looked at as Linux shows it")
+def test_memory_and_descriptors_that_grow_are_told(tmp_path):
+    kept, opened = [], []
+
+    def grows(_):
+        kept.append(np.ones(2**19))
+        opened.append((tmp_path / "file").open("w"))
+        return 1
+
+    found = Found()
+    soak._judge_rounds(found, "work", grows, "self", 8)
+    for file in opened:
+        file.close()
+    assert len(found.told) == 2
+    calm = Found()
+    soak._judge_rounds(calm, "work", lambda _: 1, "self", 8)
+    assert not calm.told and calm.judged == 2 and calm.notes["work"] == 8
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processor time of another process is read as on Linux")
+@pytest.mark.thorough
+def test_an_interrupt_ends_a_command_with_one_sentence(tmp_path):
+    found = Found()
+    one = interrupts.ended("simulate", tmp_path, 0.5)
+    interrupts._judge_end(found, "simulate", one, tmp_path / "out", {})
+    assert not found.told
+    assert found.notes["interrupted"] == 1
+
+
+def test_an_end_that_is_not_as_promised_is_told(tmp_path):
+    (tmp_path / "result.json").write_text('{"half"')
+    (tmp_path / ".response.part.csv").write_text("")
+    found = Found()
+    one = interrupts.Ended(1, b"", b"Traceback\nKeyboardInterrupt\n", 9.0, 8.0)
+    interrupts._judge_end(found, "simulate", one, tmp_path, {"result.json": b"{}"})
+    assert found.failures == 4  # too late, a file left, one that does not open, and no sentence
+
+
+def test_whole_files_are_told_from_damaged_ones(tmp_path):
+    whole = {"a.json": b"{}", "a.csv": b"x,y\n1,2\n", "a.png": b"IEND\xaeB\x60\x82", "a.pdf": b"%%EOF\n"}
+    for name, content in whole.items():
+        (tmp_path / name).write_bytes(content)
+    assert commands.faults(tmp_path, whole) == []
+    for name, content in whole.items():
+        (tmp_path / name).write_bytes(content[: len(content) // 2])
+    assert len(commands.faults(tmp_path, whole)) == len(whole)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="where a descriptor leads is read as on Linux")
+@pytest.mark.parametrize("kind", full_disk.KINDS)
+def test_a_full_disk_is_met_at_the_call_that_was_chosen(tmp_path, kind):
+    disk = full_disk.FullDisk(tmp_path, kind, 3 if kind == "open" else 2)  # a file is opened to flush it as well
+    with disk.in_place():
+        write_text(tmp_path / "first.txt", "one")
+        with pytest.raises(OutputError, match="No space left on device"):
+            write_text(tmp_path / "second.txt", "two")
+    assert disk.failed
+    assert [path.name for path in tmp_path.iterdir()] == ["first.txt"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="where a descriptor leads is read as on Linux")
+@pytest.mark.thorough
+def test_a_study_goes_on_after_a_full_disk(monkeypatch):
+    monkeypatch.setattr(full_disk, "MOST", 1)
+    found = full_disk.judge([*commands.COMMANDS].index("study run"))
+    assert not found.told
+    assert found.judged == len(full_disk.KINDS)
