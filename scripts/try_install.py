@@ -26,7 +26,7 @@ SIMULATION = "simulate el-centro-meloland-270 --width 0.24 --height 1.1 --json"
 USES = {
     "formats": "import obspy.core",
     "excel": "import pandas; pandas.DataFrame({'a': [1.0]}).to_excel('table.xlsx')",
-    "explorer": "import rocking.explorer.launch, rocking.explorer.server, rocking.plot.page",
+    "explorer": "import bokeh, uvicorn, rocking.explorer.launch, rocking.explorer.server",
     "browser": "import playwright.sync_api",
     "cluster": "import distributed, dask_jobqueue",
     "objects": "import obstore.store",
