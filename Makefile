@@ -3,6 +3,7 @@
 
 PYTHON ?= python3
 BIN := .venv/bin
+UPKEEP_TOOLS := pip-audit==2.10.1 cyclonedx-bom==7.5.0 repo-review==1.3.0 sp-repo-review==2026.8.14 zizmor==1.32.0
 PAGE_TOOLS := axe-core@4.14.1 typescript@7.0.2 eslint@10.15.0 @eslint/js@10.0.1
 # Work stealing gives each worker a run of neighbouring tests, so that few of a module's fixtures are made twice.
 PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal --benchmark-disable
@@ -13,7 +14,8 @@ EVERY_PART := $(addprefix tests/test_,reference.py result.py plot.py cli.py cli_
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help demo wheel quick test test-all browser slow verify lowest latest .bounds doctest lint types docs bench clean distclean
+.PHONY: help demo wheel quick test test-all browser slow verify lowest latest .bounds doctest lint types docs bench \
+    coverage audit sbom review try-install clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -88,13 +90,38 @@ docs: .venv/.all ## build the documentation into docs/_build/html; a warning is 
 bench: .venv/.all ## run the benchmarks
 	@for script in benchmarks/bench_*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
 
+coverage: .venv/.all ## run the tests, and say which lines none of them reaches (kernels are compiled: not counted)
+	$(BIN)/coverage erase
+	$(PYTEST:$(BIN)/python=$(BIN)/coverage run) -m $(FAST)
+	$(BIN)/coverage combine -q
+	$(BIN)/coverage report
+
+try-install: wheel ## install the wheel into empty environments, with each extra alone, and simulate there
+	$(BIN)/python scripts/try_install.py dist/rocking-*.whl --compiled --extras
+
+audit: .venv-upkeep/.installed ## compare the pinned versions with the weaknesses that are known (asks the network)
+	.venv-upkeep/bin/pip-audit --strict --requirement constraints.txt --no-deps --disable-pip
+
+sbom: .venv-upkeep/.installed ## list what an installation holds in dist/rocking-VERSION.cdx.json (CycloneDX)
+	.venv-upkeep/bin/python scripts/components.py
+
+review: .venv-upkeep/.installed ## look at the project as repo-review and zizmor do; what is left aside is in pyproject.toml
+	.venv-upkeep/bin/repo-review .
+	.venv-upkeep/bin/zizmor --offline .github
+
 clean: ## remove what the other targets made, but not the environment
 	rm -rf out build dist docs/_build docs/api/generated .pytest_cache .hypothesis .mypy_cache .ruff_cache \
 	    .benchmarks .import_linter_cache
 	find src tests benchmarks examples docs -name __pycache__ -type d -prune -exec rm -rf {} +
 
 distclean: clean ## remove the environment, too
-	rm -rf .venv .venv-lowest .venv-latest .lowest.txt .page-tools
+	rm -rf .venv .venv-lowest .venv-latest .venv-upkeep .lowest.txt .page-tools
+
+# What looks after the project itself; apart, since their requirements are none of the package's.
+.venv-upkeep/.installed: Makefile
+	@test -x .venv-upkeep/bin/python || $(PYTHON) -m venv .venv-upkeep
+	.venv-upkeep/bin/python -m pip install --disable-pip-version-check -qq --no-compile $(UPKEEP_TOOLS) "repo-review[cli]"
+	@touch $@
 
 # What checks the page: for barriers, for types, and for slips. Without npm those tests are skipped.
 .page-tools/.installed: Makefile

@@ -15,6 +15,7 @@ import json
 import os
 import platform
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -59,6 +60,12 @@ FIRST_VERSION = {"x86_64": "GLIBC_2.2.5", "aarch64": "GLIBC_2.17"}
 
 #: The oldest C library that wheels are named for, even where nothing newer than an older one is needed.
 OLDEST_NAMED = 17
+
+#: The oldest macOS that libraries are linked and wheels are named for: the first on arm64.
+OLDEST_MACOS = "11.0"
+
+#: What links the libraries.
+LINKER = shlex.split(os.environ.get("CC") or "cc")
 
 SUFFIX = {"darwin": ".dylib", "win32": ".dll"}.get(sys.platform, ".so")
 
@@ -265,9 +272,11 @@ def library(level: str, folder: Path, out: Path) -> None:
     source = folder / f"{level}.c"
     source.write_text(PROCESSOR[platform.machine().lower()], "utf-8")
     name = out / f"kernels-{level}{SUFFIX}"
-    strip = [] if sys.platform == "darwin" else ["-Wl,--strip-all", "-Wl,-z,noexecstack"]
+    linking = ["-Wl,--strip-all", "-Wl,-z,noexecstack"]
+    if sys.platform == "darwin":
+        linking = [f"-mmacosx-version-min={OLDEST_MACOS}"]
     made = [str(name), str(source), str(folder / f"{level}.o")]
-    subprocess.run(["cc", "-O2", "-fPIC", "-shared", *strip, "-o", *made, "-lm"], check=True)
+    subprocess.run([*LINKER, "-O2", "-fPIC", "-shared", *linking, "-o", *made, "-lm"], check=True)
     print(f"{name.name}: {name.stat().st_size / 1e6:.2f} MB")
 
 
@@ -327,6 +336,8 @@ def tag(libraries: list[Path]) -> str:
     if platform.libc_ver()[0] == "glibc":
         needed = [int(minor) for path in libraries for minor in re.findall(rb"GLIBC_2\.(\d+)", path.read_bytes())]
         return f"manylinux_2_{max([OLDEST_NAMED, *needed])}_{platform.machine()}"
+    if sys.platform == "darwin":  # Python itself may be for two processors; a library is for one
+        return f"macosx_{OLDEST_MACOS.replace('.', '_')}_{platform.machine()}"
     return sysconfig.get_platform().replace("-", "_").replace(".", "_")
 
 
@@ -338,8 +349,11 @@ def main() -> None:
     parser.add_argument("--folder", type=Path, help="do one step with it (used by the script itself)")
     parser.add_argument("--level", help="that for this level")
     options = parser.parse_args()
-    if shutil.which("cc") is None:
-        sys.exit("error: a C compiler (cc) links the libraries: install one, or make a wheel without them: pip wheel .")
+    if shutil.which(LINKER[0]) is None:
+        sys.exit(
+            f"error: a C compiler ({LINKER[0]}; CC names another) links the libraries: install one, or make a wheel "
+            "without them: pip wheel ."
+        )
     if options.level:
         optimise(options.level, options.folder)
         return

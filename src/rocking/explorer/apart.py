@@ -110,13 +110,24 @@ def _answer(data: bytes) -> dict[str, Any]:
     return {"made": plain, "heights": sections.heights.tolist(), "pieces": pieces}
 
 
-def _main() -> None:
-    with contextlib.suppress(ImportError):  # Windows has no limits: there only the time is waited for
+def _limit_this_process() -> None:
+    """Limit memory and time where the system can; where it cannot, the time is waited for."""
+    try:
         import resource
+    except ImportError:  # Windows
+        return
+    for kind, soft, hard in (
+        (resource.RLIMIT_AS, _MEMORY, _MEMORY),
+        (resource.RLIMIT_CPU, _SECONDS, _SECONDS + 1),
+        (resource.RLIMIT_CORE, 0, 0),
+    ):
+        # A lower limit may be set already, and macOS refuses one of memory.
+        with contextlib.suppress(ValueError, OSError):
+            resource.setrlimit(kind, (soft, hard))
 
-        resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
-        resource.setrlimit(resource.RLIMIT_CPU, (_SECONDS, _SECONDS + 1))
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+def _main() -> None:
+    _limit_this_process()
     out, sys.stdout = sys.stdout, sys.stderr
     json.dump(_answer(sys.stdin.buffer.read()), out)
 

@@ -119,7 +119,10 @@ class Folder:
 
     def append(self, name: str, line: str) -> None:
         """Append the line to the file."""
-        with _refused("written", self.path / name), (self.path / name).open("a", encoding="utf-8") as file:
+        with (
+            _refused("written", self.path / name),
+            (self.path / name).open("a", encoding="utf-8", newline="\n") as file,
+        ):
             file.write(line + "\n")
 
     @contextlib.contextmanager

@@ -154,7 +154,7 @@ def _write_csv(frames: Iterator[pd.DataFrame], dataset: xr.Dataset, target: Path
 
 
 def _write_json(frames: Iterator[pd.DataFrame], dataset: xr.Dataset, target: Path) -> None:
-    with target.open("w", encoding="utf-8") as file:
+    with target.open("w", encoding="utf-8", newline="\n") as file:
         file.write(f'{{"study": {json.dumps(plain(dataset.attrs))},\n"simulations": [')
         separator = "\n"
         for row in itertools.chain.from_iterable(frame.to_dict("records") for frame in frames):

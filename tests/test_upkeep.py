@@ -1,0 +1,126 @@
+"""What surrounds the code: workflows, supported versions, addresses."""
+
+import re
+import shlex
+import tomllib
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).resolve().parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+MAKEFILE = (ROOT / "Makefile").read_text("utf-8")
+WORKFLOWS = {path.stem: yaml.safe_load(path.read_text("utf-8")) for path in (ROOT / ".github/workflows").glob("*.yml")}
+JOBS = {(name, job): given for name, workflow in WORKFLOWS.items() for job, given in workflow["jobs"].items()}
+STEPS = [step for job in JOBS.values() for step in job["steps"]]
+
+
+def test_every_workflow_may_do_little_and_every_job_ends() -> None:
+    assert set(WORKFLOWS) == {"test", "docs", "nightly", "release"}
+    for workflow in WORKFLOWS.values():
+        assert workflow["permissions"] == {"contents": "read"}
+        assert "concurrency" in workflow
+    assert len(JOBS) >= 10
+    for job in JOBS.values():
+        assert 0 < job["timeout-minutes"] <= 180
+    may_more = {name: job["permissions"] for name, job in JOBS.items() if "permissions" in job}
+    assert may_more == {("release", "publish"): {"id-token": "write"}, ("release", "announce"): {"contents": "write"}}
+    assert JOBS["release", "publish"]["environment"] == "release"
+
+
+def test_actions_are_pinned_and_keep_no_credentials() -> None:
+    used = [step for step in STEPS if "uses" in step]
+    assert len(used) >= 20
+    for step in used:
+        assert re.fullmatch(r"[\w.-]+/[\w.-]+@v\d+\.\d+\.\d+", step["uses"])
+        if "checkout" in step["uses"]:
+            assert step["with"]["persist-credentials"] is False
+
+
+def test_jobs_run_what_is_there() -> None:
+    targets = set(re.findall(r"^([a-z-]+):", MAKEFILE, re.MULTILINE))
+    lines = [line for step in STEPS for line in step.get("run", "").splitlines()]
+    asked = {name for line in lines for name in re.findall(r"\bmake ((?:[a-z-]+ ?)+)", line)}
+    named = {target for each in asked for target in each.split()}
+    for job in JOBS.values():
+        rows = job.get("strategy", {}).get("matrix", {}).get("include", [])
+        named |= {row[key] for row in rows for key in ("bound", "target") if key in row}
+    assert len(named) >= 12
+    assert named <= targets
+    scripts = {word for line in lines for word in line.split() if word.startswith("scripts/")}
+    assert scripts
+    assert all((ROOT / script).is_file() for script in scripts)
+
+
+def test_the_tests_of_the_workflow_are_those_of_make() -> None:
+    (chosen,) = re.findall(r'^FAST := (".*")$', MAKEFILE, re.MULTILINE)
+    (tests,) = [step["run"] for step in JOBS["test", "test"]["steps"] if step.get("name") == "Test"]
+    assert shlex.split(chosen)[0] == shlex.split(tests)[-1]
+    matrix = JOBS["test", "test"]["strategy"]["matrix"]
+    supported = [each.rpartition(" ")[2] for each in PROJECT["classifiers"] if re.search(r":: 3\.\d+$", each)]
+    assert matrix["python"] == supported
+    assert PROJECT["requires-python"] == f">={supported[0]}"
+
+
+# Supported versions: SPEC 0, as docs/portability.md says
+
+#: When the table below was last complete.
+AS_OF = date(2026, 11, 24)
+
+#: When versions came out: what is younger than two years (Python: three) must not be shut out.
+RELEASES = {
+    "python": {"3.11": (2022, 10), "3.12": (2023, 10), "3.13": (2024, 10), "3.14": (2025, 10)},
+    "numpy": {"2.0": (2024, 6), "2.1": (2024, 8), "2.2": (2024, 12), "2.3": (2025, 6), "2.4": (2025, 12)},
+    "scipy": {"1.14": (2024, 6), "1.15": (2025, 1), "1.16": (2025, 6), "1.17": (2026, 1)},
+    "pandas": {"2.2": (2024, 1), "2.3": (2025, 6), "3.0": (2026, 1)},
+    "matplotlib": {"3.9": (2024, 5), "3.10": (2024, 12)},
+}
+
+#: Bounds that are newer than the rule asks, and why.
+NEWER = {"xarray": "the lowest that was tried, and passed, when the bounds were set (make lowest)"}
+
+
+def version(text: str) -> tuple[int, ...]:
+    return tuple(int(part) for part in text.split("."))
+
+
+def bound(name: str) -> tuple[int, ...]:
+    """Lowest minor version that the project takes."""
+    if name == "python":
+        return version(PROJECT["requires-python"].removeprefix(">="))
+    (found,) = [each for each in PROJECT["dependencies"] if each.partition(">=")[0] == name]
+    return version(found.partition(">=")[2])[:2]
+
+
+@pytest.mark.parametrize("name", RELEASES)
+def test_no_version_is_shut_out_before_its_time(name: str) -> None:
+    years = 3 if name == "python" else 2
+    young = [
+        text for text, (year, month) in RELEASES[name].items() if (year + years, month) > (AS_OF.year, AS_OF.month)
+    ]
+    assert young
+    for text in young:
+        assert version(text) >= bound(name), f"{name} {text}"
+    assert not set(NEWER) & set(RELEASES)
+
+
+# Addresses
+
+TEXTS = [
+    path
+    for pattern in ("*", ".github/**/*", "docs/**/*.md", "src/**/*.py", "scripts/*.py", ".ci/*")
+    for path in ROOT.glob(pattern)
+    if path.is_file() and path.suffix in ("", ".md", ".py", ".toml", ".yml", ".yaml", ".cff", ".txt")
+]
+
+
+def test_no_registry_is_named_and_the_projects_address_stands_in_one_place() -> None:
+    hosts = ("pypi" + ".org", "npmjs" + ".com", "npmjs" + ".org", "pythonhosted" + ".org", "anaconda" + ".org")
+    (address,) = PROJECT["urls"].values()
+    read: dict[Path, Any] = {path: path.read_text("utf-8") for path in TEXTS}
+    assert len(read) > 250
+    assert [path for path, text in read.items() if any(host in text for host in hosts)] == []
+    assert [path.name for path, text in read.items() if address.partition("//")[2] in text] == ["pyproject.toml"]
