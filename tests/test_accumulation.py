@@ -71,9 +71,11 @@ def test_there_are_a_hundred_cases_from_easy_to_cruel():
     assert sum(len(case["rests"]) > 1 for case in CASES.values()) >= 20
 
 
-def test_the_cases_are_what_is_computed_today():
+@pytest.mark.parametrize("names", [QUICK, pytest.param([*CASES], marks=pytest.mark.slow)], ids=["some", "all"])
+def test_the_cases_are_what_is_computed_today(names):
     made = loaded("make_cases")
-    for case in CASES.values():
+    assert len(names) >= 4
+    for case in map(CASES.get, names):
         found, rests = made.solved(case), made.bracketed(case)
         assert found["impacts"] == pytest.approx(case["impacts"], abs=1e-8)
         assert (found["count"], len(rests)) == (case["count"], len(case["rests"]))

@@ -58,7 +58,7 @@ def choose(monkeypatch: pytest.MonkeyPatch) -> Callable[[bool], None]:
 
 
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("count", [30, pytest.param(4000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [12, pytest.param(4000, marks=pytest.mark.slow)])
 def test_python_gives_the_same_bits(count: int, choose: Callable[[bool], None]) -> None:
     random = np.random.default_rng(count)
     impacts = 0
@@ -188,7 +188,8 @@ def test_threads_share_the_turns_that_python_takes(
     assert 60 <= sum(turns) < 60 + 4 * 20
 
 
-def test_the_explorer_compiles_what_responses_and_maps_call_and_for_those_types(
+@pytest.mark.slow
+def test_the_explorer_compiles_kernels_for_the_types_of_responses_and_maps(
     choose: Callable[[bool], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(compiled.Kernel, "native", None)
@@ -200,7 +201,14 @@ def test_the_explorer_compiles_what_responses_and_maps_call_and_for_those_types(
     background._compile()
     prepared = {name: [*each.compiled.overloads] for name, each in kernels.items()}
     assert [len(types) for types in prepared.values()] == [1] * len(kernels)
+    choose(False)
+    _respond_and_map()
+    assert {name: [*each.compiled.overloads] for name, each in kernels.items()} == prepared
 
+
+def test_the_explorer_compiles_what_responses_and_maps_call(
+    choose: Callable[[bool], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
     called, call = set(), compiled.Kernel.__call__
 
     def noting(kernel: compiled.Kernel, *arguments: Any) -> Any:
@@ -209,6 +217,11 @@ def test_the_explorer_compiles_what_responses_and_maps_call_and_for_those_types(
 
     monkeypatch.setattr(compiled.Kernel, "__call__", noting)
     choose(False)
+    _respond_and_map()
+    assert called == {*background._KERNELS}
+
+
+def _respond_and_map() -> None:
     record = rocking.Motion.from_samples(MOTION.acceleration([0.01 * k for k in range(200)]), 0.01)
     for motion in (MOTION, record):
         response = rocking.simulate(BLOCK, motion)
@@ -218,8 +231,6 @@ def test_the_explorer_compiles_what_responses_and_maps_call_and_for_those_types(
             rocking.simulate_many(rocking.Blocks(p=[3.0, 4.0], alpha=0.2), motion, model=model)
     for model in ("linear", "nonlinear"):
         stroboscopic_map(BLOCK, MOTION, model=model).derivative([0.01, 0.0])
-    assert called == {*kernels}
-    assert {name: [*each.compiled.overloads] for name, each in kernels.items()} == prepared
 
 
 def test_a_first_simulation_needs_no_compiler(tmp_path: Path) -> None:

@@ -135,7 +135,7 @@ def test_memory_and_descriptors_that_grow_are_told(tmp_path):
     kept, opened = [], []
 
     def grows(_):
-        kept.append(np.ones(2**19))
+        kept.append(np.ones(2**21))
         opened.append((tmp_path / "file").open("w"))
         return 1
 

@@ -289,7 +289,7 @@ def test_an_export_has_a_column_for_each_outcome_that_is_kept(complete, tmp_path
 
 def test_the_explorer_draws_what_is_kept(complete, tmp_path, reference):
     view = StudyView(complete)
-    assert [each["name"] for each in view.describe()["quantities"]] == ["overturned", "peak_rotation"]
+    assert view.describe()["quantities"] == ["overturned", "peak_rotation"]
     drawn = view.slice({"x": "p", "y": "alpha", "quantity": "peak_rotation"}).arrays["values"].reshape(4, 130)
     np.testing.assert_array_equal(drawn.T.ravel(), reference.peak_rotation.values[0, 0, 0])
     with pytest.raises(rocking.InvalidOption, match="quantity must be one of overturned, peak_rotation, not"):
