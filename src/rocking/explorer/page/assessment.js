@@ -155,7 +155,11 @@ export class View {
       : inWords(why);
     const counts = fit && {exceeded: fit.exceeded, count: outcomes, records: this.rows.length};
     one("assessment-verdict").textContent = sentence;
-    one("assessment-notes").textContent = fit ? (this.rows.length === this.about.records.length ? phrase("assessment.exceeded", counts) : phrase("assessment.exceeded_so_far", counts)) + fit.notes.map((/** @type {string} */ note) => ` ${note[0].toUpperCase()}${note.slice(1)}.`).join("") : "";
+    const all = this.rows.length === this.about.records.length;
+    // The notes of a fit are the package's own sentences.
+    const notes = fit ? fit.notes.map((/** @type {string} */ note) => ` ${note[0].toUpperCase()}${note.slice(1)}.`).join("") : "";
+    one("assessment-notes").replaceChildren(fit ? phrase(all ? "assessment.exceeded" : "assessment.exceeded_so_far", counts) : "",
+      make("span", {className: "package"}, [notes]));
     this.plot.html_attributes = {role: "img", "aria-label": phrase("assessment.plot_about", {label, sentence})};
     this.records();
     this.rules();
