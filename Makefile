@@ -14,7 +14,7 @@ EVERY_PART := $(addprefix tests/test_,reference.py result.py plot.py cli.py cli_
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help demo wheel quick test test-all browser slow verify lowest latest .bounds doctest lint types docs bench \
+.PHONY: help demo wheel quick test test-all browser slow verify mutants lowest latest .bounds doctest lint types docs bench \
     coverage audit sbom review try-install clean distclean
 
 help: ## list the targets
@@ -46,6 +46,9 @@ slow: .venv/.all ## run the tests that take long: wider ranges, many digits, a h
 
 verify: .venv/.all ## hold the package to every promise of docs/reliability.md (under an hour; PARTS=small: a minute)
 	$(BIN)/python stress/verify.py --parts $(or $(PARTS),full)
+
+mutants: .venv/.all ## ask of the tests whether they see small mistakes, 30 in each part of the package (an hour or two)
+	$(BIN)/python stress/mutants.py $(PART)
 
 lowest: .venv-lowest/.installed ## run a test of every part with the oldest versions that pyproject.toml allows
 	@ROCKING_SHIPPED=0 $(MAKE) --no-print-directory .bounds ENVIRONMENT=.venv-lowest PACKAGE=.

@@ -165,17 +165,17 @@ def ordered(found: Iterable[dict[Path, tuple[int, int]]]) -> list[Path]:
 
 def main() -> None:
     tests = FilesOfTests()
-    found = {path: tests.of(path) for path in changed(*sys.argv[1:])}
+    found = {path: tests.of(path) for path in changed(sys.argv[1] if sys.argv[1:] else "HEAD")}
     for path, files in found.items():
         if not files:
             print(f"no test is known for {path.relative_to(ROOT)}", file=sys.stderr)
     if not found:
         print("nothing has changed", file=sys.stderr)
-    files = ordered(found.values())
-    for path in files[:MOST]:
+    near = ordered(found.values())
+    for path in near[:MOST]:
         print(path.relative_to(ROOT))
-    if files[MOST:]:
-        print(f"left out: {len(files) - MOST} files of tests that are farther from the changes", file=sys.stderr)
+    if near[MOST:]:
+        print(f"left out: {len(near) - MOST} files of tests that are farther from the changes", file=sys.stderr)
 
 
 if __name__ == "__main__":

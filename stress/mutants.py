@@ -1,0 +1,289 @@
+"""Ask of the tests whether they see mistakes: draw some of each part of the package, and run the nearest tests.
+
+    python stress/mutants.py                        # 30 mutants of every part, about an hour
+    python stress/mutants.py chattering --number 5
+
+Each mutant (`mutations.py` says what is drawn) is put into a copy of the tree, and judged there by the files of tests
+that `make quick` would run for a change of its file, up to the first failure. Kernels are run uncompiled. What a mutant
+showed is kept under a hash of its text, and holds as long as the tests that showed it are what they were; a run that
+was stopped goes on where it was. Every survivor is printed; those of `equivalent_mutants.json` change nothing that can
+be seen, for the reason said there, and do not count.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import importlib
+import json
+import multiprocessing
+import os
+import random
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterable, Iterator
+from multiprocessing.connection import wait
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+
+from mutations import Mutant, mutants
+from of_changes import MOST, FilesOfTests, ordered
+
+ROOT = Path(__file__).resolve().parents[1]
+
+#: Folders of each part.
+PARTS = {
+    "kernels": ["kernels"],
+    "chattering": ["chattering"],
+    "analysis": ["analysis"],
+    "studies": ["studies"],
+    "explorer": ["explorer"],
+    "response": ["response"],
+    "motion": ["motion"],
+    "block and solid": ["block", "solid"],
+    "dynamics": ["dynamics"],
+    "cli": ["cli"],
+}
+
+#: How kernels come to be compiled, which a run without compilation shows nothing of.
+NOT_JUDGED = ("compiled.py", "compiler.py", "library.py", "signatures.py", "sources.py")
+
+#: Share of the mutants of a part that tests must see.
+WANTED = 0.85
+
+EQUIVALENT = Path(__file__).with_name("equivalent_mutants.json")
+_OPTIONS = ["-x", "-q", "-n0", "-p", "no:cacheprovider", "--benchmark-disable"]
+_FAST = ["-m", "not thorough and not slow and not browser"]
+_FORKED = multiprocessing.get_context("fork")
+
+
+class Tree:
+    """The tests, how long they take, and copies of the tree to run them in."""
+
+    def __init__(self, folder: Path, jobs: int, seconds: float) -> None:
+        self.folder, self.seconds = folder, seconds
+        self.tests = FilesOfTests(ROOT)
+        self.copies = [Path(tempfile.mkdtemp(prefix="mutants-")) for _ in range(jobs)]
+        names = subprocess.run(["git", "ls-files", "-z", "-co", "--exclude-standard"], cwd=ROOT, check=True, stdout=-1)
+        for copy in self.copies:
+            for name in names.stdout.decode().split("\0"):
+                if (ROOT / name).is_file():
+                    (copy / name).parent.mkdir(parents=True, exist_ok=True)
+                    shutil.copy2(ROOT / name, copy / name)
+            if (shipped := ROOT / "src/rocking/kernels/shipped").exists():
+                (copy / "src/rocking/kernels/shipped").symlink_to(shipped.resolve())
+        sources = sorted((ROOT / "src").rglob("*.py"))
+        self.sources = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()
+
+    def remove(self) -> None:
+        """Remove the copies."""
+        for copy in self.copies:
+            shutil.rmtree(copy, ignore_errors=True)
+
+    def hash(self, name: str) -> str:
+        """Hash of a file of tests."""
+        return hashlib.sha256((ROOT / name).read_bytes()).hexdigest()[:16]
+
+    def near(self, path: Path) -> list[str]:
+        """Names of the files of tests of a file, the nearest first."""
+        near = ordered([self.tests.of(path)])
+        return [path.relative_to(ROOT).as_posix() for path in near[:MOST]]
+
+    def measured(self, names: Iterable[str], uncompiled: bool) -> dict[str, float]:
+        """Processor time of each file of tests that passes without a mutant; the others are said and left out."""
+        tasks: list[Task] = []
+        kept = {}
+        for name in sorted(set(names)):
+            place = self.folder / "times" / f"{self.sources[:16]}-{self.hash(name)}-{int(uncompiled)}.json"
+            kept[name] = place
+            if not place.exists():
+                tasks.append((place, None, [name], 90.0, uncompiled))
+        done(tasks, self.copies)
+        times = {name: json.loads(place.read_text()) for name, place in kept.items()}
+        if failing := [name for name, found in times.items() if found["by"]]:
+            print("left out, for they fail or take too long without a mutant:", *failing)
+        return {name: found["seconds"] for name, found in times.items() if not found["by"]}
+
+    def judged(self, drawn: list[Mutant], uncompiled: bool) -> list[dict[str, Any]]:
+        """Find what the tests show of each mutant."""
+        near = {path: self.near(path) for path in {each.path for each in drawn}}
+        times = self.measured((name for names in near.values() for name in names), uncompiled)
+        tasks: list[Task] = []
+        places = []
+        for mutant in drawn:
+            names: list[str] = []
+            total = 0.0
+            for name in near[mutant.path]:
+                if name in times and (not names or total + times[name] <= self.seconds):
+                    names.append(name)
+                    total += times[name]
+            place = self.folder / "mutants" / f"{mutant.key}.json"
+            places.append(place)
+            if not (place.exists() and self._holds(json.loads(place.read_text()), names)):
+                tasks.append((place, mutant, names, 3.0 * total + 20.0, uncompiled))
+        done(tasks, self.copies)
+        return [json.loads(place.read_text()) for place in places]
+
+    def _holds(self, found: dict[str, Any], names: list[str]) -> bool:
+        """Whether a mutant that was judged is what it was: killed by a file that is the same, or spared by all."""
+        seen = [found["by"].partition("::")[0]] if "::" in found["by"] else names
+        return all(found["files"].get(name) == self.hash(name) for name in seen if (ROOT / name).exists())
+
+
+Task = tuple[Path, "Mutant | None", list[str], float, bool]
+
+
+def done(tasks: list[Task], copies: list[Path]) -> None:
+    """Run the tests of each task, in as many processes as there are copies."""
+    free, waiting = [*copies], tasks[::-1]
+    running: dict[BaseProcess, tuple[Path, float, Task]] = {}
+    while waiting or running:
+        while waiting and free:
+            task, copy = waiting.pop(), free.pop()
+            task[0].parent.mkdir(parents=True, exist_ok=True)
+            process: BaseProcess = _FORKED.Process(target=_tried, args=(copy, *task))
+            process.start()
+            running[process] = copy, time.monotonic() + 4.0 * task[3] + 60.0, task
+        wait([process.sentinel for process in running], timeout=1.0)
+        for process, (copy, end, task) in [*running.items()]:
+            if process.is_alive() and time.monotonic() < end:
+                continue
+            if process.is_alive() and process.pid:
+                os.killpg(process.pid, signal.SIGKILL)
+            process.join()
+            if process.exitcode == 1:
+                raise RuntimeError(f"pytest itself failed: {(copy / 'said.txt').read_text()[-2000:]}")
+            if process.exitcode:  # a signal: too long, or code that is no more sound
+                _written(task, "time", task[3])
+            if mutant := task[1]:
+                _placed(copy, mutant, mutant.path.read_text("utf-8"))
+            del running[process]
+            free.append(copy)
+            print(f"\r{len(waiting) + len(running)} to go   ", end="", file=sys.stderr, flush=True)
+
+
+def _written(task: Task, by: str, seconds: float) -> None:
+    files = {name: hashlib.sha256((ROOT / name).read_bytes()).hexdigest()[:16] for name in task[2]}
+    task[0].write_text(json.dumps({"by": by, "seconds": seconds, "files": files}))
+
+
+def _placed(copy: Path, mutant: Mutant, text: str) -> None:
+    """Write a module's text, and remove what Python compiled of it before: it looks at seconds and size alone."""
+    path = copy / mutant.path.relative_to(ROOT)
+    path.write_text(text, "utf-8")
+    for compiled in (path.parent / "__pycache__").glob(f"{path.stem}.*"):
+        compiled.unlink()
+
+
+class Recorder:
+    """A plugin of pytest that keeps the name of the first test that failed, and counts those that passed."""
+
+    def __init__(self) -> None:
+        self.failed, self.passed = "", 0
+
+    def pytest_runtest_logreport(self, report: Any) -> None:
+        """Keep a failure."""
+        self.failed = self.failed or (report.nodeid if report.failed else "")
+        self.passed += report.when == "call" and report.passed
+
+    def pytest_collectreport(self, report: Any) -> None:
+        """Keep a module that cannot be imported."""
+        self.failed = self.failed or (f"{report.nodeid}::" if report.failed else "")
+
+
+def _tried(copy: Path, place: Path, mutant: Mutant | None, names: list[str], limit: float, uncompiled: bool) -> None:
+    """Run tests in a copy, in a process of its own, and write what failed first."""
+    os.setsid()
+    os.chdir(copy)
+    place.unlink(missing_ok=True)
+    resource.setrlimit(resource.RLIMIT_CPU, (int(limit) + 1, int(limit) + 5))
+    if mutant:
+        _placed(copy, mutant, mutant.text)
+    said = os.open("said.txt", os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    for stream in (1, 2):
+        os.dup2(said, stream)
+    os.environ["PYTHONPATH"] = str(copy / "src")
+    sys.path[:] = [str(copy / "src"), *(path for path in sys.path if not path.startswith(str(ROOT / "s")))]
+    sys.path.remove(str(ROOT / "tests"))
+    for module in ("of_changes", "mutations"):
+        sys.modules.pop(module, None)
+    options = [*_OPTIONS, *_FAST]
+    if uncompiled:
+        os.environ["NUMBA_DISABLE_JIT"] = "1"
+        options += ["-W", "ignore::RuntimeWarning"]
+    import pytest
+
+    recorder, began = Recorder(), time.process_time()
+    status = pytest.main([*options, *names], plugins=[recorder])
+    by = recorder.failed or ("" if status == 0 and recorder.passed else f"status {int(status)}")
+    _written((place, mutant, names, limit, uncompiled), by, time.process_time() - began)
+    os._exit(0)
+
+
+def drawn(part: str, number: int, seed: int) -> list[Mutant]:
+    """Mutants of a part, the same for everybody."""
+    every = []
+    for folder in PARTS[part]:
+        for path in sorted((ROOT / "src/rocking" / folder).rglob("*.py")):
+            every += [] if path.name in NOT_JUDGED else mutants(path)
+    return random.Random(f"{part} {seed}").sample(every, min(number, len(every)))
+
+
+def equivalent() -> Callable[[Mutant], str]:
+    """Look up why a mutant changes nothing that can be seen; empty if nothing is known."""
+    known = {(each["file"], each["change"]): each["reason"] for each in json.loads(EQUIVALENT.read_text("utf-8"))}
+    return lambda mutant: known.get((mutant.path.relative_to(ROOT / "src").as_posix(), mutant.change), "")
+
+
+def report(part: str, drawn: list[Mutant], found: list[dict[str, Any]]) -> Iterator[str]:
+    """Write a line with the counts, and every survivor."""
+    reason = equivalent()
+    spared = [mutant for mutant, each in zip(drawn, found, strict=True) if not each["by"]]
+    named = [mutant for mutant in spared if reason(mutant)]
+    counted = len(drawn) - len(named)
+    killed = len(drawn) - len(spared)
+    share = killed / max(counted, 1)
+    yield f"{part}: {len(drawn)} mutants, {len(named)} equivalent, {killed} of {counted} killed ({100 * share:.0f} %)"
+    for mutant in spared:
+        place = f"{mutant.path.relative_to(ROOT / 'src')}:{mutant.line}"
+        yield f"  {place}: {reason(mutant) or 'not seen'}\n    - {mutant.before}\n    + {mutant.after}"
+    if share < WANTED:
+        yield f"  fewer than {100 * WANTED:.0f} %"
+
+
+def main() -> int:
+    """Draw, judge and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("parts", nargs="*", choices=[*PARTS, []], help="which; by default all")
+    parser.add_argument("--number", type=int, default=30, help="mutants of each part")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes")
+    parser.add_argument("--seconds", type=float, default=20.0, help="processor time of the tests of one mutant")
+    parser.add_argument("--kept", type=Path, default=ROOT / "out" / "mutants", help="folder of what is kept")
+    given = parser.parse_args()
+    for module in ("matplotlib.pyplot", "pandas", "pytest", "scipy.optimize", "xarray"):
+        importlib.import_module(module)  # each process would do so anew otherwise
+
+    tree, enough = Tree(given.kept, given.jobs, given.seconds), True
+    try:
+        for part in given.parts or PARTS:
+            some = drawn(part, given.number, given.seed)
+            lines = [*report(part, some, tree.judged(some, uncompiled=part == "kernels"))]
+            enough = enough and not lines[-1].startswith("  fewer")
+            print("\r" + "\n".join(lines), flush=True)
+    finally:
+        tree.remove()
+    return 0 if enough else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

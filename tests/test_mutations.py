@@ -1,0 +1,69 @@
+"""Mistakes that are made on purpose: each is one change that can be read, and everybody draws the same."""
+
+import ast
+
+import mutants
+import mutations
+
+CODE = '''"""A module."""
+
+from __future__ import annotations
+
+
+def middle(values: list[float], least: int = 2) -> float | None:
+    """Say nothing of mutants: {1 + 1}."""
+    if len(values) < least and not values:
+        raise ValueError(f"{len(values) + 1} values")
+    values.sort(reverse=True)
+    low = values[0] * 0.5
+    return low + values[-1]
+'''
+
+
+def test_each_mutant_is_one_mistake_in_what_is_run(tmp_path):
+    path = tmp_path / "module.py"
+    path.write_text(CODE, "utf-8")
+    found = mutations.mutants(path)
+    changes = {each.change for each in found}
+    assert {
+        "len(values) < least -> len(values) <= least",
+        "len(values) < least and (not values) -> len(values) < least or not values",
+        "len(values) < least and (not values) -> not (len(values) < least and (not values))",
+        "not values -> values",
+        "values.sort(reverse=True) -> pass",
+        "values.sort(reverse=True) -> values.sort()",
+        "True -> False",
+        "2 -> 3",
+        "2 -> 1",
+        "0 -> 1",
+        "0.5 -> 1.5",
+        "values[0] * 0.5 -> values[0] / 0.5",
+        "low + values[-1] -> low - values[-1]",
+        "-1 -> 1",
+    } <= changes
+    assert all("list[float]" in each.text and "{1 + 1}" in each.text for each in found)
+    assert "len(values) + 1 -> len(values) - 1" not in changes
+    for each in found:
+        ast.parse(each.text)
+        assert ast.dump(ast.parse(each.text)) != ast.dump(ast.parse(CODE)), each.change
+    assert len({each.key for each in found}) == len(found) >= 16
+
+
+def test_a_draw_is_the_same_again():
+    assert all((mutants.ROOT / "src/rocking" / each).is_dir() for part in mutants.PARTS.values() for each in part)
+    for part in ("response", "chattering"):
+        drawn = mutants.drawn(part, 30, 1)
+        assert len({each.key for each in drawn}) == 30, part
+        assert [each.key for each in mutants.drawn(part, 30, 1)] == [each.key for each in drawn]
+        assert [each.key for each in mutants.drawn(part, 30, 2)] != [each.key for each in drawn]
+
+
+def test_survivors_are_named_and_those_that_change_nothing_do_not_count(monkeypatch):
+    drawn = mutants.drawn("block and solid", 4, 1)
+    found = [{"by": "tests/test_block.py::test_something"}, {"by": ""}, {"by": ""}, {"by": "time"}]
+    monkeypatch.setattr(mutants, "equivalent", lambda: lambda each: "it is only faster" if each is drawn[1] else "")
+    head, *rest = mutants.report("block and solid", drawn, found)
+    assert head == "block and solid: 4 mutants, 1 equivalent, 2 of 3 killed (67 %)"
+    assert "it is only faster" in rest[0] and drawn[1].before in rest[0]
+    assert "not seen" in rest[1] and drawn[2].after in rest[1]
+    assert rest[2] == "  fewer than 85 %"
