@@ -1363,12 +1363,18 @@ def test_a_plain_case_is_printed_on_one_light_page_without_controls(opened, sche
 
 
 @pytest.mark.parametrize(
-    "query", [f"view=assessment&levels=6&records={RECORDS}", "view=block"], ids=["assessment", "block"]
+    ("view", "query"),
+    [
+        ("assessment", f"{STATUE}&view=assessment&levels=6&records={RECORDS}"),
+        ("block", f"{STATUE}&view=block"),
+        ("compare", f"{STATUE}&view=compare"),
+        ("periodic", f"{SINE}&view=periodic&sweep_points=24"),
+    ],
 )
-def test_an_assessment_and_a_block_are_printed_on_one_page_with_their_keys(opened, query):
+def test_a_view_is_printed_on_one_page_with_its_keys(opened, view, query):
     only_chromium("show what is printed")
-    page = opened(f"{STATUE}&{query}")
-    page.until("document.body.dataset.assessment === 'complete'" if "records" in query else "true")
+    page = opened(query, {"width": 1440, "height": 900})
+    page.until(COMPUTED.get(view, "true"), "the view is complete")
     page.js("window.print = () => { document.body.dataset.printed = '1'; }; 1")
     page.page.click("#print")
     page.until("document.body.dataset.printed", "the page is ready to be printed")
