@@ -101,7 +101,7 @@ def test_the_hidden_block_lies_within_the_estimates(found):
     assert found.estimates["alpha_plus"].upper < found.estimates["alpha_minus"].upper
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_full_search_finds_and_predicts_it_too(shaken, unseen):
     found = rocking.calibrate(*shaken, candidates=512, model="linear")
     test_what_a_hidden_block_will_do_is_predicted(found, unseen)

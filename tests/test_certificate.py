@@ -134,7 +134,7 @@ def test_ball_arithmetic_proves_chattering_from_the_first_certified_impact_on(
     [
         ("linear", SYMMETRIC),
         ("linear", TWO_SIDED),
-        pytest.param("nonlinear", SYMMETRIC, marks=pytest.mark.thorough),
+        pytest.param("nonlinear", SYMMETRIC, marks=pytest.mark.slow),
         pytest.param("nonlinear", TWO_SIDED, marks=pytest.mark.thorough),
     ],
 )

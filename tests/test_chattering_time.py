@@ -77,7 +77,7 @@ def test_time_and_completeness_are_proven_in_ball_arithmetic():
 
 
 FAR = [(omega, eta) for eta in (0.02, 0.3) for omega in (0.08, 0.3, 30.0, 1e3)]
-LONG = [(30.0, 0.985), *(pytest.param(omega, 0.985, marks=pytest.mark.thorough) for omega in (0.08, 0.3, 1e3))]
+LONG = [(30.0, 0.985), *(pytest.param(omega, 0.985, marks=pytest.mark.slow) for omega in (0.08, 0.3, 1e3))]
 
 
 @pytest.mark.parametrize(("omega", "eta"), [*FAR, *LONG])

@@ -39,7 +39,7 @@ def test_what_begins_at_a_flip_is_followed(run):
     assert switched["bifurcations"][0]["value"] == pytest.approx(flip["value"], abs=1e-8)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_branches_that_begin_at_flips_are_followed_one_after_the_other_and_written(run, tmp_path):
     code, out, _ = run(*AT_FLIPS, "--switch", "15,16.3", "--out", tmp_path)
     assert code == 0

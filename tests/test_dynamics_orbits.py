@@ -171,9 +171,7 @@ def table_of(ball):
 @pytest.mark.parametrize(
     ("restitution", "n"),
     [
-        pytest.param(
-            e, n, marks=() if (e, n) == (0.5, 1) else pytest.mark.thorough if (e, n) == (0.3, 2) else pytest.mark.slow
-        )
+        pytest.param(e, n, marks=() if (e, n) == (0.5, 1) else pytest.mark.slow)
         for e in (0.3, 0.5, 0.8)
         for n in (1, 2, 3)
     ],
@@ -226,7 +224,7 @@ def test_orbits_of_an_oscillator_that_hits_once_are_those_of_shaw_and_holmes(sha
     assert found == pytest.approx([value], abs=1e-10)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_linear_block_that_hits_once_every_half_period_loses_stability_where_hogans_orbits_do():
     judged = 0
     for e, shaking, m in ((0.5, 0.8, 1), (0.8, 1.2, 3)):
@@ -275,7 +273,7 @@ def test_grazing_is_found_from_both_sides():
     assert judged == 2
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_orbits_with_an_impact_more_begin_where_those_with_one_less_end():
     family = table_of(dynamics.BouncingBall(0.5, gravity=G))
     found = {}
@@ -311,7 +309,7 @@ def test_chattering_ceases_to_be_complete_at_the_critical_amplitude_and_rest_end
     }  # fmt: skip
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_doubled_branch_ends_at_the_flip_and_an_asymmetric_one_where_symmetry_breaks():
     exact = closed_orbits.Ball(0.5, 1)
     family = table_of(dynamics.BouncingBall(0.5, gravity=G))

@@ -38,7 +38,7 @@ def bodies(count, seed):
     return made
 
 
-@pytest.mark.parametrize("count", [12, pytest.param(200, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("count", [12, pytest.param(200, marks=pytest.mark.slow)])
 def test_no_drag_along_a_track_is_refused_and_the_next_step_is(count):
     draw, explorer, dragged, ended = random.Random(2), Explorer(), 0, 0
     for texts in bodies(count, 1):

@@ -222,7 +222,7 @@ def test_spoilt_records_end_in_channels_or_one_sentence(
     attempt(place, request_)
 
 
-@pytest.mark.parametrize("every", [4, pytest.param(1, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("every", [4, pytest.param(1, marks=pytest.mark.slow)])
 def test_any_token_before_a_record_ends_in_channels_or_one_sentence(place: Path, every: int) -> None:
     """As a control character before the title."""
     assert len(seeds()) >= 20

@@ -171,7 +171,7 @@ def chances_are_even(chances):
 
 
 @pytest.mark.parametrize("scope", ["test", "specimen"])
-@pytest.mark.parametrize("sets", [12, pytest.param(200, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("sets", [12, pytest.param(200, marks=pytest.mark.slow)])
 def test_of_right_predictions_chances_are_even_and_bands_hold(monkeypatch, scope, sets):
     rng = np.random.default_rng(2)
     found = [

@@ -137,7 +137,7 @@ def linear_end(step: Step, row: tuple[float, float], t: float) -> tuple[mpmath.m
 
 
 def rounds_of(few: int, many: int) -> pytest.MarkDecorator:
-    return pytest.mark.parametrize("rounds", [few, pytest.param(many, marks=pytest.mark.thorough)])
+    return pytest.mark.parametrize("rounds", [few, pytest.param(many, marks=pytest.mark.slow)])
 
 
 @rounds_of(3, 20)

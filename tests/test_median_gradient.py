@@ -56,21 +56,20 @@ def test_median_and_dispersion_change_as_differences_of_fits_say(model: str) -> 
     assert judged_by_differences(PULSES, (1.5, 2.8), 12, model, STEPS) == 3
 
 
-@pytest.mark.parametrize(
-    "model", [pytest.param("linear", marks=pytest.mark.slow), pytest.param("nonlinear", marks=pytest.mark.thorough)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("model", ["linear", "nonlinear"])
 def test_median_and_dispersion_change_so_with_each_parameter(model: str) -> None:
     assert judged_by_differences(PULSES, (1.5, 2.8), 12, model) == 3
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_bands_that_end_count_too() -> None:
     assert judged_by_differences(PULSES[1:], (1.5, 12.0), 300, "nonlinear", STEPS) >= 6
 
 
 @pytest.mark.parametrize(
     ("counts", "most"),
-    [((20, 80), (1e-2, 2e-3)), pytest.param((100, 400), (3e-3, 5e-4), marks=pytest.mark.thorough)],
+    [((20, 80), (1e-2, 2e-3)), pytest.param((100, 400), (3e-3, 5e-4), marks=pytest.mark.slow)],
 )
 def test_fits_to_many_levels_tend_to_that_of_all(counts: tuple[int, int], most: tuple[float, float]) -> None:
     block = Block.from_parameters(**{name: tuple(value) for name, value in GIVEN.items()})

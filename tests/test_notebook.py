@@ -7,7 +7,7 @@ import pytest
 
 # Each task of the page runs in one notebook, which takes half a minute. What a notebook shows of a figure is held by
 # tests/test_canvas.py, and what a result shows of itself by tests/test_reprs.py.
-pytestmark = pytest.mark.thorough
+pytestmark = pytest.mark.slow
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "howto" / "notebook.md"
 CELL = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)

@@ -4,7 +4,9 @@ import pytest
 from oracles.standing import KINDS, OF_ENSEMBLES, TOLERANCE, lanes_and_single, single_and_integrated
 
 
-@pytest.mark.parametrize("pairs", [20, pytest.param(400, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize(
+    "pairs", [20, pytest.param(100, marks=pytest.mark.thorough), pytest.param(400, marks=pytest.mark.slow)]
+)
 @pytest.mark.parametrize("kind", OF_ENSEMBLES)
 def test_an_ensemble_of_each_kind_gives_what_single_simulations_give(kind, pairs):
     found = lanes_and_single(kind, 2, pairs, most=20)
@@ -19,7 +21,7 @@ def test_an_ensemble_of_each_kind_gives_what_single_simulations_give(kind, pairs
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(
-    "cases", [2, pytest.param(8, marks=pytest.mark.thorough), pytest.param(100, marks=pytest.mark.slow)]
+    "cases", [2, pytest.param(4, marks=pytest.mark.thorough), pytest.param(100, marks=pytest.mark.slow)]
 )
 def test_each_kind_moves_as_an_integration_of_forces_says(kind, cases):
     found = single_and_integrated(kind, 2, cases)

@@ -641,7 +641,7 @@ def test_names_of_units_are_their_keys():
         assert key_of(name) not in grid
 
 
-@pytest.mark.parametrize("scales", [2_000, pytest.param(50_000, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("scales", [2_000, pytest.param(50_000, marks=pytest.mark.slow)])
 def test_however_many_units_are_opened_in_a_tenth_of_a_second_and_a_hundred_thousand_listed_in_one(tmp_path, scales):
     # Of processor time: others may use the machine.
     blocks = rocking.Blocks(p=np.linspace(1.0, 6.0, 1000), alpha=0.2, restitution=0.7)

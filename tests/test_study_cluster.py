@@ -115,7 +115,7 @@ def test_a_scheduler_s_workers_compute_the_same_bytes(complete, tmp_path, run):
 # What is lost with processes is thorough: each takes seconds to start.
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_cluster_loses_a_unit_a_worker_and_its_scheduler_but_no_result(complete, tmp_path, cluster, run, monkeypatch):
     # All is well.
     made(tmp_path / "well")
@@ -239,7 +239,7 @@ def commands(*beginnings):
     return [next(line for line in lines if line.startswith(beginning)) for beginning in beginnings]
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="the page makes a certificate with openssl")
 def test_the_commands_of_the_page_run_a_study_over_tls(complete, tmp_path, monkeypatch, run):
     with socket.socket() as free:

@@ -24,7 +24,7 @@ class HalfMap(StroboscopicMap):
         first = _first_half(strobe.motion)
         self.period *= 0.5
         self._ground = repeated(first, self.body.gravity, -1.0)
-        self._steps = self._steps[:, : len(first.coefficients)]
+        self._steps = np.ascontiguousarray(self._steps[:, : len(first.coefficients)])  # as kernels take arrays
 
     def mirrored(self, state: Floats, halves: int) -> tuple[Floats, Floats]:
         """Mirror image of a state after an odd number of half periods, and its derivative; NaN where it overturns."""
