@@ -98,8 +98,9 @@ dynamics.impact_map(ball, table)([0.05, 1.0])
 dynamics.lyapunov_exponents(ball, table, [0.1, 0.5], 20, transient=5)
 dynamics.basins(ball, table, [0.01, 0.05], [0.0, 0.1], periods=10, progress=False)
 # A mirrored block under an antisymmetric motion: only half a period of it is followed.
+mirrored = rocking.Block.from_parameters(p=2.0, alpha=0.6, restitution=0.55)
 def swing(amplitude):
-    return rocking.Block.from_parameters(p=2.0, alpha=0.6, restitution=0.55), rocking.pulses.sine(amplitude, 0.8, cycles=1)
+    return mirrored, rocking.pulses.sine(amplitude, 0.8, cycles=1)
 orbit = dynamics.periodic_orbits(*swing(16.0), model="linear", starts=8)[0]
 dynamics.continue_orbit(orbit, swing, 16.0, (15.9, 16.1))
 dynamics.simulate(dynamics.ImpactOscillator(1.0, 0.8, damping_ratio=0.1, stop=0.01), table)
