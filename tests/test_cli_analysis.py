@@ -116,7 +116,8 @@ def test_fragility_json_is_the_fit(run):
     assert (code, err) == (0, "")
     result = json.loads(out)
     motions = [rocking.records.load(name) for name in (RECORD, OTHER, "ridgecrest-clc-090")]
-    options = {"measure": "pgv", "levels": np.linspace(0.4, 1.2, 9), "polarity": "both"}
+    # The command's levels are the decimals that were meant, 0.9 and not 0.8999999999999999.
+    options = {"measure": "pgv", "levels": [0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2], "polarity": "both"}
     fitted = fragility(rocking.Block(width=0.24, height=1.1), motions, band=Band("bootstrap", samples=50), **options)
     assert result["curves"][0]["median"] == fitted.curves[0].median
     assert result["curves"][0]["median_interval"] == list(fitted.curves[0].median_interval)
