@@ -1883,6 +1883,183 @@ def test_a_pinned_case_is_returned_to_compared_with_and_kept(opened):
     assert page.js("localStorage.getItem('rocking-snapshots')") == "[]"
 
 
+# What is chosen while an answer is on its way
+
+
+@contextmanager
+def held(page, pattern):
+    """Hold back what the page asks for by addresses like this, and let it go in the end."""
+    waiting = []
+    page.page.route(pattern, lambda route: waiting.append(route))
+    yield waiting
+    page.page.unroute(pattern)  # which lets go what waits
+
+
+def asked(page, waiting, count=1):
+    """Wait until so much is held back."""
+    for _ in range(400):
+        if len(waiting) >= count:
+            return
+        page.page.wait_for_timeout(25)
+    raise AssertionError(f"{len(waiting)} of {count} were asked for")
+
+
+def entered(page, name, text):
+    """Type something into a field, and commit it."""
+    page.page.fill(f"#{name}", text)
+    page.page.press(f"#{name}", "Enter")
+
+
+def test_a_view_is_shown_once_it_hears_what_is_chosen_and_is_made_once(opened):
+    page = opened(STATUE)
+    compared = []
+    page.page.on("request", lambda request: compared.append(request.url) if "/api/compare?" in request.url else None)
+    with held(page, "**/page/compare.js") as waiting:
+        page.page.click("[data-view=compare]")
+        asked(page, waiting)
+        page.page.wait_for_timeout(100)
+        assert page.page.locator("#compare-with").is_hidden() and page.page.locator("#histories").is_visible()
+        assert page.js("document.querySelector('[aria-current]').dataset.view") == "response"
+        page.page.click("[data-view=response]")
+        page.page.click("[data-view=compare]")
+    page.page.select_option("#compare-with", "block")
+    page.until("new URLSearchParams(location.search).get('other.width') === '0.36'")
+    kinds = [parse_qs(urlsplit(url).query)["compare"][0] for url in compared]
+    assert len(kinds) == len(set(kinds)) <= 2 and kinds[-1] == "block"
+
+
+def test_a_refused_value_stays_marked_when_what_was_asked_before_comes_late(opened):
+    page = opened(STATUE, allowed=["422"])
+    with held(page, "**/api/code?*") as waiting:
+        entered(page, "width", "0.3")
+        asked(page, waiting)
+        entered(page, "width", "-1")
+        page.until("!document.getElementById('problem').hidden")
+    page.until("document.getElementById('python').textContent.includes('width=0.3')", "the code of what is shown")
+    page.page.wait_for_timeout(300)
+    assert page.js(MARKED) == ["width"] and page.text("#problem").startswith("“Width” must be a positive number")
+    assert page.js("document.getElementById('main').classList.contains('old')") and query_of(page)["width"] == "0.3"
+
+
+def test_what_can_be_taken_away_is_what_is_shown_also_beside_a_refused_value(opened):
+    page = opened(STATUE, allowed=["422"])
+    sent = []
+    page.page.on("request", lambda request: sent.append(request.url) if "/api/" in request.url else None)
+    with held(page, "**/api/tracks?*") as waiting:
+        entered(page, "width", "0.3")
+        page.until("document.getElementById('derived').textContent.includes('15.3°')")
+        entered(page, "width", "-1")  # before anything but the picture is drawn
+        page.until("!document.getElementById('problem').hidden")
+        asked(page, waiting)
+    page.until("document.getElementById('python').textContent.includes('width=0.3')", "the code of what is shown")
+    sent.clear()
+    page.page.click("#in-words summary")
+    page.until("document.querySelectorAll('#words tr').length > 5")
+    page.js("window.print = () => { document.body.dataset.printed = '1'; }; 1")
+    page.page.click("#print")
+    page.until("document.body.dataset.printed")
+    page.page.locator("#exports button").nth(2).click()
+    asked(page, sent, 3)
+    assert {parse_qs(urlsplit(url).query)["width"][0] for url in sent} == {"0.3"}
+    assert page.js(MARKED) == ["width"]
+
+
+def test_a_window_that_is_chosen_while_a_case_is_computed_is_the_one_that_is_drawn(opened):
+    page = opened(STATUE)
+    with held(page, "**/api/case?*") as waiting:
+        entered(page, "pga", "0.45")
+        asked(page, waiting)
+        page.page.click("[data-zoom=in]")
+        page.page.wait_for_timeout(400)
+    page.until("new URLSearchParams(location.search).has('from') && location.search.includes('0.45g')")
+    page.page.wait_for_timeout(300)
+    found, line = query_of(page), plotted(page)
+    times = line["origin"] + np.array(line["x"])[[0, -1]] * line["unit"]
+    assert times == pytest.approx([float(found["from"]), float(found["to"])], abs=0.05)
+
+
+def test_changes_before_a_links_file_is_known_or_before_the_units_change_are_kept(opened, here, explorer):
+    record = rocking.records.load("el-centro-meloland-270")
+    text = "\n".join(f"{value:.9g}" for value in record.samples[1])
+    key = explorer.uploads.add_file("known.txt", text.encode())
+    page = opened(STATUE)
+    with held(page, f"**/api/records/{key}") as waiting:
+        link = {"width": "0.24", "height": "1.1", "motion": f"file:{key}", "dt": "0.01", "units": "m/s2", "pga": "0.4g"}
+        page.page.goto(here.link(link))
+        page.until(READY)
+        asked(page, waiting)
+        page.rested(lambda: entered(page, "pga", "0.3"))
+        found = query_of(page)
+        assert found == link | {"pga": "0.3g"}
+    page.until("document.getElementById('dt').checkVisibility()", "the file is known")
+    page.rested(lambda: entered(page, "dt", "0.02"))
+    assert query_of(page) == link | {"pga": "0.3g", "dt": "0.02"}
+    with page.page.expect_event("load"), held(page, "**/api/case?*") as waiting:
+        entered(page, "width", "0.3")
+        asked(page, waiting)
+        page.page.select_option("#length_in", "cm")
+        page.page.wait_for_timeout(500)
+    page.until(READY)
+    assert page.page.input_value("#width") == "30" and query_of(page)["width"] == "0.3"
+
+
+def test_the_last_of_two_files_shakes_the_block_however_late_the_first_arrives(opened):
+    page = opened(STATUE)
+    rows = "time (s),a (g)\n" + "".join(f"{0.01 * k:.2f},{0.3 * (-1) ** (k // 20)}\n" for k in range(100))
+    one_, other = rows + "1.00,0.1\n", rows + "1.00,0.2\n"
+    with held(page, "**/api/records?name=first.csv") as waiting:
+        page.js(DROP, ["first.csv", one_])
+        asked(page, waiting)
+        page.js(DROP, ["second.csv", other])
+        page.page.wait_for_timeout(500)
+    key = hashlib.sha256(other.encode()).hexdigest()[:24]
+    page.until(f"location.search.includes('{key}')")
+    page.page.wait_for_timeout(500)
+    assert query_of(page)["motion"] == f"file:{key}" and "'second.csv'" in page.text("#python")
+
+
+def test_a_late_answer_leaves_alone_what_was_chosen_after_the_question(opened):
+    page = opened(f"{SINE}&view=map&points=8")
+    complete(page)
+    with held(page, "**/api/map/point?*") as waiting:
+        page.page.click("#map-open")
+        asked(page, waiting)
+        page.rested(lambda: entered(page, "restitution", "0.9"))
+    page.page.wait_for_timeout(300)
+    complete(page)
+    assert query_of(page)["restitution"] == "0.9" and query_of(page)["view"] == "map"
+    # Another quantity before the first part of a map is there.
+    with held(page, "**/api/map?*") as waiting:
+        page.page.select_option("#map-x", "p")
+        asked(page, waiting)
+        page.page.select_option("#map-quantity", "peak")
+    page.until("location.search.includes('x=p&')")
+    complete(page)
+    assert query_of(page)["quantity"] == "peak"
+    page.page.click("[data-view=response]")
+    page.until("document.getElementById('at').checkVisibility()")
+    with held(page, "**/api/at?*") as waiting:
+        entered(page, "at", "1.25")
+        asked(page, waiting)
+        page.page.press("#at-slider", "End")
+    page.page.wait_for_timeout(300)
+    chosen = float(query_of(page)["at"])
+    assert chosen != 1.25 and page.js("Number(document.getElementById('at').value)") == pytest.approx(chosen, abs=0.01)
+
+
+def test_a_lecture_that_is_left_before_it_has_begun_leaves_no_large_text(opened):
+    only_chromium("keep its size on the whole screen")
+    page = opened(STATUE)
+    with held(page, "**/page/block.js") as waiting:
+        page.page.keyboard.press("f")
+        asked(page, waiting)
+        page.page.keyboard.press("f")
+    page.until("document.getElementById('stage').checkVisibility()")
+    page.page.wait_for_timeout(200)
+    sizes = f"{MODELS}.filter((each) => each.type === 'LinearAxis').map((each) => each.major_label_text_font_size)"
+    assert set(page.js(sizes)) == {"12px"} and page.page.locator("#settings").is_visible()
+
+
 # Guided examples
 
 

@@ -80,6 +80,7 @@ export async function* frames(path, texts, signal) {
     while (held.length >= 4) {
       const size = new DataView(held.buffer, held.byteOffset).getUint32(0, true);
       if (held.length < 4 + size) break;
+      signal.throwIfAborted(); // what has come already is of no use, either
       const part = held.slice(4, 4 + size);
       if (part[0] === BRACE) {
         const {problem, argument} = JSON.parse(new TextDecoder().decode(part));
@@ -104,14 +105,20 @@ export class Latest {
     this.work = work;
     this.settled = settled;
     this.busy = false;
+    /** Comes when nothing is under way any more. @type {Promise<void>} */
+    this.idle = Promise.resolve();
     /** @type {any[] | null} */
     this.next = null;
   }
 
   /** @param {any[]} given */
-  async ask(...given) {
+  ask(...given) {
     this.next = given;
-    if (this.busy) return;
+    if (!this.busy) this.idle = this.run();
+    return this.idle;
+  }
+
+  async run() {
     this.busy = true;
     while (this.next) {
       const now = this.next;

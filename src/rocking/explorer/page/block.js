@@ -64,8 +64,8 @@ export class View {
   draw() {
     const {header} = this.page.shown ?? {};
     if (!header) return;
-    if (this.of !== JSON.stringify(this.page.state.texts)) {
-      this.of = JSON.stringify(this.page.state.texts);
+    if (this.of !== JSON.stringify(this.page.state.good.texts)) {
+      this.of = JSON.stringify(this.page.state.good.texts);
       const before = this.page.shown.arrays.uplift.filter((/** @type {number} */ each) => each <= header.peak_time);
       this.time = this.page.state.at ?? Math.max(this.left(), (before.at(-1) ?? 0) - 0.2);
       this.lines = null;
@@ -172,7 +172,7 @@ export class View {
   /** @param {number} from @param {number} to */
   async bring(from, to) {
     if (!(to > from)) return;
-    const texts = {...this.page.state.texts, from: String(from), to: String(to), ground: "1", points: "1200"};
+    const texts = {...this.page.state.good.texts, from: String(from), to: String(to), ground: "1", points: "1200"};
     const {header, arrays} = await payload("/api/window", texts);
     this.lines = {...header.window, ...arrays};
     if (!this.playing) this.paint();

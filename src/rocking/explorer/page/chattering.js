@@ -1,15 +1,21 @@
 // Chattering sequences: their rests with brackets, intervals between impacts, and their ratios against eta^2.
 
-import {json} from "./api.js";
+import {Latest, json} from "./api.js";
 import {bokeh, colour, figure, showPlot, themed} from "./theme.js";
 import {fill, make, one} from "./words.js";
 import {NONE, fixed, short, span} from "./numbers.js";
 import {phrase} from "./texts.js";
 
 export class ChatteringPanel {
-  /** @param {(ends: [number, number]) => void} go */
-  constructor(go) {
+  /** @param {(ends: [number, number]) => void} go @param {(error: unknown) => void} problem is told what went wrong */
+  constructor(go, problem) {
     this.go = go;
+    /** Texts of the case that is drawn. @type {Record<string, string> | null} */
+    this.texts = null;
+    this.summary = new Latest(async () => {
+      const rows = await json("/api/summary", this.texts ?? {});
+      fill(/** @type {HTMLTableElement} */ (one("words")), [], rows);
+    }, (error) => { if (error) problem(error); });
     this.chosen = 0;
     this.made = false;
     /** @type {any[]} */
@@ -26,12 +32,12 @@ export class ChatteringPanel {
       const before = shown.arrays.uplift.filter((each) => each <= start);
       return {uplift: before.length ? before[before.length - 1] : 0, start, end, lower, upper, impacts, off};
     });
-    if (this.key !== JSON.stringify(texts)) this.chosen = this.longest();
-    this.key = JSON.stringify(texts);
+    if (JSON.stringify(this.texts) !== JSON.stringify(texts)) this.chosen = this.longest();
+    this.texts = texts;
     this.chosen = Math.min(this.chosen, Math.max(0, this.sequences.length - 1));
     this.list();
     this.plot();
-    if (/** @type {HTMLDetailsElement} */ (one("in-words")).open) void this.words(texts);
+    this.words();
   }
 
   longest() {
@@ -139,10 +145,8 @@ export class ChatteringPanel {
     this.label?.setv({text: phrase("chattering.eta", {eta: short(eta, 4)})});
   }
 
-  /** All numbers, once somebody wants to read them. @param {Record<string, string>} texts */
-  async words(texts) {
-    if (!/** @type {HTMLDetailsElement} */ (one("in-words")).open) return;
-    const rows = await json("/api/summary", texts);
-    fill(/** @type {HTMLTableElement} */ (one("words")), [], rows);
+  /** All numbers, once somebody wants to read them. */
+  words() {
+    if (this.texts && /** @type {HTMLDetailsElement} */ (one("in-words")).open) void this.summary.ask();
   }
 }

@@ -69,19 +69,20 @@ export class View {
 
   async run() {
     const {state} = this.page;
-    const {other: chosen, compare: kind, align} = state;
+    const {other: chosen, compare: kind, align, good} = state;
     if (!Object.keys(chosen).length) return;
     const {header, arrays} = await payload("/api/compare", {...state.texts, ...this.asked(), ...ends(state)});
+    if (state.good !== good) return; // somebody went back meanwhile
     this.page.remember({other: chosen, compare: kind, align});
-    
-    this.draw(header, arrays);
-    this.files(header);
+    this.draw(header, arrays, kind);
+    if (state.other === chosen) this.block?.show(chosen, header.cases[1].block.sides);
+    this.files(header, kind);
     counted("compared");
-    if (this.with.value === "treatment") await this.schemes();
+    if (kind === "treatment") await this.schemes();
   }
 
-  /** @param {any} [header] @param {any} [arrays] */
-  draw(header, arrays) {
+  /** @param {any} [header] @param {any} [arrays] @param {string} [kind] of what is compared */
+  draw(header, arrays, kind = "") {
     if (!header) return;
     const [one_, other] = header.cases;
     const none = new Float64Array(0);
@@ -90,17 +91,16 @@ export class View {
       return {lines, rest: arrays[`${name}_rest`], uplift: none, block: header.cases[k].block};
     });
     first.lines.weight = arrays.first_weight;
-    if (!["motion", "case"].includes(this.with.value)) second.lines.ground_time = second.lines.ground_g = none;
+    if (!["motion", "case"].includes(kind)) second.lines.ground_time = second.lines.ground_g = none;
     this.histories.draw(header, first, second);
-    this.block?.show(this.page.state.other, other.block.sides);
-    one("compare-verdict").textContent = (this.with.value === "treatment" ? phrase("compare.verdict_treated", {treatment: other.treatment, verdict: inWords(other.verdict), difference: difference(one_, other)})
+    one("compare-verdict").textContent = (kind === "treatment" ? phrase("compare.verdict_treated", {treatment: other.treatment, verdict: inWords(other.verdict), difference: difference(one_, other)})
       : phrase("compare.verdict", {verdict: inWords(other.verdict), difference: difference(one_, other)})).trim();
     legend("compare-legend", [["line", phrase("compare.this")], ["second", shifted(header.shift)], ["rest", phrase("compare.at_rest")], ["impact", phrase("compare.impacts")]]);
   }
 
-  /** What may be saved: both cases, each under its name. @param {any} header */
-  files({cases: [first, other]}) {
-    const kind = this.with.value, {state} = this.page;
+  /** What may be saved: both cases, each under its name. @param {any} header @param {string} kind of what is compared */
+  files({cases: [first, other]}, kind) {
+    const {state} = this.page;
     const [one_, second] = [caseName(first), kind === "treatment" ? phrase("compare.treated", {name: caseName(other), treatment: other.treatment}) : caseName(other)];
     const name = `rocking-compare-${slug(one_)}-and-${slug(second)}`;
     const asked = {...state.texts, ...this.asked(), first: one_, second};
@@ -121,8 +121,8 @@ export class View {
   async schemes() {
     const key = JSON.stringify(this.page.state.texts);
     if (this.known === key) return;
-    this.known = key;
     const rows = await json("/api/schemes", this.page.state.texts);
+    this.known = key;
     fill(/** @type {HTMLTableElement} */ (one("schemes")), ["", phrase("compare.treatment_head"), phrase("compare.makes")], rows.map((/** @type {any} */ row) => {
       const button = make("button", {type: "button", disabled: row.right === null, "aria-label": phrase("compare.button_about", {name: row.label}), on: {click: () => { this.page.state.other = {chattering: row.text}; this.form(); this.update(); }}}, [phrase("compare.button")]);
       const sign = row.right === null ? "" : row.right ? "✓ " : "✗ ";

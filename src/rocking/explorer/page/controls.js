@@ -14,6 +14,12 @@ export function choice(prefix, name, label, options, changed) {
 /** @param {HTMLSelectElement} select @param {string[][]} options values and labels */
 export const offer = (select, options) => select.replaceChildren(...options.map(([value, text]) => make("option", {value}, [text])));
 
+/** Show what an address says, also where that is not among what is offered. @param {HTMLSelectElement} select @param {string} value */
+export function choose(select, value) {
+  if (![...select.options].some((each) => each.value === value)) select.append(make("option", {value}, [value]));
+  select.value = value;
+}
+
 /** @param {string} id @param {string} label @param {() => void} changed */
 export function check(id, label, changed) {
   const box = /** @type {HTMLInputElement} */ (make("input", {type: "checkbox", id, on: {change: changed}}));

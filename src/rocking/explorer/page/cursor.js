@@ -87,8 +87,10 @@ export class Cursor {
       this.show();
       return;
     }
+    const {at} = this.page.state;
     try {
       const {time} = await this.found(text);
+      if (this.page.state.at !== at || typed(this.field.value) !== text) return; // another time was chosen meanwhile
       this.page.problem(null, "reading");
       this.set(time);
     } catch (error) {

@@ -1,7 +1,7 @@
 // Forms that change the texts of a case: its block, its motion, its model.
 
 import {json} from "./api.js";
-import {check, choice, offer} from "./controls.js";
+import {check, choice, choose, offer} from "./controls.js";
 import {MeshFields} from "./mesh.js";
 import {namesOf, parameter, specification} from "./parameters.js";
 import {explained, make, one} from "./words.js";
@@ -16,6 +16,8 @@ import {phrase} from "./texts.js";
 const STEPS = 1000;
 const G = 9.80665;
 const BLOCK = namesOf("block"), MOTION = namesOf("motion", "start"), RELEASED = "3deg";
+/** Key of the file that a text names, if it names one. @param {string | undefined} text */
+const keyOf = (text) => /^file:([^#]*)/.exec(text ?? "")?.[1];
 
 /** A number with a slider, a field, its unit and its explanation. */
 class NumberControl {
@@ -261,8 +263,8 @@ export class MotionForm {
     this.units.select.dataset.argument = "units";
     /** What is missing of a file, with what each choice would make of it. */
     this.missing = make("div", {className: "missing", role: "group", "aria-label": phrase("file.missing"), hidden: true});
-    /** Texts that were shown and not changed here since. @type {Texts | null} */
-    this.linked = null;
+    /** Texts of the motion as it is. @type {Texts} */
+    this.texts = {};
     const {label, unit} = parameter("dt");
     const dt = /** @type {HTMLInputElement} */ (make("input", {type: "text", inputMode: "decimal", id: `${prefix}dt`, "data-argument": "dt", on: {change: chosen}}));
     this.dt = {field: dt, element: make("div", {className: "choice"}, [make("label", {className: "field", for: dt.id}, [phrase("form.with_unit", {label, unit})]), dt])};
@@ -310,9 +312,10 @@ export class MotionForm {
     for (const each of this.scales) if (texts[each.spec.name]) each.show(texts[each.spec.name].split("@")[0]);
     if (texts.sa) this.period.show(texts.sa.split("@")[1] ?? "1");
     this.upwards = texts.vertical ?? "";
-    this.units.select.value = texts.units ?? "";
+    choose(this.units.select, texts.units ?? "");
     this.dt.field.value = texts.dt ?? "";
-    this.linked = texts;
+    this.texts = texts;
+    if (kind === "file" && this.file?.key !== keyOf(motion)) this.file = null;
     this.showFields();
     void this.fetchFiles(texts);
   }
@@ -325,15 +328,17 @@ export class MotionForm {
 
   /** Learn what the files of a link are, which the server has kept. @param {Texts} texts */
   async fetchFiles(texts) {
-    const [moving, upwards] = [texts.motion, texts.vertical].map((name) => /^file:([^#]*)/.exec(name ?? "")?.[1]);
-    for (const key of new Set([moving, upwards])) {
-      if (!key || this.files.some((file) => file.key === key)) continue;
-      try { this.files.push(await json(`/api/records/${key}`, {})); } catch { return; }
+    const keys = new Set([texts.motion, texts.vertical].map(keyOf).filter(Boolean));
+    for (const key of keys) {
+      if (this.files.some((file) => file.key === key)) continue;
+      try { this.files.push(await json(`/api/records/${key}`, {})); } catch { /* what the case says of it is enough */ }
     }
-    const known = this.files.find((file) => file.key === moving);
+    // Meanwhile another motion may have been chosen.
+    const {motion, channel} = this.texts;
+    const known = this.files.find((file) => file.key === keyOf(motion));
     if (known && known !== this.file) this.use(known);
-    if (known && texts.channel) this.channel.select.value = texts.channel;
-    if (moving || upwards) this.showFields();
+    if (known && channel) this.channel.select.value = channel;
+    if (keys.size) this.showFields();
   }
 
   /** Let a file shake the block. @param {any} file */
@@ -344,11 +349,13 @@ export class MotionForm {
 
   /** Take a file that the server keeps: it shakes the block, or moves it up and down as well. @param {any} file @param {boolean} [upwards] */
   take(file, upwards = false) {
-    this.files = [...this.files.filter((each) => each.key !== file.key), file];
-    const {linked} = this;
-    if (linked && [linked.motion, linked.vertical].some((name) => name?.split("#")[0] === `file:${file.key}`)) {
-      this.show(linked);
-      this.changed(Object.fromEntries(MOTION.filter((name) => linked[name]).map((name) => [name, linked[name]])), MOTION);
+    const known = this.files.some(({key}) => key === file.key), {texts} = this;
+    this.files = [...this.files.filter(({key}) => key !== file.key), file];
+    // A file that the case waits for, or that shakes the block already, leaves the case as it is.
+    const named = known ? [upwards ? undefined : texts.motion] : [texts.motion, texts.vertical];
+    if (named.some((name) => keyOf(name) === file.key)) {
+      this.show(texts);
+      this.changed(Object.fromEntries(MOTION.filter((name) => texts[name]).map((name) => [name, texts[name]])), MOTION);
       return;
     }
     if (upwards) this.upwards = file.channels.length > 1 ? `file:${file.key}#${file.channels.at(-1).number}` : `file:${file.key}`;
@@ -441,7 +448,6 @@ export class MotionForm {
     const kind = this.kind.select.value, scaled = this.scale.select.value;
     /** @type {Texts} */
     const texts = {};
-    this.linked = null;
     if (kind === "record") texts.motion = this.record.select.value;
     else if (kind === "none") texts.motion = "none";
     else if (kind === "given") texts.motion = this.given;
@@ -452,13 +458,15 @@ export class MotionForm {
     } else if (this.file) {
       texts.motion = `file:${this.file.key}`;
       if (this.file.channels.length > 1) texts.channel = this.channel.select.value;
-    }
+    } else for (const name of ["motion", "channel"]) if (this.texts[name]) texts[name] = this.texts[name];
     if (this.upwards && !this.vertical.element.hidden) texts.vertical = this.upwards;
-    if (this.needing("units") && this.units.select.value) texts.units = this.units.select.value;
-    if (this.needing("dt") && this.dt.field.value) texts.dt = this.dt.field.value;
+    const waited = [texts.motion, texts.vertical].map(keyOf).some((key) => key && !this.files.some((file) => file.key === key));
+    if ((waited || this.needing("units")) && this.units.select.value) texts.units = this.units.select.value;
+    if ((waited || this.needing("dt")) && this.dt.field.value) texts.dt = this.dt.field.value;
     for (const each of this.starts) if (each.value(each.text) !== 0) texts[each.spec.name] = each.text;
     const control = this.scales.find(({spec}) => spec.name === scaled);
     if (control && kind !== "none" && kind !== "pulse") texts[scaled] = scaled === "sa" ? `${control.text}@${this.period.text}` : control.text;
+    this.texts = texts;
     this.changed(texts, MOTION);
   }
 }

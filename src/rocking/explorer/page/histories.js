@@ -290,9 +290,9 @@ export class Histories {
   ranged() {
     if (this.drawing) return;
     window.clearTimeout(this.waiting);
-    this.waiting = window.setTimeout(() => {
-      this.go([this.scale.time(this.x.start), this.scale.time(this.x.end)]);
-    }, 30);
+    /** @type {[number, number]} */
+    const ends = [this.scale.time(this.x.start), this.scale.time(this.x.end)]; // what is drawn until then changes the range, too
+    this.waiting = window.setTimeout(() => this.go(ends), 30);
   }
 
   /** Ask for another window. @param {[number, number] | null} ends */

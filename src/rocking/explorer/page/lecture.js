@@ -47,6 +47,7 @@ export class Lecture {
     this.page.state.lecture = true;
     document.body.classList.add("lecture");
     await this.page.go("block");
+    if (!this.on) return;
     const magnify = /** @type {HTMLSelectElement} */ (one("magnify"));
     this.magnified = magnify.value;
     magnify.value = "peak";

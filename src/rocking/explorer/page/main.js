@@ -30,8 +30,10 @@ const state = readAddress();
 /** What the views share.
  * @type {{state: import("./parameters.js").State, shown: import("./api.js").Payload | null, go: typeof go, problem: typeof problem, restate: typeof restate, follow: typeof follow, list: RecordList, remember: (parts: Partial<import("./parameters.js").Good>) => void}} */
 const page = {state, shown: null, go, problem, restate, follow, list: new RecordList(state), remember: (parts) => { accepted(state, parts); examples.check(); }};
-/** @type {Record<string, any>} */
+/** Views that somebody has opened, by name. @type {Record<string, any>} */
 const views = {};
+/** The number of the last view that was asked for. */
+let turn = 0;
 
 const forms = {
   block: new BlockForm(one("block-form"), changed),
@@ -43,7 +45,7 @@ const histories = new Histories(one("histories"), {
 });
 const phase = new PhasePanel(page, (time) => cursor.set(time));
 const cursor = new Cursor(page, {mark: (time) => { histories.mark(time); phase.mark(time); }, seek: (time) => { if (state.view === "block") views.block?.seek(time); }});
-const chattering = new ChatteringPanel(showWindow);
+const chattering = new ChatteringPanel(showWindow, problem);
 const lecture = new Lecture(page, histories);
 const examples = new Examples(state, revisit, problem);
 new Sheet();
@@ -79,49 +81,41 @@ function problem(error, place = "settings") {
 
 /** How long sliders must lie still before all is drawn, ms. */
 const PAUSE = 120;
-/** The timer; 0 where all is drawn. */
 let pause = 0;
+/** Texts of the case that is shown. @type {Texts} */
+let texts = state.texts;
+/** Whether the case must be computed; else another window of it is enough. */
+let stale = true;
+/** What was shown when all was drawn last. @type {import("./api.js").Payload | null} */
+let rested = null;
 
-/** The whole case, where a form has changed it. */
-const load = new Latest(async () => {
+/** Show what the state says: one request after the other, so that no answer overtakes a later one. */
+const load = new Latest(() => (stale || !page.shown || !state.window ? compute() : look()), problem);
+
+/** The whole case. */
+async function compute() {
   window.clearTimeout(pause);
-  const {texts} = state;
-  page.shown = await payload("/api/case", {...texts, ...ends(state)});
-  accepted(state, {texts});
-  draw();
-  counted("drawn");
-  pause = window.setTimeout(() => afterPause.ask(), PAUSE);
-}, problem);
-
-/** What nobody reads while a slider moves. */
-const afterPause = new Latest(async () => {
-  pause = 0;
-  if (!page.shown) return;
-  const {header} = page.shown, {texts} = state;
-  forms.block.show(texts, header.block.sides);
-  const asked = json("/api/tracks", texts).catch(() => ({}));
-  showNotes(header);
-  showLegend(header);
-  chattering.window(header.window);
-  if (state.view === "response") chattering.draw(page.shown, texts);
-  phase.update();
-  cursor.show();
-  await forms.block.mesh.learn(header.block.body, texts);
-  if (!ofOwn(state.view)) {
-    if (state.view !== "compare") showFiles(state, problem);
-    const {python, command} = await json("/api/code", texts);
-    if (state.texts === texts && !ofOwn(state.view)) showCode("case", python, command);
+  stale = false;
+  const {texts: asked, good} = state;
+  try {
+    const found = await payload("/api/case", {...asked, ...ends(state)});
+    if (state.good !== good) return; // somebody went back meanwhile
+    page.shown = found;
+    texts = asked;
+    accepted(state, {texts});
+    draw();
+    counted("drawn");
+  } catch (error) {
+    stale = true;
+    throw error;
+  } finally {
+    pause = window.setTimeout(() => afterPause.ask(), PAUSE);
   }
-  const found = await asked;
-  if (state.texts === texts) forms.block.tracks(found);
-  counted("rested");
-}, problem);
+}
 
 /** Another window of the case that is shown. */
-const look = new Latest(async () => {
-  if (!page.shown) return;
-  if (!state.window) { await load.work(); return; }
-  const {header, arrays} = await payload("/api/window", {...state.texts, ...ends(state)});
+async function look() {
+  const {header, arrays} = await payload("/api/window", {...texts, ...ends(state)});
   if (!page.shown) return; // another case is on its way
   page.shown.header.window = header.window;
   Object.assign(page.shown.arrays, arrays);
@@ -129,9 +123,34 @@ const look = new Latest(async () => {
   chattering.window(header.window);
   phase.update();
   cursor.show();
-  showFiles(state, problem);
   counted("drawn");
-}, problem);
+}
+
+/** What nobody reads while a slider moves. */
+const afterPause = new Latest(async () => {
+  const {shown} = page;
+  if (!shown || shown === rested) return;
+  const {header} = shown, of = texts;
+  if (state.texts === of) forms.block.show(of, header.block.sides);
+  const tracks = json("/api/tracks", of).catch(() => ({}));
+  showNotes(header);
+  showLegend(header);
+  chattering.window(header.window);
+  if (state.view === "response") chattering.draw(shown, of);
+  phase.update();
+  cursor.show();
+  await forms.block.mesh.learn(of);
+  if (!ofOwn(state.view)) {
+    if (state.view !== "compare") showFiles(state, problem);
+    const {python, command} = await json("/api/code", of);
+    if (texts === of && !ofOwn(state.view)) showCode("case", python, command);
+  }
+  const found = await tracks;
+  rested = shown;
+  if (state.texts !== of) return;
+  forms.block.tracks(found);
+  counted("rested");
+}, (error) => { if (error) problem(error); }); // that all is well with what is shown says nothing of what is in the fields
 
 /** The block is shown at another time: the plots follow, and where it stands still, so does the cursor.
  * @param {number} time @param {boolean} playing */
@@ -143,30 +162,31 @@ function follow(time, playing) {
 function showWindow(chosen) {
   state.window = chosen;
   writeAddress(state);
-  void look.ask();
+  void load.ask();
 }
 
-/** A form has changed the case: new texts stand for all those that they replace. @param {Texts} texts @param {string[]} replaced */
-function changed(texts, replaced) {
-  if (replaced.includes("motion") && state.texts.motion !== texts.motion) state.window = state.at = null;
+/** A form has changed the case: new texts stand for all those that they replace. @param {Texts} given @param {string[]} replaced */
+function changed(given, replaced) {
+  if (replaced.includes("motion") && state.texts.motion !== given.motion) state.window = state.at = null;
   const kept = Object.entries(state.texts).filter(([name]) => !replaced.includes(name));
-  state.texts = {...Object.fromEntries(kept), ...texts};
+  state.texts = {...Object.fromEntries(kept), ...given};
+  stale = true;
   views[state.view]?.update?.();
   examples.check();
   void load.ask();
 }
 
-/** Other texts altogether: show them in the forms, too. @param {Texts} texts */
-function restate(texts) {
+/** Other texts altogether: show them in the forms, too. @param {Texts} given */
+function restate(given) {
   begin();
   state.window = state.at = null;
-  showForms(texts);
-  changed(texts, Object.keys(state.texts));
+  showForms(given);
+  changed(given, Object.keys(state.texts));
 }
 
-/** @param {Texts} texts */
-function showForms(texts) {
-  for (const form of Object.values(forms)) form.show(texts);
+/** @param {Texts} given */
+function showForms(given) {
+  for (const form of Object.values(forms)) form.show(given);
 }
 
 /** Go back or forward in the browser's history. */
@@ -187,8 +207,23 @@ function revisit() {
 /** Whether a view shows something else than a response, with files and code of its own. @param {string} name */
 const ofOwn = (name) => name === "map" || name === "periodic" || name === "assessment";
 
-/** Show another view. @param {string} name */
+/** The view of a name, whose code is loaded when it is opened first. @param {string} name */
+async function made(name) {
+  if (name === "response" || views[name]) return views[name];
+  const module = await import(`./${name}.js`).catch(() => { throw new Problem(phrase("page.silent")); });
+  return views[name] ??= new module.View(page, histories);
+}
+
+/** Show another view, once its code is there: what is chosen in it is heard from the start. @param {string} name */
 async function go(name) {
+  const here = turn += 1;
+  try {
+    if (name !== "response" && !views[name]) await made(name);
+  } catch (error) {
+    problem(error);
+    return;
+  }
+  if (here !== turn) return; // another view was chosen meanwhile
   state.view = name;
   for (const button of document.querySelectorAll("[data-view]")) {
     if (/** @type {HTMLElement} */ (button).dataset.view === name) {
@@ -210,12 +245,9 @@ async function go(name) {
   writeAddress(state);
   examples.check();
   for (const [each, view] of Object.entries(views)) if (each !== name) { view.leave?.(); problem(null, `view-${each}`); }
-  if (name !== "response" && !views[name]) {
-    const module = await import(`./${name}.js`);
-    views[name] = new module.View(page, histories);
-  }
   views[name]?.enter?.();
   if (page.shown) draw();
+  stale = true;
   void load.ask();
 }
 
@@ -311,7 +343,7 @@ for (const button of document.querySelectorAll("button.what[aria-controls]")) {
     button.setAttribute("aria-expanded", String(!words.hidden));
   });
 }
-one("in-words").addEventListener("toggle", () => chattering.words(state.texts));
+one("in-words").addEventListener("toggle", () => chattering.words());
 if (coarse()) one("cursor").textContent = phrase("reading.tap");
 one("settings").addEventListener("submit", (event) => event.preventDefault());
 makeCopying();
@@ -327,13 +359,18 @@ acceptFiles(async (file, use) => {
   }
 }, async (files) => {
   await go("records");
-  await views.records.add(files);
+  await views.records?.add(files);
 });
 makePrinting(page, problem);
-unitFields(() => { writeAddress(state); window.setTimeout(() => location.reload(), 250); });
+unitFields(async () => {
+  await load.idle; // what was changed before belongs into the address that is loaded again
+  writeAddress(state);
+  window.setTimeout(() => location.reload(), 250);
+});
 window.addEventListener("popstate", revisit);
 await examples.arrive();
 showForms(state.texts);
 void watchCompilation();
 await (state.lecture ? lecture.enter() : go(state.view));
+document.body.inert = false;
 document.body.dataset.ready = String(performance.now());

@@ -1,6 +1,7 @@
 // A map of the case over two of its parameters, coarse to fine; or of a study.
 
 import {Latest, frames, json, payload} from "./api.js";
+import {choose} from "./controls.js";
 import {showExports} from "./exports.js";
 import {MapPicture} from "./map-picture.js";
 import {MapReading} from "./map-reading.js";
@@ -24,6 +25,8 @@ export class View {
     this.about = null;
     this.waiting = 0;
     this.complete = false;
+    /** Ends of the axes where none are chosen. @type {Record<string, string>} */
+    this.usual = {};
     this.picture = new MapPicture({
       over: (x, y) => this.reading.over(x, y), chosen: (x, y) => { this.reading.put(x, y); void this.open(); }, zoomed: (box) => this.zoom.into(box),
     });
@@ -85,8 +88,8 @@ export class View {
   /** What is asked of the server: all but the quantity, since it sends all of them.
    * @returns {Record<string, string>} */
   asked() {
-    const ends = Object.fromEntries(ENDS.map((end) => [end, typed(/** @type {HTMLInputElement} */ (one(`map-${end.replace("_", "-")}`)).value)]));
-    const {x, y, points} = this.page.state.map;
+    const {map} = this.page.state, {x, y, points} = map;
+    const ends = Object.fromEntries(ENDS.map((end) => [end, map[end] || this.usual[end]]));
     return {...this.page.state.texts, x, y, ...ends, points: points ?? "200"};
   }
 
@@ -141,14 +144,15 @@ export class View {
     this.select("quantity").replaceChildren(...quantities.map((/** @type {any} */ each) => make("option", {value: each}, [phrase(`quantity.${each}`)])));
     if (!quantities.includes(map.quantity)) map.quantity = this.first(quantities);
     this.select("quantity").value = map.quantity;
-    this.select("points").value = map.points ?? "200";
+    choose(this.select("points"), map.points ?? "200");
     if (this.study) return;
     for (const which of ["x", "y"]) {
       const axis = offered.find((/** @type {any} */ each) => each.name === map[which]);
       const wide = map.quantity === "peak" || map.quantity === "mode";
       for (const [k, end] of ["from", "to"].entries()) {
-        const field = /** @type {HTMLInputElement} */ (one(`map-${which}-${end}`));
-        if (document.activeElement !== field) field.value = map[`${which}_${end}`] ?? String((wide ? axis.wide : axis.close)[k]);
+        const field = /** @type {HTMLInputElement} */ (one(`map-${which}-${end}`)), name = `${which}_${end}`;
+        this.usual[name] = String((wide ? axis.wide : axis.close)[k]);
+        if (document.activeElement !== field) field.value = map[name] || this.usual[name];
       }
     }
   }
@@ -163,7 +167,7 @@ export class View {
   /** @param {AbortSignal} signal */
   async stream(signal) {
     this.fill();
-    const map = {...this.page.state.map};
+    const {map} = this.page.state;
     if (this.complete && this.drawn === JSON.stringify(this.asked())) {
       this.page.remember({map});
       this.recolour();
@@ -301,8 +305,10 @@ export class View {
   /** Open the case at the mark. */
   async open() {
     if (!this.about) return;
+    const {texts, view} = this.page.state;
     try {
       const found = await json(...this.request("point", this.reading.mark));
+      if (this.page.state.texts !== texts || this.page.state.view !== view) return; // something else was chosen meanwhile
       this.page.state.view = "response";
       this.page.restate(found);
       await this.page.go("response");

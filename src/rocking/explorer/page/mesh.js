@@ -1,7 +1,7 @@
 // The fields of a body of a mesh: its file, how that is read, and the picture on which it is turned.
 
 import {payload} from "./api.js";
-import {choice, offer} from "./controls.js";
+import {choice, choose, offer} from "./controls.js";
 import {namesOf, parameter, specification} from "./parameters.js";
 import {Plan} from "./plan.js";
 import {make} from "./words.js";
@@ -33,6 +33,8 @@ export class MeshFields {
       field("density", phrase("mesh.same_density")), field("tolerance", phrase("mesh.thousandth"))]);
     this.element = make("div", {hidden: true}, [this.file.element, this.more]);
     this.asked = "";
+    /** The body of the case that is shown. @type {any} */
+    this.body = null;
     this.plan = prefix ? null : new Plan(turned);
     this.picture = make("div", {className: "body", hidden: true}, this.plan ? [this.plan.element] : []);
   }
@@ -42,11 +44,8 @@ export class MeshFields {
     if (!texts.mesh) return;
     if (!Object.hasOwn(this.files, texts.mesh)) this.know(texts.mesh, phrase("mesh.linked"));
     this.file.select.value = texts.mesh;
-    for (const {select, name} of [{...this.unit, name: "unit"}, {...this.up, name: "up"}]) {
-      const value = texts[name] ?? "";
-      if (![...select.options].some((each) => each.value === value)) select.append(make("option", {value}, [value]));
-      select.value = value;
-    }
+    choose(this.unit.select, texts.unit ?? "");
+    choose(this.up.select, texts.up ?? "");
     for (const [name, input] of Object.entries(this.typed)) if (document.activeElement !== input) input.value = texts[name] ?? "";
   }
 
@@ -74,11 +73,14 @@ export class MeshFields {
   }
 
   /** Turn the picture, while a slider moves. @param {any} body */
-  turn(body) { this.plan?.turn(body); }
+  turn(body) {
+    this.body = body;
+    this.plan?.turn(body);
+  }
 
-  /** Learn what is said and drawn of a body, after a pause. @param {any} body of a case that is shown @param {Texts} texts */
-  async learn(body, texts) {
-    if (!body || !this.plan) return;
+  /** Learn what is said and drawn of the body that is shown, after a pause. @param {Texts} texts */
+  async learn(texts) {
+    if (!this.body || !this.plan) return;
     const asked = JSON.stringify(namesOf("block", "model").map((name) => texts[name]));
     if (asked === this.asked) return;
     const found = await payload("/api/body", texts);
@@ -87,6 +89,6 @@ export class MeshFields {
     if (texts.mesh.startsWith("file:") && this.files[texts.mesh] !== found.header.name) this.know(texts.mesh, found.header.name);
     this.typed.density.title = phrase("mesh.parts", {names: found.header.parts.join(", ")});
     this.plan.draw(found);
-    this.plan.turn(body);
+    this.plan.turn(this.body);
   }
 }

@@ -31,6 +31,7 @@ function named(spec) {
 /** Say why the page cannot open, and wait for ever: without what the server says of the parameters there is no page.
  * @param {unknown} error @returns {Promise<never>} */
 function stop(error) {
+  document.body.inert = false;
   if (!(error instanceof Problem)) throw error;
   one("problem").textContent = error.message;
   one("problem").hidden = false;

@@ -1,6 +1,7 @@
 // The case under a sine that never ends: what it settles on in the phase plane, and a diagram of that over a parameter.
 
 import {Latest, frames, json, payload, unpacked} from "./api.js";
+import {choose} from "./controls.js";
 import {showExports, withLegend} from "./exports.js";
 import {specification} from "./parameters.js";
 import {bokeh, colour, figure, showPlot, themed} from "./theme.js";
@@ -156,8 +157,9 @@ export class View {
     const {sweep} = this.page.state;
     const shown = /** @type {Texts} */ ({sweep: name, sweep_from: String(values[0]), sweep_to: String(values[values.length - 1]), sweep_points: String(values.length)});
     for (const field of FIELDS) {
-      const input = /** @type {HTMLInputElement} */ (one(field));
-      if (document.activeElement !== input) input.value = sweep[field] ?? shown[field];
+      const input = /** @type {HTMLElement} */ (one(field)), value = sweep[field] ?? shown[field];
+      if (input instanceof HTMLSelectElement) choose(input, value);
+      else if (input instanceof HTMLInputElement && document.activeElement !== input) input.value = value;
     }
   }
 
@@ -336,7 +338,8 @@ export class View {
     const {texts, sweep} = this.page.state;
     const from = point ? {u: String(point.u), v: String(point.v)} : {};
     try {
-      this.page.restate(await json("/api/sweep/point", {...texts, ...sweep, at: String(this.about.values[index]), ...from}));
+      const found = await json("/api/sweep/point", {...texts, ...sweep, at: String(this.about.values[index]), ...from});
+      if (this.page.state.texts === texts && this.page.state.view === "periodic") this.page.restate(found);
     } catch (error) {
       this.page.problem(error, "view-periodic");
     }

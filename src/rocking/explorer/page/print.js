@@ -15,9 +15,9 @@ export function makePrinting(page, problem) {
 
   async function print() {
     try {
-      const texts = JSON.stringify(page.state.texts);
+      const {texts: shown} = page.state.good, texts = JSON.stringify(shown);
       if (held !== texts) {
-        const rows = await json("/api/summary", page.state.texts);
+        const rows = await json("/api/summary", shown);
         const half = Math.ceil(rows.length / 2);
         fill(/** @type {HTMLTableElement} */ (one("print-summary")), [], Array.from({length: half}, (_, k) => [...rows[k], ...(rows[k + half] ?? ["", ""])]));
         held = texts;
@@ -32,7 +32,7 @@ export function makePrinting(page, problem) {
 
   function begin() {
     lit(true);
-    if (held !== JSON.stringify(page.state.texts)) one("print-summary").replaceChildren();
+    if (held !== JSON.stringify(page.state.good.texts)) one("print-summary").replaceChildren();
     head(page);
   }
 
@@ -59,6 +59,6 @@ function head({state, shown}) {
     [phrase("print.computed"), `rocking ${specification.version}, ${new Date().toISOString().slice(0, 10)}`],
     [phrase("print.address"), `?${location.search.slice(1)}`],
   ];
-  if (state.view === "assessment" && state.assessment.records) rows[4][1] = phrase("print.listed", {address: `?${new URLSearchParams(state.texts)}&view=assessment`});
+  if (state.view === "assessment" && state.assessment.records) rows[4][1] = phrase("print.listed", {address: `?${new URLSearchParams(state.good.texts)}&view=assessment`});
   one("print-head").replaceChildren(...rows.map(([name, text]) => make("div", {}, [make("dt", {}, [name]), make("dd", {}, [text])])));
 }

@@ -4,6 +4,8 @@ import {plain} from "./ticks.js";
 
 /** @type {Set<() => void>} */
 const followers = new Set();
+/** Where a label of usual size would be longer than its axis. */
+const narrow = window.matchMedia("(max-width: 420px)");
 const forced = window.matchMedia("(forced-colors: active)");
 for (const query of [window.matchMedia("(prefers-color-scheme: dark)"), forced]) query.addEventListener("change", () => followers.forEach((follow) => follow()));
 
@@ -66,7 +68,7 @@ export function figure(given, label) {
     for (const axis of [...made.below, ...made.left]) {
       axis.setv({
         axis_line_color: soft, major_tick_line_color: soft, minor_tick_line_color: null, major_label_text_color: ink,
-        axis_label_text_color: ink, major_label_text_font_size: `${textSize(12)}px`, axis_label_text_font_size: `${textSize(12)}px`,
+        axis_label_text_color: ink, major_label_text_font_size: `${textSize(12)}px`, axis_label_text_font_size: `${textSize(narrow.matches ? 11 : 12)}px`,
         axis_label_text_font_style: "normal", axis_label_text_font: "system-ui, sans-serif", major_label_text_font: "system-ui, sans-serif",
         axis_label_standoff: 8,
       });

@@ -25,8 +25,12 @@ export function acceptFiles(take, list) {
   /** @type {Use} */
   let chosen = "record";
   const buttons = /** @type {Record<string, Use>} */ ({"choose-file": "record", "choose-vertical": "vertical", "choose-mesh": "mesh"});
+  /** What was given before is read first: the last file that was given is the one that is used. @type {Promise<void>} */
+  let before = Promise.resolve();
   /** @param {File[]} files @param {Use} wanted */
-  const taken = async (files, wanted) => {
+  const taken = (files, wanted) => { before = before.then(() => read(files, wanted)); };
+  /** @param {File[]} files @param {Use} wanted */
+  const read = async (files, wanted) => {
     const [meshes, records] = [true, false].map((each) => files.filter((file) => (useOf(file, wanted) === "mesh") === each));
     if (meshes.length) await take(() => sendFile(meshes[0], "mesh"), "mesh");
     if (records.length > 1 && wanted === "record") await list(records);
@@ -38,7 +42,7 @@ export function acceptFiles(take, list) {
   input.addEventListener("change", () => {
     const files = [...(input.files ?? [])];
     input.value = "";
-    void taken(files, chosen);
+    taken(files, chosen);
   });
   // Text and links that are dragged are nothing to open, and the browser shall not go where they lead.
   const brings = (/** @type {DragEvent} */ event) => event.dataTransfer?.types.includes("Files") ?? false;
@@ -53,6 +57,6 @@ export function acceptFiles(take, list) {
     event.preventDefault();
     depth = 0;
     dropping.hidden = true;
-    void taken([...(event.dataTransfer?.files ?? [])], "record");
+    taken([...(event.dataTransfer?.files ?? [])], "record");
   });
 }
