@@ -16,6 +16,7 @@ import argparse
 import hashlib
 import importlib
 import json
+import math
 import multiprocessing
 import os
 import random
@@ -97,38 +98,56 @@ class Tree:
         near = ordered([self.tests.of(path)])
         return [path.relative_to(ROOT).as_posix() for path in near[:MOST]]
 
+    def chosen(self, paths: set[Path], uncompiled: bool) -> dict[Path, dict[str, float]]:
+        """Files of tests for a mutant of each file and their times: the nearest that the time allows, at least one.
+
+        Times are measured one file of tests after another, until half of the time is filled.
+        """
+        near, times = {path: self.near(path) for path in paths}, dict[str, float]()
+        while True:
+            chosen: dict[Path, dict[str, float]] = {path: {} for path in near}
+            missing = set()
+            for path, some in chosen.items():
+                for name in near[path]:
+                    total = sum(some.values())
+                    if total > 0.5 * self.seconds:
+                        break
+                    if name not in times:
+                        missing.add(name)
+                        break
+                    if total + times[name] <= (self.seconds if some else sys.float_info.max):
+                        some[name] = times[name]
+            if not missing:
+                return chosen
+            times |= self.measured(missing, uncompiled)
+
     def measured(self, names: Iterable[str], uncompiled: bool) -> dict[str, float]:
-        """Processor time of each file of tests that passes without a mutant; the others are said and left out."""
+        """Processor time of each file of tests without a mutant; infinite, and said, if it fails or takes too long."""
         tasks: list[Task] = []
         kept = {}
-        for name in sorted(set(names)):
+        for name in sorted(names):
             place = self.folder / "times" / f"{self.sources[:16]}-{self.hash(name)}-{int(uncompiled)}.json"
             kept[name] = place
             if not place.exists():
-                tasks.append((place, None, [name], 90.0, uncompiled))
+                tasks.append((place, None, [name], 3.0 * self.seconds, uncompiled))
         done(tasks, self.copies)
-        times = {name: json.loads(place.read_text()) for name, place in kept.items()}
-        if failing := [name for name, found in times.items() if found["by"]]:
+        found = {name: json.loads(place.read_text()) for name, place in kept.items()}
+        if failing := [name for name, each in found.items() if each["by"]]:
             print("left out, for they fail or take too long without a mutant:", *failing)
-        return {name: found["seconds"] for name, found in times.items() if not found["by"]}
+        return {name: math.inf if each["by"] else each["seconds"] for name, each in found.items()}
 
     def judged(self, drawn: list[Mutant], uncompiled: bool) -> list[dict[str, Any]]:
         """Find what the tests show of each mutant."""
-        near = {path: self.near(path) for path in {each.path for each in drawn}}
-        times = self.measured((name for names in near.values() for name in names), uncompiled)
+        chosen = self.chosen({mutant.path for mutant in drawn}, uncompiled)
         tasks: list[Task] = []
         places = []
         for mutant in drawn:
-            names: list[str] = []
-            total = 0.0
-            for name in near[mutant.path]:
-                if name in times and (not names or total + times[name] <= self.seconds):
-                    names.append(name)
-                    total += times[name]
+            names = [*chosen[mutant.path]]
+            limit = 3.0 * sum(chosen[mutant.path].values()) + 20.0
             place = self.folder / "mutants" / f"{mutant.key}.json"
             places.append(place)
             if not (place.exists() and self._holds(json.loads(place.read_text()), names)):
-                tasks.append((place, mutant, names, 3.0 * total + 20.0, uncompiled))
+                tasks.append((place, mutant, names, limit, uncompiled))
         done(tasks, self.copies)
         return [json.loads(place.read_text()) for place in places]
 
