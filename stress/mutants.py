@@ -7,12 +7,15 @@ Each mutant (`mutations.py` says what is drawn) is put into a copy of the tree, 
 that `make quick` would run for a change of its file, up to the first failure. Kernels are run uncompiled. What a mutant
 showed is kept under a hash of its text, and holds as long as the tests that showed it are what they were; a run that
 was stopped goes on where it was. Every survivor is printed; those of `equivalent_mutants.json` change nothing that can
-be seen, for the reason said there, and do not count.
+be seen, for the reason said there, and do not count. Once every part has been judged, in one run or in several, the
+table of docs/reliability.md is written.
 """
 
 from __future__ import annotations
 
 import argparse
+import dataclasses
+import datetime
 import hashlib
 import importlib
 import json
@@ -28,6 +31,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -55,7 +59,7 @@ PARTS = {
 }
 
 #: How kernels come to be compiled, which a run without compilation shows nothing of.
-NOT_JUDGED = ("compiled.py", "compiler.py", "library.py", "signatures.py", "sources.py")
+NOT_JUDGED = ("compiled.py", "compiler.py", "interpreted.py", "library.py", "signatures.py", "sources.py")
 
 #: Share of the mutants of a part that tests must see.
 WANTED = 0.85
@@ -263,20 +267,66 @@ def equivalent() -> Callable[[Mutant], str]:
     return lambda mutant: known.get((mutant.path.relative_to(ROOT / "src").as_posix(), mutant.change), "")
 
 
-def report(part: str, drawn: list[Mutant], found: list[dict[str, Any]]) -> Iterator[str]:
-    """Write a line with the counts, and every survivor."""
-    reason = equivalent()
-    spared = [mutant for mutant, each in zip(drawn, found, strict=True) if not each["by"]]
-    named = [mutant for mutant in spared if reason(mutant)]
-    counted = len(drawn) - len(named)
-    killed = len(drawn) - len(spared)
-    share = killed / max(counted, 1)
-    yield f"{part}: {len(drawn)} mutants, {len(named)} equivalent, {killed} of {counted} killed ({100 * share:.0f} %)"
-    for mutant in spared:
-        place = f"{mutant.path.relative_to(ROOT / 'src')}:{mutant.line}"
-        yield f"  {place}: {reason(mutant) or 'not seen'}\n    - {mutant.before}\n    + {mutant.after}"
-    if share < WANTED:
-        yield f"  fewer than {100 * WANTED:.0f} %"
+@dataclass(frozen=True)
+class Shown:
+    """What the tests showed of the mutants of a part."""
+
+    drawn: int
+    equivalent: int
+    killed: int
+    #: Of each survivor its place, why it changes nothing that can be seen (empty: it does), and the change.
+    spared: list[list[str]]
+    seed: int = 1
+    date: str = ""
+
+    @property
+    def counted(self) -> int:
+        """Mutants that change something."""
+        return self.drawn - self.equivalent
+
+    @property
+    def share(self) -> float:
+        """Share of these that tests saw."""
+        return self.killed / max(self.counted, 1)
+
+    @classmethod
+    def of(cls, drawn: list[Mutant], found: list[dict[str, Any]], seed: int) -> Shown:
+        """Count, and name the survivors."""
+        reason = equivalent()
+        spared = [mutant for mutant, each in zip(drawn, found, strict=True) if not each["by"]]
+        places = [f"{mutant.path.relative_to(ROOT / 'src/rocking')}:{mutant.line}" for mutant in spared]
+        named = [
+            [place, reason(mutant), mutant.before, mutant.after] for place, mutant in zip(places, spared, strict=True)
+        ]
+        counts = len(drawn), sum(bool(each[1]) for each in named), len(drawn) - len(spared)
+        return cls(*counts, named, seed, datetime.date.today().isoformat())
+
+    def report(self, part: str) -> Iterator[str]:
+        """Write a line with the counts, and every survivor."""
+        counts = f"{self.drawn} mutants, {self.equivalent} equivalent, {self.killed} of {self.counted} killed"
+        yield f"{part}: {counts} ({100 * self.share:.0f} %)"
+        for place, reason, before, after in self.spared:
+            yield f"  {place}: {reason or 'not seen'}\n    - {before}\n    + {after}"
+        if self.share < WANTED:
+            yield f"  fewer than {100 * WANTED:.0f} %"
+
+
+def table(shown: dict[str, Shown]) -> str:
+    """Table of all parts, and below it every survivor that changes something."""
+    heads = ("part", "mutants", "equivalent", "killed", "killed, %", "date")
+    lines = ["| " + " | ".join(heads) + " |", "|---" + "|--:" * (len(heads) - 1) + "|"]
+    for part, each in shown.items():
+        cells = (part, each.drawn, each.equivalent, each.killed, f"{100 * each.share:.0f}", each.date)
+        lines.append("| " + " | ".join(map(str, cells)) + " |")
+    spared = [survivor for each in shown.values() for survivor in each.spared if not survivor[1]]
+    lines += ["", "Not seen by any test:" if spared else "None was spared that changes anything."]
+    for place, _, before, after in spared:
+        lines += ["", f"- {place}: `{_line(before)}` became `{_line(after)}`"]
+    return "\n".join([*lines, ""])
+
+
+def _line(code: str) -> str:
+    return " ".join(code.replace("`", "'").split())
 
 
 def main() -> int:
@@ -296,11 +346,16 @@ def main() -> int:
     try:
         for part in given.parts or PARTS:
             some = drawn(part, given.number, given.seed)
-            lines = [*report(part, some, tree.judged(some, uncompiled=part == "kernels"))]
-            enough = enough and not lines[-1].startswith("  fewer")
-            print("\r" + "\n".join(lines), flush=True)
+            shown = Shown.of(some, tree.judged(some, uncompiled=part == "kernels"), given.seed)
+            (given.kept / f"{part}.json").write_text(json.dumps(dataclasses.asdict(shown)), "utf-8")
+            enough = enough and shown.share >= WANTED
+            print("\r" + "\n".join(shown.report(part)), flush=True)
     finally:
         tree.remove()
+    kept = {part: given.kept / f"{part}.json" for part in PARTS}
+    if all(path.exists() for path in kept.values()):
+        shown_by = {part: Shown(**json.loads(path.read_text("utf-8"))) for part, path in kept.items()}
+        (ROOT / "docs/_tables/tests-mutants.txt").write_text(table(shown_by), "utf-8")
     return 0 if enough else 1
 
 

@@ -1,6 +1,8 @@
 """Mistakes that are made on purpose: each is one change that can be read, and everybody draws the same."""
 
 import ast
+import math
+from pathlib import Path
 
 import mutants
 import mutations
@@ -62,8 +64,36 @@ def test_survivors_are_named_and_those_that_change_nothing_do_not_count(monkeypa
     drawn = mutants.drawn("block and solid", 4, 1)
     found = [{"by": "tests/test_block.py::test_something"}, {"by": ""}, {"by": ""}, {"by": "time"}]
     monkeypatch.setattr(mutants, "equivalent", lambda: lambda each: "it is only faster" if each is drawn[1] else "")
-    head, *rest = mutants.report("block and solid", drawn, found)
+    shown = mutants.Shown.of(drawn, found, 1)
+    head, *rest = shown.report("block and solid")
     assert head == "block and solid: 4 mutants, 1 equivalent, 2 of 3 killed (67 %)"
     assert "it is only faster" in rest[0] and drawn[1].before in rest[0]
     assert "not seen" in rest[1] and drawn[2].after in rest[1]
     assert rest[2] == "  fewer than 85 %"
+    _, _, row, _, title, _, survivor, end = mutants.table({"block and solid": shown}).split("\n")
+    assert row == f"| block and solid | 4 | 1 | 2 | 67 | {shown.date} |"
+    assert (title, end) == ("Not seen by any test:", "")
+    assert survivor.startswith(f"- {drawn[2].path.relative_to(mutants.ROOT / 'src/rocking')}:{drawn[2].line}: `")
+    assert mutants.table({"none": mutants.Shown(3, 0, 3, [])}).endswith("\nNone was spared that changes anything.\n")
+
+
+def test_times_are_measured_of_the_nearest_tests_until_half_of_the_time_is_filled(monkeypatch):
+    """One that fails without a mutant, or does not fit, is left out; the nearest is taken however long it is."""
+    tree, asked = object.__new__(mutants.Tree), []
+    tree.seconds = 20.0
+    near = {"a.py": ["slow", "quick"], "b.py": ["fails", "quick", "slow", "other", "last"], "c.py": ["fails"]}
+    times = {"slow": 30.0, "quick": 4.0, "fails": math.inf, "other": 9.0}
+    monkeypatch.setattr(tree, "near", lambda path: near[path.name])
+
+    def measured(names, uncompiled):
+        asked.append(sorted(names))
+        return {name: times[name] for name in names}
+
+    monkeypatch.setattr(tree, "measured", measured)
+    chosen = tree.chosen({Path(name) for name in near}, uncompiled=False)
+    assert {path.name: [*names] for path, names in chosen.items()} == {
+        "a.py": ["slow"],
+        "b.py": ["quick", "other"],
+        "c.py": [],
+    }
+    assert asked == [["fails", "slow"], ["quick"], ["other"]]
