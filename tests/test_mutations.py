@@ -4,6 +4,7 @@ import ast
 import math
 from pathlib import Path
 
+import branches
 import mutants
 import mutations
 
@@ -97,3 +98,32 @@ def test_times_are_measured_of_the_nearest_tests_until_half_of_the_time_is_fille
         "c.py": [],
     }
     assert asked == [["fails", "slow"], ["quick"], ["other"]]
+
+
+def test_branches_are_measured_of_files_that_are_there_by_tests_that_are_there():
+    for name, part in branches.PARTS.items():
+        assert part.files and part.tests, name
+        assert not {path.name for path in part.files} & set(mutants.NOT_JUDGED)
+    assert sum(path.parent.name == "sine" for path in branches.PARTS["kernels"].files) >= 5
+
+
+def test_a_part_without_enough_branches_fails_the_run(monkeypatch, tmp_path, capsys):
+    found = {"num_branches": 40, "covered_branches": 38, "num_statements": 50, "covered_lines": 50, "seconds": 3.2}
+    runs = []
+
+    def run(part):
+        runs.append(part)
+        return found | {"missing": {"place.py": [[3, 5], [7, -1]]}}
+
+    monkeypatch.setattr(branches, "_run", run)
+    monkeypatch.setattr("sys.argv", ["branches.py", "readers", "--kept", str(tmp_path)])
+    assert branches.main() == 0
+    said, title, _, row = capsys.readouterr().out.strip().splitlines()
+    assert said == "place.py: 3 to 5, 7 to its end"
+    assert title.startswith("| part | branches | taken, % |") and row.startswith(
+        "| readers | 40 | 95.0 | 50 | 100.0 | 3 |"
+    )
+    assert branches.main() == 0 and len(runs) == 1  # nothing has changed
+    found["covered_branches"] = 37
+    (tmp_path / "readers.json").unlink()
+    assert branches.main() == 1
