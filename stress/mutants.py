@@ -263,8 +263,9 @@ def drawn(part: str, number: int, seed: int) -> list[Mutant]:
 
 def equivalent() -> Callable[[Mutant], str]:
     """Look up why a mutant changes nothing that can be seen; empty if nothing is known."""
-    known = {(each["file"], each["change"]): each["reason"] for each in json.loads(EQUIVALENT.read_text("utf-8"))}
-    return lambda mutant: known.get((mutant.path.relative_to(ROOT / "src").as_posix(), mutant.change), "")
+    names = ("file", "line", "change")
+    known = {tuple(each[name] for name in names): each["reason"] for each in json.loads(EQUIVALENT.read_text("utf-8"))}
+    return lambda each: known.get((each.path.relative_to(ROOT / "src").as_posix(), each.code, each.change), "")
 
 
 @dataclass(frozen=True)

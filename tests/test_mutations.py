@@ -1,6 +1,7 @@
 """Mistakes that are made on purpose: each is one change that can be read, and everybody draws the same."""
 
 import ast
+import json
 import math
 from pathlib import Path
 
@@ -59,6 +60,13 @@ def test_a_draw_is_the_same_again():
         assert len({each.key for each in drawn}) == 30, part
         assert [each.key for each in mutants.drawn(part, 30, 1)] == [each.key for each in drawn]
         assert [each.key for each in mutants.drawn(part, 30, 2)] != [each.key for each in drawn]
+
+
+def test_what_changes_nothing_is_in_a_line_that_is_there():
+    for each in json.loads(mutants.EQUIVALENT.read_text("utf-8")):
+        found = mutations.mutants(mutants.ROOT / "src" / each["file"])
+        assert any((one.code, one.change) == (each["line"], each["change"]) for one in found), each
+        assert each["reason"], each
 
 
 def test_survivors_are_named_and_those_that_change_nothing_do_not_count(monkeypatch):
