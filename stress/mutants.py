@@ -67,6 +67,10 @@ WANTED = 0.85
 EQUIVALENT = Path(__file__).with_name("equivalent_mutants.json")
 _OPTIONS = ["-x", "-q", "-n0", "-p", "no:cacheprovider", "--benchmark-disable"]
 _FAST = ["-m", "not thorough and not slow and not browser"]
+
+#: Time over processor time after which a process hangs: on a busy machine it is only waiting.
+_SLOWER = 100.0
+
 _FORKED = multiprocessing.get_context("fork")
 
 
@@ -174,18 +178,19 @@ def done(tasks: list[Task], copies: list[Path]) -> None:
             task[0].parent.mkdir(parents=True, exist_ok=True)
             process: BaseProcess = _FORKED.Process(target=_tried, args=(copy, *task))
             process.start()
-            running[process] = copy, time.monotonic() + 4.0 * task[3] + 60.0, task
+            running[process] = copy, time.monotonic() + _SLOWER * task[3], task
         wait([process.sentinel for process in running], timeout=1.0)
         for process, (copy, end, task) in [*running.items()]:
             if process.is_alive() and time.monotonic() < end:
                 continue
-            if process.is_alive() and process.pid:
+            hangs = process.is_alive()
+            if hangs and process.pid:
                 os.killpg(process.pid, signal.SIGKILL)
             process.join()
             if process.exitcode == 1:
                 raise RuntimeError(f"pytest itself failed: {(copy / 'said.txt').read_text()[-2000:]}")
             if process.exitcode:  # a signal: too long, or code that is no more sound
-                _written(task, "time", task[3])
+                _written(task, "no end" if hangs else f"signal {-process.exitcode}", task[3])
             if mutant := task[1]:
                 _placed(copy, mutant, mutant.path.read_text("utf-8"))
             del running[process]

@@ -71,7 +71,7 @@ def test_what_changes_nothing_is_in_a_line_that_is_there():
 
 def test_survivors_are_named_and_those_that_change_nothing_do_not_count(monkeypatch):
     drawn = mutants.drawn("block and solid", 4, 1)
-    found = [{"by": "tests/test_block.py::test_something"}, {"by": ""}, {"by": ""}, {"by": "time"}]
+    found = [{"by": "tests/test_block.py::test_something"}, {"by": ""}, {"by": ""}, {"by": "signal 24"}]
     monkeypatch.setattr(mutants, "equivalent", lambda: lambda each: "it is only faster" if each is drawn[1] else "")
     shown = mutants.Shown.of(drawn, found, 1)
     head, *rest = shown.report("block and solid")
