@@ -26,11 +26,12 @@ def between(low: float, high: float) -> st.SearchStrategy[float]:
 
 @st.composite
 def series(draw: st.DrawFn) -> np.ndarray:
-    """Series of a block that is off the ground, or leaves it."""
+    """Series of a block that leaves the ground, is off it, or nearly falls."""
     terms = draw(st.lists(between(-2.0, 2.0), min_size=2, max_size=9))
-    on_the_ground = draw(st.booleans())
-    start = (
-        [0.0, draw(st.floats(1e-6, 1.0))] if on_the_ground else [draw(st.floats(1e-6, 1.5)), draw(between(-1.0, 3.0))]
+    start = draw(
+        st.tuples(st.just(0.0), st.floats(1e-6, 1.0))
+        | st.tuples(st.floats(1e-6, 1.5), between(-1.0, 1.0))
+        | st.tuples(st.floats(1.3, 1.5), st.floats(0.5, 3.0))
     )
     return np.array([*start, *terms])
 
@@ -71,7 +72,7 @@ def test_a_step_ends_at_its_first_event() -> None:
             assert overturn == math.inf or f(exact(h)) <= exact(QUARTER_TURN) + rounding
 
     judge()
-    assert all(judged[each] >= 5 for each in (Outcome.IMPACT, Outcome.OVERTURN, Outcome.STEP)), judged
+    assert all(judged[each] >= 3 for each in (Outcome.IMPACT, Outcome.OVERTURN, Outcome.STEP)), judged
 
 
 @quick
@@ -138,7 +139,7 @@ def test_a_fall_is_where_the_rotation_first_reaches_the_limit() -> None:
             assert latest >= free.time * (1.0 - 1e-14)
 
     judge()
-    assert 5 <= judged <= 45
+    assert 3 <= judged <= 47
 
 
 @pytest.mark.parametrize("nonlinear", [False, True])
