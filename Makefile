@@ -16,7 +16,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: help demo wheel quick test test-all browser slow verify mutants lowest latest .bounds doctest lint types docs bench \
-    coverage audit sbom review try-install clean distclean
+    coverage branches audit sbom review try-install clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -49,7 +49,7 @@ verify: .venv/.all ## hold the package to every promise of docs/reliability.md (
 	$(BIN)/python stress/verify.py --parts $(or $(PARTS),full)
 
 mutants: .venv/.all ## ask of the tests whether they see small mistakes, 30 in each part of the package (an hour or two)
-	$(BIN)/python stress/mutants.py $(PART)
+	$(BIN)/python stress/mutants.py $(if $(PART),"$(PART)")
 
 lowest: .venv-lowest/.installed ## run a test of every part with the oldest versions that pyproject.toml allows
 	@ROCKING_SHIPPED=0 $(MAKE) --no-print-directory .bounds ENVIRONMENT=.venv-lowest PACKAGE=.
@@ -102,6 +102,9 @@ coverage: .venv/.all ## run the tests, and say which lines none of them reaches 
 
 try-install: wheel ## install the wheel into empty environments, with each extra alone, and simulate there
 	$(BIN)/python scripts/try_install.py dist/rocking-*.whl --compiled --extras
+
+branches: .venv/.all ## ask for 95 % of the branches of kernels (uncompiled), store, readers and authentication (20 minutes)
+	$(BIN)/python stress/branches.py $(if $(PART),"$(PART)")
 
 audit: .venv-upkeep/.installed ## compare the pinned versions with the weaknesses that are known (asks the network)
 	.venv-upkeep/bin/pip-audit --strict --requirement constraints.txt --no-deps --disable-pip

@@ -7,15 +7,19 @@ Each mutant (`mutations.py` says what is drawn) is put into a copy of the tree, 
 that `make quick` would run for a change of its file, up to the first failure. Kernels are run uncompiled. What a mutant
 showed is kept under a hash of its text, and holds as long as the tests that showed it are what they were; a run that
 was stopped goes on where it was. Every survivor is printed; those of `equivalent_mutants.json` change nothing that can
-be seen, for the reason said there, and do not count.
+be seen, for the reason said there, and do not count. Once every part has been judged, in one run or in several, the
+table of docs/reliability.md is written.
 """
 
 from __future__ import annotations
 
 import argparse
+import dataclasses
+import datetime
 import hashlib
 import importlib
 import json
+import math
 import multiprocessing
 import os
 import random
@@ -27,6 +31,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -54,7 +59,7 @@ PARTS = {
 }
 
 #: How kernels come to be compiled, which a run without compilation shows nothing of.
-NOT_JUDGED = ("compiled.py", "compiler.py", "library.py", "signatures.py", "sources.py")
+NOT_JUDGED = ("compiled.py", "compiler.py", "interpreted.py", "library.py", "signatures.py", "sources.py")
 
 #: Share of the mutants of a part that tests must see.
 WANTED = 0.85
@@ -62,6 +67,10 @@ WANTED = 0.85
 EQUIVALENT = Path(__file__).with_name("equivalent_mutants.json")
 _OPTIONS = ["-x", "-q", "-n0", "-p", "no:cacheprovider", "--benchmark-disable"]
 _FAST = ["-m", "not thorough and not slow and not browser"]
+
+#: Time over processor time after which a process hangs: on a busy machine it is only waiting.
+_SLOWER = 100.0
+
 _FORKED = multiprocessing.get_context("fork")
 
 
@@ -97,38 +106,56 @@ class Tree:
         near = ordered([self.tests.of(path)])
         return [path.relative_to(ROOT).as_posix() for path in near[:MOST]]
 
+    def chosen(self, paths: set[Path], uncompiled: bool) -> dict[Path, dict[str, float]]:
+        """Files of tests for a mutant of each file and their times: the nearest that the time allows, at least one.
+
+        Times are measured one file of tests after another, until half of the time is filled.
+        """
+        near, times = {path: self.near(path) for path in paths}, dict[str, float]()
+        while True:
+            chosen: dict[Path, dict[str, float]] = {path: {} for path in near}
+            missing = set()
+            for path, some in chosen.items():
+                for name in near[path]:
+                    total = sum(some.values())
+                    if total > 0.5 * self.seconds:
+                        break
+                    if name not in times:
+                        missing.add(name)
+                        break
+                    if total + times[name] <= (self.seconds if some else sys.float_info.max):
+                        some[name] = times[name]
+            if not missing:
+                return chosen
+            times |= self.measured(missing, uncompiled)
+
     def measured(self, names: Iterable[str], uncompiled: bool) -> dict[str, float]:
-        """Processor time of each file of tests that passes without a mutant; the others are said and left out."""
+        """Processor time of each file of tests without a mutant; infinite, and said, if it fails or takes too long."""
         tasks: list[Task] = []
         kept = {}
-        for name in sorted(set(names)):
+        for name in sorted(names):
             place = self.folder / "times" / f"{self.sources[:16]}-{self.hash(name)}-{int(uncompiled)}.json"
             kept[name] = place
             if not place.exists():
-                tasks.append((place, None, [name], 90.0, uncompiled))
+                tasks.append((place, None, [name], 3.0 * self.seconds, uncompiled))
         done(tasks, self.copies)
-        times = {name: json.loads(place.read_text()) for name, place in kept.items()}
-        if failing := [name for name, found in times.items() if found["by"]]:
+        found = {name: json.loads(place.read_text()) for name, place in kept.items()}
+        if failing := [name for name, each in found.items() if each["by"]]:
             print("left out, for they fail or take too long without a mutant:", *failing)
-        return {name: found["seconds"] for name, found in times.items() if not found["by"]}
+        return {name: math.inf if each["by"] else each["seconds"] for name, each in found.items()}
 
     def judged(self, drawn: list[Mutant], uncompiled: bool) -> list[dict[str, Any]]:
         """Find what the tests show of each mutant."""
-        near = {path: self.near(path) for path in {each.path for each in drawn}}
-        times = self.measured((name for names in near.values() for name in names), uncompiled)
+        chosen = self.chosen({mutant.path for mutant in drawn}, uncompiled)
         tasks: list[Task] = []
         places = []
         for mutant in drawn:
-            names: list[str] = []
-            total = 0.0
-            for name in near[mutant.path]:
-                if name in times and (not names or total + times[name] <= self.seconds):
-                    names.append(name)
-                    total += times[name]
+            names = [*chosen[mutant.path]]
+            limit = 3.0 * sum(chosen[mutant.path].values()) + 20.0
             place = self.folder / "mutants" / f"{mutant.key}.json"
             places.append(place)
             if not (place.exists() and self._holds(json.loads(place.read_text()), names)):
-                tasks.append((place, mutant, names, 3.0 * total + 20.0, uncompiled))
+                tasks.append((place, mutant, names, limit, uncompiled))
         done(tasks, self.copies)
         return [json.loads(place.read_text()) for place in places]
 
@@ -151,18 +178,19 @@ def done(tasks: list[Task], copies: list[Path]) -> None:
             task[0].parent.mkdir(parents=True, exist_ok=True)
             process: BaseProcess = _FORKED.Process(target=_tried, args=(copy, *task))
             process.start()
-            running[process] = copy, time.monotonic() + 4.0 * task[3] + 60.0, task
+            running[process] = copy, time.monotonic() + _SLOWER * task[3], task
         wait([process.sentinel for process in running], timeout=1.0)
         for process, (copy, end, task) in [*running.items()]:
             if process.is_alive() and time.monotonic() < end:
                 continue
-            if process.is_alive() and process.pid:
+            hangs = process.is_alive()
+            if hangs and process.pid:
                 os.killpg(process.pid, signal.SIGKILL)
             process.join()
             if process.exitcode == 1:
                 raise RuntimeError(f"pytest itself failed: {(copy / 'said.txt').read_text()[-2000:]}")
             if process.exitcode:  # a signal: too long, or code that is no more sound
-                _written(task, "time", task[3])
+                _written(task, "no end" if hangs else f"signal {-process.exitcode}", task[3])
             if mutant := task[1]:
                 _placed(copy, mutant, mutant.path.read_text("utf-8"))
             del running[process]
@@ -240,24 +268,71 @@ def drawn(part: str, number: int, seed: int) -> list[Mutant]:
 
 def equivalent() -> Callable[[Mutant], str]:
     """Look up why a mutant changes nothing that can be seen; empty if nothing is known."""
-    known = {(each["file"], each["change"]): each["reason"] for each in json.loads(EQUIVALENT.read_text("utf-8"))}
-    return lambda mutant: known.get((mutant.path.relative_to(ROOT / "src").as_posix(), mutant.change), "")
+    names = ("file", "line", "change")
+    known = {tuple(each[name] for name in names): each["reason"] for each in json.loads(EQUIVALENT.read_text("utf-8"))}
+    return lambda each: known.get((each.path.relative_to(ROOT / "src").as_posix(), each.code, each.change), "")
 
 
-def report(part: str, drawn: list[Mutant], found: list[dict[str, Any]]) -> Iterator[str]:
-    """Write a line with the counts, and every survivor."""
-    reason = equivalent()
-    spared = [mutant for mutant, each in zip(drawn, found, strict=True) if not each["by"]]
-    named = [mutant for mutant in spared if reason(mutant)]
-    counted = len(drawn) - len(named)
-    killed = len(drawn) - len(spared)
-    share = killed / max(counted, 1)
-    yield f"{part}: {len(drawn)} mutants, {len(named)} equivalent, {killed} of {counted} killed ({100 * share:.0f} %)"
-    for mutant in spared:
-        place = f"{mutant.path.relative_to(ROOT / 'src')}:{mutant.line}"
-        yield f"  {place}: {reason(mutant) or 'not seen'}\n    - {mutant.before}\n    + {mutant.after}"
-    if share < WANTED:
-        yield f"  fewer than {100 * WANTED:.0f} %"
+@dataclass(frozen=True)
+class Shown:
+    """What the tests showed of the mutants of a part."""
+
+    drawn: int
+    equivalent: int
+    killed: int
+    #: Of each survivor its place, why it changes nothing that can be seen (empty: it does), and the change.
+    spared: list[list[str]]
+    seed: int = 1
+    date: str = ""
+
+    @property
+    def counted(self) -> int:
+        """Mutants that change something."""
+        return self.drawn - self.equivalent
+
+    @property
+    def share(self) -> float:
+        """Share of these that tests saw."""
+        return self.killed / max(self.counted, 1)
+
+    @classmethod
+    def of(cls, drawn: list[Mutant], found: list[dict[str, Any]], seed: int) -> Shown:
+        """Count, and name the survivors."""
+        reason = equivalent()
+        spared = [mutant for mutant, each in zip(drawn, found, strict=True) if not each["by"]]
+        places = [f"{mutant.path.relative_to(ROOT / 'src/rocking')}:{mutant.line}" for mutant in spared]
+        named = [
+            [place, reason(mutant), mutant.before, mutant.after] for place, mutant in zip(places, spared, strict=True)
+        ]
+        counts = len(drawn), sum(bool(each[1]) for each in named), len(drawn) - len(spared)
+        return cls(*counts, named, seed, datetime.date.today().isoformat())
+
+    def report(self, part: str) -> Iterator[str]:
+        """Write a line with the counts, and every survivor."""
+        counts = f"{self.drawn} mutants, {self.equivalent} equivalent, {self.killed} of {self.counted} killed"
+        yield f"{part}: {counts} ({100 * self.share:.0f} %)"
+        for place, reason, before, after in self.spared:
+            yield f"  {place}: {reason or 'not seen'}\n    - {before}\n    + {after}"
+        if self.share < WANTED:
+            yield f"  fewer than {100 * WANTED:.0f} %"
+
+
+def table(shown: dict[str, Shown]) -> str:
+    """Table of all parts, and below it every survivor that changes something."""
+    heads = ("part", "mutants", "equivalent", "killed", "killed, %", "date")
+    lines = ["| " + " | ".join(heads) + " |", "|---" + "|--:" * (len(heads) - 1) + "|"]
+    for part, each in shown.items():
+        cells = (part, each.drawn, each.equivalent, each.killed, f"{100 * each.share:.0f}", each.date)
+        lines.append("| " + " | ".join(map(str, cells)) + " |")
+    spared = [survivor for each in shown.values() for survivor in each.spared if not survivor[1]]
+    lines += ["", "Not seen by any test:" if spared else "None was spared that changes anything."]
+    for place, _, before, after in spared:
+        lines += ["", f"- {place}: `{_line(before)}` became `{_line(after)}`"]
+    return "\n".join([*lines, ""])
+
+
+def _line(code: str) -> str:
+    return " ".join(code.replace("`", "'").split())
 
 
 def main() -> int:
@@ -277,11 +352,16 @@ def main() -> int:
     try:
         for part in given.parts or PARTS:
             some = drawn(part, given.number, given.seed)
-            lines = [*report(part, some, tree.judged(some, uncompiled=part == "kernels"))]
-            enough = enough and not lines[-1].startswith("  fewer")
-            print("\r" + "\n".join(lines), flush=True)
+            shown = Shown.of(some, tree.judged(some, uncompiled=part == "kernels"), given.seed)
+            (given.kept / f"{part}.json").write_text(json.dumps(dataclasses.asdict(shown)), "utf-8")
+            enough = enough and shown.share >= WANTED
+            print("\r" + "\n".join(shown.report(part)), flush=True)
     finally:
         tree.remove()
+    kept = {part: given.kept / f"{part}.json" for part in PARTS}
+    if all(path.exists() for path in kept.values()):
+        shown_by = {part: Shown(**json.loads(path.read_text("utf-8"))) for part, path in kept.items()}
+        (ROOT / "docs/_tables/tests-mutants.txt").write_text(table(shown_by), "utf-8")
     return 0 if enough else 1
 
 

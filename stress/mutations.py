@@ -47,6 +47,8 @@ class Mutant:
 
     path: Path
     line: int
+    #: That line of the file.
+    code: str
     #: What the code was, and what it is.
     before: str
     after: str
@@ -79,7 +81,8 @@ def mutants(path: Path) -> list[Mutant]:
         after = ast.unparse(other)
         written = after if isinstance(node, ast.stmt) else f"({after})"
         text = source[:first] + written.encode() + source[last:]
-        found.append(Mutant(path, node.lineno, ast.unparse(node), after, text.decode()))
+        code = source.splitlines()[node.lineno - 1].decode().strip()
+        found.append(Mutant(path, node.lineno, code, ast.unparse(node), after, text.decode()))
     return found
 
 

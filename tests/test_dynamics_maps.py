@@ -134,7 +134,7 @@ def test_the_impact_map_gives_the_impacts_of_a_simulation(name):
     body, model, (amplitude, frequency) = CASES[name]
     one, many = (pulses.sine(amplitude, frequency, cycles=count) for count in (1, 9))
     following = dynamics.impact_map(body, one, model=model)
-    judged = 0
+    judged = differentiated = 0
     for state in starts(body, 6, 4):
         found, _ = simulated(body, model, many, state, 8.0 / frequency)
         impacts = found.impacts
@@ -157,7 +157,8 @@ def test_the_impact_map_gives_the_impacts_of_a_simulation(name):
                 plain & np.all(np.abs(change[:, :, column]) < 20.0, axis=1) & np.all(np.abs(difference) < 20.0, axis=1)
             )
             assert change[sound][:, :, column] == pytest.approx(difference[sound], abs=1e-5)
-    assert judged > 10
+            differentiated += int(np.count_nonzero(sound))
+    assert judged > 10 and differentiated > 10
 
 
 def test_a_ball_flies_for_one_period_in_closed_form():

@@ -324,3 +324,15 @@ def test_no_websocket_is_accepted(application):
     with pytest.raises(StopIteration):
         call.send(None)
     assert sent == [{"type": "websocket.close", "code": 1008}]
+
+
+def test_the_start_and_the_end_of_the_server_are_passed_on():
+    """They come from the server itself, and carry no headers."""
+    reached = []
+
+    async def application(scope, receive, send):
+        reached.append(scope["type"])
+
+    with pytest.raises(StopIteration):
+        RequestAuthentication(application, PORT)({"type": "lifespan"}, None, None).send(None)
+    assert reached == ["lifespan"]

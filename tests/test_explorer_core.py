@@ -626,8 +626,9 @@ def test_peaks_and_modes_of_a_map_are_those_of_single_simulations():
     )
     assert np.array_equal(found["mode"], expected.mode.values)
     stays = found["mode"] < 0
+    assert np.count_nonzero(stays) >= 10 and np.count_nonzero(~stays) >= 10
     assert found["peak"][stays] == pytest.approx(expected.peak_rotation.values[stays] / 0.2, rel=1e-6)
-    assert np.isinf(found["peak"][found["mode"] >= 0]).all()
+    assert np.isinf(found["peak"][~stays]).all()
 
 
 @pytest.mark.parametrize(
@@ -637,7 +638,7 @@ def test_peaks_and_modes_of_a_map_are_those_of_single_simulations():
 def test_the_case_at_a_point_of_a_map_is_what_the_map_shows(x, y):
     case = read_case({**SINE, "model": "nonlinear"}, UploadStore())
     grid = maps.grid_of(case, {"x": x, "y": y, "points": "8"})
-    found = filled(grid)
+    found, judged = filled(grid), 0
     for row, column in ((1, 2), (5, 6), (7, 0)):
         texts = maps.texts_at(grid, float(grid.x.values[column]), float(grid.y.values[row]))
         response = read_case(texts, UploadStore()).simulate()
@@ -646,6 +647,8 @@ def test_the_case_at_a_point_of_a_map_is_what_the_map_shows(x, y):
         if len(response.chattering):
             rest = response.chattering["end"][0] - response.events["time"][0]
             assert found["rest"][row, column] == pytest.approx(rest, rel=1e-5)
+            judged += 1
+    assert judged >= 1
 
 
 @pytest.mark.parametrize("block", ECCENTRIC)
@@ -718,6 +721,7 @@ def test_the_curves_over_a_map_are_the_critical_amplitudes():
     found = maps.curves(grid)
     assert np.array_equal(found["exact"], critical_amplitude(grid.x.values, 0.92))
     inside = (grid.x.values >= 0.5) & (grid.x.values <= 8.0)
+    assert 10 <= np.count_nonzero(inside) < 20
     assert np.array_equal(np.isfinite(found["eq76"]), inside)
     assert np.array_equal(found["eq76"][inside], critical_amplitude(grid.x.values[inside], 0.92, method="eq76"))
     assert maps.curves(maps.grid_of(case, {"x": "omega", "y": "restitution", "points": "8"})) == {}

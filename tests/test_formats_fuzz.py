@@ -210,7 +210,11 @@ def test_seeds_are_accepted_or_refused_as_they_are(place: Path) -> None:
     assert accepted == len(seeds()) - 6
 
 
-@settings(max_examples=250, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+#: On a busy machine all is slow; each example writes the file anew.
+SLOW_OR_SHARED = [HealthCheck.too_slow, HealthCheck.function_scoped_fixture]
+
+
+@settings(max_examples=250, deadline=None, suppress_health_check=SLOW_OR_SHARED)
 @given(
     index=st.integers(0, 10**6), other=st.integers(0, 10**6), operations=OPERATIONS, request_=st.sampled_from(REQUESTS)
 )
@@ -231,7 +235,7 @@ def test_any_token_before_a_record_ends_in_channels_or_one_sentence(place: Path,
         attempt(place, {})
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, deadline=None, suppress_health_check=SLOW_OR_SHARED)
 @given(content=st.binary(max_size=500), request_=st.sampled_from(REQUESTS))
 def test_random_bytes_end_in_channels_or_one_sentence(place: Path, content: bytes, request_: dict[str, object]) -> None:
     place.write_bytes(content)

@@ -603,4 +603,5 @@ def test_a_finite_limit_counts_in_the_smaller_slenderness_of_an_asymmetric_block
     exceeded = result.outcomes.exceeded_half.values
     assert exceeded.tolist() == (peaks / 0.2 > 0.5).tolist()
     assert 0 < np.sum(peaks / 0.3 > 0.5) < np.sum(exceeded) < len(motions)
+    assert np.count_nonzero(peaks < 0.2) >= 3
     assert result.outcomes.peak_over_alpha.values[peaks < 0.2] == pytest.approx(peaks[peaks < 0.2] / 0.2, rel=1e-9)

@@ -16,7 +16,9 @@ GRAVITY = 9.80665
 FOREVER = 1e9
 
 many = settings(deadline=None, max_examples=25)
-quick = settings(deadline=None, max_examples=30, suppress_health_check=[HealthCheck.filter_too_much])
+quick = settings(
+    deadline=None, max_examples=30, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow]
+)
 few = settings(deadline=None, max_examples=12)
 
 Sides = tuple[Restoring, Restoring]

@@ -97,11 +97,11 @@ def test_what_a_short_step_decides_is_what_the_full_series_says(nonlinear: bool,
         found = case.short(start, left)
         if found.outcome == Outcome.UNDECIDED:
             continue
-        decided[found.outcome] += 1
         assert 0.0 < found.time <= left
         expected, reach = case.long(start, found.time if found.outcome == Outcome.STEP else left)
         if reach < found.time:
             continue
+        decided[found.outcome] += 1
         t = found.time
         size = max(u, abs(v) * t, abs(found.v) * t, found.u, case.pulls(t))
         assert found.outcome == expected.outcome

@@ -1,7 +1,11 @@
 """Mistakes that are made on purpose: each is one change that can be read, and everybody draws the same."""
 
 import ast
+import json
+import math
+from pathlib import Path
 
+import branches
 import mutants
 import mutations
 
@@ -58,12 +62,76 @@ def test_a_draw_is_the_same_again():
         assert [each.key for each in mutants.drawn(part, 30, 2)] != [each.key for each in drawn]
 
 
+def test_what_changes_nothing_is_in_a_line_that_is_there():
+    for each in json.loads(mutants.EQUIVALENT.read_text("utf-8")):
+        found = mutations.mutants(mutants.ROOT / "src" / each["file"])
+        assert any((one.code, one.change) == (each["line"], each["change"]) for one in found), each
+        assert each["reason"], each
+
+
 def test_survivors_are_named_and_those_that_change_nothing_do_not_count(monkeypatch):
     drawn = mutants.drawn("block and solid", 4, 1)
-    found = [{"by": "tests/test_block.py::test_something"}, {"by": ""}, {"by": ""}, {"by": "time"}]
+    found = [{"by": "tests/test_block.py::test_something"}, {"by": ""}, {"by": ""}, {"by": "signal 24"}]
     monkeypatch.setattr(mutants, "equivalent", lambda: lambda each: "it is only faster" if each is drawn[1] else "")
-    head, *rest = mutants.report("block and solid", drawn, found)
+    shown = mutants.Shown.of(drawn, found, 1)
+    head, *rest = shown.report("block and solid")
     assert head == "block and solid: 4 mutants, 1 equivalent, 2 of 3 killed (67 %)"
     assert "it is only faster" in rest[0] and drawn[1].before in rest[0]
     assert "not seen" in rest[1] and drawn[2].after in rest[1]
     assert rest[2] == "  fewer than 85 %"
+    _, _, row, _, title, _, survivor, end = mutants.table({"block and solid": shown}).split("\n")
+    assert row == f"| block and solid | 4 | 1 | 2 | 67 | {shown.date} |"
+    assert (title, end) == ("Not seen by any test:", "")
+    assert survivor.startswith(f"- {drawn[2].path.relative_to(mutants.ROOT / 'src/rocking')}:{drawn[2].line}: `")
+    assert mutants.table({"none": mutants.Shown(3, 0, 3, [])}).endswith("\nNone was spared that changes anything.\n")
+
+
+def test_times_are_measured_of_the_nearest_tests_until_half_of_the_time_is_filled(monkeypatch):
+    """One that fails without a mutant, or does not fit, is left out; the nearest is taken however long it is."""
+    tree, asked = object.__new__(mutants.Tree), []
+    tree.seconds = 20.0
+    near = {"a.py": ["slow", "quick"], "b.py": ["fails", "quick", "slow", "other", "last"], "c.py": ["fails"]}
+    times = {"slow": 30.0, "quick": 4.0, "fails": math.inf, "other": 9.0}
+    monkeypatch.setattr(tree, "near", lambda path: near[path.name])
+
+    def measured(names, uncompiled):
+        asked.append(sorted(names))
+        return {name: times[name] for name in names}
+
+    monkeypatch.setattr(tree, "measured", measured)
+    chosen = tree.chosen({Path(name) for name in near}, uncompiled=False)
+    assert {path.name: [*names] for path, names in chosen.items()} == {
+        "a.py": ["slow"],
+        "b.py": ["quick", "other"],
+        "c.py": [],
+    }
+    assert asked == [["fails", "slow"], ["quick"], ["other"]]
+
+
+def test_branches_are_measured_of_files_that_are_there_by_tests_that_are_there():
+    for name, part in branches.PARTS.items():
+        assert part.files and part.tests, name
+        assert not {path.name for path in part.files} & set(mutants.NOT_JUDGED)
+    assert sum(path.parent.name == "sine" for path in branches.PARTS["kernels"].files) >= 5
+
+
+def test_a_part_without_enough_branches_fails_the_run(monkeypatch, tmp_path, capsys):
+    found = {"num_branches": 40, "covered_branches": 38, "num_statements": 50, "covered_lines": 50, "seconds": 3.2}
+    runs = []
+
+    def run(part):
+        runs.append(part)
+        return found | {"missing": {"place.py": [[3, 5], [7, -1]]}}
+
+    monkeypatch.setattr(branches, "_run", run)
+    monkeypatch.setattr("sys.argv", ["branches.py", "readers", "--kept", str(tmp_path)])
+    assert branches.main() == 0
+    said, title, _, row = capsys.readouterr().out.strip().splitlines()
+    assert said == "place.py: 3 to 5, 7 to its end"
+    assert title.startswith("| part | branches | taken, % |") and row.startswith(
+        "| readers | 40 | 95.0 | 50 | 100.0 | 3 |"
+    )
+    assert branches.main() == 0 and len(runs) == 1  # nothing has changed
+    found["covered_branches"] = 37
+    (tmp_path / "readers.json").unlink()
+    assert branches.main() == 1

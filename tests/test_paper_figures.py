@@ -157,6 +157,7 @@ def test_figure_5_is_drawn_to_the_critical_amplitude_and_only_eq_65_beyond(figur
     table = figures[5].tables["durations"]
     critical = float(critical_amplitude(2.0, 0.92))
     inside = table["a"] < critical
+    assert np.count_nonzero(inside) >= 20 and np.count_nonzero(table["a"] > critical) >= 1
     assert np.all(np.diff(table["exact"][inside]) > 0.0)
     assert np.all(np.isnan(table["exact"][table["a"] > critical]))
     assert np.all(np.isfinite(table["asymptotic"]))
@@ -228,6 +229,7 @@ def test_no_label_leaves_the_figure(figures, number, drawing):
     drawn = figures[number].draw(drawing)
     canvas = FigureCanvasAgg(drawn)
     canvas.draw()
+    assert drawn.axes
     for axes in drawn.axes:
         box = axes.get_tightbbox(canvas.get_renderer())
         assert drawn.bbox.x0 - 1.0 <= box.x0
@@ -328,6 +330,7 @@ def test_the_labels_of_figure_6_lie_within_their_panel_and_apart(figures):
     drawing = figures[6].draw()
     canvas = FigureCanvasAgg(drawing)
     canvas.draw()
+    assert len(drawing.axes) >= 2
     for axes in drawing.axes:
         boxes = [text.get_window_extent(canvas.get_renderer()) for text in axes.texts]
         assert len(boxes) > 5
@@ -458,7 +461,9 @@ def test_whoever_follows_the_flowcharts_rests_when_simulate_does(figures, k, a, 
 
 
 def test_every_decision_of_the_flowcharts_has_both_answers_and_every_box_is_reached(figures):
-    for chart in figures[8].drawings["flowcharts"].args[0]:
+    charts = figures[8].drawings["flowcharts"].args[0]
+    assert len(charts) == 2 and all(len(chart.boxes) >= 5 for chart in charts)
+    for chart in charts:
         for name, box in chart.boxes.items():
             answers = sorted(way.answer for way in chart.ways if way.start == name)
             assert answers == (["no", "yes"] if box.kind == "decision" else [] if name == "end" else [""])

@@ -1,11 +1,15 @@
 """Laws of the public interface: what stands first, and what is called how."""
 
+import ast
 import inspect
 import re
+from pathlib import Path
 from typing import Any
 
 import pytest
 from public_names import callables, faults, public_members, unreachable
+
+import rocking
 
 #: What rocks, and what shakes it, by the names of parameters.
 ROCKS = {"block", "blocks", "body", "bodies"}
@@ -13,6 +17,9 @@ SHAKES = {"motion", "motions", "pulse"}
 
 #: Words that are no longer used for what another word stands for.
 OTHER_WORDS = {"t": "time", "scale": "levels", "pga": "measure", "pgv": "measure", "sa": "measure"}
+
+#: What is built up step by step, within one call.
+CHANGING = {"Component", "Location", "OrbitEquations", "_Walk"}
 
 #: Most parameters of one function.
 MOST = 13
@@ -96,3 +103,17 @@ def test_public_docstrings_are_complete() -> None:
 
 def test_all_that_is_taken_or_returned_has_a_public_name() -> None:
     assert unreachable() == []
+
+
+def test_what_holds_data_cannot_be_changed() -> None:
+    """All dataclasses are frozen but those that are built up within one call."""
+    changing, judged = set(), 0
+    for path in sorted(Path(rocking.__file__).parent.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            made = [ast.unparse(each) for each in node.decorator_list] if isinstance(node, ast.ClassDef) else []
+            if any(each.startswith("dataclass") for each in made):
+                judged += 1
+                if not any("frozen=True" in each for each in made):
+                    changing.add(node.name)
+    assert judged >= 100
+    assert changing == CHANGING

@@ -50,6 +50,7 @@ def test_rotation_is_continuous_and_its_derivatives_agree(shaken):
     assert np.max(np.abs(slope - shaken.angular_velocity(times))) < 1e-7
     slope = (shaken.angular_velocity(times + h) - shaken.angular_velocity(times - h)) / (2 * h)
     corners = np.abs(times / 0.01 - np.round(times / 0.01)) < 2e-3
+    assert np.count_nonzero(~corners) > 1000
     assert np.max(np.abs(slope - shaken.angular_acceleration(times))[~corners]) < 1e-5
 
 
@@ -60,6 +61,16 @@ def test_rotation_vanishes_at_impacts_and_speeds_match(shaken):
     assert np.max(np.abs(shaken.rotation(times))) < 1e-14
     after = shaken.angular_velocity(np.nextafter(times, np.inf))
     assert np.allclose(after, (shaken.impacts["side"] * shaken.impacts["speed_after"])[early], rtol=1e-9)
+
+
+def test_the_largest_rotation_of_each_side_is_what_a_dense_look_finds(shaken):
+    dense = shaken.rotation(np.linspace(0.0, shaken.duration, 200_001))
+    plus, minus = shaken._history.largest()
+    assert plus != minus
+    assert (plus, minus) == pytest.approx((dense.max(), -dense.min()), rel=1e-6)
+    assert max(plus, minus) == pytest.approx(shaken.peak_rotation, rel=1e-12)
+    thrown = simulate(Block.from_parameters(p=1.0, alpha=0.2, restitution=0.92), None, initial_velocity=0.1)
+    assert thrown._history.largest()[0] == pytest.approx(thrown.peak_rotation, rel=1e-12)
 
 
 def test_outside_the_response_there_is_nothing(shaken):

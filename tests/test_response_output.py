@@ -141,6 +141,23 @@ def test_a_change_beyond_all_numbers_leaves_no_digit_that_is_told_as_known(chang
     assert summary.digits_of(0.123, change) == 1
 
 
+@pytest.mark.parametrize("name", ["motion", "initial_rotation", "initial_velocity"])
+def test_digits_are_those_that_are_left_by_whatever_drives_the_block(name):
+    """Motion, initial rotation and initial velocity, each where it alone drives: peak and impacts by differences."""
+    block, h = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9), 1e-6
+
+    def driven(factor):
+        motion = rocking.pulses.one_sine(2.5, 1.0).scaled(factor) if name == "motion" else None
+        return simulate(block, motion, **({} if name == "motion" else {name: 0.1 * factor}))
+
+    response, more, less = driven(1.0), driven(1.0 + h), driven(1.0 - h)
+    peak, events, impacts = sensitivity.driving(response.sensitivity)
+    assert peak == pytest.approx(abs(more.peak_rotation - less.peak_rotation) / (2.0 * h), rel=1e-4)
+    slopes = (more.impacts["time"][:3] - less.impacts["time"][:3]) / (2.0 * h)
+    assert impacts[:3] == pytest.approx(np.abs(slopes), rel=1e-3)
+    assert min(peak, *impacts[:3]) > 1e-3 and len(events) == len(response.events)
+
+
 def test_a_motion_changed_by_a_millionth_keeps_the_digits_that_are_shown():
     block, record = Block(width=0.24, height=1.1), rocking.records.load("ridgecrest-clc-090")
     texts = [simulate(block, motion).summary() for motion in (record, record.scaled(1.0 + 1e-6))]

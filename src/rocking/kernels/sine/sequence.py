@@ -89,6 +89,8 @@ def bracket(entered: State, window: float, delta: float, eta: float) -> tuple[fl
     They hold if the upper one lies within the window and the window ends before x = pi: P rises there, at a rate of D
     at first, and |P''| <= a.
     """
+    if not window > 0.0:
+        return np.nan, np.nan
     V, P, D = entered
     rate = (D + window * math.sqrt((1.0 - P) * (1.0 - P) + D * D)) * (1.0 + _ROUNDING)
     low = P * (1.0 - _ROUNDING)
