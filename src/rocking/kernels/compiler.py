@@ -224,7 +224,8 @@ def _kept(function: Callable[..., Any], cache: Path | None, **options: Any) -> A
         before = numba.config.CACHE_DIR
         numba.config.CACHE_DIR = str(cache)
         try:
-            compiled._cache = KernelCache(function)
+            with contextlib.suppress(RuntimeError):
+                compiled._cache = KernelCache(function)
         finally:
             numba.config.CACHE_DIR = before
     return compiled

@@ -14,14 +14,25 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from numba.core.caching import FunctionCache
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
 from numba.core.serialize import dumps
 
 _HASH = hashlib.sha256().digest_size
 
 
+class _OneFolder(CompileResultCacheImpl):
+    """What numba keeps, in the folder that it is told: others are not named by the sources of all kernels."""
+
+    _locator_classes = (UserProvidedCacheLocator,)
+
+
 class KernelCache(FunctionCache):
-    """numba's cache of a function, with files of our own; numba chooses the folder by the place of the source."""
+    """numba's cache of a function, with files of our own; a `RuntimeError` where the folder cannot be written any more.
+
+    In the folder numba makes one for each place of sources.
+    """
+
+    _impl_class = _OneFolder
 
     def __init__(self, function: Any) -> None:
         super().__init__(function)
