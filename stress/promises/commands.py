@@ -70,6 +70,13 @@ COMMANDS: Final[dict[str, tuple[str, ...]]] = {
     "study report": ("study", "report", "STUDY", "OUT"),
 }
 
+#: Commands that may take long, at sizes that people ask for.
+LONG: Final = tuple(
+    name
+    for name in COMMANDS
+    if name not in ("check", "chatter", "critical", "study new", "study create", "study export")
+)
+
 #: Commands that end with what was computed until Ctrl-C was pressed.
 ENDING_WITH_A_PART: Final = ("basin",)
 

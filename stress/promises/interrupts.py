@@ -1,4 +1,4 @@
-"""Ctrl-C at any moment of a command: over at once, in one sentence, with nothing half-written.
+"""Ctrl-C at any moment of a long command: over at once, in one sentence, with nothing half-written.
 
 The moment is a share of the processor time that the command takes undisturbed, so that it does not hang on how busy the
 machine is. Some commands are processes of their own, in which it may fall into the start of Python itself, the imports,
@@ -18,7 +18,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from promises.commands import COMMANDS, ENDING_WITH_A_PART, arguments, called, faults, files
+from promises.commands import ENDING_WITH_A_PART, LONG, arguments, called, faults, files
 from promises.promise import Found, Promise
 from rocking.cli import main
 from rocking.errors import INTERRUPTED
@@ -149,7 +149,7 @@ def undisturbed(name: str, *, forked: bool = False) -> tuple[float, dict[str, by
 def judge(part: int) -> Found:
     """Interrupt one command at several moments."""
     found, rng = Found(parts=1), random.Random(f"interrupts {part}")
-    name = [*COMMANDS][part % len(COMMANDS)]
+    name = LONG[part % len(LONG)]
     for forked, count in ((False, PROCESSES), (True, FORKS)):
         seconds, whole = undisturbed(name, forked=forked)
         for number in range(count):
@@ -198,7 +198,7 @@ def table(found: Found) -> str:
 PROMISE = Promise(
     name="interrupts",
     says="Ctrl-C ends a command at once, and leaves nothing half-written",
-    parts=2 * len(COMMANDS),
+    parts=2 * len(LONG),
     small=1,
     judge=judge,
     table=table,
