@@ -82,11 +82,14 @@ def key(promise: Promise) -> str:
 
 def _modules(module: str) -> list[Path]:
     """Files of a promise's module, and of those beside it that it imports."""
-    file = Path(sys.modules[module].__file__ or "")
-    tree = ast.walk(ast.parse(file.read_text(encoding="utf-8")))
-    imported = {each.module or "" for each in tree if isinstance(each, ast.ImportFrom)}
-    beside = sorted(each for each in imported if each.startswith("promises."))
-    return [file, *(one for each in beside for one in _modules(each))]
+    found = [Path(sys.modules[module].__file__ or "")]
+    for file in found:
+        tree = ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+        imported = sorted({each.module or "" for each in tree if isinstance(each, ast.ImportFrom)})
+        names = [each.rpartition(".")[2] for each in imported if each.startswith("promises.")]
+        beside = [ROOT / "stress" / "promises" / f"{each}.py" for each in names]
+        found += [each for each in beside if each not in found]
+    return found
 
 
 def _counts(file: Path, package: Path, promise: Promise) -> bool:
