@@ -11,6 +11,7 @@ not as promised, and with 130 if it was stopped.
 from __future__ import annotations
 
 import argparse
+import ast
 import datetime
 import hashlib
 import importlib.metadata
@@ -33,7 +34,7 @@ import rocking
 from rocking.progress import Progress
 
 ROOT = Path(__file__).resolve().parents[1]
-LIBRARIES = ("numpy", "numba", "scipy", "python-flint")
+LIBRARIES = ("numpy", "numba", "scipy", "python-flint", "heyoka")
 STOPPED = 130
 
 
@@ -68,19 +69,40 @@ def _parts(promise: Promise, size: str) -> int:
 
 
 def key(promise: Promise) -> str:
-    """Hash of all that an answer hangs on: sources of package, oracles and promise, and versions."""
-    own = ROOT / "stress" / "promises"
-    files = [own / "promise.py", Path(sys.modules[promise.judge.__module__].__file__ or "")]
-    for folder in (Path(rocking.__file__).parent, ROOT / "tests" / "oracles"):
-        files += sorted(folder.rglob("*.py"))
+    """Hash of all that an answer hangs on: files of package, oracles and promise, and versions."""
+    package = Path(rocking.__file__).parent
+    files = [*_modules(promise.judge.__module__), ROOT / "scripts" / "ship_kernels.py"]
+    files += sorted((ROOT / "tests" / "oracles").rglob("*.py"))
+    files += [file for file in sorted(package.rglob("*")) if file.is_file() and _counts(file, package, promise)]
     total = hashlib.sha256(" ".join([sys.version, platform.machine(), *map(_version, LIBRARIES)]).encode())
     for file in files:
         total.update(file.name.encode() + b"\0" + file.read_bytes())
     return total.hexdigest()[:16]
 
 
+def _modules(module: str) -> list[Path]:
+    """Files of a promise's module, and of those beside it that it imports."""
+    found = [Path(sys.modules[module].__file__ or "")]
+    for file in found:
+        tree = ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+        imported = sorted({each.module or "" for each in tree if isinstance(each, ast.ImportFrom)})
+        names = [each.rpartition(".")[2] for each in imported if each.startswith("promises.")]
+        beside = [ROOT / "stress" / "promises" / f"{each}.py" for each in names]
+        found += [each for each in beside if each not in found]
+    return found
+
+
+def _counts(file: Path, package: Path, promise: Promise) -> bool:
+    """Whether a file of the package is a source, and of a part that the promise hangs on."""
+    parts = file.relative_to(package).parts
+    return not {"__pycache__", "shipped"} & {*parts} and parts[0] not in promise.above
+
+
 def _version(library: str) -> str:
-    return f"{library} {importlib.metadata.version(library)}"
+    try:
+        return f"{library} {importlib.metadata.version(library)}"
+    except importlib.metadata.PackageNotFoundError:
+        return f"no {library}"
 
 
 def _judged(wanted: dict[str, int], folders: dict[str, Path], jobs: int) -> bool:

@@ -121,30 +121,82 @@ def test_the_fingerprint_changes_with_the_content_of_any_kernel(places: Path) ->
     assert compiled.fingerprint() not in seen
 
 
-@pytest.mark.skipif(compiled.UNCOMPILED, reason="nothing is compiled")
-def test_what_another_python_or_another_place_has_kept_is_not_at_hand(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    declared: Any = eq65_sums
+def anew(declared: Any) -> compiled.Kernel:
+    """Declare a kernel again, as another process does: nothing of it is compiled."""
+    return compiled.Kernel(declared.py_func, declared._compile)
 
-    def anew() -> compiled.Kernel:
-        return compiled.Kernel(declared.py_func, declared._compile)
 
+@pytest.fixture
+def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder for what is compiled, and no library."""
     monkeypatch.setattr(compiled, "cache_folder", lambda: tmp_path)
     monkeypatch.setattr(compiled.Kernel, "native", None)
-    first = anew()
+    return tmp_path
+
+
+@pytest.mark.skipif(compiled.UNCOMPILED, reason="nothing is compiled")
+def test_what_another_python_or_another_place_has_kept_is_not_at_hand(kept: Path) -> None:
+    first = anew(eq65_sums)
     assert not first.is_at_hand
     numbas = first.compiled
     assert not first.is_at_hand
     numbas(0.5)
     assert first.is_at_hand
-    assert anew().is_at_hand
-    (kept,) = tmp_path.rglob("*.nbi")
-    other = kept.rename(kept.with_name(kept.name.replace(".py3", ".py2")))
-    assert not anew().is_at_hand
-    other.rename(kept)
-    kept.parent.rename(kept.parent.with_name("kernels_elsewhere"))
-    assert not anew().is_at_hand
+    assert anew(eq65_sums).is_at_hand
+    (file,) = kept.rglob("*.nbc")
+    other = file.rename(file.with_name(file.name.replace(".py3", ".py2")))
+    assert not anew(eq65_sums).is_at_hand
+    other.rename(file)
+    file.parent.rename(file.parent.with_name("kernels_elsewhere"))
+    assert not anew(eq65_sums).is_at_hand
+
+
+@pytest.mark.skipif(compiled.UNCOMPILED, reason="nothing is compiled")
+def test_processes_that_compile_at_once_for_different_types_keep_both(kept: Path) -> None:
+    """Each sees an empty folder, and what they keep comes together."""
+    expected = eq65_sums(0.5)
+    for process, eta in (("first", 0.5), ("second", np.float32(0.5))):
+        (kept / process).mkdir()
+        compiled.cache_folder = lambda folder=kept / process: folder  # type: ignore[assignment, misc]
+        assert anew(eq65_sums)(eta) == expected
+    shutil.copytree(kept / "second", kept / "first", dirs_exist_ok=True)
+    compiled.cache_folder = lambda: kept / "first"  # type: ignore[assignment]
+    third = anew(eq65_sums)
+    assert [third(eta) for eta in (0.5, np.float32(0.5))] == [expected, expected]
+    assert sum(third.compiled.stats.cache_hits.values()) == 2
+
+
+@pytest.mark.skipif(compiled.UNCOMPILED, reason="nothing is compiled")
+@pytest.mark.parametrize(
+    "damage", [lambda data: data[:-100], lambda data: data[:5000] + b"no" + data[5002:], lambda data: b""]
+)
+def test_a_damaged_file_is_made_anew(kept: Path, damage: Any) -> None:
+    expected = anew(eq65_sums)(0.5)
+    (file,) = kept.rglob("*.nbc")
+    sound = file.read_bytes()
+    file.write_bytes(damage(sound))
+    assert anew(eq65_sums)(0.5) == expected
+    assert file.read_bytes() != damage(sound)
+    again = anew(eq65_sums)
+    assert again(0.5) == expected
+    assert sum(again.compiled.stats.cache_hits.values()) == 1
+
+
+@pytest.mark.skipif(compiled.UNCOMPILED, reason="nothing is compiled")
+def test_a_folder_that_can_no_longer_be_written_is_done_without(kept: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = anew(eq65_sums)
+    folder = Path(first.compiled.stats.cache_path)
+    block(folder)
+    assert first(0.5) == eq65_sums(0.5)
+    folder.unlink()
+    assert anew(eq65_sums)(0.5) == eq65_sums(0.5)
+    assert len(list(folder.glob("*.nbc"))) == 1
+    file = kept / "a file"
+    file.touch()
+    monkeypatch.setattr(compiled, "cache_folder", lambda: file / "and below")
+    second = anew(eq65_sums)
+    assert second(0.5) == eq65_sums(0.5)
+    assert second.compiled.stats.cache_path is None
 
 
 @pytest.mark.skipif(compiled.UNCOMPILED, reason="nothing is compiled")
@@ -177,7 +229,7 @@ def test_what_calls_a_part_from_python_is_kept_too_but_for_a_part_from_elsewhere
 
     first, second = anew(), anew()
     assert not first(NO_GROUND)
-    assert len(list(tmp_path.rglob("*.nbi"))) == 1
+    assert len(list(tmp_path.rglob("*.nbc"))) == 1
     assert not second(NO_GROUND)
     assert [len(each.dispatcher.signatures) for each in (first, second)] == [1, 0]
 
@@ -186,7 +238,7 @@ def test_what_calls_a_part_from_python_is_kept_too_but_for_a_part_from_elsewhere
         return 2.0 * x
 
     assert twice(21.0) == 42.0
-    assert len(list(tmp_path.rglob("*.nbi"))) == 1
+    assert len(list(tmp_path.rglob("*.nbc"))) == 1
 
 
 PROGRAM = """

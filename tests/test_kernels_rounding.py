@@ -3,35 +3,12 @@
 import re
 
 import pytest
+from oracles.rounding import FUSED, PRODUCTS, RELAXED, compiled_here
 
 from rocking.kernels import compiled
-from rocking.kernels.signatures import named, signatures
+from rocking.kernels.signatures import signatures
 
 pytestmark = pytest.mark.skipif(compiled.UNCOMPILED, reason="nothing is compiled")
-
-#: One rounding for a product and a sum, on processors of Intel's and of ARM's kind.
-FUSED = re.compile(r"\t(v?fn?m(?:add|sub|addsub|subadd)\w*|fml[as]\w*)\b")
-PRODUCTS = re.compile(r"\t(v?mul[sp]d|fmul)\b")
-#: What lets a compiler change the order of operations or their rounding, and the functions that round once.
-RELAXED = re.compile(
-    r"= (?:tail |musttail |notail )?(?:f\w+|call) (?:fast|reassoc|contract|arcp|afn|nnan|ninf|nsz)\b"
-    r"|@llvm\.fm(?:a|uladd)\b"
-)
-
-
-def code(names: tuple[str, ...]) -> tuple[str, str]:
-    """Assembly of kernels for this processor, and LLVM's code that it is made of; from numba's cache where it is."""
-    from numba import typeof
-
-    machine, middle = [], []
-    for name in names:
-        kernel, (arguments, *_) = named(name), signatures()[name]
-        kernel.compiled.compile(tuple(map(typeof, arguments)))
-        for made in kernel.compiled.overloads.values():
-            module = made.library._get_module_for_linking()
-            machine.append(made.library.codegen._tm.emit_assembly(module))
-            middle.append(str(module))
-    return "\n".join(machine), "\n".join(middle)
 
 
 def test_a_fused_operation_and_a_relaxed_one_would_be_seen() -> None:
@@ -61,7 +38,7 @@ def test_a_fused_operation_and_a_relaxed_one_would_be_seen() -> None:
     ],
 )
 def test_no_product_and_sum_are_rounded_once(names: tuple[str, ...]) -> None:
-    machine, middle = code(names)
+    machine, middle = compiled_here(names)
     bodies = re.findall(r"^define .*@", middle, re.MULTILINE)
     assert len(bodies) >= len(names)
     assert len(PRODUCTS.findall(machine)) >= 20 * len(names)

@@ -1,7 +1,11 @@
 """The promises of docs/reliability.md at a small size, and the program that runs them."""
 
 import itertools
+import platform
 import re
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +13,12 @@ import pytest
 import verify
 from oracles import leapfrog, multiprecision
 from oracles.problem import Problem, linear_record
-from promises import ALL, chattering, containment, cross_code, events, exact, one_answer
+from oracles.rounding import FUSED, PRODUCTS, of_library
+from promises import ALL, chattering, compile_cache, containment, cross_code, events, exact, interrupts, one_answer
 from promises.promise import Found, Promise
+
+import rocking
+from rocking.kernels import compiled
 
 ROOT = Path(__file__).parents[1]
 
@@ -164,3 +172,59 @@ def test_what_is_kept_is_known_by_its_sources(monkeypatch, tmp_path):
     changed.write_text(Path(containment.__file__).read_text("utf-8") + "\n", "utf-8")
     monkeypatch.setattr(containment, "__file__", str(changed))
     assert verify.key(promise) != before
+
+
+def test_modules_beside_a_promise_count_and_layers_above_do_not(monkeypatch, tmp_path):
+    files = [file.name for file in verify._modules(ALL["chattering"].judge.__module__)]
+    assert files[0] == "chattering.py"
+    assert {"exact.py", "promise.py"} <= {*files}
+    package = Path(rocking.__file__).parent
+    page, kernel = package / "explorer" / "server.py", package / "kernels" / "march.py"
+    assert page.exists() and kernel.exists()
+    assert verify._counts(kernel, package, ALL["containment"])
+    assert not verify._counts(page, package, ALL["containment"])
+    assert verify._counts(page, package, ALL["serving"])
+    assert not verify._counts(package / "kernels" / "__pycache__" / "march.pyc", package, ALL["serving"])
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory and rights of processes are as on Linux")
+@pytest.mark.skipif(compiled.UNCOMPILED, reason="nothing is compiled")
+@pytest.mark.slow
+def test_processes_that_compile_at_once_or_are_killed_leave_right_code(monkeypatch):
+    monkeypatch.setattr(compile_cache, "ROUNDS", 2)
+    found = compile_cache.judge(0)
+    assert not found.told
+    assert found.notes["rounds"] == 2
+    assert found.notes["killed"] >= 1
+    assert found.notes["updates"] == 1
+    assert found.notes["damaged files"] >= 3
+    assert found.judged >= 2 * 6 + len(compile_cache.FOLDERS)
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64" or sys.platform != "linux", reason="for processors of Intel's kind")
+def test_a_fused_operation_in_a_library_would_be_seen(tmp_path):
+    if not (shutil.which("cc") and shutil.which("objdump")):
+        pytest.skip("no C compiler or no objdump")
+    source, library = tmp_path / "a.c", tmp_path / "a.so"
+    source.write_text("double f(double a, double b, double c) { return a * b + c; }\n")
+    for contract, fused in (("fast", 1), ("off", 0)):
+        options = ["-O2", "-mfma", f"-ffp-contract={contract}", "-shared", "-fPIC", "-nostdlib"]
+        subprocess.run(["cc", *options, "-o", str(library), str(source)], check=True)
+        assembly = of_library(library)
+        assert len(FUSED.findall(assembly)) == fused
+        assert len(PRODUCTS.findall(assembly)) == 1 - fused
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processor time of another process is read as on Linux")
+@pytest.mark.thorough
+def test_a_fork_is_interrupted_as_a_process_is(tmp_path):
+    seconds, whole = interrupts.undisturbed("critical", forked=True)
+    assert whole
+    found = Found()
+    for share in (0.3, 0.6):
+        folder = tmp_path / str(share)
+        folder.mkdir()
+        one = interrupts.ended("critical", folder, share * seconds, forked=True)
+        interrupts._judge_end(found, "critical", one, folder / "out", whole)
+    assert not found.told
+    assert found.cases == 2

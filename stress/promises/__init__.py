@@ -2,6 +2,7 @@
 
 from promises import (
     chattering,
+    compile_cache,
     containment,
     cross_code,
     events,
@@ -9,10 +10,24 @@ from promises import (
     interrupts,
     one_answer,
     reading,
+    rounding,
     serving,
     soak,
 )
 
-_MODULES = (containment, events, chattering, cross_code, one_answer, reading, serving, soak, interrupts, full_disk)
+_MODULES = (
+    containment,
+    events,
+    chattering,
+    cross_code,
+    one_answer,
+    rounding,
+    compile_cache,
+    reading,
+    serving,
+    soak,
+    interrupts,
+    full_disk,
+)
 
 ALL = {each.PROMISE.name: each.PROMISE for each in _MODULES}

@@ -9,7 +9,7 @@ import numpy as np
 
 import rocking
 from promises.exact import GRAVITY, Side, rest
-from promises.promise import Found, Promise
+from promises.promise import ABOVE_ENSEMBLES, Found, Promise
 from rocking.treatment import Certified
 
 #: Cases of a part, some ten seconds of processor time.
@@ -20,6 +20,9 @@ TOLERANCES = (1e-6, 1e-9, 1e-12, 1e-15)
 
 #: Impacts more than it takes to follow them one by one until the tolerance is left.
 MORE = 20
+
+#: Impacts more, on an average over the cases of a part, for a tolerance a tenth of another.
+FOR_A_DIGIT = 1.0
 
 _ULP = 2.0**-52
 
@@ -48,6 +51,11 @@ def judge(part: int) -> Found:
     found = Found(parts=1)
     for number in range(part * CASES, (part + 1) * CASES):
         _judge_case(number, found)
+    finest, coarsest = TOLERANCES[-1], TOLERANCES[0]
+    more = found.notes[f"resolved at {finest:g}"] - found.notes[f"resolved at {coarsest:g}"]
+    each = more / max(found.judged, 1) / math.log10(coarsest / finest)
+    if each > FOR_A_DIGIT:
+        found.fail(f"part {part}: each digit of the tolerance costs {each:.2f} impacts on an average")
     return found
 
 
@@ -109,4 +117,5 @@ PROMISE = Promise(
     small=1,
     judge=judge,
     table=table,
+    above=ABOVE_ENSEMBLES,
 )

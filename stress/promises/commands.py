@@ -1,16 +1,25 @@
-"""The long commands, each small enough for a second or two, and how to tell whether what they write is whole."""
+"""All commands that compute or write, each small enough for a second or two, and whether what they write is whole."""
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
+import shutil
+import tempfile
+from functools import cache
 from pathlib import Path
 from typing import Final
 
 import xarray as xr
 
+from rocking.cli import main
+
 _BLOCK: Final = ("--width", "0.24", "--height", "1.1")
 _RECORD: Final = "el-centro-meloland-270"
 _SINE: Final = "sine:amplitude=0.3g,frequency=2Hz"
+_ALONG: Final = ("--pulse", "sine:frequency=2Hz", "--along", "amplitude:0.1g:0.4g:9")
+_GRID: Final = ("--positions=-0.15:0.15:17", "--velocities=-0.5:0.5:17")
 
 _STUDY: Final = """\
 [blocks]
@@ -35,7 +44,7 @@ _TESTS: Final = "motion,overturned,scale\n" + "".join(
 #: What a study writes of its own runs; half a line there is passed over.
 _JOURNALS: Final = ("lock", "runs.jsonl")
 
-#: Commands by name; OUT is the folder for their files, and what they read lies beside it.
+#: Commands by name; OUT is the folder for their files, and what they read lies beside it. STUDY is one that is done.
 COMMANDS: Final[dict[str, tuple[str, ...]]] = {
     "simulate": ("simulate", _RECORD, *_BLOCK, "--out", "OUT"),
     "map": ("map", "one-sine", *_BLOCK, "--out", "OUT"),
@@ -46,13 +55,85 @@ COMMANDS: Final[dict[str, tuple[str, ...]]] = {
     "orbits": ("orbits", *_BLOCK, "--pulse", _SINE, "--out", "OUT"),
     "calibrate": ("calibrate", "tests.csv", "--out", "OUT"),
     "validate": ("validate", "tests.csv", *_BLOCK, "--out", "OUT"),
+    "check": ("check", _RECORD, *_BLOCK, "--out", "OUT"),
+    "ida": ("ida", _RECORD, *_BLOCK, "--levels", "0.1g:1.5g:30", "--out", "OUT"),
+    "measures": ("measures", _RECORD, "ridgecrest-clc-090", *_BLOCK, "--periods", "0.5,1", "--out", "OUT"),
+    "schemes": ("schemes", _RECORD, *_BLOCK, "--schemes", "velocity=5e-2", "--repetitions", "0", "--out", "OUT"),
+    "bifurcation": ("bifurcation", *_BLOCK, *_ALONG, "--transient", "20", "--kept", "8", "--out", "OUT"),
+    "basin": ("basin", *_BLOCK, "--pulse", _SINE, *_GRID, "--periods", "50", "--out", "OUT"),
+    "chatter": ("chatter", "1.05", "0.7", "0.8", "--out", "OUT"),
+    "critical": ("critical", "0.7", "0.8", "--out", "OUT"),
+    "mesh": ("mesh", "statue", "--azimuth", "0,90", "--out", "OUT"),
+    "study new": ("study", "new", "OUT/study.toml"),
+    "study create": ("study", "create", "study.toml", "OUT"),
+    "study export": ("study", "export", "STUDY", "OUT/study.csv"),
+    "study report": ("study", "report", "STUDY", "OUT"),
+}
+
+#: Commands that may take long, at sizes that people ask for.
+LONG: Final = tuple(
+    name
+    for name in COMMANDS
+    if name not in ("check", "chatter", "critical", "study new", "study create", "study export")
+)
+
+#: Commands that end with what was computed until Ctrl-C was pressed.
+ENDING_WITH_A_PART: Final = ("basin",)
+
+#: Commands that only print.
+PRINTING: Final[dict[str, tuple[str, ...]]] = {
+    "records": ("records",),
+    "pulses": ("pulses",),
+    "study status": ("study", "status", "STUDY"),
+    "study verify": ("study", "verify", "STUDY"),
+    "version": ("--version",),
 }
 
 
-def inputs(folder: Path) -> None:
-    """Write what the commands read."""
+def arguments(name: str, folder: Path) -> list[str]:
+    """Write what a command reads into a folder, and return its words."""
+    words = [*(COMMANDS | PRINTING)[name]]
     (folder / "study.toml").write_text(_STUDY, encoding="utf-8")
     (folder / "tests.csv").write_text(_TESTS, encoding="utf-8")
+    if "STUDY" in words:
+        shutil.copytree(_study(), folder / "study")
+    if any(word.startswith("OUT/") for word in words):
+        (folder / "out").mkdir()
+    places = {"OUT": "out", "STUDY": "study", "study.toml": "study.toml", "tests.csv": "tests.csv"}
+    for number, word in enumerate(words):
+        first, slash, rest = word.partition("/")
+        if first in places:
+            words[number] = f"{folder / places[first]}{slash}{rest}"
+    return words
+
+
+@cache
+def _study() -> Path:
+    """Run the study, once in this process."""
+    folder = Path(_kept().name)
+    (folder / "study.toml").write_text(_STUDY, encoding="utf-8")
+    status, said = called(["study", "run", str(folder / "study.toml"), str(folder / "study")])
+    if status != 0:
+        raise RuntimeError(said)
+    return folder / "study"
+
+
+@cache
+def _kept() -> tempfile.TemporaryDirectory[str]:
+    """Return a folder that goes with this process."""
+    return tempfile.TemporaryDirectory()
+
+
+def called(words: list[str]) -> tuple[int, str]:
+    """Run a command in this process: exit status, and what it says on stderr but for notes."""
+    errors, status = io.StringIO(), 0
+    with contextlib.redirect_stderr(errors), contextlib.redirect_stdout(io.StringIO()):
+        try:
+            main(words)
+        except SystemExit as stop:
+            status = int(stop.code or 0)
+    said = [line for line in errors.getvalue().splitlines() if not line.startswith("rocking: note:")]
+    return status, "\n".join(said)
 
 
 def files(folder: Path) -> dict[str, bytes]:
@@ -61,16 +142,23 @@ def files(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in found}
 
 
-def faults(folder: Path, whole: dict[str, bytes]) -> list[str]:
-    """Say which files of a folder are not whole, or are none that an undisturbed run (`whole`) leaves."""
-    return [fault for name, content in files(folder).items() if (fault := _fault(folder / name, name, content, whole))]
+def faults(folder: Path, whole: dict[str, bytes], *, of_a_part: bool = False) -> list[str]:
+    """Say which files of a folder are not whole, or are none that an undisturbed run (`whole`) leaves.
+
+    ``of_a_part``: tables may hold the part that was computed until then.
+    """
+    fault = {name: _fault(folder / name, name, content, whole, of_a_part) for name, content in files(folder).items()}
+    return [each for each in fault.values() if each]
 
 
-def _fault(path: Path, name: str, content: bytes, whole: dict[str, bytes]) -> str:
+def _fault(path: Path, name: str, content: bytes, whole: dict[str, bytes], of_a_part: bool) -> str:
     if Path(name).name in _JOURNALS:
         return ""
     if name not in whole:
         return f"{name} is left"
+    if of_a_part and path.suffix == ".csv":
+        same_head = content.partition(b"\n")[0] == whole[name].partition(b"\n")[0]
+        return "" if same_head and content.endswith(b"\n") else f"{name} is not whole"
     try:
         return "" if _opens(path, content, whole[name]) else f"{name} is not whole"
     except (OSError, ValueError) as error:

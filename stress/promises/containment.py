@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from oracles import vertical_referee
 
-from promises.promise import Found, Promise
+from promises.promise import ABOVE_ENSEMBLES, Found, Promise
 
 #: Cases of a part, some six seconds of processor time.
 CASES = 200
@@ -52,9 +52,10 @@ def table(found: Found) -> str:
 PROMISE = Promise(
     name="containment",
     says="rotation, times and peak within the stated error",
-    parts=500,
+    parts=512,
     small=3,
     judge=judge,
     least=0.85,
     table=table,
+    above=ABOVE_ENSEMBLES,
 )

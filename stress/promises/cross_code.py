@@ -16,7 +16,7 @@ import numpy as np
 from oracles import leapfrog
 
 import rocking
-from promises.promise import Found, Promise
+from promises.promise import ABOVE_ENSEMBLES, Found, Promise
 
 #: Blocks of a part, which has one motion.
 BLOCKS = 100
@@ -167,4 +167,5 @@ PROMISE = Promise(
     judge=judge,
     least=0.97,
     table=table,
+    above=ABOVE_ENSEMBLES,
 )

@@ -1,7 +1,8 @@
 """A full disk at every opening, write, flush and renaming of every command: one sentence, and no damaged file.
 
 Commands run in this process, with the functions of Python through which files are written replaced: the n-th call for a
-file in the command's folder fails with ENOSPC, a write after half of its bytes. A part is one command.
+file in the command's folder fails with ENOSPC, a write after half of its bytes. What a command prints goes to a disk
+that is full from the start. A part is one command; the last one is all those that only print.
 """
 
 from __future__ import annotations
@@ -11,6 +12,8 @@ import contextlib
 import errno
 import io
 import os
+import subprocess
+import sys
 import tempfile
 from collections.abc import Iterator
 from functools import cache
@@ -18,12 +21,11 @@ from pathlib import Path
 from typing import Any, Final
 from unittest.mock import patch
 
-from promises.commands import COMMANDS, faults, files, inputs
+from promises.commands import COMMANDS, PRINTING, arguments, called, faults, files
 from promises.promise import Found, Promise
-from rocking.cli import main
 
 #: Calls that fail one by one, of each kind, at most.
-MOST: Final = 100
+MOST: Final = 1000
 
 KINDS: Final = ("open", "write", "fsync", "rename")
 
@@ -120,55 +122,63 @@ class _Written:
         self._file.__exit__(*error)
 
 
-def called(name: str, folder: Path) -> tuple[int, str]:
-    """Run a command in this process: exit status, and what it says on stderr but for notes."""
-    arguments = [str(folder / "out") if word == "OUT" else word for word in COMMANDS[name]]
-    arguments = [str(folder / word) if word.endswith((".toml", ".csv")) else word for word in arguments]
-    errors, status = io.StringIO(), 0
-    with contextlib.redirect_stderr(errors), contextlib.redirect_stdout(io.StringIO()):
-        try:
-            main(arguments)
-        except SystemExit as stop:
-            status = int(stop.code or 0)
-    said = [line for line in errors.getvalue().splitlines() if not line.startswith("rocking: note:")]
-    return status, "\n".join(said)
-
-
 @cache
 def undisturbed(name: str) -> dict[str, bytes]:
     """Files of a command that nothing disturbs."""
     with tempfile.TemporaryDirectory() as where:
         folder = Path(where)
-        inputs(folder)
-        status, said = called(name, folder)
+        status, said = called(arguments(name, folder))
         if status != 0:
             raise RuntimeError(f"{name}: {said[-500:]}")
         return files(folder / "out")
 
 
 def judge(part: int) -> Found:
-    """Let the first, second, ... call of every kind fail, of one command."""
-    found, name = Found(parts=1), [*COMMANDS][part]
+    """Let the first, second, ... call of every kind fail, of one command; and print to a full disk."""
+    found = Found(parts=1)
+    names = [*COMMANDS][part : part + 1]
+    for name in names:
+        _judge_calls(found, name)
+    for name in names or PRINTING:
+        _judge_printing(found, name)
+    return found
+
+
+def _judge_printing(found: Found, name: str) -> None:
+    with tempfile.TemporaryDirectory() as where, Path("/dev/full").open("wb") as full:
+        command = [sys.executable, "-m", "rocking", *arguments(name, Path(where))]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False, cwd=where)
+        lines = [line for line in done.stderr.splitlines() if not line.startswith("rocking: note:")]
+        found.cases += 1
+        found.judged += 1
+        found.notes["print"] += 1
+        if done.returncode != 2 or len(lines) != 1 or os.strerror(errno.ENOSPC) not in lines[0]:
+            found.fail(f"{name}, printed to a full disk: status {done.returncode}, {done.stderr[-300:]!r}")
+        if name in COMMANDS:
+            for fault in faults(Path(where, "out"), undisturbed(name)):
+                found.fail(f"{name}, printed to a full disk: {fault}")
+
+
+def _judge_calls(found: Found, name: str) -> None:
     whole = undisturbed(name)
     for kind in KINDS:
         for number in range(1, MOST + 1):
             with tempfile.TemporaryDirectory() as where:
                 folder = Path(where).resolve()
-                inputs(folder)
+                words = arguments(name, folder)
                 disk = FullDisk(folder / "out", kind, number)
                 what = f"{name}, {kind} {number}"
                 with disk.in_place():
-                    status, said = _answer(name, folder)
+                    status, said = _answer(words)
                 if not disk.failed:
                     break
                 _judge_end(found, what, folder, (status, said), whole)
                 found.notes[kind] += 1
-    return found
 
 
-def _answer(name: str, folder: Path) -> tuple[int, str]:
+def _answer(words: list[str]) -> tuple[int, str]:
     try:
-        return called(name, folder)
+        return called(words)
     except Exception as error:
         return -1, f"{type(error).__name__}: {error}"
 
@@ -187,20 +197,21 @@ def _judge_end(found: Found, what: str, folder: Path, answer: tuple[int, str], w
     name = what.partition(",")[0]
     if name == "study run":
         kept = {each for each in files(folder / "out") if "/c." in each}
-        again = called(name, folder)
+        again = called(["study", "run", str(folder / "study.toml"), str(folder / "out")])
         if again[0] != 0 or not kept <= {*files(folder / "out")} or faults(folder / "out", whole):
             found.fail(f"{what}: the study does not go on: {again}")
 
 
 def table(found: Found) -> str:
     """Say how many calls failed."""
-    return "Failed calls: " + ", ".join(f"{found.notes[kind]} of {kind}" for kind in KINDS) + ".\n"
+    kinds = ", ".join(f"{found.notes[kind]} of {kind}" for kind in KINDS)
+    return f"Failed calls: {kinds}. {found.notes['print']} commands printed to a full disk.\n"
 
 
 PROMISE = Promise(
     name="full-disk",
     says="a full disk is one sentence, and damages no file",
-    parts=len(COMMANDS),
+    parts=len(COMMANDS) + 1,
     small=1,
     judge=judge,
     table=table,

@@ -181,4 +181,5 @@ PROMISE = Promise(
     small=2,
     judge=judge,
     table=table,
+    above=("cli", "explorer"),
 )

@@ -7,6 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+#: Parts of the package above single simulations and ensembles.
+ABOVE_ENSEMBLES = ("cli", "explorer", "studies", "analysis", "chattering", "dynamics")
+
 #: Failures of a part that are told in words; all are counted.
 MOST_TOLD = 20
 
@@ -69,6 +72,8 @@ class Promise:
         Share of the cases that must be decided, and so judged; less is a failure of the program.
     table : callable, optional
         Makes a table of its own from all parts.
+    above : tuple of str
+        Parts of the package above all that is judged: their sources change no answer, as the import contracts say.
     """
 
     name: str
@@ -78,6 +83,7 @@ class Promise:
     judge: Callable[[int], Found]
     least: float = 1.0
     table: Table | None = None
+    above: tuple[str, ...] = ()
 
     def faults(self, found: Found) -> list[str]:
         """Say what is not as promised, in sentences."""

@@ -266,6 +266,7 @@ PROMISE = Promise(
     small=1,
     judge=judge,
     table=table,
+    above=("cli", "explorer"),
 )
 
 assert set(READINGS) <= {*records()}

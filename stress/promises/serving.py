@@ -42,7 +42,7 @@ ROUTES: Final[dict[str, dict[str, int]]] = {
     "/page/main.js": {"GET": 200},
     "/page/index.html": {"GET": 404},
     "/page/nothing.js": {"GET": 404},
-    "/page/..%2fserver.py": {"GET": 404},
+    "/page/..%2fserver.py": {},
     "/library/bokeh.min.js": {"GET": 200},
     "/library/nothing.js": {"GET": 404},
     "/api/start": {"GET": 200},
@@ -50,6 +50,10 @@ ROUTES: Final[dict[str, dict[str, int]]] = {
     "/api/case?p=nothing": {"GET": 422},
     "/api/code?p=2&alpha=0.2": {"GET": 200},
     "/api/list": {"GET": 200},
+    "/api/tracks?p=2&alpha=0.2": {"GET": 200},
+    "/api/summary?p=2&alpha=0.2&motion=one-sine:amplitude=3,frequency=1": {"GET": 200},
+    "/api/compare?answers=nothing": {"GET": 422},
+    "/api/assessment?p=nothing": {"GET": 422},
     "/api/study": {"GET": 422},
     "/api/export?form=exe": {"GET": 422},
     "/api/map?x=nothing": {"GET": 422},
@@ -232,10 +236,11 @@ def _judge_names(found: Found, rng: random.Random, running: Running) -> None:
 
 
 def _judge_half_open(found: Found, running: Running, part: int) -> None:
-    """Let others hold connections with nothing, half a head or half a body, and ask meanwhile."""
+    """Let others hold connections with nothing, half a head, half a body or a head by single letters; ask meanwhile."""
     head = f"HTTP/1.1\r\nHost: 127.0.0.1:{running.port}\r\n"
     known = f"{head}Authorization: Bearer {running.secret}\r\nOrigin: http://127.0.0.1:{running.port}\r\n"
-    halves = ("", f"GET / {head}", f"POST /api/records?name=a {known}Content-Length: 99\r\n\r\nx", "\0\1\2\r\n")
+    slow = f"GET / {head}Slow: "
+    halves = ("", f"GET / {head}", f"POST /api/records?name=a {known}Content-Length: 99\r\n\r\nx", "\0\1\2\r\n", slow)
     held = []
     try:
         for k in range(CONNECTIONS):
@@ -251,6 +256,9 @@ def _judge_half_open(found: Found, running: Running, part: int) -> None:
         # Those that sent no whole head end after ten seconds; half a body may wait longer.
         waiting = [one for k, one in enumerate(held) if (part + k) % len(halves) != 2]
         while waiting and time.monotonic() < deadline:
+            for one in {*held[(halves.index(slow) - part) % len(halves) :: len(halves)]} & {*waiting}:
+                with contextlib.suppress(OSError):
+                    one.sendall(b"a")
             readable, _, _ = select.select(waiting, [], [], 1.0)
             waiting = [one for one in waiting if one not in readable or _goes_on(one)]
         _judge_that(found, not waiting, f"{len(waiting)} connections without a whole head are still open")

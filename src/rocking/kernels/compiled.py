@@ -87,7 +87,7 @@ class Kernel(OnUse):
         folder, source = cache_folder(), Path(self.py_func.__code__.co_filename).absolute()
         place = hashlib.sha1(str(source.parent).encode(), usedforsecurity=False).hexdigest()
         version = "py{}{}{}".format(*sys.version_info[:2], getattr(sys, "abiflags", ""))
-        entry = f"*_{place}/{source.stem}.{self.py_func.__qualname__}-*.{version}.nbi"
+        entry = f"*_{place}/{source.stem}.{self.py_func.__qualname__}-*.{version}.*.nbc"
         return folder is not None and any(folder.glob(entry))
 
     def prepare(self, *arguments: Any) -> None:
@@ -144,9 +144,9 @@ def cache_folder() -> Path | None:
     """Folder for what is compiled from exactly these sources; None where nothing can be written, or they have changed.
 
     numba checks the file of an entry point only, and would use old code when another kernel that it calls has changed.
-    So the folder's name is a hash of all of them. numba writes its files under another name and renames them, so that
-    any number of processes may share the folder. A process that has imported what the files no longer say keeps
-    nothing: others would take it for code of the new sources.
+    So the folder's name is a hash of all of them. Files are written under another name and renamed, so that any number
+    of processes may share the folder. A process that has imported what the files no longer say keeps nothing: others
+    would take it for code of the new sources.
     """
     now = sources(_HERE)
     if _imported.setdefault(_HERE, now) != now:

@@ -29,6 +29,8 @@ from numba.core.typed_passes import NativeLowering
 from numba.core.types.misc import unliteral
 from numba.extending import register_model
 
+from rocking.kernels.kept import KernelCache
+
 #: Whether numba's libraries have the members that `PartLibrary` uses.
 _POSSIBLE = hasattr(Flags, "no_compile") and all(
     hasattr(JITCodeLibrary, name) for name in ("_finalized", "_ensure_finalized", "_get_module_for_linking")
@@ -217,9 +219,13 @@ def part_of(function: Callable[..., Any], cache: Path | None, *, inline: bool) -
 
 
 def _kept(function: Callable[..., Any], cache: Path | None, **options: Any) -> Any:
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(cache or "")
-    try:
-        return numba.njit(cache=cache is not None, **options)(function)
-    finally:
-        numba.config.CACHE_DIR = before
+    compiled = numba.njit(**options)(function)
+    if cache is not None:
+        before = numba.config.CACHE_DIR
+        numba.config.CACHE_DIR = str(cache)
+        try:
+            with contextlib.suppress(RuntimeError):
+                compiled._cache = KernelCache(function)
+        finally:
+            numba.config.CACHE_DIR = before
+    return compiled
