@@ -60,6 +60,7 @@ html_theme_options = {
     "logo": {"text": f"rocking {version}"},
     "header_links_before_dropdown": 8,
     "navbar_align": "left",
+    "search_bar_text": "Search",
     "show_toc_level": 2,
     "footer_start": ["copyright"],
     "footer_end": [],
@@ -68,6 +69,7 @@ html_theme_options = {
     "pygments_dark_style": "a11y-high-contrast-dark",
 }
 html_sidebars = {"index": []}
+html_context = {"default_mode": "auto"}
 
 
 def escape_bars(_app, _what, _name, _object, _options, lines):
