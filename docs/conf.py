@@ -1,9 +1,13 @@
 """Sphinx configuration; the pages load nothing from the network."""
 
 import re
+import sys
 from importlib.metadata import version as installed_version
+from pathlib import Path
 
 import sphinx.ext.autosummary
+
+sys.path.insert(0, str(Path(__file__).parent / "_extensions"))
 
 project = "rocking"
 author = "The rocking developers"
@@ -16,12 +20,14 @@ extensions = [
     "sphinx.ext.autosummary",
     "sphinx.ext.mathjax",
     "sphinx-mathjax-offline",
+    "sphinx_design",
     "numpydoc",
+    "commands",
 ]
 exclude_patterns = ["_build"]
 templates_path = ["_templates"]
 
-myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence"]
+myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence", "deflist"]
 myst_heading_anchors = 3
 # MathJax's menu could fetch its speech engine from a content network.
 mathjax3_config = {"options": {"enableMenu": False}}
@@ -33,10 +39,37 @@ autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 numpydoc_show_class_members = False
 
-html_theme = "furo"
+#: Pages of the repository's root that are included in docs/development.
+INCLUDED = {
+    "ARCHITECTURE.md": "architecture",
+    "CONTRIBUTING.md": "contributing",
+    "CHANGELOG.md": "changelog",
+    "SECURITY.md": "security",
+    "CODE_OF_CONDUCT.md": "conduct",
+}
+
+html_theme = "pydata_sphinx_theme"
 html_title = f"rocking {version}"
 html_static_path = ["_static"]
+html_css_files = ["pages.css"]
 html_show_sphinx = False
+html_show_sourcelink = False
+# Summaries of what was found are fetched, which a browser refuses where pages are opened as files.
+html_show_search_summary = False
+html_theme_options = {
+    "logo": {"text": f"rocking {version}"},
+    "header_links_before_dropdown": 8,
+    "navbar_align": "left",
+    "search_bar_text": "Search",
+    "show_toc_level": 2,
+    "footer_start": ["copyright"],
+    "footer_end": [],
+    "secondary_sidebar_items": ["page-toc"],
+    "pygments_light_style": "a11y-high-contrast-light",
+    "pygments_dark_style": "a11y-high-contrast-dark",
+}
+html_sidebars = {"index": []}
+html_context = {"default_mode": "auto"}
 
 
 def escape_bars(_app, _what, _name, _object, _options, lines):
@@ -44,7 +77,15 @@ def escape_bars(_app, _what, _name, _object, _options, lines):
     lines[:] = [re.sub(r"\|([^|`\s]+)\|", r"\\|\1\\|", line) for line in lines]
 
 
+def lead_within(_app, _path, _page, content):
+    """Let links of an included page of the repository lead to its page here."""
+    for file, page in INCLUDED.items():
+        content[0] = content[0].replace(f"]({file})", f"](/development/{page}.md)")
+    content[0] = content[0].replace("](docs/", "](/")
+
+
 def setup(app):
     """Register what this file adds to Sphinx."""
+    app.connect("include-read", lead_within)
     # After numpydoc, which reads the docstring at the default priority.
     app.connect("autodoc-process-docstring", escape_bars, priority=900)

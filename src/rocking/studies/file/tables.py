@@ -68,7 +68,7 @@ _OF_HELD: Final[Mapping[str, _Kind]] = {
 }
 
 #: Tables of a file, the keys of each, and what their values must be; numbers are read by `_QUANTITIES`.
-_SCHEMA: Final[Mapping[str, Mapping[str, _Kind]]] = {
+SCHEMA: Final[Mapping[str, Mapping[str, _Kind]]] = {
     "blocks": {"csv": _TEXT, **dict.fromkeys(PARAMETERS, _ANY), **_OF_HELD},
     "motions": {
         "records": _TEXTS,
@@ -109,8 +109,8 @@ class Tables:
     def check(self) -> None:
         """Check names of tables and keys, and that values which are no numbers are what they must be."""
         for table in self.tables:
-            if table not in _SCHEMA:
-                hint = nearest(table, (name for name in _SCHEMA if "." not in name))
+            if table not in SCHEMA:
+                hint = nearest(table, (name for name in SCHEMA if "." not in name))
                 raise self.wrong(table, None, f"there is no table [{{}}]; {hint}", table)
             self._check_keys(table)
         for needed in ("blocks", "motions"):
@@ -122,12 +122,12 @@ class Tables:
         if not isinstance(content, dict):
             raise self.wrong("", table, f"{{}} must be a table, [{table}]", table.rpartition(".")[2])
         for key, value in content.items():
-            if key not in _SCHEMA[table]:
-                raise self.wrong(table, key, f"[{table}] has no {{}}; {nearest(key, _SCHEMA[table])}", key)
-            kind = _SCHEMA[table][key]
+            if key not in SCHEMA[table]:
+                raise self.wrong(table, key, f"[{table}] has no {{}}; {nearest(key, SCHEMA[table])}", key)
+            kind = SCHEMA[table][key]
             if not kind.holds(value):
                 raise self.wrong(table, key, f"{{}} must be {kind.words}, not {checks.shown(value)}", key, value=value)
-            if f"{table}.{key}" in _SCHEMA:
+            if f"{table}.{key}" in SCHEMA:
                 self._check_keys(f"{table}.{key}")
 
     def numbers(self, table: str, key: str, value: Any) -> Floats:
