@@ -22,8 +22,8 @@ unexport PYTHONDONTWRITEBYTECODE
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-demo: .venv/.base ## simulate a block under a shipped record; writes out/demo.png
-	@$(BIN)/python examples/demo.py
+demo: .venv/.base ## simulate a block under a shipped record; writes out/museum.png
+	@$(BIN)/python examples museum
 
 wheel: .venv/.all ## build a wheel for this platform, with kernels compiled beforehand, into dist
 	$(BIN)/python scripts/ship_kernels.py
@@ -90,7 +90,8 @@ lint: .venv/.all ## ruff (rules and format), the import contracts, public docstr
 
 types: .venv/.all ## mypy: strictly for the package, and whether what stands beside it still fits
 	$(BIN)/mypy
-	$(BIN)/mypy benchmarks scripts examples stress
+	$(BIN)/mypy benchmarks scripts stress docs/howto
+	$(BIN)/mypy --allow-redefinition examples
 
 docs: .venv/.all ## build the documentation into docs/_build/html; a warning is an error
 	$(BIN)/sphinx-build -W --keep-going -n -b html docs docs/_build/html
@@ -121,7 +122,7 @@ review: .venv-upkeep/.installed ## look at the project as repo-review and zizmor
 	.venv-upkeep/bin/zizmor --offline .github
 
 clean: ## remove what the other targets made, but not the environment
-	rm -rf out build dist docs/_build docs/api/generated .pytest_cache .hypothesis .mypy_cache .ruff_cache \
+	rm -rf out build dist docs/_build docs/api/generated docs/gallery .pytest_cache .hypothesis .mypy_cache .ruff_cache \
 	    .benchmarks .import_linter_cache
 	find src tests benchmarks examples docs -name __pycache__ -type d -prune -exec rm -rf {} +
 

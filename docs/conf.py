@@ -6,6 +6,7 @@ from importlib.metadata import version as installed_version
 from pathlib import Path
 
 import sphinx.ext.autosummary
+from sphinx_gallery.sorting import ExplicitOrder
 
 sys.path.insert(0, str(Path(__file__).parent / "_extensions"))
 
@@ -23,6 +24,7 @@ extensions = [
     "sphinx_design",
     "numpydoc",
     "commands",
+    "sphinx_gallery.gen_gallery",
 ]
 exclude_patterns = ["_build"]
 templates_path = ["_templates"]
@@ -38,6 +40,25 @@ sphinx.ext.autosummary.WELL_KNOWN_ABBREVIATIONS += ("Eq.", "Eqs.", "Fig.", "Figs
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 numpydoc_show_class_members = False
+
+GALLERY = ["paper", "museum", "threshold", "bouncing_ball", "chaos", "pulse_map", "frame", "sizes", "ten_thousand"]
+GALLERY += ["precarious_rock", "statue", "calibration"]
+sphinx_gallery_conf = {
+    "examples_dirs": "../examples",
+    "gallery_dirs": "gallery",
+    "filename_pattern": "",
+    "ignore_pattern": "__main__",
+    "within_subsection_order": ExplicitOrder([f"{name}.py" for name in GALLERY]),
+    "abort_on_example_error": True,
+    "capture_repr": (),
+    "image_srcset": ["2x"],
+    # The same pages from every build, and nothing that nobody needs.
+    "min_reported_time": 3600,
+    "write_computation_times": False,
+    "show_signature": False,
+    "download_all_examples": False,
+}
+
 
 #: Pages of the repository's root that are included in docs/development.
 INCLUDED = {

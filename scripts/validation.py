@@ -2,7 +2,7 @@
 
 Run ``python scripts/validation.py`` from the repository's root (ten minutes). Some tables need what is not part of this
 repository, and stay as they are without it: OpenSeesPy, shake-table tests (``--shake-table FOLDER``, as
-examples/shake_table.py takes it), and tests on a small table (``--small-table FILE``: a CSV file of the columns set,
+scripts/shake_table.py takes it), and tests on a small table (``--small-table FILE``: a CSV file of the columns set,
 pgv_over_pga_s, pga_g and overturned).
 """
 
@@ -29,7 +29,6 @@ from rocking.constants import STANDARD_GRAVITY
 
 ROOT = Path(__file__).resolve().parents[1]
 TABLES = ROOT / "docs" / "_tables"
-sys.path.insert(0, str(ROOT / "examples"))
 
 #: Half diagonals, m, and amplitudes over the threshold (each +- 4.9e-6) of Numerics-in-Motion/blocks, under-this-pulse.
 OTHERS = {0.25: 1.2618896484375, 0.5: 1.4584423828125, 1.0: 2.1637841796875, 2.0: 5.1549267578125}

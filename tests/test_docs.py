@@ -291,17 +291,23 @@ def test_pages_load_nothing_from_the_network(tmp_path):
     shutil.copytree(ROOT / "docs" / "_extensions", source / "_extensions")
     (source / "_static").mkdir()
     shutil.copy(ROOT / "docs" / "_static" / "pages.css", source / "_static")
-    listed = "```{toctree}\nreference/commands/index\n```\n"
+    listed = "```{toctree}\nreference/commands/index\ngallery/index\n```\n"
     (source / "index.md").write_text(f"# A page\n\nwith $x^2$ and\n\n$$\ny = x\n$$ (label)\n\n{listed}", "utf-8")
+    examples = tmp_path / "examples"
+    examples.mkdir()
+    shutil.copy(ROOT / "examples" / "GALLERY_HEADER.rst", examples)
+    (examples / "paper.py").write_text('"""\nAn example\n==========\n\nwith :math:`x`.\n"""\nprint(1)\n', "utf-8")
     assert build.main(["-q", "-W", "-b", "html", str(source), str(tmp_path / "html")]) == 0
-    page = (tmp_path / "html" / "index.html").read_text("utf-8")
-    loaded = re.findall(r"<(?:script|img|iframe)[^>]*\ssrc=\"([^\"]*)\"|<link[^>]*\shref=\"([^\"]*)\"", page)
-    addresses = ["".join(pair) for pair in loaded]
-    assert any("mathjax" in address for address in addresses)
-    for address in addresses:
-        assert "//" not in address
-        # Where a page asks for a file, the build must have put it there.
-        assert address.startswith("#") or (tmp_path / "html" / re.split("[?#]", address)[0]).is_file(), address
+    for path in ("index.html", "gallery/index.html", "gallery/paper.html"):
+        page = tmp_path / "html" / path
+        text = page.read_text("utf-8")
+        loaded = re.findall(r"<(?:script|img|iframe)[^>]*\ssrc=\"([^\"]*)\"|<link[^>]*\shref=\"([^\"]*)\"", text)
+        addresses = ["".join(pair) for pair in loaded]
+        assert any("mathjax" in address for address in addresses) or path == "gallery/index.html"
+        for address in addresses:
+            assert "//" not in address
+            # Where a page asks for a file, the build must have put it there.
+            assert address.startswith("#") or (page.parent / re.split("[?#]", address)[0]).is_file(), address
     for style in (tmp_path / "html" / "_static").rglob("*.css"):
         assert not re.search(r"@import|url\(\s*['\"]?(?:https?:)?//", style.read_text("utf-8"))
 

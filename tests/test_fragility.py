@@ -2,8 +2,6 @@
 
 import csv
 import math
-import runpy
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +15,6 @@ from rocking import InvalidOption, fit_fragility, fragility
 from rocking.analysis import Band
 from rocking.block import Blocks
 
-EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "fragility.py"
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
 PULSES = [rocking.pulses.one_sine(1.0, frequency) for frequency in np.linspace(0.3, 1.5, 13)]
 
@@ -520,12 +517,6 @@ def test_an_unknown_limit_state_names_those_there_are():
         result.curve("uplift")
     with pytest.raises(rocking.InvalidOption, match="intensities"):
         result.curves[0].probability([-1.0])
-
-
-def test_the_example_ends_in_its_number(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert runpy.run_path(str(EXAMPLE))["main"]() == pytest.approx(0.642368, abs=1e-6)
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"fragility.png", "fragility.xml", "ida.png"}
 
 
 def test_a_block_of_weight_two_counts_as_two_blocks():

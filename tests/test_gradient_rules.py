@@ -12,7 +12,7 @@ import pytest
 
 from rocking.arrays import Floats
 
-EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
+EXAMPLES = Path(__file__).resolve().parents[1] / "docs" / "howto"
 #: One second of a sine and a half, m/s^2, in the steps of the examples, and a change of all samples.
 SAMPLES = 3.4 * np.sin(2.0 * np.pi * 1.5 * 0.02 * np.arange(51))
 CHANGE = np.cos(np.arange(51.0))

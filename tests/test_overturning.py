@@ -1,7 +1,6 @@
 """Overturning maps: closed forms of pulses, the second region, refined boundaries, and what must be refused."""
 
 import math
-import runpy
 from functools import partial
 from pathlib import Path
 
@@ -17,7 +16,6 @@ from rocking.engine import Setup, simulate_each
 from rocking.named_pulses import FAMILIES
 from rocking.treatment import Certified
 
-EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "overturning_map.py"
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
 FREQUENCIES = np.array([1.0, 2.0, 3.0, 5.0, 6.5])
 
@@ -295,14 +293,6 @@ def test_a_map_is_the_same_in_one_thread_and_in_several():
     grid = {"amplitudes": [0.5, 2.0, 6.0], "frequencies": [1.0, 4.0]}
     one, several = (overturning_map(BLOCK, "one-sine", threads=count, **grid) for count in (1, 3))
     assert one.data.identical(several.data)
-
-
-# The tests above hold the closed form; the example draws a map of five thousand pulses as well.
-@pytest.mark.thorough
-def test_the_example_ends_in_its_number(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert runpy.run_path(str(EXAMPLE))["main"]() < 1e-8
-    assert (tmp_path / "out" / "map.png").stat().st_size > 10_000
 
 
 def test_the_summary_tells_none_from_already_the_first():

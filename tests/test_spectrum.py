@@ -1,8 +1,6 @@
 """Rocking spectra: what `simulate` says, fractiles over blocks that overturn, equal displacements of similar blocks."""
 
 import math
-import runpy
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +11,6 @@ from hypothesis.extra.numpy import arrays
 import rocking
 from rocking.analysis.spectrum import fractiles_of, rocking_spectrum, weighted_fractiles
 
-EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "rocking_spectrum.py"
 PULSES = [rocking.pulses.one_sine(5.0, frequency) for frequency in (0.5, 0.8, 1.3, 2.0)]
 
 
@@ -153,13 +150,6 @@ def test_a_figure_shows_any_number_of_curves_and_names_some_of_many(spectrum):
         assert named[0].startswith("alpha = 0.1 ") and named[-1].startswith("alpha = 0.3 ")
     with pytest.raises(rocking.InvalidOption, match="against"):
         spectrum.plot(against="height")
-
-
-def test_the_example_ends_in_its_number(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    # Responses to one of its records are ambiguous: the last place of a machine's sine changes their peaks by 1e-4.
-    assert runpy.run_path(str(EXAMPLE))["main"]() == pytest.approx(-0.9367, abs=5e-4)
-    assert (tmp_path / "out" / "spectrum.png").stat().st_size > 10_000
 
 
 @given(

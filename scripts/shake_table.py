@@ -1,6 +1,6 @@
 """Calibrate two rock specimens on shake-table tests: which motions overturned them, and which will.
 
-    python examples/shake_table.py FOLDER [--cross-validate REPEATS]
+    python scripts/shake_table.py FOLDER [--cross-validate REPEATS]
 
 FOLDER holds index.csv (columns test, ground_motion, overturned_specimen_1, dem_best_specimen_1, ... _2) and
 table_acceleration.npz (one array test_N for each test: the table's acceleration in g at 200 Hz). The data are those of
