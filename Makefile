@@ -122,7 +122,8 @@ review: .venv-upkeep/.installed ## look at the project as repo-review and zizmor
 	.venv-upkeep/bin/zizmor --offline .github
 
 clean: ## remove what the other targets made, but not the environment
-	rm -rf out build dist docs/_build docs/api/generated docs/gallery .pytest_cache .hypothesis .mypy_cache .ruff_cache \
+	rm -rf out build dist docs/_build docs/api/generated docs/gallery docs/reference/commands .pytest_cache \
+	    .hypothesis .mypy_cache .ruff_cache \
 	    .benchmarks .import_linter_cache
 	find src tests benchmarks examples docs -name __pycache__ -type d -prune -exec rm -rf {} +
 

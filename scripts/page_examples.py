@@ -1,7 +1,7 @@
 """Run the examples of pages of the documentation, and keep the images that tutorials draw.
 
-Run ``python scripts/page_examples.py`` from the repository's root (a minute): the code of every page of docs/tutorials is
-run in an empty folder, what it prints is compared with what the page says, and the images that it saves are put into
+Run ``python scripts/page_examples.py`` from the repository's root (a minute): the code of every page of docs/tutorials
+is run in an empty folder, what it prints is compared with what the page says, and the images that it saves are put into
 docs/_static/tutorials. So a figure is always that of the code beside it. Other pages may be named to be run.
 """
 

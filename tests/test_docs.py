@@ -99,9 +99,9 @@ def console_lines() -> list[tuple[str, str]]:
     for page in [*PAGES, ROOT / "SECURITY.md"]:
         for console in re.findall(r"^```console\n(.*?)^```", page.read_text("utf-8"), re.DOTALL | re.MULTILINE):
             for line in re.findall(r"^\$ (.*)$", console, re.MULTILINE):
-                for part in re.split(r"\s(?:\||&&|&)\s", line.partition("  #")[0]):
-                    if part.startswith("rocking "):
-                        found.append((str(page.relative_to(ROOT)), part.removeprefix("rocking ")))
+                parts = re.split(r"\s(?:\||&&|&)\s", line.partition("  #")[0])
+                typed = (part.removeprefix("rocking ") for part in parts if part.startswith("rocking "))
+                found += [(str(page.relative_to(ROOT)), each) for each in typed]
     return found
 
 
