@@ -49,5 +49,7 @@ never, chance = stood.unlikely, stood.probability
 print(f"most likely never a PGV of {never:.2f} m/s or more")
 print(f"the chance to stand for 10,000 years under this hazard is {chance:.2f}")
 
+# %%
+
 stood.plot(title="How often at most, if the rock has stood for 10,000 years")
 plt.show()
