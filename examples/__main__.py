@@ -2,6 +2,7 @@
 
 import runpy
 import sys
+import warnings
 from pathlib import Path
 
 import matplotlib as mpl
@@ -20,7 +21,7 @@ def main(*names: str) -> None:
     if unknown:
         sys.exit(f"There is no example {unknown[0]!r}; there are: {', '.join(EXAMPLES)}.")
     OUT.mkdir(exist_ok=True)
-    plt.show = lambda: None
+    warnings.filterwarnings("ignore", "FigureCanvasAgg is non-interactive")
     for name in names or EXAMPLES:
         title = EXAMPLES[name].read_text("utf-8").splitlines()[1]
         print(f"{title} (examples/{name}.py)\n", flush=True)

@@ -39,5 +39,7 @@ scores = Scores.of(chances, np.array(overturned[80:]))
 accuracy, brier = scores.accuracy, scores.brier
 print(f"{100.0 * accuracy:.1f} % of 80 further tests predicted, Brier score {brier:.3f}")
 
+# %%
+
 calibration.plot()
 plt.show()

@@ -30,5 +30,7 @@ rests, bracket = len(response.chattering), last["upper"] - last["lower"]
 print(f"it turns by {peak:.4f} of its slenderness at most, and rests {rests} times,")
 print(f"the last time at {last['end']:.4f} s; the bracket is {bracket:.0e} s wide")
 
+# %%
+
 response.plot(longest_sequence=True)
 plt.show()

@@ -33,7 +33,9 @@ print(f"even odds at a PGV of {median:.3f} m/s")
 # The hazard curve is an example and belongs to no real site: how often a year the ground exceeds each
 # velocity. With it the annual rate of overturning is :math:`\int \lambda(x)\,dP(x)`.
 
-site = rocking.HazardCurve([0.05, 0.1, 0.2, 0.5, 1.0, 2.0], [2e-2, 8e-3, 3e-3, 6e-4, 1e-4, 1e-5], measure="pgv")
+velocity = np.array([0.05, 0.1, 0.2, 0.5, 1.0, 2.0])  # m/s
+exceeded = np.array([2e-2, 8e-3, 3e-3, 6e-4, 1e-4, 1e-5])  # times a year
+site = rocking.HazardCurve(velocity, exceeded, measure=rocking.Measure("pgv"))
 rate = fragility.annual_rate(site).rate("overturning")
 years = rate.return_period
 print(f"overturns {rate.in_words()}")
@@ -46,6 +48,8 @@ stood = fragility.survival(10_000.0, site)
 never, chance = stood.unlikely, stood.probability
 print(f"most likely never a PGV of {never:.2f} m/s or more")
 print(f"the chance to stand for 10,000 years under this hazard is {chance:.2f}")
+
+# %%
 
 stood.plot(title="How often at most, if the rock has stood for 10,000 years")
 plt.show()

@@ -32,5 +32,8 @@ print(f"under the Ridgecrest record, scaled to 5 m/s^2, it turns by {peak:.4f} r
 rose = statue.rose()
 least = rose.weakest_acceleration
 print(f"the least acceleration that lifts it is {least:.4f} g, towards {rose.weakest_azimuth:g} degrees")
+
+# %%
+
 rose.plot()
 plt.show()

@@ -24,14 +24,14 @@ motion = rocking.pulses.sine(1.05 * block.gravity * block.alpha, 0.5 / np.pi, cy
 thresholds = np.geomspace(1e-4, 1e-1, 13)
 schemes = [rocking.VelocityThreshold(float(threshold)) for threshold in thresholds]
 found = dynamics.compare_schemes(block, motion, schemes=schemes, model="linear")
-certified, outcomes = found.certified.response, found.outcomes
-false_rests = [len(outcome.false_rests) for outcome in outcomes]
-for outcome in outcomes[::4]:
+false_rests = [len(outcome.false_rests) for outcome in found.outcomes]
+for outcome in found.outcomes[::4]:
     print(f"{outcome.scheme.label}: {outcome.verdict}")
 
 # %%
 # One of the wrong responses beside the right one, and how many rests each threshold makes up:
 
+certified = rocking.simulate(block, motion, model="linear")
 wrong = rocking.simulate(block, motion, model="linear", chattering=rocking.VelocityThreshold(0.05))
 verdicts = [certified.overturned, wrong.overturned]
 print(f"overturns: {verdicts[0]}; with a threshold of 0.05 p alpha: {verdicts[1]}")
