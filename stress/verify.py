@@ -51,9 +51,9 @@ def main() -> int:
     tables = given.tables or (ROOT / "docs" / "_tables" if given.parts == "full" else None)
     wanted = {promise.name: _parts(promise, given.parts) for promise in promises}
     folders = {promise.name: given.kept / f"{promise.name}-{key(promise)}" for promise in promises}
-    if not _judged(wanted, folders, given.jobs):
+    if status := _judged(wanted, folders, given.jobs):
         print(f"stopped; what is done is kept in {given.kept}, and the same command goes on from there")
-        return STOPPED
+        return status
     found = {promise.name: _together(folders[promise.name], wanted[promise.name]) for promise in promises}
     print(overview(promises, found))
     if tables:
@@ -105,23 +105,27 @@ def _version(library: str) -> str:
         return f"no {library}"
 
 
-def _judged(wanted: dict[str, int], folders: dict[str, Path], jobs: int) -> bool:
-    """Judge the parts that are not kept yet; False if stopped on the way."""
+def _judged(wanted: dict[str, int], folders: dict[str, Path], jobs: int) -> int:
+    """Judge the parts that are not kept yet; exit status, if it was stopped or if a part could not be judged."""
+    status = 0
     files = [(name, part, folders[name] / f"{part}.json") for name in wanted for part in range(wanted[name])]
     missing = [each for each in files if not each[-1].exists()]
     # numba's threads do not survive a fork.
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(jobs, mp_context=context, initializer=_deaf) as pool:
-        futures = [pool.submit(_judge_part, *each) for each in missing]
+        futures = {pool.submit(_judge_part, *each): f"{each[0]} {each[1]}" for each in missing}
         try:
             with Progress("parts", len(files), done=len(files) - len(missing)) as bar:
                 for future in as_completed(futures):
-                    print(future.result(), flush=True)
+                    error = future.exception()
+                    status |= error is not None
+                    told = f"{futures[future]}: not judged: {type(error).__name__}: {error}"
+                    print(told if error else future.result(), flush=True)
                     bar.advance(1)
         except KeyboardInterrupt:
             pool.shutdown(wait=True, cancel_futures=True)
-            return False
-    return True
+            return STOPPED
+    return status
 
 
 def _deaf() -> None:

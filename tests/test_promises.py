@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -147,6 +148,21 @@ def test_parts_add_up_and_a_failure_is_told():
         total.add(judge(part))
     assert (total.parts, total.cases, total.failures, total.worst) == (4, 4, 1, 3.0)
     assert MADE_UP.faults(total) == ["made-up: two"]
+
+
+def test_a_part_that_cannot_be_judged_does_not_stop_the_others(monkeypatch, tmp_path, capsys):
+    """With threads in the place of processes, which would not know what is made up here."""
+
+    def fails(part):
+        if part == 1:
+            raise TimeoutError("too late")
+        return judge(0)
+
+    monkeypatch.setattr(verify, "ALL", {"made-up": Promise("made-up", "a promise made up", 4, 1, fails)})
+    monkeypatch.setattr(verify, "ProcessPoolExecutor", lambda jobs, **given: ThreadPoolExecutor(jobs))
+    assert verify._judged({"made-up": 3}, {"made-up": tmp_path}, 1) == 1
+    assert "made-up 1: not judged: TimeoutError: too late" in capsys.readouterr().out
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["0.json", "2.json"]
 
 
 def test_too_few_decided_cases_are_a_fault():

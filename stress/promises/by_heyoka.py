@@ -70,7 +70,8 @@ def _arc() -> Any:
 def _impacts(asked: Question) -> list[float]:
     side, motion = asked.block.sides[0], asked.motion
     ends, levels = [*motion.breakpoints[1:-1].tolist(), np.inf], motion.coefficients[:, 0] / GRAVITY
-    (u, v), time, sign, found = asked.start, 0.0, 1.0, []
+    found: list[float] = []
+    (u, v), time, sign = asked.start, 0.0, 1.0
     while len(found) < max(len(asked.true), 1) and time < asked.until:
         piece = int(np.searchsorted(ends, time, side="right"))
         held, until = side.alpha + sign * float(levels[piece]), min(ends[piece], asked.until)
@@ -92,5 +93,5 @@ def _advanced(time: float, u: float, v: float, p: float, held: float, until: flo
     while True:
         outcome = arc.propagate_until(min(arc.time + reach, until))[0]
         if outcome != hy.taylor_outcome.time_limit or arc.time >= until:
-            return float(arc.time), *map(float, arc.state), outcome != hy.taylor_outcome.time_limit  # type: ignore[return-value]
+            return float(arc.time), float(arc.state[0]), float(arc.state[1]), outcome != hy.taylor_outcome.time_limit
         reach *= 2.0
