@@ -7,8 +7,8 @@ Each mutant (`mutations.py` says what is drawn) is put into a copy of the tree, 
 that `make quick` would run for a change of its file, up to the first failure. Kernels are run uncompiled. What a mutant
 showed is kept under a hash of its text, and holds as long as the tests that showed it are what they were; a run that
 was stopped goes on where it was. Every survivor is printed; those of `equivalent_mutants.json` change nothing that can
-be seen, for the reason said there, and do not count. Once every part has been judged, in one run or in several, the
-table of docs/reliability.md is written.
+be seen, for the reason said there, and do not count. The table of docs/reliability.md is written from all parts that
+are kept.
 """
 
 from __future__ import annotations
@@ -43,6 +43,7 @@ from mutations import Mutant, mutants
 from of_changes import MOST, FilesOfTests, ordered
 
 ROOT = Path(__file__).resolve().parents[1]
+TABLE = ROOT / "docs/_tables/tests-mutants.txt"
 
 #: Folders of each part.
 PARTS = {
@@ -321,8 +322,10 @@ def table(shown: dict[str, Shown]) -> str:
     """Table of all parts, and below it every survivor that changes something."""
     heads = ("part", "mutants", "equivalent", "killed", "killed, %", "date")
     lines = ["| " + " | ".join(heads) + " |", "|---" + "|--:" * (len(heads) - 1) + "|"]
-    for part, each in shown.items():
-        cells = (part, each.drawn, each.equivalent, each.killed, f"{100 * each.share:.0f}", each.date)
+    for part in PARTS:
+        cells: tuple[object, ...] = (part, *["not judged yet"] * (len(heads) - 1))
+        if each := shown.get(part):
+            cells = (part, each.drawn, each.equivalent, each.killed, f"{100 * each.share:.0f}", each.date)
         lines.append("| " + " | ".join(map(str, cells)) + " |")
     spared = [survivor for each in shown.values() for survivor in each.spared if not survivor[1]]
     lines += ["", "Not seen by any test:" if spared else "None was spared that changes anything."]
@@ -359,9 +362,8 @@ def main() -> int:
     finally:
         tree.remove()
     kept = {part: given.kept / f"{part}.json" for part in PARTS}
-    if all(path.exists() for path in kept.values()):
-        shown_by = {part: Shown(**json.loads(path.read_text("utf-8"))) for part, path in kept.items()}
-        (ROOT / "docs/_tables/tests-mutants.txt").write_text(table(shown_by), "utf-8")
+    shown_by = {part: Shown(**json.loads(path.read_text("utf-8"))) for part, path in kept.items() if path.exists()}
+    TABLE.write_text(table(shown_by), "utf-8")
     return 0 if enough else 1
 
 

@@ -4,12 +4,24 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 
 import numpy as np
 import pytest
 
 import rocking
-from rocking import Block, Blocks, InvalidBlock, InvalidOption, Measure, VelocityThreshold, simulate, simulate_many
+from rocking import (
+    Block,
+    Blocks,
+    Certified,
+    InvalidBlock,
+    InvalidOption,
+    Measure,
+    VelocityThreshold,
+    engine,
+    simulate,
+    simulate_many,
+)
 
 ULP = 2.0**-52
 
@@ -265,6 +277,42 @@ def test_an_interrupt_returns_at_once(records):
     begun, late, tasks = map(int, out.split())
     assert begun < tasks
     assert late <= 2  # one for each thread, on its way when the interrupt came
+
+
+def test_an_interrupt_reaches_the_tasks_in_hand(monkeypatch):
+    setup, task = (
+        engine.Setup(Block.from_parameters(2.0, 0.2).alone(), "linear", Certified()),
+        engine.Task(slice(None), rocking.pulses.one_sine(1.0, 1.0)),
+    )
+    begun, told = threading.Event(), []
+
+    def held(setup, task, stop):
+        begun.set()
+        told.append(stop.wait(20.0))
+
+    def tasks():
+        yield task
+        assert begun.wait(60.0)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(engine, "simulate_task", held)
+        with pytest.raises(KeyboardInterrupt):
+            [*engine.simulate_tasks(setup, tasks(), threads=1)]
+    assert told == [True]
+
+
+def test_a_task_that_is_told_to_stop_follows_no_body_any_further(monkeypatch, records):
+    setup, task = engine.Setup(random_blocks(3, 1), "linear", Certified()), engine.Task(slice(None), records[2])
+    marched, stop = [], threading.Event()
+    march = engine._march_together
+    monkeypatch.setattr(engine, "_march_together", lambda *given: marched.append(march(*given)))
+    engine.simulate_task(setup, task, stop)
+    assert len(marched) >= 1
+    stop.set()
+    marched.clear()
+    engine.simulate_task(setup, task, stop)
+    assert not marched
 
 
 @pytest.mark.slow

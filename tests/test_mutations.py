@@ -79,8 +79,9 @@ def test_survivors_are_named_and_those_that_change_nothing_do_not_count(monkeypa
     assert "it is only faster" in rest[0] and drawn[1].before in rest[0]
     assert "not seen" in rest[1] and drawn[2].after in rest[1]
     assert rest[2] == "  fewer than 85 %"
-    _, _, row, _, title, _, survivor, end = mutants.table({"block and solid": shown}).split("\n")
-    assert row == f"| block and solid | 4 | 1 | 2 | 67 | {shown.date} |"
+    *_, title, _, survivor, end = rows = mutants.table({"block and solid": shown}).split("\n")
+    assert f"| block and solid | 4 | 1 | 2 | 67 | {shown.date} |" in rows
+    assert sum("not judged yet" in row for row in rows) == len(mutants.PARTS) - 1
     assert (title, end) == ("Not seen by any test:", "")
     assert survivor.startswith(f"- {drawn[2].path.relative_to(mutants.ROOT / 'src/rocking')}:{drawn[2].line}: `")
     assert mutants.table({"none": mutants.Shown(3, 0, 3, [])}).endswith("\nNone was spared that changes anything.\n")
@@ -124,13 +125,14 @@ def test_a_part_without_enough_branches_fails_the_run(monkeypatch, tmp_path, cap
         return found | {"missing": {"place.py": [[3, 5], [7, -1]]}}
 
     monkeypatch.setattr(branches, "_run", run)
+    monkeypatch.setattr(branches, "TABLE", tmp_path / "table.txt")
     monkeypatch.setattr("sys.argv", ["branches.py", "readers", "--kept", str(tmp_path)])
     assert branches.main() == 0
-    said, title, _, row = capsys.readouterr().out.strip().splitlines()
+    said, title, _, *rows = capsys.readouterr().out.strip().splitlines()
     assert said == "place.py: 3 to 5, 7 to its end"
-    assert title.startswith("| part | branches | taken, % |") and row.startswith(
-        "| readers | 40 | 95.0 | 50 | 100.0 | 3 |"
-    )
+    assert title.startswith("| part | branches | taken, % |") and len(rows) == len(branches.PARTS)
+    assert any(row.startswith("| readers | 40 | 95.0 | 50 | 100.0 | 3 |") for row in rows)
+    assert (tmp_path / "table.txt").read_text() == "\n".join([title, "|---" + "|--:" * 6 + "|", *rows, ""])
     assert branches.main() == 0 and len(runs) == 1  # nothing has changed
     found["covered_branches"] = 37
     (tmp_path / "readers.json").unlink()
