@@ -14,7 +14,7 @@ EVERY_PART := $(addprefix tests/test_,reference.py result.py plot.py cli.py cli_
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help demo wheel quick test test-all browser slow verify mutants lowest latest .bounds doctest lint types docs bench \
+.PHONY: help demo wheel quick test test-all browser browser-all slow verify mutants lowest latest .bounds doctest lint types docs bench \
     coverage audit sbom review try-install clean distclean
 
 help: ## list the targets
@@ -39,6 +39,9 @@ test-all: .venv/.all ## run them with more cases each (twice as long)
 	$(PYTEST) -m "not slow and not browser"
 
 browser: .venv/.all .page-tools/.installed ## drive the explorer's page in Chromium, which must be installed
+	ROCKING_BROWSER_REQUIRED=1 $(PYTEST) -m "browser and not thorough"
+
+browser-all: .venv/.all .page-tools/.installed ## drive it through more cases each
 	ROCKING_BROWSER_REQUIRED=1 $(PYTEST) -m browser
 
 slow: .venv/.all ## run the tests that take long: wider ranges, many digits, a hundred thousand pairs
