@@ -16,8 +16,8 @@ EVERY_PART := $(addprefix tests/test_,reference.py result.py plot.py cli.py cli_
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help demo wheel quick test test-all browser slow verify mutants lowest latest .bounds doctest lint types docs bench \
-    coverage branches audit sbom review try-install clean distclean
+.PHONY: help demo wheel quick test test-all browser browser-all slow verify mutants lowest latest .bounds doctest lint types \
+    docs bench coverage branches audit sbom review try-install clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -42,6 +42,9 @@ test-all: .venv/.all ## run them with more cases each (twice as long)
 	$(PYTEST) -m "not slow and not browser"
 
 browser: .venv/.all .page-tools/.installed ## drive the explorer's page in Chromium, which must be installed
+	ROCKING_BROWSER_REQUIRED=1 $(PYTEST) -m "browser and not thorough"
+
+browser-all: .venv/.all .page-tools/.installed ## drive it through more cases each
 	ROCKING_BROWSER_REQUIRED=1 $(PYTEST) -m browser
 
 slow: .venv/.all ## run the tests that take long: wider ranges, many digits, a hundred thousand pairs
@@ -124,8 +127,7 @@ review: .venv-upkeep/.installed ## look at the project as repo-review and zizmor
 
 clean: ## remove what the other targets made, but not the environment
 	rm -rf out build dist docs/_build docs/api/generated docs/gallery docs/reference/commands .pytest_cache \
-	    .hypothesis .mypy_cache .ruff_cache \
-	    .benchmarks .import_linter_cache
+	    .hypothesis .mypy_cache .ruff_cache .benchmarks .import_linter_cache
 	find src tests benchmarks examples docs -name __pycache__ -type d -prune -exec rm -rf {} +
 
 distclean: clean ## remove the environment, too
