@@ -51,7 +51,8 @@ def drawn(seed):
         body.loads.append((mass * rng.uniform(0.0, 1.0), 2.0 * size, rng.uniform(-0.05, 0.05) * size))
         restraints.append(Load(*body.loads[-1], follows=False))
     block = Block.from_pivots(distances, height, gyration, restitution=e, mass=mass, gravity=9.81)
-    ours = RestrainedBlock(block, *restraints, one_sided=one_sided, lean=lean, restitution=e)
+    kept = e[0] if one_sided else e
+    ours = RestrainedBlock(block, *restraints, one_sided=one_sided, lean=lean, restitution=kept)
     threshold = min(ours.uplift_thresholds())
     motion = rocking.pulses.sine(
         threshold * 10.0 ** rng.uniform(0.05, 1.2),
@@ -197,6 +198,39 @@ def test_what_is_known_in_closed_form():
     assert toe._held[0].sine == 0.0 < -toe._held[1].sine
     leaning = RestrainedBlock(column, lean=0.02)
     assert [side.alpha for side in leaning.sides] == pytest.approx([column.alpha - 0.02, column.alpha + 0.02])
+
+
+@pytest.mark.parametrize("lean", [0.0, 0.03])
+def test_restraints_stay_where_they_are_on_the_block_when_a_load_that_follows_moves_its_centre_of_mass(lean):
+    """Thresholds are what sums of moments about each pivot say, of forces at points from the block's own centre."""
+    right, left, up, mass, g = 0.25, 0.3, 1.5, 4e3, 9.80665
+    block = Block.from_pivots((right, left), up, 0.9, mass=mass)
+    carried, thrust, pressing, tendon = (8e2, 3.0, 0.2), (5e2, 2.0, -0.1), (3e2, 2.8, -0.05), (0.0, 4e3, 0.1)
+    body = RestrainedBlock(
+        block, Load(*carried), Thrust(*thrust), Load(*pressing, follows=False), Tendon(*tendon), lean=lean
+    )
+    for sign, pivot, found in zip((1.0, -1.0), (right, -left), body.uplift_thresholds(), strict=True):
+
+        def arms(across, along, pivot=pivot):
+            x, z = across - pivot, along
+            return x * math.cos(lean) + z * math.sin(lean), z * math.cos(lean) - x * math.sin(lean)
+
+        holding, height = 0.0, 0.0  # moment that holds the block down, over the sign; what an acceleration lifts by
+        for m, z, x in ((mass, up, 0.0), carried):
+            holding -= m * g * arms(x, z)[0]
+            height += m * arms(x, z)[1]
+        holding -= pressing[0] * g * arms(pressing[2], pressing[1])[0]
+        holding -= thrust[0] * arms(thrust[2], thrust[1])[1]
+        holding += tendon[1] * (pivot - tendon[2])
+        assert found == pytest.approx(sign * holding / height, rel=1e-13)
+    assert body.tendons_at((0.02, 0.0))[0][0] == pytest.approx(2.0 * (right - 0.1) * math.sin(0.01))
+
+
+def test_a_body_too_stocky_for_angular_momentum_carries_a_load_with_a_restitution_that_is_given():
+    stocky = Block(width=2.5, height=1.6, mass=1e3, restitution=0.5)
+    assert [side.restitution for side in RestrainedBlock(stocky, Load(50.0, 1.6), restitution=0.4).sides] == [0.4, 0.4]
+    with pytest.raises(rocking.InvalidBlock, match="too stocky to rock that way; give restitution"):
+        RestrainedBlock(stocky, Load(50.0, 1.6))
 
 
 def test_a_tendon_that_has_yielded_leaves_the_block_free():

@@ -7,6 +7,8 @@ import pytest
 
 import rocking
 from rocking import Block, Damper, InvalidOption, Load, RestrainedBlock, Spring, Tendon, Thrust
+from rocking.response.answers import trail_of
+from rocking.response.history import plastic_elongations
 
 MASS, G = 4e3, 9.80665
 COLUMN = Block.from_pivots((0.25, 0.3), 1.5, 0.9, mass=MASS, restitution=0.85)
@@ -38,8 +40,9 @@ def test_forces_of_the_ground_and_of_restraints_turn_the_block_about_its_centre_
     times = np.linspace(0.0, min(response.duration, 3.0), 500)
     theta, rate, acceleration = response.states(times).T
     vertical = response.normal_force(times)
-    horizontal = body.contact((theta, rate, acceleration), (PUSH.acceleration(times) / G,
-        PUSH.vertical.acceleration(times) / G), np.where(theta > 0, 0, np.where(theta < 0, 1, -1)))[0]  # fmt: skip
+    ground = PUSH.acceleration(times) / G, PUSH.vertical.acceleration(times) / G
+    side = np.where(theta > 0, 0, np.where(theta < 0, 1, -1))
+    horizontal = body.contact((theta, rate, acceleration), ground, side, np.zeros(len(times)))[0]
     judged = 0
     for k in np.flatnonzero(theta != 0.0):
         turned = theta[k] + lean
@@ -93,6 +96,16 @@ def test_tendons_are_stretched_as_the_rotations_of_both_sides_stretch_them(stren
     assert (found["plastic_elongation"][0] > 1e-3) == (strength < math.inf)
     # On the other side of its toe the second one is stretched less by the larger rotation.
     assert response.to_dict()["tendons"][1]["force_N"] == found["force"][1]
+
+
+def test_a_tendon_yields_in_the_linear_model_where_its_response_says_so():
+    tendon = Tendon(3e5, prestress=4e3, strength=5e3)
+    response = rocking.simulate(RestrainedBlock(COLUMN, tendon), PUSH, model="linear")
+    elongation = max(0.25 * response.rotation(response.peak_time), -0.3 * response.rotation(response.peak_time))
+    (row,) = response.tendons
+    assert row["elongation"] == pytest.approx(elongation, rel=1e-12)
+    assert row["plastic_elongation"] == pytest.approx(elongation - 1e3 / 3e5, rel=1e-9)
+    assert row["plastic_elongation"] == pytest.approx(plastic_elongations(trail_of(response))[-1], rel=1e-9)
 
 
 def test_a_summary_names_restraints_balance_and_the_forces_of_tendons():

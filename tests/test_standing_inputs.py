@@ -65,7 +65,7 @@ WRONG = {
     "support of NaN": (
         lambda: Solid.from_mesh(box(), support=[(0.1, 0.1), (math.nan, 0.0), (0.0, -0.1)]),
         "support",
-        r"finite (east, north) in m, of shape (n, 2)",
+        "each a finite (east, north) in m, not",
     ),
     "tolerance of all": (lambda: Solid.from_mesh(box(), tolerance=5.0), "tolerance", "below the height of the mesh"),
     "points": (
@@ -104,7 +104,20 @@ WRONG = {
     "a load outside": (
         lambda: held(Load(1e5, 4.0, offset=1.0)), "offset", "0.702 m beyond its pivot, so that it falls: give"
     ),
+    "sizes of a wall without names": (
+        lambda: Block.one_sided(0.4, 4.0),
+        "width",
+        "the sizes of a block are given by name, not as 0.4, 4: width and height for the full sizes",
+    ),
     "a load that follows": (lambda: Load(5.0, 4.0, follows="no"), "follows", "must be True or False, not 'no'"),
+    "a pair for one side": (
+        lambda: held(one_sided=True, restitution=(0.4, 0.5)), "restitution", "rocks one way is one number, not a pair"
+    ),
+    "corners of different lengths": (
+        lambda: Solid.from_mesh(box(), support=[(0.1, 0.2), (0.3,)]),
+        "support",
+        "each a finite (east, north) in m, not [(0.1, 0.2), (0.3,)]",
+    ),
     "walls": (lambda: held(one_sided="yes"), "one_sided", "must be True or False, not 'yes'"),
     "a lean in degrees": (
         lambda: held(lean=2.0), "lean", "0.1244 rad it stands; if it is in degrees, give math.radians(2)"

@@ -36,8 +36,9 @@ class Coordinate(NamedTuple):
 
 
 #: Forces of the ground on a body over its weight, horizontal and vertical: from the coordinate and its two rates, from
-#: the ground acceleration over g (horizontal, vertical), and from the side (0, 1, or -1 at rest); arrays of one shape.
-ContactLaw = Callable[[tuple[Floats, Floats, Floats], tuple[Floats, Floats], Integers], tuple[Floats, Floats]]
+#: the ground acceleration over g (horizontal, vertical), from the side (0, 1, or -1 at rest), and from the elongation
+#: of a tendon that yields beyond its plastic one, m (0 where there is none); arrays of one shape.
+ContactLaw = Callable[[tuple[Floats, Floats, Floats], tuple[Floats, Floats], Integers, Floats], tuple[Floats, Floats]]
 
 
 @runtime_checkable

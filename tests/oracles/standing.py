@@ -80,7 +80,9 @@ def _body(kind: str, rng: Drawn) -> tuple[RestrainedBlock, Held]:
     restraints, law, lean = _RESTRAINTS.get(kind, _none)(rng, held, weight, size)
     held.lean = lean
     block = Block.from_pivots(distances, height, gyration, restitution=e, mass=mass, gravity=GRAVITY)
-    return RestrainedBlock(block, *restraints, one_sided=wall, lean=lean, restitution=law or e), held
+    return RestrainedBlock(
+        block, *restraints, one_sided=wall, lean=lean, restitution=law or (e[0] if wall else e)
+    ), held
 
 
 Made = tuple[list[Restraint], Any, float]

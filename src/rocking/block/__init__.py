@@ -9,9 +9,11 @@ from rocking.block.restitution import (
     impact_restitution,
     one_sided_restitution,
 )
-from rocking.block.restrained import RestrainedBlock, RestrainedBlocks
+from rocking.block.restrained import RestrainedBlock
+from rocking.block.restrained_many import RestrainedBlocks
 from rocking.block.restraints import Damper, Load, Restraint, Spring, Tendon, Thrust
-from rocking.block.single import Block, Side, one_block
+from rocking.block.sides import Side
+from rocking.block.single import Block, one_block
 
 __all__ = [
     "Block",

@@ -5,94 +5,13 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from rocking import checks
 from rocking.arrays import Floats, Integers
+from rocking.block.moments import Held, Pivot, Yielding
 from rocking.errors import InvalidBlock
-
-
-class Held(NamedTuple):
-    """What restraints do on one side, at a rotation u and a rate u'.
-
-    Their moment about the pivot, positive where it brings the block back, over the weight times R is
-
-        sine sin(alpha - u) + cosine cos(alpha - u) + prestress cos(u/2) + spring u + (damping/p^2) u'.
-    """
-
-    sine: float = 0.0
-    cosine: float = 0.0
-    prestress: float = 0.0
-    spring: float = 0.0
-    damping: float = 0.0
-
-    def plus(self, other: Held) -> Held:
-        """Return both together."""
-        return Held(*(a + b for a, b in zip(self, other, strict=True)))
-
-
-class Yielding(NamedTuple):
-    """A tendon that yields, on one side.
-
-    Attributes
-    ----------
-    opening : float
-        Distance x of its duct from the pivot, m: it is longer by 2 x sin(u/2) than while the block stands.
-    stiffness : float
-        Its stiffness times x over weight times R, 1/m.
-    yields, slack : float
-        Elongations, beyond the plastic one, at which it yields and above which it is taut, m.
-    """
-
-    opening: float = 0.0
-    stiffness: float = 0.0
-    yields: float = math.inf
-    slack: float = 0.0
-
-
-class Pivot(NamedTuple):
-    """One side of a standing block, as restraints see it.
-
-    Attributes
-    ----------
-    sign : float
-        +1 on side +, -1 on side -.
-    alpha, lean : float
-        Slenderness as it stands, and the angle by which the block leans to this side, rad.
-    distance : float
-        Distance of the pivot from the centre of mass along the base, m.
-    p : float
-        Frequency parameter, rad/s.
-    moment : float
-        Weight times R, N m.
-    gravity : float
-        m/s^2.
-    """
-
-    sign: float
-    alpha: float
-    lean: float
-    distance: float
-    p: float
-    moment: float
-    gravity: float
-
-    def arms(self, height: float, offset: float) -> tuple[float, float]:
-        """Distance from the pivot inwards and height above it, m, of a point of the standing block.
-
-        The point is at a height above the base and at an offset from the centre of mass to side +, both along the
-        block's own axes.
-        """
-        inwards = self.distance - self.sign * offset
-        c, s = math.cos(self.lean), math.sin(self.lean)
-        return inwards * c - height * s, height * c + inwards * s
-
-    def turned(self, inwards: float, upwards: float) -> tuple[float, float]:
-        """Return ``rho sin`` and ``rho cos`` of the angle of a point from the line of the centre of mass, m."""
-        c, s = math.cos(self.alpha), math.sin(self.alpha)
-        return inwards * c - upwards * s, upwards * c + inwards * s
 
 
 class Restraint(ABC):
@@ -118,7 +37,9 @@ class Restraint(ABC):
         """
         return None
 
-    def _acting(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers) -> tuple[Floats, Floats]:
+    def _acting(
+        self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats
+    ) -> tuple[Floats, Floats]:
         """Return the force on the block; a spring and a damper have none, since they turn it alone.
 
         Parameters
@@ -129,6 +50,8 @@ class Restraint(ABC):
             Rotations to side +, rad.
         side : ndarray of int
             0 on side +, 1 on side -, -1 at rest.
+        stretch : ndarray
+            Elongation of a tendon that yields beyond its plastic one, m.
 
         Returns
         -------
@@ -139,7 +62,7 @@ class Restraint(ABC):
         --------
         >>> import numpy as np
         >>> pivot = Pivot(1.0, 0.2, 0.0, 0.2, 2.7, 1e4, 9.81)
-        >>> Thrust(1.5e3, height=4.0)._acting((pivot, pivot), np.zeros(1), np.zeros(1, int))
+        >>> Thrust(1.5e3, height=4.0)._acting((pivot, pivot), np.zeros(1), np.zeros(1, int), np.zeros(1))
         (array([1500.]), array([0.]))
         """
         return np.zeros_like(rotation), np.zeros_like(rotation)
@@ -189,8 +112,8 @@ class Tendon(Restraint):
     prestress : float
         Force while the block stands, N.
     offset : float
-        Distance of the duct from the centre of mass, m, positive to side +. At a pivot's distance it is at that toe,
-        and does nothing while the block rocks about it.
+        Distance of the duct from the centre of mass of the block without loads, m, positive to side +. At a pivot's
+        distance it is at that toe, and does nothing while the block rocks about it.
     strength : float
         Force at which it yields, N: it becomes longer for good then, and hangs slack when the block has come back.
 
@@ -262,25 +185,26 @@ class Tendon(Restraint):
             -self.prestress / self.stiffness,
         )
 
-    def _acting(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers) -> tuple[Floats, Floats]:
-        """Return its pull while it is elastic."""
-        x = np.where(side == 1, self._opening(pivots[1]), self._opening(pivots[0]))
-        return self._along(pivots, rotation, self.prestress + self.stiffness * 2.0 * x * np.sin(0.5 * np.abs(rotation)))
-
-    def _along(self, pivots: tuple[Pivot, Pivot], rotation: Floats, pull: Floats | float) -> tuple[Floats, Floats]:
-        """Return a pull along the chord from its end in the block to that in the ground."""
+    def _acting(
+        self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats
+    ) -> tuple[Floats, Floats]:
+        """Return its pull, along the chord from its end in the block to that in the ground."""
+        if self.strength == math.inf:
+            x = np.where(side == 1, self._opening(pivots[1]), self._opening(pivots[0]))
+            stretch = 2.0 * x * np.sin(0.5 * np.abs(rotation))
+        pull = np.clip(self.prestress + self.stiffness * stretch, 0.0, self.strength)
         along = 0.5 * rotation + pivots[0].lean
         return -pull * np.sin(along), -pull * np.cos(along)
 
-    def _stretched(self, pivots: tuple[Pivot, Pivot], largest: tuple[float, float]) -> tuple[float, float, float]:
+    def _stretched(self, pivots: tuple[Pivot, Pivot], bends: tuple[float, float]) -> tuple[float, float, float]:
         """Return the largest elongation, m, the largest force, N, and the plastic elongation, m.
 
         Parameters
         ----------
         pivots : (Pivot, Pivot)
             Both sides.
-        largest : (float, float)
-            Largest rotation on each, rad.
+        bends : (float, float)
+            Largest opening of the base over the distance from the pivot on each: 2 sin(u/2), in the linear model u.
 
         Returns
         -------
@@ -293,9 +217,7 @@ class Tendon(Restraint):
         >>> [round(value, 6) for value in Tendon(1e6, strength=1e3)._stretched((pivot, pivot), (0.01, 0.0))]
         [0.005, 1000.0, 0.004]
         """
-        elongation = max(
-            2.0 * self._opening(pivot) * math.sin(0.5 * u) for pivot, u in zip(pivots, largest, strict=True)
-        )
+        elongation = max(self._opening(pivot) * bend for pivot, bend in zip(pivots, bends, strict=True))
         elastic = self.prestress + self.stiffness * elongation
         if elastic <= self.strength:
             return elongation, elastic, 0.0
@@ -399,7 +321,7 @@ class Thrust(Restraint):
     height : float
         Height of the point where it acts, above the base, m.
     offset : float
-        Distance of that point from the centre of mass, m, positive to side +.
+        Distance of that point from the centre of mass of the block without loads, m, positive to side +.
 
     Raises
     ------
@@ -432,7 +354,9 @@ class Thrust(Restraint):
         force = pivot.sign * self.force / pivot.moment
         return Held(force * across, -force * along)
 
-    def _acting(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers) -> tuple[Floats, Floats]:
+    def _acting(
+        self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats
+    ) -> tuple[Floats, Floats]:
         """Return the thrust."""
         return np.full_like(rotation, self.force), np.zeros_like(rotation)
 
@@ -451,7 +375,7 @@ class Load(Restraint):
     height : float
         Height of the point where it rests, above the base, m.
     offset : float
-        Distance of that point from the centre of mass, m, positive to side +.
+        Distance of that point from the centre of mass of the block without loads, m, positive to side +.
     follows : bool
         Whether it moves with the block. One that does not presses with its weight, whatever the ground does, and its
         own inertia does not count.
@@ -486,7 +410,9 @@ class Load(Restraint):
         weight = self.mass * pivot.gravity / pivot.moment
         return Held(weight * along, weight * across)
 
-    def _acting(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers) -> tuple[Floats, Floats]:
+    def _acting(
+        self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats
+    ) -> tuple[Floats, Floats]:
         """Return the weight of one that does not follow; that of one that follows is part of the block's."""
         weight = 0.0 if self.follows else self.mass * pivots[0].gravity
         return np.zeros_like(rotation), np.full_like(rotation, -weight)

@@ -12,8 +12,9 @@ import numpy as np
 from rocking import checks, svg
 from rocking.arrays import Floats, Integers
 from rocking.block.limits import checked_gravity, checked_length, checked_mass, checked_pair, checked_parameter
-from rocking.block.restitution import Restitution, housner_restitution
+from rocking.block.restitution import housner_restitution
 from rocking.block.rigid_body import contact_forces, gyration_squared, refusal, rigid_bodies
+from rocking.block.sides import Side, even_sides, restitutions, sides_on_pivots
 from rocking.body import KINDS, Bodies, ContactLaw, Coordinate
 from rocking.constants import MODELS, STANDARD_GRAVITY, Model
 from rocking.errors import InvalidBlock, InvalidOption, UnequalSides
@@ -32,38 +33,6 @@ _SAME_RESTITUTION: Final = 1e-9
 _HEAVIEST_BEAM: Final = 1e12
 #: Longer side of a block's picture, pixels.
 _PICTURED: Final = 120.0
-
-
-@dataclass(frozen=True)
-class Side:
-    """One side of a block: what counts while it leans to that side.
-
-    Attributes
-    ----------
-    p : float
-        Frequency parameter, rad/s.
-    alpha : float
-        Slenderness, rad: the angle between the vertical and the line from the pivot to the centre of mass.
-    restitution : float
-        Factor on the angular speed when the block leaves this side at an impact.
-    radius : float
-        Distance R from the pivot to the centre of mass, m.
-    inertia : float or None
-        Moment of inertia about the pivot, m g R/p^2, kg m^2; None while the mass is not known.
-    """
-
-    p: float
-    alpha: float
-    restitution: float
-    radius: float
-    inertia: float | None = None
-
-    def __str__(self) -> str:
-        """Return the parameters as people read them."""
-        return f"p = {self.p:.5g} rad/s, alpha = {self.alpha:.5g} rad, restitution = {self.restitution:.5g}"
-
-    def __repr__(self) -> str:
-        return f"<Side: {self}, R = {self.radius:.5g} m>"
 
 
 @dataclass(frozen=True)
@@ -159,11 +128,11 @@ class Block:
             )
         if s == 0.0:
             alpha = math.atan2(b, h)
-            sides = _even_sides(
+            sides = even_sides(
                 g, math.hypot(b, h), alpha, restitution, housner_restitution(alpha), _perhaps_swapped(b, h)
             )
         else:
-            sides = _sides_on_pivots(
+            sides = sides_on_pivots(
                 (b - s, b + s), h, gyration_squared(b, h, s), g, restitution, _perhaps_swapped(b, h)
             )
             text += f", centre of mass {abs(s):.5g} m off its middle to side {'+' if s > 0.0 else '-'}"
@@ -224,14 +193,14 @@ class Block:
         angles = [checked_parameter(value, "alpha") for value in checked_pair(alpha, "alpha")]
         radii, text = [0.75 * g / rate**2 for rate in rates], "block from its parameters"
         if rates[0] == rates[1] and angles[0] == angles[1]:
-            e = _restitutions(restitution, (housner_restitution(angles[0]),) * 2)
+            e = restitutions(restitution, (housner_restitution(angles[0]),) * 2)
         else:
             both = np.array([rates]), np.array([angles])
             found = rigid_bodies(*both)
             if restitution is None and (reason := refusal(found, *both)):
                 raise InvalidBlock(reason, "restitution")
             conserved = found.restitution[0].tolist()
-            e = _restitutions(restitution, conserved)
+            e = restitutions(restitution, conserved)
             if not found.alike[0] and all(abs(e[i] - conserved[i]) <= _SAME_RESTITUTION for i in range(2)):
                 depth = g * float(found.depth[0])
                 radii = [depth / math.cos(angle) for angle in angles]
@@ -250,6 +219,7 @@ class Block:
         restitution: float | Sequence[float] | None = None,
         mass: float | None = None,
         gravity: float = STANDARD_GRAVITY,
+        description: str | None = None,
     ) -> Block:
         """Rigid body of any shape that rocks on two pivots.
 
@@ -268,6 +238,8 @@ class Block:
             Mass, kg.
         gravity : float
             Acceleration of gravity, m/s^2.
+        description : str, optional
+            What it is, in words; by default its pivots are.
 
         Returns
         -------
@@ -296,9 +268,9 @@ class Block:
         h = checked_length(height, "height")
         k = checked_length(radius_of_gyration, "radius_of_gyration")
         g = checked_gravity(gravity)
-        sides = _sides_on_pivots((plus, minus), h, k * k, g, restitution)
-        text = f"body on pivots {plus:.5g} m and {minus:.5g} m from its centre of mass, which is {h:.5g} m high"
-        return block_of_sides(cls.__new__(cls), sides, g, text, mass)
+        sides = sides_on_pivots((plus, minus), h, k * k, g, restitution)
+        pivots = f"body on pivots {plus:.5g} m and {minus:.5g} m from its centre of mass, which is {h:.5g} m high"
+        return block_of_sides(cls.__new__(cls), sides, g, description or pivots, mass)
 
     @classmethod
     def from_frame(
@@ -352,7 +324,7 @@ class Block:
         alpha = math.atan2(b, h)
         radius = math.hypot(b, h) * (1.0 + 3.0 * gamma) / (1.0 + 2.0 * gamma)
         kept = 1.0 - 1.5 * math.sin(alpha) ** 2 + 3.0 * gamma * math.cos(2.0 * alpha)
-        sides = _even_sides(g, radius, alpha, restitution, kept / (1.0 + 3.0 * gamma), _perhaps_swapped(b, h))
+        sides = even_sides(g, radius, alpha, restitution, kept / (1.0 + 3.0 * gamma), _perhaps_swapped(b, h))
         return block_of_sides(
             cls.__new__(cls), sides, g, f"frame of columns {2 * b:.5g} m x {2 * h:.5g} m, mass ratio {gamma:.5g}"
         )
@@ -401,7 +373,8 @@ class Block:
         """
         from rocking.block.restrained import RestrainedBlock
 
-        return RestrainedBlock(cls(**sizes), *restraints, one_sided=True, lean=lean, restitution=restitution)
+        numbers: Any = [each for each in restraints if isinstance(each, (int, float))]
+        return RestrainedBlock(cls(*numbers, **sizes), *restraints, one_sided=True, lean=lean, restitution=restitution)
 
     def __str__(self) -> str:
         """Return description and parameters in one line."""
@@ -490,7 +463,11 @@ class Block:
         return self._contact_forces
 
     def _contact_forces(
-        self, motion: tuple[Floats, Floats, Floats], ground_over_g: tuple[Floats, Floats], side: Integers
+        self,
+        motion: tuple[Floats, Floats, Floats],
+        ground_over_g: tuple[Floats, Floats],
+        side: Integers,
+        stretch: Floats,
     ) -> tuple[Floats, Floats]:
         leaning = np.maximum(side, 0)
         alpha, radius = (np.array([getattr(s, name) for s in self.sides])[leaning] for name in ("alpha", "radius"))
@@ -541,36 +518,6 @@ def block_of_sides(
     return block
 
 
-def _even_sides(
-    gravity: float, radius: float, alpha: float, restitution: object, conserved: float, advice: str
-) -> tuple[Side, Side]:
-    """Both sides of a body that rocks like a rectangle of this radius, m, and slenderness, rad."""
-    plus, minus = _restitutions(restitution, (conserved, conserved), advice)
-    p = math.sqrt(0.75 * gravity / radius)
-    return Side(p, alpha, plus, radius), Side(p, alpha, minus, radius)
-
-
-def _sides_on_pivots(
-    distances: tuple[float, float],
-    height: float,
-    gyration_squared: float,
-    gravity: float,
-    restitution: object,
-    advice: str = "",
-) -> tuple[Side, Side]:
-    """Sides of a body from the distances of its pivots from the centre of mass, its height, m, and k^2, m^2."""
-    plus, minus = distances
-    radii = math.hypot(plus, height), math.hypot(minus, height)
-    inertias = [gyration_squared + radius * radius for radius in radii]
-    kept = gyration_squared + height * height - plus * minus
-    e = _restitutions(restitution, (kept / inertias[1], kept / inertias[0]), advice)
-    first, second = (
-        Side(math.sqrt(gravity * radius / inertia), math.atan2(distance, height), factor, radius)
-        for distance, radius, inertia, factor in zip(distances, radii, inertias, e, strict=True)
-    )
-    return first, second
-
-
 def _half_sizes(
     halves: tuple[float | None, float | None], full: tuple[float | None, float | None]
 ) -> tuple[float, float]:
@@ -591,21 +538,3 @@ def _perhaps_swapped(half_width: float, half_height: float) -> str:
     if half_width <= half_height:
         return ""
     return f"swap its sizes, {2.0 * half_width:g} m wide and {2.0 * half_height:g} m high, if that is a slip, or "
-
-
-def _restitutions(given: object, conserved: Sequence[float], advice: str = "") -> tuple[float, float]:
-    """Return the factors that are given, or those that conserve angular momentum; advice for a block too stocky."""
-    if given is None:
-        if min(conserved) <= 0.0:
-            raise InvalidBlock(
-                f"conserving angular momentum gives this block a restitution of {min(conserved):.3g}: it is too stocky "
-                f"to rock that way; {advice}give {{}} a value in (0, 1]",
-                "restitution",
-            )
-        return conserved[0], conserved[1]
-    if isinstance(given, Restitution):
-        raise InvalidBlock(
-            "{} of a block is a number or a pair; a law goes to RestrainedBlock(block, restitution=...)", "restitution"
-        )
-    plus, minus = (checked_parameter(value, "restitution") for value in checked_pair(given, "restitution"))
-    return plus, minus

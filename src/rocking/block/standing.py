@@ -11,17 +11,18 @@ import numpy as np
 
 from rocking.bisection import bisected
 from rocking.block.limits import checked_pair, checked_parameter
-from rocking.block.restitution import Restitution
-from rocking.block.restraints import Held, Load, Pivot, Yielding
-from rocking.block.single import Block, Side, block_of_sides
+from rocking.block.moments import Held, Pivot, Yielding
+from rocking.block.restraints import Load, Restraint
+from rocking.block.sides import Side
+from rocking.block.single import Block, block_of_sides
 from rocking.errors import InvalidBlock
 
 #: Rotations at which the balance is looked for, on each side.
 _LOOKS: Final = 512
 
 
-def carrying(block: Block, loads: Sequence[Load]) -> Block:
-    """Return the rigid body of a block and the loads that follow it."""
+def carrying(block: Block, loads: Sequence[Load], restitution: float | Sequence[float] | None) -> Block:
+    """Return the rigid body of a block and the loads that follow it, with a restitution or that of angular momentum."""
     if not loads:
         return block
     assert block.mass is not None
@@ -42,7 +43,12 @@ def carrying(block: Block, loads: Sequence[Load]) -> Block:
             "offset",
         )
     return Block.from_pivots(
-        (right - x, left + x), z, math.sqrt(gyration), mass=float(masses.sum()), gravity=block.gravity
+        (right - x, left + x),
+        z,
+        math.sqrt(gyration),
+        restitution=restitution,
+        mass=float(masses.sum()),
+        gravity=block.gravity,
     )
 
 
@@ -62,14 +68,11 @@ def leaning(block: Block, lean: float) -> Block:
     return block_of_sides(Block.__new__(Block), sides, block.gravity, block.description, block.mass)
 
 
-def with_restitution(block: Block, restitution: float | Sequence[float] | Restitution) -> Block:
+def with_restitution(block: Block, restitution: float | Sequence[float]) -> Block:
     """Return a block with another restitution."""
-    factors = (
-        restitution._factors() if isinstance(restitution, Restitution) else checked_pair(restitution, "restitution")
-    )
     plus, minus = (
         replace(side, restitution=checked_parameter(factor, "restitution"))
-        for side, factor in zip(block.sides, factors, strict=True)
+        for side, factor in zip(block.sides, checked_pair(restitution, "restitution"), strict=True)
     )
     return block_of_sides(Block.__new__(Block), (plus, minus), block.gravity, block.description, block.mass)
 
@@ -80,13 +83,22 @@ def distances_of(block: Block) -> tuple[float, float]:
     return plus.radius * math.sin(plus.alpha), minus.radius * math.sin(minus.alpha)
 
 
-def pivots_of(block: Block, lean: float) -> tuple[Pivot, Pivot]:
-    """Both sides of a block that leans, as restraints see them."""
-    weight = math.nan if block.mass is None else block.mass * block.gravity
+def following(restraints: Sequence[Restraint]) -> list[Load]:
+    """Return the loads that follow the block, of all that restrains it."""
+    return [each for each in restraints if isinstance(each, Load) and each.follows]
+
+
+def pivots_of(block: Block, lean: float, restraints: Sequence[Restraint]) -> tuple[Pivot, Pivot]:
+    """Both sides of a block that leans, with the loads that follow it, as its restraints see them.
+
+    Their points are placed from the centre of mass of the block without these loads, from which the loads are, too.
+    """
+    mass = math.nan if block.mass is None else block.mass
+    shift = sum(load.mass * load.offset for load in following(restraints)) / mass
     plus, minus = (
         Pivot(
-            sign, side.alpha, sign * lean, side.radius * math.sin(side.alpha + sign * lean), side.p,
-            weight * side.radius, block.gravity,
+            sign, side.alpha, sign * lean, side.radius * math.sin(side.alpha + sign * lean) + sign * shift, side.p,
+            mass * block.gravity * side.radius, block.gravity,
         )
         for sign, side in zip((1.0, -1.0), block.sides, strict=True)
     )  # fmt: skip

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, TypeVar
 
 from cyclopts import Group, Parameter, Token
 
 from rocking.constants import Model
-from rocking.errors import InvalidBlock, InvalidOption
+from rocking.errors import InvalidBlock, InvalidOption, RockingError, literal
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.plausibility import block_notes, level_notes, restraint_notes
 from rocking.progress import note
@@ -21,6 +22,8 @@ from rocking.quantities import Quantity, acceleration, length, number, position,
 if TYPE_CHECKING:
     from rocking.block import Block
     from rocking.body import Body
+
+Made = TypeVar("Made")
 
 #: What describes a block, together, and what may go with it.
 _Descriptions = Mapping[tuple[str, ...], tuple[str, ...]]
@@ -195,13 +198,18 @@ class HeldOptions(BlockOptions):
             return block
         e = None if self.restitution is None else sides(self.restitution, "restitution")
         kinds = {"tendon": Tendon, "thrust": Thrust, "load": Load}
-        restraints = [
-            kind(**_parameters(text, name, kind)) for name, kind in kinds.items() for text in getattr(self, name)
-        ]
-        couples = {"spring": Spring, "damper": Damper}
-        restraints += [kind(held[name]) for name, kind in couples.items() if name in held]
+        restraints = [_made(kind, text, name) for name, kind in kinds.items() for text in getattr(self, name)]
+        for name, couple in {"spring": Spring, "damper": Damper}.items():
+            if name in held:
+                with _about(name):
+                    restraints.append(couple(held[name]))
         lean = 0.0 if self.lean is None else tilt(self.lean, "lean")
-        body = RestrainedBlock(block, *restraints, one_sided=self.one_sided, lean=lean, restitution=e)
+        try:
+            body = RestrainedBlock(block, *restraints, one_sided=self.one_sided, lean=lean, restitution=e)
+        except InvalidBlock as wrong:
+            if wrong.argument != "offset":
+                raise
+            raise InvalidBlock(literal(str(wrong))) from wrong  # that of a restraint, where --offset is the block's own
         for sentence in restraint_notes(body, None if block.half_height is None else 2.0 * block.half_height):
             note(sentence)
         return body
@@ -273,11 +281,27 @@ class BodyOptions(HeldOptions):
         if self.ball is not None:
             return BouncingBall(self.ball)
         if self.oscillator is not None:
-            return ImpactOscillator(**_parameters(self.oscillator, "oscillator", ImpactOscillator))
-        return InvertedPendulum(**_parameters(self.pendulum or "", "pendulum", InvertedPendulum))
+            return _made(ImpactOscillator, self.oscillator, "oscillator")
+        return _made(InvertedPendulum, self.pendulum or "", "pendulum")
 
 
-def _parameters(text: str, option: str, made: type) -> dict[str, Any]:
+@contextmanager
+def _about(option: str) -> Iterator[None]:
+    """Say of which option a parameter is that is wrong, whose name may be that of another option."""
+    try:
+        yield
+    except RockingError as wrong:
+        raise InvalidOption(f"{{}}: {literal(str(wrong))}", option) from wrong
+
+
+def _made(kind: Callable[..., Made], text: str, option: str) -> Made:
+    """Make what an option describes by NAME=VALUE."""
+    given = _parameters(text, option, kind)
+    with _about(option):
+        return kind(**given)
+
+
+def _parameters(text: str, option: str, made: Callable[..., object]) -> dict[str, Any]:
     """Return the parameters of a body that a text gives, by name."""
     known = inspect.signature(made).parameters
     given = {}
@@ -286,6 +310,8 @@ def _parameters(text: str, option: str, made: type) -> dict[str, Any]:
         name = name.replace("-", "_")
         if not equals or name not in known:
             raise InvalidOption(f"{{}} takes NAME=VALUE with {', '.join(known)}, not {part.strip()!r}", option)
+        if name in given:
+            raise InvalidOption(f"{{}} gives {name} twice, in {text!r}", option)
         is_truth = isinstance(known[name].default, bool)
         given[name] = _truth(value, name, option) if is_truth else number(value, option)
     missing = [name for name, each in known.items() if each.default is each.empty and name not in given]

@@ -18,7 +18,7 @@ from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.trace import Trail
 from rocking.motion.motion import Motion
-from rocking.response.contact import Contact, TendonContact, friction_coefficient, friction_demand
+from rocking.response.contact import Contact, friction_coefficient, friction_demand
 from rocking.response.energy import Energy, energy_of
 from rocking.response.history import History, with_all_impacts
 from rocking.response.sensitivity import Sensitivity, ambiguities, sensitivity_along
@@ -87,7 +87,7 @@ class Answers:
             if self.overturned:  # the last step ends there
                 side = int(self._trail.nodes["side"][-1])
                 plus, minus = (self.peak_rotation, minus) if side == 0 else (plus, self.peak_rotation)
-            rows = self.body.tendons_at((plus, minus))
+            rows = self.body.tendons_at((plus, minus), "nonlinear" if self._trail.rules["nonlinear"] else "linear")
         return np.array(rows, dtype=[("elongation", "f8"), ("force", "f8"), ("plastic_elongation", "f8")])
 
     @property
@@ -341,8 +341,6 @@ class Answers:
         if law is None:
             raise InvalidOption(f"the forces of the ground are not known of this body: {self.body.description}")
         until = self.duration if math.isnan(self.tipping_time) else self.tipping_time
-        if isinstance(self.body, RestrainedBlock) and any(tendon.stiffness > 0.0 for tendon in self.body._tendon):
-            return TendonContact(self._history, law, until, self.body)
         return Contact(self._history, law, until)
 
 

@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike
 from rocking import checks
 from rocking.arrays import Flags, Floats, Integers
 from rocking.bisection import bisected
-from rocking.block import RestrainedBlock
 from rocking.body import ContactLaw
 from rocking.errors import InvalidOption
 from rocking.kernels.ground import components
@@ -70,6 +69,10 @@ class Contact:
     history: History
     law: ContactLaw
     until: float
+
+    @cached_property
+    def _plastic(self) -> Floats:
+        return plastic_elongations(self.history.trail)
 
     def forces(self, time: ArrayLike) -> tuple[Floats, Floats]:
         """Both forces at times of any shape; NaN outside the response."""
@@ -137,7 +140,8 @@ class Contact:
         theta, rate, acceleration = self.history.states_in(times, rows).T
         side = self.history.trail.nodes["side"][rows]
         ground = self._ground_in(times, rows, side < 0)
-        return self.law((theta, rate, acceleration), ground, side)
+        stretch = elongation(self.history.trail, np.abs(theta), side) - self._plastic[rows]
+        return self.law((theta, rate, acceleration), ground, side, stretch)
 
     def _ground_in(self, times: Floats, rows: Integers, at_rest: Flags) -> tuple[Floats, Floats]:
         """Both ground accelerations in g: in the piece where a step starts; at rest, which may span many, anywhere."""
@@ -164,23 +168,3 @@ class Contact:
         resting = nodes["side"][rows] < 0  # what the motion is before a jump
         times[resting, -1] = np.maximum(np.nextafter(times[resting, -1], 0.0), times[resting, 0])
         return times, np.repeat(rows[:, None], _SAMPLES, axis=1)
-
-
-@dataclass(frozen=True, eq=False)
-class TendonContact(Contact):
-    """As `Contact`, of a body with a tendon that yields: its pull depends on how far it was stretched before."""
-
-    body: RestrainedBlock
-
-    @cached_property
-    def _plastic(self) -> Floats:
-        return plastic_elongations(self.history.trail)
-
-    def _forces_in(self, times: Floats, rows: Integers) -> tuple[Floats, Floats]:
-        """Compute the forces in the steps that start at these rows, the tendon's pull among them."""
-        theta, rate, acceleration = self.history.states_in(times, rows).T
-        side = self.history.trail.nodes["side"][rows]
-        ground = self._ground_in(times, rows, side < 0)
-        stretched = elongation(self.history.trail, np.abs(theta), side)
-        tension = self.body.tension(stretched - self._plastic[rows])
-        return self.body.contact_forces((theta, rate, acceleration), ground, side, tension)

@@ -14,7 +14,6 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.block import Block
 from rocking.block.limits import checked_gravity, checked_mass
-from rocking.block.single import block_of_sides
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidBlock
 from rocking.result import Result, Row, dictionary_of, text_of
@@ -235,16 +234,15 @@ class Solid(Result):
         """
         plane = plane_of(self, azimuth)
         plus, minus = plane.pivots.distance.tolist()
-        block = Block.from_pivots(
+        return Block.from_pivots(
             (plus, minus),
             plane.height,
             plane.gyration,
             restitution=restitution,
             mass=self.mass,
             gravity=self.gravity,
+            description=f"{self.description} in the plane of {plane.azimuth:.5g} deg",
         )
-        text = f"{self.description} in the plane of {plane.azimuth:.5g} deg"
-        return block_of_sides(Block.__new__(Block), block.sides, block.gravity, text, block.mass)
 
     def rose(self, azimuths: ArrayLike | None = None) -> Rose:
         """Resistance in every direction.

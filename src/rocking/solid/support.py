@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from rocking import checks
 from rocking.arrays import Floats
-from rocking.errors import InvalidBlock
+from rocking.errors import InvalidBlock, literal
 from rocking.motion.directions import sine_cosine
 
 #: Corners of a polygon within this part of its size of the outermost one are on one edge with it.
@@ -64,9 +64,16 @@ def area(polygon: Floats) -> float:
 
 def given_polygon(value: ArrayLike) -> Floats:
     """Return the convex polygon around points that somebody gives, shape (n, 2), or refuse them."""
-    points = checks.numbers(value, "support", InvalidBlock)
+    try:
+        points = np.asarray(value, float)
+    except (TypeError, ValueError):
+        points = np.empty(0)
     if points.ndim != 2 or points.shape[1] != 2 or not np.all(np.isfinite(points)):
-        raise InvalidBlock("{} must be corners of a polygon, finite (east, north) in m, of shape (n, 2)", "support")
+        raise InvalidBlock(
+            f"{{}} must be corners of a polygon, each a finite (east, north) in m, not {literal(checks.shown(value))}",
+            "support",
+            value=value,
+        )
     found = hull(points)
     if found is None:
         raise InvalidBlock("{} must have three corners or more that are not on one line", "support")
