@@ -117,7 +117,7 @@ def table(found: dict[str, dict[str, Any]]) -> str:
     heads = ("part", "branches", "taken, %", "lines", "run, %", "processor time, s", "date")
     lines = ["| " + " | ".join(heads) + " |", "|---" + "|--:" * (len(heads) - 1) + "|"]
     for name in PARTS:
-        cells: tuple[object, ...] = (name, *["not measured yet"] * (len(heads) - 1))
+        cells: tuple[object, ...] = (name, "not measured yet", *[""] * (len(heads) - 2))
         if each := found.get(name):
             taken, run = (f"{100 * share:.1f}" for share in shares(each))
             cells = (name, each["num_branches"], taken, each["num_statements"], run, f"{each['seconds']:.0f}")

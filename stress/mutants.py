@@ -107,7 +107,7 @@ class Tree:
         near = ordered([self.tests.of(path)])
         return [path.relative_to(ROOT).as_posix() for path in near[:MOST]]
 
-    def chosen(self, paths: set[Path], uncompiled: bool) -> dict[Path, dict[str, float]]:
+    def chosen(self, paths: set[Path], seconds: float, uncompiled: bool) -> dict[Path, dict[str, float]]:
         """Files of tests for a mutant of each file and their times: the nearest that the time allows, at least one.
 
         Times are measured one file of tests after another, until half of the time is filled.
@@ -119,12 +119,12 @@ class Tree:
             for path, some in chosen.items():
                 for name in near[path]:
                     total = sum(some.values())
-                    if total > 0.5 * self.seconds:
+                    if total > 0.5 * seconds:
                         break
                     if name not in times:
                         missing.add(name)
                         break
-                    if total + times[name] <= (self.seconds if some else sys.float_info.max):
+                    if total + times[name] <= (seconds if some else sys.float_info.max):
                         some[name] = times[name]
             if not missing:
                 return chosen
@@ -146,19 +146,20 @@ class Tree:
         return {name: math.inf if each["by"] else each["seconds"] for name, each in found.items()}
 
     def judged(self, drawn: list[Mutant], uncompiled: bool) -> list[dict[str, Any]]:
-        """Find what the tests show of each mutant."""
-        chosen = self.chosen({mutant.path for mutant in drawn}, uncompiled)
-        tasks: list[Task] = []
-        places = []
-        for mutant in drawn:
-            names = [*chosen[mutant.path]]
-            limit = 3.0 * sum(chosen[mutant.path].values()) + 20.0
-            place = self.folder / "mutants" / f"{mutant.key}.json"
-            places.append(place)
-            if not (place.exists() and self._holds(json.loads(place.read_text()), names)):
-                tasks.append((place, mutant, names, limit, uncompiled))
-        done(tasks, self.copies)
-        return [json.loads(place.read_text()) for place in places]
+        """Find what the tests show of each mutant; what the nearest ones spare is judged again, by more of them."""
+        places = {mutant: self.folder / "mutants" / f"{mutant.key}.json" for mutant in drawn}
+        left = drawn
+        for seconds in (self.seconds, 3.0 * self.seconds):
+            chosen = self.chosen({mutant.path for mutant in left}, seconds, uncompiled)
+            tasks: list[Task] = []
+            for mutant in left:
+                names, place = [*chosen[mutant.path]], places[mutant]
+                if not (place.exists() and self._holds(json.loads(place.read_text()), names)):
+                    limit = 3.0 * sum(chosen[mutant.path].values()) + 20.0
+                    tasks.append((place, mutant, names, limit, uncompiled))
+            done(tasks, self.copies)
+            left = [mutant for mutant in left if not json.loads(places[mutant].read_text())["by"]]
+        return [json.loads(place.read_text()) for place in places.values()]
 
     def _holds(self, found: dict[str, Any], names: list[str]) -> bool:
         """Whether a mutant that was judged is what it was: killed by a file that is the same, or spared by all."""
@@ -323,12 +324,12 @@ def table(shown: dict[str, Shown]) -> str:
     heads = ("part", "mutants", "equivalent", "killed", "killed, %", "date")
     lines = ["| " + " | ".join(heads) + " |", "|---" + "|--:" * (len(heads) - 1) + "|"]
     for part in PARTS:
-        cells: tuple[object, ...] = (part, *["not judged yet"] * (len(heads) - 1))
+        cells: tuple[object, ...] = (part, "not judged yet", *[""] * (len(heads) - 2))
         if each := shown.get(part):
             cells = (part, each.drawn, each.equivalent, each.killed, f"{100 * each.share:.0f}", each.date)
         lines.append("| " + " | ".join(map(str, cells)) + " |")
     spared = [survivor for each in shown.values() for survivor in each.spared if not survivor[1]]
-    lines += ["", "Not seen by any test:" if spared else "None was spared that changes anything."]
+    lines += ["", "Not seen by any test:" if spared else "No test has spared any that changes something."]
     for place, _, before, after in spared:
         lines += ["", f"- {place}: `{_line(before)}` became `{_line(after)}`"]
     return "\n".join([*lines, ""])

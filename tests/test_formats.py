@@ -197,6 +197,20 @@ def test_a_channel_not_chosen_or_unknown_lists_those_there_are() -> None:
     assert "no channel ''" in complaint(path, channel="")
 
 
+def test_the_vertical_motion_is_any_channel_but_the_horizontal_one() -> None:
+    path, single = written.FOLDER / "two.v1", written.FOLDER / "nga.at2"
+    for horizontal in (1, "90 Deg", None):
+        found = formats.read_vertical(path, "Up", formats.Request.checked(None, None, horizontal))
+        assert found.pga == read(path, channel="Up").pga
+    for file, horizontal, said in (
+        (path, 1, "no channel, file or shipped record 'north'; give one of 2 'Up'"),
+        (path, 2, "no channel, file or shipped record 'north'; give one of 1 '90 Deg'"),
+        (single, None, "'north', and this file holds the horizontal motion alone; give the path"),
+    ):
+        with pytest.raises(UnreadableRecord, match=re.escape(said)):
+            formats.read_vertical(file, "north", formats.Request.checked(None, None, horizontal))
+
+
 def test_two_channels_of_one_name_ask_for_the_number(file: Callable[[str], Path]) -> None:
     path = file(written.csmip_v1([(1, "Up", SERIES.tolist()), (2, "Up", SERIES.tolist())]))
     assert "2 channels are called 'Up'" in complaint(path, channel="Up")

@@ -84,13 +84,14 @@ def test_survivors_are_named_and_those_that_change_nothing_do_not_count(monkeypa
     assert sum("not judged yet" in row for row in rows) == len(mutants.PARTS) - 1
     assert (title, end) == ("Not seen by any test:", "")
     assert survivor.startswith(f"- {drawn[2].path.relative_to(mutants.ROOT / 'src/rocking')}:{drawn[2].line}: `")
-    assert mutants.table({"none": mutants.Shown(3, 0, 3, [])}).endswith("\nNone was spared that changes anything.\n")
+    assert mutants.table({"none": mutants.Shown(3, 0, 3, [])}).endswith(
+        "\nNo test has spared any that changes something.\n"
+    )
 
 
 def test_times_are_measured_of_the_nearest_tests_until_half_of_the_time_is_filled(monkeypatch):
     """One that fails without a mutant, or does not fit, is left out; the nearest is taken however long it is."""
     tree, asked = object.__new__(mutants.Tree), []
-    tree.seconds = 20.0
     near = {"a.py": ["slow", "quick"], "b.py": ["fails", "quick", "slow", "other", "last"], "c.py": ["fails"]}
     times = {"slow": 30.0, "quick": 4.0, "fails": math.inf, "other": 9.0}
     monkeypatch.setattr(tree, "near", lambda path: near[path.name])
@@ -100,7 +101,7 @@ def test_times_are_measured_of_the_nearest_tests_until_half_of_the_time_is_fille
         return {name: times[name] for name in names}
 
     monkeypatch.setattr(tree, "measured", measured)
-    chosen = tree.chosen({Path(name) for name in near}, uncompiled=False)
+    chosen = tree.chosen({Path(name) for name in near}, 20.0, uncompiled=False)
     assert {path.name: [*names] for path, names in chosen.items()} == {
         "a.py": ["slow"],
         "b.py": ["quick", "other"],
@@ -137,3 +138,28 @@ def test_a_part_without_enough_branches_fails_the_run(monkeypatch, tmp_path, cap
     found["covered_branches"] = 37
     (tmp_path / "readers.json").unlink()
     assert branches.main() == 1
+
+
+def test_what_the_nearest_tests_spare_is_judged_by_more_of_them(monkeypatch, tmp_path):
+    tree = object.__new__(mutants.Tree)
+    tree.folder, tree.seconds, tree.copies = tmp_path, 20.0, []
+    (tmp_path / "mutants").mkdir()
+    drawn, asked = mutants.drawn("response", 3, 1), []
+    files = {20.0: {"near": 9.0}, 60.0: {"near": 9.0, "far": 40.0}}
+    monkeypatch.setattr(tree, "chosen", lambda paths, seconds, uncompiled: dict.fromkeys(paths, files[seconds]))
+    monkeypatch.setattr(tree, "hash", lambda name: name)
+
+    def done(tasks, copies):
+        asked.append([(drawn.index(mutant), names) for _, mutant, names, *_ in tasks])
+        for place, mutant, names, *_ in tasks:
+            by = {0: "near::first", 1: "far::second" if "far" in names else ""}.get(drawn.index(mutant), "")
+            place.write_text(json.dumps({"by": by, "files": {name: name for name in names}}))
+
+    monkeypatch.setattr(mutants, "done", done)
+    monkeypatch.setattr(mutants, "ROOT", tmp_path)
+    (tmp_path / "near").touch(), (tmp_path / "far").touch()
+    for _ in range(2):
+        assert [each["by"] for each in tree.judged(drawn, uncompiled=False)] == ["near::first", "far::second", ""]
+    more = ["near", "far"]
+    assert asked[:2] == [[(0, ["near"]), (1, ["near"]), (2, ["near"])], [(1, more), (2, more)]]
+    assert asked[2:] == [[], []]
