@@ -42,15 +42,15 @@ def main() -> int:
     """Judge what is not yet kept, print, and write the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("promises", nargs="*", choices=[*ALL, []], help="which; by default all")
-    parser.add_argument("--parts", default="full", help="full, small, or a number of parts of each")
+    parser.add_argument("--parts", default="full", help="full, small, a number, or kept: judge nothing more")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes")
     parser.add_argument("--kept", type=Path, default=ROOT / "out" / "verify", help="folder of what is kept")
     parser.add_argument("--tables", type=Path, help="folder for the tables; by default docs/_tables of a full run")
     given = parser.parse_args()
     promises = [ALL[name] for name in given.promises or ALL]
     tables = given.tables or (ROOT / "docs" / "_tables" if given.parts == "full" else None)
-    wanted = {promise.name: _parts(promise, given.parts) for promise in promises}
     folders = {promise.name: given.kept / f"{promise.name}-{key(promise)}" for promise in promises}
+    wanted = {promise.name: _parts(promise, given.parts, folders[promise.name]) for promise in promises}
     if status := _judged(wanted, folders, given.jobs):
         print(f"stopped; what is done is kept in {given.kept}, and the same command goes on from there")
         return status
@@ -63,9 +63,12 @@ def main() -> int:
     return 1 if faults else 0
 
 
-def _parts(promise: Promise, size: str) -> int:
+def _parts(promise: Promise, size: str, folder: Path) -> list[int]:
+    """Numbers of the parts that are asked for."""
+    if size == "kept":
+        return [part for part in range(promise.parts) if (folder / f"{part}.json").exists()]
     known = {"full": promise.parts, "small": promise.small}
-    return known[size] if size in known else min(int(size), promise.parts)
+    return [*range(known[size] if size in known else min(int(size), promise.parts))]
 
 
 def key(promise: Promise) -> str:
@@ -105,10 +108,10 @@ def _version(library: str) -> str:
         return f"no {library}"
 
 
-def _judged(wanted: dict[str, int], folders: dict[str, Path], jobs: int) -> int:
+def _judged(wanted: dict[str, list[int]], folders: dict[str, Path], jobs: int) -> int:
     """Judge the parts that are not kept yet; exit status, if it was stopped or if a part could not be judged."""
     status = 0
-    files = [(name, part, folders[name] / f"{part}.json") for name in wanted for part in range(wanted[name])]
+    files = [(name, part, folders[name] / f"{part}.json") for name in wanted for part in wanted[name]]
     missing = [each for each in files if not each[-1].exists()]
     # numba's threads do not survive a fork.
     context = multiprocessing.get_context("spawn")
@@ -150,10 +153,10 @@ def _spent() -> float:
     return sum(os.times()[:4])
 
 
-def _together(folder: Path, parts: int) -> Found:
+def _together(folder: Path, parts: list[int]) -> Found:
     """Add up what the parts have shown."""
     found = Found()
-    for part in range(parts):
+    for part in parts:
         found.add(Found.of(json.loads((folder / f"{part}.json").read_text(encoding="utf-8"))))
     return found
 
@@ -191,7 +194,9 @@ def _lines(file: Path) -> Iterator[str]:
 def write(folder: Path, promises: list[Promise], found: dict[str, Found]) -> None:
     """Write the overview, and the table of each promise that has one."""
     texts = {"all": overview(promises, found), "made": made()}
-    texts |= {each.name: each.table(found[each.name]) for each in promises if each.table}
+    for each in promises:
+        if each.table:
+            texts[each.name] = each.table(found[each.name]) if found[each.name].parts else "Nothing is judged yet.\n"
     for name, text in texts.items():
         (folder / f"reliability-{name}.txt").write_text(text, encoding="utf-8")
 

@@ -160,9 +160,11 @@ def test_a_part_that_cannot_be_judged_does_not_stop_the_others(monkeypatch, tmp_
 
     monkeypatch.setattr(verify, "ALL", {"made-up": Promise("made-up", "a promise made up", 4, 1, fails)})
     monkeypatch.setattr(verify, "ProcessPoolExecutor", lambda jobs, **given: ThreadPoolExecutor(jobs))
-    assert verify._judged({"made-up": 3}, {"made-up": tmp_path}, 1) == 1
+    assert verify._judged({"made-up": [0, 1, 2]}, {"made-up": tmp_path}, 1) == 1
     assert "made-up 1: not judged: TimeoutError: too late" in capsys.readouterr().out
     assert sorted(path.name for path in tmp_path.iterdir()) == ["0.json", "2.json"]
+    assert verify._parts(MADE_UP, "kept", tmp_path) == [0, 2]
+    assert verify._parts(MADE_UP, "full", tmp_path) == [0, 1, 2, 3]
 
 
 def test_too_few_decided_cases_are_a_fault():
