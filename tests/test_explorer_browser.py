@@ -352,6 +352,12 @@ def test_the_phase_plane_and_the_energy_are_drawn_where_they_are_seen(opened):
     line = page.js(
         f"({MODELS}).filter((each) => each.name === 'phase-total').map((each) => Array.from(each.data.y))[0]"
     )
+    # Orange parts what overturns from what comes back, as the legend says.
+    orange = page.js("getComputedStyle(document.documentElement).getPropertyValue('--over').trim()")
+    dash = "String(each.line_dash?.value ?? each.line_dash)"
+    dashed = f"({MODELS}).filter((each) => {dash} === '7,3,2,3' && each.visible !== false)"
+    inks = page.js(f"{dashed}.map(({{line_color: each}}) => each.value ?? each)")
+    assert len(inks) >= 3 and set(inks) == {orange}
     times = np.linspace(231.0, 235.0, 4001)
     assert max(line) == pytest.approx(
         (response.kinetic_energy(times) + response.potential_energy(times)).max(), rel=1e-3

@@ -101,7 +101,7 @@ export class MapReading {
     for (const level of [0, 1, -1]) {
       if (level < low || level > high) continue;
       pen.setLineDash(level ? [6, 3] : []);
-      pen.strokeStyle = colour(level ? "accent" : "soft");
+      pen.strokeStyle = colour(level ? "over" : "soft");
       pen.beginPath();
       pen.moveTo(0, up(level));
       pen.lineTo(WIDTH, up(level));

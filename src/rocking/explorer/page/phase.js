@@ -82,7 +82,7 @@ export class PhasePanel {
     this.plane.below[0].ticker.desired_num_ticks = 5;
     this.plane.left[0].axis_label = phrase("phase.velocity");
     for (const dimension of ["width", "height"]) span(this.plane, dimension, "grid");
-    line(this.plane, "boundary", "accent", {line_dash: [7, 3, 2, 3]});
+    line(this.plane, "boundary", "over", {line_dash: [7, 3, 2, 3]});
     add(this.plane, "jumps", ["before", "after"], new B.Segment({x0: 0, x1: 0, y0: F("before"), y1: F("after"), line_width: 1.6, line_dash: [2, 3]}), () => ({line_color: colour("ground")}));
     line(this.plane, "course", "ink");
     add(this.plane, "rest", ["x", "y"], mark("square", 9), () => ({fill_color: colour("rest"), line_color: colour("ink")}));
@@ -91,7 +91,7 @@ export class PhasePanel {
 
     this.energy = made(phrase("phase.energy_plot"));
     this.energy.left[0].axis_label = phrase("phase.energy");
-    this.levels = [0, 1].map(() => span(this.energy, "width", "accent", {line_dash: [7, 3, 2, 3], visible: false}));
+    this.levels = [0, 1].map(() => span(this.energy, "width", "over", {line_dash: [7, 3, 2, 3], visible: false}));
     add(this.energy, "impact", ["x", "y"], new B.Scatter({x: F("x"), y: F("y"), angle: Math.PI / 2, size: 9, line_width: 1, marker: {value: "dash"}}), () => ({line_color: colour("ink")}));
     line(this.energy, "potential", "ground");
     line(this.energy, "kinetic", "second", {line_dash: [6, 3]});
