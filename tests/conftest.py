@@ -2,6 +2,7 @@
 
 import json
 import os
+import sys
 import tempfile
 import time
 from collections import Counter
@@ -97,6 +98,14 @@ def _no_waiting_for_disks() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(os, "fsync", lambda file: None)
         yield
+
+
+@pytest.fixture(autouse=True)
+def _no_pyplot_stays() -> Iterator[None]:
+    """Forget pyplot after a test that has loaded it: from then on it would be told of every figure, and keep them."""
+    yield
+    if (pyplot := sys.modules.pop("matplotlib.pyplot", None)) is not None:
+        pyplot.close("all")
 
 
 @pytest.fixture

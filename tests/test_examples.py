@@ -1,11 +1,11 @@
 """Every example of the gallery ends in the numbers that are written here, draws one figure, and is in the gallery."""
 
 import ast
+import importlib
 import re
 import runpy
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
@@ -55,13 +55,10 @@ THOROUGH = {"calibration", "chaos", "frame", "pulse_map"}
     "name", [pytest.param(name, marks=[pytest.mark.thorough] if name in THOROUGH else []) for name in sorted(NUMBERS)]
 )
 def test_an_example_ends_in_its_numbers_and_draws_one_figure(name, monkeypatch, capsys):
+    plt = importlib.import_module("matplotlib.pyplot")
     monkeypatch.setattr(plt, "show", lambda: None)
-    plt.close("all")
-    try:
-        found = runpy.run_path(str(EXAMPLES[name]))
-        assert len(plt.get_fignums()) == 1
-    finally:
-        plt.close("all")
+    found = runpy.run_path(str(EXAMPLES[name]))
+    assert len(plt.get_fignums()) == 1
     assert capsys.readouterr().out
     for number, (value, tolerance) in NUMBERS[name].items():
         assert np.asarray(found[number], dtype=float) == pytest.approx(np.asarray(value), abs=tolerance), number
