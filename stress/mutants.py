@@ -329,7 +329,10 @@ def table(shown: dict[str, Shown]) -> str:
             cells = (part, each.drawn, each.equivalent, each.killed, f"{100 * each.share:.0f}", each.date)
         lines.append("| " + " | ".join(map(str, cells)) + " |")
     spared = [survivor for each in shown.values() for survivor in each.spared if not survivor[1]]
-    lines += ["", "Not seen by any test:" if spared else "No test has spared any that changes something."]
+    if spared:
+        lines += ["", "Not seen by any test:"]
+    elif len(shown) == len(PARTS):
+        lines += ["", "Tests have seen each that changes something."]
     for place, _, before, after in spared:
         lines += ["", f"- {place}: `{_line(before)}` became `{_line(after)}`"]
     return "\n".join([*lines, ""])

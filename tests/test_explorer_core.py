@@ -639,7 +639,8 @@ def test_the_case_at_a_point_of_a_map_is_what_the_map_shows(x, y):
     case = read_case({**SINE, "model": "nonlinear"}, UploadStore())
     grid = maps.grid_of(case, {"x": x, "y": y, "points": "8"})
     found, judged = filled(grid), 0
-    for row, column in ((1, 2), (5, 6), (7, 0)):
+    rests = np.argwhere(np.isfinite(found["rest"]))
+    for row, column in ((1, 2), (5, 6), (7, 0), *rests[:: max(1, len(rests) // 3)]):
         texts = maps.texts_at(grid, float(grid.x.values[column]), float(grid.y.values[row]))
         response = read_case(texts, UploadStore()).simulate()
         peak = math.inf if response.overturned else response.peak_over_slenderness
@@ -648,7 +649,7 @@ def test_the_case_at_a_point_of_a_map_is_what_the_map_shows(x, y):
             rest = response.chattering["end"][0] - response.events["time"][0]
             assert found["rest"][row, column] == pytest.approx(rest, rel=1e-5)
             judged += 1
-    assert judged >= 1
+    assert judged >= 3 or (x, y) == ("p", "alpha")  # there all that is lifted off rocks on or falls
 
 
 @pytest.mark.parametrize("block", ECCENTRIC)

@@ -174,7 +174,7 @@ def test_too_few_decided_cases_are_a_fault():
 def test_the_page_tells_of_every_promise_and_shows_its_table():
     page = (ROOT / "docs" / "reliability.md").read_text("utf-8")
     tables = {f"reliability-{name}.txt" for name in ("all", "made", *(n for n, each in ALL.items() if each.table))}
-    assert set(re.findall(r"_tables/(\S+)", page)) == tables
+    assert set(re.findall(r"_tables/(reliability-\S+)", page)) == tables
     for name in ALL:
         assert f"`python stress/verify.py {name}`" in page
     whole = (ROOT / "docs" / "_tables" / "reliability-all.txt").read_text("utf-8")
