@@ -84,9 +84,11 @@ def test_survivors_are_named_and_those_that_change_nothing_do_not_count(monkeypa
     assert sum("not judged yet" in row for row in rows) == len(mutants.PARTS) - 1
     assert (title, end) == ("Not seen by any test:", "")
     assert survivor.startswith(f"- {drawn[2].path.relative_to(mutants.ROOT / 'src/rocking')}:{drawn[2].line}: `")
-    assert mutants.table({"none": mutants.Shown(3, 0, 3, [])}).endswith(
-        "\nNo test has spared any that changes something.\n"
+    complete = mutants.Shown(3, 0, 3, [])
+    assert mutants.table(dict.fromkeys(mutants.PARTS, complete)).endswith(
+        "\nTests have seen each that changes something.\n"
     )
+    assert "Tests have seen" not in mutants.table({"kernels": complete})
 
 
 def test_times_are_measured_of_the_nearest_tests_until_half_of_the_time_is_filled(monkeypatch):
