@@ -1457,6 +1457,14 @@ def test_no_view_has_a_barrier(opened, viewport, scheme):
     assert len(judged) == len(views) + 4
 
 
+def test_a_browser_whose_language_is_none_writes_numbers_as_the_page_does(opened):
+    page = opened(STATUE)
+    page.page.add_init_script("Object.defineProperty(Navigator.prototype, 'language', {get: () => 'C'})")
+    page.page.reload()
+    page.until(READY)
+    assert page.js("navigator.language") == "C" and page.text("#figures div:first-child dd").startswith("0.265")
+
+
 def test_the_page_follows_the_systems_colours(opened):
     only_chromium("prefer other colours")
     page = opened(STATUE)

@@ -1,7 +1,14 @@
 // Numbers for people: shown as the browser's locale writes them, and read as people type them. What is copied into programs,
 // and what fields and the address hold, has a decimal point everywhere.
 
-const LOCALE = navigator.language;
+const LOCALE = locale(navigator.language);
+
+/** The browser's locale, or that of the page where it is none, as "C" of a system without a language.
+ * @param {string} given */
+function locale(given) {
+  try { return Intl.getCanonicalLocales(given)[0]; } catch { return document.documentElement.lang; }
+}
+
 /** What stands where there is no number. */
 export const NONE = "–";
 /** Formats by their options, which take long to make. @type {Map<string, Intl.NumberFormat>} */
