@@ -1,11 +1,14 @@
 """The command line: results, files, exit codes, and one line for every mistake."""
 
+import contextlib
 import inspect
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
+import time
 import tomllib
 from pathlib import Path
 
@@ -14,6 +17,7 @@ import pytest
 
 import rocking
 from rocking.cli import app
+from rocking.cli.interrupts import Interrupts
 from rocking.errors import INTERRUPTED
 
 BLOCK = ["--half-width", "0.12", "--half-height", "0.55"]
@@ -201,6 +205,36 @@ def test_an_interrupt_while_the_command_line_is_imported_is_no_traceback():
     assert project["project"]["scripts"]["rocking"] == "rocking.__main__:main"
     done = subprocess.run([sys.executable, "-m", "rocking", "--version"], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == rocking.__version__
+
+
+def test_an_interrupt_that_python_drops_comes_again():
+    class Dropping:
+        def __del__(self):
+            signal.raise_signal(signal.SIGINT)
+
+    late = time.monotonic() + 10.0
+    with pytest.raises(KeyboardInterrupt), Interrupts() as interrupts:
+        Dropping()
+        while time.monotonic() < late:
+            time.sleep(0.001)
+    assert interrupts.asked and time.monotonic() < late
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.mark.parametrize("interrupted", [True, False])
+def test_an_error_in_place_of_an_interrupt_is_one(run, monkeypatch, interrupted):
+    def called(*_):
+        with contextlib.suppress(KeyboardInterrupt):
+            if interrupted:
+                signal.raise_signal(signal.SIGINT)
+        raise ValueError("of a library that was called back")
+
+    monkeypatch.setattr("rocking.cli.wording.called", called)
+    if interrupted:
+        assert run("records") == (130, "", f"{INTERRUPTED}\n")
+    else:
+        with pytest.raises(ValueError, match="called back"):
+            run("records")
 
 
 def test_help_starts_without_the_heavy_libraries():

@@ -8,12 +8,17 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Final, NoReturn
 
 from cyclopts import App, CycloptsError
 
 from rocking.cli import wording
+from rocking.cli.interrupts import Interrupts
 from rocking.errors import INTERRUPTED, RockingError
 from rocking.progress import notes_for
+
+#: What is wrong where a disk is full.
+_FULL: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 app = App(
     name="rocking",
@@ -62,32 +67,46 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")  # what the locale cannot encode is shown as question marks
     given = list(sys.argv[1:] if arguments is None else arguments)
-    try:
-        called = wording.called(app, given)
-        if called.default_command is not None:
-            called.help = None  # The help of a command is all that its function says, not its line in the list.
-        command, bound, _ = app.parse_args(given, exit_on_error=False, print_error=False)
-        wording.refuse_unknown_options(bound.args, app, given)
-        quiet = any(getattr(value, "quiet", False) for value in bound.arguments.values())
-        with notes_for("nobody" if quiet else "everybody", wording.spelling_of(called)):
-            command(*bound.args, **bound.kwargs)
-        sys.stdout.flush()
-    except (RockingError, CycloptsError) as error:
-        print(f"rocking: {wording.of(error, app, given)}", file=sys.stderr)
-        sys.exit(2)
-    except KeyboardInterrupt:
-        print(INTERRUPTED, file=sys.stderr)
-        sys.exit(130)
-    except BrokenPipeError:
-        # The reader of our output has gone; so must Python's own last flush.
-        _close_output()
-    except OSError as error:
-        # Files have their own sentence: this is what is printed, to a disk that is full.
-        if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO):
-            raise
-        _close_output()
-        print(f"rocking: the output cannot be written: {os.strerror(error.errno)}; send it elsewhere", file=sys.stderr)
-        sys.exit(2)
+    with Interrupts() as interrupts:
+        try:
+            _run(given)
+        except KeyboardInterrupt:
+            _end_interrupted()
+        except BrokenPipeError:
+            # The reader of our output has gone; so must Python's own last flush.
+            _close_output()
+        except Exception as error:
+            if interrupts.asked:
+                _end_interrupted()
+            if isinstance(error, (RockingError, CycloptsError)):
+                print(f"rocking: {wording.of(error, app, given)}", file=sys.stderr)
+                sys.exit(2)
+            # Files have their own sentence: this is what is printed, to a disk that is full.
+            if not isinstance(error, OSError) or error.errno not in _FULL:
+                raise
+            _close_output()
+            print(
+                f"rocking: the output cannot be written: {os.strerror(error.errno)}; send it elsewhere", file=sys.stderr
+            )
+            sys.exit(2)
+
+
+def _run(given: list[str]) -> None:
+    """Call the command that is given."""
+    called = wording.called(app, given)
+    if called.default_command is not None:
+        called.help = None  # The help of a command is all that its function says, not its line in the list.
+    command, bound, _ = app.parse_args(given, exit_on_error=False, print_error=False)
+    wording.refuse_unknown_options(bound.args, app, given)
+    quiet = any(getattr(value, "quiet", False) for value in bound.arguments.values())
+    with notes_for("nobody" if quiet else "everybody", wording.spelling_of(called)):
+        command(*bound.args, **bound.kwargs)
+    sys.stdout.flush()
+
+
+def _end_interrupted() -> NoReturn:
+    print(INTERRUPTED, file=sys.stderr)
+    sys.exit(130)
 
 
 def _close_output() -> None:
