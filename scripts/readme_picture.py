@@ -73,7 +73,8 @@ class Drawing:
         self.stage.set(xlim=(-0.42, 0.42), ylim=(-0.2, 1.35))
         self.stage.axhspan(-0.06, 0.0, facecolor=REST)
         self.stage.axhline(0.0, color=INK, linewidth=1.2)
-        self.block = self.stage.add_patch(Polygon(np.zeros((4, 2)), facecolor="#cfc6b8", edgecolor=INK, linewidth=1.4))
+        self.block = Polygon(np.zeros((4, 2)), facecolor="#cfc6b8", edgecolor=INK, linewidth=1.4)
+        self.stage.add_patch(self.block)
         self.words = self.stage.text(0.0, -0.15, "", ha="center", va="center", color=INK)
         self.stage.text(
             0.0,
@@ -87,11 +88,10 @@ class Drawing:
     def draw_panels(self, panels, time, motion) -> None:
         """Draw what does not move."""
         rotation, ground, impacts = panels
-        alpha = self.response.body.alpha
         rotation.plot(time, np.degrees(self.response.rotation(time)), color=INK, linewidth=1.2)
         rotation.set_ylabel("rotation (°)")
         rotation.set_title("Ridgecrest 2019, China Lake, scaled to 0.42 g", loc="left", fontsize="medium", color=INK)
-        threshold = np.tan(alpha)
+        threshold = WIDTH / HEIGHT
         ground.plot(time, motion.acceleration(time) / 9.80665, color=GROUND, linewidth=0.8)
         for level in (-threshold, threshold):
             ground.axhline(level, color=INK, linewidth=0.8, linestyle=(0, (5, 2)))
