@@ -196,4 +196,4 @@ def test_a_study_goes_on_after_a_full_disk(monkeypatch):
     monkeypatch.setattr(full_disk, "MOST", 1)
     found = full_disk.judge([*commands.COMMANDS].index("study run"))
     assert not found.told
-    assert found.judged == len(full_disk.KINDS)
+    assert found.notes == dict.fromkeys([*full_disk.KINDS, "print"], 1)
