@@ -1220,8 +1220,10 @@ def test_a_record_is_answered_with_the_nearest_sine(opened):
     page = opened(f"view=periodic&{STATUE}&sweep_points=24")
     page.until("/needs a sine/.test(document.getElementById('orbit-verdict').textContent)")
     assert not page.page.locator("#orbit").is_visible() and not page.page.locator("#save").is_visible()
-    found = settles(page, lambda: page.page.click("#orbit-sine"))
-    assert found["motion"].startswith("sine:") and "pga" not in found and found["width"] == "0.24"
+    page.page.click("#orbit-sine")
+    page.until("(new URLSearchParams(location.search).get('motion') ?? '').startsWith('sine:')", "the case is a sine")
+    found = query_of(page)
+    assert "pga" not in found and found["width"] == "0.24"
     page.until("document.body.dataset.sweep === 'complete'")
     assert page.page.locator("#save").is_visible()
 
@@ -1537,7 +1539,7 @@ def test_space_plays_from_the_stage_alone_and_a_map_hands_its_focus_on(opened):
     page.until("document.getElementById('map-at').textContent.length > 20")
     page.page.focus("#map")
     page.rested(lambda: page.page.keyboard.press("Enter"))
-    assert page.js(FOCUSED) == "histories"
+    page.until(f"({FOCUSED}) === 'histories'", "the view that is opened has the focus")
 
 
 def test_every_control_shows_its_focus_and_is_large_enough(opened):

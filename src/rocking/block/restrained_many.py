@@ -161,7 +161,9 @@ class RestrainedBlocks:
 
         Examples
         --------
-        >>> tied = RestrainedBlock(Block(width=0.4, height=2.0, mass=2000.0), Tendon(2e5)).alone()
+        >>> import rocking
+        >>> block = rocking.Block(width=0.4, height=2.0, mass=2000.0)
+        >>> tied = rocking.RestrainedBlock(block, rocking.Tendon(2e5)).alone()
         >>> larger = tied.resized(np.array([0.5]))
         >>> bool(np.all(larger.p == 0.5 * tied.p) and np.all(larger.sine == tied.sine))
         True
