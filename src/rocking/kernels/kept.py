@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
+from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.serialize import dumps
 
 _HASH = hashlib.sha256().digest_size
@@ -23,7 +23,12 @@ _HASH = hashlib.sha256().digest_size
 class _OneFolder(CompileResultCacheImpl):
     """What numba keeps, in the folder that it is told: others are not named by the sources of all kernels."""
 
-    _locator_classes = (UserProvidedCacheLocator,)
+    # Older versions of numba have an underscore before the name.
+    _locator_classes = tuple(
+        each
+        for each in CompileResultCacheImpl._locator_classes
+        if each.__name__.removeprefix("_") == "UserProvidedCacheLocator"
+    )
 
 
 class KernelCache(FunctionCache):
