@@ -290,7 +290,7 @@ def test_a_change_in_a_kernel_that_others_call_is_seen(tmp_path: Path) -> None:
     before = finished(started(PROGRAM, source, cache))
     impact = source / "rocking" / "kernels" / "events.py"
     text = impact.read_text()
-    changed = text.replace("block.restitution[left] * speed", "0.5 * block.restitution[left] * speed")
+    changed = text.replace("= factor(block, left", "= 0.5 * factor(block, left")
     assert changed != text
     impact.write_text(changed)
     after = finished(started(PROGRAM, source, cache))
