@@ -671,7 +671,7 @@ def test_a_body_is_seen_from_above_and_turned(opened, explorer):
     page.until(PLAN, "the plan is drawn")
     assert "Towards 30°" in page.text("#derived") and "Towards 210°" in page.text("#derived")
     assert "lifted first towards 90°, above 0.282 g" in page.text(".body")
-    assert "Planar rocking leaves out" in page.text(".body") and "Nothing had to be mended" in page.text(".body")
+    assert "Planar rocking leaves out" in page.text(".body") and "Nothing had to be repaired" in page.text(".body")
     plan = page.page.locator(".plan").bounding_box()
     page.rested(lambda: page.page.locator(".plan").click(position={"x": 0.95 * plan["width"], "y": plan["height"] / 2}))
     assert query_of(page)["azimuth"] == "90"

@@ -126,7 +126,7 @@ def test_what_is_said_of_a_body_are_its_own_numbers():
         == "statue.obj of 3 parts (figure, head, plinth): 1.73 m high, 0.1711 m³, 455.4 kg."
     )
     assert "Towards 30° the products of inertia are" in in_english(found.header["left_out"])
-    assert in_english(found.header["repaired"]) == "Nothing had to be mended in the mesh."
+    assert in_english(found.header["repaired"]) == "Nothing had to be repaired in the mesh."
     assert np.allclose(found.arrays["support"].reshape(-1, 2), solid.support - solid.centre[:2])
     assert found.arrays["piece"][-1] == len(found.arrays["plan"]) / 2 > 100
     with pytest.raises(InvalidOption, match="this block is of no mesh"):
@@ -140,7 +140,7 @@ def test_what_was_mended_is_said_and_what_looks_wrong_is_noted(here):
     scan.invert()
     taken = explorer.take_mesh("scan.obj", content(scan, "obj"))
     texts = {**STATUE, "mesh": f"file:{taken['key']}", "azimuth": str(taken["azimuth"])}
-    assert in_english(explorer.body(texts).header["repaired"]).startswith("Mended in the mesh: 1 hole filled")
+    assert in_english(explorer.body(texts).header["repaired"]).startswith("Repaired in the mesh: 1 hole filled")
     assert "the body is 1000 m high" in explorer.case(texts).header["block"]["notes"][-1]
     assert explorer.case({**texts, "unit": "mm"}).header["block"]["notes"] == []
 

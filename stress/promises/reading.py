@@ -261,7 +261,7 @@ def table(found: Found) -> str:
 
 PROMISE = Promise(
     name="reading",
-    says="a spoilt file is refused, or read as it states",
+    says="a damaged file is refused, or read as it states",
     parts=PARTS,
     small=1,
     judge=judge,
