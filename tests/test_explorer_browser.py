@@ -343,6 +343,18 @@ def test_ten_times_closer_again_and_again(opened):
     page.until("!new URLSearchParams(location.search).has('from')")
 
 
+@pytest.mark.parametrize("viewport", [DESK, pytest.param(PHONE, marks=MORE)])
+def test_nothing_moves_where_plots_are_drawn_once_they_are_seen(opened, viewport):
+    page = opened(STATUE, viewport=viewport)
+    top = "document.getElementById('deeper').getBoundingClientRect().top"
+    page.js("document.getElementById('phase-legend').scrollIntoView({block: 'center'})")
+    assert page.js("document.body.dataset.phases") is None
+    before = page.js(top)
+    page.until("document.body.dataset.phases === '1'")
+    page.page.wait_for_timeout(100)
+    assert page.js(top) == pytest.approx(before, abs=1)
+
+
 def test_the_phase_plane_and_the_energy_are_drawn_where_they_are_seen(opened):
     page = opened(f"{STATUE}&from=231&to=235&at=232.5", viewport={"width": 1280, "height": 700})
     assert page.js("document.body.dataset.phases") is None

@@ -27,6 +27,11 @@ export class PhasePanel {
     /** @type {Record<string, any>} */
     this.sources = {};
     this.latest = new Latest(() => this.bring(), (error) => page.problem(error, "view-phase"));
+    // Words stand before the plots do, so that nothing below moves when these are drawn.
+    legend("phase-legend", [
+      ["line", phrase("phase.legend_course")], ["jump", phrase("phase.legend_jump")], ["uplift", phrase("legend.uplift")], ["rest", phrase("phase.legend_rest")],
+      ["balance", phrase("phase.legend_balance")], ["potential", phrase("phase.legend_potential")], ["second", phrase("phase.legend_kinetic")],
+    ]);
     new IntersectionObserver((entries) => {
       this.visible = entries[entries.length - 1].isIntersecting;
       this.update();
@@ -100,10 +105,6 @@ export class PhasePanel {
     this.energy.on_event("tap", (/** @type {any} */ event) => this.pick(this.scale.time(event.x)));
     void showPlot(this.plane, one("case-plane"));
     void showPlot(this.energy, one("energy"));
-    legend("phase-legend", [
-      ["line", phrase("phase.legend_course")], ["jump", phrase("phase.legend_jump")], ["uplift", phrase("legend.uplift")], ["rest", phrase("phase.legend_rest")],
-      ["balance", phrase("phase.legend_balance")], ["potential", phrase("phase.legend_potential")], ["second", phrase("phase.legend_kinetic")],
-    ]);
   }
 
   draw() {
