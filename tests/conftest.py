@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import sys
 import tempfile
 import time
@@ -57,9 +58,13 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Keep Matplotlib's settings and list of fonts to the tests: a user's own change what is drawn and said."""
+    """Keep Matplotlib's settings and list of fonts to the tests, and let Ctrl-C be heard."""
+    # A user's own settings change what is drawn and said.
     cached = config.pluginmanager.hasplugin("cacheprovider")
     os.environ["MPLCONFIGDIR"] = str(config.cache.mkdir("matplotlib")) if cached else tempfile.mkdtemp()
+    # A shell has what it starts in the background ignore Ctrl-C, and so would all that is tested.
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")

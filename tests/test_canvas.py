@@ -45,6 +45,7 @@ def test_pyplot_knows_the_figures_of_those_who_use_it_and_is_not_loaded_for_a_ba
     assert printed(f"{unknown}; {known}", DISPLAY=":987", WAYLAND_DISPLAY=":987", MPLBACKEND="agg") == "False\nTrue"
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems say nothing of a display in the environment")
 def test_the_command_line_writes_its_figures_without_windows(tmp_path):
     seen = tmp_path / "seen.csv"
@@ -65,6 +66,7 @@ def images(*cells: str) -> list[int]:
     return [sum("image/png" in output.get("data", {}) for output in cell.outputs) for cell in notebook.cells[1:]]
 
 
+@pytest.mark.thorough
 def test_a_notebook_shows_a_figure_once_and_so_one_in_axes_of_the_caller(monkeypatch):
     for name in CHOICES:
         monkeypatch.delenv(name, raising=False)

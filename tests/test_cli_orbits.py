@@ -29,6 +29,7 @@ def test_orbits_are_those_of_the_functions_and_one_is_followed(run, tmp_path):
 AT_FLIPS = "orbits", "--ball", 0.5, "--pulse", "sine:amplitude=14.95,frequency=5Hz", "--along", "amplitude:14.9:16.5"
 
 
+@pytest.mark.thorough
 def test_what_begins_at_a_flip_is_followed(run):
     code, out, err = run(*AT_FLIPS, "--switch", "15", "--json")
     assert (code, err) == (0, "")
@@ -120,6 +121,7 @@ def test_a_diagram_takes_restraints(run, tmp_path):
     assert float(rows[-1].split(",")[-1]) == pytest.approx(float(table.iloc[-1, -1]), rel=1e-12)
 
 
+@pytest.mark.thorough
 def test_a_basin_of_a_wall_lies_before_its_stop(run, tmp_path):
     options = (*SIZES, "--one-sided", "--thrust", "force=500,height=2", "--pulse", "sine:amplitude=2.5,frequency=1.5Hz")
     grid = ("--positions", "0.5deg:5deg:6", "--velocities=-0.3:0.3:5", "--periods", 50)

@@ -528,6 +528,7 @@ def test_a_fit_used_beyond_its_range_is_one_line(run, monkeypatch):
     assert run("critical", 2, 0.9, "--quiet")[2].splitlines() == ["rocking: enough"]
 
 
+@pytest.mark.thorough
 def test_compiling_is_said_once_for_each_work_and_not_where_it_is_short():
     program = (
         "import time\n"
@@ -580,6 +581,7 @@ def test_notes_go_to_those_who_want_them(capsys):
     assert capsys.readouterr().err == "rocking: note: two lines\n"
 
 
+@pytest.mark.thorough
 def test_every_command_in_the_documentation_has_the_options_that_it_shows():
     root = Path(__file__).resolve().parents[1]
     pages = [root / "README.md", *sorted((root / "docs").rglob("*.md"))]
@@ -602,6 +604,7 @@ def test_a_history_s_motion_may_be_scaled(run, tmp_path):
     assert "--scale and --pgv" in err
 
 
+@pytest.mark.thorough
 def test_a_calibration_draws_what_it_found(run, tmp_path):
     table, out = tmp_path / "history.csv", tmp_path / "out"
     block = rocking.Block.from_parameters(p=2.5, alpha=0.2, restitution=0.9)

@@ -28,8 +28,8 @@ EXAMPLE = EXAMPLES["EXAMPLE"]
 PAGES_WITH_EXAMPLES = [page for page in PAGES if EXAMPLE.search(page.read_text("utf-8"))]
 # They take seconds; the other pages show that examples run.
 THOROUGH = {
-    "basins.md", "calibrate.md", "calibration.md", "fragility.md", "from-a-mesh.md", "gradients.md",
-    "periodic-orbits.md", "risk.md", "study.md", "walls-and-tendons.md",
+    "basins.md", "calibrate.md", "calibration.md", "fragility.md", "from-a-mesh.md", "gradients.md", "orbits.md",
+    "overturning-map.md", "periodic-orbits.md", "risk.md", "study.md", "walls-and-tendons.md",
 }  # fmt: skip
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 
@@ -105,6 +105,7 @@ def console_lines() -> list[tuple[str, str]]:
     return found
 
 
+@pytest.mark.thorough
 def test_every_command_of_the_pages_is_taken_with_its_options():
     lines = console_lines()
     assert len(lines) > 100
@@ -117,6 +118,7 @@ def test_every_command_of_the_pages_is_taken_with_its_options():
             pytest.fail(f"{page}: rocking {line}: {error}")
 
 
+@pytest.mark.thorough
 def test_the_reference_of_commands_has_every_option_that_their_help_shows(tmp_path, capsys, monkeypatch):
     monkeypatch.syspath_prepend(ROOT / "docs" / "_extensions")
     importlib.import_module("commands").write_pages(tmp_path)
@@ -282,6 +284,7 @@ def test_all_places_state_the_same_version():
     assert PROJECT["version"] == rocking.__version__
 
 
+@pytest.mark.thorough
 @pytest.mark.filterwarnings("default")
 def test_pages_load_nothing_from_the_network(tmp_path):
     build = pytest.importorskip("sphinx.cmd.build")

@@ -245,6 +245,7 @@ def test_positions_are_right_between_the_proof_and_the_rest():
     assert judged > 40
 
 
+@pytest.mark.thorough
 def test_a_study_of_oscillators_is_taken_up_again_by_another_program(tmp_path):
     bodies = dynamics.LinearBodies([dynamics.ImpactOscillator(1.0, e, stop=-0.01) for e in (0.3, 0.6, 0.9)])
     motion = rocking.pulses.one_sine(15.0, 2.0)

@@ -187,6 +187,7 @@ def peak_of(exact, speed):
     )
 
 
+@pytest.mark.thorough
 def test_a_branch_ends_where_its_orbits_overturn():
     """An orbit of the linear model goes beyond the balance, and ends where its peak is a right angle."""
     block = Block.from_parameters(p=2.0, alpha=0.6, restitution=0.55)

@@ -36,6 +36,7 @@ def found():
     }
 
 
+@pytest.mark.thorough
 def test_every_orbit_comes_back_and_none_is_there_twice(found):
     judged = 0
     for name, orbits in found.items():
@@ -152,6 +153,7 @@ def test_the_linear_response_of_an_oscillator_that_misses_its_stop_is_an_orbit()
     )
 
 
+@pytest.mark.thorough
 def test_orbits_of_a_shorter_period_are_listed_with_their_own():
     ball, table = dynamics.BouncingBall(0.5, gravity=G), pulses.sine(15.5, TABLE, cycles=1)
     once, twice = (dynamics.periodic_orbits(ball, table, period=period) for period in (1, 2))
@@ -196,7 +198,8 @@ def test_a_ball_bounces_once_every_n_periods_between_the_levels_of_luck_and_meht
 
 @pytest.mark.parametrize(
     ("shape", "kind"),
-    [((1.0, 0.8, 0.05, 0.01, 1.3), "fold"), ((1.0, 0.8, 0.02, 0.02, 2.2), "flip"),
+    [((1.0, 0.8, 0.02, 0.02, 2.2), "flip"),
+     pytest.param((1.0, 0.8, 0.05, 0.01, 1.3), "fold", marks=pytest.mark.thorough),
      pytest.param((1.0, 0.8, 0.05, -0.02, 2.4), "fold", marks=pytest.mark.thorough)],
 )  # fmt: skip
 def test_orbits_of_an_oscillator_that_hits_once_are_those_of_shaw_and_holmes(shape, kind):
@@ -252,6 +255,7 @@ def test_a_linear_block_that_hits_once_every_half_period_loses_stability_where_h
     assert judged == 2
 
 
+@pytest.mark.thorough
 def test_grazing_is_found_from_both_sides():
     """The linear response touches the stop at a known amplitude; orbits with an impact begin there, too."""
     body = dynamics.ImpactOscillator(1.0, 0.8, damping_ratio=0.05, stop=0.01)

@@ -79,6 +79,7 @@ def bounces_of_a_ball(level, times, speeds):
     return found[:2], found[2:] - [rate(each) for each in found[:2]]
 
 
+@pytest.mark.thorough
 def test_the_doubled_orbits_of_a_ball_are_those_of_its_own_equations(once, twice):
     exact = closed_orbits.Ball(0.5, 1)
     assert (twice.period, twice.impacts, twice.ends[0]) == (2, 2.0, "flip")
@@ -159,6 +160,7 @@ def test_a_simulation_settles_on_the_doubled_orbit_of_an_oscillator(oscillating)
     assert min(gaps) < 1e-9 < 1e-4 < max(gaps)
 
 
+@pytest.mark.thorough
 def test_where_symmetry_breaks_two_orbits_leave_that_are_mirror_images():
     exact = closed_orbits.Block(2.0, 0.2, 0.8, 1.2, BLOCK.gravity, 3)
     breaking = exact.amplitude(exact.breaking)

@@ -612,7 +612,9 @@ def test_the_server_answers_over_a_socket_and_compiles_ahead(running, browser):
     [
         ("map", {"x": "omega", "y": "a", "points": "400"}),
         ("sweep", {"sweep": "a", "sweep_points": "400"}),
-        ("assessment", {"records": "motion=ridgecrest-clc-090;" * 90, "levels": "60"}),
+        pytest.param(
+            "assessment", {"records": "motion=ridgecrest-clc-090;" * 90, "levels": "60"}, marks=pytest.mark.thorough
+        ),
     ],
 )
 def test_a_map_that_nobody_reads_any_more_stops(running, browser, path, axes):

@@ -145,11 +145,12 @@ def test_the_first_response_takes_less_than_a_second_of_processor_time() -> None
     assert float(answer(FIRST)) < 1.0
 
 
-@pytest.mark.parametrize("model", ["linear", "nonlinear"])
+@pytest.mark.parametrize("model", [pytest.param("linear", marks=pytest.mark.thorough), "nonlinear"])
 def test_ten_thousand_blocks_need_no_compiler(model: str) -> None:
     assert float(answer(MANY.format(model=model))) > 0.0
 
 
+@pytest.mark.thorough
 def test_everything_that_computes_needs_no_compiler() -> None:
     found = library.opened()
     assert found is not None

@@ -298,6 +298,7 @@ def test_a_change_in_a_kernel_that_others_call_is_seen(tmp_path: Path) -> None:
     assert len(list(cache.iterdir())) == 2
 
 
+@pytest.mark.thorough
 def test_numba_is_imported_as_a_whole_before_a_part_of_it() -> None:
     """Two threads may import it at once; one that begins with a part holds it while it waits for the whole."""
     judged = 0

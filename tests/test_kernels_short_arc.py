@@ -88,7 +88,7 @@ def cases(
 @long_uncompiled
 @models
 @weights
-@pytest.mark.parametrize("count", [1500, pytest.param(6000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [500, pytest.param(6000, marks=pytest.mark.slow)])
 def test_what_a_short_step_decides_is_what_the_full_series_says(nonlinear: bool, weighted: bool, count: int) -> None:
     """Outcome, time, rotation, velocity and peak to a few units in the last place, over many powers of ten."""
     decided = {Outcome.STEP: 0, Outcome.IMPACT: 0}

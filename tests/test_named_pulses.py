@@ -104,6 +104,7 @@ def test_the_papers_scheme_is_refused_under_another_pulse(run):
     assert "triangular" in err
 
 
+@pytest.mark.thorough
 def test_pulses_are_scaled_and_go_with_records(run, tmp_path):
     code, out, err = run(
         "simulate", "el-centro-meloland-270", "--pulse", SINE, "--pulse", "half-sine:amplitude=1,frequency=2",

@@ -14,6 +14,7 @@ def tests():
     return FilesOfTests()
 
 
+@pytest.mark.thorough
 def test_every_module_has_tests_and_they_are_near(tests):
     assert len(SOURCES) > 150
     for source in SOURCES:

@@ -566,7 +566,7 @@ def test_an_initiation_that_the_certified_response_has_not_names_the_scheme_that
     assert texts[11] == ["1st initiation", r"2nd initiation, by $VelTol/(p\alpha) = 5\cdot 10^{-2}$ alone"]
 
 
-@pytest.mark.parametrize("eta", [0.01, pytest.param(0.5, marks=pytest.mark.thorough), 0.99])
+@pytest.mark.parametrize("eta", [0.01, *(pytest.param(eta, marks=pytest.mark.thorough) for eta in (0.5, 0.99))])
 def test_sequences_of_few_and_of_many_impacts_are_drawn(eta):
     for number in (2, 3, 9):
         a = 1.0 + 0.5 * (critical_amplitude(2.0, eta) - 1.0)

@@ -88,6 +88,7 @@ def test_any_zarr_reader_opens_it_there(complete, url):
     np.testing.assert_array_equal(array[1, :, :, 0], reference[array.attrs["outcomes"][1]].values)
 
 
+@pytest.mark.thorough
 def test_the_commands_take_a_url(url, run, tmp_path):
     file = tmp_path / "museum.toml"
     file.write_text(

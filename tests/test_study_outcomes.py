@@ -236,7 +236,10 @@ def test_rests_alone_are_enough_for_nothing_else(tmp_path):
 
 @pytest.mark.parametrize(
     ("verdict", "outcomes"),
-    [("overturning", ["overturned"]), ("complete_chattering", ["complete_chattering", "rests"])],
+    [
+        pytest.param("overturning", ["overturned"], marks=pytest.mark.thorough),
+        ("complete_chattering", ["complete_chattering", "rests"]),
+    ],
 )
 def test_a_refinement_keeps_as_little_as_its_verdict_needs_and_finds_the_same(tmp_path, verdict, outcomes):
     def refined(kept):
