@@ -6,6 +6,7 @@ import signal
 import sys
 import tempfile
 import time
+import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -38,6 +39,27 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the limit that `make quick` sets."""
     help_text = "leave out the tests that would start later than that after the first"
     parser.addoption("--within", type=float, metavar="SECONDS", help=help_text)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Spread the cases of a function over the tiers, as its mark `cases` says: mixed, and always in the same way."""
+    functions: dict[str, list[pytest.Item]] = {}
+    for item in items:
+        if item.get_closest_marker("cases"):
+            functions.setdefault(item.nodeid.partition("[")[0], []).append(item)
+    for cases in functions.values():
+        numbers = cases[0].get_closest_marker("cases").kwargs
+        cases.sort(key=lambda case: (_tier(case), zlib.crc32(case.nodeid.encode())))
+        for case in cases[numbers["fast"] :]:
+            case.add_marker("thorough")
+        for case in cases[numbers.get("thorough", len(cases)) :]:
+            case.add_marker("slow")
+
+
+def _tier(case: pytest.Item) -> int:
+    """Tier of a case by the marks of its own."""
+    return 2 if case.get_closest_marker("slow") else 1 if case.get_closest_marker("thorough") else 0
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

@@ -426,6 +426,7 @@ def test_where_candidates_are_does_not_change_the_posterior(threshold_evidence):
     assert np.abs(weights @ more.points / weights.sum() - expected).max() < 0.02
 
 
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize(("candidates", "goes_on"), [(512, True), (2500, False)])
 def test_a_search_goes_on_while_few_candidates_speak_for_what_it_found(threshold_evidence, candidates, goes_on):
     evidence, thresholds = threshold_evidence
@@ -583,6 +584,7 @@ def free(coarsely):
         return rocking.calibrate_history(TIMES, released())
 
 
+@pytest.mark.thorough
 def test_a_release_test_gives_the_block_within_its_errors_in_the_linear_model_too(coarse, free):
     # With p known, the other model's restitution is 6 standard errors off.
     linear = rocking.calibrate_history(TIMES, released("linear"), model="linear", p=2.5, initial_rotation=0.1)
@@ -590,7 +592,7 @@ def test_a_release_test_gives_the_block_within_its_errors_in_the_linear_model_to
         is_within_its_errors(found, count)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_full_search_gives_the_block_within_its_errors_too():
     is_within_its_errors(rocking.calibrate_history(TIMES, released()), 4)
 
@@ -611,6 +613,7 @@ def test_standard_errors_are_those_of_repeated_tests():
         assert 0.48 < math.sqrt(np.mean(np.square(scaled))) < 1.59, name
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "known", [pytest.param({}, marks=pytest.mark.thorough), {"p": 2.5, "initial_rotation": 0.1}], ids=str
 )

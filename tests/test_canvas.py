@@ -32,6 +32,7 @@ def printed(script: str, **environment: str) -> str:
     return done.stdout.strip()
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems say nothing of a display in the environment")
 @pytest.mark.parametrize("name", ["DISPLAY", pytest.param("WAYLAND_DISPLAY", marks=pytest.mark.thorough)])
 def test_pyplot_is_loaded_where_there_is_a_display_and_not_before(name):

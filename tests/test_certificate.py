@@ -106,6 +106,7 @@ KINDS = [
 ]
 
 
+@pytest.mark.cases(fast=4, thorough=6)
 @pytest.mark.parametrize(("model", "block", "motion"), KINDS)
 def test_ball_arithmetic_proves_the_brackets(model: str, block: tuple[Pair, Pair, Pair], motion: str) -> None:
     case = Case(model, *block, MOTIONS[motion]())

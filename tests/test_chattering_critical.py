@@ -18,6 +18,7 @@ def test_critical_amplitudes_of_the_reference(reference):
 LONG = [pytest.param(omega, 0.975, marks=pytest.mark.thorough) for omega in (0.3, 2.0, 30.0)]
 
 
+@pytest.mark.cases(fast=3, thorough=7)
 @pytest.mark.parametrize(
     ("omega", "eta"), [*((omega, eta) for eta in (0.1, 0.5, 0.92) for omega in (0.3, 2.0, 30.0)), *LONG]
 )

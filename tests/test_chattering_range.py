@@ -38,6 +38,7 @@ AGREEING = [
 ]
 
 
+@pytest.mark.cases(fast=8, thorough=26)
 @pytest.mark.parametrize(("share", "omega", "eta"), AGREEING)
 def test_times_and_verdicts_agree_with_many_digits(share, omega, eta):
     assert_agrees(share, omega, eta)
@@ -53,6 +54,7 @@ NEAR = [
 ]
 
 
+@pytest.mark.cases(fast=3, thorough=12)
 @pytest.mark.parametrize(("omega", "eta", "distance"), NEAR)
 def test_near_the_critical_amplitude_a_time_is_as_accurate_as_the_amplitude_allows(omega, eta, distance):
     """Two ulp of a, by the documented slope, that of the power law, and by the true one, which may be less steep."""
@@ -104,6 +106,7 @@ LONG = [
 ]
 
 
+@pytest.mark.cases(fast=8)
 @pytest.mark.parametrize(("omega", "eta"), [*CORNERS, *LONG])
 def test_time_and_sequence_have_an_answer_at_every_corner(omega, eta):
     critical = float(chattering.critical_amplitude(omega, eta)) - 1.0

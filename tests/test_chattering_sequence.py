@@ -29,6 +29,7 @@ def test_first_intervals_of_the_reference(reference):
         assert sequence.impacts["interval"][: first.size] == pytest.approx(first, rel=2e-13)
 
 
+@pytest.mark.cases(fast=3)
 @pytest.mark.parametrize("case", CASES)
 def test_intervals_and_speeds_agree_with_eighty_digits(case):
     impacts = chattering.sequence(*case).impacts

@@ -36,6 +36,7 @@ def test_leading_coefficient_is_that_of_the_paper():
     assert asymptotic / np.sqrt((1.0 + eps) - 1.0) == pytest.approx(leading, rel=1e-9)
 
 
+@pytest.mark.cases(fast=5)
 @pytest.mark.parametrize(("omega", "eta"), [(2.0, 0.92), (0.6, 0.7), (8.0, 0.5)])
 @pytest.mark.parametrize("terms", [1, 2, 3, 4])
 def test_the_error_rises_by_one_order_per_term(omega, eta, terms):

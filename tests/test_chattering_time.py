@@ -80,6 +80,7 @@ FAR = [(omega, eta) for eta in (0.02, 0.3) for omega in (0.08, 0.3, 30.0, 1e3)]
 LONG = [(30.0, 0.985), *(pytest.param(omega, 0.985, marks=pytest.mark.slow) for omega in (0.08, 0.3, 1e3))]
 
 
+@pytest.mark.cases(fast=4)
 @pytest.mark.parametrize(("omega", "eta"), [*FAR, *LONG])
 def test_time_is_proven_far_outside_the_usual_range(omega, eta):
     critical = float(chattering.critical_amplitude(omega, eta))

@@ -256,6 +256,7 @@ def test_json_has_no_nan(run):
 COMMANDS = [name for name in app if not name.startswith("-") and name != "study"]
 
 
+@pytest.mark.cases(fast=8)
 @pytest.mark.parametrize("command", COMMANDS)
 def test_the_help_of_a_command_is_all_that_its_function_says(run, command):
     said = " ".join(inspect.getdoc(app[command].default_command).partition("Parameters\n---")[0].split())

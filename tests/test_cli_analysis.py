@@ -56,6 +56,7 @@ def test_map_json_is_the_map(run):
     assert result["modes"]["0"] == "overturns without impact"
 
 
+@pytest.mark.thorough
 def test_map_prints_shares_and_writes_what_it_says(run, tmp_path):
     arguments = ["--amplitudes", "0.5:8:9", "--frequencies", "2:5:4", "--out", tmp_path]
     code, out, _ = run("map", "ricker", "--kind", "antisymmetric", *SIZES, *arguments)
@@ -275,6 +276,7 @@ COMMANDS = {
 }
 
 
+@pytest.mark.cases(fast=3)
 @pytest.mark.usefixtures("coarse")
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_figure_that_is_refused_takes_nothing_else_away(run, tmp_path, monkeypatch, request, command):
@@ -442,6 +444,7 @@ def test_the_table_of_many_records_says_no_more_than_is_known(run, tmp_path, wid
     assert "ambiguous" in (tmp_path / "out" / "summary.csv").read_text().splitlines()[0]
 
 
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize("command", ["ida", "measures"])
 def test_a_vertical_motion_is_scaled_along_by_the_commands_that_scale(run, command):
     records = [RECORD, OTHER]

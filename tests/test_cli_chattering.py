@@ -70,6 +70,7 @@ def test_without_loss_at_impacts_nothing_rests(run):
     assert json.loads(run("chatter", 1.03, 2, 1, "--json")[1])["series"]["error"] is None
 
 
+@pytest.mark.cases(fast=2)
 @pytest.mark.parametrize("sequence", [(1.03, 2, 0.92), (1.5, 2, 0.92), (1.03, 2, 1), (1, 2, 0.9)])
 def test_chatter_draws_the_sequence_whatever_becomes_of_it(run, tmp_path, sequence):
     code, out, _ = run("chatter", *sequence, "--out", tmp_path)
@@ -185,7 +186,7 @@ def test_paper_refuses_a_parameter_that_a_figure_does_not_depend_on(run, tmp_pat
     assert not (tmp_path / "new").exists()
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_paper_draws_figure_6_as_contours_and_as_a_surface(run, tmp_path):
     code, _, _ = run("paper", "--figure", 6, "--out", tmp_path)
     assert code == 0

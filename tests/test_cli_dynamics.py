@@ -64,6 +64,7 @@ def test_bifurcation_writes_what_it_says(run, tmp_path):
     assert {path.name for path in tmp_path.iterdir()} == names
 
 
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize(
     ("options", "body"),
     [

@@ -548,7 +548,7 @@ def test_compiling_is_said_once_for_each_work_and_not_where_it_is_short():
 
 
 # The kernels are compiled for it; what is announced, and how often, is tested above.
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_cold_cache_is_announced_by_the_command_line(tmp_path):
     command = [sys.executable, "-c", "from rocking.cli import main; main(['critical', '2', '0.9'])"]
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "ROCKING_SHIPPED": "0"}

@@ -27,9 +27,12 @@ EXAMPLES = runpy.run_path(str(ROOT / "scripts" / "page_examples.py"))
 EXAMPLE = EXAMPLES["EXAMPLE"]
 PAGES_WITH_EXAMPLES = [page for page in PAGES if EXAMPLE.search(page.read_text("utf-8"))]
 # They take seconds; the other pages show that examples run.
-THOROUGH = {
-    "basins.md", "calibrate.md", "calibration.md", "fragility.md", "from-a-mesh.md", "gradients.md", "orbits.md",
-    "overturning-map.md", "periodic-orbits.md", "risk.md", "study.md", "walls-and-tendons.md",
+MARKS = {
+    **dict.fromkeys(
+        ("basins.md", "calibrate.md", "calibration.md", "fragility.md", "from-a-mesh.md", "orbits.md",
+         "overturning-map.md", "risk.md", "walls-and-tendons.md"), pytest.mark.thorough
+    ),
+    **dict.fromkeys(("gradients.md", "periodic-orbits.md", "study.md"), pytest.mark.slow),
 }  # fmt: skip
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 
@@ -41,9 +44,7 @@ def normalised(name: str) -> str:
 @pytest.mark.parametrize(
     "page",
     [
-        pytest.param(
-            page, id=str(page.relative_to(ROOT)), marks=[pytest.mark.thorough] if page.name in THOROUGH else []
-        )
+        pytest.param(page, id=str(page.relative_to(ROOT)), marks=[MARKS[page.name]] if page.name in MARKS else [])
         for page in PAGES_WITH_EXAMPLES
     ],
 )

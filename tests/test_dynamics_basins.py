@@ -120,7 +120,7 @@ def integrated(block, push, period, state, periods, orbits):
 
 
 @pytest.mark.parametrize(
-    "count", [5, pytest.param(40, marks=pytest.mark.thorough), pytest.param(100, marks=pytest.mark.slow)]
+    "count", [5, pytest.param(40, marks=pytest.mark.slow), pytest.param(100, marks=pytest.mark.slow)]
 )
 def test_cells_drawn_at_random_go_where_an_integration_by_scipy_goes(count):
     block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.8)
@@ -159,6 +159,7 @@ def test_cells_drawn_at_random_go_where_an_integration_by_scipy_goes(count):
     assert judged == count and ambiguous <= count / 50
 
 
+@pytest.mark.thorough
 def test_the_order_of_work_and_threads_do_not_count():
     x, v = np.linspace(-0.2, 0.2, 36), np.linspace(-0.4, 0.4, 31)
     one, two = (dynamics.basins(BLOCK, SHAKING, x, v, threads=count) for count in (1, 3))

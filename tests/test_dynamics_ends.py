@@ -62,7 +62,7 @@ def test_an_orbit_that_comes_to_touch_its_stop_once_more_ends_at_grazing(step):
     assert np.max(np.abs(end.orbit.multipliers)) > 2.0  # none is near 1
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_mass_that_just_touches_its_stop_does_not_double_its_period_there():
     """Without impacts its multipliers are exp(+-2 pi i/2.2) up to the touch; a trial point beyond it counted as one."""
 
@@ -139,6 +139,7 @@ def test_a_branch_is_lost_where_the_family_has_no_body():
     assert closed_orbits.Ball(fold.value, 1).fold == pytest.approx(0.4, abs=1e-10)
 
 
+@pytest.mark.thorough
 def test_rest_starts_where_a_threshold_on_the_speed_is_reached():
     """A ball that bounces once a period leaves with the speed e g T/(1 + e), however hard the table shakes."""
     limit = 0.5

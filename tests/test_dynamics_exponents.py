@@ -85,6 +85,7 @@ def chaotic_cases():
     }
 
 
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize("name", chaotic_cases())
 def test_in_chaos_one_is_positive_and_their_sum_is_the_contraction_of_areas(name):
     body, motion, state, drag = chaotic_cases()[name]

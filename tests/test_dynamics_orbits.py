@@ -55,7 +55,7 @@ def test_every_orbit_comes_back_and_none_is_there_twice(found):
     assert judged >= 30
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_multipliers_and_impacts_are_those_of_forty_digits(found):
     judged = 0
     for name, orbits in found.items():
@@ -292,7 +292,7 @@ def test_orbits_with_an_impact_more_begin_where_those_with_one_less_end():
     assert once == pytest.approx(twice, abs=1e-9)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_chattering_ceases_to_be_complete_at_the_critical_amplitude_and_rest_ends_at_uplift():
     body, shaking = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9), 0.8
     lifts = body.uplift_thresholds("linear")[0]
@@ -343,6 +343,7 @@ def branch():
     return dynamics.continue_orbit(stable, family, 1.2, (1.0, 1.6), name="level")
 
 
+@pytest.mark.thorough
 def test_points_of_a_branch_are_orbits_and_stability_changes_at_its_bifurcations(branch):
     e, exact = 0.5, closed_orbits.Ball(0.5, 1)
     stable = branch.is_stable
@@ -396,6 +397,7 @@ def test_an_orbit_near_which_nothing_grows_or_shrinks_is_neutral():
     assert orbit.multipliers[0] == pytest.approx(np.exp(2j * math.pi / 1.3).conjugate(), abs=1e-9)
 
 
+@pytest.mark.thorough
 def test_the_peak_of_an_orbit_between_walls_is_where_they_are():
     def family(amplitude):
         return dynamics.InvertedPendulum(3.0, 0.1, 0.6), pulses.sine(amplitude, 1.3, cycles=1)

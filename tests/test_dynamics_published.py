@@ -80,9 +80,10 @@ def test_chattering_of_the_oscillator_ends_within_its_proven_bracket(restitution
     assert found.time == pytest.approx(float(period - ends), abs=upper - lower + rounding)
 
 
+@pytest.mark.cases(fast=1, thorough=3)
 @pytest.mark.parametrize(
     ("restitution", "sigma", "about"),
-    [STICKING[0], *(pytest.param(*each, marks=pytest.mark.thorough) for each in STICKING[1:])],
+    STICKING,
 )
 def test_complete_chattering_is_lost_where_forty_digits_say(restitution, sigma, about):
     """The mass would come to rest at the instant of its release: nothing is left of the time in which it sticks."""
@@ -150,7 +151,7 @@ def test_beyond_that_boundary_attractors_come_in_a_cascade_with_one_impact_more_
 
 @pytest.mark.parametrize(
     ("frequency", "tilted"),
-    [pytest.param(1.6, 1.0, marks=pytest.mark.slow), pytest.param(2.5, -1.0, marks=pytest.mark.thorough)],
+    [pytest.param(1.6, 1.0, marks=pytest.mark.slow), pytest.param(2.5, -1.0, marks=pytest.mark.slow)],
 )
 def test_speeds_of_orbits_with_one_impact_are_half_an_ellipse_over_the_place_of_the_stop(frequency, tilted):
     """As F. Dux found (1992): centred on the origin, and tilted to one side below the frequency 2, to the other above.

@@ -122,8 +122,8 @@ def test_a_block_thrown_over_falls_in_no_time_or_is_refused(model: str, rotation
 
 
 # Last: each ends the process in which the others ran.
+@pytest.mark.cases(fast=0, thorough=1)
 @pytest.mark.skipif(os.name == "nt", reason="signals are sent the POSIX way")
-@pytest.mark.thorough
 @pytest.mark.parametrize("count", [2, 5_000])
 def test_an_ensemble_of_blocks_that_hardly_lose_energy_can_be_interrupted(count: int) -> None:
     expression = MANY.format(LIVELY.format(count), "linear")

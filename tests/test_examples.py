@@ -48,11 +48,14 @@ NUMBERS = {
 }
 
 #: Their laws are held by faster tests, too.
-THOROUGH = {"calibration", "chaos", "frame", "pulse_map"}
+MARKS = {
+    **dict.fromkeys(("calibration", "chaos"), pytest.mark.thorough),
+    **dict.fromkeys(("frame", "pulse_map"), pytest.mark.slow),
+}
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.thorough] if name in THOROUGH else []) for name in sorted(NUMBERS)]
+    "name", [pytest.param(name, marks=[MARKS[name]] if name in MARKS else []) for name in sorted(NUMBERS)]
 )
 def test_an_example_ends_in_its_numbers_and_draws_one_figure(name, monkeypatch, capsys):
     plt = importlib.import_module("matplotlib.pyplot")

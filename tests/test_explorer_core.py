@@ -91,6 +91,7 @@ def test_every_pulse_of_the_page_can_be_written_and_read_back(family):
     assert np.array_equal(again.coefficients, motion.coefficients)
 
 
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize("vertical", ["ridgecrest-clc-up", "file:{up}", "file:{both}#2"])
 def test_a_record_has_a_vertical_component(vertical, tmp_path, monkeypatch):
     horizontal, upwards = (rocking.records.load(f"ridgecrest-clc-{which}") for which in ("090", "up"))
@@ -262,6 +263,7 @@ def test_the_case_as_python_runs_and_has_the_same_peak(texts, tmp_path, capsys):
     assert "verdict" in capsys.readouterr().out
 
 
+@pytest.mark.cases(fast=3)
 @pytest.mark.parametrize("texts", CASES)
 def test_the_case_as_a_command_runs_and_has_the_same_peak(texts, run):
     case = read_case(texts, UploadStore())
@@ -496,6 +498,7 @@ def test_schemes_tell_where_each_is_wrong(explorer):
     assert rows["time=eq76"]["right"] is None
 
 
+@pytest.mark.cases(fast=3)
 @pytest.mark.parametrize(
     ("form", "start"),
     [
@@ -935,6 +938,7 @@ _MAPS = [
 ]
 
 
+@pytest.mark.cases(fast=3)
 @pytest.mark.parametrize(("texts", "axes"), _MAPS)
 def test_every_map_is_a_script_that_computes_the_same(texts, axes, tmp_path):
     grid, mapped = _mapped(texts, axes)

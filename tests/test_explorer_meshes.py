@@ -66,6 +66,7 @@ def test_a_case_of_a_mesh_is_the_packages_block_of_that_azimuth():
         assert case.body.solid.to_dict() == solid.to_dict()
 
 
+@pytest.mark.thorough
 def test_code_of_a_mesh_has_the_same_bits(run, tmp_path, monkeypatch, here):
     monkeypatch.chdir(tmp_path)
     data = content(box((300.0, 200.0, 1000.0)))

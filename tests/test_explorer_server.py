@@ -202,6 +202,7 @@ def test_a_comparison_takes_what_is_other_under_a_prefix(page):
     assert {"first_rotation", "second_rotation"} <= arrays.keys()
 
 
+@pytest.mark.cases(fast=3)
 @pytest.mark.parametrize("form", ["svg", "png", "csv", "events.csv", "impacts.csv", "nc"])
 def test_every_export_is_a_download(page, form):
     answer = page.get("/api/export", params={**SINE, "form": form})
@@ -367,7 +368,7 @@ AT2 = (Path(__file__).parent / "data" / "formats" / "nga.at2").read_bytes()
         pytest.param(b"0 " * (LARGEST // 2), "each line holds 256 numbers", marks=pytest.mark.thorough),
         pytest.param(b".1\n" * 490_000, "read", marks=pytest.mark.thorough),
         pytest.param(b"0;0\n" * 490_000, "the time does not increase", marks=pytest.mark.slow),
-        pytest.param(AT2 + b"0\n" * 999_000, "NPTS says", marks=pytest.mark.thorough),
+        pytest.param(AT2 + b"0\n" * 999_000, "NPTS says", marks=pytest.mark.slow),
         pytest.param(AT2 + b"0 " * (LARGEST // 2 - 2000), "NPTS says", marks=pytest.mark.slow),
         pytest.param(HEADED + (b"0" + b",0" * 200 + b"\n") * 20_000, "the time does not", marks=pytest.mark.slow),
     ],
@@ -607,14 +608,13 @@ def test_the_server_answers_over_a_socket_and_compiles_ahead(running, browser):
     assert start["compilation"]["done"]
 
 
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize(
     ("path", "axes"),
     [
         ("map", {"x": "omega", "y": "a", "points": "400"}),
         ("sweep", {"sweep": "a", "sweep_points": "400"}),
-        pytest.param(
-            "assessment", {"records": "motion=ridgecrest-clc-090;" * 90, "levels": "60"}, marks=pytest.mark.thorough
-        ),
+        ("assessment", {"records": "motion=ridgecrest-clc-090;" * 90, "levels": "60"}),
     ],
 )
 def test_a_map_that_nobody_reads_any_more_stops(running, browser, path, axes):

@@ -29,9 +29,10 @@ def explorer():
     return Explorer()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "numbers",
-    [range(10), pytest.param(range(10, 40), marks=pytest.mark.thorough)],
+    [range(10), pytest.param(range(10, 40), marks=pytest.mark.slow)],
     ids=["ten states", "many states"],
 )
 def test_random_states_are_what_their_commands_print(explorer, run, numbers):

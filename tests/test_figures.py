@@ -317,13 +317,14 @@ def shown_boxes(figure):
             yield "an axis", box
 
 
+@pytest.mark.cases(fast=8, thorough=26)
 @pytest.mark.parametrize(
     ("width", "dpi"),
     [
         pytest.param(COLUMN, 100.0, id="column"),
-        pytest.param(PAGE, 100.0, id="page", marks=pytest.mark.thorough),
-        pytest.param(COLUMN, 300.0, id="column, fine", marks=pytest.mark.thorough),
-        pytest.param(PAGE, 200.0, id="page, fine", marks=pytest.mark.thorough),
+        pytest.param(PAGE, 100.0, id="page"),
+        pytest.param(COLUMN, 300.0, id="column, fine"),
+        pytest.param(PAGE, 200.0, id="page, fine"),
     ],
 )
 @pytest.mark.parametrize("kind", FIGURES)

@@ -109,6 +109,7 @@ def test_without_levels_they_go_from_the_first_uplift_to_twice_the_first_overtur
     np.testing.assert_allclose(dataset.level.values[1:] / dataset.level.values[:-1], 1.05, rtol=1e-12)
 
 
+@pytest.mark.cases(fast=2)
 @pytest.mark.parametrize(
     ("measure", "units"),
     [

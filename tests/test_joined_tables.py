@@ -76,6 +76,7 @@ def test_the_tables_of_all_commands_join_by_record_and_by_motion(run, folder, tm
         assert [*result["skipped"]] == [str(folder / "notes.txt")], command
 
 
+@pytest.mark.thorough
 def test_a_motion_is_named_by_its_file_on_screen_and_in_the_files_of_each(run, folder, tmp_path):
     (folder / "notes.txt").unlink()
     code, text, _ = run("ida", folder, *SIZES, "--tolerance", "1e-2")
@@ -108,6 +109,7 @@ def test_a_table_of_many_records_names_block_friction_and_what_was_skipped(run, 
     assert sheet.verdict.to_dict() == summary.verdict.to_dict()
 
 
+@pytest.mark.thorough
 def test_the_tables_of_one_block_name_the_vertical_components(run, tmp_path):
     names, vertical = ["el-centro-meloland-270", "el-centro-meloland-360"], "el-centro-meloland-up"
     for command, file in (("simulate", "summary.csv"), ("check", "check.csv")):

@@ -70,6 +70,7 @@ def dense(ground: Ground, piece: int, offset: float, window: float, count: int =
         elapsed, piece, offset = elapsed + length - offset, piece + 1, 0.0
 
 
+@pytest.mark.thorough
 @quick
 @given(rows, numbers(0.0, 3.0), st.sampled_from([1.0, -1.0]))
 def test_the_local_series_is_the_same_polynomial_about_a_later_time(

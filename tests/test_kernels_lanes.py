@@ -140,6 +140,7 @@ def rounds_of(few: int, many: int) -> pytest.MarkDecorator:
     return pytest.mark.parametrize("rounds", [few, pytest.param(many, marks=pytest.mark.slow)])
 
 
+@pytest.mark.cases(fast=4)
 @rounds_of(3, 20)
 @pytest.mark.parametrize("late", [0.0, 1e-9, -1e-9])
 @pytest.mark.parametrize("stiffness", [1.0, 0.0, -1.0], ids=["block", "ball", "oscillator"])
@@ -164,6 +165,7 @@ def test_a_quiet_linear_step_is_exact(stiffness: float, late: float, rounds: int
     assert quiet > 16 * rounds
 
 
+@pytest.mark.cases(fast=3)
 @pytest.mark.parametrize("late", [0.0, 1e-13, -1e-13])
 @pytest.mark.parametrize("substeps", [1, 3])
 def test_a_quiet_nonlinear_step_is_the_full_series(substeps: int, late: float) -> None:
@@ -218,6 +220,7 @@ def weighted_cases(
     return blocks, states, push, weight
 
 
+@pytest.mark.cases(fast=6)
 @rounds_of(1, 4)
 @pytest.mark.parametrize("substeps", [1, 3])
 @pytest.mark.parametrize("kind", WEIGHTS)
@@ -261,6 +264,7 @@ def shapes(random: np.random.Generator, h: float, nonlinear: bool) -> tuple[Reco
     return blocks, states
 
 
+@pytest.mark.cases(fast=2)
 @long_uncompiled
 @pytest.mark.parametrize("nonlinear", [False, True], ids=["linear", "nonlinear"])
 @pytest.mark.parametrize("weighted", [False, True], ids=["", "weighted"])

@@ -124,9 +124,8 @@ def sine_impacts(amplitude: float, frequency: float, e: float, v: float, count: 
     return found
 
 
-@pytest.mark.parametrize(
-    ("e", "frequency"), [(0.5, 0.5), (0.5, 3.0), pytest.param(0.9, 0.5, marks=pytest.mark.thorough), (0.9, 3.0)]
-)
+@pytest.mark.cases(fast=1)
+@pytest.mark.parametrize(("e", "frequency"), [(0.5, 0.5), (0.5, 3.0), (0.9, 0.5), (0.9, 3.0)])
 def test_a_ball_on_a_table_that_moves_like_a_sine_bounces_as_in_many_digits(frequency: float, e: float) -> None:
     amplitude, v = 0.4, 0.5
     found = thrown(sine_table(amplitude, frequency, 3.0, 0.05 / frequency), ball(e), v)
@@ -238,6 +237,7 @@ def test_a_march_of_a_ball_without_a_table_of_rows_is_the_same() -> None:
         assert kept.at[name] == alone.at[name]
 
 
+@pytest.mark.thorough
 def test_what_has_one_side_is_lifted_to_no_other() -> None:
     """Whatever pushes the other way as it lifts off: a spring that is pressed, or a weight that is gone."""
     for body, ground in (

@@ -136,6 +136,7 @@ def drawn(random: np.random.Generator, nonlinear: bool, weighted: bool) -> tuple
     return System(lam, alpha, nonlinear, None if nonlinear else gain), (u, v), push, weight
 
 
+@pytest.mark.cases(fast=4)
 @pytest.mark.parametrize(("form", "weighted", "terms"), FORMS, ids=[form.__name__ for form, *_ in FORMS])
 def test_every_coefficient_is_that_of_the_equation_of_motion(form: Form, weighted: bool, terms: int) -> None:
     """To a few units in the last place of the sizes that it is the sum of."""

@@ -85,6 +85,7 @@ def cases(
         yield case, u, v if u == 0.0 else sign[2] * v, left / p
 
 
+@pytest.mark.thorough
 @long_uncompiled
 @models
 @weights

@@ -82,7 +82,7 @@ def test_fits_to_many_levels_tend_to_that_of_all(counts: tuple[int, int], most: 
     assert errors[1] < most[1]
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_fit_to_many_levels_changes_as_the_derivative_says() -> None:
     """By 2 % more of the slenderness, which moves the ends of bands over ten of 400 levels."""
     found, share = of(PULSES, 1.5, 2.8, 30, "nonlinear"), 0.02

@@ -99,6 +99,7 @@ def test_a_change_is_staged_unstaged_untracked_or_since_a_commit(tmp_path):
     assert changed("HEAD~1", tmp_path) == sorted([*expected, committed])
 
 
+@pytest.mark.thorough
 def test_a_test_that_comes_too_late_is_left_out_and_said(tmp_path):
     options = ["-n0", "-p", "no:cacheprovider", "--rootdir", str(tmp_path), "--confcutdir", str(tmp_path)]
     (tmp_path / "conftest.py").write_text((ROOT / "tests" / "conftest.py").read_text("utf-8"), "utf-8")

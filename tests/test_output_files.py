@@ -58,6 +58,7 @@ WRITERS = {
 }
 
 
+@pytest.mark.cases(fast=3)
 @pytest.mark.parametrize("name", WRITERS)
 def test_a_full_disk_leaves_no_part_of_a_file_and_keeps_the_old_one(response, analysis, tmp_path, name):
     path = tmp_path / name

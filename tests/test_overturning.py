@@ -80,6 +80,7 @@ def test_a_second_region_overturns_after_one_impact_with_safety_above_it():
     ]
 
 
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize("pulse", ["half-sine", "one-cosine", "one-sine"])
 def test_the_larger_of_two_similar_blocks_is_safer(pulse):
     # A larger block has a smaller p, so the same pulse has a larger ratio to it.
@@ -137,6 +138,7 @@ def test_a_block_that_overturns_after_a_rest_is_told_so():
     assert [text.get_text() for text in legend.get_texts()] == [mode_name(-4)]
 
 
+@pytest.mark.thorough
 def test_only_ratios_count():
     larger = rocking.Block.from_parameters(p=0.7, alpha=0.2, restitution=0.9)
     maps = [

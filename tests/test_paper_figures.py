@@ -224,6 +224,7 @@ def test_two_runs_write_the_same_files(unarranged, tmp_path):
 DRAWINGS = [(number, None) for number in FIGURES] + [(6, "surface")]
 
 
+@pytest.mark.cases(fast=4, thorough=8)
 @pytest.mark.parametrize(("number", "drawing"), DRAWINGS)
 def test_no_label_leaves_the_figure(figures, number, drawing):
     drawn = figures[number].draw(drawing)
@@ -609,7 +610,7 @@ def test_parameters_beyond_a_figures_range_are_refused(number, parameters, sente
 
 
 # All tables are made at once. What they hold, numbers of the paper and critical amplitudes, is also tested above.
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_the_tables_of_the_pages_are_those_that_the_script_makes():
     path = ROOT / "scripts" / "chattering_pages.py"
     specification = importlib.util.spec_from_file_location("chattering_pages", path)

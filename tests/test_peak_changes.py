@@ -51,7 +51,7 @@ def test_derivatives_in_an_ensemble_are_those_of_its_responses_to_the_bit(model:
     assert counts["known"] >= 12
 
 
-@pytest.mark.thorough
+@pytest.mark.cases(fast=0, thorough=1)
 @pytest.mark.parametrize("model", ["linear", "nonlinear"])
 def test_derivatives_in_larger_ensembles_are_those_of_their_responses_to_the_bit(model: str) -> None:
     shaken = [record(3), rocking.pulses.ricker(3.0, 1.0), record(4).with_vertical(record(5, 30))]

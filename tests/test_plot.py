@@ -198,9 +198,8 @@ def test_impacts_closer_than_the_spacing_of_times_are_left_out_of_the_zoom():
     assert zoom.lines[0].get_xdata().size < 60
 
 
-@pytest.mark.parametrize(
-    "extension", ["png", *(pytest.param(vector, marks=pytest.mark.thorough) for vector in ("pdf", "svg"))]
-)
+@pytest.mark.cases(fast=3, thorough=7)
+@pytest.mark.parametrize("extension", ["png", "pdf", "svg"])
 @pytest.mark.parametrize(
     "changes",
     [

@@ -77,7 +77,7 @@ def test_every_rest_is_in_its_bracket_at_a_bounded_cost(monkeypatch, cases):
     assert resolved < 0.5 * followed
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_another_code_agrees_on_whole_analyses(monkeypatch):
     monkeypatch.setattr(cross_code, "BLOCKS", 30)
     found = cross_code.judge(3)

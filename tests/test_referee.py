@@ -54,9 +54,10 @@ ONCE_DIFFERENT = [
 ]
 
 
+@pytest.mark.cases(fast=5)
 @pytest.mark.parametrize(
     "seed, number, vertical",
-    [pytest.param(*given, marks=pytest.mark.thorough) if k % 2 else given for k, given in enumerate(ONCE_DIFFERENT)],
+    ONCE_DIFFERENT,
 )
 def test_batches_that_differed_once_do_not(seed: int, number: int, vertical: bool) -> None:
     verdict = referee.compare(referee.batch(seed, number, vertical=vertical))
@@ -100,10 +101,9 @@ def assert_independent_of_the_batch(given: Batch, alone: range) -> None:
         assert_same_bytes(single.together(), expected, np.array([k]))
 
 
+@pytest.mark.cases(fast=3)
 @vertical
-@pytest.mark.parametrize(
-    "number", [pytest.param(n, marks=[] if n % 3 == 0 else pytest.mark.thorough) for n in range(LAW_BATCHES)]
-)
+@pytest.mark.parametrize("number", range(LAW_BATCHES))
 def test_an_outcome_does_not_depend_on_the_batch(number: int, vertical: bool) -> None:
     given = referee.batch(4, number, vertical=vertical)
     assert_independent_of_the_batch(given, range(0, len(given.blocks), 4))

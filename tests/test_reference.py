@@ -90,6 +90,7 @@ def short_record(seed: int) -> rocking.Motion:
     return rocking.Motion.from_samples(samples, 0.02)
 
 
+@pytest.mark.cases(fast=3)
 @pytest.mark.parametrize("model", ["linear", "nonlinear"])
 @pytest.mark.parametrize("seed", range(4))
 def test_responses_to_short_records_are_those_of_sixty_digit_arithmetic(model: str, seed: int) -> None:
@@ -107,8 +108,9 @@ def test_responses_to_short_records_are_those_of_sixty_digit_arithmetic(model: s
         assert_allclose(response.impacts[name][:resolved], exact, rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.cases(fast=2)
 @pytest.mark.parametrize("model", ["linear", "nonlinear"])
-@pytest.mark.parametrize("seed", [4, 5, *(pytest.param(seed, marks=pytest.mark.thorough) for seed in (6, 7))])
+@pytest.mark.parametrize("seed", [4, 5, 6, 7])
 def test_responses_from_initial_states_are_those_of_scipy(model: str, seed: int) -> None:
     motion = short_record(seed)
     generator = np.random.default_rng(seed)

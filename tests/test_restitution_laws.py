@@ -28,6 +28,7 @@ def releases(law, seed=1, timing=1e-3, impacts=12, model="nonlinear"):
     return [run.impacts["time"][:impacts] + noise.normal(0.0, timing, impacts) for run in runs]
 
 
+@pytest.mark.cases(fast=2)
 @pytest.mark.parametrize(
     ("law", "names"),
     [

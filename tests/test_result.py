@@ -30,6 +30,7 @@ def small_budget(monkeypatch):
     monkeypatch.setattr(engine, "BUDGET", 0)
 
 
+@pytest.mark.cases(fast=3)
 @pytest.mark.usefixtures("small_budget")
 @pytest.mark.parametrize(
     "analysis",

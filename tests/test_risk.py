@@ -298,6 +298,7 @@ def test_a_missing_file_and_another_measure_are_refused(tmp_path: Path) -> None:
         HazardCurve([0.1, 1.0], [1e-2, 1e-3], "pga_ratio")
 
 
+@pytest.mark.thorough
 def test_the_command_gives_annual_rates(run, tmp_path: Path) -> None:
     site = tmp_path / "site.csv"
     site.write_text("pga_g,annual_rate\n0.05,0.05\n0.2,0.005\n1.0,0.00005\n")
@@ -461,6 +462,7 @@ def test_counts_groups_and_motions_are_taken(tmp_path: Path) -> None:
         read_observed(path, Measure("pgv_ratio"))
 
 
+@pytest.mark.thorough
 def test_an_ensemble_has_its_weights_and_its_model_on_the_command_line(run, tmp_path: Path) -> None:
     table = tmp_path / "ensemble.csv"
     table.write_text(

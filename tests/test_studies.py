@@ -130,6 +130,7 @@ def test_any_zarr_reader_opens_the_store(complete, reference):
         np.testing.assert_array_equal(array[k], reference[name].values.astype(float))
 
 
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize("how", ["two threads", "processes", "reversed order"])
 def test_whoever_computes_it_the_store_is_the_same_to_the_byte(complete, tmp_path, how, monkeypatch):
     study = made(tmp_path)
@@ -241,6 +242,7 @@ def test_the_first_signal_is_taken_note_of_and_the_second_raises():
             signal.raise_signal(signal.SIGTERM)
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(os.name == "nt", reason="a pseudo-terminal is POSIX")
 def test_a_run_shows_its_rate_and_others_are_told_of_it(tmp_path):
     motion = rocking.records.load("el-centro-meloland-270")

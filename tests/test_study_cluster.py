@@ -167,7 +167,7 @@ def test_a_cluster_loses_a_unit_a_worker_and_its_scheduler_but_no_result(complet
     assert digest(tmp_path / "scheduler") == complete
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_local_workers_are_reached_from_here_alone_and_leave_signals_to_the_run(complete, tmp_path):
     made(tmp_path)
     command = [*ROCKING, "study", "run", str(tmp_path), "--workers", "2"]

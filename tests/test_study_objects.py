@@ -65,6 +65,7 @@ def same(study, folder):
     return len(kept) == UNITS + 4 and all(study._store.place.get(name) == data for name, data in kept.items())
 
 
+@pytest.mark.thorough
 def test_a_study_in_an_object_store_holds_the_same_bytes(complete, url, tmp_path):
     study = made(url)
     half = sorted(study._store.missing())[::2]

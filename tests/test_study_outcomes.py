@@ -326,6 +326,7 @@ limits = { overturning = inf, half = 0.5 }
 """
 
 
+@pytest.mark.thorough
 def test_a_file_chooses_outcomes_and_the_commands_go_on_with_them(run, tmp_path):
     file = tmp_path / "museum.toml"
     file.write_text(TEXT)

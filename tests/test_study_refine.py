@@ -79,6 +79,7 @@ def bisected(verdict, low, high, tolerance):
     return low, high
 
 
+@pytest.mark.thorough
 def test_critical_scales_are_those_of_bisection_by_single_simulations(complete):
     study = rocking.study(complete)
     found, verdicts = study.critical_scales(), study.results().overturned.values
@@ -110,6 +111,7 @@ def test_a_verdict_that_goes_back_has_a_bracket_for_each_change(complete):
     assert np.all(np.diff(one.low) > 0.0)
 
 
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize("threads", [1, 2])
 def test_whoever_refines_it_and_when_the_store_is_the_same_to_the_byte(complete, tmp_path, threads):
     folder = tmp_path / "study"

@@ -78,6 +78,7 @@ def test_the_curve_of_each_block_is_that_of_its_simulations(study):
     assert fitted >= 4
 
 
+@pytest.mark.cases(fast=2)
 @pytest.mark.parametrize("measure", ["pga", "pgv", "pga_ratio", "pgv_ratio"])
 def test_one_curve_for_all_blocks_is_fitted_to_all_their_simulations(study, measure):
     table = rocking.simulate_many(BLOCKS, MOTIONS, levels=LEVELS, measure="pga")
