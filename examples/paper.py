@@ -55,8 +55,8 @@ for value, style in ((0.80, ":"), (eta, "-"), (0.96, "--")):
 axes["time"].set(xlabel="amplitude $a$", ylabel=r"chattering time over $T/2$", ylim=(0.0, 1.0))
 axes["critical"].set(xlabel=r"frequency $\omega$", ylabel="critical amplitude")
 time = np.linspace(0.0, 11.0, 2000)
-for response, style, a in ((strong, "C3--", 1.05), (weak, "k-", 1.03)):
-    axes["rotation"].plot(time, response.rotation(time) / block.alpha, style, label=f"a = {a:g}")
+for response, style, level in ((strong, "C3--", 1.05), (weak, "k-", 1.03)):
+    axes["rotation"].plot(time, response.rotation(time) / block.alpha, style, label=f"a = {level:g}")
 axes["rotation"].set(xlabel=r"time $\tau$", ylabel=r"rotation $\theta/\alpha$", xlim=(0.0, 11.0))
 axes["time"].legend(frameon=False)
 axes["rotation"].legend(frameon=False, ncols=2)

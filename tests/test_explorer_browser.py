@@ -280,7 +280,7 @@ def test_a_link_reproduces_what_is_shown(opened):
     assert peak_shown(page) == pytest.approx(response.peak_over_slenderness, rel=2e-3)
 
 
-@pytest.mark.parametrize(("seed", "count"), [(7, 4), pytest.param(8, 24, marks=MORE)])
+@pytest.mark.parametrize(("seed", "count"), [(7, 2), pytest.param(8, 24, marks=MORE)])
 def test_whatever_an_address_says_the_page_has_no_fault(opened, here, seed, count):
     page, draw, told = opened(allowed=["422", "404"]), random.Random(seed), 0
     corners = [{"width": "0.24", "height": "1.1", "motion": "none"}, {"from": "0", "to": "1e-300"}]
@@ -582,6 +582,7 @@ DROP = """async ([name, text]) => {
 HOSTILE = ["x<img src=x id=hostile onerror=alert(1)>", '"><style id=hostile>*{display:none}', "$$hostile{$$"]
 
 
+@MORE
 def test_names_of_files_and_channels_are_shown_as_they_are_written(opened):
     page = opened(STATUE)
     channels = ["a", "&amp;&lt;b&gt;", "$$\\hostile{$$"]
@@ -702,6 +703,7 @@ def test_a_body_is_seen_from_above_and_turned(opened, explorer):
     assert page.js("document.querySelector('.plan').checkVisibility()") is False
 
 
+@MORE
 def test_a_mesh_is_dropped_read_otherwise_and_opened_again_by_its_link(opened, explorer):
     page = opened(STATUE, allowed=["422"])
     text = trimesh.exchange.obj.export_obj(trimesh.creation.box((200, 400, 1000)))
@@ -727,7 +729,9 @@ def test_a_mesh_is_dropped_read_otherwise_and_opened_again_by_its_link(opened, e
     assert query_of(page)["mesh"] == link["mesh"]
 
 
-@pytest.mark.parametrize(("viewport", "scheme"), [(DESK, "dark"), (PHONE, "light")], ids=["desk", "phone"])
+@pytest.mark.parametrize(
+    ("viewport", "scheme"), [pytest.param(DESK, "dark", marks=MORE), (PHONE, "light")], ids=["desk", "phone"]
+)
 def test_a_body_has_no_barrier_and_is_compared_with_itself_turned(opened, viewport, scheme):
     axe = tool("axe-core/axe.min.js").read_text("utf-8")
     page = opened(f"{MESH}&view=block", viewport, scheme, bypass_csp=True)
@@ -826,6 +830,7 @@ def test_the_copied_command_and_the_script_have_the_same_peak(opened, tmp_path):
     assert peak_shown(page) == pytest.approx(json.loads(ran.stdout)["peak_over_slenderness"], rel=2e-3)
 
 
+@MORE
 def test_random_states_show_what_their_commands_print(opened, here, run):
     page, judged = opened(STATUE), 0
     for number in range(4):
@@ -852,6 +857,7 @@ def test_random_states_show_what_their_commands_print(opened, here, run):
     assert judged == 4
 
 
+@MORE
 def test_every_file_can_be_taken_away(opened):
     only_chromium("hand over what it has saved")
     page = opened(f"{SINE}&from=0.5&to=2")
@@ -1187,6 +1193,7 @@ def test_a_diagram_is_read_by_keys_and_swept_over_the_frequency(opened):
     assert "case, np.linspace(0.5, 8.0, 100), (0.0, 0.0)" in page.text("#python")
 
 
+@MORE
 def test_a_diagram_is_taken_away_and_computed_again(opened, tmp_path):
     only_chromium("hand over what it has saved")
     page = periodic(opened, f"{CASCADE}&sweep_points=100&sweep_from=1&sweep_to=7.2")
@@ -1383,6 +1390,7 @@ def test_a_plain_case_is_printed_on_one_light_page_without_controls(opened, sche
     assert (page.js(figure) == "#ffffff") == (scheme == "light")
 
 
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize(
     ("view", "query"),
     [
@@ -1425,7 +1433,9 @@ COMPUTED = {
 }
 
 
-@pytest.mark.parametrize(("viewport", "scheme"), [(DESK, "light"), (PHONE, "dark")], ids=["desk", "phone"])
+@pytest.mark.parametrize(
+    ("viewport", "scheme"), [(DESK, "light"), pytest.param(PHONE, "dark", marks=MORE)], ids=["desk", "phone"]
+)
 def test_no_view_has_a_barrier(opened, viewport, scheme):
     axe = tool("axe-core/axe.min.js").read_text("utf-8")
     # The checker itself writes styles that the page's policy does not admit.
@@ -1471,6 +1481,7 @@ def test_no_view_has_a_barrier(opened, viewport, scheme):
     assert len(judged) == len(views) + 4
 
 
+@MORE
 def test_a_browser_whose_language_is_none_writes_numbers_as_the_page_does(opened):
     page = opened(STATUE)
     page.page.add_init_script("Object.defineProperty(Navigator.prototype, 'language', {get: () => 'C'})")
@@ -1638,6 +1649,7 @@ def test_a_lecture_shows_the_stage_large_and_says_how_much_larger_the_rotation_i
     page.until("!document.fullscreenElement")
 
 
+@MORE
 def test_impacts_click_louder_the_faster_they_are_and_a_video_is_recorded(opened):
     only_chromium("hand over what it has saved")
     page = opened(f"view=block&{STATUE}&from=232&to=239.7")
@@ -1880,6 +1892,7 @@ def test_a_drag_is_one_entry_and_leaves_curves_behind_for_a_second(opened):
     page.until("document.getElementById('pga').value === '0.4'")
 
 
+@MORE
 def test_a_pinned_case_is_returned_to_compared_with_and_kept(opened):
     only_chromium("hand over what it has saved")
     page = opened(STATUE)
