@@ -148,7 +148,7 @@ def test_impacts_are_those_of_an_integration():
 
 
 @pytest.mark.parametrize(
-    "seeds", [pytest.param(range(10), marks=pytest.mark.thorough), pytest.param(range(10, 120), marks=pytest.mark.slow)]
+    "seeds", [pytest.param(range(20), marks=pytest.mark.thorough), pytest.param(range(20, 120), marks=pytest.mark.slow)]
 )
 def test_impacts_are_those_of_an_integration_over_wide_ranges(seeds):
     assert compared(drawn, seeds)[0] >= 1.5 * len(seeds)
