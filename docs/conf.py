@@ -35,6 +35,7 @@ myst_heading_anchors = 3
 mathjax3_config = {"options": {"enableMenu": False}}
 
 autosummary_generate = True
+autosummary_ignore_module_all = False
 # So that a summary does not end at the citation of an equation.
 sphinx.ext.autosummary.WELL_KNOWN_ABBREVIATIONS += ("Eq.", "Eqs.", "Fig.", "Figs.")
 autodoc_typehints = "none"
