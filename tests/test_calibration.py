@@ -775,14 +775,14 @@ def test_an_ensemble_is_read_as_it_was_written(found, tmp_path):
     for name in ("p", "alpha", "restitution"):
         assert getattr(read.blocks, name) == pytest.approx(getattr(found.blocks, name), rel=1e-9)
     text = (tmp_path / "ensemble.csv").read_text()
-    for spoilt, said in (
+    for damaged, said in (
         (text.replace("weight", "wait", 1), "line 1: no ensemble"),
         (text.replace("linear", "cubic", 1), "line 2: 'cubic' is not linear or nonlinear"),
         (text.replace("linear", "nonlinear", 1), "one model"),
     ):
-        (tmp_path / "spoilt.csv").write_text(spoilt)
+        (tmp_path / "damaged.csv").write_text(damaged)
         with pytest.raises(rocking.UnreadableRecord, match=said):
-            read_ensemble(tmp_path / "spoilt.csv")
+            read_ensemble(tmp_path / "damaged.csv")
 
 
 def test_an_error_within_a_table_keeps_what_it_is_about(tmp_path):

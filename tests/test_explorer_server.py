@@ -434,7 +434,7 @@ def test_no_path_leads_anywhere_else(page, path):
 
 
 def malformed(rng):
-    """One file that is none: cut, spoilt, or noise."""
+    """One file that is none: cut, damaged, or noise."""
     kind = rng.randrange(6)
     if kind == 0:
         return rng.randbytes(rng.randrange(2000))

@@ -272,16 +272,16 @@ def test_a_step_that_is_not_positive_is_refused(file: Callable[[str], Path]) -> 
         assert "line 4: the sampling step is" in complaint(file(written.at2(SERIES.tolist(), f"NPTS=37, DT={dt} SEC")))
 
 
-def test_a_spoilt_number_is_named_with_its_line(file: Callable[[str], Path]) -> None:
+def test_a_damaged_number_is_named_with_its_line(file: Callable[[str], Path]) -> None:
     text = (written.FOLDER / "nga.at2").read_text().splitlines(keepends=True)
-    spoilt = text[6].split()[2]
+    damaged = text[6].split()[2]
     for bad in (".12x4567E-01", "NaN", "-inf", "1E999", "--.1", "1_0", "0x10", "********", "\xb5"):
-        lines = [*text[:6], text[6].replace(spoilt, bad), *text[7:]]
+        lines = [*text[:6], text[6].replace(damaged, bad), *text[7:]]
         message = complaint(file("".join(lines)))
         assert f"line 7: {bad!r} is not a" in message
 
 
-def test_spoilt_numbers_elsewhere(file: Callable[[str], Path]) -> None:
+def test_damaged_numbers_elsewhere(file: Callable[[str], Path]) -> None:
     for name, row, channel in (("two.v1", 30, 1), ("two.v2", 48, 1), ("two.v2c", 52, 1), ("even.smc", 31, None)):
         lines = (written.FOLDER / name).read_text().splitlines(keepends=True)
         lines[row - 1] = lines[row - 1][:13] + "?" + lines[row - 1][14:]
@@ -490,8 +490,8 @@ def test_a_header_that_does_not_fit_is_named(
 ) -> None:
     text = (written.FOLDER / name).read_text()
     assert old in text
-    spoilt = new.join(text.rsplit(old, 1))
-    assert what in complaint(file(spoilt), channel=1)
+    damaged = new.join(text.rsplit(old, 1))
+    assert what in complaint(file(damaged), channel=1)
 
 
 def test_headers_without_labels_are_numbered(file: Callable[[str], Path]) -> None:

@@ -218,7 +218,7 @@ SLOW_OR_SHARED = [HealthCheck.too_slow, HealthCheck.function_scoped_fixture]
 @given(
     index=st.integers(0, 10**6), other=st.integers(0, 10**6), operations=OPERATIONS, request_=st.sampled_from(REQUESTS)
 )
-def test_spoilt_records_end_in_channels_or_one_sentence(
+def test_damaged_records_end_in_channels_or_one_sentence(
     place: Path, index: int, other: int, operations: list[Operation], request_: dict[str, object]
 ) -> None:
     known = seeds()

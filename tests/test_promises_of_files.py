@@ -7,7 +7,7 @@ import sys
 
 import numpy as np
 import pytest
-from oracles import record_files, spoilt_files, stated_records
+from oracles import damaged_files, record_files, stated_records
 from promises import commands, full_disk, interrupts, reading, serving, soak
 from promises.promise import Found
 
@@ -20,7 +20,7 @@ from rocking.tables import write_text
 
 
 @pytest.mark.parametrize("cases", [60, pytest.param(600, marks=pytest.mark.thorough)])
-def test_a_spoilt_file_is_refused_or_read_as_it_states(monkeypatch, cases):
+def test_a_damaged_file_is_refused_or_read_as_it_states(monkeypatch, cases):
     monkeypatch.setattr(reading, "CASES", cases)
     monkeypatch.setattr(reading, "PARTS", 1000)
     monkeypatch.setattr(reading, "_TRACED", 10**9)
@@ -51,7 +51,7 @@ def test_what_a_sound_file_states_is_what_is_read():
 
 def test_every_mishap_changes_files():
     rng, files = random.Random(1), [*reading.records().values()]
-    for operation in spoilt_files.OPERATIONS:
+    for operation in damaged_files.OPERATIONS:
         assert sum(operation(file, rng) != file for file in files) >= 3, operation.__doc__
 
 

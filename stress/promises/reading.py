@@ -1,7 +1,7 @@
-"""Files of records and of studies, cut off at every byte or spoilt otherwise: refused in a sentence, or read right.
+"""Files of records and of studies, cut off at every byte or damaged otherwise: refused in a sentence, or read right.
 
-A part takes every hundredth truncation of every fixture, and so many files that `oracles.spoilt_files` has spoilt. What
-is read without a word is compared with what the file states, where `oracles.stated_records` can tell.
+A part takes every hundredth truncation of every fixture, and so many files that `oracles.damaged_files` makes.
+What is read without a word is compared with what the file states, where `oracles.stated_records` can tell.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from oracles import record_files
-from oracles.spoilt_files import spoilt
+from oracles.damaged_files import damaged
 from oracles.stated_records import READINGS, contradiction, stated
 
 from promises.promise import Found, Promise
@@ -155,7 +155,7 @@ def read_other(name: str, content: bytes) -> Any:
 
 
 def judge(part: int) -> Found:
-    """Judge the truncations and the spoilt files of a part."""
+    """Judge the truncations and the damaged files of a part."""
     found, rng = Found(parts=1), random.Random(f"reading {part}")
     installed, through_obspy.installed = through_obspy.installed, lambda: False
     try:
@@ -179,11 +179,11 @@ def _cases(part: int, rng: random.Random) -> Iterator[tuple[str, bytes]]:
         with zipfile.ZipFile(packed, "w") as archive:
             archive.writestr(name, content)
         for each in (gzip.compress(content, mtime=0), packed.getvalue()):
-            yield name, spoilt(each, rng) if part else each
+            yield name, damaged(each, rng) if part else each
     files = list(records().items()), list(others().items())
     for _ in range(CASES):
         name, content = rng.choice(files[rng.random() < _OF_STUDIES])
-        yield name, spoilt(content, rng)
+        yield name, damaged(content, rng)
 
 
 def _judge_case(found: Found, rng: random.Random, what: str, name: str, content: bytes, *, traced: bool) -> None:

@@ -180,7 +180,7 @@ def _numerical_roots(widths: Floats, coefficients: Floats) -> Floats:
 
 
 def _significant_degrees(pieces: Floats) -> Integers:
-    """Degree of each piece; a leading coefficient far below rounding would put roots at infinity and spoil others."""
+    """Degree of each piece; a leading coefficient far below rounding would put roots at infinity and harm others."""
     sizes = np.abs(pieces)
     significant = sizes > 1e-18 * np.max(sizes, axis=1, keepdims=True)
     last = pieces.shape[1] - 1 - np.argmax(significant[:, ::-1], axis=1)

@@ -132,7 +132,7 @@ def _join(lines: list[bytes], rng: random.Random) -> None:
     lines[at : at + 2] = [b"".join(lines[at : at + 2])]
 
 
-def _spoil_first_row(lines: list[bytes], rng: random.Random) -> None:
+def _damage_first_row(lines: list[bytes], rng: random.Random) -> None:
     """The first row of numbers is gone, or one of its numbers is none."""
     at = next((k for k, line in enumerate(lines) if line.strip() and not re.search(rb"[A-DF-Za-df-z]", line)), 0)
     if rng.random() < 0.3:
@@ -166,14 +166,14 @@ def _swap_columns(lines: list[bytes], rng: random.Random) -> None:
 OPERATIONS: Final[tuple[Operation, ...]] = (
     *(flip_a_bit, change_a_byte, cut_off, lose_a_stretch, repeat_a_stretch, put_in_a_token),
     *(change_a_number, change_a_number, change_a_digit, change_a_digit, change_a_unit, change_a_unit, change_a_word),
-    *map(_of_lines, (_lose, _repeat, _swap, _join, _spoil_first_row, _lose_a_column, _swap_columns)),
+    *map(_of_lines, (_lose, _repeat, _swap, _join, _damage_first_row, _lose_a_column, _swap_columns)),
 )
 
 #: No file grows beyond this, bytes.
 _MOST: Final = 200_000
 
 
-def spoilt(data: bytes, rng: random.Random) -> bytes:
+def damaged(data: bytes, rng: random.Random) -> bytes:
     """A file after one mishap, two or three."""
     for _ in range(rng.choice((1, 1, 1, 2, 3))):
         data = rng.choice(OPERATIONS)(data, rng)[:_MOST]
