@@ -22,6 +22,7 @@ from rocking.errors import InvalidMotion, RockingError, UnreadableRecord
 from rocking.motion import formats, records
 from rocking.motion.formats import Channel, channels, identify, read, source, through_obspy, values
 from rocking.motion.formats.channel import even_step
+from rocking.motion.formats.source import open_source
 
 GRAVITY = 9.80665
 SERIES = np.array(written.series(1)) / 100.0
@@ -71,6 +72,25 @@ def test_fixtures_are_what_their_writer_writes() -> None:
     assert {path.name for path in written.FOLDER.iterdir()} == written.fixtures().keys()
     for name, content in written.fixtures().items():
         assert (written.FOLDER / name).read_bytes() == content.encode(), name
+
+
+def test_every_format_has_a_fixture_and_stands_in_the_reference_the_how_to_and_the_docstring() -> None:
+    names: dict[str, str] = {}
+    for fixture in written.fixtures().keys() - REFUSED.keys():
+        opened = open_source(written.FOLDER / fixture)
+        module, found = next((each.__module__, it) for each in formats._RECOGNISERS if (it := each(opened)) is not None)
+        names[found.identification.format] = module
+    without = {each.__module__ for each in formats._RECOGNISERS} - {*names.values()}
+    assert without == {through_obspy.__name__}
+    docs = Path(__file__).parents[1] / "docs"
+    reference, how_to = (
+        (docs / each).read_text("utf-8") for each in ("reference/records.md", "howto/read-a-record.md")
+    )
+    assert len(names) >= 8
+    for name in names:
+        assert f"`{name}`" in reference, name
+        for word in name.split("/")[0].split():
+            assert word in how_to and word in (read.__doc__ or ""), name
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import functools
 import math
+from pathlib import Path
 
 import mpmath as mp
 import numpy as np
@@ -118,6 +119,12 @@ def test_pieces_follow_the_formula_within_the_stated_error(case):
     assert worst_error(motion, formula) <= 0.5 * motion.error
     assert motion.error <= 1.2e-15 * motion.pga
     assert motion.coefficients.shape[1] <= 16
+
+
+def test_no_pulse_is_without_a_test_of_its_formula():
+    text = Path(__file__).read_text("utf-8")
+    assert {name for name in pulses.__all__ if f"pulses.{name}(" not in text} == set()
+    assert len(pulses.__all__) >= 9
 
 
 @settings(deadline=None, max_examples=30)

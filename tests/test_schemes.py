@@ -1,7 +1,10 @@
 """Every scheme that ends chattering against the certified response: right where it is, and shown wrong where not."""
 
 import math
+import re
 import warnings
+from pathlib import Path
+from typing import get_type_hints
 
 import numpy as np
 import pytest
@@ -11,8 +14,13 @@ from hypothesis import strategies as st
 import rocking
 from rocking import dynamics
 from rocking.chattering import chattering_time
+from rocking.cli.options import TreatmentOptions
+from rocking.dynamics.comparison import FAMILIES
 from rocking.dynamics.schemes import STEPPINGS, TREATMENTS, compare_schemes
 from rocking.errors import OutsideFit
+from rocking.explorer.parameters import specification
+from rocking.explorer.phrases import english
+from rocking.treatment import _BY_NAME as KINDS
 from rocking.treatment import treatment
 
 BLOCK = rocking.Block.from_parameters(p=1.0, alpha=0.2, restitution=0.92)
@@ -323,6 +331,19 @@ def test_the_asymptotic_time_is_for_symmetric_blocks_under_sines():
             scheme.limits(different, sine, "linear")
     with pytest.raises(rocking.InvalidOption, match="sinusoidal"):
         scheme.limits(symmetric, sine.delayed(1.0), "linear")
+
+
+def test_every_treatment_is_in_figures_on_the_page_in_help_and_in_the_how_to():
+    assert len(KINDS) >= 5
+    assert {*FAMILIES} == {*KINDS} | {type(each).name for each in STEPPINGS}
+    assert {each["name"] for each in specification()["treatments"]} == {*KINDS}
+    assert {f"treatment.{name}{end}" for name in KINDS for end in ("", "_about")} <= english().keys()
+    told = get_type_hints(TreatmentOptions, include_extras=True)["chattering"].__metadata__[0].help
+    page = (Path(__file__).parents[1] / "docs/howto/choose-a-chattering-treatment.md").read_text("utf-8")
+    for name, kind in KINDS.items():
+        assert re.search(rf"\b{name}\b", told), name
+        assert f'"{name}"' in rocking.simulate.__doc__ and f"`{kind.__name__}`" in rocking.simulate.__doc__, name
+        assert f'| `"{name}"`, `{kind.__name__}(' in page, name
 
 
 @pytest.mark.parametrize("value", ["1e-9", True, np.nan, np.inf, 0.0, -1.0, None])

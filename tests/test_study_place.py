@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from rocking.errors import StudyError
 from rocking.studies.place import Folder
 
 
@@ -29,3 +30,22 @@ def test_an_object_is_on_the_disk_before_it_has_its_name(tmp_path: Path, monkeyp
     Folder(tmp_path).put("c.0.1", b"outcomes")
     assert done == [len(b"outcomes"), "name", "folder"]
     assert (tmp_path / "c.0.1").read_bytes() == b"outcomes"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="there the folder says who may read its files")
+@pytest.mark.parametrize(("umask", "mode"), [(0o022, 0o644), (0o002, 0o664), (0o077, 0o600)])
+def test_who_may_read_a_study_is_for_the_umask_to_say(tmp_path: Path, umask: int, mode: int) -> None:
+    before = os.umask(umask)
+    try:
+        Folder(tmp_path).put("c.0.1", b"outcomes")
+        with Folder(tmp_path).locked():
+            pass
+    finally:
+        os.umask(before)
+    assert [stat.S_IMODE((tmp_path / name).stat().st_mode) for name in ("c.0.1", "lock")] == [mode, mode]
+
+
+def test_a_second_run_is_told_who_holds_the_study_and_what_to_do(tmp_path: Path) -> None:
+    told = rf"run by process {os.getpid()} on .*; wait for it, or end it there"
+    with Folder(tmp_path).locked(), pytest.raises(StudyError, match=told), Folder(tmp_path).locked():
+        pass

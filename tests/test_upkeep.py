@@ -2,6 +2,7 @@
 
 import json
 import re
+import runpy
 import shlex
 import shutil
 import subprocess
@@ -91,6 +92,33 @@ def test_the_tests_of_the_workflow_are_those_of_make() -> None:
     supported = [each.rpartition(" ")[2] for each in PROJECT["classifiers"] if re.search(r":: 3\.\d+$", each)]
     assert matrix["python"] == supported
     assert PROJECT["requires-python"] == f">={supported[0]}"
+
+
+def test_what_a_release_lacks_is_said_before_it_is_made(tmp_path: Path) -> None:
+    lacking = runpy.run_path(str(ROOT / "scripts" / "release_lacks.py"))["lacking"]
+    texts = {
+        "pyproject.toml": '[project]\nversion = "1.2.0"\n[project.urls]\nHomepage = "https://rocking.example.org"\n',
+        "CITATION.cff": "version: 1.1.0\nreferences:\n  - authors:\n      - name: Authors as listed in the article\n",
+        "CHANGELOG.md": "# Changelog\n\n## [Unreleased]\n",
+    }
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text, "utf-8")
+    # Each place is corrected in turn, and one sentence less is said.
+    said = [[*lacking(tmp_path, "v1.1.0")], [*lacking(tmp_path, "v1.2.0")]]
+    for name, old, new in (
+        ("CITATION.cff", "version: 1.1.0", "version: 1.2.0"),
+        ("CITATION.cff", "Authors as listed in the article", "A. Name"),
+        ("pyproject.toml", "example.org", "somewhere.net"),
+        ("CHANGELOG.md", "[Unreleased]", "[1.2.0] - 2026-12-01"),
+        ("CITATION.cff", "references", "date-released: 2026-12-01\nreferences"),
+    ):
+        (tmp_path / name).write_text((tmp_path / name).read_text("utf-8").replace(old, new), "utf-8")
+        said.append([*lacking(tmp_path, "v1.2.0")])
+    assert [len(each) for each in said] == [5, 4, 3, 2, 1, 1, 0]
+    assert "date-released: 2026-12-01" in said[-2][0]
+    before = [step.get("run", "") for step in JOBS["release", "source"]["steps"]]
+    assert 'python scripts/release_lacks.py "$GITHUB_REF_NAME"' in before
+    assert JOBS["release", "publish"]["needs"] == ["wheel", "source"]
 
 
 # Supported versions: SPEC 0, as docs/portability.md says

@@ -38,6 +38,8 @@ class Treatment(ABC):
     name: ClassVar[str]
     #: What the kernels compare with the limits, a code of `rocking.kernels.state`.
     code: ClassVar[int]
+    #: Unit of its parameter in tables; "1" is of a number without one, and "" of a word.
+    unit: ClassVar[str]
 
     def __init_subclass__(cls) -> None:
         _BY_NAME[cls.name] = cls
@@ -153,6 +155,7 @@ class AsymptoticTime(Treatment):
 
     name: ClassVar[str] = "time"
     code: ClassVar[int] = state.RestRule.TIME
+    unit: ClassVar[str] = ""
 
     critical: Critical = "eq76"
 
@@ -230,6 +233,7 @@ class Certified(Treatment):
 
     name: ClassVar[str] = "certified"
     code: ClassVar[int] = state.RestRule.CERTIFIED
+    unit: ClassVar[str] = "s"
 
     tolerance: float = 1e-12
 
@@ -268,6 +272,7 @@ class VelocityThreshold(Treatment):
 
     name: ClassVar[str] = "velocity"
     code: ClassVar[int] = state.RestRule.VELOCITY
+    unit: ClassVar[str] = "1"
 
     threshold: float = 5e-10
 
@@ -336,6 +341,7 @@ class IntervalThreshold(Treatment):
 
     name: ClassVar[str] = "interval"
     code: ClassVar[int] = state.RestRule.INTERVAL
+    unit: ClassVar[str] = "s"
 
     threshold: float = 1e-9
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -15,7 +15,7 @@ from rocking.dynamics.stepping import SteppedResponse, TimeStepping
 from rocking.response import Response
 from rocking.result import DrawnResult, TableResult
 from rocking.tables import as_written, counted, named, rows_of, text_table
-from rocking.treatment import AsymptoticTime, Certified, IntervalThreshold, Treatment
+from rocking.treatment import Treatment
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -297,11 +297,8 @@ def _parameter(scheme: Scheme) -> tuple[float | str, str]:
     """Return the parameter of a scheme and its unit."""
     if isinstance(scheme, TimeStepping):
         return scheme.step, "s"
-    if isinstance(scheme, AsymptoticTime):
-        return scheme.critical, ""
-    if isinstance(scheme, Certified):
-        return scheme.tolerance, "s"
-    return scheme.threshold, "s" if isinstance(scheme, IntervalThreshold) else "1"  # type: ignore[attr-defined]
+    (parameter,) = (getattr(scheme, each.name) for each in fields(scheme))
+    return parameter, scheme.unit
 
 
 def _cost_unit(scheme: Scheme) -> str:

@@ -315,6 +315,12 @@ _TREATMENTS: Final = (
         ).described(),
     },
     {
+        "name": "bypass",
+        "limit": Parameter(
+            "limit", "treatment", "number", "", "0.001", 1e-9, 0.1, True, text="limit_velocity"
+        ).described(),
+    },
+    {
         "name": "interval",
         "limit": Parameter(
             "limit", "treatment", "number", "s", "0.001", 1e-9, 0.1, True, text="limit_interval"

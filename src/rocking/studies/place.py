@@ -9,7 +9,6 @@ import contextlib
 import json
 import os
 import socket
-import tempfile
 import threading
 import time
 import uuid
@@ -133,7 +132,9 @@ class Folder:
                 self.path.mkdir(parents=True, exist_ok=True)
                 file = stack.enter_context(self._lock_file())
                 if not _lock(file, _TRIES):
-                    raise StudyError(f"the study is being run by {_holder(file) or 'another process'}", path=str(self))
+                    holder = _holder(file) or "another process"
+                    sentence = f"the study is being run by {holder}; wait for it, or end it there and run it again"
+                    raise StudyError(sentence, path=str(self))
                 file.seek(0)
                 before = file.read().decode(errors="replace").strip()
                 file.truncate(0)
@@ -193,18 +194,18 @@ def _holder(file: IO[bytes]) -> str:
 
 
 def _written(folder: Path, data: bytes) -> Path:
-    """Temporary file of these bytes, on the disk."""
-    handle, name = tempfile.mkstemp(prefix=".", suffix=_PART, dir=folder)
+    """Temporary file of these bytes, on the disk; who may read it is for the process's umask to say."""
+    part = folder / f".{uuid.uuid4().hex}{_PART}"
     try:
-        with os.fdopen(handle, "wb") as file:
+        with part.open("xb") as file:
             file.write(data)
             file.flush()
             os.fsync(file.fileno())
             _drop_from_cache(file.fileno())
     except OSError:
-        Path(name).unlink(missing_ok=True)
+        part.unlink(missing_ok=True)
         raise
-    return Path(name)
+    return part
 
 
 def _drop_from_cache(handle: int) -> None:
