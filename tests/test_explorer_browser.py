@@ -1660,6 +1660,11 @@ def test_a_phone_shows_the_picture_while_settings_are_changed(opened, width):
     assert page.js("document.documentElement.scrollWidth") <= width
     page.page.keyboard.press("Escape")
     assert page.page.locator("#width").is_hidden() and page.js(FOCUSED) == "to-settings"
+    page.page.click("[data-view=block]")
+    page.until("document.getElementById('stage').checkVisibility()")
+    page.page.click("#to-settings")
+    stage = page.page.locator("#stage").bounding_box()
+    assert stage["y"] + stage["height"] <= sheet["y"], "all of the block is seen"
 
 
 def test_a_lecture_shows_the_stage_large_and_says_how_much_larger_the_rotation_is(opened):
