@@ -148,7 +148,8 @@ def test_the_first_page_shows_a_block_that_chatters(opened):
     cells = page.page.locator("#sequences tbody tr:last-child td").all_text_contents()
     assert cells[4] == "± 7.1 s" and cells[5].endswith(" ps")
     head = page.page.locator("#sequences th").all_text_contents()
-    assert head[3:5] == ["Off, if the motion is by a millionth", "Bracket of the computation"]
+    assert page.js("(({scrollWidth, clientWidth}) => scrollWidth <= clientWidth)(document.querySelector('.scroll'))")
+    assert head[3:5] == ["Moves, if the motion is off by a millionth", "Bracket of the computation"]
 
 
 def test_a_slider_changes_the_response(opened):
@@ -353,6 +354,37 @@ def test_ten_times_closer_again_and_again(opened):
     page.until("!new URLSearchParams(location.search).has('from')")
 
 
+#: What has moved by itself from the time on at which the page can be used: not soon after a click or a key, and more
+#: than what follows from another width of a plot's numbers. What is within a plot has no name.
+MOVED = """new Promise((done) => {
+  const name = (node) => node && (node.id || node.parentElement?.id || node.className || node.localName);
+  const moved = ({node, previousRect: before, currentRect: after}) => node && before.width && after.width
+    && (Math.abs(after.x - before.x) > 2 || Math.abs(after.y - before.y) > 2);
+  const found = [], ready = Number(document.body.dataset.ready);
+  new PerformanceObserver((list) => {
+    for (const {startTime, hadRecentInput, sources} of list.getEntries()) {
+      if (startTime > ready && !hadRecentInput) found.push(...sources.filter(moved).map(({node}) => name(node)));
+    }
+  }).observe({type: 'layout-shift', buffered: true});
+  setTimeout(() => done(found), 100);
+})"""
+
+
+@pytest.mark.parametrize("viewport", [DESK, pytest.param(PHONE, marks=MORE)])
+def test_nothing_moves_while_a_view_is_computed(opened, viewport):
+    only_chromium("tell what has moved")
+    page = opened(f"{STATUE}&points=24&levels=4&records={RECORDS}", viewport=viewport)
+    assert page.js(MOVED) == []
+    for view in ("map", "assessment"):
+        page.page.click(f"[data-view={view}]")
+        page.until(COMPUTED[view], timeout=120)
+        assert page.js(MOVED) == [], view
+    level = page.page.locator("#verdict + *").bounding_box()["y"]
+    page.page.goto(page.page.url.replace("pga=0.4g", "pga=0.9g"))
+    page.until(READY)
+    assert page.page.locator("#verdict + *").bounding_box()["y"] == level, "the verdict is shorter"
+
+
 @pytest.mark.parametrize("viewport", [DESK, pytest.param(PHONE, marks=MORE)])
 def test_nothing_moves_where_plots_are_drawn_once_they_are_seen(opened, viewport):
     page = opened(STATUE, viewport=viewport)
@@ -398,6 +430,7 @@ def test_the_phase_plane_and_the_energy_are_drawn_where_they_are_seen(opened):
 def test_a_time_is_read_by_mouse_by_keys_and_typed_and_the_block_follows(opened):
     page = opened(f"{STATUE}&from=231&to=235", allowed=["422"])
     response = statue(0.4 * 9.80665)
+    assert page.text("#cursor").startswith("Click on the plots")
 
     def read(time):
         page.until(f"Math.abs(Number(document.getElementById('cursor').dataset.time) - {time}) < 1e-9")
@@ -1076,6 +1109,10 @@ def test_a_map_of_a_record_opens_on_the_final_fate_and_hatches_what_falls_later(
     falls, at_once = (mode >= 0) | (mode == -4), outcome == 4
     shares = [float(each) for each in re.findall(r"overturns [^,]*, ([\d.e−]+) %", page.text("#map-legend"))]
     assert sum(shares) == pytest.approx(100 * falls.mean(), rel=0.05) and len(shares) >= 2
+    assert page.text("#map-y option:checked") == "Peak ground acceleration (g)"
+    assert re.match(
+        r"Frequency parameter p = 3\.\d+ rad/s, Peak ground acceleration = 1\.\d+ g: ", page.text("#map-at")
+    )
     page.page.select_option("#map-quantity", "outcome")
     page.until("document.getElementById('map-legend').textContent.includes('hatched: overturns later')")
     assert "End of the first rocking" in page.text("#map-quantity option:checked")
@@ -1550,6 +1587,7 @@ def test_explanations_open_where_they_stand(opened):
 def test_a_finger_scrolls_the_page_over_the_plots(opened):
     page = opened(STATUE, PHONE, has_touch=True, is_mobile=True)
     assert page.js(f"{MODELS}.filter((each) => each.type === 'BoxZoomTool').length") == 0
+    assert page.page.locator(".drag").is_hidden() and page.text("#cursor") == "Tap the plots to read them."
 
 
 FOCUSED = "document.activeElement.id"
@@ -1632,6 +1670,11 @@ def test_a_phone_shows_the_picture_while_settings_are_changed(opened, width):
     assert page.js("document.documentElement.scrollWidth") <= width
     page.page.keyboard.press("Escape")
     assert page.page.locator("#width").is_hidden() and page.js(FOCUSED) == "to-settings"
+    page.page.click("[data-view=block]")
+    page.until("document.getElementById('stage').checkVisibility()")
+    page.page.click("#to-settings")
+    stage = page.page.locator("#stage").bounding_box()
+    assert stage["y"] + stage["height"] <= sheet["y"], "all of the block is seen"
 
 
 def test_a_lecture_shows_the_stage_large_and_says_how_much_larger_the_rotation_is(opened):

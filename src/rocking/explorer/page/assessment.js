@@ -147,15 +147,15 @@ export class View {
     this.plot.below[0].axis_label = phrase("assessment.axis", {label, unit});
     this.plot.x_range.setv({start: 0, end: 1.02 * levels[levels.length - 1] * scale});
     const interval = (/** @type {(number | null)[]} */ ends, /** @type {(value: number | null) => string} */ written) => phrase("assessment.interval", {low: written(ends[0]), high: ends[1] === null ? "∞" : written(ends[1])});
+    const all = this.rows.length === this.about.records.length;
     const sentence = fit
       ? (bounded ? phrase("assessment.fit_bounded", {
         median: acceleration(fit.median), confidence: short(100 * fit.confidence), interval: interval(fit.median_interval, acceleration),
         dispersion: short(fit.dispersion), range: interval(fit.dispersion_interval, (value) => fixed(value, 2)),
       }) : phrase("assessment.fit", {median: acceleration(fit.median), dispersion: short(fit.dispersion)}))
-      : inWords(why);
+      : all ? inWords(why) : phrase("assessment.no_fit_so_far", {records: this.rows.length, count: this.about.records.length});
     const counts = fit && {exceeded: fit.exceeded, count: outcomes, records: this.rows.length};
     one("assessment-verdict").textContent = sentence;
-    const all = this.rows.length === this.about.records.length;
     // The notes of a fit are the package's own sentences.
     const notes = fit ? fit.notes.map((/** @type {string} */ note) => ` ${note[0].toUpperCase()}${note.slice(1)}.`).join("") : "";
     one("assessment-notes").replaceChildren(fit ? phrase(all ? "assessment.exceeded" : "assessment.exceeded_so_far", counts) : "",

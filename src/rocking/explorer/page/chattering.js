@@ -59,7 +59,7 @@ export class ChatteringPanel {
       table.replaceChildren(make("caption", {}, [phrase("chattering.none")]));
       return;
     }
-    fill(table, ["", phrase("chattering.uplift"), phrase("chattering.complete"), phrase("chattering.rest"), phrase("chattering.off"), phrase("chattering.bracket"), phrase("chattering.impacts")], this.sequences.map((each, k) => {
+    fill(table, ["", phrase("chattering.uplift"), phrase("chattering.complete"), phrase("chattering.rest"), phrase(this.shown?.header.motion ? "chattering.off" : "chattering.off_start"), phrase("chattering.bracket"), phrase("chattering.impacts")], this.sequences.map((each, k) => {
       const proven = Number.isFinite(each.upper);
       const button = make("button", {type: "button", "aria-pressed": String(k === this.chosen), on: {click: () => { this.chosen = k; this.list(); this.plot(); this.showSequence(each); }}}, [phrase("chattering.show", {number: String(k + 1)})]);
       return [button, fixed(each.uplift, 3), proven ? fixed(each.start, 4) : phrase("chattering.unproven"), fixed(each.end, 9), Number.isFinite(each.off) ? phrase("chattering.within", {span: span(each.off)}) : NONE, proven ? phrase("chattering.within", {span: span(0.5 * (each.upper - each.lower))}) : NONE, fixed(this.count(each), 0)];
@@ -92,7 +92,7 @@ export class ChatteringPanel {
     const B = bokeh();
     // Ranges that follow the data by themselves would paint everything twice.
     this.x = new B.Range1d({start: 0, end: 1});
-    this.intervals = figure({height: 210, x_range: this.x, y_range: new B.Range1d({start: 1e-3, end: 1}), y_axis_type: "log", min_border_bottom: 44}, phrase("chattering.interval_plot"));
+    this.intervals = figure({height: 232, x_range: this.x, y_range: new B.Range1d({start: 1e-3, end: 1}), y_axis_type: "log", min_border_bottom: 44}, phrase("chattering.interval_plot"));
     this.ratios = figure({height: 232, x_range: this.x, y_range: new B.Range1d({start: 0, end: 1}), min_border_bottom: 44}, phrase("chattering.ratio_plot"));
     this.intervals.left[0].axis_label = phrase("chattering.interval");
     this.ratios.left[0].axis_label = phrase("chattering.ratio");

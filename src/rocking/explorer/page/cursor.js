@@ -3,6 +3,7 @@
 import {Latest, json} from "./api.js";
 import {writeAddress} from "./parameters.js";
 import {one, say} from "./words.js";
+import {coarse} from "./theme.js";
 import {decimals, fixed, short, typed} from "./numbers.js";
 import {inWords, phrase} from "./texts.js";
 
@@ -54,7 +55,7 @@ export class Cursor {
     this.tell.mark(known ? at : null);
     window.clearTimeout(this.still);
     if (!known) {
-      one("cursor").textContent = at === null || !shown ? "" : phrase("reading.late");
+      one("cursor").textContent = phrase(at !== null && shown ? "reading.late" : coarse() ? "reading.tap" : "reading.hint");
       return;
     }
     const digits = decimals(this.width());

@@ -15,7 +15,6 @@ import {Sheet} from "./sheet.js";
 import {Snapshots} from "./snapshots.js";
 import {RecordList} from "./list.js";
 import {makePrinting} from "./print.js";
-import {coarse} from "./theme.js";
 import {angle, caseName, ofG, unitFields, unitsChosen} from "./units.js";
 import {acceptFiles} from "./upload.js";
 import {begin, settle} from "./visits.js";
@@ -296,16 +295,16 @@ function showLegend({motion, overturned, peak_over_slenderness: peak}) {
   legend("legend", entries);
 }
 
-/** @param {any} header */
+/** @param {any} header of the case; null before there is one */
 function showFigures(header) {
-  const rows = [
+  const rows = header ? [
     [phrase("figure.peak"), header.overturned ? phrase("figure.overturns") : `${short(header.peak_over_slenderness)} α`,
       header.overturned ? phrase("figure.overturn_time", {time: fixed(header.overturn_time, 3)}) : phrase("figure.peak_at", {angle: angle(header.peak_rotation), time: fixed(header.peak_time, 2)})],
     [phrase("figure.rests"), phrase("figure.times", {count: header.rests}),
       header.rests ? (header.proven === header.rests ? phrase("figure.all_proven") : phrase("figure.proven", {count: header.proven})) : phrase("figure.no_rest")],
-    [phrase("figure.impacts"), fixed(header.impacts, 0), phrase("figure.resolved")],
+    [phrase("figure.impacts"), fixed(header.impacts, 0), phrase(header.rests ? "figure.until" : "figure.resolved")],
     [phrase("figure.share"), header.share_at_rest === null ? NONE : phrase("figure.percent", {share: short(100 * header.share_at_rest, 2)}), phrase("figure.strong")],
-  ];
+  ] : [phrase("figure.peak"), phrase("figure.rests"), phrase("figure.impacts"), phrase("figure.share")].map((name) => [name, NONE, "\u00a0"]);
   const list = one("figures");
   if (!list.childNodes.length) list.append(...rows.map(([name]) => make("div", {}, [make("dt", {}, [name]), make("dd", {}, ["", make("small")])])));
   const values = list.getElementsByTagName("dd");
@@ -344,7 +343,6 @@ for (const button of document.querySelectorAll("button.what[aria-controls]")) {
   });
 }
 one("in-words").addEventListener("toggle", () => chattering.words());
-if (coarse()) one("cursor").textContent = phrase("reading.tap");
 one("settings").addEventListener("submit", (event) => event.preventDefault());
 makeCopying();
 acceptFiles(async (file, use) => {
@@ -370,6 +368,7 @@ unitFields(async () => {
 window.addEventListener("popstate", revisit);
 await examples.arrive();
 showForms(state.texts);
+showFigures(null);
 void watchCompilation();
 await (state.lecture ? lecture.enter() : go(state.view));
 document.body.inert = false;

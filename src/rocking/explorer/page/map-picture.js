@@ -8,6 +8,9 @@ import {make, one} from "./words.js";
 import {short} from "./numbers.js";
 import {inWords, phrase} from "./texts.js";
 
+/** What an axis is called, with its unit. @param {any} axis */
+export const labelled = ({label, unit}) => (unit ? phrase("map.axis_unit", {label: inWords(label), unit}) : inWords(label));
+
 export class MapPicture {
   /** @param {{over: (x: number, y: number) => void, chosen: (x: number, y: number) => void, zoomed: (box: number[]) => void}} tell is told where the
    * pointer is, where it clicked, and what rectangle it drew: ends to the right, ends upwards */
@@ -66,9 +69,8 @@ export class MapPicture {
     this.about = about;
     if (!this.plot) this.build();
     const {x, y} = about;
-    const label = (/** @type {any} */ axis) => (axis.unit ? phrase("map.axis_unit", {label: inWords(axis.label), unit: axis.unit}) : inWords(axis.label));
-    this.plot.below[0].axis_label = label(x);
-    this.plot.left[0].axis_label = label(y);
+    this.plot.below[0].axis_label = labelled(x);
+    this.plot.left[0].axis_label = labelled(y);
     const [x0, x1, y0, y1] = this.box();
     this.show([x0, x1, y0, y1]);
     for (const [name, source] of Object.entries(this.curves ?? {})) {

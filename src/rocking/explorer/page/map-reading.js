@@ -3,7 +3,7 @@
 import {payload} from "./api.js";
 import {colour} from "./theme.js";
 import {make, one, say} from "./words.js";
-import {short} from "./numbers.js";
+import {joined, short} from "./numbers.js";
 import {inWords, phrase} from "./texts.js";
 
 /** How long pointer or mark must lie still before a response is asked for, ms. */
@@ -126,7 +126,7 @@ export class MapReading {
     if (!this.view.about || !this.view.values) return;
     const [row, column] = this.place(x, y);
     const written = (/** @type {any} */ axis, /** @type {number} */ k) => {
-      const label = inWords(axis.label), value = short(axis.values[k]);
+      const label = inWords(axis.label), value = joined(short(axis.values[k]), axis.unit);
       return axis.names ? phrase("map.coordinate_named", {label, value, name: axis.names[k]}) : phrase("map.coordinate", {label, value});
     };
     const index = row * this.view.about.shape[1] + column;

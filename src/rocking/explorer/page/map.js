@@ -3,13 +3,13 @@
 import {Latest, frames, json, payload} from "./api.js";
 import {choose} from "./controls.js";
 import {showExports} from "./exports.js";
-import {MapPicture} from "./map-picture.js";
+import {MapPicture, labelled} from "./map-picture.js";
 import {MapReading} from "./map-reading.js";
 import {MapZoom} from "./map-zoom.js";
 import {namesOf, specification} from "./parameters.js";
 import {make, one} from "./words.js";
 import {short, typed} from "./numbers.js";
-import {inWords, phrase} from "./texts.js";
+import {phrase} from "./texts.js";
 
 const ENDS = ["x_from", "x_to", "y_from", "y_to"];
 
@@ -135,7 +135,7 @@ export class View {
     const {names, right} = this.axes();
     for (const [name, slice] of Object.entries(this.slices)) slice.hidden = [map.x, map.y].some((axis) => name === `fix_${axis}` || name === `${axis}_index`);
     const offered = this.study ? this.study.axes : specification.axes;
-    const label = (/** @type {string} */ name) => inWords(offered.find((/** @type {any} */ each) => each.name === name).label);
+    const label = (/** @type {string} */ name) => labelled(offered.find((/** @type {any} */ each) => each.name === name));
     for (const [name, values] of Object.entries({x: right, y: names})) {
       this.select(name).replaceChildren(...values.map((/** @type {string} */ value) => make("option", {value}, [label(value)])));
       this.select(name).value = map[name];

@@ -76,5 +76,8 @@ export function span(seconds) {
   return `${short(seconds / unit)} ${name}`;
 }
 
+/** A number with its unit, if it has one. @param {string} number @param {string} unit */
+export const joined = (number, unit) => (/^(?:[° ]|$)/.test(unit) ? `${number}${unit}` : `${number} ${unit}`);
+
 /** Decimals of times in a window of this width. @param {number} width */
 export const decimals = (width) => Math.min(15, Math.max(2, 3 - Math.floor(Math.log10(width))));

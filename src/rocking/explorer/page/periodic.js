@@ -209,7 +209,7 @@ export class View {
     void showPlot(this.plot, one("diagram"));
     legend("orbit-legend", [
       ["line", phrase("orbit.trajectory")], ["jump", phrase("orbit.jump")], ["dot", phrase("orbit.start")], ["at", phrase("orbit.case")],
-      ["up-dot", phrase("orbit.upwards")], ["down-ring", phrase("orbit.downwards")], ["cross", phrase("orbit.cross")],
+      ["up-dot", phrase("orbit.upwards")], ["down-ring", phrase("orbit.downwards")], ["cross", phrase("orbit.over_up")], ["over-ring", phrase("orbit.over_down")],
     ]);
   }
 

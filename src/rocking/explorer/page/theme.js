@@ -81,6 +81,7 @@ export function figure(given, label) {
 /** Put a plot into an element. Keys go to the element: within the plot the keyboard does not stop, where nobody would see it.
  * @param {any} plot @param {HTMLElement} element */
 export async function showPlot(plot, element) {
+  element.inert = true; // until the keyboard does not stop there any more
   await bokeh().Plotting.show(plot, element);
   /** @param {Element | ShadowRoot} node */
   const pass = (node) => {
@@ -90,6 +91,7 @@ export async function showPlot(plot, element) {
     }
   };
   pass(element);
+  element.inert = false;
 }
 
 /** Whether the pointer is a finger: then dragging scrolls the page. */

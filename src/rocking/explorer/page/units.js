@@ -1,7 +1,7 @@
 // Units in which the page shows lengths, angles and accelerations: chosen once, and part of the address.
 
 import {make, one} from "./words.js";
-import {NONE, short} from "./numbers.js";
+import {NONE, joined, short} from "./numbers.js";
 import {phrase} from "./texts.js";
 
 /** What one SI unit is in each unit, and how the page writes that. @type {Record<string, [number, string, string]>} */
@@ -42,7 +42,7 @@ export function inUnits(spec) {
 function written(name, value, digits = 3, which = 1) {
   const [scale] = KNOWN[chosen[name]], unit = KNOWN[chosen[name]][which];
   if (value === null || !Number.isFinite(value)) return NONE;
-  return `${short(value * scale, digits)}${/^[° ]/.test(unit) ? unit : ` ${unit}`}`;
+  return joined(short(value * scale, digits), unit);
 }
 
 /** @param {number | null} value in m/s² @param {number} [digits] */
