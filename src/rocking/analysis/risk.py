@@ -253,8 +253,9 @@ class Risk(DrawnResult):
             if share > 0.01
         ]
         notes += [
-            f"{one.limit_state}: the upper end, {one.interval[1]:.2g} a year, is more than all motions of the hazard "
-            "curve are: it is from weaker ones, to which its first line is extended; more motions narrow the interval"
+            f"{one.limit_state}: the upper end, {one.interval[1]:.2g} a year, is above the highest rate of the hazard "
+            "curve: it comes from weaker motions, to which the first line of the curve is extended; more motions "
+            "narrow the interval"
             for one in self.rates
             if self.hazard.rate[0] < one.interval[1] < math.inf
         ]
