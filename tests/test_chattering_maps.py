@@ -179,6 +179,22 @@ def test_unusable_parameters_are_refused(parameters):
         chattering_map(families.sine(BLOCK), parameters)
 
 
+@pytest.mark.parametrize("names", [("omega", "a"), ("omega", "amplitude"), ("frequency", "a")])
+def test_parameters_that_a_family_has_by_name_may_stand_in_any_order(names):
+    frequencies, amplitudes = [1.0, 2.0, 4.0], [1.02, 1.05]
+    usual = chattering_map(families.sine(BLOCK), {"a": amplitudes, "omega": frequencies})
+    turned = chattering_map(families.sine(BLOCK), dict(zip(names, (frequencies, amplitudes), strict=True)))
+    assert turned.outcome.dims == names
+    np.testing.assert_array_equal(turned.outcome.values, usual.outcome.values.T)
+    assert len(np.unique(usual.outcome)) > 1
+
+
+def test_names_that_a_family_does_not_have_keep_their_order():
+    usual = chattering_map(families.sine(BLOCK), {"a": [1.02, 1.05], "omega": [1.0, 2.0]})
+    named = chattering_map(families.sine(BLOCK), {"amplitude": [1.02, 1.05], "frequency": [1.0, 2.0]})
+    np.testing.assert_array_equal(named.outcome.values, usual.outcome.values)
+
+
 def test_a_map_is_the_same_in_one_thread_and_in_several():
     parameters = {"a": [0.9, 1.03, 1.05, 9.0], "omega": [1.0, 2.0]}
     one, several = (chattering_map(families.sine(BLOCK), parameters, threads=count) for count in (1, 3))

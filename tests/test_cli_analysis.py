@@ -141,6 +141,7 @@ def test_fragility_prints_a_table_and_writes_what_it_says(run, tmp_path):
     ("arguments", "word"),
     [
         (["spectrum", RECORD, "--alpha", "0.2"], "one of --p"),
+        (["spectrum", RECORD, "--alpha", "0.2", "--size", "1s"], "--size takes a length as 0.2, 0.2m or 20cm"),
         (["spectrum", "--alpha", "0.2", "--p", "2"], "record"),
         (["spectrum", RECORD, "--alpha", "high", "--p", "2"], "--alpha"),
         (["spectrum", RECORD, "--alpha", "0.2", "--p", "1:2"], "--p"),

@@ -117,7 +117,10 @@ def test_an_angle_beyond_all_degrees_is_refused_without_a_hint():
 def test_swapped_sizes_are_suspected(run, sizes):
     code, _, err = run("simulate", RECORD, *sizes)
     assert code == 2
-    assert "swap its sizes" in err and "if that is a slip" in err and "--restitution" in err
+    wide, high = float(sizes[1]), float(sizes[3])
+    full = 2.0 if sizes[0] == "--half-width" else 1.0
+    assert f"it is {full * wide:g} m wide and {full * high:g} m high, so swap its sizes if that is a slip" in err
+    assert "--restitution" in err
 
 
 def test_a_rotation_may_be_negative(run):

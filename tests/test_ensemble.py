@@ -210,7 +210,7 @@ def test_the_result_can_be_written_and_says_what_it_is(records, tmp_path):
     [
         ({"levels": 1.0, "measure": "pga_ratio"}, "measure must be one of factor, pga, pgv, sa"),
         ({"levels": 1.0, "measure": Measure("pga_ratio")}, "measure must be one of factor, pga, pgv, sa"),
-        ({"levels": 1.0, "measure": "sa"}, "needs period"),
+        ({"levels": 1.0, "measure": "sa"}, r"give rocking\.Measure\(.sa., period=1\.0\), in s"),
         ({"measure": "pga"}, "levels"),
         ({"levels": []}, "positive"),
         ({"levels": [1.0, -1.0]}, "positive"),

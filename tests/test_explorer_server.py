@@ -834,6 +834,12 @@ def test_the_command_refuses_with_one_line(run, arguments, words):
     assert words in err.splitlines()[-1]
 
 
+def test_a_folder_without_a_study_is_refused(run, tmp_path):
+    code, out, err = run("explore", "--no-open", tmp_path)
+    assert (code, out) == (2, "")
+    assert "this folder holds no study; name one record, and drop the other files on the page" in err
+
+
 def test_a_missing_package_is_named(run, monkeypatch):
     monkeypatch.setattr(launch.util, "find_spec", lambda name: None)
     code, _, err = run("explore", "--no-open")

@@ -396,7 +396,11 @@ def test_the_figure_shows_curves_bands_and_shares():
 @pytest.mark.parametrize(
     ("intensity", "exceeded", "sentence"),
     [
-        ([1.0, 2.0, 3.0], [0, 0, 0], "none of the 3 outcomes exceeds .* stronger motions"),
+        (
+            [1.0, 2.0, 3.0],
+            [0, 0, 0],
+            r"none of the 3 outcomes exceeds the limit, at 1 m/s\^2 \(0.102 g\) to 3 .*: stronger motions",
+        ),
         ([1.0, 2.0, 3.0], [1, 1, 1], "all of the 3 outcomes exceed .* weaker motions"),
         (
             [1.0, 2.0, 3.0, 4.0],
@@ -413,7 +417,7 @@ def test_the_figure_shows_curves_bands_and_shares():
         ([1.0, 2.0, 3.0, 4.0, 5.0, 6.0], [1, 1, 0, 1, 0, 0], "contradict a curve that rises"),
         ([1.0, 2.0, 4.0], [0, 1, 0], "contradict a curve that rises"),
         ([2.0, 2.0, 2.0], [0, 1, 0], r"all outcomes are at one intensity, 2 m/s\^2"),
-        ([1.0], [1], "the only outcome exceeds"),
+        ([1.0], [1], r"the only outcome exceeds the limit, at 1 m/s\^2 \(0.102 g\): weaker"),
     ],
 )
 def test_outcomes_without_a_best_lognormal_are_refused_in_one_sentence(intensity, exceeded, sentence):

@@ -135,6 +135,13 @@ def test_a_time_has_the_digits_that_a_millionth_of_the_motion_leaves(time, chang
     assert time_text(time, change) == text
 
 
+def test_a_summary_explains_the_margins_that_it_has():
+    fallen = rocking.simulate(Block(width=0.22, height=1.1), rocking.records.load("ridgecrest-tow2-360")).summary()
+    assert "overturn            38.747 +- 0.004 s" in fallen
+    last = fallen.splitlines()[-1]
+    assert last == "+-                  by how much the number before it is off if the motion is off by a millionth"
+
+
 @pytest.mark.parametrize("change", [math.inf, math.nan])
 def test_a_change_beyond_all_numbers_leaves_no_digit_that_is_told_as_known(change):
     assert time_text(230.7, change) == "about 231 s"

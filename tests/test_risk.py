@@ -339,6 +339,28 @@ def test_points_out_of_order_are_named_with_their_file(tmp_path: Path, rows: str
     assert str(caught.value).startswith(f"{path}: ")
 
 
+def test_a_hazard_curve_that_looks_as_if_in_per_cent_of_g_is_noted(run, tmp_path: Path) -> None:
+    seen = tmp_path / "seen.csv"
+    seen.write_text("pga_g,overturned,trials\n0.2,1,10\n0.3,4,10\n0.4,7,10\n")
+    site = tmp_path / "site.csv"
+    for factor, is_noted in ((1.0, False), (100.0, True)):
+        site.write_text(f"pga_g,annual_rate\n{0.1 * factor},1e-2\n{0.8 * factor},5e-5\n")
+        code, _, notes = run("fragility", "--outcomes", seen, "--hazard", site)
+        assert code == 0
+        assert ("are its units right?" in notes) is is_noted
+    assert "even the weakest motions of the hazard curve have 98.0665 m/s^2 (10 g)" in notes
+
+
+def test_an_interval_that_ends_beyond_the_hazard_curve_is_told() -> None:
+    few = rocking.fit_fragility([2.0, 3.0, 4.0, 5.0, 6.0, 7.0], [0, 0, 1, 0, 1, 1], trials=1)
+    steep = rocking.HazardCurve([1.0, 2.0, 4.0, 8.0], [1e-2, 3e-3, 5e-4, 5e-5])
+    risk = few.annual_rate(steep)
+    assert steep.rate[0] < risk.rates[0].interval[1] < math.inf
+    assert "it comes from weaker motions, to which the first line of the curve is extended" in risk.summary()
+    many = rocking.fit_fragility([2.0, 4.0, 8.0], [1, 4, 9], trials=10)
+    assert "is extended" not in many.annual_rate(steep).summary()
+
+
 @pytest.mark.parametrize("site", [1, -1, float("nan"), "x"])
 def test_a_table_has_one_site_only(tmp_path: Path, site: int) -> None:
     path = tmp_path / "site.csv"

@@ -155,7 +155,7 @@ def test_a_coarse_threshold_hides_overturning():
     (outcome,) = comparison.outcomes
     assert comparison.certified.response.overturned
     assert not outcome.response.overturned
-    assert outcome.overturns_wrongly
+    assert outcome.wrong_verdict
     assert not outcome.is_right
     assert "does not overturn, wrongly" in outcome.verdict
 
@@ -232,7 +232,7 @@ def test_tables_have_a_row_for_each_scheme_and_each_rest():
     schemes, rests = found.to_dataframe(), found.to_dataframe("rests")
     assert schemes["scheme"].tolist() == ["certified", "velocity", "moreau-jean", "time"]
     assert schemes["parameter"].tolist() == [1e-12, 1e-3, 1e-3, "eq76"]
-    assert schemes["unit"].tolist() == ["s", "1", "s", ""]
+    assert schemes["unit"].tolist() == ["s", "p alpha", "s", ""]
     assert schemes["cost_unit"].tolist() == ["arcs", "arcs", "steps", "arcs"]
     assert schemes["position_error_rad"][0] == 0.0
     assert (schemes["position_error_over_largest"][1:] > 0.0).all()

@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from rocking.arrays import Floats
 from rocking.block import Block, Load, RestrainedBlock, RestrainedBlocks, Thrust
 from rocking.block.rigid_body import rigid_bodies
 from rocking.constants import STANDARD_GRAVITY
@@ -15,6 +16,7 @@ from rocking.errors import Message
 from rocking.motion import measures
 from rocking.motion.description import Origin
 from rocking.motion.motion import Motion
+from rocking.motion.scaling import Measure
 
 #: Peak accelerations of ground motions that were ever of interest, g.
 _WEAKEST: Final = 1e-3
@@ -23,6 +25,9 @@ _STRONGEST: Final = 5.0
 #: Peak velocities and sampling steps beyond those of any record, m/s and s.
 _FASTEST: Final = 5.0
 _COARSEST: Final = 0.1
+
+#: Peak velocities between which a hazard curve has some, m/s.
+_SPEEDS: Final = (1e-3, _FASTEST)
 
 #: Times of a record are even but for this part of a step; more gaps than this part of the steps are none.
 _UNEVEN: Final = 0.02
@@ -149,6 +154,25 @@ def level_notes(text: str, value: float, name: str) -> tuple[Message, ...]:
         return ()
     sentence = f"{{}} {text} is taken for {value:g} m/s^2, {value / STANDARD_GRAVITY:.3g} g; write {text}g for {text} g"
     return (Message(sentence, (name,)),)
+
+
+def hazard_notes(intensity: Floats, measure: Measure) -> tuple[str, ...]:
+    """Return what looks like a mistake in the units of a hazard curve's intensities; empty if nothing does.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> hazard_notes(9.80665 * np.array([0.1, 0.8]), Measure("pga"))
+    ()
+    >>> print(*hazard_notes(9.80665 * np.array([10.0, 80.0]), Measure("pga")))
+    even the weakest motions of the hazard curve have 98.0665 m/s^2 (10 g): are its units right?
+    """
+    weakest, strongest = float(intensity[0]), float(intensity[-1])
+    least, most = (_WEAKEST * STANDARD_GRAVITY, _STRONGEST * STANDARD_GRAVITY) if measure.units == "m/s^2" else _SPEEDS
+    for which, value, is_odd in (("weakest", weakest, weakest > most), ("strongest", strongest, strongest < least)):
+        if is_odd:
+            return (f"even the {which} motions of the hazard curve have {measure.shown(value)}: are its units right?",)
+    return ()
 
 
 def block_notes(block: Block) -> tuple[Message | str, ...]:

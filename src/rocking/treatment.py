@@ -38,7 +38,7 @@ class Treatment(ABC):
     name: ClassVar[str]
     #: What the kernels compare with the limits, a code of `rocking.kernels.state`.
     code: ClassVar[int]
-    #: Unit of its parameter in tables; "1" is of a number without one, and "" of a word.
+    #: Unit of its parameter in tables; "speed" is the body's own unit of speed, and "" is of a word.
     unit: ClassVar[str]
 
     def __init_subclass__(cls) -> None:
@@ -272,7 +272,7 @@ class VelocityThreshold(Treatment):
 
     name: ClassVar[str] = "velocity"
     code: ClassVar[int] = state.RestRule.VELOCITY
-    unit: ClassVar[str] = "1"
+    unit: ClassVar[str] = "speed"
 
     threshold: float = 5e-10
 

@@ -537,4 +537,5 @@ def _perhaps_swapped(half_width: float, half_height: float) -> str:
     """Return what to try first where a block is wider than it is high; else nothing."""
     if half_width <= half_height:
         return ""
-    return f"swap its sizes, {2.0 * half_width:g} m wide and {2.0 * half_height:g} m high, if that is a slip, or "
+    width, height = 2.0 * half_width, 2.0 * half_height
+    return f"it is {width:g} m wide and {height:g} m high, so swap its sizes if that is a slip, or "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -110,7 +111,8 @@ def chattering_map(
         Makes a `SimulationInput` (block, motion, model) from two numbers: one of `rocking.chattering.families`, or your
         own.
     parameters : mapping
-        Names and values of the two parameters, in the order in which the family takes them.
+        Names and values of the two parameters, the first of them upwards in the figure. Those that the family has by
+        these names go there; else they are given to it in this order.
     threads : int, optional
         Number of threads; by default one for every core.
     progress : bool, optional
@@ -149,7 +151,8 @@ def chattering_map(
         raise InvalidOption(f"{{}} must be two, not {len(parameters)}", "parameters")
     count = None if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
     (first, x), (second, y) = ((name, _axis(values, name)) for name, values in parameters.items())
-    inputs = [family(float(one), float(other)) for one in x for other in y]
+    swapped = _is_swapped(family, str(first), str(second))
+    inputs = [family(*map(float, (other, one) if swapped else (one, other))) for one in x for other in y]
     points = []
     with Progress("mapping", len(inputs), show=progress) as bar:
         for point in in_threads(_simulated, inputs, threads=count):
@@ -330,6 +333,15 @@ def _is_complete(response: Response, rests: int, uplift: float, rest: float) -> 
     states = state.new_states(1, 0)
     states["rests"], states["first_uplift"], states["first_rest"] = rests, uplift, rest
     return bool(complete_chattering(trail_of(response).ground, np.array([trail_of(response).block]), states)[0])
+
+
+def _is_swapped(family: Family, first: str, second: str) -> bool:
+    """Whether a family has two parameters, by the names of which they stand the other way round."""
+    try:
+        taken = [*inspect.signature(family).parameters]
+    except (TypeError, ValueError):  # a callable that does not tell its parameters
+        return False
+    return len(taken) > 1 and (first == taken[1] or second == taken[0])
 
 
 def _axis(values: ArrayLike, name: str) -> Floats:

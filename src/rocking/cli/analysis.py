@@ -26,7 +26,7 @@ from rocking.cli.options import (
 from rocking.cli.output import OUTPUT, OutputOptions, deliver
 from rocking.cli.records import RECORDS, MotionOptions, Names, ReadRecords, UnscaledOptions
 from rocking.errors import InvalidOption
-from rocking.quantities import angle, tilt, values
+from rocking.quantities import angle, length, tilt, values
 from rocking.result import DatasetResult
 
 
@@ -56,7 +56,7 @@ def spectrum(
     p
         Frequency parameters, rad/s; or give --size.
     size
-        Half diagonals of rectangular blocks, m; or give --p.
+        Half diagonals of rectangular blocks, as 0.5,1 (m) or 50cm:5m:10; or give --p.
     restitution
         Restitutions; Housner's by default.
     ensemble
@@ -79,7 +79,7 @@ def spectrum(
     with output.folder() as folder:
         axes: dict[str, Any] = {
             "p": None if p is None else values(p, "p"),
-            "size": None if size is None else values(size, "size"),
+            "size": None if size is None else values(size, "size", length),
         }
         how = model.chosen()
         if alpha is not None:

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from rocking.cli.output import OUTPUT, QuietOptions
-from rocking.errors import UnreadableRecord
+from rocking.errors import InvalidOption, UnreadableRecord
 from rocking.motion.named import is_shipped
 
 if TYPE_CHECKING:
     from rocking.explorer.core import Explorer
+    from rocking.explorer.studies import StudyView
 
 
 def explore(
@@ -43,15 +44,26 @@ def explore(
 
     require_packages()
     from rocking.explorer.core import Explorer
-    from rocking.explorer.studies import StudyView
 
     explorer = Explorer()
     is_study = motion is not None and Path(motion).is_dir()
-    study = StudyView(Path(motion)) if motion is not None and is_study else None
+    study = _study(Path(motion)) if motion is not None and is_study else None
     texts = {"view": "map"} if is_study else {} if motion is None else _opening(explorer, motion)
     server = served(explorer, texts, study, address=address, port=port)
     server.announce(open_browser=not no_open)
     server.run()
+
+
+def _study(folder: Path) -> StudyView:
+    """Study in a folder, to be shown as maps."""
+    from rocking.explorer.studies import StudyView
+    from rocking.studies.place import place_of
+    from rocking.studies.store import exists
+
+    if not exists(place_of(folder)):
+        sentence = "this folder holds no study; name one record, and drop the other files on the page"
+        raise InvalidOption(sentence, path=str(folder))
+    return StudyView(folder)
 
 
 def _opening(explorer: Explorer, motion: str) -> dict[str, str]:

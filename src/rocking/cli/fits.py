@@ -33,6 +33,7 @@ from rocking.ensemble import Polarity
 from rocking.errors import InvalidOption, RockingError, Unfitted, literal
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
+from rocking.plausibility import hazard_notes
 from rocking.progress import note
 from rocking.quantities import bounds, number, tilt
 from rocking.tables import counted, text_table, write_csv
@@ -100,7 +101,7 @@ def fragility(
     if outcomes is not None:
         _refuse_beside_outcomes(names, block, motion, measure, limits, polarity)
     bodies = {} if outcomes is not None else block.blocks(model)
-    curve = None if hazard is None else HazardCurve.read(hazard, site=site, period=measure.period)
+    curve = None if hazard is None else _hazard(hazard, site, measure.period)
     checks.positive(years, "years", InvalidOption)
     states = _limits(limits)
     if output.out is not None:
@@ -159,6 +160,14 @@ def _outcomes_kept(folder: Path | None) -> Iterator[None]:
             write_csv(folder / "outcomes.csv", refused.outcomes)
             note(f"what was simulated is in {folder / 'outcomes.csv'}")
         raise
+
+
+def _hazard(file: Path, site: int, period: float | None) -> HazardCurve:
+    """Read a hazard curve, with notes on what looks like a mistake."""
+    curve = HazardCurve.read(file, site=site, period=period)
+    for sentence in hazard_notes(curve.intensity, curve.measure):
+        note(f"{file}: {sentence}")
+    return curve
 
 
 def _check_hazard(curve: HazardCurve | None, measure: Measure) -> None:

@@ -401,8 +401,7 @@ class ModelOptions:
         Model | None,
         Parameter(
             name="--model",
-            help="Equation of motion: exact (nonlinear, the default), or linearised for slender blocks; an ensemble "
-            "has its own.",
+            help="Equation of motion: exact (nonlinear, the default), or linearised for slender blocks.",
         ),
     ] = None
 

@@ -63,7 +63,7 @@ class SchemeOutcome:
         Arcs, or steps of time stepping.
     processor_time : float
         Of one run, s; NaN where it was not measured.
-    overturns_wrongly : bool
+    wrong_verdict : bool
         Whether the verdict on overturning is wrong.
     """
 
@@ -75,7 +75,7 @@ class SchemeOutcome:
     position_error: float
     cost: int
     processor_time: float
-    overturns_wrongly: bool
+    wrong_verdict: bool
 
     def __repr__(self) -> str:
         return f"<SchemeOutcome: {self.scheme.label}: {self.verdict}>"
@@ -105,7 +105,7 @@ class SchemeOutcome:
     @property
     def is_right(self) -> bool:
         """Whether it finds every rest, no other one, and the right verdict; how exactly, `largest_error` says."""
-        return not (self.false_rests.size or self.missed.size or self.overturns_wrongly)
+        return not (self.false_rests.size or self.missed.size or self.wrong_verdict)
 
     @property
     def verdict(self) -> str:
@@ -115,7 +115,7 @@ class SchemeOutcome:
             faults.append(f"{counted(self.false_rests.size, 'false rest')}, the first at {self.false_rests[0]:.6f} s")
         if self.missed.size:
             faults.append(f"{counted(self.missed.size, 'rest')} missed, the first at {self.missed[0]:.6f} s")
-        if self.overturns_wrongly:
+        if self.wrong_verdict:
             faults.append("overturns, wrongly" if self.response.overturned else "does not overturn, wrongly")
         if isinstance(self.response, Response) and self.response.stalled:
             faults.append(f"{counted(self.response.stalled, 'rest')} only as time no longer advanced")
@@ -222,7 +222,7 @@ class SchemeComparison(DrawnResult, TableResult):
     def _entry(self, outcome: SchemeOutcome) -> dict[str, Any]:
         """Return what all tables say of a scheme, in plain values."""
         scheme, rests = outcome.scheme, outcome.rests["time"]
-        value, unit = _parameter(scheme)
+        value, unit = _parameter(scheme, self._unit)
         timed = {named("processor_time", "s"): outcome.processor_time} if self._is_timed else {}
         impacts = outcome.impact_times
         first = float(rests[0]) if rests.size else math.inf
@@ -243,7 +243,7 @@ class SchemeComparison(DrawnResult, TableResult):
             "impacts": len(impacts),
             "impacts_to_first_rest": int(np.sum(impacts <= first)),
             named("penetration", self._unit): outcome.penetration,
-            "overturns_wrongly": outcome.overturns_wrongly,
+            "wrong_verdict": outcome.wrong_verdict,
         }
 
     def _frame(self, table: str) -> pd.DataFrame:
@@ -256,7 +256,7 @@ class SchemeComparison(DrawnResult, TableResult):
         found = [
             {"scheme": outcome.scheme.name, "parameter": value, "unit": unit, **rest}
             for outcome in self.outcomes
-            for value, unit in [_parameter(outcome.scheme)]
+            for value, unit in [_parameter(outcome.scheme, self._unit)]
             for rest in rows_of(outcome.rests)
         ]
         units = {"time": "s", "certified": "s", "error": "s"}
@@ -293,12 +293,13 @@ class SchemeComparison(DrawnResult, TableResult):
         )
 
 
-def _parameter(scheme: Scheme) -> tuple[float | str, str]:
-    """Return the parameter of a scheme and its unit."""
+def _parameter(scheme: Scheme, coordinate: str) -> tuple[float | str, str]:
+    """Return the parameter of a scheme and its unit, of a body whose coordinate has a unit."""
     if isinstance(scheme, TimeStepping):
         return scheme.step, "s"
     (parameter,) = (getattr(scheme, each.name) for each in fields(scheme))
-    return parameter, scheme.unit
+    speed = "p alpha" if coordinate == "rad" else f"{coordinate}/s"
+    return parameter, speed if scheme.unit == "speed" else scheme.unit
 
 
 def _cost_unit(scheme: Scheme) -> str:

@@ -266,7 +266,7 @@ def _outcome(
         position_error=_position_error(response, exact),
         cost=len(trail_of(response).nodes) if isinstance(response, Response) else len(response.times) - 1,
         processor_time=math.nan,
-        overturns_wrongly=response.overturned != certified.overturned,
+        wrong_verdict=response.overturned != certified.overturned,
     )
 
 

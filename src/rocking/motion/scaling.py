@@ -105,7 +105,7 @@ class Measure:
         Raises
         ------
         InvalidOption
-            If it is no measure, or none of them.
+            If it is no measure, or none of them, or a spectral acceleration by its name alone.
 
         Examples
         --------
@@ -116,6 +116,8 @@ class Measure:
             checks.one_of(measure.name, "measure", InvalidOption, among)
             return measure
         checks.one_of(measure, "measure", InvalidOption, among)
+        if measure == "sa":
+            raise InvalidOption('{} "sa" needs a period: give rocking.Measure("sa", period=1.0), in s', "measure")
         return cls(measure)
 
     @property

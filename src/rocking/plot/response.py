@@ -278,7 +278,7 @@ def _draw_sequence(axes: Axes, sequence: DrawnSequence) -> None:
     axes.grid()
     width = sequence.rest_upper - sequence.rest_lower
     decimals = 6 if sequence.off < 1e-6 else max(0, math.floor(-math.log10(sequence.off)))
-    axes.set_title(f"A: at rest at {rest:.{decimals}f} s", color=ABOVE, loc="left", wrap=True)
+    axes.set_title(f"A: at rest at {rest:.{decimals}f}\N{NO-BREAK SPACE}s", color=ABOVE, loc="left", wrap=True)
     known = f"± {sequence.off:.0e} s if\n{sequence.driver} is off\nby a millionth;\n" if sequence.off >= 1e-6 else ""
     # Below the falling line there is room.
     words = f"{known}bracket of the\ncomputation\n{width:.0e} s"

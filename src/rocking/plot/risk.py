@@ -68,7 +68,7 @@ def risk_figure(
         shares.set(xlim=(float(intensity[shown][0]), float(intensity[shown][-1])))
         shares.set_ylim(bottom=0.0)
         shares.grid()
-        add_labels(shares, intensity_label, "share of the rate (per unit of ln)")
+        add_labels(shares, intensity_label, "share of the rate per factor of e")
         add_legend(figure, ax, handles_of(*panels))
     return figure
 

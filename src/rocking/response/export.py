@@ -16,7 +16,7 @@ from rocking.plot.response import RotationUnits
 from rocking.problem import thresholds_of
 from rocking.response.answers import Answers, history_of
 from rocking.response.history import even_times
-from rocking.response.sensitivity import KNOWN, driving
+from rocking.response.sensitivity import KNOWN, driver, driving
 from rocking.tables import as_written, named, rows_of
 
 if TYPE_CHECKING:
@@ -231,8 +231,8 @@ def _longest_sequence(response: Answers, start: float, end: float) -> tuple[Floa
         return None
     times = _within(response.impacts["time"], longest["start"], longest["end"])
     change = driving(response.sensitivity)[1][response.events["time"] == longest["end"]]
-    driver = "the initial state" if response.motion is None else "the motion"
-    return times, float(longest["lower"]), float(longest["upper"]), KNOWN * float(change.max(initial=0.0)), driver
+    off = KNOWN * float(change.max(initial=0.0))
+    return times, float(longest["lower"]), float(longest["upper"]), off, driver(response.motion)
 
 
 def _within(times: Floats, start: float, end: float) -> Floats:

@@ -147,6 +147,11 @@ def driving(found: Sensitivity) -> tuple[float, Floats, Floats]:
     return float(_total(found.peak, DRIVING)[0]), _total(found.events, DRIVING), _total(found.impacts, DRIVING)
 
 
+def driver(motion: object | None) -> str:
+    """Say what drives the body: a motion or, where there is none, its initial state."""
+    return "the initial state" if motion is None else "the motion"
+
+
 def _total(values: NDArray[np.void], quantities: tuple[str, ...]) -> Floats:
     total: Floats = np.sum([np.abs(values[name]) for name in quantities], axis=0)
     return total

@@ -12,7 +12,7 @@ from rocking.body import Body
 from rocking.problem import thresholds_of
 from rocking.response.answers import Answers
 from rocking.response.export import records
-from rocking.response.sensitivity import KNOWN, driving
+from rocking.response.sensitivity import KNOWN, driver, driving
 from rocking.result import Row
 from rocking.tables import counted, named
 
@@ -65,7 +65,9 @@ def summary_rows(response: Answers, friction: float | None) -> list[Row]:
         ]
     rows.append(Row("verdict", _verdict(response), note="" if math.isnan(sliding) else " (as if it did not slide)"))
     if any(" +- " in row.text for row in rows):
-        rows.append(Row("+-", "what a millionth more or less of what drives the block changes"))
+        rows.append(
+            Row("+-", f"by how much the number before it is off if {driver(response.motion)} is off by a millionth")
+        )
     return rows
 
 
@@ -275,10 +277,9 @@ def _rest_text(response: Answers, time: float, change: float, sequence: np.void)
         # The bracket is for the motion to the last place: beside a time with fewer digits it would say too much.
         bracket = f", bracket {width:.1e} s wide" if decimals >= _MOST_DECIMALS else ""
         return f"{text}, complete chattering proven from {start} s on{bracket}"
-    driver = "the initial state" if response.motion is None else "the motion"
     off = f"+- {unknown:.1g} s" if unknown < 0.5 * time else "far from it"
     known = "rest proven" if width >= 0.0 else "by the treatment, not proven"
-    return f"at about {time:.{decimals}f} s ({off} if {driver} is off by a millionth); {known}"
+    return f"at about {time:.{decimals}f} s ({off} if {driver(response.motion)} is off by a millionth); {known}"
 
 
 def _peak_rows(response: Answers) -> list[Row]:

@@ -126,10 +126,10 @@ def unidentified(data: Outcomes, shown: Callable[[float], str]) -> str | None:
     yes, no, count = z[exceeded > 0], z[exceeded < trials], round(float(trials.sum()))
     if not yes.size:
         which = "the only outcome does not exceed" if count == 1 else f"none of the {count} outcomes exceeds"
-        return f"{which} the limit: stronger motions are needed"
+        return f"{which} the limit, {_tried(z, shown)}: stronger motions are needed"
     if not no.size:
         which = "the only outcome exceeds" if count == 1 else f"all of the {count} outcomes exceed"
-        return f"{which} the limit: weaker motions are needed"
+        return f"{which} the limit, {_tried(z, shown)}: weaker motions are needed"
     if z.min() == z.max():
         return f"all outcomes are at one intensity, {shown(math.exp(z[0]))}: others are needed"
     if no.max() <= yes.min() + _overlap(z):
@@ -149,6 +149,12 @@ def unidentified(data: Outcomes, shown: Callable[[float], str]) -> str | None:
             "another measure or more motions are needed"
         )
     return None
+
+
+def _tried(z: Floats, shown: Callable[[float], str]) -> str:
+    """Say at which intensities outcomes are."""
+    low, high = (shown(math.exp(end)) for end in (z.min(), z.max()))
+    return f"at {low}" if low == high else f"at {low} to {high}"
 
 
 def fit(data: Outcomes) -> Probit:

@@ -62,7 +62,7 @@ def figure_5(*, omega: float = OMEGA, eta: float = ETA) -> PaperFigure:
         5,
         "chattering time against amplitude",
         case.words("omega", "eta"),
-        {"durations": {"a": a, **durations}},
+        {"durations": {"a": a, **{f"{name}_over_half_period": time for name, time in durations.items()}}},
         _duration_statements(case),
         {
             "durations": partial(
