@@ -139,12 +139,13 @@ class Watched:
 
     def until(self, expression, what="", timeout=60.0):
         """Wait until an expression holds; the page's policy forbids the browser to wait by itself."""
-        deadline = time.monotonic() + timeout
+        deadline, pause = time.monotonic() + timeout, 0.02
         while time.monotonic() < deadline:
             found = self.page.evaluate(expression)
             if found:
                 return found
-            time.sleep(0.03)
+            time.sleep(pause)
+            pause = min(1.2 * pause, 0.2)  # each question takes time from what is waited for
         raise AssertionError(f"not within {timeout:g} s: {what or expression}; {self.text('#problem')}")
 
     def text(self, selector):

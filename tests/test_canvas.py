@@ -67,7 +67,7 @@ def images(*cells: str) -> list[int]:
     return [sum("image/png" in output.get("data", {}) for output in cell.outputs) for cell in notebook.cells[1:]]
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_notebook_shows_a_figure_once_and_so_one_in_axes_of_the_caller(monkeypatch):
     for name in CHOICES:
         monkeypatch.delenv(name, raising=False)

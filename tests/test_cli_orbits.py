@@ -30,7 +30,7 @@ def test_orbits_are_those_of_the_functions_and_one_is_followed(run, tmp_path):
 AT_FLIPS = "orbits", "--ball", 0.5, "--pulse", "sine:amplitude=14.95,frequency=5Hz", "--along", "amplitude:14.9:16.5"
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_what_begins_at_a_flip_is_followed(run):
     code, out, err = run(*AT_FLIPS, "--switch", "15", "--json")
     assert (code, err) == (0, "")

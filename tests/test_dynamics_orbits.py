@@ -255,7 +255,7 @@ def test_a_linear_block_that_hits_once_every_half_period_loses_stability_where_h
     assert judged == 2
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_grazing_is_found_from_both_sides():
     """The linear response touches the stop at a known amplitude; orbits with an impact begin there, too."""
     body = dynamics.ImpactOscillator(1.0, 0.8, damping_ratio=0.05, stop=0.01)

@@ -79,7 +79,7 @@ def bounces_of_a_ball(level, times, speeds):
     return found[:2], found[2:] - [rate(each) for each in found[:2]]
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_the_doubled_orbits_of_a_ball_are_those_of_its_own_equations(once, twice):
     exact = closed_orbits.Ball(0.5, 1)
     assert (twice.period, twice.impacts, twice.ends[0]) == (2, 2.0, "flip")

@@ -126,7 +126,7 @@ def test_a_file_that_finds_no_room_is_refused_until_one_is_taken_out(monkeypatch
         store.add_file("4.txt", samples(4).encode())
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_forty_records_of_three_components_are_kept_and_few_motions_of_them_in_memory(monkeypatch):
     store, count = UploadStore(), 100
     monkeypatch.setattr(uploads, "READ", 20 * count)

@@ -292,7 +292,7 @@ def test_what_reads_meshes_may_be_missing(here, monkeypatch):
         Explorer().take_mesh("box.stl", content(box()))
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_maps_and_sweeps_of_a_mesh_are_of_its_block(run, tmp_path):
     store = UploadStore()
     sine = {**STATUE, "motion": "sine:amplitude=0.5g,frequency=1,cycles=2.5"}

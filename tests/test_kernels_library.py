@@ -81,7 +81,7 @@ def test_every_kernel_that_python_calls_is_listed_once() -> None:
     assert {*signatures()} == found
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_numbers_and_tuples_are_those_of_numba(shipped: Path) -> None:
     random = np.random.default_rng(4)
     time, reference = both("sine.eq65.eq65_time")

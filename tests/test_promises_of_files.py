@@ -191,7 +191,7 @@ def test_a_full_disk_is_met_at_the_call_that_was_chosen(tmp_path, kind):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="where a descriptor leads is read as on Linux")
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_study_goes_on_after_a_full_disk(monkeypatch):
     monkeypatch.setattr(full_disk, "MOST", 1)
     found = full_disk.judge([*commands.COMMANDS].index("study run"))

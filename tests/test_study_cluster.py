@@ -101,7 +101,7 @@ def after_the_first_unit(monkeypatch, study, action):
     monkeypatch.setattr(study._store, "put", first)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_scheduler_s_workers_compute_the_same_bytes(complete, tmp_path, run):
     here = {"protocol": "tcp", "host": "127.0.0.1", "dashboard_address": "127.0.0.1:0", "processes": False}
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, **here) as pool:
