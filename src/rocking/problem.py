@@ -119,7 +119,7 @@ def set_start(
     InvalidOption
         If a body cannot be there, or a number is not finite or beyond all sense.
     """
-    stops, facing, one_sided = bodies.stops, records["facing"], records["entered"][:, 0] == 0
+    stops = bodies.stops
     if (
         not isinstance(rate, np.ndarray)
         and rate == 0.0
@@ -127,6 +127,7 @@ def set_start(
         and not stops.any()
     ):
         return
+    facing, one_sided = records["facing"], records["entered"][:, 0] == 0
     if coordinate is None:
         coordinate = np.clip(0.0, stops[:, 0], np.where(facing, stops[:, 1], np.inf))
     if not isinstance(rate, np.ndarray):  # arrays have been checked; in them a body may have fallen
@@ -150,8 +151,10 @@ def highest(states: state.Records, records: state.Records, stops: Floats) -> Flo
 
     One at the second stop has been across from the first.
     """
-    at_other = records["facing"] & (states["peak"] >= records["fallen"])
-    return np.where(at_other, stops[..., 1], states["peak"] + stops[..., 0])
+    peaks: Floats = states["peak"] + stops[..., 0]
+    if not records["facing"].any():
+        return peaks
+    return np.where(records["facing"] & (states["peak"] >= records["fallen"]), stops[..., 1], peaks)
 
 
 def _check_start(
