@@ -69,7 +69,7 @@ def here(explorer):
 
 
 @pytest.fixture(scope="module")
-def new_page(browser):
+def new_page(browser, tmp_path_factory):
     """Make empty pages, in as few contexts as there can be, so that the plotting library is loaded once in each."""
     contexts = {}
 
@@ -80,7 +80,7 @@ def new_page(browser):
             only_chromium("be that of a phone")
         if BROWSER == "chromium" and not options:
             if "plain" not in contexts:
-                contexts["plain"] = remembering(browser)
+                contexts["plain"] = remembering(browser, tmp_path_factory.mktemp("profile"))
             page = contexts["plain"].new_page()
             page.set_viewport_size(viewport)
             page.emulate_media(color_scheme=scheme)

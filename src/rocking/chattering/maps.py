@@ -111,8 +111,8 @@ def chattering_map(
         Makes a `SimulationInput` (block, motion, model) from two numbers: one of `rocking.chattering.families`, or your
         own.
     parameters : mapping
-        Names and values of the two parameters, the first of them upwards in the figure. Those that the family has by
-        these names go there; else they are given to it in this order.
+        Names and values of the two parameters, the first of them upwards in the figure. A family whose first two
+        parameters have these names the other way round gets them so; else they are given to it in this order.
     threads : int, optional
         Number of threads; by default one for every core.
     progress : bool, optional

@@ -280,7 +280,7 @@ def _draw_sequence(axes: Axes, sequence: DrawnSequence) -> None:
     decimals = 6 if sequence.off < 1e-6 else max(0, math.floor(-math.log10(sequence.off)))
     axes.set_title(f"A: at rest at {rest:.{decimals}f}\N{NO-BREAK SPACE}s", color=ABOVE, loc="left", wrap=True)
     known = f"± {sequence.off:.0e} s if\n{sequence.driver} is off\nby a millionth;\n" if sequence.off >= 1e-6 else ""
-    # Below the falling line there is room.
+    # Below the falling line there is space.
     words = f"{known}bracket of the\ncomputation\n{width:.0e} s"
     axes.text(0.04, 0.03, words, color=ABOVE, fontsize=7.0, transform=axes.transAxes, ha="left", va="bottom")
 
