@@ -124,7 +124,7 @@ def set_start(
         not isinstance(rate, np.ndarray)
         and rate == 0.0
         and (coordinate is None or coordinate == 0.0)
-        and not stops.any()
+        and not np.count_nonzero(stops)
     ):
         return
     facing, one_sided = records["facing"], records["entered"][:, 0] == 0
@@ -200,13 +200,19 @@ def _refuse_behind(bodies: Bodies, k: int, at: Floats, speed: Floats, u: Floats,
     )
 
 
+def never_rests(bodies: Bodies) -> bool:
+    """Say whether one of the bodies loses no speed at all from one impact to the next but one."""
+    e = bodies.restitution
+    return bool(np.count_nonzero(e[:, 0] * e[:, 1] == 1.0))
+
+
 def rules_of(
     bodies: Bodies, model: Model, treatment: Treatment, duration: float | None, *, record: bool
 ) -> state.Record:
     """Return the rules of a simulation, checked; its end must be given where nothing comes to rest."""
     checks.one_of(model, "model", InvalidOption, MODELS)
     if duration is None:
-        if np.any(np.prod(bodies.restitution, axis=1) == 1.0):
+        if never_rests(bodies):
             raise InvalidOption(
                 "a block with {} 1 never comes to rest; give {} to say when to stop", "restitution", "duration"
             )

@@ -31,7 +31,7 @@ from rocking.motion.exceedance import lifting_factors
 from rocking.motion.motion import Motion
 from rocking.motion.named import Motions, several_motions
 from rocking.motion.scaling import IntensityName, Measure
-from rocking.problem import bodies_of, slenderness_of, thresholds_of
+from rocking.problem import bodies_of, never_rests, slenderness_of, thresholds_of
 from rocking.result import DatasetResult
 from rocking.tables import as_written, counted, named, text_table
 from rocking.treatment import Certified
@@ -130,7 +130,7 @@ def incremental_dynamic_analysis(
     many, how, shaken = bodies_of(blocks), Measure.of(measure), several_motions(motions)
     slenderness = slenderness_of(many)
     values = values_of(shaken, how)
-    if np.any(np.prod(many.restitution, axis=1) == 1.0):
+    if never_rests(many):
         raise InvalidOption("a block with {} 1 never comes to rest; scaling up needs one below 1", "restitution")
     width = checks.within(tolerance, "tolerance", InvalidOption, 1e-15, 0.5)
     options: dict[str, Any] = {"model": model, "threads": threads, "progress": progress}

@@ -175,7 +175,7 @@ class Blocks:
         if len(gravities) != 1:
             raise InvalidBlock("Blocks.of needs at least one block, and all of them under the same gravity")
         table = np.array([[(side.p, side.alpha, side.restitution) for side in block.sides] for block in gathered])
-        p, alpha, restitution = np.moveaxis(table, 2, 0)
+        p, alpha, restitution = table.transpose(2, 0, 1)
         return _filled(cls.__new__(cls), gravities.pop(), p=p, alpha=alpha, restitution=restitution)
 
     def parameters(self) -> Mapping[str, tuple[Floats, str]]:

@@ -105,7 +105,7 @@ class RestrainedBlocks:
             for each in given
             for sides in [[*zip(each.block.sides, each._held, each._tendon, each._varying, strict=True)]]
         ]
-        return cls(**dict(zip(_PARAMETERS, np.moveaxis(np.array(rows), 2, 0), strict=True)), gravity=given[0].gravity)
+        return cls(**dict(zip(_PARAMETERS, np.array(rows).transpose(2, 0, 1), strict=True)), gravity=given[0].gravity)
 
     def parameters(self) -> Mapping[str, tuple[Floats, str]]:
         """Return what they are made from, with units, by name."""
