@@ -95,11 +95,12 @@ def test_the_tests_of_the_workflow_are_those_of_make() -> None:
 
 
 def test_what_a_release_lacks_is_said_before_it_is_made(tmp_path: Path) -> None:
-    lacking = runpy.run_path(str(ROOT / "scripts" / "release_lacks.py"))["lacking"]
+    script = runpy.run_path(str(ROOT / "scripts" / "release.py"))
+    lacking, notes = script["lacking"], script["notes"]
     texts = {
         "pyproject.toml": '[project]\nversion = "1.2.0"\n[project.urls]\nHomepage = "https://rocking.example.org"\n',
         "CITATION.cff": "version: 1.1.0\nreferences:\n  - authors:\n      - name: Authors as listed in the article\n",
-        "CHANGELOG.md": "# Changelog\n\n## [Unreleased]\n",
+        "CHANGELOG.md": "# Changelog\n\n## [Unreleased]\n\n- Two.\n\n## [1.1.0] - 2026-01-01\n\n### Added\n\n- One.\n",
     }
     for name, text in texts.items():
         (tmp_path / name).write_text(text, "utf-8")
@@ -117,7 +118,8 @@ def test_what_a_release_lacks_is_said_before_it_is_made(tmp_path: Path) -> None:
     assert [len(each) for each in said] == [5, 4, 3, 2, 1, 1, 0]
     assert "date-released: 2026-12-01" in said[-2][0]
     before = [step.get("run", "") for step in JOBS["release", "source"]["steps"]]
-    assert 'python scripts/release_lacks.py "$GITHUB_REF_NAME"' in before
+    assert 'python scripts/release.py lacks "$GITHUB_REF_NAME"' in before
+    assert [notes(tmp_path, tag) for tag in ("v1.2.0", "v1.1.0", "v1.0.0")] == ["- Two.", "### Added\n\n- One.", ""]
     assert JOBS["release", "publish"]["needs"] == ["wheel", "source"]
 
 

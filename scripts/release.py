@@ -1,9 +1,11 @@
-"""Say what a release still lacks: one version everywhere, its part of the changelog, and no placeholder left.
+"""Say what a release still lacks: one version, its part of the changelog, no placeholder; or print its notes.
 
-python scripts/release_lacks.py            # of the version that pyproject.toml states
-python scripts/release_lacks.py v0.1.0     # of that tag, as the workflow of releases asks
+python scripts/release.py lacks            # of the version that pyproject.toml states
+python scripts/release.py lacks v0.1.0     # of that tag, as the workflow of releases asks
+python scripts/release.py notes v0.1.0     # the part of CHANGELOG.md on it
 """
 
+import argparse
 import re
 import sys
 import tomllib
@@ -33,11 +35,25 @@ def lacking(root: Path, tag: str | None = None) -> Iterator[str]:
         yield "CITATION.cff lacks the authors, the journal, the year and the DOI of the article that it refers to"
 
 
+def notes(root: Path, tag: str) -> str:
+    """Return what the changelog says of a version, or an empty text."""
+    parts = re.split(r"^## \[(.+?)\].*$", (root / "CHANGELOG.md").read_text("utf-8"), flags=re.MULTILINE)
+    return dict(zip(parts[1::2], parts[2::2], strict=True)).get(tag.removeprefix("v"), "").strip()
+
+
 def main() -> None:
-    """Print what is missing, and fail if anything is."""
-    sentences = [*lacking(ROOT, *sys.argv[1:2])]
-    print("\n".join(sentences) or "nothing is missing")
-    sys.exit(bool(sentences))
+    """Print what is missing, and fail if anything is; or the notes, and fail if there are none."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("wanted", choices=["lacks", "notes"])
+    parser.add_argument("tag", nargs="?", help="by default of the version that pyproject.toml states")
+    given = parser.parse_args()
+    if given.wanted == "lacks":
+        sentences = [*lacking(ROOT, given.tag)]
+        print("\n".join(sentences) or "nothing is missing")
+        sys.exit(bool(sentences))
+    found = notes(ROOT, given.tag or tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["version"])
+    print(found or "CHANGELOG.md says nothing of this version")
+    sys.exit(not found)
 
 
 if __name__ == "__main__":
