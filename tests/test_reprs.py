@@ -1,5 +1,6 @@
 """What every public result says of itself at the prompt: a line or two, no arrays, numbers with their units."""
 
+import contextlib
 import copy
 import functools
 import pickle
@@ -21,6 +22,13 @@ from rocking.motion import formats, named
 BLOCK = rocking.Block(width=0.24, height=1.1)
 RECORD = rocking.records.load("el-centro-meloland-270")
 MOTIONS = [rocking.pulses.one_sine(a, f) for a in np.linspace(2.0, 9.0, 5) for f in (0.6, 1.0, 1.6)]
+WALL = rocking.Block.one_sided(width=0.5, height=4.0, restitution=0.4)
+COLUMN = rocking.RestrainedBlock(
+    rocking.Block(width=0.4, height=2.0, mass=2000.0), rocking.Tendon(2e5, prestress=2e3, strength=2e4)
+)
+SOLID = rocking.Solid(
+    [(0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2)], (0.0, 0.0, 0.9), np.diag([3.4, 3.6, 0.52]) / 12
+)
 SITE = rocking.HazardCurve([0.5, 1.0, 2.0], [0.1, 0.01, 0.001])
 
 #: Longer than any sentence at the prompt.
@@ -42,7 +50,16 @@ RESULTS = {
     "two-sided block": lambda path: rocking.Block.from_pivots((0.2, 0.15), 0.6, 0.4),
     "blocks": lambda path: rocking.Blocks.grid(p=[1.0, 2.0], alpha=[0.1, 0.2]),
     "motion": lambda path: RECORD.scaled_to(5.0).with_vertical(RECORD),
+    "wall": lambda path: WALL,
+    "column with a tendon": lambda path: COLUMN,
+    "restrained blocks": lambda path: COLUMN.alone(),
     "response": lambda path: rocking.simulate(BLOCK, RECORD),
+    "response of a wall": lambda path: rocking.simulate(WALL, RECORD),
+    "gradient": lambda path: rocking.gradient(rocking.simulate(WALL, RECORD)),
+    "critical scale": lambda path: rocking.critical_scale(WALL, RECORD, 0.5, 20.0),
+    "median gradient": lambda path: rocking.median_gradient(BLOCK, MOTIONS[6:8], 2.0, 9.0, levels=20),
+    "solid": lambda path: SOLID,
+    "rose": lambda path: SOLID.rose(),
     "fragility": lambda path: rocking.fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10),
     "bootstrapped fragility": lambda path: rocking.fit_fragility(
         [2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10, band=Band("bootstrap", samples=50)
@@ -97,8 +114,9 @@ def parts_of(value: object, name: str, seen: set[int]) -> Iterator[tuple[str, ob
     seen.add(id(value))
     yield name, value
     for each in [*vars(type(value)), *getattr(value, "__dict__", {})]:
-        if not each.startswith("_") and hasattr(value, each) and not callable(getattr(value, each)):
-            yield from parts_of(getattr(value, each), f"{name}.{each}", seen)
+        with contextlib.suppress(AttributeError, rocking.InvalidOption):  # of what this one lacks
+            if not each.startswith("_") and not callable(part := getattr(value, each)):
+                yield from parts_of(part, f"{name}.{each}", seen)
 
 
 @pytest.fixture(autouse=True)
@@ -157,3 +175,19 @@ def test_a_number_is_answered_with_a_number():
         assert isinstance(ask(3.0), float)
         assert ask([3.0, 4.0]).shape == (2,)
         assert ask([3.0])[0] == ask(3.0)
+
+
+def test_a_summary_says_which_side_has_which_parameters():
+    eccentric = rocking.Block.from_pivots((0.2, 0.15), 0.6, 0.4)
+    rows = {row.split("  ")[0]: row for row in rocking.simulate(eccentric, RECORD).summary().splitlines()}
+    assert re.search(r"side \+: p = .*; side -: p = ", rows["parameters"])
+    assert "side" not in rocking.simulate(WALL, RECORD).summary().split("motion")[0].replace("sided", "")
+
+
+def test_a_gradient_of_a_block_that_stays_says_what_it_is_and_what_it_cannot_tell():
+    found = rocking.gradient(rocking.simulate(BLOCK, RECORD.scaled(0.01)))
+    assert re.match(r"<Gradient: 0 depends on 0 of \d+ pieces of the motion; the response starts on the", repr(found))
+
+
+def test_a_median_has_the_unit_of_its_measure():
+    assert "m/s^2, dispersion" in repr(RESULTS["median gradient"](None))

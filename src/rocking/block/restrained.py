@@ -15,7 +15,7 @@ from rocking.block.limits import checked_pair
 from rocking.block.moments import Held, Yielding
 from rocking.block.restitution import Restitution, Varying, one_sided_restitution
 from rocking.block.restraints import Restraint, Tendon
-from rocking.block.sides import Side
+from rocking.block.sides import Side, in_line
 from rocking.block.single import Block, one_block
 from rocking.block.standing import balance_of, carrying, following, leaning, pivots_of, with_restitution
 from rocking.body import KINDS, Bodies, ContactLaw, Coordinate
@@ -130,6 +130,13 @@ class RestrainedBlock:
                 f"this block does not stand: it would take a ground acceleration of {least:.3g} m/s^2 to lift it; "
                 f"a smaller thrust, load or lean lets it{'; forces are in N, masses in kg' * (least < -self.gravity)}"
             )
+
+    def __str__(self) -> str:
+        """Return description and parameters in one line."""
+        return f"{self.description}; {in_line(self.sides)}"
+
+    def __repr__(self) -> str:
+        return f"<RestrainedBlock: {self}>"
 
     @property
     def gravity(self) -> float:

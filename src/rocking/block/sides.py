@@ -43,6 +43,13 @@ class Side:
         return f"<Side: {self}, R = {self.radius:.5g} m>"
 
 
+def in_line(sides: Sequence[object]) -> str:
+    """Return the parameters of one side or of two, which are named where they differ."""
+    if len(sides) == 1 or sides[0] == sides[1]:
+        return str(sides[0])
+    return "; ".join(f"side {sign}: {side}" for sign, side in zip("+-", sides, strict=True))
+
+
 def even_sides(
     gravity: float, radius: float, alpha: float, restitution: object, conserved: float, advice: str
 ) -> tuple[Side, Side]:

@@ -14,7 +14,7 @@ from rocking.arrays import Floats, Integers
 from rocking.block.limits import checked_gravity, checked_length, checked_mass, checked_pair, checked_parameter
 from rocking.block.restitution import housner_restitution
 from rocking.block.rigid_body import contact_forces, gyration_squared, refusal, rigid_bodies
-from rocking.block.sides import Side, even_sides, restitutions, sides_on_pivots
+from rocking.block.sides import Side, even_sides, in_line, restitutions, sides_on_pivots
 from rocking.body import KINDS, Bodies, ContactLaw, Coordinate
 from rocking.constants import MODELS, STANDARD_GRAVITY, Model
 from rocking.errors import InvalidBlock, InvalidOption, UnequalSides
@@ -378,9 +378,7 @@ class Block:
 
     def __str__(self) -> str:
         """Return description and parameters in one line."""
-        sides = self.sides[:1] if self.is_symmetric else self.sides
-        names = ("",) if self.is_symmetric else ("side +: ", "side -: ")
-        return "; ".join([self.description, *(f"{name}{side}" for name, side in zip(names, sides, strict=True))])
+        return f"{self.description}; {in_line(self.sides)}"
 
     def __repr__(self) -> str:
         return f"<Block: {self}>"

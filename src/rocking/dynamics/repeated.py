@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from rocking import checks
 from rocking.arrays import Floats, Integers
 from rocking.block import Block
+from rocking.block.sides import in_line
 from rocking.body import Body
 from rocking.constants import Model
 from rocking.dynamics.simulation import model_of
@@ -200,7 +201,7 @@ def described(what: Body | Motion) -> str:
     """Return what moves, or what shakes it, with its parameters in one line."""
     if isinstance(what, Motion):
         return ", ".join(part for part in (what.label, what.description.numbers) if part)
-    return ", ".join([what.description, *dict.fromkeys(map(str, what.sides))])
+    return f"{what.description}, {in_line(what.sides)}"
 
 
 def one_period(motion: Motion | None) -> Motion:

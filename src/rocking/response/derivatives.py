@@ -94,10 +94,11 @@ class Gradient:
         return _by_samples(self._motion.vertical, self.vertical)
 
     def __repr__(self) -> str:
-        if self.reason:
+        if np.isnan(self.coefficients).any():
             return f"<Gradient: {self.reason}>"
         moved = int(np.count_nonzero(np.any(self.coefficients != 0.0, axis=1)))
-        return f"<Gradient: {self.value:.6g} depends on {moved} of {len(self.coefficients)} pieces of the motion>"
+        text = f"{self.value:.6g} depends on {moved} of {len(self.coefficients)} pieces of the motion"
+        return f"<Gradient: {'; '.join(filter(None, [text, self.reason]))}>"
 
 
 def gradient(response: Response, of: Told = "peak", at: float | None = None) -> Gradient:

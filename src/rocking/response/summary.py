@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from rocking.block import Block, RestrainedBlock
+from rocking.block.sides import in_line
 from rocking.body import Body
 from rocking.problem import thresholds_of
 from rocking.response.answers import Answers
@@ -41,11 +42,10 @@ _AFFECTED: Final = {
 def summary_rows(response: Answers, friction: float | None) -> list[Row]:
     """Return what happened, line by line; with a coefficient of friction, whether it is enough."""
     body = response.body
-    sides = body.sides[:1] if body.sides[0] == body.sides[-1] else body.sides
     sliding = math.nan if friction is None else response.sliding_time(friction)
     rows = [
         Row("block" if isinstance(body, Block) else "body", body.description),
-        Row("parameters", "; ".join(map(str, sides))),
+        Row("parameters", in_line(body.sides)),
         *_balance_rows(body),
         Row("motion", _motion_text(response)),
         Row("uplift above", _thresholds_text(response)),

@@ -51,16 +51,18 @@ class MedianGradient:
     Attributes
     ----------
     median, dispersion : float
-        Median intensity, in SI units, and standard deviation of the logarithm of the intensity.
+        Median intensity, in `units`, and standard deviation of the logarithm of the intensity.
     median_by_p, median_by_alpha, median_by_restitution : float
         Change of the median per relative change of these of both sides together: times 1e-3 it is that by 0.1 % more.
     dispersion_by_p, dispersion_by_alpha, dispersion_by_restitution : float
         The same of the dispersion.
     ends : structured array
-        Ends of the bands of levels that overturn: position of the motion, level (SI), whether the band begins there,
-        and the change of the level by_p, by_alpha and by_restitution per relative change of each.
+        Ends of the bands of levels that overturn: position of the motion, level (in `units`), whether the band begins
+        there, and the change of the level by_p, by_alpha and by_restitution per relative change of each.
     reason : str
         Why derivatives are NaN, one sentence; empty where none is.
+    units : str
+        Of the measure: "m/s^2", "m/s", or "1".
     """
 
     median: float
@@ -73,9 +75,11 @@ class MedianGradient:
     dispersion_by_restitution: float
     ends: NDArray[np.void]
     reason: str
+    units: str
 
     def __repr__(self) -> str:
-        text = f"median {self.median:.6g} in SI units, dispersion {self.dispersion:.6g}"
+        units = "" if self.units == "1" else f" {self.units}"
+        text = f"median {self.median:.6g}{units}, dispersion {self.dispersion:.6g}"
         by = self.reason or (
             f"0.1 % more of the slenderness changes them by {1e-3 * self.median_by_alpha:.2g} and "
             f"{1e-3 * self.dispersion_by_alpha:.2g}"
@@ -197,7 +201,8 @@ def _segments(
     """Stretches of the logarithm of the level under each motion, and whether all levels there overturn."""
     low, high = (math.log(each) for each in limits)
     for m, beyond in enumerate(starts_beyond):
-        mine = np.sort(np.log(ends["level"][ends["motion"] == m]))
+        level: Floats = ends["level"][ends["motion"] == m]
+        mine = np.sort(np.log(level))
         edges = [low, *mine.tolist(), high]
         for k in range(len(edges) - 1):
             yield edges[k], edges[k + 1], bool(beyond) ^ (k % 2 == 1)
@@ -244,6 +249,7 @@ def _fitted(
         **{f"dispersion_{name}": float(each) for name, each in zip(_BY, by_dispersion, strict=True)},
         ends=ends,
         reason=reason,
+        units=measure.units,
     )
 
 
@@ -264,6 +270,7 @@ def _information(outcomes: Outcomes, a: float, b: float) -> Floats:
 
 def _score_by_ends(ends: NDArray[np.void], a: float, b: float) -> Floats:
     """Change of the likelihood's gradient as ends of bands shift by p, slenderness and restitution, shape (2, 3)."""
-    z = np.log(ends["level"])
-    pull = np.where(ends["begins"], -1.0, 1.0) * sum(_ratios(a + b * z)) / ends["level"]
+    level: Floats = ends["level"]
+    z = np.log(level)
+    pull = np.where(ends["begins"], -1.0, 1.0) * sum(_ratios(a + b * z)) / level
     return np.asarray(np.stack([pull, pull * z]) @ np.stack([ends[name] for name in _BY], axis=1))
