@@ -63,6 +63,9 @@ class Repeated:
         rows = step_rows(self._ground, self._records[0])
         self._steps = rows if self.model == "linear" else rows[:, :0]
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {described(self.body)} under {described(self.motion)}; {self.model} model>"
+
     def _rules(self, *, record: bool) -> state.Record:
         rules = rules_of(self.bodies, self.model, self.treatment, self.period, record=record)
         rules["stop"], rules["endless"] = np.inf, True
