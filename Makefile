@@ -60,8 +60,9 @@ verify: .venv/.all ## hold the package to every promise of docs/reliability.md (
 mutants: .venv/.all ## ask of the tests whether they see small mistakes, 30 in each part of the package (an hour or two)
 	$(BIN)/python stress/mutants.py $(if $(PART),"$(PART)")
 
+# Most of its time is compiling, and workers beside each other would compile the same.
 lowest: .venv-lowest/.installed ## run a test of every part with the oldest versions that pyproject.toml allows
-	@ROCKING_SHIPPED=0 $(MAKE) --no-print-directory .bounds ENVIRONMENT=.venv-lowest PACKAGE=.
+	@ROCKING_SHIPPED=0 $(MAKE) --no-print-directory .bounds ENVIRONMENT=.venv-lowest PACKAGE=. WORKERS="-n 0"
 
 latest: wheel .venv-latest/.installed ## the same with the versions of the day, and with the compiled kernels of the wheel
 	@ROCKING_LIBRARY_REQUIRED=1 $(MAKE) --no-print-directory .bounds ENVIRONMENT=.venv-latest \
@@ -69,7 +70,7 @@ latest: wheel .venv-latest/.installed ## the same with the versions of the day, 
 
 .bounds:
 	$(ENVIRONMENT)/bin/python -m pip install --disable-pip-version-check -qq --no-deps --force-reinstall "$(PACKAGE)"
-	$(PYTEST:$(BIN)/%=$(ENVIRONMENT)/bin/%) -m $(FAST) $(EVERY_PART)
+	$(PYTEST:$(BIN)/%=$(ENVIRONMENT)/bin/%) $(WORKERS) -m $(FAST) $(EVERY_PART)
 
 .lowest.txt: pyproject.toml scripts/lowest_versions.py
 	$(PYTHON) scripts/lowest_versions.py > $@
