@@ -1,5 +1,7 @@
 """Addresses of the explorer's page as nobody writes them on purpose: names and values right, wrong and missing."""
 
+import math
+
 _BLOCKS = (
     {"width": "0.24", "height": "1.1"}, {"p": "2", "alpha": "12deg"},
     {"p": "2,2.2", "alpha": "0.2,0.3", "restitution": "0.9"},
@@ -74,54 +76,82 @@ def shown(draw):
 
 
 _SIDED = {"p": (1.5, 5.0), "alpha": (0.1, 0.35), "restitution": (0.6, 0.95)}
-_SCALINGS = ("pga", "pgv", "sa", "scale", "")
 _PULSES = (
     "sine:amplitude={a}g,frequency={f},cycles={c},phase={d}deg", "half-sine:amplitude={a}g,frequency={f}",
     "one-sine:amplitude={a}g,frequency={f}", "one-cosine:amplitude={a}g,frequency={f}",
-    "ricker:amplitude={a}g,frequency={f},kind=antisymmetric", "rectangular:amplitude={a}g,duration={c}",
-    "triangular:amplitude={a}g,duration={c}",
+    "ricker:amplitude={a}g,frequency={f},kind=antisymmetric", "ricker:amplitude={a}g,frequency={f}",
+    "rectangular:amplitude={a}g,duration={c}", "triangular:amplitude={a}g,duration={c}",
     "mavroeidis-papageorgiou:amplitude={a},frequency={f},phase={d}deg,gamma={c}",
+    "sine:amplitude=-{a}g,frequency={f},cycles={c}",
 )  # fmt: skip
 _HORIZONTAL = ("ridgecrest-clc-090", "ridgecrest-clc-360", "el-centro-meloland-270", "el-centro-meloland-360")
+_LENGTHS = {"": 1.0, " m": 1.0, "cm": 100.0, "mm": 1000.0, " ft": 1.0 / 0.3048, "in": 1.0 / 0.0254}
+_ANGLES = {"": 1.0, "rad": 1.0, "deg": 180.0 / math.pi, "°": 180.0 / math.pi}
+_ACCELERATIONS = {"g": 1.0, "": 9.80665, " m/s2": 9.80665, "cm/s2": 980.665}
 
 
-def sound(draw, number):
-    """Texts of a case that the command line does, too: blocks and motions of every kind in turn, by a number."""
+def _written(draw, low, high, units):
+    """A number between two ends, with a unit in which people may write it."""
+    unit, size = draw.choice(list(units.items()))
+    return f"{size * draw.uniform(low, high)!r}{unit}"
 
-    def between(low, high):
-        return repr(draw.uniform(low, high))
 
-    def pair(name):
-        return ",".join(between(*_SIDED[name]) for _ in range(2))
+def _block(draw):
+    """Texts of a block of any kind, by its sizes, by p and alpha, of two sides, by its pivots, of a mesh."""
 
-    width = draw.uniform(0.15, 0.5)
-    block = (
-        lambda: {"width": repr(width), "height": between(0.8, 2.5)},
-        lambda: {"width": repr(width), "height": between(0.8, 2.5), "offset": repr(draw.uniform(-0.2, 0.2) * width)},
-        lambda: {name: between(*ends) for name, ends in _SIDED.items()},
-        lambda: {name: pair(name) for name in _SIDED},
-        lambda: {"pivots": f"{between(0.1, 0.2)},{between(0.1, 0.2)}", "height_of_mass": between(0.5, 0.9),
-                 "gyration": between(0.3, 0.5)},
-        lambda: {"mesh": "statue", "azimuth": repr(float(draw.randrange(360)))},
-    )[number % 6]()  # fmt: skip
-    if number % 2:
-        values = {"a": between(0.15, 0.5), "f": between(0.8, 2.5), "c": between(1.0, 2.5), "d": between(0.0, 90.0)}
-        motion = {"motion": _PULSES[number // 2 % len(_PULSES)].format(**values)}
-    else:
-        motion = {"motion": draw.choice(_HORIZONTAL)}
-        scaling = _SCALINGS[number // 2 % len(_SCALINGS)]
-        level = between(0.2, 0.7)
-        if scaling:
-            motion[scaling] = {"pga": f"{level}g", "sa": f"{level}g@{between(0.3, 1.5)}"}.get(scaling, level)
-        if number // 2 % 3 != 1:
-            motion["vertical"] = motion["motion"][:-3] + "up"
-    more = {}
+    def length(low, high):
+        return _written(draw, low, high, _LENGTHS)
+
+    kind = draw.choice(("sizes", "off the middle", "p and alpha", "two sides", "pivots", "mesh"))
+    if kind in ("sizes", "off the middle"):
+        texts = {"width": length(0.15, 0.5), "height": length(0.8, 2.5)}
+        if kind == "off the middle":
+            texts["offset"] = length(-0.03, 0.03)
+        elif draw.random() < 0.4:
+            texts["restitution"] = repr(draw.uniform(*_SIDED["restitution"]))
+        return texts
+    if kind == "pivots":
+        pair = ",".join(length(0.1, 0.2) for _ in range(2))
+        return {"pivots": pair, "height_of_mass": length(0.5, 0.9), "gyration": length(0.3, 0.5)}
+    if kind == "mesh":
+        return {"mesh": "statue", "azimuth": repr(float(draw.randrange(360)))}
+    texts = {}
+    for name, ends in _SIDED.items():
+        units = _ANGLES if name == "alpha" else {"": 1.0}
+        count = draw.choice((1, 2)) if kind == "two sides" else 1  # what is one number is that of both sides
+        texts[name] = ",".join(_written(draw, *ends, units) for _ in range(count))
+    if kind == "p and alpha" and draw.random() < 0.5:
+        del texts["restitution"]
+    return texts
+
+
+def _motion(draw):
+    """Texts of a pulse, or of a record that is scaled in any way or not, with its vertical component or without."""
+    level = draw.uniform(0.2, 0.7)
+    if draw.random() < 0.5:
+        values = {"a": draw.uniform(0.15, 0.5), "f": draw.uniform(0.8, 2.5), "c": draw.uniform(1.0, 2.5)}
+        texts = {"motion": draw.choice(_PULSES).format(**values, d=draw.uniform(0.0, 90.0))}
+        return texts | ({"duration": repr(draw.uniform(3.0, 9.0))} if draw.random() < 0.2 else {})
+    texts = {"motion": draw.choice(_HORIZONTAL)}
+    scaling = draw.choice(("pga", "pgv", "sa", "scale", ""))
+    if scaling:
+        texts[scaling] = {
+            "pga": _written(draw, 0.2, 0.7, _ACCELERATIONS), "pgv": repr(level),
+            "sa": f"{level!r}g@{draw.uniform(0.3, 1.5)!r}", "scale": repr(draw.choice((-2.0, 2.0)) * level),
+        }[scaling]  # fmt: skip
+    if draw.random() < 0.5:
+        texts["vertical"] = texts["motion"][:-3] + "up"
+    return texts
+
+
+def sound(draw):
+    """Texts of a case that the command line does, too: any block and any motion, the model, what ends chattering."""
+    texts = _block(draw) | _motion(draw)
     if draw.random() < 0.4:
-        more["model"] = "linear"
+        texts["model"] = "linear"
     if draw.random() < 0.3:
-        more["chattering"] = draw.choice(("velocity=0.02", "interval=0.001"))
+        texts["chattering"] = draw.choice(("velocity=0.02", "interval=0.001", "bypass=0.001", "certified=1e-9"))
     if draw.random() < 0.4:
-        more |= {"initial_rotation": between(-0.04, 0.04), "initial_velocity": between(-0.2, 0.2)}
-    if number % 2 and draw.random() < 0.2:
-        more["duration"] = between(3.0, 9.0)
-    return block | motion | more
+        texts["initial_rotation"] = _written(draw, -0.04, 0.04, _ANGLES)
+        texts["initial_velocity"] = repr(draw.uniform(-0.2, 0.2))
+    return texts

@@ -875,9 +875,9 @@ def test_the_copied_command_and_the_script_have_the_same_peak(opened, tmp_path):
 
 @MORE
 def test_random_states_show_what_their_commands_print(opened, here, run):
-    page, judged = opened(STATUE), 0
-    for number in range(4):
-        texts = explorer_addresses.sound(random.Random(number), number)
+    page, draw, judged = opened(STATUE), random.Random(27), 0
+    for _ in range(10):
+        texts = explorer_addresses.sound(draw)
         page.page.goto(here.link(texts))
         page.until(READY, texts)
         asked = "import('/page/api.js').then(({payload}) => payload('/api/case', %s)).then(({header}) => header)"
@@ -890,14 +890,22 @@ def test_random_states_show_what_their_commands_print(opened, here, run):
         command = shlex.split(page.until("document.getElementById('command').textContent"))
         found = run(*command[1:], "--json", "--quiet")
         assert found[0] == 0 and found[2] == "", texts
-        assert json.loads(found[1])["peak_rotation_rad"] == header["peak_rotation"], texts
+        result = json.loads(found[1])
+        assert result["peak_rotation_rad"] == header["peak_rotation"], texts
+        # What is read on the page, to the digits that it shows.
+        peak, rests, impacts = page.page.locator("#figures dd").all_text_contents()[:3]
+        assert peak.startswith("overturns") == result["overturned"] == ("overturns" in page.text("#verdict")), texts
+        if not result["overturned"]:
+            assert float(f"{result['peak_over_slenderness']:.3g}") == peak_shown(page), texts
+        assert int(re.match(r"[\d,]+", impacts)[0].replace(",", "")) == result["impacts_resolved"], texts
+        assert int(rests.split()[0]) == sum(each["kind"] == "rest" for each in result["events"]), texts
         assert page.text("#verdict") == in_english(header["verdict"]), texts
         printed = " ".join(run(*command[1:])[1].split())
         # A mesh is written as its pivots, so that its block is called otherwise.
         rows = page.js(words)[1 if "mesh" in texts else 0 :]
         assert printed.endswith(" ".join(" ".join(row).strip() for row in rows)), texts
         judged += 1
-    assert judged == 4
+    assert judged == 10
 
 
 @MORE
