@@ -1890,6 +1890,37 @@ def test_a_reload_another_tab_and_the_way_back_know_the_secret_and_no_other_port
     context.close()
 
 
+def test_links_in_slides_hold_once_the_printed_link_was_opened_also_after_a_start_anew(browser):
+    """As docs/howto/explorer.md says of a lecture, on a port of one's choice."""
+    context, links = browser.new_context(viewport=DESK), 0
+    examples = json.loads((Path(rocking.__file__).parent / "explorer" / "page" / "examples.json").read_text("utf-8"))
+    port = 0
+    for _ in range(2):
+        running = served(Explorer(), {}, port=port)
+        serving = threading.Thread(target=running.run, daemon=True)
+        serving.start()
+        port = running.port
+        page = Watched(context.new_page())
+        page.page.goto(running.link())
+        page.until(READY)
+        page.page.close()
+        for example in examples[links::2]:
+            page = Watched(context.new_page())
+            page.page.goto(f"http://127.0.0.1:{port}/?example={example['name']}&step=1&lecture=1")
+            page.until(READY)
+            page.until("document.body.classList.contains('lecture')")
+            assert page.page.locator("#stage").is_visible() and page.page.locator("#settings").is_hidden()
+            title = page.text("#examples-title")
+            assert title == f"{example['title']}: step 1 of {len(example['steps'])}"
+            assert page.complaints == []
+            page.page.close()
+        links += 1
+        running.server.should_exit = True
+        serving.join(20)
+    context.close()
+    assert links == 2
+
+
 def test_a_browser_without_the_link_is_told_so(browser, here):
     context = browser.new_context(viewport=DESK)
     page = Watched(context.new_page(), allowed=["403"])
