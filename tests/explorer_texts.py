@@ -1,8 +1,12 @@
 """What the explorer's page makes of the keys and values that the server sends: English, in Python, for tests."""
 
+import math
 import re
 
 from rocking.explorer.phrases import english
+
+#: Kinds of quantities in texts: the unit in which the page shows them unless another is chosen, in SI units.
+MEASURES = {"angle": (math.radians(1.0), "°"), "acceleration": (9.80665, " g"), "length": (1.0, " m")}
 
 
 def in_english(said):
@@ -20,6 +24,9 @@ def in_english(said):
         value = values[name]
         if not isinstance(value, int | float):
             return in_english(value)
+        if kind in MEASURES:
+            size, unit = MEASURES[kind]
+            return f"{value / size:.{digits or 3}g}{unit}"
         return f"{value:.{digits or 6}{kind}}" if kind else f"{value:.0f}"
 
-    return re.sub(r"\{(\w+)(?::\.?(\d*)([fg]))?\}", written, form)
+    return re.sub(r"\{(\w+)(?::\.?(\d*)([a-z]+))?\}", written, form)

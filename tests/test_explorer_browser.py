@@ -1106,6 +1106,19 @@ def test_a_map_is_taken_away_and_computed_again(opened, tmp_path):
     page.until("document.getElementById('python-title').textContent === 'This case as Python'")
 
 
+@pytest.mark.parametrize("scheme", [pytest.param("light", marks=MORE), "dark"])
+def test_the_key_of_a_curve_is_drawn_as_the_curve(opened, scheme):
+    page = opened(f"view=map&{SINE}&points=8", scheme=scheme)
+    complete(page)
+    paint = "Array.from(document.querySelectorAll('#map-legend .curve'), (each) => getComputedStyle(each).background)"
+    exact, fitted = page.js(paint)
+    inks = f"{MODELS}.filter((each) => each.type === 'Line').map((each) => each.line_color.value ?? each.line_color)"
+    assert set(page.js(inks)) == {"#10243e", "#ffffff"}
+    for each in (exact, fitted):
+        assert each.startswith("rgb(255, 255, 255) repeating-linear-gradient") and "rgb(16, 36, 62)" in each
+    assert "rgb(255, 255, 255) 11px" in fitted and page.text("#map-legend").endswith("Eq. 76")
+
+
 def test_a_map_of_a_record_opens_on_the_final_fate_and_hatches_what_falls_later(opened, explorer):
     page = opened("view=map&width=0.24&height=1.1&motion=el-centro-meloland-270&points=40&y_from=0.1&y_to=2")
     page.until("document.body.dataset.map === 'complete'", timeout=120)
@@ -1311,8 +1324,13 @@ def test_a_thresholds_wrong_answer_is_seen(opened):
     first, second = plotted(page, "first", "compare-plots"), plotted(page, "second", "compare-plots")
     assert max(first["y"]) > 2.0 * max(second["y"])
     assert "7 by the treatment" in page.text("#compare-verdict")
-    wrong = page.page.locator("#schemes tr", has_text="velocity 0.05")
+    assert page.text("#compare-verdict").startswith("The other (Velocity threshold, 0.05 pα): It stays up")
+    wrong = page.page.locator("#schemes tr", has_text="Velocity threshold, 0.05 pα")
     assert "false rest" in wrong.text_content()
+    rows = page.page.locator("#schemes tbody tr td:nth-child(2)").all_text_contents()
+    assert rows[0] == "Velocity threshold, 5·10⁻¹⁰ pα" and "Interval threshold, 1 µs" in rows
+    errors = re.findall(r"worst error of a rest (\S+ \S+)\)", page.text("#schemes"))
+    assert len(errors) >= 9 and all(re.fullmatch(r"−?[\d.]+ ([mµnp]?s)", each) for each in errors)
 
 
 @pytest.mark.parametrize("what", ["block", "motion"])
@@ -1422,6 +1440,60 @@ def test_units_are_chosen_once_and_in_the_address(opened):
     assert page.page.input_value("#width") == "9.843" and query_of(page)["length_in"] == "in"
 
 
+def test_every_sentence_and_axis_has_the_units_that_are_chosen(opened):
+    units = "&length_in=cm&angle_in=rad&acceleration_in=m/s2"
+    axes = f"{MODELS}.filter((each) => each.type === 'LinearAxis').map((each) => each.axis_label)"
+    ends = f"{MODELS}.filter((each) => each.type === 'Range1d').map((each) => each.end)"
+    for more, rotation, ground, axis, peak in (
+        ("", "rotation 3.26° =", "ground 0.0666 g", "ground (g)", 0.44),
+        (units, "rotation 0.0569 rad =", "ground 0.653 m/s²", "ground (m/s²)", 0.44 * 9.80665),
+    ):
+        page = opened(f"{STATUE}&at=232.68{more}")
+        page.until("document.getElementById('cursor').dataset.time")
+        assert rotation in page.text("#cursor") and ground in page.text("#cursor"), page.text("#cursor")
+        assert axis in page.js(axes) and any(each == pytest.approx(peak) for each in page.js(ends))
+    still = "width=0.24&height=1.1&motion=rectangular:amplitude%3D0.1g,duration%3D0.5"
+    for more, lifting in (("", "0.218 g"), (units, "2.14 m/s²")):
+        assert f"never passes {lifting}, which" in opened(still + more).text("#verdict")
+    released = f"view=periodic&{CASCADE}&initial_rotation=0.0174532925&sweep_points=24"
+    for more, start in (("", "from 1° and 0 rad/s"), (units, "from 0.01745 rad and 0 rad/s")):
+        page = opened(released + more)
+        page.until(f"document.getElementById('orbit-about').textContent.includes({start!r})")
+
+
+def test_a_g_is_the_same_whatever_gravity_a_block_has(opened):
+    sine = "motion=sine:amplitude%3D0.1g,frequency%3D0.5,cycles%3D2"
+    page = opened(f"p=1&alpha=0.2&restitution=0.9&gravity=1.62&{sine}")
+    assert f"lifts above {1.62 * math.tan(0.2) / 9.80665:.3g} g" in page.text("#derived")
+    assert "sine 0.1 g" in page.page.title()
+    assert max(plotted(page, "first-ground")["y"]) == pytest.approx(0.1, rel=1e-6)
+
+
+@pytest.mark.parametrize("width", [320, 390, 1280])
+def test_no_word_of_a_command_is_broken_that_fits_in_a_line(opened, width):
+    query = f"{STATUE}&model=linear&initial_rotation=-0.01&initial_velocity=0.05&chattering=velocity%3D0.02"
+    page = opened(query, {"width": width, "height": 800})
+    broken = """() => {
+      const command = document.getElementById('command'), walker = document.createTreeWalker(command, 4), found = [];
+      let count = 0;
+      for (let node = walker.nextNode(); node; node = walker.nextNode()) {
+        for (const {0: word, index} of node.data.matchAll(/\\S+/g)) {
+          const range = document.createRange();
+          range.setStart(node, index);
+          range.setEnd(node, index + word.length);
+          count += 1;
+          if (new Set(Array.from(range.getClientRects(), ({top}) => top)).size > 1) found.push(word);
+        }
+      }
+      return [count, found];
+    }"""
+    count, found = page.js(broken)
+    assert count >= 14 and found == []
+    copied = page.js("getSelection().selectAllChildren(document.getElementById('command')), String(getSelection())")
+    assert copied.strip() == page.text("#command")
+    assert shlex.split(copied)[:2] == ["rocking", "simulate"] and "--initial-velocity" in shlex.split(copied)
+
+
 @pytest.mark.parametrize("scheme", [pytest.param("light", marks=MORE), "dark"])
 def test_a_plain_case_is_printed_on_one_light_page_without_controls(opened, scheme):
     only_chromium("show what is printed")
@@ -1437,7 +1509,7 @@ def test_a_plain_case_is_printed_on_one_light_page_without_controls(opened, sche
     controls = page.page.query_selector_all("button, select, input")
     assert len(controls) > 50 and not any(each.is_visible() for each in controls)
     head = page.text("#print-head")
-    for part in ("0.24 m x 1.1 m", "ridgecrest-clc-090", "nonlinear", "certified", rocking.__version__, "pga=0.4g"):
+    for part in ("0.24 m x 1.1 m", "ridgecrest-clc-090", "nonlinear", "by: Proof", rocking.__version__, "pga=0.4g"):
         assert part in head
     assert "rocks and does not overturn" in page.text("#print-summary")
     page.page.emulate_media(media="screen")
@@ -1478,6 +1550,10 @@ def barriers(page, where="document"):
     return [(each["id"], [node["target"] for node in each["nodes"]][:4]) for each in found["violations"]]
 
 
+#: What is said on the page: code, and numbers as Python prints them, are left out.
+SAID = """Array.from(document.querySelectorAll('main > section:not(#save), .settings'),
+  (each) => each.innerText.replace(document.getElementById('words').innerText, '')).join(' ')"""
+
 #: What holds when a view has computed all that it shows.
 COMPUTED = {
     "map": "document.body.dataset.map === 'complete'",
@@ -1505,6 +1581,8 @@ def test_no_view_has_a_barrier(opened, viewport, scheme):
         page.page.wait_for_timeout(300)
         assert barriers(page) == [], view
         assert page.js("document.documentElement.scrollWidth") <= viewport["width"], view
+        # One way of writing numbers: 5·10⁻¹⁰, on the page as at the axes.
+        assert re.findall(r"\b\d[\d.]*e[-−+]?\d+", page.js(SAID)) == [], view
         judged.append(view)
     page.page.click("[data-view=block]")
     page.page.click("#lecture")

@@ -15,7 +15,7 @@ from explorer_texts import in_english
 import rocking
 from rocking.chattering import chattering_map, critical_amplitude, families
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingError, StudyError, UnreadableRecord
-from rocking.explorer import maps
+from rocking.explorer import maps, readings
 from rocking.explorer.code import case_as_command, case_as_python, map_as_command, map_as_python
 from rocking.explorer.core import Explorer, extremes
 from rocking.explorer.inputs import NAMES, pulse_as_text, pulse_of, read_case, texts_of, texts_of_motion
@@ -143,6 +143,32 @@ def test_a_vertical_component_that_cannot_be_is_answered(texts, says):
             {"width": "0.24", "height": "1.1", "motion": DEFAULT["motion"], "vertical": "ridgecrest-clc-up"} | texts,
             UploadStore(),
         )
+
+
+def test_a_g_is_the_standard_one_whatever_gravity_a_block_has(explorer):
+    """As in the texts of the case: a motion of 0.1 g is not one of 0.6 g where things weigh less."""
+    moon = 1.62
+    texts = {"p": "1", "alpha": "0.2", "restitution": "0.9", "gravity": repr(moon), "motion": "ridgecrest-clc-090"}
+    texts |= {"vertical": "ridgecrest-clc-up", "pga": "0.1g"}
+    found, response = explorer.case(texts, (225.0, 240.0)), explorer.show(texts).response
+    header, vertical = found.header, response.motion.vertical
+    assert header["motion"]["pga_g"] == pytest.approx(0.1, rel=1e-12)
+    assert header["motion"]["vertical"]["pga_g"] == pytest.approx(vertical.pga / 9.80665, rel=1e-12)
+    lifting = moon * math.tan(0.2)
+    assert header["block"]["thresholds_g"] == pytest.approx([lifting / 9.80665] * 2, rel=1e-12)
+    assert np.abs(found.arrays["ground_g"]).max() == pytest.approx(0.1, rel=1e-12)
+    # Drawn are the vertical acceleration and thresholds that move by the weight, which is over the block's own gravity.
+    drawn = header["block"]["gravity_g"] * (found.arrays["weight"] - 1.0)
+    times = 225.0 + found.arrays["ground_time"]
+    assert drawn == pytest.approx(vertical.acceleration(times) / 9.80665, abs=1e-12)
+    now = readings.at(explorer, texts, "232.5")
+    for name, motion in (("ground_g", response.motion), ("vertical_g", vertical)):
+        assert now[name] == pytest.approx(float(motion.acceleration(232.5)) / 9.80665, rel=1e-12)
+    still = {**texts, "pga": "0.02g", "scale": None, "vertical": None}
+    verdict = explorer.case({name: text for name, text in still.items() if text}).header["verdict"]
+    assert in_english(verdict) == (
+        f"It does not move: the ground acceleration never passes {lifting / 9.80665:.3g} g, which would lift it."
+    )
 
 
 def test_the_weight_on_moving_ground_says_when_the_block_is_lifted(explorer):
@@ -491,6 +517,13 @@ def test_a_comparison_holds_both_cases(explorer):
     assert larger["block"]["sides"][0]["p"] == 2.0
 
 
+def test_schemes_are_judged_over_the_duration_of_the_case(explorer):
+    """The first rest that a threshold of 0.05 gets wrong is at 230.75 s."""
+    for more, right in (({}, False), ({"duration": "230.5"}, True)):
+        rows = {row["text"]: row["right"] for row in explorer.schemes(STATUE | more)}
+        assert rows["velocity=0.05"] is right
+
+
 def test_schemes_tell_where_each_is_wrong(explorer):
     rows = {row["text"]: row for row in explorer.schemes(STATUE)}
     assert rows["velocity=0.05"]["right"] is False
@@ -538,7 +571,7 @@ def test_a_file_says_what_must_be_told(explorer):
     assert set(found["missing"]) == {"units", "dt"}
     assert found["channels"][0]["choices"] == {
         "units": [
-            (name, {"peak": pytest.approx(0.3 * unit, rel=1e-12)})
+            (name, {"peak": pytest.approx(0.3 * 9.80665 * unit, rel=1e-12)})
             for name, unit in {
                 "g": 1.0,
                 "m/s2": 1 / 9.80665,

@@ -345,7 +345,7 @@ def test_the_server_takes_a_mesh_and_shows_it(page, here):
         ("/api/case", {**texts, "mesh": "file:0123"}, "this mesh is not here any more"),
         ("/api/case", {**texts, "unit": "yard"}, "“Unit of the coordinates” must be one of"),
         ("/api/case", {**texts, "up": "north"}, "“Axis that points up” must be one of"),
-        ("/api/case", {**texts, "density": "stone"}, "“Density, kg/m³”"),
+        ("/api/case", {**texts, "density": "stone"}, "“Density (kg/m³)”"),
         ("/api/case", {**texts, "azimuth": "nan"}, "azimuth"),
         ("/api/body", {"width": "1", "height": "2"}, "this block is of no “Mesh”"),
     ):

@@ -198,7 +198,7 @@ def test_the_case_at_a_point_of_a_sweep(page):
 
 def test_a_comparison_takes_what_is_other_under_a_prefix(page):
     header, arrays = unpacked(page.get("/api/compare", params={**STATUE, "other.chattering": "velocity=0.05"}).content)
-    assert header["cases"][1]["treatment"] == "velocity 0.05"
+    assert header["cases"][1]["treatment"] == "velocity=0.05"
     assert {"first_rotation", "second_rotation"} <= arrays.keys()
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from rocking.arrays import Floats, Integers
 from rocking.block import Block
 from rocking.chattering.episodes import chattering_episodes
+from rocking.constants import STANDARD_GRAVITY
 from rocking.dynamics.schemes import TREATMENTS, compare_schemes
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.explorer.code import case_as_command, case_as_python
@@ -237,11 +238,12 @@ class Explorer:
         """Return what each treatment of chattering makes of a case, against the proven response."""
         case = self.show(texts).case
         start: dict[str, Any] = {"initial_position": case.initial_rotation, "initial_velocity": case.initial_velocity}
+        start["duration"] = case.duration
         found = compare_schemes(case.block, case.motion, schemes=TREATMENTS, model=case.model, **start)
         rows = [(each.scheme, each.is_right, each.verdict, each.largest_error) for each in found.outcomes]
         unfit = [(scheme, None, reason, None) for scheme, reason in found.not_applicable]
         return [
-            {"label": scheme.label, "text": str(scheme), "right": right, "verdict": words, "error": error}
+            {"text": str(scheme), "right": right, "verdict": words, "error": error}
             for scheme, right, words, error in [*rows, *unfit]
         ]
 
@@ -342,18 +344,21 @@ def _window_arrays(shown: Simulated, start: float, end: float, points: int = _PO
 
 
 def _shaking(case: Case, start: float, end: float, points: int) -> dict[str, Floats]:
-    """Ground acceleration in a window, g; with a vertical component, the weight, by which thresholds are multiplied."""
-    motion, gravity = case.motion, case.block.gravity
+    """Ground acceleration in a window, g; with a vertical component, the weight, by which thresholds are multiplied.
+
+    A g is the standard one, as in every text of a case, whatever gravity the block has.
+    """
+    motion = case.motion
     if motion is None:
         return {"ground_time": np.empty(0), "ground_g": np.empty(0)}
     last = motion.duration if motion.vertical is None else max(motion.duration, motion.vertical.duration)
     corners = motion.drawing_times(start, min(end, max(start, last)))
-    acceleration = motion.acceleration(corners) / gravity
+    acceleration = motion.acceleration(corners) / STANDARD_GRAVITY
     if motion.vertical is None:
         kept = extremes(acceleration, points)
         return {"ground_time": corners[kept] - start, "ground_g": acceleration[kept]}
-    weight = 1.0 + motion.vertical.acceleration(corners) / gravity
-    plus, minus = (threshold / gravity for threshold in case.block.uplift_thresholds(case.model))
+    weight = 1.0 + motion.vertical.acceleration(corners) / case.block.gravity
+    plus, minus = (threshold / STANDARD_GRAVITY for threshold in case.block.uplift_thresholds(case.model))
     beyond = (-acceleration - plus * weight, acceleration - minus * weight)
     kept = np.unique(np.concatenate([extremes(each, points) for each in (acceleration, weight, *beyond)]))
     return {"ground_time": corners[kept] - start, "ground_g": acceleration[kept], "weight": weight[kept]}
@@ -411,21 +416,21 @@ def _intervals(response: Response) -> tuple[Floats, Floats]:
 def _facts(shown: Simulated) -> dict[str, Any]:
     case, response = shown.case, shown.response
     block, motion = case.block, case.motion
-    gravity = block.gravity
     episodes = chattering_episodes(response)
     return {
         "block": {
             "description": block.description,
             "sides": [vars(side) for side in block.sides],
             "symmetric": block.is_symmetric,
-            "thresholds_g": [each / gravity for each in block.uplift_thresholds(case.model)],
+            "thresholds_g": [each / STANDARD_GRAVITY for each in block.uplift_thresholds(case.model)],
+            "gravity_g": block.gravity / STANDARD_GRAVITY,
             "outline": _outline(block, shown.outline),
             "notes": [*map(str, block_notes(block)), *(case.body.solid.notes if case.body else ())],
             "body": None if case.body is None else case.body.plane(case.azimuth),
         },
-        "motion": None if motion is None else _motion_facts(motion, gravity),
+        "motion": None if motion is None else _motion_facts(motion),
         "model": case.model,
-        "treatment": case.treatment.label,
+        "treatment": str(case.treatment),
         "duration": response.duration,
         "overturned": response.overturned,
         "unfinished": response.unfinished,
@@ -452,10 +457,9 @@ def verdict(response: Response, thresholds: tuple[float, float]) -> dict[str, An
     if not len(response.events) and not len(response.impacts) and response.peak_rotation == 0.0:
         if response.motion is None:
             return phrase("verdict.still")
-        lifting = min(thresholds) / response.block.gravity
         if response.motion.vertical is not None:
             return phrase("verdict.unlifted")
-        return phrase("verdict.below", lifting=lifting)
+        return phrase("verdict.below", lifting=min(thresholds))
     rests = int(np.sum(response.events["kind"] == "rest"))
     if response.overturned:
         time = response.overturn_time
@@ -480,13 +484,13 @@ def _percent(share: float) -> dict[str, Any]:
 
 
 @functools.lru_cache(maxsize=4)
-def _motion_facts(motion: Motion, gravity: float) -> dict[str, Any]:
+def _motion_facts(motion: Motion) -> dict[str, Any]:
     """Say what a motion is, found once while only the block is changed."""
     return {
         "name": motion.name,
         "duration": motion.duration,
-        "pga_g": motion.pga / gravity,
-        "vertical": motion.vertical and {"name": motion.vertical.name, "pga_g": motion.vertical.pga / gravity},
+        "pga_g": motion.pga / STANDARD_GRAVITY,
+        "vertical": motion.vertical and {"name": motion.vertical.name, "pga_g": motion.vertical.pga / STANDARD_GRAVITY},
         "notes": list(motion_notes(motion)),
         "filtered": _drifts(motion),
     }

@@ -101,6 +101,7 @@ def described(body: Body, azimuth: float) -> Payload:
         else phrase("body.sound"),
         "weakest_azimuth": rose.data.weakest_azimuth,
         "weakest": rose.data.weakest_acceleration,
+        "gravity_g": solid.gravity / STANDARD_GRAVITY,
         "height_of_mass": float(solid.centre[2]),
     }
     arrays = {

@@ -154,13 +154,13 @@ def settled_case(case: Case, sine: Sine) -> tuple[Settled, StroboscopicMap]:
 def orbit(case: Case) -> Payload:
     """Return the phase plane of a case whose sine never ends, in units of slenderness, and what it settles on in words.
 
-    For another motion the header has nothing but ``offer``: the text of the nearest sine, its amplitude (g) and its
+    For another motion the header has nothing but ``offer``: the text of the nearest sine, its amplitude (m/s^2) and its
     frequency (Hz).
     """
     sine = sine_of(case)
     if sine is None:
         near = nearest_sine(case)
-        offer = {"motion": near.text, "amplitude": near.amplitude / case.block.gravity, "frequency": near.frequency}
+        offer = {"motion": near.text, "amplitude": near.amplitude, "frequency": near.frequency}
         return Payload({"offer": offer})
     found, rock = settled_case(case, sine)
     response = _followed(case, sine, *found.course)

@@ -6,6 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
 from rocking.explorer.core import Explorer, Simulated, checked_window, extremes, verdict
 from rocking.explorer.inputs import Texts
@@ -103,9 +104,11 @@ def _state(response: Response, time: float, rotation: float) -> dict[str, Any]:
 
 def _ground(shown: Simulated, time: float) -> dict[str, float | None]:
     """Ground accelerations at a time, g; None where there is no such motion."""
-    motion, gravity = shown.case.motion, shown.case.block.gravity
+    motion = shown.case.motion
     both = {"ground_g": motion, "vertical_g": None if motion is None else motion.vertical}
-    return {name: None if each is None else float(each.acceleration(time)) / gravity for name, each in both.items()}
+    return {
+        name: None if each is None else float(each.acceleration(time)) / STANDARD_GRAVITY for name, each in both.items()
+    }
 
 
 def thumbnail(explorer: Explorer, texts: Texts) -> Payload:

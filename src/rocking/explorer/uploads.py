@@ -10,7 +10,6 @@ from dataclasses import replace
 from pathlib import PurePosixPath, PureWindowsPath
 from typing import Any, Final, NamedTuple
 
-from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion, RockingError, UnreadableRecord
 from rocking.explorer.meshes import MeshStore
 from rocking.explorer.parameters import MESH_KINDS
@@ -250,7 +249,7 @@ def _told(motion: Motion, missing: list[str]) -> dict[str, Any]:
     choices: dict[str, list[tuple[str, dict[str, float]]]] = {}
     if "units" in missing:
         units = {name: unit for name in CHOICES if (unit := find_unit(name)) is not None}
-        peaks = {name: motion.pga * unit.multiplier / unit.divisor / STANDARD_GRAVITY for name, unit in units.items()}
+        peaks = {name: motion.pga * unit.multiplier / unit.divisor for name, unit in units.items()}
         choices["units"] = [(name, {"peak": peak}) for name, peak in peaks.items()]
     if "dt" in missing:
         steps = motion.duration / _STAND_INS["dt"]

@@ -9,6 +9,7 @@ import {colour, textSize, themed} from "./theme.js";
 import {one, say} from "./words.js";
 import {decimals, fixed, short} from "./numbers.js";
 import {phrase} from "./texts.js";
+import {ofG} from "./units.js";
 
 /** Wall-clock seconds that an interval between impacts takes at least where playing slows down for them. */
 const SEEN = 0.22;
@@ -225,7 +226,7 @@ export class View {
     pen.fillStyle = colour("ink");
     pen.font = `${textSize(12)}px system-ui, sans-serif`;
     pen.textAlign = "right";
-    pen.fillText(phrase("stage.grid", {step: short(step)}), width - 10, height - 8);
+    pen.fillText(phrase("stage.grid", {step}), width - 10, height - 8);
     pen.save();
     const pivot = drawn >= 0 ? right : -left;
     pen.translate(middle + scale * pivot, floor);
@@ -303,7 +304,7 @@ export class View {
     pen.font = `${size}px system-ui, sans-serif`;
     pen.textAlign = "left";
     const alpha = this.page.shown.header.block.sides[theta >= 0 ? 0 : 1].alpha;
-    const rows = [phrase("stage.rotation", {degrees: short((theta * 180) / Math.PI), share: short(theta / alpha)}), phrase("stage.ground", {acceleration: short(ground, 2), moved: short(100 * moved, 2)})];
+    const rows = [phrase("stage.rotation", {rotation: theta, share: short(theta / alpha)}), phrase("stage.ground", {acceleration: ofG(ground, 2), moved})];
     const larger = this.larger();
     if (larger > 1) rows.push(phrase("stage.larger", {times: larger}));
     rows.forEach((row, k) => pen.fillText(row, 12, 9 + size * (1 + 1.4 * k)));

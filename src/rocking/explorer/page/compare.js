@@ -7,9 +7,9 @@ import {offer} from "./exports.js";
 import {ends, namesOf, parameter, specification} from "./parameters.js";
 import {snapshots} from "./snapshots.js";
 import {colour} from "./theme.js";
-import {caseName} from "./units.js";
+import {caseName, treatmentName} from "./units.js";
 import {counted, fill, legend, make, one, slug} from "./words.js";
-import {short} from "./numbers.js";
+import {short, span} from "./numbers.js";
 import {inWords, phrase} from "./texts.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
@@ -22,7 +22,7 @@ export class View {
     this.with.addEventListener("change", () => { page.state.compare = this.with.value; page.state.other = {}; this.form(); this.update(); });
     this.align = /** @type {HTMLSelectElement} */ (one("compare-align"));
     this.align.addEventListener("change", () => { page.state.align = this.align.value; page.state.window = null; this.update(); });
-    this.histories = new Histories(one("compare-plots"), {window: (span) => { page.state.window = span; this.update(); }});
+    this.histories = new Histories(one("compare-plots"), {window: (chosen) => { page.state.window = chosen; this.update(); }});
     this.known = "";
     this.load = new Latest(() => this.run(), (error) => page.problem(error, "view-compare"));
     this.restore();
@@ -93,7 +93,7 @@ export class View {
     first.lines.weight = arrays.first_weight;
     if (!["motion", "case"].includes(kind)) second.lines.ground_time = second.lines.ground_g = none;
     this.histories.draw(header, first, second);
-    one("compare-verdict").textContent = (kind === "treatment" ? phrase("compare.verdict_treated", {treatment: other.treatment, verdict: inWords(other.verdict), difference: difference(one_, other)})
+    one("compare-verdict").textContent = (kind === "treatment" ? phrase("compare.verdict_treated", {treatment: treatmentName(other.treatment), verdict: inWords(other.verdict), difference: difference(one_, other)})
       : phrase("compare.verdict", {verdict: inWords(other.verdict), difference: difference(one_, other)})).trim();
     legend("compare-legend", [["line", phrase("compare.this")], ["second", shifted(header.shift)], ["rest", phrase("compare.at_rest")], ["impact", phrase("compare.impacts")]]);
   }
@@ -101,7 +101,7 @@ export class View {
   /** What may be saved: both cases, each under its name. @param {any} header @param {string} kind of what is compared */
   files({cases: [first, other]}, kind) {
     const {state} = this.page;
-    const [one_, second] = [caseName(first), kind === "treatment" ? phrase("compare.treated", {name: caseName(other), treatment: other.treatment}) : caseName(other)];
+    const [one_, second] = [caseName(first), kind === "treatment" ? phrase("compare.treated", {name: caseName(other), treatment: treatmentName(other.treatment)}) : caseName(other)];
     const name = `rocking-compare-${slug(one_)}-and-${slug(second)}`;
     const asked = {...state.texts, ...this.asked(), first: one_, second};
     /** @type {[string, string][]} */
@@ -124,9 +124,10 @@ export class View {
     const rows = await json("/api/schemes", this.page.state.texts);
     this.known = key;
     fill(/** @type {HTMLTableElement} */ (one("schemes")), ["", phrase("compare.treatment_head"), phrase("compare.makes")], rows.map((/** @type {any} */ row) => {
-      const button = make("button", {type: "button", disabled: row.right === null, "aria-label": phrase("compare.button_about", {name: row.label}), on: {click: () => { this.page.state.other = {chattering: row.text}; this.form(); this.update(); }}}, [phrase("compare.button")]);
+      const name = treatmentName(row.text);
+      const button = make("button", {type: "button", disabled: row.right === null, "aria-label": phrase("compare.button_about", {name}), on: {click: () => { this.page.state.other = {chattering: row.text}; this.form(); this.update(); }}}, [phrase("compare.button")]);
       const sign = row.right === null ? "" : row.right ? "✓ " : "✗ ";
-      return [button, row.label, sign + (row.error ? phrase("compare.worst", {verdict: row.verdict, error: short(row.error)}) : row.verdict)];
+      return [button, name, sign + (row.error ? phrase("compare.worst", {verdict: row.verdict, error: span(row.error)}) : row.verdict)];
     }));
   }
 }

@@ -6,6 +6,7 @@ import {one, say} from "./words.js";
 import {coarse} from "./theme.js";
 import {decimals, fixed, short, typed} from "./numbers.js";
 import {inWords, phrase} from "./texts.js";
+import {ofG} from "./units.js";
 
 /** How long the time must stay before it is read from the response, and before it is spoken, ms. */
 const STILL = 60, QUIET = 600;
@@ -109,11 +110,10 @@ export class Cursor {
   async read(text) {
     const found = await this.found(text);
     const digits = decimals(this.width());
-    const degrees = (/** @type {number} */ radians) => short((radians * 180) / Math.PI);
     const parts = [
-      phrase("reading.rotation", {degrees: degrees(found.rotation), share: short(found.over_slenderness)}), phrase("reading.velocity", {velocity: short(found.velocity)}),
-      ...(found.ground_g === null ? [] : [phrase("reading.ground", {acceleration: short(found.ground_g)})]),
-      ...(found.vertical_g === null ? [] : [phrase("reading.upwards", {acceleration: short(found.vertical_g)})]),
+      phrase("reading.rotation", {rotation: found.rotation, share: short(found.over_slenderness)}), phrase("reading.velocity", {velocity: short(found.velocity)}),
+      ...(found.ground_g === null ? [] : [phrase("reading.ground", {acceleration: ofG(found.ground_g)})]),
+      ...(found.vertical_g === null ? [] : [phrase("reading.upwards", {acceleration: ofG(found.vertical_g)})]),
       phrase("reading.energy", {energy: short(found.energy)}),
     ];
     const words = phrase("reading.is", {time: fixed(found.time, digits), state: inWords(found.state), parts: parts.join(", ")});

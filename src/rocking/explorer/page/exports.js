@@ -37,7 +37,7 @@ export function showExports(what, python, command, files) {
 export function showCode(what, python, command) {
   one("python-title").textContent = phrase(`save.${what}_python`);
   one("python").textContent = python;
-  one("command").textContent = command ?? phrase(`save.no_${what}_command`);
+  one("command").replaceChildren(...(command ? command.split(/( +)/).map((part, k) => (k % 2 ? part : make("span", {}, [part]))) : [phrase(`save.no_${what}_command`)]));
   /** @type {HTMLButtonElement} */ (document.querySelector("[data-copy=command]")).disabled = !command;
 }
 

@@ -7,6 +7,7 @@ import {namesOf, parameter, specification} from "./parameters.js";
 import {explained, make, one} from "./words.js";
 import {measured, shown, typed, whole} from "./numbers.js";
 import {phrase} from "./texts.js";
+import {G} from "./units.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
 /** @typedef {import("./parameters.js").Parameter} Parameter */
@@ -14,7 +15,6 @@ import {phrase} from "./texts.js";
 /** @typedef {{tell: () => void}} Form */
 
 const STEPS = 1000;
-const G = 9.80665;
 const BLOCK = namesOf("block"), MOTION = namesOf("motion", "start"), RELEASED = "3deg";
 /** Key of the file that a text names, if it names one. @param {string | undefined} text */
 const keyOf = (text) => /^file:([^#]*)/.exec(text ?? "")?.[1];

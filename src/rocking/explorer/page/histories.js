@@ -4,9 +4,10 @@ import {withLegend} from "./exports.js";
 import {bokeh, coarse, colour, figure, showPlot, themed} from "./theme.js";
 import {fixed} from "./numbers.js";
 import {phrase} from "./texts.js";
+import {gAxis} from "./units.js";
 
 /** @typedef {{time: Float64Array, rotation: Float64Array, ground_time: Float64Array, ground_g: Float64Array, weight?: Float64Array, impact: Float64Array}} Lines */
-/** @typedef {{lines: Lines, rest: Float64Array, uplift: Float64Array, block: {sides: {alpha: number}[], thresholds_g: number[]}}} Drawn */
+/** @typedef {{lines: Lines, rest: Float64Array, uplift: Float64Array, block: {sides: {alpha: number}[], thresholds_g: number[], gravity_g: number}}} Drawn */
 
 const NARROWEST = 1e-10;
 const WIDE = 0.5;
@@ -52,7 +53,7 @@ export class Histories {
     /** @type {[number, number]} */
     this.window = [0, 1];
     this.whole = 1;
-    /** Ground accelerations that lift the block, g: to the right and to the left. */
+    /** Ground accelerations that lift the block, in the unit of the axis: to the right and to the left. */
     this.thresholds = [NaN, NaN];
     /** @type {(Drawn | null)[]} */
     this.drawn = [null, null];
@@ -64,6 +65,8 @@ export class Histories {
     this.cursors = [];
     /** Curves that were shown before, the oldest first. @type {import("./ghosts.js").Ghost[]} */
     this.ghosts = [];
+    this.perG = this.upwards = 1;
+    this.unit = "g";
     this.made = false;
     this.drawing = false;
     element.addEventListener("keydown", (event) => this.key(event));
@@ -75,7 +78,8 @@ export class Histories {
     this.rotation = figure({height: 290, x_range: this.x, y_range: new B.Range1d({start: -1, end: 1})}, phrase("histories.rotation_plot"));
     this.ground = figure({height: 190, x_range: this.x, y_range: new B.Range1d({start: -1, end: 1}), min_border_bottom: 44}, phrase("histories.ground_plot"));
     this.rotation.left[0].axis_label = phrase("histories.rotation");
-    this.ground.left[0].axis_label = phrase("histories.ground");
+    [this.perG, this.unit] = gAxis();
+    this.ground.left[0].axis_label = phrase("histories.ground", {unit: this.unit});
     this.rotation.below[0].visible = false;
     for (const each of [this.rotation, this.ground]) this.addTools(each);
     this.glyphs();
@@ -183,7 +187,9 @@ export class Histories {
     this.window = [from, to];
     this.whole = duration;
     this.drawn = [first, second];
-    this.thresholds = first.block.thresholds_g;
+    this.thresholds = first.block.thresholds_g.map((each) => this.perG * each);
+    /** What the vertical acceleration is drawn with, which the weight has over the block's own gravity. */
+    this.upwards = this.perG * first.block.gravity_g;
     this.scale = new Scale(from, to);
     const {dataset} = this.element, origin = String(this.scale.origin), unit = String(this.scale.unit);
     if (dataset.origin !== origin || dataset.unit !== unit) Object.assign(dataset, {origin, unit});
@@ -199,7 +205,7 @@ export class Histories {
       const y = lines.rotation.map((each) => each / sides[each >= 0 ? 0 : 1].alpha);
       for (const each of y) { if (each < low) low = each; if (each > high) high = each; }
       this.sources[name].data = {x: this.scale.all(lines.time, from), y};
-      this.sources[`${name}-ground`].data = {x: this.scale.all(lines.ground_time, from), y: lines.ground_g};
+      this.sources[`${name}-ground`].data = {x: this.scale.all(lines.ground_time, from), y: lines.ground_g.map((each) => this.perG * each)};
     }
     this.drawGhosts();
     this.drawThresholds(first.lines);
@@ -232,11 +238,11 @@ export class Histories {
 
   /** What of the ground motion is beyond the threshold of a side; under a vertical component, that and the thresholds, which it moves.
    * @param {Lines} lines */
-  drawThresholds({ground_g: y, weight}) {
-    const {x} = this.sources[`${NAMES[0]}-ground`].data;
+  drawThresholds({weight}) {
+    const {x, y} = this.sources[`${NAMES[0]}-ground`].data;
     const [plus, minus] = this.thresholds;
     for (const level of this.levels.threshold) level.visible = !weight;
-    if (weight) this.sources.vertical.data = {x, y: weight.map((each) => each - 1), plus: weight.map((each) => minus * each), minus: weight.map((each) => -plus * each)};
+    if (weight) this.sources.vertical.data = {x, y: weight.map((each) => this.upwards * (each - 1)), plus: weight.map((each) => minus * each), minus: weight.map((each) => -plus * each)};
     else this.empty("vertical");
     for (const sign of SIGNS) {
       const still = sign > 0 ? minus : plus;
@@ -264,8 +270,8 @@ export class Histories {
     const [start, end] = [bottom - 0.24 * span, top + 0.08 * span];
     this.rotation.y_range.setv({start, end});
     let peak = 0;
-    for (const drawn of this.drawn) for (const each of drawn?.lines.ground_g ?? []) peak = Math.max(peak, Math.abs(each));
-    for (const each of this.drawn[0]?.lines.weight ?? []) peak = Math.max(peak, Math.abs(each - 1));
+    for (const drawn of this.drawn) for (const each of drawn?.lines.ground_g ?? []) peak = Math.max(peak, Math.abs(this.perG * each));
+    for (const each of this.drawn[0]?.lines.weight ?? []) peak = Math.max(peak, Math.abs(this.upwards * (each - 1)));
     const shown = 1.1 * Math.max(peak, Math.min(...this.thresholds, peak || Infinity) || 0.1);
     this.ground.y_range.setv({start: -shown, end: shown});
     this.levels.balance.forEach((each, k) => { each.location = k ? -1 : 1; });

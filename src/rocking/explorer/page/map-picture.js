@@ -5,11 +5,31 @@ import {AFTER_REST, AROUND, MARK, MODES, OUTCOMES, OVERTURNS, RAMP, STRIPES, UNK
 import {plain} from "./ticks.js";
 import {bokeh, coarse, colour, figure, showPlot, themed} from "./theme.js";
 import {make, one} from "./words.js";
-import {short} from "./numbers.js";
+import {joined, short} from "./numbers.js";
 import {inWords, phrase} from "./texts.js";
+import {angleAxis} from "./units.js";
 
 /** What an axis is called, with its unit. @param {any} axis */
 export const labelled = ({label, unit}) => (unit ? phrase("map.axis_unit", {label: inWords(label), unit}) : inWords(label));
+
+/** What one of a study's quantities is on a bar, and its unit. @type {Record<string, () => [number, string]>} */
+const MEASURED = {peak_rotation: angleAxis, time_at_rest: () => [1, "s"]};
+/** @param {string} name of a quantity @returns {[number, string]} */
+const measure = (name) => MEASURED[name]?.() ?? [1, ""];
+/** What a quantity is called, with its unit. @param {string} name */
+export const quantityLabel = (name) => (name in MEASURED ? phrase("map.axis_unit", {label: phrase(`quantity.${name}`), unit: measure(name)[1]}) : phrase(`quantity.${name}`));
+/** A value of a quantity. @param {string} name @param {number} value */
+export const quantityValue = (name, value) => { const [scale, unit] = measure(name); return phrase("map.value", {name: phrase(`quantity.${name}`), value: joined(short(scale * value), unit)}); };
+
+/** Curves over a map, and how each is dashed. */
+const CURVES = /** @type {[string, number[]][]} */ ([["exact", []], ["eq76", [7, 4]]]);
+
+/** A curve as it is drawn, also on dark paper: dark on light. @param {number[]} dash */
+function curveKey([on = 1, off = 0]) {
+  const key = make("i", {className: "key curve"});
+  key.style.background = `repeating-linear-gradient(90deg, ${MARK} 0 ${on}px, ${AROUND} ${on}px ${on + off}px) center / 100% 2px no-repeat ${AROUND}`;
+  return key;
+}
 
 export class MapPicture {
   /** @param {{over: (x: number, y: number) => void, chosen: (x: number, y: number) => void, zoomed: (box: number[]) => void}} tell is told where the
@@ -34,7 +54,7 @@ export class MapPicture {
     this.plot.add_renderers(new B.GlyphRenderer({data_source: this.image, glyph: new B.ImageRGBA({image: F("image"), x: F("x"), y: F("y"), dw: F("dw"), dh: F("dh")}), level: "image"}));
     /** @type {Record<string, any>} */
     this.curves = {};
-    for (const [name, dash] of /** @type {[string, number[]][]} */ ([["eq76", [7, 4]], ["exact", []]])) {
+    for (const [name, dash] of [...CURVES].reverse()) {
       const source = new B.ColumnDataSource({data: {x: [], y: []}});
       // A light line under the dark one: it is seen on every colour of the map.
       for (const [width, ink] of /** @type {[number, string][]} */ ([[4.5, AROUND], [2, MARK]])) {
@@ -167,7 +187,7 @@ export class MapPicture {
       const part = (scale(value) - scale(low)) / (scale(high) - scale(low) || 1);
       out[k] = inks[Math.max(0, Math.min(RAMP.length - 1, Math.floor(part * RAMP.length)))];
     });
-    const ends = {low, high: high > low ? high : low + 1};
+    const ends = {low: measure(quantity)[0] * low, high: measure(quantity)[0] * (high > low ? high : low + 1)};
     const kind = logarithmic ? "LogColorMapper" : "LinearColorMapper";
     if (this.bar.color_mapper.type === kind) this.bar.color_mapper.setv(ends);
     else this.bar.color_mapper = new (bokeh()[kind])({palette: RAMP, ...ends});
@@ -206,7 +226,7 @@ export class MapPicture {
       key.style.background = ink;
       return make("span", {}, [key, text]);
     });
-    if (this.about.curves.exact) parts.push(make("span", {}, [make("i", {className: "key exact"}), phrase("map.exact")]), make("span", {}, [make("i", {className: "key eq76"}), phrase("map.eq76")]));
+    if (this.about.curves.exact) for (const [name, dash] of CURVES) parts.push(make("span", {}, [curveKey(dash), phrase(name === "exact" ? "map.exact" : "map.eq76")]));
     one("map-legend").replaceChildren(...parts);
   }
 

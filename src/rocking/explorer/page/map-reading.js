@@ -1,6 +1,7 @@
 // What is at a point of a map: the mark, which keys move, and where pointer or mark lie still the response there, small.
 
 import {payload} from "./api.js";
+import {quantityValue} from "./map-picture.js";
 import {colour} from "./theme.js";
 import {make, one, say} from "./words.js";
 import {joined, short} from "./numbers.js";
@@ -139,10 +140,11 @@ export class MapReading {
     if (Number.isNaN(value)) return "";
     const kinds = this.view.picture.kinds(name);
     if (name === "mode" && value > 1) return phrase("map.overturns_after", {count: value});
-    if (kinds) return kinds.find((/** @type {[number, string, string]} */ [each]) => each === value)?.[1] ?? "";
+    const kind = kinds?.find((/** @type {[number, string, string]} */ [each]) => each === value)?.[1] ?? "";
+    if (kinds) return name === "outcome" && kind ? phrase("map.first_rocking", {outcome: kind}) : kind;
     if (name === "rest") return phrase("map.rests_after", {time: short(value)});
     if (name === "peak") return value === Infinity ? "" : phrase("map.peak", {peak: short(value)});
-    return phrase("map.value", {name: phrase(`quantity.${name}`), value: short(value)});
+    return quantityValue(name, value);
   }
 
   /** @param {number} x @param {number} y */

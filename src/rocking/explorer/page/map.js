@@ -3,7 +3,7 @@
 import {Latest, frames, json, payload} from "./api.js";
 import {choose} from "./controls.js";
 import {showExports} from "./exports.js";
-import {MapPicture, labelled} from "./map-picture.js";
+import {MapPicture, labelled, quantityLabel} from "./map-picture.js";
 import {MapReading} from "./map-reading.js";
 import {MapZoom} from "./map-zoom.js";
 import {namesOf, specification} from "./parameters.js";
@@ -141,7 +141,7 @@ export class View {
       this.select(name).value = map[name];
     }
     const quantities = this.study ? this.study.quantities : specification.quantities;
-    this.select("quantity").replaceChildren(...quantities.map((/** @type {any} */ each) => make("option", {value: each}, [phrase(`quantity.${each}`)])));
+    this.select("quantity").replaceChildren(...quantities.map((/** @type {any} */ each) => make("option", {value: each}, [quantityLabel(each)])));
     if (!quantities.includes(map.quantity)) map.quantity = this.first(quantities);
     this.select("quantity").value = map.quantity;
     choose(this.select("points"), map.points ?? "200");

@@ -9,6 +9,10 @@ function locale(given) {
   try { return Intl.getCanonicalLocales(given)[0]; } catch { return document.documentElement.lang; }
 }
 
+const RAISED = "⁰¹²³⁴⁵⁶⁷⁸⁹";
+/** A power of ten, as it stands behind a number. @param {number} exponent */
+export const power = (exponent) => `·10${exponent < 0 ? "⁻" : ""}${[...String(Math.abs(exponent))].map((each) => RAISED[Number(each)]).join("")}`;
+
 /** What stands where there is no number. */
 export const NONE = "–";
 /** Formats by their options, which take long to make. @type {Map<string, Intl.NumberFormat>} */
@@ -31,7 +35,7 @@ export function short(value, digits = 3) {
   const size = Math.abs(value);
   if (size === 0 || (size >= 1e-4 && size < 1e6)) return formatted("significant", digits, value || 0);
   const [mantissa, exponent] = value.toExponential(digits - 1).split("e");
-  return `${formatted("fixed", digits - 1, Number(mantissa))}e${exponent.replace("-", "−")}`;
+  return `${formatted("significant", digits, Number(mantissa))}${power(Number(exponent))}`;
 }
 
 /** A number with so many decimals, or a dash where there is none. @param {number | null | undefined} value @param {number} digits */

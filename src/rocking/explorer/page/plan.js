@@ -4,6 +4,7 @@ import {colour} from "./theme.js";
 import {make} from "./words.js";
 import {short} from "./numbers.js";
 import {inWords, phrase} from "./texts.js";
+import {ofG} from "./units.js";
 
 /** Width of the plan, pixels, and of what is free around it. */
 const SIZE = 252, MARGIN = 16;
@@ -62,14 +63,14 @@ export class Plan {
     this.still.replaceChildren(
       shape("path", {d: pieces, class: "plan-edge"}), shape("path", {d: pieces, class: "plan-body"}),
       ...rings.map((level) => shape("circle", {cx: SIZE / 2, cy: SIZE / 2, r: (this.scale * height * level).toFixed(2), class: "plan-ring"})),
-      ...rings.slice(-2).map((level) => shape("text", {x: SIZE / 2, y: (SIZE / 2 + this.scale * height * level + 4).toFixed(2), class: "plan-text"}, [`${short(level)} g`])),
+      ...rings.slice(-2).map((level) => shape("text", {x: SIZE / 2, y: (SIZE / 2 + this.scale * height * level + 4).toFixed(2), class: "plan-text"}, [ofG(header.gravity_g * level)])),
       shape("path", {d: this.path(support), class: "plan-support"}),
       shape("path", {d: this.path(rose), class: "plan-rose"}),
       ...[[phrase("plan.north"), 0, -1], [phrase("plan.east"), 1, 0]].map(([name, x, y]) => shape("text", {x: SIZE / 2 + Number(x) * (SIZE / 2 - 7), y: SIZE / 2 + Number(y) * (SIZE / 2 - 9) + 4, class: "plan-compass"}, [String(name)])),
     );
     const entries = [["plan-key-body", phrase("plan.body")], ["line", phrase("plan.support")], ["plan-key-rose", phrase("plan.rose")], ["plan-key-edge", phrase("plan.edges")]];
     this.legend.replaceChildren(...entries.map(([kind, words]) => make("span", {}, [make("i", {className: `key ${kind}`}), words])));
-    const about = phrase("plan.about", {body: inWords(header.about), azimuth: short(header.weakest_azimuth, 4), acceleration: short(header.weakest)});
+    const about = phrase("plan.about", {body: inWords(header.about), azimuth: short(header.weakest_azimuth, 4), acceleration: ofG(header.gravity_g * header.weakest)});
     this.words.replaceChildren(...[about, inWords(header.left_out), inWords(header.repaired)].map((words) => make("p", {}, [words])));
   }
 

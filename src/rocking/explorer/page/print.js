@@ -3,7 +3,7 @@
 import {json} from "./api.js";
 import {specification} from "./parameters.js";
 import {lit} from "./theme.js";
-import {angle, ofG} from "./units.js";
+import {angle, ofG, treatmentName} from "./units.js";
 import {fill, make, one} from "./words.js";
 import {short} from "./numbers.js";
 import {phrase} from "./texts.js";
@@ -55,7 +55,7 @@ function head({state, shown}) {
     [phrase("print.motion"), !motion ? phrase("print.no_motion") : motion.vertical
       ? phrase("print.of_both", {name: motion.name, pga: ofG(motion.pga_g), vertical: motion.vertical.name, peak: ofG(motion.vertical.pga_g)})
       : phrase("print.of_motion", {name: motion.name, pga: ofG(motion.pga_g)})],
-    [phrase("print.model"), phrase("print.ends", {model: phrase(`model.${model}`), treatment})],
+    [phrase("print.model"), phrase("print.ends", {model: phrase(`model.${model}`), treatment: treatmentName(treatment)})],
     [phrase("print.computed"), `rocking ${specification.version}, ${new Date().toISOString().slice(0, 10)}`],
     [phrase("print.address"), `?${location.search.slice(1)}`],
   ];

@@ -1,13 +1,9 @@
 // Numbers at the ticks of an axis, as people write them: 0.003, and powers of ten only where zeros would fill the axis.
 
-import {fixed} from "./numbers.js";
+import {fixed, power} from "./numbers.js";
 
 /** Exponents beyond which a power of ten is written. */
 const SMALLEST = -5, LARGEST = 6;
-const RAISED = "⁰¹²³⁴⁵⁶⁷⁸⁹";
-
-/** @param {number} exponent */
-const raised = (exponent) => (exponent < 0 ? "⁻" : "") + [...String(Math.abs(exponent))].map((each) => RAISED[Number(each)]).join("");
 
 /** Decimals that tell these numbers apart and write each as it is. @param {ArrayLike<number>} values */
 function decimals(values) {
@@ -23,12 +19,12 @@ function decimals(values) {
 export function written(values) {
   const all = Array.from(values), size = all.reduce((most, each) => Math.max(most, Math.abs(each)), 0);
   const exponent = size > 0 ? Math.floor(Math.log10(size) + 1e-9) : 0;
-  const power = exponent < SMALLEST || exponent >= LARGEST;
-  const scaled = power ? all.map((each) => Number((each / 10 ** exponent).toPrecision(12))) : all;
+  const raised = exponent < SMALLEST || exponent >= LARGEST;
+  const scaled = raised ? all.map((each) => Number((each / 10 ** exponent).toPrecision(12))) : all;
   const count = decimals(scaled);
   return scaled.map((each) => {
     const text = fixed(each, count);
-    return Number(each.toFixed(count)) === 0 ? "0" : power ? `${text}·10${raised(exponent)}` : text;
+    return Number(each.toFixed(count)) === 0 ? "0" : raised ? `${text}${power(exponent)}` : text;
   });
 }
 

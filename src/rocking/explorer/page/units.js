@@ -1,13 +1,15 @@
 // Units in which the page shows lengths, angles and accelerations: chosen once, and part of the address.
 
 import {make, one} from "./words.js";
-import {NONE, joined, short} from "./numbers.js";
-import {phrase} from "./texts.js";
+import {NONE, joined, short, span} from "./numbers.js";
+import {measures, phrase} from "./texts.js";
 
+/** Standard gravity, m/s²: what a g is, whatever gravity a block has. */
+export const G = 9.80665;
 /** What one SI unit is in each unit, and how the page writes that. @type {Record<string, [number, string, string]>} */
 const KNOWN = {
   m: [1, "m", "m/s"], cm: [100, "cm", "cm/s"], ft: [1 / 0.3048, "ft", "ft/s"], in: [1 / 0.0254, "in", "in/s"],
-  deg: [180 / Math.PI, "°", ""], rad: [1, " rad", ""], g: [1 / 9.80665, "g", ""], "m/s2": [1, "m/s²", ""],
+  deg: [180 / Math.PI, "°", ""], rad: [1, " rad", ""], g: [1 / G, "g", ""], "m/s2": [1, "m/s²", ""],
 };
 const KINDS = /** @type {Record<string, string>} */ ({
   length: "length_in", position: "length_in", angle: "angle_in", acceleration: "acceleration_in", "acceleration at a period": "acceleration_in",
@@ -48,13 +50,20 @@ function written(name, value, digits = 3, which = 1) {
 /** @param {number | null} value in m/s² @param {number} [digits] */
 export const acceleration = (value, digits) => written("acceleration_in", value, digits);
 /** @param {number} value in g @param {number} [digits] */
-export const ofG = (value, digits) => acceleration(value * 9.80665, digits);
+export const ofG = (value, digits) => acceleration(value * G, digits);
 /** @param {number} value in rad @param {number} [digits] */
 export const angle = (value, digits) => written("angle_in", value, digits);
+/** @param {number} value in m @param {number} [digits] */
+export const length = (value, digits) => written("length_in", value, digits);
+Object.assign(measures, {acceleration, angle, length});
 /** @param {number | null} value in m/s @param {number} [digits] */
 export const velocity = (value, digits) => written("length_in", value, digits, 2);
 /** An acceleration as the axis of a figure has it: what one m/s² is, and the unit. @returns {[number, string]} */
 export const accelerationAxis = () => [KNOWN[chosen.acceleration_in][0], KNOWN[chosen.acceleration_in][1]];
+/** The same of one g. @returns {[number, string]} */
+export const gAxis = () => [Number((G * KNOWN[chosen.acceleration_in][0]).toPrecision(15)), KNOWN[chosen.acceleration_in][1]];
+/** An angle likewise: what one rad is, and the unit. @returns {[number, string]} */
+export const angleAxis = () => [KNOWN[chosen.angle_in][0], KNOWN[chosen.angle_in][1].trim()];
 /** A field's text, with the chosen unit where it is a bare number. @param {string} text */
 export const withUnit = (text) => (text && !Number.isNaN(Number(text)) ? `${Number(text)}${chosen.acceleration_in}` : text);
 
@@ -70,4 +79,12 @@ export function unitFields(write) {
 /** What a case is called, from what the server says of it. @param {any} header */
 export function caseName({block: {sides: [{p, alpha}]}, motion}) {
   return phrase("case.name", {p: short(p), alpha: angle(alpha), motion: motion ? phrase("case.motion", {name: motion.name, pga: ofG(motion.pga_g)}) : phrase("case.still")});
+}
+
+/** What a treatment of chattering is called, with its limit. @param {string} text as the address has it */
+export function treatmentName(text) {
+  const [kind, limit] = text.split("="), name = phrase(`treatment.${kind}`), size = Number(limit);
+  if (limit === undefined || kind === "certified") return name;
+  if (kind === "time") return limit === "exact" ? phrase("limit.named", {name, limit: phrase("limit.exact")}) : name;
+  return phrase("limit.named", {name, limit: kind === "interval" ? span(size) : phrase("limit.over", {limit: short(size)})});
 }
