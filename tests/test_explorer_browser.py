@@ -1110,8 +1110,9 @@ def test_a_map_is_taken_away_and_computed_again(opened, tmp_path):
 def test_the_key_of_a_curve_is_drawn_as_the_curve(opened, scheme):
     page = opened(f"view=map&{SINE}&points=8", scheme=scheme)
     complete(page)
-    paint = "Array.from(document.querySelectorAll('#map-legend .curve'), (each) => getComputedStyle(each).background)"
-    exact, fitted = page.js(paint)
+    keys = "Array.from(document.querySelectorAll('#map-legend .on-map'), (each) => getComputedStyle(each))"
+    exact, fitted = page.js(f"{keys}.map(({{background: each}}) => each)")
+    assert page.js(f"{keys}.map((each) => [each.height, each.borderTopStyle])") == [["6px", "none"]] * 2
     inks = f"{MODELS}.filter((each) => each.type === 'Line').map((each) => each.line_color.value ?? each.line_color)"
     assert set(page.js(inks)) == {"#10243e", "#ffffff"}
     for each in (exact, fitted):

@@ -26,7 +26,7 @@ const CURVES = /** @type {[string, number[]][]} */ ([["exact", []], ["eq76", [7,
 
 /** A curve as it is drawn, also on dark paper: dark on light. @param {number[]} dash */
 function curveKey([on = 1, off = 0]) {
-  const key = make("i", {className: "key curve"});
+  const key = make("i", {className: "key on-map"});
   key.style.background = `repeating-linear-gradient(90deg, ${MARK} 0 ${on}px, ${AROUND} ${on}px ${on + off}px) center / 100% 2px no-repeat ${AROUND}`;
   return key;
 }
