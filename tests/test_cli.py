@@ -212,12 +212,12 @@ def test_an_interrupt_that_python_drops_comes_again():
         def __del__(self):
             signal.raise_signal(signal.SIGINT)
 
-    late = time.monotonic() + 10.0
+    late = time.monotonic() + 60.0
     with pytest.raises(KeyboardInterrupt), Interrupts() as interrupts:
         Dropping()
         while time.monotonic() < late:
             time.sleep(0.001)
-    assert interrupts.asked and time.monotonic() < late
+    assert interrupts.asked
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 

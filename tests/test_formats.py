@@ -813,6 +813,18 @@ def test_large_files_are_read_in_pieces_of_the_same_content(
     assert f"line {len(lines) - 1}: 'oops' is not a number" in complaint(file("".join(lines)))
 
 
+@pytest.mark.parametrize("between", ["", "# a comment\n"], ids=["at once", "row after row"])
+def test_a_row_of_a_table_may_be_1024_characters_long_and_no_longer(file: Callable[[str], Path], between: str) -> None:
+    rows = [f"0.0{k} {k}.5\n" for k in range(6)]
+    for blanks, says in ((1017, ""), (1018, "line 3: this row is 1025 characters long; make all rows alike")):
+        rows[2] = f"0.02{' ' * blanks}2.5\n"
+        table = file("".join([*rows[:4], between, *rows[4:]]))
+        if says:
+            assert says in complaint(table, units="m/s^2")
+        else:
+            assert read(table, units="m/s^2").coefficients[:, 0].tolist() == [0.5, 1.5, 2.5, 3.5, 4.5]
+
+
 def test_one_endless_number_is_refused_quickly(file: Callable[[bytes], Path]) -> None:
     assert "1000000 characters long" in complaint(file(b"1\n" + b"1" * 10**6), dt=0.1, units="g")
     header = written.at2([], "NPTS=2, DT=.01").encode()
