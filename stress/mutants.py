@@ -65,6 +65,10 @@ NOT_JUDGED = ("compiled.py", "compiler.py", "interpreted.py", "library.py", "sig
 #: Share of the mutants of a part that tests must see.
 WANTED = 0.85
 
+#: Tests of laws that every module keeps, which import none of them; and more than the processor time that they take, s.
+OF_ALL = "tests/test_public_interface.py"
+_OF_ALL_SECONDS = 30.0
+
 EQUIVALENT = Path(__file__).with_name("equivalent_mutants.json")
 _OPTIONS = ["-x", "-q", "-n0", "-p", "no:cacheprovider", "--benchmark-disable"]
 _FAST = ["-m", "not thorough and not slow and not browser"]
@@ -146,11 +150,12 @@ class Tree:
         return {name: math.inf if each["by"] else each["seconds"] for name, each in found.items()}
 
     def judged(self, drawn: list[Mutant], uncompiled: bool) -> list[dict[str, Any]]:
-        """Find what the tests show of each mutant; what the nearest ones spare is judged again, by more of them."""
+        """Find what the tests show of each mutant: the nearest, and of what these spare more, and what judges all."""
         places = {mutant: self.folder / "mutants" / f"{mutant.key}.json" for mutant in drawn}
         left = drawn
-        for seconds in (self.seconds, 3.0 * self.seconds):
-            chosen = self.chosen({mutant.path for mutant in left}, seconds, uncompiled)
+        for seconds, of_all in ((self.seconds, {}), (3.0 * self.seconds, {OF_ALL: _OF_ALL_SECONDS})):
+            near = self.chosen({mutant.path for mutant in left}, seconds, uncompiled)
+            chosen = {path: some | of_all for path, some in near.items()}
             tasks: list[Task] = []
             for mutant in left:
                 names, place = [*chosen[mutant.path]], places[mutant]

@@ -142,7 +142,7 @@ def test_a_part_without_enough_branches_fails_the_run(monkeypatch, tmp_path, cap
     assert branches.main() == 1
 
 
-def test_what_the_nearest_tests_spare_is_judged_by_more_of_them(monkeypatch, tmp_path):
+def test_what_the_nearest_tests_spare_is_judged_by_more_of_them_and_by_laws_of_all(monkeypatch, tmp_path):
     tree = object.__new__(mutants.Tree)
     tree.folder, tree.seconds, tree.copies = tmp_path, 20.0, []
     (tmp_path / "mutants").mkdir()
@@ -159,9 +159,11 @@ def test_what_the_nearest_tests_spare_is_judged_by_more_of_them(monkeypatch, tmp
 
     monkeypatch.setattr(mutants, "done", done)
     monkeypatch.setattr(mutants, "ROOT", tmp_path)
-    (tmp_path / "near").touch(), (tmp_path / "far").touch()
+    monkeypatch.setattr(mutants, "OF_ALL", "all")
+    for name in ("near", "far", "all"):
+        (tmp_path / name).touch()
     for _ in range(2):
         assert [each["by"] for each in tree.judged(drawn, uncompiled=False)] == ["near::first", "far::second", ""]
-    more = ["near", "far"]
+    more = ["near", "far", "all"]
     assert asked[:2] == [[(0, ["near"]), (1, ["near"]), (2, ["near"])], [(1, more), (2, more)]]
     assert asked[2:] == [[], []]

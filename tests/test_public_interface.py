@@ -3,6 +3,7 @@
 import ast
 import inspect
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -105,15 +106,33 @@ def test_all_that_is_taken_or_returned_has_a_public_name() -> None:
     assert unreachable() == []
 
 
-def test_what_holds_data_cannot_be_changed() -> None:
-    """All dataclasses are frozen but those that are built up within one call."""
-    changing, judged = set(), 0
+def made_dataclasses() -> Iterator[tuple[ast.ClassDef, str]]:
+    """Every dataclass of the package, with its decorator."""
     for path in sorted(Path(rocking.__file__).parent.rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-            made = [ast.unparse(each) for each in node.decorator_list] if isinstance(node, ast.ClassDef) else []
-            if any(each.startswith("dataclass") for each in made):
-                judged += 1
-                if not any("frozen=True" in each for each in made):
-                    changing.add(node.name)
-    assert judged >= 100
-    assert changing == CHANGING
+            for made in node.decorator_list if isinstance(node, ast.ClassDef) else []:
+                if ast.unparse(made).startswith("dataclass"):
+                    yield node, ast.unparse(made)
+
+
+def test_what_holds_data_cannot_be_changed() -> None:
+    """All dataclasses are frozen but those that are built up within one call."""
+    made = [*made_dataclasses()]
+    assert len(made) >= 100
+    assert {node.name for node, how in made if "frozen=True" not in how} == CHANGING
+
+
+def test_what_holds_arrays_is_equal_to_itself_alone_and_a_result_says_what_it_is() -> None:
+    """Arrays cannot be compared by one truth value, nor hashed; a result's own text would be hidden by its fields."""
+    arrays = re.compile(r"\b(Floats|Integers|Flags|NDArray|ndarray|Dataset|DataArray|DataFrame)\b")
+    comparing, hiding, judged = set(), set(), 0
+    for node, how in made_dataclasses():
+        bases = [ast.unparse(base).rpartition(".")[2] for base in node.bases]
+        is_result = any(base.endswith(("Result", "Response", "UnderRecords", "WrittenToFiles")) for base in bases)
+        fields = [ast.unparse(field.annotation) for field in node.body if isinstance(field, ast.AnnAssign)]
+        if is_result or any(map(arrays.search, fields)):
+            judged += 1
+            comparing |= {node.name} if "eq=False" not in how else set()
+            hiding |= {node.name} if is_result and "repr=False" not in how else set()
+    assert judged >= 50
+    assert comparing == hiding == set()

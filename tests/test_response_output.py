@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 
 import rocking
-from rocking import Block, InvalidOption, OutputError, simulate
+from rocking import Block, InvalidOption, OutputError, dynamics, simulate
 from rocking.analysis.survey import survey
 from rocking.response import QUANTITIES, answers, history, sensitivity, summary
 from rocking.response.contact import Contact
@@ -347,6 +347,16 @@ def test_the_time_of_a_peak_is_as_uncertain_as_its_swing():
     decimals = len(summary.peak_time_text(one).partition(".")[2].removesuffix(" s"))
     moved = 0.01 * abs(other.peak_time - one.peak_time)
     assert moved < 10.0**-decimals
+
+
+def test_a_stop_that_is_not_reached_changes_no_digit_of_the_time_of_a_peak():
+    motion = rocking.pulses.sine(2.0, 0.5, cycles=4)
+    free = dynamics.simulate(dynamics.ImpactOscillator(1.0, 0.8, stop=0.01), motion)
+    for above in (1e-9, 1e-3):
+        body = dynamics.ImpactOscillator(1.0, 0.8, stop=0.01, second_stop=free.peak_rotation + above)
+        held = dynamics.simulate(body, motion)
+        assert held.peak_time == free.peak_time
+        assert summary.peak_time_text(held) == summary.peak_time_text(free)
 
 
 def test_the_time_of_a_peak_just_short_of_a_fall_is_told_with_fewer_digits():

@@ -82,7 +82,7 @@ class Setup:
     start: tuple[float | None, float] = (None, 0.0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Task:
     """Some of the bodies under one motion times a factor.
 

@@ -392,7 +392,7 @@ def _dataset(table: xr.Dataset, bands: _Bands, alpha: Floats, measure: Measure) 
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Levels:
     """Levels that motions were scaled to as people read them, and bands of them, in words: only what was looked at."""
 

@@ -108,7 +108,7 @@ def simulate_levels(
     return whole.isel(block=np.argsort(np.concatenate(groups))).rename(scale="level")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Boundaries:
     """Changes of the outcome in columns of a grid, ordered by column, then level.
 

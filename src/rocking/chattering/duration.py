@@ -161,7 +161,7 @@ def is_complete(a: ArrayLike, omega: ArrayLike, eta: ArrayLike) -> NDArray[np.bo
     return np.isfinite(chattering_time(a, omega, eta))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ChatteringSequence:
     """The resolved impacts of one chattering sequence and what follows from the last.
 

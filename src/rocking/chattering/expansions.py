@@ -248,7 +248,7 @@ def series_coefficients(omega: ArrayLike, eta: ArrayLike, *, order: int = 4) -> 
     return _coefficients(checked_frequency(omega), checked_restitution(eta), order)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SeriesDiagnosis:
     """A partial sum of the expansion and what is known of the rest.
 

@@ -47,7 +47,7 @@ _CROSSING: Final = 4
 _WIDER: Final = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 
 
-@dataclass
+@dataclass(eq=False)
 class Location:
     """Where a branch has been followed to: the equations there, a point, its tangent, test functions and course."""
 

@@ -13,7 +13,7 @@ from rocking.arrays import Floats
 from rocking.tables import plain
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Payload:
     """What is sent: plain values, and arrays of floats by name."""
 

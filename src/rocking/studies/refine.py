@@ -69,7 +69,7 @@ class Finding(enum.IntEnum):
     YES = 1
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Brackets:
     """Changes of verdicts, each between two scales; in order of verdict, motion, polarity, block and scale.
 

@@ -184,7 +184,7 @@ def program() -> str:
     return f"rocking {VERSION} (kernels {fingerprint()})"
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Work(ABC):
     """All that a worker needs for a unit.
 
@@ -244,7 +244,7 @@ class GridWork(Work):
             yield (m, s, k, blocks), Task(blocks, self.motions[m], float(self.factors[m, s, k]))
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class PointsWork(Work):
     """Simulations that are no grid: n blocks of `setup` and as many factors; equal ones of a motion stand together.
 

@@ -344,7 +344,7 @@ def rate(
     return {name: RULES[name](many, motion) for name in names}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Oscillator:
     """Oscillators that stand for one side of a block at some rotations.
 
