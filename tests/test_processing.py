@@ -209,3 +209,53 @@ def test_unusable_arguments_are_refused(arguments):
 def test_filters_ask_for_even_samples(arguments):
     with pytest.raises(InvalidMotion, match="resample"):
         pulses.ricker(1.0, 1.0).processed(**arguments)
+
+
+# With a vertical component
+
+
+def wave(amplitude: float, seed: int, dt: float = 0.02, count: int = 200) -> Motion:
+    """Smooth random motion, linear between even samples."""
+    random = np.random.default_rng(seed)
+    t = dt * np.arange(count + 1)
+    parts = [random.normal() * np.sin(f * t + random.uniform(0.0, 6.0)) for f in random.uniform(2.0, 25.0, 6)]
+    return Motion.from_samples(amplitude * np.sum(parts, axis=0) * np.sin(np.pi * t / t[-1]), dt)
+
+
+def test_a_part_after_the_vertical_component_has_none() -> None:
+    motion = wave(3.0, 1).with_vertical(wave(2.0, 2, count=100))
+    assert motion.processed(trim=(1.0, 3.0)).vertical.duration == pytest.approx(1.0)
+    assert motion.processed(trim=(2.5, 3.0)).vertical is None
+
+
+@pytest.mark.parametrize(
+    ("fine", "coarse"), [(0.01, 0.02), (0.01, 0.03), (0.02, 0.01), (0.005, 0.0078125), (0.01, 0.01)]
+)
+@pytest.mark.parametrize("trim", [(0.11, 1.53), (0.213, 0.233), (1.0, 1.5), (0.0, 4.0), (3.0, 3.99)])
+def test_components_are_cut_at_the_same_instants_whatever_their_steps(
+    fine: float, coarse: float, trim: tuple[float, float]
+) -> None:
+    push, lift = wave(3.0, 1, dt=fine, count=round(4.5 / fine)), wave(2.0, 2, dt=coarse, count=201)
+    part = push.with_vertical(lift).processed(trim=trim)
+    start = push.processed(trim=trim).history[-1].split()[-2].split("-")[0]
+    times = np.linspace(0.0, part.duration, 1001)[1:-1]
+    inside = times < part.vertical.duration if part.vertical is not None else times < 0.0
+    assert part.acceleration(times) == pytest.approx(push.acceleration(times + float(start)), abs=1e-9)
+    if part.vertical is None:
+        assert float(start) >= lift.duration
+        return
+    expected = lift.acceleration(times[inside] + float(start))
+    assert part.vertical.acceleration(times[inside]) == pytest.approx(expected, abs=1e-9)
+    assert part.vertical.duration == pytest.approx(min(part.duration, lift.duration - float(start)), abs=1e-12)
+
+
+def test_a_vertical_component_on_multiples_of_the_step_stays_even_and_can_be_filtered() -> None:
+    push, lift = wave(3.0, 1, dt=0.01, count=401), wave(2.0, 2, dt=0.04, count=101)
+    for trim, step in {(0.11, 3.53): 0.01, (0.2, 3.6): 0.04}.items():
+        part = push.with_vertical(lift).processed(trim=trim, band_pass=(0.5, 10.0))
+        assert (part.step, part.vertical.step) == (0.01, step)
+    pulse = pulses.ricker(1.0, 1.0)
+    both = pulse.with_vertical(lift).processed(trim=(0.5123, 0.5321))
+    assert both.vertical.acceleration(0.01) == pytest.approx(lift.acceleration(0.5223), abs=1e-12)
+    both = push.with_vertical(pulse).processed(trim=(0.51, 1.53))
+    assert both.vertical.acceleration(0.345) == pytest.approx(pulse.acceleration(0.855), abs=1e-12)

@@ -121,6 +121,7 @@ REFUSED = [
     ("a word for a value", "t (s)\ta (g)\n0\tfaulty\n" + rows(start=1, sign="\t"), 2, "'faulty' is not"),
     ("a word for a time", "time,a (g)\nx,1\n" + rows(start=1), 2, "'x' is not a number"),
     ("a word for a time first", "t (s)  a (g)\nx  0.1\n" + rows(start=1, sign="  "), 2, "'x' is not a number"),
+    ("a word below title", "Title\n0,lost,2\n" + wide(TIMES[1:], OTHER[1:], OTHER[1:]), 2, "'lost' is not a number"),
     ("a word for a time, no heading", "x;0,1\n" + rows(start=1, sign=";"), 1, "'x' is not a number"),
     ("two damaged rows", "t,a\n0,?\n\n0.01,?\n" + rows(start=2), 2, "'?' is not a number"),
     ("one damaged number", "a (g)\n0.l\n0.2\n0.3\n", 2, "'0.l' is not a number"),
@@ -189,6 +190,15 @@ def test_units_overrule_what_a_heading_says_and_lines_before_the_rows_may_hold_n
     (channel,) = channels(path, units="g")
     assert channel.metadata["heading units"] == "cm/s"
     assert identify(path).reason == "from line 2 on each line holds two numbers, between them a comma"
+
+
+def test_the_first_row_of_a_table_is_among_its_first_64_lines(tmp_path: Path) -> None:
+    path = tmp_path / "table.txt"
+    path.write_text("words of a laboratory\n" * 63 + rows())
+    assert read(path, units="g").samples[1] == pytest.approx(G * np.array(SAMPLES))
+    path.write_text("words of a laboratory\n" * 64 + rows())
+    with pytest.raises(UnreadableRecord, match="no line of it holds numbers alone"):
+        read(path, units="g")
 
 
 def test_even_and_uneven_times_are_in_the_unit_of_their_heading(tmp_path: Path) -> None:
