@@ -212,13 +212,14 @@ def test_an_interrupt_that_python_drops_comes_again():
         def __del__(self):
             signal.raise_signal(signal.SIGINT)
 
-    late = time.monotonic() + 60.0
+    late, hook = time.monotonic() + 60.0, sys.unraisablehook
     with pytest.raises(KeyboardInterrupt), Interrupts() as interrupts:
         Dropping()
         while time.monotonic() < late:
             time.sleep(0.001)
     assert interrupts.asked
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert sys.unraisablehook is hook
 
 
 @pytest.mark.parametrize("interrupted", [True, False])

@@ -8,9 +8,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from matplotlib.figure import Figure
+from matplotlib.image import imread
 
 import rocking
 from rocking.analysis.survey import survey
+from rocking.cli.output import write_results
 from rocking.result import DatasetResult
 from rocking.studies.results import FORMATS
 from rocking.tables import whole_file, write_figure
@@ -151,3 +154,11 @@ def test_a_link_is_kept_and_a_file_keeps_its_rights_and_a_device_is_written_to(t
     assert (tmp_path / "fresh.csv").stat().st_mode & 0o777 == 0o644
     with pytest.raises(rocking.OutputError, match="there is no folder"), whole_file(tmp_path / "none" / "a.csv"):
         pass
+
+
+def test_figures_of_a_command_have_the_size_and_resolution_of_a_page(tmp_path: Path) -> None:
+    figure = Figure(figsize=(3.0, 2.0))
+    write_results(tmp_path, figures={"one": lambda: figure}, result={"answer": 1.5})
+    assert imread(tmp_path / "one.png").shape[:2] == (320, 480)  # 160 dots per inch
+    assert b"/MediaBox [ 0 0 216 144 ]" in (tmp_path / "one.pdf").read_bytes()
+    assert json.loads((tmp_path / "result.json").read_text("utf-8")) == {"answer": 1.5}
