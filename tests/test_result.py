@@ -16,6 +16,7 @@ import rocking
 from rocking import chattering, dynamics, engine
 from rocking.chattering import chattering_map, critical_amplitude_nonlinear, families
 from rocking.errors import Unfinished
+from rocking.progress import Progress
 from rocking.result import DatasetResult
 from rocking.tables import write_netcdf
 
@@ -67,13 +68,29 @@ def test_an_ensemble_marks_what_was_given_up_and_keeps_the_rest(monkeypatch):
 
 
 @pytest.fixture(scope="module")
-def spectrum():
+def bars():
+    """Of every progress bar that ended what it is of, what was done, and of how much."""
+    found = []
+    with pytest.MonkeyPatch.context() as patched:
+        ended = Progress.__exit__
+
+        def noted(bar, kind, *error):
+            if kind is None:
+                found.append((bar._what, bar._done, bar._total))
+            return ended(bar, kind, *error)
+
+        patched.setattr(Progress, "__exit__", noted)
+        yield found
+
+
+@pytest.fixture(scope="module")
+def spectrum(bars):
     blocks = rocking.Blocks.grid(alpha=[0.15, 0.2], p=[1.0, 2.0, 3.0], restitution=[0.9])
     return rocking.rocking_spectrum(blocks, [PULSE, PULSE.scaled(0.5)])
 
 
 @pytest.fixture(scope="module")
-def study(tmp_path_factory):
+def study(bars, tmp_path_factory):
     motions = [rocking.pulses.one_sine(6.0, frequency) for frequency in (0.5, 0.8, 1.2, 2.0)]
     levels = [2.0, 3.0, 4.0, 5.0, 6.0, 8.0]
     found = rocking.study(tmp_path_factory.mktemp("study") / "one", [BLOCK], motions, levels=levels, measure="pga")
@@ -82,7 +99,7 @@ def study(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def results(spectrum, study):
+def results(bars, spectrum, study):
     return {
         "RockingSpectrum": spectrum,
         "OverturningMap": rocking.overturning_map(BLOCK, "one-sine", amplitudes=[1.0, 4.0], frequencies=[2.0, 3.0]),
@@ -106,6 +123,12 @@ def results(spectrum, study):
 def test_every_public_result_with_a_dataset_is_among_those_that_are_judged(results):
     public = {value for value in public_names().values() if inspect.isclass(value) and issubclass(value, DatasetResult)}
     assert {each.__name__ for each in public} - {"DatasetResult"} == results.keys()
+
+
+def test_every_bar_comes_to_its_end(results, bars):
+    assert {"mapping", "simulating", "refining", "basins", "eroding", "fitting"} <= {what for what, *_ in bars}
+    assert len(bars) > 12
+    assert [each for each in bars if not each[1] == each[2] > 0] == []
 
 
 def test_a_result_shows_itself_in_a_line(results):

@@ -146,14 +146,21 @@ def boundaries(
     """
     here = _on_grid(levels, outcome)
     origin = np.arange(len(here.level))
-    halvings = np.ceil(np.log2(np.maximum(1.0, (here.high - here.low) / (tolerance * here.high))))
-    with Progress("refining", int(halvings.sum()), show=progress) as bar:
+    left = _halvings(here, tolerance)
+    with Progress("refining", left, show=progress) as bar:
         while (wide := bisection.is_wide(here.low, here.high, tolerance)).any():
             found = here.below.copy()
             found[wide] = outcome_of(here.column[wide], here.level[wide])
             here, origin = _halved(here, wide, found, origin)
-            bar.advance(int(wide.sum()))
+            # A third outcome makes more of them: the bar waits until these are done, too.
+            before, left = left, min(left, _halvings(here, tolerance))
+            bar.advance(before - left)
     return _ordered(here)
+
+
+def _halvings(here: Boundaries, tolerance: float) -> int:
+    """Count the bisections that are left, as far as is known."""
+    return int(np.ceil(np.log2(np.maximum(1.0, (here.high - here.low) / (tolerance * here.high)))).sum())
 
 
 def _on_grid(levels: Floats, outcome: Integers) -> Boundaries:
