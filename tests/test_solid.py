@@ -20,7 +20,7 @@ import rocking
 from rocking import Block, InvalidBlock, InvalidOption, Solid
 from rocking.solid.moments import moments
 from rocking.solid.overlap import overlaps
-from rocking.solid.reading import upright
+from rocking.solid.reading import _NothingElse, upright
 from rocking.solid.repair import agreeing, closed, is_closed, joined
 
 SCRIPT = runpy.run_path(str(Path(__file__).resolve().parents[1] / "scripts" / "ship_statue.py"))
@@ -522,6 +522,13 @@ def flat():
     return mesh_of([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)], [(0, 1, 2), (1, 3, 2)])
 
 
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+def test_a_plate_is_too_thin_for_its_size_and_not_for_a_metre(size):
+    assert Solid.from_mesh(box((size, size, 1e-7 * size))).volume == pytest.approx(1e-7 * size**3, rel=1e-6)
+    with pytest.raises(InvalidBlock, match="encloses no volume"):
+        Solid.from_mesh(box((size, size, 1e-11 * size)))
+
+
 def strip():
     """A Möbius strip of six quadrilaterals."""
     turns = np.arange(6) * np.pi / 3.0
@@ -674,5 +681,12 @@ def test_a_stream_names_no_other_file(tmp_path, monkeypatch):
         gltf["buffers"][0]["uri"] = uri
         with pytest.raises(InvalidBlock, match=f"a.gltf: names another file, '{uri}', which is not read"):
             Solid.from_mesh(named(json.dumps(gltf).encode(), "a.gltf"))
-    scene = b"mtllib /etc/passwd\n" + trimesh.exchange.obj.export_obj(box()).encode()
+    asked = []
+    monkeypatch.setattr(_NothingElse, "__getitem__", lambda resolver, other: asked.append(other) or bytes(120))
+    with pytest.raises(InvalidBlock):
+        Solid.from_mesh(named(json.dumps(gltf).encode(), "a.gltf"))
+    assert asked == ["file:///etc/passwd"]
+    # Materials of an OBJ file are not looked for.
+    scene = b"mtllib /etc/passwd\nusemtl red\n" + trimesh.exchange.obj.export_obj(box()).encode()
     assert Solid.from_mesh(named(scene, "a.obj")).volume == pytest.approx(box().volume)
+    assert len(asked) == 1
