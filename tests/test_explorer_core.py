@@ -924,6 +924,9 @@ def test_two_records_are_laid_over_each_other_at_a_moment_of_both(explorer, alig
     inside = (times >= 0.0) & (times <= second.duration)
     assert np.allclose(arrays["second_rotation"][inside], second.rotation(times[inside]), rtol=0.0, atol=1e-9)
     assert inside.sum() > 500
+    # The window holds all that happens, of both.
+    happens = np.concatenate([first.impacts["time"], second.impacts["time"] + header["shift"]])
+    assert header["window"]["from"] <= happens.min() < happens.max() <= header["window"]["to"]
     rows = explorer.compared_as_csv(STATUE, other, ("statue", "the other"), align=align).decode().splitlines()
     assert {row.split(",")[0] for row in rows[1:]} == {"statue", "the other"}
     common, own = map(float, rows[-1].split(",")[1:3])
@@ -997,6 +1000,18 @@ def test_every_map_is_a_script_that_computes_the_same(texts, axes, tmp_path):
 def test_a_slice_that_is_none_is_refused(study, texts):
     with pytest.raises(InvalidOption):
         study.slice(texts)
+
+
+def test_a_slice_of_more_points_than_a_map_may_have_is_refused(study, monkeypatch):
+    axes = study.axes()
+    size = axes["p"].size * axes["alpha"].size
+    for most, fits in ((size, True), (size - 1, False)):
+        monkeypatch.setattr("rocking.explorer.studies._MOST", most)
+        if fits:
+            assert study.slice({"x": "p", "y": "alpha"}).arrays
+        else:
+            with pytest.raises(InvalidOption, match="points are too many for a map"):
+                study.slice({"x": "p", "y": "alpha"})
 
 
 def test_names_of_texts_are_options_of_the_command():

@@ -126,6 +126,8 @@ def test_what_is_said_of_a_body_are_its_own_numbers():
         in_english(found.header["about"])
         == "statue.obj of 3 parts (figure, head, plinth): 1.73 m high, 0.1711 m³, 455.4 kg."
     )
+    without_mass = in_english(explorer.body(STATUE).header["about"])
+    assert without_mass == "statue.obj of 3 parts (figure, head, plinth): 1.73 m high, 0.1711 m³."
     assert "Towards 30° the products of inertia are" in in_english(found.header["left_out"])
     assert in_english(found.header["repaired"]) == "Nothing had to be repaired in the mesh."
     assert np.allclose(found.arrays["support"].reshape(-1, 2), solid.support - solid.centre[:2])
