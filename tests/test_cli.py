@@ -264,6 +264,15 @@ def test_the_help_of_a_command_is_all_that_its_function_says(run, command):
     assert said in " ".join(run(command, "--help")[1].split())
 
 
+def test_groups_of_options_have_one_order_in_every_command(run):
+    order, seen = ["Arguments", "Parameters", "Intensity", "Block", "Records", "Model", "Output"], set()
+    for command in ("simulate", "fragility", "spectrum", "ida"):
+        groups = re.findall("╭─ (.+?) ─", run(command, "--help")[1])
+        assert groups == [each for each in order if each in groups], command
+        seen |= {*groups}
+    assert seen == {*order}
+
+
 def test_the_list_of_commands_has_a_line_for_each(run):
     code, out, _ = run("--help")
     assert code == 0
