@@ -548,6 +548,19 @@ def test_figure_3_has_one_panel_where_its_cases_are_the_same():
     np.testing.assert_array_equal(figure.tables["ratios"]["ratio_a"], interval_ratios(1.02, 3.0, 0.8, 100))
 
 
+def test_figure_3_states_its_last_ratio_and_that_all_late_ones_are_as_near(figures):
+    cases = [name for name in figures[3].tables["ratios"] if name != "n"]
+    limits = [statement for statement in figures[3].statements if "and its limit" in statement.claim]
+    apart = [statement for statement in figures[3].statements if "largest relative distance" in statement.claim]
+    assert len(cases) == len(limits) == len(apart) == 2
+    for name, limit, late in zip(cases, limits, apart, strict=True):
+        ratios = figures[3].tables["ratios"][name]
+        last = np.flatnonzero(np.isfinite(ratios))[-1]
+        assert f"ratio at n = {last}," in limit.claim and last > 50
+        assert limit.here == ratios[last]
+        assert abs(limit.here / limit.paper - 1.0) <= late.here
+
+
 @pytest.mark.parametrize("number", [9, 10, 11])
 def test_the_detail_of_a_response_is_a_panel_whose_time_is_shaded_wide_enough_to_be_seen(figures, number):
     drawing = figures[number].draw()
