@@ -12,6 +12,8 @@ from numpy.testing import assert_array_equal
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import UnreadableRecord
 from rocking.motion import records
+from rocking.motion.formats import read
+from rocking.motion.named import named_motion
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = ROOT / "src" / "rocking" / "motion" / "data"
@@ -114,3 +116,13 @@ def test_an_unknown_name_is_answered_with_a_near_one():
         records.load("ridgecrest-clc-90")
     with pytest.raises(UnreadableRecord, match="there are ridgecrest-clc-090, "):
         records.info("zzz")
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.5, 0.5])
+def test_a_record_by_name_is_multiplied_by_its_scale(scale, tmp_path):
+    path = tmp_path / "record.csv"
+    path.write_text("time (s),a (g)\n" + "".join(f"{0.01 * k:.2f},{0.1 * (k % 7 - 3):.3f}\n" for k in range(40)))
+    for name, base in (("el-centro-meloland-270", records.load("el-centro-meloland-270")), (str(path), read(path))):
+        found = named_motion(name, scale=scale)
+        assert np.array_equal(found.coefficients, scale * base.coefficients)
+        assert found.name == base.name
