@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from kernel_records import long_uncompiled
 from oracles.time_stepping import moreau_jean, schatzman_paoli
 
 import rocking
@@ -93,6 +94,7 @@ def test_the_exact_response_is_what_siconos_computes_event_by_event():
     np.testing.assert_allclose(found.velocity(times[between]), velocity[between], rtol=0.0, atol=5e-11)
 
 
+@long_uncompiled
 @pytest.mark.parametrize("second", [None, 0.03])
 @pytest.mark.parametrize("kind", BOTH)
 def test_an_oscillator_with_damping_and_stops_is_followed_with_order_one(kind, second):
@@ -139,6 +141,7 @@ def test_without_impacts_a_scheme_is_of_its_order(scheme, order, model):
     assert orders == pytest.approx(order, abs=0.1)
 
 
+@long_uncompiled
 @pytest.mark.parametrize("kind", BOTH)
 def test_with_impacts_the_order_is_one(kind):
     # The error of one step length depends on where the impacts lie within steps: many are averaged.
