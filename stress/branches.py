@@ -62,10 +62,18 @@ class Part:
 PARTS = {
     "kernels": Part(
         ("kernels/**/*.py",),
-        ("test_kernels_*.py", "test_chattering_first_arc.py", "test_chattering_sequence.py", "test_time_stepping.py"),
+        (
+            "test_kernels_*.py",
+            "test_chattering_kernels.py",
+            "test_chattering_first_arc.py",
+            "test_chattering_sequence.py",
+            "test_time_stepping.py",
+        ),
         compiled=False,
     ),
-    "store of studies": Part(("studies/store.py", "studies/place.py", "studies/state.py"), ("test_stud*.py",)),
+    "store of studies": Part(
+        ("studies/store.py", "studies/place.py", "studies/state.py"), ("test_stud*.py", "test_portability.py")
+    ),
     "readers": Part(("motion/formats/*.py",), ("test_formats*.py", "test_table_headings.py", "test_records.py")),
     "authentication of requests": Part(("explorer/authentication.py",), ("test_explorer_authentication.py",)),
 }

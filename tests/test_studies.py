@@ -669,6 +669,13 @@ def test_however_many_units_there_are_a_study_opens_alike_and_lists_its_folder_o
     assert opening[0] == opening[1] and not any("c.0" in what for _, what in opening[0])
 
 
+def test_a_unit_that_is_gone_is_named_and_so_is_what_to_do(tmp_path):
+    blocks = rocking.Blocks(p=np.linspace(1.0, 6.0, 600), alpha=0.2, restitution=0.7)
+    study = rocking.study(tmp_path, blocks, MOTIONS[0], levels=[1.0], unit_blocks=512)
+    with pytest.raises(rocking.StudyError, match="is gone: run the study again"):
+        study._store.present((0, 0, 0, 1))
+
+
 def test_the_bytes_of_a_unit_are_the_same_whenever_it_is_encoded(monkeypatch):
     outcomes = np.zeros((len(OUTCOMES), 1, 1, 1, 512))
     first = encoded(outcomes)

@@ -8,6 +8,7 @@ import pytest
 
 from rocking.errors import StudyError
 from rocking.studies.place import Folder
+from rocking.studies.store import Store, exists, keep
 
 
 @pytest.mark.skipif(os.name == "nt", reason="folders cannot be flushed there")
@@ -49,3 +50,20 @@ def test_a_second_run_is_told_who_holds_the_study_and_what_to_do(tmp_path: Path)
     told = rf"run by process {os.getpid()} on .*; wait for it, or end it there"
     with Folder(tmp_path).locked(), pytest.raises(StudyError, match=told), Folder(tmp_path).locked():
         pass
+
+
+def test_what_is_there_already_is_not_written_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    place, written = Folder(tmp_path), []
+    put = Folder.put
+    monkeypatch.setattr(Folder, "put", lambda folder, name, data: written.append(data) or put(folder, name, data))
+    for data in (b"one", b"one", b"two"):
+        keep(place, "study.json", data)
+        assert place.get("study.json") == data
+    assert written == [b"one", b"two"]
+
+
+def test_where_there_is_no_study_none_is_opened(tmp_path: Path) -> None:
+    place = Folder(tmp_path)
+    assert not exists(place)
+    with pytest.raises(StudyError, match="there is no study here: create it first"):
+        Store.open(place)
