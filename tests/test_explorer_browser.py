@@ -126,8 +126,15 @@ def statue(level, measure="pga"):
     return rocking.simulate(block, rocking.records.load("ridgecrest-clc-090").scaled_to(level, measure))
 
 
+def as_number(text):
+    """The number that the page writes so, as 3.14·10⁻⁵."""
+    mantissa, _, power = text.replace("−", "-").partition("·10")
+    exponent = int(power.translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")) or "0")
+    return float(f"{mantissa}e{exponent}")
+
+
 def peak_shown(page):
-    return float(page.text("#figures div:first-child dd").split(" ")[0].replace("−", "-"))
+    return as_number(page.text("#figures div:first-child dd").split(" ")[0])
 
 
 # The response
@@ -1065,10 +1072,11 @@ def test_a_small_response_is_shown_where_the_pointer_lies_still(opened, explorer
     plots.focus()
     plots.press("Escape")
     assert small.is_hidden()
+    before = len(asked)
     plots.press("ArrowRight")
     small.wait_for(state="visible", timeout=20_000)
     page.until("document.getElementById('said').textContent.startsWith('It ')")
-    assert len(asked) == 2
+    assert len(asked) == before + 1
 
 
 def test_a_map_is_taken_away_and_computed_again(opened, tmp_path):
@@ -1129,7 +1137,7 @@ def test_a_map_of_a_record_opens_on_the_final_fate_and_hatches_what_falls_later(
     found = [part.values for part in maps.parts(maps.grid_of(read_case(texts, explorer.uploads), axes))]
     outcome, mode = np.concatenate(found, axis=1)[[0, 3]]
     falls, at_once = (mode >= 0) | (mode == -4), outcome == 4
-    shares = [float(each) for each in re.findall(r"overturns [^,]*, ([\d.e−]+) %", page.text("#map-legend"))]
+    shares = [as_number(each) for each in re.findall(r"overturns [^,]*, (\S+) %", page.text("#map-legend"))]
     assert sum(shares) == pytest.approx(100 * falls.mean(), rel=0.05) and len(shares) >= 2
     assert page.text("#map-y option:checked") == "Peak ground acceleration (g)"
     assert re.match(
@@ -1918,7 +1926,7 @@ def test_a_response_is_explored_in_a_notebooks_frame(browser, host):
         context.close()
     assert shown.startswith("overturns") == response.overturned
     if not response.overturned:
-        assert float(shown.split(" ")[0]) == pytest.approx(response.peak_over_slenderness, rel=2e-3)
+        assert as_number(shown.split(" ")[0]) == pytest.approx(response.peak_over_slenderness, rel=2e-3)
 
 
 def test_a_foreign_page_cannot_show_the_explorer_in_a_frame(browser, here, opened):
