@@ -366,3 +366,15 @@ def test_the_time_of_a_peak_just_short_of_a_fall_is_told_with_fewer_digits():
     one, other = (simulate(block, motion.scaled(factor)) for factor in (1.0, 1.0 - 1e-6))
     assert 1e-3 < abs(other.peak_time - one.peak_time) < 1e-2
     assert summary.peak_time_text(one) == f"about {one.peak_time:.3f} s"
+
+
+def test_a_g_is_the_standard_one_whatever_gravity_the_block_has():
+    block = rocking.Block(width=0.4, height=2.0, gravity=1.62)
+    motion = rocking.pulses.one_sine(0.1 * 9.80665, 1.0)
+    response = rocking.simulate(block, motion.with_vertical(0.5 * motion))
+    summary = response.summary()
+    assert re.search(r"^motion .*peak 0\.1000 g.*vertical .*peak 0\.0500 g", summary, re.MULTILINE)
+    assert f"uplift above        {block.uplift_thresholds()[0] / 9.80665:.4f} g" in summary
+    for axes, peak in zip(response.plot().axes[1:3], (0.1, 0.05), strict=True):
+        highest = [np.max(np.abs(line.get_ydata())) for line in axes.lines]
+        assert min(abs(each - peak) for each in highest) < 1e-3 * peak

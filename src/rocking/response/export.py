@@ -11,6 +11,7 @@ import numpy as np
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.body import title_of
+from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
 from rocking.plot.response import RotationUnits
 from rocking.problem import thresholds_of
@@ -146,14 +147,14 @@ def figure(
     checks.one_of(units, "units", InvalidOption, get_args(RotationUnits))
     start, end = active_span(response) if window is None else checked_window(window, response.duration)
     times = drawing_times(response, start, end)
-    body, motion, gravity = response.body, response.motion, response.body.gravity
+    body, motion = response.body, response.motion
     coordinate = body.coordinate
     corners = np.empty(0) if motion is None else motion.drawing_times(start, end)
-    lift = None if motion is None or motion.vertical is None else motion.vertical.acceleration(corners) / gravity
-    weight = 1.0 if lift is None else 1.0 + lift
+    lift = None if motion is None or motion.vertical is None else motion.vertical.acceleration(corners)
+    weight = 1.0 if lift is None else 1.0 + lift / body.gravity
     (pair,), (own,) = thresholds_of(body.alone(), response.model)
     with np.errstate(invalid="ignore"):  # of a body of one side, which nothing lifts to the other
-        plus, minus = ((pair[k] + (weight - 1.0) * own[k]) / gravity for k in range(2))
+        plus, minus = ((pair[k] + (weight - 1.0) * own[k]) / STANDARD_GRAVITY for k in range(2))
     balance = (body.balance[0], body.balance[0 if math.isinf(pair[1]) else 1])
     if units == "slenderness" and any(map(math.isinf, balance)):
         units = "rad"
@@ -168,9 +169,9 @@ def figure(
         uplift_times=response.events["time"][response.events["kind"] == "uplift"],
         overturn_time=response.overturn_time if response.overturned and response.overturn_time <= end else None,
         motion_time=corners,
-        motion_acceleration_g=corners if motion is None else motion.acceleration(corners) / gravity,
+        motion_acceleration_g=corners if motion is None else motion.acceleration(corners) / STANDARD_GRAVITY,
         thresholds_g=(plus, minus),
-        vertical_acceleration_g=lift,
+        vertical_acceleration_g=None if lift is None else lift / STANDARD_GRAVITY,
         duration=response.duration,
         chattering=None if sequence is None else DrawnSequence(*sequence),
         units=units,

@@ -10,6 +10,7 @@ import numpy as np
 from rocking.block import Block, RestrainedBlock
 from rocking.block.sides import in_line
 from rocking.body import Body
+from rocking.constants import STANDARD_GRAVITY
 from rocking.problem import thresholds_of
 from rocking.response.answers import Answers
 from rocking.response.export import records
@@ -224,28 +225,29 @@ def digits_of(value: float, change: float) -> int:
 
 
 def _motion_text(response: Answers) -> str:
-    motion, gravity = response.motion, response.body.gravity
+    """Say what shakes the body; here and below a g is the standard one, as wherever accelerations are given in g."""
+    motion = response.motion
     if motion is None:
         return "none: free rocking"
-    parts = [f"{motion.name}, {motion.duration:.2f} s, peak {motion.pga / gravity:.4f} g", *motion.history]
+    parts = [f"{motion.name}, {motion.duration:.2f} s, peak {motion.pga / STANDARD_GRAVITY:.4f} g", *motion.history]
     if motion.vertical is not None:
-        parts.append(f"vertical {motion.vertical.name}, peak {motion.vertical.pga / gravity:.4f} g")
+        parts.append(f"vertical {motion.vertical.name}, peak {motion.vertical.pga / STANDARD_GRAVITY:.4f} g")
     return "; ".join(parts)
 
 
 def _thresholds_text(response: Answers) -> str:
     """Return what lifts the body; under a vertical motion it changes with the weight."""
-    gravity, motion = response.body.gravity, response.motion
+    motion = response.motion
     (pair,), (own,) = thresholds_of(response.body.alone(), response.model)
-    plus, minus = (pair / gravity).tolist()
+    plus, minus = (pair / STANDARD_GRAVITY).tolist()
     one = plus == minus or math.isinf(minus)
     text = f"{plus:.4f} g" if one else f"{plus:.4f} g (side +), {minus:.4f} g (side -)"
     if motion is None or motion.vertical is None:
         return text
-    low, high = (1.0 + lift / gravity for lift in motion.vertical.extremes)
+    low, high = (1.0 + lift / response.body.gravity for lift in motion.vertical.extremes)
     if np.array_equal(pair, own):
         return f"{text}, times the weight over that at rest, {low:.4f} to {high:.4f}"
-    least, most = ((pair[0] + (factor - 1.0) * own[0]) / gravity for factor in (low, high))
+    least, most = ((pair[0] + (factor - 1.0) * own[0]) / STANDARD_GRAVITY for factor in (low, high))
     return f"{text}; from {least:.4f} to {most:.4f} g with the weight{'' if one else ', to side +'}"
 
 
