@@ -41,11 +41,11 @@ def adopt(block: Record, law: int, plastic: float) -> None:
 
 @inlined
 def rotation_at(block: Record, nonlinear: bool, side: int, elongation: float) -> float:
-    """Rotation at which the tendon is longer by so much; inf where it never is."""
+    """Rotation at which the tendon is longer by so much; an infinity with the sign of that where it never is."""
     x = block.opening[side]
-    if not nonlinear:
-        return elongation / x if x > 0.0 else np.inf
-    return 2.0 * math.asin(0.5 * elongation / x) if elongation < 2.0 * x else np.inf
+    if x <= 0.0 or (nonlinear and abs(elongation) >= 2.0 * x):
+        return math.copysign(np.inf, elongation)
+    return 2.0 * math.asin(0.5 * elongation / x) if nonlinear else elongation / x
 
 
 @inlined
