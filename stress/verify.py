@@ -47,6 +47,7 @@ def main() -> int:
     parser.add_argument("--kept", type=Path, default=ROOT / "out" / "verify", help="folder of what is kept")
     parser.add_argument("--tables", type=Path, help="folder for the tables; by default docs/_tables of a full run")
     given = parser.parse_args()
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell makes its background jobs ignore Ctrl-C
     promises = [ALL[name] for name in given.promises or ALL]
     tables = given.tables or (ROOT / "docs" / "_tables" if given.parts == "full" else None)
     folders = {promise.name: given.kept / f"{promise.name}-{key(promise)}" for promise in promises}

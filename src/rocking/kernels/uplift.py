@@ -94,7 +94,7 @@ def push_series(ground: Ground, piece: int, offset: float, threshold: float, sig
     It is the motion less what the vertical component adds to the threshold. ``d`` is scratch space.
     """
     degree = local_series(ground, piece, offset, 1.0, A)
-    if not has_vertical(ground):
+    if not has_vertical(ground) or threshold == np.inf:  # the threshold of a side that nothing lifts stays infinite
         return degree
     changes = local_series(vertical_of(ground), piece, offset, 1.0, d)
     for k in range(degree + 1, changes + 1):
@@ -233,6 +233,8 @@ def back_within(ground: Ground, block: Record, scratch: Record, lifted: Uplift) 
 def time_beyond(ground: Ground, block: Record, scratch: Record, piece: int, offset: float, side: int) -> float:
     """Time from here for which the motion stays beyond a side's threshold within a piece; inf when to its end."""
     sign, threshold = 1.0 if side == 1 else -1.0, block.threshold[side]
+    if threshold == np.inf:
+        return 0.0
     A, d = scratch.ground, scratch.other
     degree = push_series(ground, piece, offset, threshold, sign, A, d)
     threshold += block.hold[side]
