@@ -223,6 +223,23 @@ def test_an_interrupt_that_python_drops_comes_again():
 
 
 @pytest.mark.parametrize("interrupted", [True, False])
+def test_what_is_dropped_after_an_interrupt_is_not_printed(monkeypatch, interrupted):
+    class Failing:
+        def __del__(self):
+            raise KeyError("a handle that the interrupt left half-open")
+
+    told = []
+    monkeypatch.setattr(sys, "unraisablehook", told.append)
+    with contextlib.suppress(KeyboardInterrupt), Interrupts():
+        try:
+            if interrupted:
+                signal.raise_signal(signal.SIGINT)
+        finally:
+            Failing()
+    assert [each.exc_type for each in told] == [KeyError] * (not interrupted)
+
+
+@pytest.mark.parametrize("interrupted", [True, False])
 def test_an_error_in_place_of_an_interrupt_is_one(run, monkeypatch, interrupted):
     def called(*_):
         with contextlib.suppress(KeyboardInterrupt):

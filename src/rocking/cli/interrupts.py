@@ -17,7 +17,8 @@ class Interrupts:
     """What became of Ctrl-C within a block of code.
 
     Python drops an exception that is raised in a finaliser or in a callback, and a library that calls Python may raise
-    another in its place. The first is raised again; for the second, `asked` says where the error comes from.
+    another in its place. The first is raised again; for the second, `asked` says where the error comes from. What
+    Python drops of the second kind is not printed.
 
     Attributes
     ----------
@@ -53,5 +54,5 @@ class Interrupts:
         if issubclass(unraisable.exc_type, KeyboardInterrupt):
             self._again = threading.Timer(_AGAIN, _thread.interrupt_main)
             self._again.start()
-        else:
+        elif not self.asked:
             self._before(unraisable)
