@@ -46,7 +46,7 @@ def test_pyplot_knows_the_figures_of_those_who_use_it_and_is_not_loaded_for_a_ba
     assert printed(f"{unknown}; {known}", DISPLAY=":987", WAYLAND_DISPLAY=":987", MPLBACKEND="agg") == "False\nTrue"
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems say nothing of a display in the environment")
 def test_the_command_line_writes_its_figures_without_windows(tmp_path):
     seen = tmp_path / "seen.csv"

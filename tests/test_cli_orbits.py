@@ -122,7 +122,7 @@ def test_a_diagram_takes_restraints(run, tmp_path):
     assert float(rows[-1].split(",")[-1]) == pytest.approx(float(table.iloc[-1, -1]), rel=1e-12)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_basin_of_a_wall_lies_before_its_stop(run, tmp_path):
     options = (*SIZES, "--one-sided", "--thrust", "force=500,height=2", "--pulse", "sine:amplitude=2.5,frequency=1.5Hz")
     grid = ("--positions", "0.5deg:5deg:6", "--velocities=-0.3:0.3:5", "--periods", 50)

@@ -27,13 +27,9 @@ EXAMPLES = runpy.run_path(str(ROOT / "scripts" / "page_examples.py"))
 EXAMPLE = EXAMPLES["EXAMPLE"]
 PAGES_WITH_EXAMPLES = [page for page in PAGES if EXAMPLE.search(page.read_text("utf-8"))]
 # They take seconds; the other pages show that examples run.
-MARKS = {
-    **dict.fromkeys(
-        ("basins.md", "calibrate.md", "calibration.md", "fragility.md", "from-a-mesh.md", "orbits.md",
-         "overturning-map.md", "risk.md", "walls-and-tendons.md"), pytest.mark.thorough
-    ),
-    **dict.fromkeys(("gradients.md", "periodic-orbits.md", "study.md"), pytest.mark.slow),
-}  # fmt: skip
+THOROUGH = ("fragility.md", "from-a-mesh.md", "orbits.md", "overturning-map.md", "risk.md", "walls-and-tendons.md")
+SLOW = ("basins.md", "calibrate.md", "calibration.md", "gradients.md", "periodic-orbits.md", "study.md")
+MARKS = {**dict.fromkeys(THOROUGH, pytest.mark.thorough), **dict.fromkeys(SLOW, pytest.mark.slow)}
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 
 

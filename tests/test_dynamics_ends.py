@@ -102,7 +102,7 @@ def test_a_flip_is_a_branch_point_where_the_motion_is_given_twice():
     assert np.array_equal(branch.is_stable, branch.values < EXACT.flip)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_branch_that_comes_back_is_followed_round_once():
     """Where the level has a maximum, the two orbits meet at a fold on either side of it."""
     branch = branch_of(lambda q: table(EXACT.fold + 0.09 - q * q), 0.1, (-0.6, 0.6))
@@ -128,7 +128,7 @@ def test_no_more_points_than_asked_for():
     assert len(branch) == 7 and branch.ends == ("too many points", "too many points")
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_branch_is_lost_where_the_family_has_no_body():
     branch = branch_of(
         lambda e: (dynamics.BouncingBall(e, gravity=G), pulses.sine(0.4 * G, TABLE, cycles=1)), 0.85, (0.7, 1.2)

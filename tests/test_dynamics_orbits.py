@@ -200,7 +200,7 @@ def test_a_ball_bounces_once_every_n_periods_between_the_levels_of_luck_and_meht
     ("shape", "kind"),
     [((1.0, 0.8, 0.02, 0.02, 2.2), "flip"),
      pytest.param((1.0, 0.8, 0.05, 0.01, 1.3), "fold", marks=pytest.mark.thorough),
-     pytest.param((1.0, 0.8, 0.05, -0.02, 2.4), "fold", marks=pytest.mark.thorough)],
+     pytest.param((1.0, 0.8, 0.05, -0.02, 2.4), "fold", marks=pytest.mark.slow)],
 )  # fmt: skip
 def test_orbits_of_an_oscillator_that_hits_once_are_those_of_shaw_and_holmes(shape, kind):
     frequency, e, damping, stop, shaking = shape

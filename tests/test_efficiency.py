@@ -42,7 +42,7 @@ def test_the_interval_is_that_of_a_normal_sample(rectangles):
     np.testing.assert_allclose(rectangles.dispersion_high.values, high * beta, rtol=1e-12)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_measure_that_was_scattered_by_hand_gets_its_scatter_back():
     # The same pulse, each time with another sudden, harmless burst that only the peak acceleration sees.
     rng = np.random.default_rng(3)

@@ -49,8 +49,8 @@ NUMBERS = {
 
 #: Their laws are held by faster tests, too.
 MARKS = {
-    **dict.fromkeys(("calibration", "chaos"), pytest.mark.thorough),
-    **dict.fromkeys(("frame", "pulse_map"), pytest.mark.slow),
+    "chaos": pytest.mark.thorough,
+    **dict.fromkeys(("calibration", "frame", "pulse_map"), pytest.mark.slow),
 }
 
 

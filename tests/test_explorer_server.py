@@ -608,7 +608,7 @@ def test_the_server_answers_over_a_socket_and_compiles_ahead(running, browser):
     assert start["compilation"]["done"]
 
 
-@pytest.mark.cases(fast=1)
+@pytest.mark.cases(fast=1, thorough=2)
 @pytest.mark.parametrize(
     ("path", "axes"),
     [

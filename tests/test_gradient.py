@@ -72,7 +72,7 @@ def test_samples_of_both_components_and_the_start_change_the_peak_as_differences
     assert judged_by_differences(range(5, 6), model, every=3) >= 10
 
 
-@pytest.mark.cases(fast=0, thorough=1)
+@pytest.mark.slow
 @MODELS
 def test_many_samples_change_the_peak_as_differences_say(model: str) -> None:
     assert judged_by_differences(range(6, 10), model) >= 50
@@ -107,7 +107,7 @@ def test_coefficients_change_the_peak_as_thirty_digits_say(model: str) -> None:
     assert judged_by_digits(3, model, range(6, 7)) == 2
 
 
-@pytest.mark.cases(fast=0, thorough=1)
+@pytest.mark.slow
 @MODELS
 def test_many_coefficients_change_the_peak_as_thirty_digits_say(model: str) -> None:
     assert sum(judged_by_digits(seed, model, range(4, 9)) for seed in range(4)) >= 20
@@ -139,7 +139,7 @@ def test_restrained_bodies_answer_backwards_as_forwards() -> None:
     assert judged_by_variation(range(16)) >= 14
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_many_restrained_bodies_answer_backwards_as_forwards() -> None:
     assert judged_by_variation(range(16, 216)) >= 180
 

@@ -57,7 +57,7 @@ def test_rotations_velocities_and_times_change_with_the_motion_as_thirty_digits_
     assert min(judged.values()) >= 1
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 @MODELS
 def test_many_rotations_velocities_and_times_change_as_thirty_digits_say(model: str) -> None:
     judged = [judged_by_digits(seed, model, [2, 5, 9], 20) for seed in range(5)]
@@ -109,7 +109,7 @@ def test_times_of_restrained_bodies_answer_backwards_as_forwards() -> None:
     assert min(judged.get(kind, 0) for kind in ("peak", "impact", "uplift", "rest")) >= 3
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_times_of_many_restrained_bodies_answer_backwards_as_forwards() -> None:
     judged = judged_restrained(range(5, 105))
     assert min(judged.get(kind, 0) for kind in ("peak", "impact", "uplift", "rest", "overturn")) >= 40
@@ -148,7 +148,7 @@ def test_bodies_between_two_stops_answer_backwards_as_forwards() -> None:
     assert judged["rest"] >= 1
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_many_bodies_between_two_stops_answer_backwards_as_forwards() -> None:
     judged = judged_between_stops(range(8, 80))
     assert judged["impact"] >= 200

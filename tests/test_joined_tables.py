@@ -40,7 +40,7 @@ def table(path, **options):
     return pd.read_csv(path, **options)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_the_tables_of_all_commands_join_by_record_and_by_motion(run, folder, tmp_path):
     out = {name: tmp_path / name for name in ("simulate", "check", "ida", "spectrum", "measures", "fragility")}
     common = [folder, "--keep-going", "--quiet"]

@@ -72,7 +72,7 @@ def test_the_bracket_holds_the_time_to_rest(case: tuple[float, Sides]) -> None:
     assert lower <= exact(v, sides) <= upper
 
 
-@pytest.mark.cases(fast=3)
+@pytest.mark.cases(fast=3, thorough=4)
 @pytest.mark.parametrize("stiffness", [9.0, 0.0, -9.0])
 @pytest.mark.parametrize("one_sided", [True, False])
 def test_width_and_error_fall_with_the_fifth_power_of_the_speed(stiffness: float, one_sided: bool) -> None:

@@ -51,7 +51,7 @@ def judged_by_differences(
     return len(found.ends)
 
 
-@pytest.mark.parametrize("model", [pytest.param("linear", marks=pytest.mark.thorough), "nonlinear"])
+@pytest.mark.parametrize("model", [pytest.param("linear", marks=pytest.mark.slow), "nonlinear"])
 def test_median_and_dispersion_change_as_differences_of_fits_say(model: str) -> None:
     assert judged_by_differences(PULSES, (1.5, 2.8), 12, model, STEPS) == 3
 

@@ -104,7 +104,7 @@ def test_another_answer_of_another_code_would_be_found(monkeypatch, change, says
     assert all(says in told for told in found.told)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_the_other_code_agrees_with_many_digits():
     """Short records of all kinds; what does not overturn has the same peak to some thousand units of rounding."""
     worst, moved, fell = 0.0, 0, 0

@@ -54,7 +54,7 @@ ONCE_DIFFERENT = [
 ]
 
 
-@pytest.mark.cases(fast=5)
+@pytest.mark.cases(fast=5, thorough=15)
 @pytest.mark.parametrize(
     "seed, number, vertical",
     ONCE_DIFFERENT,

@@ -108,7 +108,7 @@ def test_responses_to_short_records_are_those_of_sixty_digit_arithmetic(model: s
         assert_allclose(response.impacts[name][:resolved], exact, rtol=1e-9, atol=1e-12)
 
 
-@pytest.mark.cases(fast=2)
+@pytest.mark.cases(fast=2, thorough=5)
 @pytest.mark.parametrize("model", ["linear", "nonlinear"])
 @pytest.mark.parametrize("seed", [4, 5, 6, 7])
 def test_responses_from_initial_states_are_those_of_scipy(model: str, seed: int) -> None:

@@ -4,7 +4,7 @@ import pytest
 from oracles.standing import KINDS, OF_ENSEMBLES, TOLERANCE, lanes_and_single, single_and_integrated
 
 
-@pytest.mark.cases(fast=4)
+@pytest.mark.cases(fast=4, thorough=12)
 @pytest.mark.parametrize(
     "pairs", [20, pytest.param(100, marks=pytest.mark.thorough), pytest.param(400, marks=pytest.mark.slow)]
 )
@@ -20,7 +20,7 @@ def test_an_ensemble_of_each_kind_gives_what_single_simulations_give(kind, pairs
         assert found.still < 0.4 * pairs
 
 
-@pytest.mark.cases(fast=5, thorough=14)
+@pytest.mark.cases(fast=5, thorough=10)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(
     "cases", [2, pytest.param(4, marks=pytest.mark.thorough), pytest.param(100, marks=pytest.mark.slow)]

@@ -237,7 +237,7 @@ def test_rests_alone_are_enough_for_nothing_else(tmp_path):
 @pytest.mark.parametrize(
     ("verdict", "outcomes"),
     [
-        pytest.param("overturning", ["overturned"], marks=pytest.mark.thorough),
+        pytest.param("overturning", ["overturned"], marks=pytest.mark.slow),
         ("complete_chattering", ["complete_chattering", "rests"]),
     ],
 )

@@ -219,7 +219,7 @@ def completes(block, motion, model, pga, sign):
     return int(np.count_nonzero(starts < response.chattering["end"][0])) == 1
 
 
-@pytest.mark.parametrize("model", [pytest.param("linear", marks=pytest.mark.thorough), "nonlinear"])
+@pytest.mark.parametrize("model", [pytest.param("linear", marks=pytest.mark.slow), "nonlinear"])
 def test_chattering_becomes_complete_and_stops_being_so_where_bisection_by_single_simulations_finds_it(tmp_path, model):
     motions = [rocking.records.load("el-centro-meloland-270"), rocking.pulses.ricker(1.0, 0.9)]
     blocks, levels, signs = BLOCKS.select(slice(0, 50, 3)), np.linspace(1.5, 6.0, 13), {"+": 1, "-": -1}

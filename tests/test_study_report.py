@@ -162,7 +162,7 @@ def test_a_study_that_is_not_complete_has_no_report(tmp_path):
         study.fragility()
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_two_commands_go_from_a_file_to_fragility_curves(run, tmp_path):
     file = tmp_path / "museum.toml"
     file.write_text(TEXT)

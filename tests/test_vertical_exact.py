@@ -190,7 +190,8 @@ def drawn(number: int) -> Case:
 
 
 @pytest.mark.parametrize(
-    "number", [pytest.param(n, marks=[] if n % 4 == 0 else pytest.mark.thorough) for n in range(24)]
+    "number",
+    [pytest.param(n, marks=[pytest.mark.thorough, pytest.mark.slow][n % 2] if n % 4 else []) for n in range(24)],
 )
 def test_the_judge_says_the_same_with_more_digits_and_other_steps(number: int) -> None:
     """So 32 digits are enough: errors grow along a response, here up to the last impact that is followed."""
