@@ -1,5 +1,6 @@
 """A headless browser for tests of the explorer's page: found, started, and watched for whatever it complains of."""
 
+import json
 import os
 import shlex
 import shutil
@@ -155,7 +156,13 @@ class Watched:
         raise AssertionError(f"not within {timeout:g} s: {what or expression}; {self.text('#problem')}")
 
     def text(self, selector):
-        return self.page.locator(selector).text_content()
+        """Text of an element; where a number and its unit are kept on one line, there is a space between them."""
+        return self.page.locator(selector).text_content().replace("\u00a0", " ")
+
+    def says(self, name, words):
+        """Wait until an element says so."""
+        text = f"document.getElementById({name!r}).textContent.replaceAll('\\u00a0', ' ')"
+        self.until(f"{text}.includes({json.dumps(words)})", f"#{name} says {words!r}")
 
     def rested(self, act):
         """Do something, and wait until all is drawn that follows from it."""

@@ -53,7 +53,7 @@ class WebKit:
         raise AssertionError(f"not within {timeout:g} s: {what or expression}; {self.text('problem')}")
 
     def text(self, name):
-        return self.js(f"document.getElementById({name!r}).textContent")
+        return self.js(f"document.getElementById({name!r}).textContent").replace("\u00a0", " ")
 
     def click(self, selector):
         self.js(f"document.querySelector({selector!r}).click()")

@@ -496,7 +496,7 @@ def test_dragging_across_a_plot_zooms_in(opened):
         "((given) => Number(given.get('to')) - Number(given.get('from')) < 3)(new URLSearchParams(location.search))"
     )
     page.page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 110, steps=2)
-    page.until("document.getElementById('cursor').textContent.includes('the block')")
+    page.says("cursor", "the block")
 
 
 def test_ratios_of_intervals_are_drawn_against_eta_squared(opened):
@@ -989,7 +989,7 @@ def test_a_map_is_drawn_and_a_click_opens_the_case(opened):
     assert "exact critical amplitude" in page.text("#map-legend")
     box = page.page.locator("#map").bounding_box()
     page.page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.8 * box["height"])
-    page.until("/complete/.test(document.getElementById('map-at').textContent)")
+    page.says("map-at", "complete")
     page.rested(lambda: page.page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.8 * box["height"]))
     found = query_of(page)
     assert "view" not in found
@@ -1109,7 +1109,7 @@ def test_a_map_is_taken_away_and_computed_again(opened, tmp_path):
     shown = table["mode"].reshape(8, 8)
     assert np.array_equal(np.where(shown == -4, 0, shown), np.where(shown == -4, 0, np.array(found["mode"])))
     page.page.select_option("#map-quantity", "outcome")
-    page.until("document.getElementById('python').textContent.includes('chattering_map')")
+    page.says("python", "chattering_map")
     page.page.click("[data-view=response]")
     page.until("document.getElementById('python-title').textContent === 'This case as Python'")
 
@@ -1144,7 +1144,7 @@ def test_a_map_of_a_record_opens_on_the_final_fate_and_hatches_what_falls_later(
         r"Frequency parameter p = 3\.\d+ rad/s, Peak ground acceleration = 1\.\d+ g: ", page.text("#map-at")
     )
     page.page.select_option("#map-quantity", "outcome")
-    page.until("document.getElementById('map-legend').textContent.includes('hatched: overturns later')")
+    page.says("map-legend", "hatched: overturns later")
     assert "End of the first rocking" in page.text("#map-quantity option:checked")
     (later,) = re.findall(r"hatched: overturns later, ([\d.]+) %", page.text("#map-legend"))
     assert float(later) == pytest.approx(100 * (falls & ~at_once).mean(), rel=0.05) and float(later) > 1.0
@@ -1153,7 +1153,7 @@ def test_a_map_of_a_record_opens_on_the_final_fate_and_hatches_what_falls_later(
 def test_a_map_of_a_record_offers_a_sine_whose_critical_amplitude_is_known(opened):
     page = opened(f"view=map&{STATUE}&points=8")
     page.page.click("#map-sine")
-    page.until("/exact critical amplitude/.test(document.getElementById('map-legend').textContent)")
+    page.says("map-legend", "exact critical amplitude")
     assert query_of(page)["motion"].startswith("sine:")
 
 
@@ -1314,7 +1314,7 @@ def test_a_mistake_in_a_sweep_is_marked_there(opened):
 
 def test_a_record_is_answered_with_the_nearest_sine(opened):
     page = opened(f"view=periodic&{STATUE}&sweep_points=24")
-    page.until("/needs a sine/.test(document.getElementById('orbit-verdict').textContent)")
+    page.says("orbit-verdict", "needs a sine")
     assert not page.page.locator("#orbit").is_visible() and not page.page.locator("#save").is_visible()
     page.page.click("#orbit-sine")
     page.until("(new URLSearchParams(location.search).get('motion') ?? '').startsWith('sine:')", "the case is a sine")
@@ -1357,7 +1357,7 @@ def test_two_blocks_or_two_motions_are_compared(opened, what):
         if response.overturned
         else {0: "does not come to rest", 1: "once", 2: "twice"}.get(rests, f"{rests} times")
     )
-    page.until(f"document.getElementById('compare-verdict').textContent.includes({words!r})")
+    page.says("compare-verdict", words)
 
 
 # Records, assessment, units, paper
@@ -1467,7 +1467,7 @@ def test_every_sentence_and_axis_has_the_units_that_are_chosen(opened):
     released = f"view=periodic&{CASCADE}&initial_rotation=0.0174532925&sweep_points=24"
     for more, start in (("", "from 1° and 0 rad/s"), (units, "from 0.01745 rad and 0 rad/s")):
         page = opened(released + more)
-        page.until(f"document.getElementById('orbit-about').textContent.includes({start!r})")
+        page.says("orbit-about", start)
 
 
 def test_a_g_is_the_same_whatever_gravity_a_block_has(opened):
@@ -1881,7 +1881,7 @@ def test_axes_and_settings_are_read_at_a_glance(opened):
     page.page.click("[data-view=response]")
     page.page.fill("#pulse-amplitude", "2")
     page.page.press("#pulse-amplitude", "Enter")
-    page.until("document.getElementById('legend').textContent.includes('would overturn')")
+    page.says("legend", "would overturn")
     assert page.text("#verdict").startswith("It overturns")
 
 
@@ -2177,7 +2177,7 @@ def test_a_refused_value_stays_marked_when_what_was_asked_before_comes_late(open
         asked(page, waiting)
         entered(page, "width", "-1")
         page.until("!document.getElementById('problem').hidden")
-    page.until("document.getElementById('python').textContent.includes('width=0.3')", "the code of what is shown")
+    page.says("python", "width=0.3")
     page.page.wait_for_timeout(300)
     assert page.js(MARKED) == ["width"] and page.text("#problem").startswith("“Width” must be a positive number")
     assert page.js("document.getElementById('main').classList.contains('old')") and query_of(page)["width"] == "0.3"
@@ -2189,11 +2189,11 @@ def test_what_can_be_taken_away_is_what_is_shown_also_beside_a_refused_value(ope
     page.page.on("request", lambda request: sent.append(request.url) if "/api/" in request.url else None)
     with held(page, "**/api/tracks?*") as waiting:
         entered(page, "width", "0.3")
-        page.until("document.getElementById('derived').textContent.includes('15.3°')")
+        page.says("derived", "15.3°")
         entered(page, "width", "-1")  # before anything but the picture is drawn
         page.until("!document.getElementById('problem').hidden")
         asked(page, waiting)
-    page.until("document.getElementById('python').textContent.includes('width=0.3')", "the code of what is shown")
+    page.says("python", "width=0.3")
     sent.clear()
     page.page.click("#in-words summary")
     page.until("document.querySelectorAll('#words tr').length > 5")
@@ -2324,7 +2324,7 @@ def test_an_example_is_followed_by_keys_and_by_the_browsers_history(opened):
     keys.press("Tab")
     page.rested(lambda: keys.press("Enter"))
     assert guided(page) == ("Housner's water tank: step 2 of 3", "example-words", "2")
-    assert "23\u00a0%" in page.text("#example-words")
+    assert "23\u00a0%" in page.page.locator("#example-words").text_content()
     assert "23 % of the overturning" in page.text("#verdict") and page.page.locator("#example-left").is_hidden()
     page.rested(lambda: page.page.go_back())
     assert guided(page) == ("Housner's water tank: step 1 of 3", "example-words", "1")
@@ -2357,8 +2357,8 @@ def test_a_link_to_a_step_is_enough_also_on_a_phone_and_a_changed_case_is_said_t
 def test_a_step_of_the_compare_view_shows_both_responses_that_it_tells_of(opened):
     page = opened("example=threshold&step=1")
     page.page.click("#example-next")
-    page.until("document.getElementById('compare-verdict').textContent.includes('overturns, 236.17 s')")
-    assert page.page.locator("#example-left").is_hidden() and "236.17\u00a0s" in page.text("#example-words")
+    page.says("compare-verdict", "overturns, 236.17 s")
+    assert page.page.locator("#example-left").is_hidden() and "236.17 s" in page.text("#example-words")
     page.page.select_option("#compare-with", "block")
     page.until("!document.getElementById('example-left').hidden", "the case is said to be another")
     assert page.page.locator("#example-next").is_enabled()

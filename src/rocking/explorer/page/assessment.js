@@ -4,7 +4,7 @@ import {Latest, frames, unpacked} from "./api.js";
 import {showExports, withLegend} from "./exports.js";
 import {bokeh, colour, figure, showPlot, themed} from "./theme.js";
 import {acceleration, accelerationAxis, velocity, withUnit} from "./units.js";
-import {counted, fill, legend, make, one} from "./words.js";
+import {counted, fill, legend, make, one, tell} from "./words.js";
 import {NONE, fixed, short, shown, typed} from "./numbers.js";
 import {inWords, phrase} from "./texts.js";
 
@@ -155,7 +155,7 @@ export class View {
       }) : phrase("assessment.fit", {median: acceleration(fit.median), dispersion: short(fit.dispersion)}))
       : all ? inWords(why) : phrase("assessment.no_fit_so_far", {records: this.rows.length, count: this.about.records.length});
     const counts = fit && {exceeded: fit.exceeded, count: outcomes, records: this.rows.length};
-    one("assessment-verdict").textContent = sentence;
+    tell(one("assessment-verdict"), sentence);
     // The notes of a fit are the package's own sentences.
     const notes = fit ? fit.notes.map((/** @type {string} */ note) => ` ${note[0].toUpperCase()}${note.slice(1)}.`).join("") : "";
     one("assessment-notes").replaceChildren(fit ? phrase(all ? "assessment.exceeded" : "assessment.exceeded_so_far", counts) : "",

@@ -8,7 +8,7 @@ import {ends, namesOf, parameter, specification} from "./parameters.js";
 import {snapshots} from "./snapshots.js";
 import {colour} from "./theme.js";
 import {caseName, treatmentName} from "./units.js";
-import {counted, fill, legend, make, one, slug} from "./words.js";
+import {counted, fill, legend, make, one, slug, tell} from "./words.js";
 import {short, span} from "./numbers.js";
 import {inWords, phrase} from "./texts.js";
 
@@ -93,8 +93,8 @@ export class View {
     first.lines.weight = arrays.first_weight;
     if (!["motion", "case"].includes(kind)) second.lines.ground_time = second.lines.ground_g = none;
     this.histories.draw(header, first, second);
-    one("compare-verdict").textContent = (kind === "treatment" ? phrase("compare.verdict_treated", {treatment: treatmentName(other.treatment), verdict: inWords(other.verdict), difference: difference(one_, other)})
-      : phrase("compare.verdict", {verdict: inWords(other.verdict), difference: difference(one_, other)})).trim();
+    tell(one("compare-verdict"), (kind === "treatment" ? phrase("compare.verdict_treated", {treatment: treatmentName(other.treatment), verdict: inWords(other.verdict), difference: difference(one_, other)})
+      : phrase("compare.verdict", {verdict: inWords(other.verdict), difference: difference(one_, other)})).trim());
     legend("compare-legend", [["line", phrase("compare.this")], ["second", shifted(header.shift)], ["rest", phrase("compare.at_rest")], ["impact", phrase("compare.impacts")]]);
   }
 

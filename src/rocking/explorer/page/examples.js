@@ -5,7 +5,7 @@ import {json} from "./api.js";
 import {namesOf, readAddress, writeAddress} from "./parameters.js";
 import {unitsChosen} from "./units.js";
 import {begin} from "./visits.js";
-import {counted, make, one} from "./words.js";
+import {counted, make, one, tell} from "./words.js";
 import {phrase} from "./texts.js";
 
 /** @typedef {{name: string, title: string, about: string, source?: string, steps: {query: string, words: string}[]}} Example */
@@ -123,7 +123,7 @@ export class Examples {
     one("examples-title").textContent = now
       ? phrase("examples.step", {title: now.example.title, step: this.state.example?.step ?? 1, count: now.example.steps.length}) : phrase("examples.title");
     if (now) {
-      one("example-words").textContent = now.step.words.replace(/(\d) (?=[%a-zµH])/g, "$1\u00a0"); // numbers stay with their units
+      tell(one("example-words"), now.step.words);
       one("example-source").hidden = !now.example.source;
       one("example-source").textContent = now.example.source ?? "";
       /** @type {HTMLButtonElement} */ (one("example-previous")).disabled = this.state.example?.step === 1;

@@ -18,7 +18,7 @@ import {makePrinting} from "./print.js";
 import {angle, caseName, ofG, unitFields, unitsChosen} from "./units.js";
 import {acceptFiles} from "./upload.js";
 import {begin, settle} from "./visits.js";
-import {counted, legend, make, one, say} from "./words.js";
+import {counted, legend, make, one, say, tell} from "./words.js";
 import {NONE, fixed, short} from "./numbers.js";
 import {inWords, phrase} from "./texts.js";
 
@@ -255,13 +255,13 @@ function draw() {
   if (!page.shown) return;
   const {header, arrays} = page.shown;
   entitle(header);
-  put(one("verdict"), inWords(header.verdict));
+  tell(one("verdict"), inWords(header.verdict));
   showFigures(header);
   const [plus, minus] = header.block.thresholds_g;
   const [right, left] = header.block.sides.map((/** @type {any} */ side, /** @type {number} */ k) =>
     phrase("block.side", {p: short(side.p), alpha: angle(side.alpha), eta: short(side.restitution), threshold: ofG([plus, minus][k])}));
   const {body} = header.block;
-  put(one("derived"), right === left ? phrase("block.same", {side: right})
+  tell(one("derived"), right === left ? phrase("block.same", {side: right})
     : body ? phrase("block.towards", {to: short(body.azimuth, 4), fro: short((body.azimuth + 180) % 360, 4), right, left}) : phrase("block.differing", {right, left}));
   forms.block.mesh.turn(body);
   if (state.view === "response" || state.view === "block") {
@@ -278,11 +278,6 @@ function entitle({block, motion}) {
   const {study} = specification;
   const shown = study && state.view === "map" ? phrase("page.study", {name: study.name}) : caseName({block, motion});
   document.title = phrase("page.case_title", {view, shown});
-}
-
-/** Write a text where it is another one. @param {Node} node @param {string} text */
-function put(node, text) {
-  if (node.textContent !== text) node.textContent = text;
 }
 
 /** @param {any} header */
@@ -310,8 +305,8 @@ function showFigures(header) {
   const values = list.getElementsByTagName("dd");
   rows.forEach(([, value, more], k) => {
     const [number, small] = values[k].childNodes;
-    put(number, value);
-    put(small, more);
+    tell(number, value);
+    tell(small, more);
   });
 }
 

@@ -3,7 +3,7 @@
 import {payload} from "./api.js";
 import {quantityValue} from "./map-picture.js";
 import {colour} from "./theme.js";
-import {make, one, say} from "./words.js";
+import {make, one, say, tell} from "./words.js";
 import {joined, short} from "./numbers.js";
 import {inWords, phrase} from "./texts.js";
 
@@ -132,7 +132,7 @@ export class MapReading {
     };
     const index = row * this.view.about.shape[1] + column;
     const said = this.view.about.quantities.map((/** @type {string} */ name, /** @type {number} */ q) => this.said(name, /** @type {Float32Array[]} */ (this.view.values)[q][index])).filter(Boolean);
-    one("map-at").textContent = phrase("map.at", {x: written(this.view.about.x, column), y: written(this.view.about.y, row), what: said.join("; ")});
+    tell(one("map-at"), phrase("map.at", {x: written(this.view.about.x, column), y: written(this.view.about.y, row), what: said.join("; ")}));
   }
 
   /** @param {string} name @param {number} value */

@@ -5,7 +5,7 @@ import {choose} from "./controls.js";
 import {showExports, withLegend} from "./exports.js";
 import {specification} from "./parameters.js";
 import {bokeh, colour, figure, showPlot, themed} from "./theme.js";
-import {counted, legend, one} from "./words.js";
+import {counted, legend, one, tell} from "./words.js";
 import {short, typed} from "./numbers.js";
 import {inWords, phrase} from "./texts.js";
 
@@ -79,8 +79,8 @@ export class View {
       return;
     }
     if (!this.plane) this.build();
-    one("orbit-verdict").textContent = inWords(header.sentence);
-    one("orbit-about").textContent = inWords(header.about);
+    tell(one("orbit-verdict"), inWords(header.sentence));
+    tell(one("orbit-about"), inWords(header.about));
     /** @type {Record<string, number>} */
     this.at = header.at;
     this.drawPlane(header, arrays);

@@ -23,6 +23,13 @@ export function counted(name) {
   dataset[name] = String(Number(dataset[name] ?? 0) + 1);
 }
 
+/** Write a text where it is another one; a number and its unit are not parted at the end of a line.
+ * @param {Node} node @param {string} text */
+export function tell(node, text) {
+  const whole = text.replace(/(\d) (?=[%°a-zµH])/g, "$1\u00a0");
+  if (node.textContent !== whole) node.textContent = whole;
+}
+
 /** A name as part of a file's. @param {string} name */
 export const slug = (name) => name.replace(/[^\p{L}\d.]+/gu, "-").slice(0, 60);
 
