@@ -60,7 +60,7 @@ PARTS = {
 }
 
 #: How kernels come to be compiled, which a run without compilation shows nothing of.
-NOT_JUDGED = ("compiled.py", "compiler.py", "interpreted.py", "library.py", "signatures.py", "sources.py")
+NOT_JUDGED = ("compiled.py", "compiler.py", "interpreted.py", "kept.py", "library.py", "signatures.py", "sources.py")
 
 #: Share of the mutants of a part that tests must see.
 WANTED = 0.85

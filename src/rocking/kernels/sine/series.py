@@ -88,13 +88,6 @@ class PowerSeries:
         """Divide a number."""
         return self.reciprocal() * other
 
-    def __pow__(self, exponent: int) -> PowerSeries:
-        """Raise to a whole power, one or more."""
-        power = self
-        for _ in range(exponent - 1):
-            power = power * self
-        return power
-
 
 Series = Floats
 ThreeSeries = tuple[Series, Series, Series]
