@@ -17,13 +17,14 @@ from rocking.chattering import chattering_map, critical_amplitude, families
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingError, StudyError, UnreadableRecord
 from rocking.explorer import maps, readings
 from rocking.explorer.code import case_as_command, case_as_python, map_as_command, map_as_python
-from rocking.explorer.core import Explorer, extremes
+from rocking.explorer.core import Explorer
 from rocking.explorer.inputs import NAMES, pulse_as_text, pulse_of, read_case, texts_of, texts_of_motion
 from rocking.explorer.parameters import DEFAULT
 from rocking.explorer.parameters import PULSES as OFFERED
 from rocking.explorer.payload import pack
 from rocking.explorer.studies import StudyView
 from rocking.explorer.uploads import LARGEST, MOST, UploadStore, bare_name
+from rocking.explorer.windows import extremes
 from rocking.motion.exceedance import exceedances
 from rocking.named_pulses import FAMILIES
 
