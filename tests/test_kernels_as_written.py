@@ -130,6 +130,9 @@ def repeated(model: str) -> Numbers:
     found = dynamics.basins(block, motion, [-0.1, 0.1], [-0.3, 0.3], 4, model=model, threads=1)
     for name in ("multiplier", "orbit_coordinate", "orbit_velocity"):
         yield from np.ravel(found.data[name].values)
+    slow = pulses.sine(6.0, 1.0, cycles=1)
+    found = dynamics.basins(block, slow, [-0.1, 0.1], [-0.3, 0.3], 4, model=model, threads=1)
+    yield from np.ravel(found.data.multiplier.values)
     exponents = dynamics.lyapunov_exponents(block, motion, (0.05, 0.1), 20, transient=1, model=model)
     yield from (exponents.largest, exponents.smallest)
 
@@ -147,6 +150,14 @@ def oscillators(model: str) -> Numbers:
         yield from found.data_vars[next(iter(found.data_vars))].values.ravel().astype(float)
         section = dynamics.stroboscopic_map(body, pulses.sine(12.0, 2.0, cycles=1))
         yield from np.ravel(section.orbit([(body.stops[0] + 0.01, 0.3)], 4))
+    pressed = dynamics.ImpactOscillator(3.0, 0.3, 0.05, stop=-0.02, second_stop=0.06)
+    for motion in (pulses.sine(1.0, 1.0, cycles=3), pulses.sine(6.0, 1.0, cycles=2), shaken(3.0, seed=10)):
+        yield from told(dynamics.simulate(pressed, motion, duration=3.0))
+    for body in (dynamics.BouncingBall(0.2), pressed):
+        exponents = dynamics.lyapunov_exponents(body, pulses.sine(12.0, 2.0, cycles=1), (0.03, 0.1), 20, transient=0)
+        yield from (exponents.largest, exponents.smallest, exponents.resting)
+        impacts = dynamics.impact_map(body, pulses.sine(12.0, 2.0, cycles=1))
+        yield from np.ravel(impacts.derivative(np.array([(0.1, 0.001), (0.2, 0.4)]))[1])
 
 
 def yielding(model: str) -> Numbers:
