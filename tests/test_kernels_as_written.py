@@ -22,7 +22,9 @@ from oracles import standing
 import rocking
 from rocking import Block, Motion, chattering, dynamics, gradient, pulses, simulate, simulate_many
 from rocking.chattering import families
+from rocking.kernels import march
 from rocking.kernels.compiled import UNCOMPILED
+from rocking.kernels.interpreted import Interpreted
 
 # Compiled kernels wait here for two minutes of Python.
 pytestmark = [] if UNCOMPILED else [pytest.mark.slow]
@@ -214,7 +216,7 @@ def mapped(model: str) -> Numbers:
     ):
         section = dynamics.stroboscopic_map(body, pulses.sine(12.0, 2.0, cycles=1))
         yield from np.ravel(section.derivative([state], 2)[1])
-    found = dynamics.basins(ball, pulses.sine(12.0, 2.0, cycles=1), [0.01, 0.1], [0.1, 0.5], 40, threads=1)
+    found = dynamics.basins(ball, pulses.sine(12.0, 2.0, cycles=1), [0.1, 0.3], [0.5, 2.0], 30, threads=1)
     yield from np.ravel(found.data.outcome.values).astype(float)
 
 
@@ -279,6 +281,27 @@ def both() -> tuple[dict[str, list[float]], dict[str, list[float]]]:
         there, _ = process.communicate()
     assert process.returncode == 0
     return here, json.loads(there)
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_what_python_follows_in_turns_is_the_whole(monkeypatch: pytest.MonkeyPatch, fails: bool) -> None:
+    class Some(Interpreted):
+        def work(self) -> int:
+            return max(self._left, 0)
+
+        def __call__(self, *arguments: Any) -> Any:
+            found = super().__call__(*arguments)
+            if fails and self._left < 20:
+                raise ZeroDivisionError
+            return found
+
+    motion = shaken(4.0, seconds=0.4)
+    whole = list(told(simulate(STATUE, motion)))
+    some = Some(march.march, 25)
+    monkeypatch.setattr(march, "_interpreted", some)
+    monkeypatch.setattr(march, "_PORTION", 6)
+    assert list(told(simulate(STATUE, motion))) == whole
+    assert some.work() == 0
 
 
 @pytest.mark.parametrize("model", MODELS)
