@@ -198,6 +198,7 @@ def write(folder: Path, promises: list[Promise], found: dict[str, Found]) -> Non
     for each in promises:
         if each.table:
             texts[each.name] = each.table(found[each.name]) if found[each.name].parts else "Nothing is judged yet.\n"
+    folder.mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():
         (folder / f"reliability-{name}.txt").write_text(text, encoding="utf-8")
 
