@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from oracles import leapfrog
 
 import rocking
 from promises.promise import ABOVE_ENSEMBLES, Found, Promise
@@ -97,6 +96,8 @@ def _scaled(rng: np.random.Generator, kind: str, times: np.ndarray, across: np.n
 
 def judge(part: int) -> Found:
     """Judge the blocks of a part."""
+    from oracles import leapfrog  # needs numba, which those who import all promises may do without
+
     found = Found(parts=1)
     blocks, shaking, model = drawn(part)
     motion: Any = shaking.motion

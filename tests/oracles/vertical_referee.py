@@ -32,6 +32,8 @@ TIMES = 4
 """Instants at which rotations are compared."""
 TIE = 2.0**-48
 """A motion that passes a threshold by less than this share of it may count as within it."""
+ROUNDED_TIE = 1.25 * TIE
+"""The same, with what four roundings of the threshold add where the weight takes nearly all of it away."""
 NOTHING = 2.0**-44
 """A block that lifts off by less than this share of its slenderness, and comes to rest again, may count as at rest."""
 Drawn = np.random.Generator
@@ -358,7 +360,7 @@ def judge(given: Case) -> Verdict:
 
 def _compare(given: Case, response: rocking.Response, verdict: Verdict) -> None:
     times = _times_to_compare(given, response)
-    for slack in (0.0, TIE):
+    for slack in (0.0, TIE, ROUNDED_TIE):
         course = multiprecision.follow(
             given.problem,
             rotation=given.rotation,
