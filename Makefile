@@ -52,7 +52,7 @@ slow: .venv/.all ## run the tests that take long: wider ranges, many digits, a h
 	$(PYTEST) -m slow
 
 # heyoka is asked where events lie, beside the package; without it that column of the table is empty.
-verify: .venv/.all ## hold the package to every promise of docs/reliability.md (under an hour; PARTS=small: a minute)
+verify: .venv/.all ## hold the package to every promise of docs/reliability.md (hours; PARTS=small: some minutes)
 	@$(BIN)/python -c "import heyoka" 2>/dev/null || $(BIN)/python -m pip install --disable-pip-version-check -q $(HEYOKA) \
 	    || echo "heyoka could not be installed: events are located without it"
 	$(BIN)/python stress/verify.py --parts $(or $(PARTS),full)

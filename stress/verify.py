@@ -1,6 +1,6 @@
 """Hold the package to every promise of docs/reliability.md, part by part.
 
-    python stress/verify.py --parts small      # a quick look, about a minute
+    python stress/verify.py --parts small      # a quick look, some minutes
     python stress/verify.py                    # everything, and the tables of docs/reliability.md
 
 What a part has shown is kept in a folder under its promise and a hash of the sources, so that a run that was killed

@@ -40,7 +40,7 @@ def shaken(peak: float, seed: int = 1, seconds: float = 1.5) -> Motion:
     return standing.record(np.random.default_rng(seed), peak, seconds)
 
 
-def told(response: Any, dt: float = 0.0) -> Numbers:
+def told(response: Any) -> Numbers:
     """Numbers of a response: events, impacts, peak, and its course at some times."""
     yield from (response.overturned, response.peak_rotation, response.peak_time, len(response.impacts))
     yield from response.events["time"]

@@ -11,7 +11,7 @@ from oracles import vertical_referee
 
 from promises.promise import ABOVE_ENSEMBLES, Found, Promise
 
-#: Cases of a part, some six seconds of processor time.
+#: Cases of a part, six to fifteen seconds of processor time.
 CASES = 200
 
 
