@@ -80,7 +80,7 @@ def test_a_body_that_overturns_has_none():
 def chaotic_cases():
     damped = dynamics.ImpactOscillator(1.0, 0.9, damping_ratio=0.01, stop=0.02)
     return {
-        "ball": (*shaken_ball(0.8, 3.0), [0.1, 0.5], 0.0),
+        "ball": (*shaken_ball(0.9, 5.0), [0.1, 0.5], 0.0),
         "oscillator": (damped, pulses.sine(10.0, 2.6, cycles=1), [0.02, 0.1], 2.0 * 0.01 * 2.0 * math.pi / 2.6),
     }
 

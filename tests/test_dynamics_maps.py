@@ -50,16 +50,18 @@ def test_the_map_is_a_simulation_of_as_many_periods(name):
     strobe = dynamics.stroboscopic_map(body, one, model=model)
     given = starts(body, 20, 1)
     orbits = strobe.orbit(given, 8)
+    # How much the last place of the motion, which is not the same for one period as for nine, may change.
+    changes = np.array([np.linalg.norm(strobe.derivative(given, n)[1], axis=(1, 2)) for n in range(1, 9)])
     judged = moving = 0
-    for state, orbit in zip(given, orbits, strict=True):
+    for k, (state, orbit) in enumerate(zip(given, orbits, strict=True)):
         found, _ = simulated(body, model, many, state, 8.5 / frequency)
         for n in range(9):
             time = n / frequency
             if n == 0 or time >= found.duration:
                 continue
             near = len(found.impacts) and np.min(np.abs(found.impacts["time"] - time)) < 1e-9
-            if not near:
-                assert orbit[n] == pytest.approx(found.states(time)[:2], abs=2e-9)
+            if not near and np.isfinite(changes[n - 1, k]):
+                assert orbit[n] == pytest.approx(found.states(time)[:2], abs=2e-12 * max(1.0, changes[n - 1, k]))
                 judged += 1
                 moving += orbit[n, 1] != 0.0
     assert judged > 100 and moving > 20

@@ -307,7 +307,7 @@ def test_where_a_block_leaves_as_it_comes_to_rest_there_is_no_derivative() -> No
 
 
 def test_of_an_unfinished_simulation_all_but_the_peak_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rocking.simulation.SLICE", 40)
+    monkeypatch.setattr("rocking.simulation.SLICE", 20)
     monkeypatch.setattr("rocking.simulation.slices", lambda _: 1)
     response = rocking.simulate(BLOCK, None, initial_rotation=0.05)
     assert response.unfinished

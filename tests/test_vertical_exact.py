@@ -73,6 +73,15 @@ def assert_right(case: Case) -> None:
     assert not verdict.faults, said(verdict)
 
 
+@pytest.mark.parametrize("number", [7792, 11838])
+def test_no_rounding_adds_up_on_the_way(number: int) -> None:
+    """Pieces of a high degree that a breakpoint of the other component cuts; and a piece of many short steps."""
+    verdict = vertical_referee.judge(vertical_referee.case(2024, number))
+    assert verdict.judged == 1
+    assert not verdict.faults, said(verdict)
+    assert verdict.units <= 4.0
+
+
 BLOCK = Block.from_parameters(p=1.0, alpha=0.2, restitution=0.8)
 STILL = Motion.from_samples([0.0, 0.0], 1.0)
 DIP = Motion.from_points([0.0, 0.1, 0.4, 0.41, 0.8], [0.0, -G, -7.0 * G, 0.0, 0.0])

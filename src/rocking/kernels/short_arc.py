@@ -22,6 +22,9 @@ SHORT_LINEAR = 4e-3
 SHORT_WEIGHTED = 2e-3
 SHORT_NONLINEAR = 1.2e-3
 
+#: Least part of what is left that a short step is worth: a full series goes further, and is rounded less often.
+_WORTH = 0.125
+
 #: Largest sum of the last two terms of a linear velocity, over the first two: as lam t^2 is small, the truncation is
 #: smaller by a factor of 20,000 or more.
 _LAST_TERMS = 2.0**-40
@@ -36,7 +39,14 @@ _CONVERGED = 1e-8
 
 @inlined
 def short_step(ground: Ground, block: Record, rules: Record, state: Record, left: float) -> StepEnd:
-    """Step to the next impact or over ``left``, or the part of it that is short; UNDECIDED where it is not simple."""
+    """Step to the next impact or over ``left``, or a part of it; UNDECIDED where it is small or not simple."""
+    end = short_part(ground, block, rules, state, left)
+    return undecided() if end.outcome == Outcome.STEP and end.time < _WORTH * left else end
+
+
+@inlined
+def short_part(ground: Ground, block: Record, rules: Record, state: Record, left: float) -> StepEnd:
+    """Step to the next impact or over ``left``, or the part of it that is short."""
     if not is_straight(ground) or block.restrained:
         return undecided()
     if has_vertical(ground):

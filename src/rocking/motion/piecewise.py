@@ -14,6 +14,7 @@ from rocking import checks
 from rocking.arrays import Floats, Integers
 from rocking.constants import HIGHEST_DEGREE
 from rocking.errors import InvalidMotion
+from rocking.motion.exact import exact_product, exact_sum
 
 #: Pieces that meet within this part of the largest value do not jump.
 _JUMP: Final = 1e-12
@@ -111,13 +112,18 @@ def antiderivative(widths: Floats, coefficients: Floats) -> Floats:
 
 
 def moved(coefficients: Floats, shift: Floats) -> Floats:
-    """Coefficients about ``x = shift`` of each piece (repeated synthetic division)."""
-    result = coefficients.copy()
+    """Coefficients about ``x = shift`` of each piece: repeated synthetic division, with the error of each operation.
+
+    So they are as good as rounded once, even where the terms of a piece are thousands of times larger than its values.
+    """
+    result, errors = coefficients.copy(), np.zeros_like(coefficients)
     last = result.shape[1] - 1
     for i in range(last):
         for j in range(last - 1, i - 1, -1):
-            result[:, j] += shift * result[:, j + 1]
-    return result
+            product, of_product = exact_product(shift, result[:, j + 1])
+            result[:, j], of_sum = exact_sum(result[:, j], product)
+            errors[:, j] += shift * errors[:, j + 1] + (of_product + of_sum)
+    return result + errors
 
 
 def refined(breakpoints: Floats, coefficients: Floats, finer: Floats, columns: int) -> Floats:

@@ -15,6 +15,7 @@ import numpy as np
 from rocking import checks
 from rocking.errors import InvalidMotion
 from rocking.motion.description import Description
+from rocking.motion.exact import exact_product, exact_quotient
 from rocking.motion.motion import Motion
 from rocking.motion.series import (
     ERROR,
@@ -23,8 +24,6 @@ from rocking.motion.series import (
     PIECES_PER_CYCLE,
     about_starts,
     checked_frequency,
-    exact_product,
-    exact_quotient,
     gaussian_derivative,
     middles,
     sine_and_cosine,

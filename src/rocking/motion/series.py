@@ -17,6 +17,7 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidMotion
 from rocking.motion import piecewise
+from rocking.motion.exact import exact_product
 
 
 class Angle(NamedTuple):
@@ -49,27 +50,6 @@ def sum_of_angles(one: Angle, other: Angle, sign: float) -> Angle:
         one.sine * other.cosine + sign * one.cosine * other.sine,
         one.cosine * other.cosine - sign * one.sine * other.sine,
     )
-
-
-def exact_product(a: float, b: Floats) -> tuple[Floats, Floats]:
-    """Product and its rounding error (Dekker 1971)."""
-    product = a * b
-    a_high, a_low = _halves(np.asarray(a))
-    b_high, b_low = _halves(b)
-    return product, ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low
-
-
-def exact_quotient(a: Floats, rest: Floats, divisor: float) -> tuple[Floats, Floats]:
-    """Quotient of ``a + rest``, and what it lacks."""
-    quotient = a / divisor
-    product, error = exact_product(divisor, quotient)
-    return quotient, ((a - product) - error + rest) / divisor
-
-
-def _halves(a: Floats) -> tuple[Floats, Floats]:
-    scaled = 134217729.0 * a
-    high = scaled - (scaled - a)
-    return high, a - high
 
 
 #: Relative to the amplitude of the acceleration, which a pulse that is cut need not reach; covers the terms left out
