@@ -98,22 +98,22 @@ def test_a_table_of_many_records_is_whole_or_not_there(response, tmp_path):
     assert not [*tmp_path.iterdir()]
 
 
-@pytest.mark.parametrize("too_large", ["response.csv", "response.pdf"])
-def test_a_command_that_meets_a_full_disk_leaves_no_result_that_looks_whole(run, tmp_path, too_large):
-    """Smaller files than the one that does not fit may be there; result.json, the last, is not."""
+@pytest.mark.parametrize(("too_large", "tables"), [("response.csv", 0), ("response.png", 3)])
+def test_a_command_that_meets_a_full_disk_leaves_no_result_that_looks_whole(run, tmp_path, too_large, tables):
+    """Files that are written before the one that does not fit may be there; result.json, the last, is not."""
     whole, out = tmp_path / "whole", tmp_path / "out"
     command = ["simulate", RECORD, "--width", "0.24", "--height", "1.1", "--out"]
     assert run(*command, whole)[0] == 0
     assert json.loads((whole / "result.json").read_text("utf-8"))["overturned"] is True
-    with full_disk((whole / too_large).stat().st_size // 2):
+    with full_disk((whole / too_large).stat().st_size - 1):
         code, _, err = run(*command, out)
     assert code == 2
     assert err.startswith("rocking: ") and "cannot be written: File too large" in err and len(err.splitlines()) == 1
     left = {file.name: file.read_bytes() for file in out.iterdir()} if out.exists() else {}
     assert not {"result.json", too_large} & left.keys()
-    for name, content in left.items():
-        if name.endswith(".csv"):
-            assert content == (whole / name).read_bytes()
+    found = {name: content for name, content in left.items() if name.endswith(".csv")}
+    assert len(found) == tables
+    assert found == {name: (whole / name).read_bytes() for name in found}
 
 
 def test_a_write_that_fails_in_the_middle_leaves_what_was_there(tmp_path, monkeypatch):
