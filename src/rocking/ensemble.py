@@ -132,7 +132,7 @@ class Scales:
         Examples
         --------
         >>> import rocking
-        >>> Scales.of([1.5, 6.0], "pga").factors(rocking.pulses.one_sine(amplitude=3.0, frequency=1.0)).tolist()
+        >>> Scales.of([1.5, 6.0], "pga").factors(rocking.pulses.one_sine(3.0, 1.0)).round(12).tolist()
         [0.5, 2.0]
         """
         with np.errstate(over="ignore"):
