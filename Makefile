@@ -12,12 +12,14 @@ PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal --be
 FAST := "not thorough and not slow and not browser"
 # Something of every library that the package needs, for other versions than those that are pinned; `make lowest EVERY_PART=tests` runs all.
 EVERY_PART := $(addprefix tests/test_,reference.py result.py plot.py cli.py response.py chattering_maps.py processing.py explorer_server.py first_response.py)
+# What the oldest numba compiles; all else uses the compiled kernels of the wheel.
+COMPILED := tests/test_reference.py tests/test_ensemble.py::test_lanes_agree_with_single_simulations
 
 # Tests start hundreds of processes: without its compiled modules Python takes seconds to import what each of them needs.
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help demo wheel quick test test-all browser browser-all slow verify mutants lowest latest .bounds doctest lint types \
+.PHONY: help demo wheel quick test test-all browser browser-all slow verify mutants lowest latest .bounds-lowest .bounds-latest doctest lint types \
     docs bench coverage branches audit sbom review try-install clean distclean
 
 help: ## list the targets
@@ -60,17 +62,15 @@ verify: .venv/.all ## hold the package to every promise of docs/reliability.md (
 mutants: .venv/.all ## ask of the tests whether they see small mistakes, 30 in each part of the package (an hour or two)
 	$(BIN)/python stress/mutants.py $(if $(PART),"$(PART)")
 
-# Most of its time is compiling, and workers beside each other would compile the same.
-lowest: .venv-lowest/.installed ## run a test of every part with the oldest versions that pyproject.toml allows
-	@ROCKING_SHIPPED=0 $(MAKE) --no-print-directory .bounds ENVIRONMENT=.venv-lowest PACKAGE=. WORKERS="-n 0"
+lowest: .bounds-lowest ## run a test of every part with the oldest versions that pyproject.toml allows
+	@# Workers beside each other would compile the same.
+	ROCKING_SHIPPED=0 $(PYTEST:$(BIN)/%=.venv-lowest/bin/%) -n 0 -m $(FAST) $(COMPILED)
 
-latest: wheel .venv-latest/.installed ## the same with the versions of the day, and with the compiled kernels of the wheel
-	@ROCKING_LIBRARY_REQUIRED=1 $(MAKE) --no-print-directory .bounds ENVIRONMENT=.venv-latest \
-	    PACKAGE="$$(ls $(CURDIR)/dist/rocking-*.whl)"
+latest: .bounds-latest ## the same with the versions of the day
 
-.bounds:
-	$(ENVIRONMENT)/bin/python -m pip install --disable-pip-version-check -qq --no-deps --force-reinstall "$(PACKAGE)"
-	$(PYTEST:$(BIN)/%=$(ENVIRONMENT)/bin/%) $(WORKERS) -m $(FAST) $(EVERY_PART)
+.bounds-lowest .bounds-latest: .bounds-%: wheel .venv-%/.installed
+	.venv-$*/bin/python -m pip install --disable-pip-version-check -qq --no-deps --force-reinstall dist/rocking-*.whl
+	ROCKING_LIBRARY_REQUIRED=1 $(PYTEST:$(BIN)/%=.venv-$*/bin/%) -m $(FAST) $(EVERY_PART)
 
 .lowest.txt: pyproject.toml scripts/lowest_versions.py
 	$(PYTHON) scripts/lowest_versions.py > $@

@@ -112,25 +112,39 @@ def antiderivative(widths: Floats, coefficients: Floats) -> Floats:
 
 
 def moved(coefficients: Floats, shift: Floats) -> Floats:
-    """Coefficients about ``x = shift`` of each piece: repeated synthetic division, with the error of each operation.
-
-    So they are as good as rounded once, even where the terms of a piece are thousands of times larger than its values.
-    """
-    result, errors = coefficients.copy(), np.zeros_like(coefficients)
+    """Coefficients about ``x = shift`` of each piece (repeated synthetic division)."""
+    result = coefficients.copy()
     last = result.shape[1] - 1
     for i in range(last):
         for j in range(last - 1, i - 1, -1):
-            product, of_product = exact_product(shift, result[:, j + 1])
-            result[:, j], of_sum = exact_sum(result[:, j], product)
-            errors[:, j] += shift * errors[:, j + 1] + (of_product + of_sum)
+            result[:, j] += shift * result[:, j + 1]
+    return result
+
+
+def moved_exactly(coefficients: Floats, shift: Floats) -> Floats:
+    """Coefficients about ``x = shift`` of each piece: Horner's rule for all of them, with the error of each operation.
+
+    They are as good as rounded once, even where the terms of a piece are thousands of times larger than its values.
+    """
+    by, nothing = shift[:, np.newaxis], np.zeros((len(shift), 1))
+    result = errors = np.zeros_like(coefficients)
+    for k in range(coefficients.shape[1] - 1, -1, -1):
+        # What there is so far, times x + shift; and the next coefficient.
+        before = np.hstack([coefficients[:, k : k + 1], result[:, :-1]])
+        product, of_product = exact_product(by, result)
+        result, of_sum = exact_sum(product, before)
+        errors = by * errors + np.hstack([nothing, errors[:, :-1]]) + (of_product + of_sum)
     return result + errors
 
 
 def refined(breakpoints: Floats, coefficients: Floats, finer: Floats, columns: int) -> Floats:
     """Coefficients on the pieces of `finer`, which has all the breakpoints and may end later (zero there)."""
     piece = np.minimum(np.searchsorted(breakpoints, finer[:-1], side="right"), len(coefficients)) - 1
+    shift = finer[:-1] - breakpoints[piece]
+    cut = shift > 0.0
     result = np.zeros((len(finer) - 1, columns))
-    result[:, : coefficients.shape[1]] = moved(coefficients[piece], finer[:-1] - breakpoints[piece])
+    result[:, : coefficients.shape[1]] = coefficients[piece]
+    result[cut, : coefficients.shape[1]] = moved_exactly(coefficients[piece[cut]], shift[cut])
     result[finer[:-1] >= breakpoints[-1]] = 0.0
     return result
 
