@@ -34,6 +34,13 @@ def words(name: str) -> set[str]:
     return {re.sub("ies$", "y", word).removesuffix("s") for word in re.split(r"[\W_]+", name)}
 
 
+def dotted(node: ast.expr) -> str:
+    """Name with its attributes, as it is written; empty for the attributes of anything else."""
+    if isinstance(node, ast.Attribute):
+        return f"{before}.{node.attr}" if (before := dotted(node.value)) else ""
+    return node.id if isinstance(node, ast.Name) else ""
+
+
 def names_used(tree: ast.AST, package: str) -> Iterator[str]:
     """Dotted names that a module imports, reads from what it imports, or writes in a string."""
     imported, nodes = {}, [*ast.walk(tree)]
@@ -49,8 +56,8 @@ def names_used(tree: ast.AST, package: str) -> Iterator[str]:
     yield from imported.values()
     for node in nodes:
         if isinstance(node, ast.Attribute):
-            first, _, others = ast.unparse(node).partition(".")
-            if first in imported and re.fullmatch(r"[\w.]+", others):
+            first, _, others = dotted(node).partition(".")
+            if first in imported:
                 yield f"{imported[first]}.{others}"
         elif isinstance(node, ast.Constant) and isinstance(node.value, str):
             yield from re.findall(r"\brocking\.[\w.]+", node.value)

@@ -34,7 +34,7 @@ def said(verdict: Verdict) -> str:
 
 
 @vertical
-@pytest.mark.parametrize("pairs", [QUICK, pytest.param(LONGER, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("pairs", [QUICK, pytest.param(LONGER, marks=pytest.mark.slow)])
 def test_an_ensemble_gives_what_single_simulations_give(pairs: int, vertical: bool) -> None:
     verdict = judged(1, pairs, vertical=vertical)
     assert not verdict.differences, said(verdict)
