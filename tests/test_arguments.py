@@ -221,8 +221,11 @@ def test_a_fragility_names_its_limit_states():
         fitted().curve("half")
 
 
-@pytest.mark.parametrize("level", [1e60, 1e300])
-def test_no_ensemble_is_shaken_more_than_a_motion_may_be(level):
+@pytest.mark.parametrize("level", [1e60, 1e300, 1e308])
+def test_nothing_is_shaken_more_than_a_motion_may_be(level):
+    for scaled in (MOTION.scaled, MOTION.scaled_to):
+        with pytest.raises(InvalidMotion, match=r"the acceleration of a motion must stay below 1e\+50 m/s\^2"):
+            scaled(level)
     for scale in ({"levels": level, "measure": "pga"}, {"levels": level}):
         with pytest.raises(InvalidMotion, match=r"the acceleration of a motion must stay below 1e\+50 m/s\^2"):
             rocking.simulate_many(BLOCK, MOTION, **scale)

@@ -2387,3 +2387,69 @@ def test_the_modules_pass_the_linter():
     words = ["node", linter, "--no-config-lookup", "--max-warnings", "0", "--config", rules, folder]
     found = subprocess.run(words, capture_output=True, text=True)
     assert found.returncode == 0, found.stdout + found.stderr
+
+
+# Where the keys are: no action loses them, and what has them is seen.
+
+HAS_KEYS = "document.activeElement.id || document.activeElement.textContent || document.activeElement.tagName"
+#: Name of what has the keys, and whether it is seen at one of nine points; null for the page itself.
+SEEN = """(() => {
+  const on = document.activeElement, box = on.getBoundingClientRect();
+  if (on === document.body) return null;
+  const shares = [0.2, 0.5, 0.8];
+  const at = (x, y) => document.elementFromPoint(box.x + x * box.width, box.y + y * box.height);
+  const hits = shares.flatMap((x) => shares.map((y) => at(x, y)));
+  return [on.id || on.textContent, hits.some((hit) => hit && (on.contains(hit) || hit.closest("label")?.contains(on)))];
+})()"""
+
+
+def press(page, *keys):
+    for key in keys:
+        page.page.keyboard.press(key)
+
+
+def test_enter_pins_a_case_once_and_a_case_that_is_removed_is_told(opened):
+    page = opened(STATUE)
+    page.page.focus("#pin")
+    press(page, "Enter")
+    page.page.keyboard.type("as found")
+    press(page, "Enter")
+    assert page.js("document.getElementById('pin-name').hidden")
+    assert page.js(HAS_KEYS) == "pin" and page.text("#said") == "as found is pinned."
+    press(page, "Shift+Tab", "Enter")
+    assert page.js(HAS_KEYS) == "pin" and page.text("#said") == "as found is no longer pinned."
+
+
+def test_a_case_that_is_opened_from_a_map_has_the_keys_and_so_has_the_map_afterwards(opened):
+    page = opened(f"{STATUE}&view=map&points=20")
+    page.until("Number(document.body.dataset.mapTook) > 0")
+    page.page.focus("#map")
+    press(page, "ArrowRight", "Enter")
+    page.until("!document.getElementById('view-response').hidden")
+    page.until(f"({HAS_KEYS}) === 'histories'")
+    page.page.go_back()
+    page.until("!document.getElementById('view-map').hidden")
+    page.until("document.activeElement.dataset.view === 'map'")
+
+
+@pytest.mark.parametrize(
+    ("viewport", "view"),
+    [
+        (DESK, "response"),
+        (DESK, "block&lecture=1"),
+        pytest.param(DESK, "map", marks=pytest.mark.thorough),
+        pytest.param({"width": 390, "height": 844}, "response", marks=pytest.mark.thorough),
+        ({"width": 390, "height": 844}, "map"),
+    ],
+    ids=["response", "lecture", "map", "response on a phone", "map on a phone"],
+)
+def test_what_has_the_keys_is_seen(opened, view, viewport):
+    page = opened(f"{STATUE}&view={view}&points=20", viewport)
+    hidden, judged = [], 0
+    for key in ("Tab", "Shift+Tab"):
+        for _ in range(60):
+            press(page, key)
+            if found := page.js(SEEN):
+                judged += 1
+                hidden += [] if found[1] else [(key, found[0])]
+    assert hidden == [] and judged > 60

@@ -119,6 +119,12 @@ def test_a_record_has_a_vertical_component(vertical, tmp_path, monkeypatch):
         assert f"--vertical {'up.csv' if 'file' in vertical else vertical}" in command
 
 
+def test_a_spreadsheet_takes_no_name_of_a_case_for_a_formula():
+    texts = {"width": "0.24", "height": "1.1", "motion": "one-sine:amplitude=4,frequency=1"}
+    table = Explorer().compared_as_csv(texts, {"scale": "2"}, ("=1+1", "-x")).decode()
+    assert {line.partition(",")[0] for line in table.splitlines()[1:]} == {"'=1+1", "'-x"}
+
+
 def test_a_vertical_component_is_a_channel_of_the_same_file(tmp_path, monkeypatch):
     uploads = UploadStore()
     file = Path(__file__).parent / "data" / "formats" / "two.v2"

@@ -206,6 +206,8 @@ FLAT = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], process=F
 HUGE = b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
 HUGE += b"element face 700000\nproperty list uchar uchar vertex_indices\nend_header\n"
 HUGE += struct.pack("<9f", 0, 0, 0, 1, 0, 0, 0, 1, 0) + bytes([3, 0, 1, 2]) * 700_000
+NARROW = b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nelement face 1\n"
+NARROW += b"property list uchar int vertex_indices\nend_header\n0\n1\n2\n3 0 1 2\n"
 
 HOSTILE = {
     "other.gltf": (gltf(buffers=[{"uri": "../secret.bin", "byteLength": 9}]), "names another file, '../secret.bin'"),
@@ -219,10 +221,11 @@ HOSTILE = {
     "wide.obj": (content(box(), "obj").replace(b"0.15000000", b"1e20", 1), "m large, which no body is"),
     "text.obj": (b"hello\n" * 9, "(cannot be read|holds no faces)"),
     "empty.stl": (b"", "(cannot be read|holds no faces)"),
-    "flat.obj": (content(FLAT, "obj"), "encloses no volume"),
+    "flat.obj": (content(FLAT, "obj"), "^flat.obj: encloses no volume"),
     "point.obj": (b"v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n", "all corners of the mesh are at one place"),
     "far.obj": (content(FLAT, "obj") + b"f 1 2 99\n", "(cannot be read|no volume)"),
     "huge.ply": (HUGE, "holds 700000 triangles, of which at most 500000 are read here"),
+    "narrow.ply": (NARROW, "cannot be read: it lacks 'y'"),
     "count.ply": (HUGE.replace(b"700000", b"9" * 15), "cannot be read"),
 }
 

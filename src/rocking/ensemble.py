@@ -137,7 +137,8 @@ class Scales:
         """
         with np.errstate(over="ignore"):
             factors = self.values / measured(self, motion)
-        if not factors.max() * np.abs(motion.coefficients).max() <= STRONGEST:
+            largest = factors.max() * np.abs(motion.coefficients).max()
+        if not largest <= STRONGEST:
             motion.scaled(float(factors.max()))  # refused where it is too strong, and not only steep
         return factors
 

@@ -179,7 +179,8 @@ class AsymptoticTime(Treatment):
         if motion is None or motion.description.family != "sine":
             raise InvalidOption(
                 '{} "time" is the scheme for sinusoidal motions (rocking.pulses.sine), not for '
-                f'{"free rocking" if motion is None else motion.description.family}; use "certified"',
+                f"{'free rocking' if motion is None else f'a motion of family {motion.description.family}'}; "
+                'use "certified"',
                 "chattering",
             )
         if motion.vertical is not None:

@@ -29,6 +29,9 @@ from rocking.response import Response, active_span, trail_of
 _KEPT: Final = 48
 _KEPT_STEPS: Final = 2_000_000
 
+#: With what a spreadsheet's formulas begin.
+_FORMULA: Final = ("=", "+", "-", "@", "\t", "\r")
+
 #: What a figure or a table can be written as, and the type of its content.
 EXPORTS: Final[Mapping[str, str]] = {
     "svg": "image/svg+xml",
@@ -155,7 +158,9 @@ class Explorer:
     ) -> bytes:
         """Return the histories of two cases as one table, each under its name."""
         first, second = (shown.response for shown in self._compared(texts, changed, whole=whole))
-        one, other = names if names[0] != names[1] else (names[0], f"{names[1]} (other)")
+        # A spreadsheet takes no name for a formula.
+        one, other = (f"'{name}" if name.startswith(_FORMULA) else name for name in names)
+        other = f"{other} (other)" if one == other else other
         return as_csv({one: first, other: second}, shift_of(first, second, align)).encode()
 
     def _compared(self, texts: Texts, changed: Texts, *, whole: bool) -> tuple[Simulated, Simulated]:

@@ -878,8 +878,10 @@ class Motion:
         vertical = self.vertical
         if vertical is not None and abs(factor) != 1.0:
             vertical = vertical._times(abs(factor), done)
-        with np.errstate(over="ignore"):
+        with np.errstate(over="ignore", invalid="ignore"):
             coefficients = self.coefficients * factor
+        if not np.all(np.abs(coefficients[:, 0]) <= piecewise.STRONGEST) or not np.isfinite(coefficients).all():
+            raise InvalidMotion(piecewise.TOO_STRONG)
         return replace(
             self,
             coefficients=coefficients,

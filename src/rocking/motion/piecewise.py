@@ -25,6 +25,8 @@ _ROUNDING: Final = 4.0 * np.finfo(np.float64).eps
 STRONGEST: Final = 1e50
 _LONGEST: Final = 1e15
 
+TOO_STRONG: Final = f"the acceleration of a motion must stay below {STRONGEST:g} m/s^2: check units and scale"
+
 #: Far below any ground motion; pieces may be shorter, but must not change faster than over this time.
 SHORTEST: Final = 1e-9
 
@@ -300,7 +302,7 @@ def checked_pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Flo
     with np.errstate(over="ignore"):
         reached, soon = (value(np.abs(rows), spans) for spans in (widths, np.maximum(widths, SHORTEST)))
     if not np.all(reached <= STRONGEST):
-        raise InvalidMotion(f"the acceleration of a motion must stay below {STRONGEST:g} m/s^2: check units and scale")
+        raise InvalidMotion(TOO_STRONG)
     if not np.all(soon <= STRONGEST):
         raise InvalidMotion(
             f"a piece of a motion is too steep: shorter than {SHORTEST:g} s, it would pass {STRONGEST:g} m/s^2 "

@@ -75,8 +75,9 @@ def properties(
     inside = [moments(surface.vertices, surface.faces) for surface in surfaces]
     for name, each in zip(names, inside, strict=True):
         if not each.amount > _FLAT * size**3:
+            what = "" if name == found.name else f"{name} "
             raise InvalidBlock(
-                f"{name} encloses no volume: it is a surface without an inside; give it a thickness", path=found.name
+                f"{what}encloses no volume: it is a surface without an inside; give it a thickness", path=found.name
             )
     used = [densities[name] for name in names]
     whole = together(inside, [1.0 if each is None else each for each in used])

@@ -142,7 +142,8 @@ def _loaded(source: Path | BinaryIO, named: str, **how: Any) -> Scene:
         raise
     except Exception as error:  # what a reader of foreign files raises is of any kind
         formats = sorted(trimesh.available_formats())
-        reason = f"{' '.join(str(error).split()) or type(error).__name__}; is it whole, and what its name says?"
+        said = f"it lacks {error}" if isinstance(error, KeyError) else " ".join(str(error).split())
+        reason = f"{said or type(error).__name__}; is it whole, and what its name says?"
         if suffix not in formats:
             reason = f"is of no format that trimesh reads ({', '.join(formats)})"
         raise InvalidBlock(f"cannot be read: {literal(reason)}", path=named) from None

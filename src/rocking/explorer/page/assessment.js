@@ -4,7 +4,7 @@ import {Latest, frames, unpacked} from "./api.js";
 import {showExports, withLegend} from "./exports.js";
 import {bokeh, colour, figure, showPlot, themed} from "./theme.js";
 import {acceleration, accelerationAxis, velocity, withUnit} from "./units.js";
-import {counted, fill, legend, make, one, tell} from "./words.js";
+import {counted, fill, legend, make, one, tell, textCell} from "./words.js";
 import {NONE, fixed, short, shown, typed} from "./numbers.js";
 import {inWords, phrase} from "./texts.js";
 
@@ -255,7 +255,7 @@ export class View {
 
   /** What each record does, in SI units. */
   table() {
-    const rows = this.rows.map((row) => [JSON.stringify(this.about.records[row.number]), row.pga, row.pgv, row.overturns, row.peak_over_slenderness ?? "inf", row.friction_needed ?? "inf", row.sliding_time ?? ""]);
+    const rows = this.rows.map((row) => [textCell(this.about.records[row.number]), row.pga, row.pgv, row.overturns, row.peak_over_slenderness ?? "inf", row.friction_needed ?? "inf", row.sliding_time ?? ""]);
     return [["record", "pga_m_s2", "pgv_m_s", "overturns", "peak_over_alpha", "friction_needed", "sliding_time_s"], ...rows].map((row) => `${row.join(",")}\n`).join("");
   }
 }

@@ -110,9 +110,12 @@ export class ChatteringPanel {
     this.label = new B.Title({text: "", align: "right", text_font_size: "12px", text_font_style: "normal", text_font: "system-ui, sans-serif"});
     this.ratios.title = this.label;
     themed(() => { if (this.label) this.label.text_color = colour("accent"); });
-    const narrow = window.matchMedia("(max-width: 700px)").matches;
-    const rows = narrow ? [[this.intervals], [this.ratios]] : [[this.intervals, this.ratios]];
-    void showPlot(B.Plotting.gridplot(rows, {sizing_mode: "stretch_width", toolbar_location: null, merge_tools: false}), one("ratios"));
+    const narrow = window.matchMedia("(max-width: 700px)");
+    const grid = B.Plotting.gridplot([[this.intervals, this.ratios]], {sizing_mode: "stretch_width", toolbar_location: null, merge_tools: false});
+    const place = () => { grid.children = [[this.intervals, 0, 0], [this.ratios, ...(narrow.matches ? [1, 0] : [0, 1])]]; };
+    narrow.addEventListener("change", place);
+    place();
+    void showPlot(grid, one("ratios"));
     this.made = true;
   }
 

@@ -17,6 +17,7 @@ import {RecordList} from "./list.js";
 import {makePrinting} from "./print.js";
 import {angle, caseName, ofG, unitFields, unitsChosen} from "./units.js";
 import {acceptFiles} from "./upload.js";
+import {keepingFocus} from "./focus.js";
 import {begin, settle} from "./visits.js";
 import {counted, legend, make, one, say, tell} from "./words.js";
 import {NONE, fixed, short} from "./numbers.js";
@@ -237,7 +238,8 @@ async function go(name) {
     "view-block": name === "block", "view-map": name === "map", "view-periodic": name === "periodic",
     "view-compare": name === "compare", "view-records": name === "records", "view-assessment": name === "assessment",
   };
-  for (const [id, shown] of Object.entries(parts)) one(id).hidden = !shown;
+  keepingFocus(() => { for (const [id, shown] of Object.entries(parts)) one(id).hidden = !shown; },
+    () => document.querySelector(`[data-view="${name}"]`));
   one("figures").hidden = one("at-slider").hidden = name === "block";
   if (name === "block") histories.size(190, 140);
   else if (name === "response") histories.size(290, 190);

@@ -3,6 +3,7 @@
 import {Latest, frames, json, payload} from "./api.js";
 import {choose} from "./controls.js";
 import {showExports} from "./exports.js";
+import {goOnAt} from "./focus.js";
 import {MapPicture, labelled, quantityLabel} from "./map-picture.js";
 import {MapReading} from "./map-reading.js";
 import {MapZoom} from "./map-zoom.js";
@@ -312,7 +313,7 @@ export class View {
       this.page.state.view = "response";
       this.page.restate(found);
       await this.page.go("response");
-      one("histories").focus({preventScroll: true}); // where the keys go on
+      goOnAt(one("histories"));
     } catch (error) {
       this.page.problem(error, "view-map");
     }

@@ -56,13 +56,25 @@ export class Snapshots {
   close() {
     this.name.hidden = true;
     this.button.textContent = phrase("snapshots.pin");
-    this.button.focus();
+    this.focus();
+  }
+
+  /** Let the keys go on here; the button is off where no more cases can be kept. */
+  focus() { (this.button.disabled ? this.chips.querySelector("button") : this.button)?.focus(); }
+
+  /** @param {Snapshot} gone */
+  remove(gone) {
+    this.keep(known.filter((each) => each !== gone));
+    say(phrase("snapshots.removed", {name: gone.name}));
+    this.focus();
   }
 
   /** @param {KeyboardEvent} event */
   key(event) {
-    if (event.key === "Enter") this.pin();
-    else if (event.key === "Escape") this.close();
+    if (event.key === "Escape") this.close();
+    if (event.key !== "Enter") return;
+    event.preventDefault(); // or the same key presses the button that has the focus afterwards
+    this.pin();
   }
 
   /** @param {Snapshot[]} all */
@@ -76,7 +88,7 @@ export class Snapshots {
   show() {
     this.chips.replaceChildren(...known.map((each) => make("span", {className: "chip"}, [
       make("button", {type: "button", title: phrase("snapshots.return"), on: {click: () => this.page.open({...each.texts})}}, [each.name]),
-      make("button", {type: "button", className: "remove", "aria-label": phrase("snapshots.remove", {name: each.name}), on: {click: () => this.keep(known.filter((other) => other !== each))}}, ["×"]),
+      make("button", {type: "button", className: "remove", "aria-label": phrase("snapshots.remove", {name: each.name}), on: {click: () => this.remove(each)}}, ["×"]),
     ])));
     this.button.disabled = known.length >= MOST;
     this.button.title = this.button.disabled ? phrase("snapshots.full", {count: MOST}) : "";

@@ -26,9 +26,12 @@ export function counted(name) {
 /** Write a text where it is another one; a number and its unit are not parted at the end of a line.
  * @param {Node} node @param {string} text */
 export function tell(node, text) {
-  const whole = text.replace(/(\d) (?=[%°a-zµH])/g, "$1\u00a0");
+  const whole = text.replace(/(\d) (?=[%°a-zα-ωµH])/g, "$1\u00a0");
   if (node.textContent !== whole) node.textContent = whole;
 }
+
+/** A text as a cell of a table: a spreadsheet takes none for a formula. @param {string} text */
+export const textCell = (text) => `"${text.replace(/^(?=[=+\-@\t\r])/, "'").replaceAll('"', '""')}"`;
 
 /** A name as part of a file's. @param {string} name */
 export const slug = (name) => name.replace(/[^\p{L}\d.]+/gu, "-").slice(0, 60);
