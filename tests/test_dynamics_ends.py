@@ -101,7 +101,7 @@ def test_a_flip_is_a_branch_point_where_the_motion_is_given_twice():
     """
     branch = branch_of(lambda level: table(level, cycles=2), 1.5, (1.48, 1.58))
     (crossing,) = branch.bifurcations
-    assert crossing.kind == "branch point" and crossing.value == pytest.approx(EXACT.flip, abs=1e-8)
+    assert crossing.kind == "branch point" and crossing.value == pytest.approx(EXACT.flip, abs=4e-9)
     assert np.array_equal(branch.is_stable, branch.values < EXACT.flip)
 
 
