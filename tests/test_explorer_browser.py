@@ -1543,6 +1543,10 @@ def test_a_view_is_printed_on_one_page_with_its_keys(opened, view, query):
     page.js("window.print = () => { document.body.dataset.printed = '1'; }; 1")
     page.page.click("#print")
     page.until("document.body.dataset.printed", "the page is ready to be printed")
+    if view == "block":  # it is drawn for paper: shrunk, its letters would be smaller than those of the page
+        stage = "document.getElementById('stage')"
+        drawn = page.js(f"[{stage}.clientHeight, {stage}.height, {stage}.width - 3 * {stage}.clientWidth]")
+        assert drawn == [185, 555, 0]
     assert len(re.findall(rb"/Type\s*/Page\b", page.page.pdf(prefer_css_page_size=True))) == 1
     page.page.emulate_media(media="print")
     keys = "Array.from(document.querySelectorAll('.key'), (each) => getComputedStyle(each).printColorAdjust)"
@@ -1783,6 +1787,8 @@ def test_a_lecture_shows_the_stage_large_and_says_how_much_larger_the_rotation_i
     sizes = f"{MODELS}.filter((each) => each.type === 'LinearAxis').map((each) => each.major_label_text_font_size)"
     assert page.js("getComputedStyle(document.getElementById('clock')).fontSize") == "24px"
     assert set(page.js(sizes)) == {"24px"}
+    apart = f"{MODELS}.filter((each) => each.type === 'LinearAxis').map((each) => each.major_label_policy.min_distance)"
+    assert set(page.js(apart)) == {12}
     peak = statue(0.4 * 9.80665).peak_over_slenderness
     assert 3 * peak <= 1 < 5 * peak
     assert page.text("#magnify option:checked") == "by its peak, 3 × larger"
@@ -2108,6 +2114,7 @@ def test_a_pinned_case_is_returned_to_compared_with_and_kept(opened):
     page.until("new URLSearchParams(location.search).get('compare') === 'case'")
     found = query_of(page)
     assert (found["width"], found["other.width"], found["other.pga"]) == ("0.3", "0.24", "0.4g")
+    page.says("compare-verdict", "The other (as found): ")
     assert page.page.locator("#other-case option").all_text_contents() == ["as found"]
     page.page.select_option("#compare-align", "uplift")
     page.until("new URLSearchParams(location.search).get('align') === 'uplift'")

@@ -183,7 +183,7 @@ class Explorer:
         start["duration"] = case.duration
         found = compare_schemes(case.block, case.motion, schemes=TREATMENTS, model=case.model, **start)
         rows = [(each.scheme, each.is_right, each.verdict, each.largest_error) for each in found.outcomes]
-        unfit = [(scheme, None, reason, None) for scheme, reason in found.not_applicable]
+        unfit = [(scheme, None, "", None) for scheme, _ in found.not_applicable]
         return [
             {"text": str(scheme), "right": right, "verdict": words, "error": error}
             for scheme, right, words, error in [*rows, *unfit]

@@ -5,7 +5,7 @@ import {at} from "./histories.js";
 import {fillOutline} from "./plan.js";
 import {Recording} from "./recording.js";
 import {Clicks} from "./sound.js";
-import {colour, textSize, themed} from "./theme.js";
+import {colour, sharpness, textSize, themed} from "./theme.js";
 import {one, say} from "./words.js";
 import {decimals, fixed, short} from "./numbers.js";
 import {phrase} from "./texts.js";
@@ -182,7 +182,7 @@ export class View {
   /** Draw the block, its ground and what is behind it. */
   paint() {
     const {header} = this.page.shown ?? {};
-    const ratio = window.devicePixelRatio || 1;
+    const ratio = sharpness();
     const {clientWidth: width, clientHeight: height} = this.canvas;
     if (!header || !width) return;
     if (this.canvas.width !== Math.round(width * ratio) || this.canvas.height !== Math.round(height * ratio)) {

@@ -93,8 +93,9 @@ export class View {
     first.lines.weight = arrays.first_weight;
     if (!["motion", "case"].includes(kind)) second.lines.ground_time = second.lines.ground_g = none;
     this.histories.draw(header, first, second);
-    tell(one("compare-verdict"), (kind === "treatment" ? phrase("compare.verdict_treated", {treatment: treatmentName(other.treatment), verdict: inWords(other.verdict), difference: difference(one_, other)})
-      : phrase("compare.verdict", {verdict: inWords(other.verdict), difference: difference(one_, other)})).trim());
+    const name = kind === "treatment" ? treatmentName(other.treatment) : pinnedAs(this.page.state.other)?.name;
+    const found = {verdict: inWords(other.verdict), difference: difference(one_, other)};
+    tell(one("compare-verdict"), (name ? phrase("compare.verdict_named", {name, ...found}) : phrase("compare.verdict", found)).trim());
     legend("compare-legend", [["line", phrase("compare.this")], ["second", shifted(header.shift)], ["rest", phrase("compare.at_rest")], ["impact", phrase("compare.impacts")]]);
   }
 
@@ -127,7 +128,7 @@ export class View {
       const name = treatmentName(row.text);
       const button = make("button", {type: "button", disabled: row.right === null, "aria-label": phrase("compare.button_about", {name}), on: {click: () => { this.page.state.other = {chattering: row.text}; this.form(); this.update(); }}}, [phrase("compare.button")]);
       const sign = row.right === null ? "" : row.right ? "✓ " : "✗ ";
-      return [button, name, sign + (row.error ? phrase("compare.worst", {verdict: row.verdict, error: span(row.error)}) : row.verdict)];
+      return [button, name, sign + (row.right === null ? phrase("compare.unfit") : row.error ? phrase("compare.worst", {verdict: row.verdict, error: span(row.error)}) : row.verdict)];
     }));
   }
 }
@@ -143,9 +144,15 @@ class PinnedForm {
 
   /** @param {Texts} texts */
   show(texts) {
-    const found = snapshots().findIndex((each) => JSON.stringify(Object.entries(each.texts).sort()) === JSON.stringify(Object.entries(texts).sort()));
-    this.select.value = String(found);
+    const found = pinnedAs(texts);
+    this.select.value = found ? String(snapshots().indexOf(found)) : "";
   }
+}
+
+/** The pinned case that has these texts. @param {Texts} texts */
+function pinnedAs(texts) {
+  const sorted = (/** @type {Texts} */ all) => JSON.stringify(Object.entries(all).sort());
+  return snapshots().find((each) => sorted(each.texts) === sorted(texts));
 }
 
 /** The same shape, half as large again; of a mesh the same body, a quarter turned. @param {Texts} texts @returns {Texts} */

@@ -9,6 +9,9 @@ const narrow = window.matchMedia("(max-width: 420px)");
 const forced = window.matchMedia("(forced-colors: active)");
 for (const query of [window.matchMedia("(prefers-color-scheme: dark)"), forced]) query.addEventListener("change", () => followers.forEach((follow) => follow()));
 
+/** Pixels of a canvas in one of the page, at least so many for a printer. */
+export const sharpness = () => Math.max(window.devicePixelRatio || 1, printed ? 3 : 1);
+
 /** How many times as large as usual the text of the plots is. */
 let enlarged = 1;
 /** Size of a text of the plots, px. @param {number} usual */
@@ -61,7 +64,6 @@ export function figure(given, label) {
     html_attributes: {role: "img", "aria-label": label}, ...given,
   });
   for (const axis of [...made.below, ...made.left]) if (axis.type === "LinearAxis") axis.formatter = plain(new (bokeh().BasicTickFormatter)());
-  for (const axis of [...made.below, ...made.left]) axis.major_label_policy = new (bokeh().NoOverlap)({min_distance: 6});
   themed(() => {
     const ink = colour("ink"), soft = colour("soft"), grid = colour("grid");
     made.setv({background_fill_color: colour("paper"), border_fill_color: colour("paper"), min_border_left: enlarged > 1 ? 118 : 62});
@@ -70,7 +72,7 @@ export function figure(given, label) {
         axis_line_color: soft, major_tick_line_color: soft, minor_tick_line_color: null, major_label_text_color: ink,
         axis_label_text_color: ink, major_label_text_font_size: `${textSize(12)}px`, axis_label_text_font_size: `${textSize(narrow.matches ? 11 : 12)}px`,
         axis_label_text_font_style: "normal", axis_label_text_font: "system-ui, sans-serif", major_label_text_font: "system-ui, sans-serif",
-        axis_label_standoff: 8,
+        axis_label_standoff: 8, major_label_policy: new (bokeh().NoOverlap)({min_distance: textSize(6)}),
       });
     }
     for (const each of made.center) if (each.type === "Grid") each.setv({grid_line_color: grid});
