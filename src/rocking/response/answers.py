@@ -283,12 +283,17 @@ class Answers:
 
         Infinite if the normal force does not stay positive.
         """
-        return self._contact.largest(friction_demand)
+        return self._extremes[0]
 
     @cached_property
     def minimum_normal_force(self) -> float:
         """Smallest normal force over the weight, between impacts and until the block tips (`tipping_time`)."""
-        return -self._contact.largest(_pull)
+        return -self._extremes[1]
+
+    @cached_property
+    def _extremes(self) -> list[float]:
+        """Largest demand of friction and largest pull, from the same samples: to take them is most of the work."""
+        return self._contact.largest(friction_demand, _pull)
 
     def sliding_time(self, friction: float) -> float:
         """Return the first time, s, at which sticking needs more than a friction coefficient; NaN if it never does.
@@ -325,6 +330,8 @@ class Answers:
 
         NaN if that never happens; as for `sliding_time`, until the block tips and between impacts.
         """
+        if self.minimum_normal_force > 0.0:
+            return math.nan
         return self._contact.first(_pull, lambda pull: pull >= 0.0)
 
     def __getstate__(self) -> dict[str, Any]:

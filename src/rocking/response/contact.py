@@ -84,12 +84,16 @@ class Contact:
         horizontal[outside] = vertical[outside] = np.nan
         return horizontal.reshape(times.shape), vertical.reshape(times.shape)
 
-    def largest(self, measure: Measure) -> float:
-        """Largest value of a measure: steps whose samples come near it are sampled again, around their best."""
+    def largest(self, *measures: Measure) -> list[float]:
+        """Largest value of each measure: steps whose samples come near it are sampled again, around their best."""
         times, rows = self._samples()
-        values = self._measured(measure, times, rows)
-        kept = np.argsort(values.max(axis=1))[-_MOST_REFINED:]
-        return float(max(values.max(), self._peaks(measure, times[kept], rows[kept])[1].max()))
+        forces = self._forces_in(times.ravel(), rows.ravel())
+        found = []
+        for measure in measures:
+            highest = measure(*forces).reshape(times.shape).max(axis=1)
+            kept = np.argsort(highest)[-_MOST_REFINED:]
+            found.append(float(max(highest.max(), self._peaks(measure, times[kept], rows[kept])[1].max())))
+        return found
 
     def first(self, measure: Measure, is_beyond: Callable[[Floats], Flags]) -> float:
         """First time, s, at which a measure is beyond a level, as then all greater values are; NaN if it never is."""
