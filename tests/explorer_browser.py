@@ -18,7 +18,7 @@ REQUIRED = "ROCKING_BROWSER_REQUIRED" in os.environ
 #: Which browser drives the page, and the names that its program may have.
 BROWSER = os.environ.get("ROCKING_BROWSER", "chromium")
 _PROGRAMS = {
-    "chromium": ("chromium", "chromium-browser", "google-chrome"),
+    "chromium": ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome"),
     "firefox": ("firefox-esr", "firefox"),
     "webkit": ("WebKitWebDriver",),
 }
