@@ -351,7 +351,7 @@ def test_calibrate_prints_the_diagnostics_and_writes_what_it_says(run, outcomes_
     assert len((tmp_path / "out" / "ensemble.csv").read_text().splitlines()) > 10
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse")
 def test_several_specimens_are_calibrated_each_by_itself(run, outcomes_table, tmp_path, monkeypatch):
     header, *rows = outcomes_table.read_text().splitlines()

@@ -10,7 +10,7 @@ from rocking import Block, Damper, RestrainedBlock, Tendon, Thrust, dynamics, pu
 SINE = "sine:amplitude=12,frequency=5Hz"
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_orbits_are_those_of_the_functions_and_one_is_followed(run, tmp_path):
     code, out, err = run("orbits", "--ball", 0.5, "--pulse", SINE, "--along", "amplitude:10:15", "--json",
                          "--out", tmp_path)  # fmt: skip

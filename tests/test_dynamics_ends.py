@@ -117,7 +117,7 @@ def test_a_branch_that_comes_back_is_followed_round_once():
     assert np.abs(branch.values).max() == pytest.approx(0.3, abs=0.01) and np.any(branch.is_stable)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_two_orbits_near_each_other_are_not_where_the_branch_began():
     """Beyond a fold the branch comes back to the same values, near its first point but the other way."""
     branch = branch_of(table, EXACT.fold + 0.01, (1.0, 1.6))
@@ -142,7 +142,7 @@ def test_a_branch_is_lost_where_the_family_has_no_body():
     assert closed_orbits.Ball(fold.value, 1).fold == pytest.approx(0.4, abs=1e-10)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_rest_starts_where_a_threshold_on_the_speed_is_reached():
     """A ball that bounces once a period leaves with the speed e g T/(1 + e), however hard the table shakes."""
     limit = 0.5
@@ -191,7 +191,7 @@ def peak_of(exact, speed):
     )
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_branch_ends_where_its_orbits_overturn():
     """An orbit of the linear model goes beyond the balance, and ends where its peak is a right angle."""
     block = Block.from_parameters(p=2.0, alpha=0.6, restitution=0.55)

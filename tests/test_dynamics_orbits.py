@@ -199,7 +199,7 @@ def test_a_ball_bounces_once_every_n_periods_between_the_levels_of_luck_and_meht
 @pytest.mark.parametrize(
     ("shape", "kind"),
     [((1.0, 0.8, 0.02, 0.02, 2.2), "flip"),
-     pytest.param((1.0, 0.8, 0.05, 0.01, 1.3), "fold", marks=pytest.mark.thorough),
+     pytest.param((1.0, 0.8, 0.05, 0.01, 1.3), "fold", marks=pytest.mark.slow),
      pytest.param((1.0, 0.8, 0.05, -0.02, 2.4), "fold", marks=pytest.mark.slow)],
 )  # fmt: skip
 def test_orbits_of_an_oscillator_that_hits_once_are_those_of_shaw_and_holmes(shape, kind):
@@ -343,7 +343,7 @@ def branch():
     return dynamics.continue_orbit(stable, family, 1.2, (1.0, 1.6), name="level")
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_points_of_a_branch_are_orbits_and_stability_changes_at_its_bifurcations(branch):
     e, exact = 0.5, closed_orbits.Ball(0.5, 1)
     stable = branch.is_stable

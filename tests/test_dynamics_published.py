@@ -93,7 +93,7 @@ def test_complete_chattering_is_lost_where_forty_digits_say(restitution, sigma, 
         assert below.is_complete() and not above.is_complete()
 
 
-@pytest.mark.cases(fast=0, thorough=2)
+@pytest.mark.cases(fast=0, thorough=1)
 @pytest.mark.parametrize(("restitution", "sigma", "about"), STICKING[::4])
 def test_a_branch_of_orbits_that_stick_ends_at_that_boundary(restitution, sigma, about):
     def family(frequency):

@@ -160,7 +160,7 @@ def test_a_simulation_settles_on_the_doubled_orbit_of_an_oscillator(oscillating)
     assert min(gaps) < 1e-9 < 1e-4 < max(gaps)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_where_symmetry_breaks_two_orbits_leave_that_are_mirror_images():
     exact = closed_orbits.Block(2.0, 0.2, 0.8, 1.2, BLOCK.gravity, 3)
     breaking = exact.amplitude(exact.breaking)

@@ -150,7 +150,7 @@ def test_memory_and_descriptors_that_grow_are_told(tmp_path):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="processor time of another process is read as on Linux")
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_an_interrupt_ends_a_command_with_one_sentence(tmp_path):
     # At a share of the processor time here and now: a quick machine is through in half a second.
     folders = [tmp_path / name for name in ("whole", "ended")]

@@ -147,11 +147,9 @@ def test_impacts_are_those_of_an_integration():
     assert compared(drawn, [13, 14, 17, 35])[0] >= 20
 
 
-@pytest.mark.parametrize(
-    "seeds", [pytest.param(range(20), marks=pytest.mark.thorough), pytest.param(range(20, 120), marks=pytest.mark.slow)]
-)
-def test_impacts_are_those_of_an_integration_over_wide_ranges(seeds):
-    assert compared(drawn, seeds)[0] >= 1.5 * len(seeds)
+@pytest.mark.slow
+def test_impacts_are_those_of_an_integration_over_wide_ranges():
+    assert compared(drawn, range(120))[0] >= 180
 
 
 # ---- Proofs ----

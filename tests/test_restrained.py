@@ -72,15 +72,10 @@ def test_restrained_blocks_move_as_forces_on_their_points_make_them():
     assert (impacts, peaks, overturned) >= (20, 1, 5)
 
 
-@pytest.mark.parametrize(
-    "seeds",
-    [pytest.param(range(16, 30), marks=pytest.mark.thorough), pytest.param(range(30, 120), marks=pytest.mark.slow)],
-)
-def test_restrained_blocks_move_so_over_wide_ranges(seeds):
-    impacts, peaks, overturned = compared(drawn, seeds)
-    assert impacts > 1.4 * len(seeds)
-    assert peaks > 0.15 * len(seeds)
-    assert overturned > 0.35 * len(seeds)
+@pytest.mark.slow
+def test_restrained_blocks_move_so_over_wide_ranges():
+    impacts, peaks, overturned = compared(drawn, range(16, 120))
+    assert (impacts, peaks, overturned) >= (145, 15, 36)
 
 
 def of_restraints(body, j, u):
