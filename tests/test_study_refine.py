@@ -346,12 +346,27 @@ def test_simulations_that_were_stopped_are_no_verdict(tmp_path):
     study.run()
     results, found = study.results(), study.critical_scales()
     known = (results.overturned | ~results.stopped).values
-    changes = (results.overturned.values[:, 1:] != results.overturned.values[:, :-1]) & known[:, 1:] & known[:, :-1]
     assert (~known).any()
     assert not (results.overturned & results.stopped).any()  # a verdict asks for no more than the latter
-    assert found.sizes["change"] == changes.sum()
+    columns = zip(
+        *(np.moveaxis(values, 1, -1).reshape(-1, len(SCALES)) for values in (results.overturned.values, known)),
+        strict=True,
+    )
+    assert found.sizes["change"] == sum(int(np.sum(np.diff(falls[told].astype(int)) != 0)) for falls, told in columns)
     wide = (found.high - found.low > 0.01 * found.high).values
     assert np.array_equal(wide, ~found.known.values)
+
+
+def test_a_change_with_unknown_verdicts_inside_lies_between_the_known_ones(tmp_path):
+    block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.97)
+    options = {"levels": [0.5, 1.0, 2.2, 2.5, 6.0, 6.5], "measure": "pga", "duration": 4.0, "refine": 1e-3}
+    study = rocking.study(tmp_path / "study", block, rocking.pulses.one_sine(1.0, 1.0), **options)
+    study.run(threads=1)
+    results, found = study.results(), study.critical_scales()
+    assert results.stopped.values.ravel().tolist() == [False, False, True, True, False, False]
+    assert results.overturned.values.ravel().tolist() == [False, False, False, False, True, True]
+    assert (found.low.values.tolist(), found.high.values.tolist()) == ([1.0], [6.0])
+    assert (found.overturns.values.tolist(), found.known.values.tolist()) == ([True], [False])
 
 
 def test_what_cannot_be_refined_is_refused(tmp_path):

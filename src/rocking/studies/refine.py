@@ -336,22 +336,28 @@ def _found_brackets(store: Store, verdict: StudyVerdict) -> Brackets:
 
 
 def grid_brackets(store: Store, of: Collection[str]) -> Brackets:
-    """Find changes of verdicts between neighbouring scales of the grid, all of whose units are done."""
+    """Find changes of verdicts between each scale of the grid and the next known one; all its units are done."""
     _require_order(store.product)
     findings = np.full((len(VERDICTS), *store.grid.shape), Finding.UNKNOWN, dtype=np.int8)
     for key in store.grid:
         outcomes = store.present(key)
         for verdict in of:
             findings[VERDICTS.index(verdict)][store.grid.ranges(key)] = _finding(verdict, outcomes)
+    is_known = findings != Finding.UNKNOWN
+    # An unknown verdict takes the last known one below it: else a change with unknown verdicts inside would be lost.
+    for k in range(1, findings.shape[2]):
+        np.copyto(findings[:, :, k], findings[:, :, k - 1], where=~is_known[:, :, k])
     here, above = findings[:, :, :-1], findings[:, :, 1:]
-    found = np.nonzero((here != above) & (here != Finding.UNKNOWN) & (above != Finding.UNKNOWN))
+    found = np.nonzero((here != above) & (here != Finding.UNKNOWN))
     which, motion, scale, polarity, block = found
     order = np.lexsort((scale, block, polarity, motion, which))
     which, motion, scale, polarity, block = (index[order] for index in found)
     levels = store.product.scales.values
     holds = above[which, motion, scale, polarity, block] == Finding.YES
-    known = np.ones(len(motion), dtype=bool)
-    return Brackets(which, motion, polarity, block, levels[scale], levels[scale + 1], holds, known)
+    below = scale.copy()
+    while (unknown := ~is_known[which, motion, below, polarity, block]).any():
+        below[unknown] -= 1
+    return Brackets(which, motion, polarity, block, levels[below], levels[scale + 1], holds, below == scale)
 
 
 def critical_scales(store: Store, verdict: StudyVerdict) -> xr.Dataset:

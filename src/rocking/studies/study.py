@@ -247,7 +247,8 @@ class Study(WrittenToFiles):
             known (whether all verdicts on the way are, else the bracket stays wide: a simulation was given up or
             stopped, or a rest is not proven); motion, polarity, block and its parameters as coordinates. A block that
             stands a stronger motion than one that overturns it has several. Brackets are neighbouring scales of the
-            study, or narrower where it was made with `refine`.
+            study, or narrower where it was made with `refine`; where verdicts are not known at scales between two that
+            differ, the bracket is those two.
 
         Raises
         ------
