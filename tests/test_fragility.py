@@ -271,6 +271,24 @@ def test_the_bootstrap_draws_whole_clusters():
     assert np.diff(apart.median_interval) < 0.5 * np.diff(kept.median_interval)
 
 
+def test_the_bootstrap_draws_counted_outcomes_one_by_one():
+    intensity, exceeded, trials = np.array([2.0, 3.0, 4.0, 5.0]), np.array([1, 4, 7, 10]), 10
+    band = Band("bootstrap", samples=4000)
+    counted = fit_fragility(intensity, exceeded, trials=trials, band=band).curves[0]
+    given = [1.0] * 10 + [0.0] * 10
+    each = np.concatenate([given[10 - count : 20 - count] for count in exceeded])
+    single = fit_fragility(np.repeat(intensity, trials), each, band=band).curves[0]
+    assert counted.clusters == single.clusters == 40
+    # The two draw other numbers: ends of intervals differ by their sampling, as from one seed to another.
+    assert counted.median_interval == pytest.approx(single.median_interval, rel=0.015)
+    assert counted.dispersion_interval == pytest.approx(single.dispersion_interval, rel=0.05)
+    assert counted.degenerate == pytest.approx(single.degenerate, abs=0.01)
+    assert np.diff(counted.band(intensity), axis=0) == pytest.approx(np.diff(single.band(intensity), axis=0), rel=0.1)
+    of_counts, of_single = counted._uncertainty, single._uncertainty
+    cubes = of_counts.alike @ of_counts.influence**3
+    assert cubes == pytest.approx(np.sum(of_single.influence**3, axis=0), rel=1e-12)
+
+
 def test_resampled_outcomes_that_are_separated_count_as_steps():
     curve = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 0, 1], band=Band("bootstrap", samples=500)).curves[0]
     assert 0.5 < curve.degenerate < 1.0

@@ -95,22 +95,29 @@ class Resamples:
 
     A fit is a step where the drawn outcomes are separated, level where they do not rise; `degenerate` is the share of
     such. The influence (clusters, 2) of a cluster is its score over the observed information: how far it pulls the fit.
+    Clusters that are alike have one row there, and `alike` says how many they are.
     """
 
     fits: Probit
     degenerate: float
     influence: Floats
+    alike: Floats
 
     def __repr__(self) -> str:
         return f"<Resamples: {len(self.fits.slope)} fits, {100 * self.degenerate:.3g} % of them degenerate>"
 
     @classmethod
-    def of(cls, data: Outcomes, fitted: Probit, clusters: Integers, samples: int, seed: int) -> Resamples:
-        """Draw and fit."""
+    def of(cls, data: Outcomes, fitted: Probit, clusters: Integers | None, samples: int, seed: int) -> Resamples:
+        """Draw and fit; without clusters every outcome is on its own."""
+        if clusters is None:
+            data, alike = _single(data)
+            clusters = np.arange(alike.size)
+        else:
+            alike = np.ones(int(clusters.max()) + 1)
         order = np.argsort(data.z, kind="stable")
         starts = np.flatnonzero(np.diff(data.z[order], prepend=-np.inf))
-        count = int(clusters.max()) + 1
-        drawn = np.random.default_rng(seed).multinomial(count, np.full(count, 1.0 / count), size=samples)
+        count = alike.sum()
+        drawn = np.random.default_rng(seed).multinomial(int(count), alike / count, size=samples)
         weights = drawn[:, clusters[order]]
         yes, trials = (np.add.reduceat(weights * values[order], starts, axis=1) for values in data[1:])
         anew = Outcomes(data.z[order][starts], yes, trials)
@@ -118,7 +125,7 @@ class Resamples:
         if regular.any():
             found = fit(anew.of(regular))
             fits.intercept[regular], fits.slope[regular] = found.intercept, found.slope
-        return cls(fits, 1.0 - float(regular.mean()), _influences(data, clusters, fitted))
+        return cls(fits, 1.0 - float(regular.mean()), _influences(data, clusters, alike, fitted), alike)
 
     def interval(self, quantity: Quantity, estimate: Floats, gradient: Floats, confidence: float) -> Ends:
         """Percentiles of a quantity, corrected for its bias and its skewness.
@@ -134,7 +141,7 @@ class Resamples:
         bias = ndtri(np.clip(below, 0.5 / count, 1.0 - 0.5 / count))
         pulls = self.influence @ gradient
         tiny = np.finfo(float).tiny
-        acceleration = np.sum(pulls**3, axis=0) / (6.0 * np.maximum(np.sum(pulls**2, axis=0) ** 1.5, tiny))
+        acceleration = self.alike @ pulls**3 / (6.0 * np.maximum((self.alike @ pulls**2) ** 1.5, tiny))
         reach = float(ndtri(0.5 + 0.5 * confidence))
         ordered = np.sort(values, axis=0)
         ends = []
@@ -146,6 +153,14 @@ class Resamples:
 
 
 Confidence = LikelyRegion | Resamples
+
+
+def _single(data: Outcomes) -> tuple[Outcomes, Floats]:
+    """One outcome of each kind at each intensity, and how many are like it: the outcomes may be very many."""
+    counts = np.column_stack([data.exceeded, data.trials - data.exceeded]).ravel()
+    there = counts > 0.0
+    exceeded = np.tile([1.0, 0.0], data.z.size)[there]
+    return Outcomes(np.repeat(data.z, 2)[there], exceeded, np.ones_like(exceeded)), counts[there]
 
 
 def _around(data: Outcomes, best: Probit, drop: float) -> Floats:
@@ -202,12 +217,12 @@ def _stretch(data: Outcomes, clusters: Integers, best: Probit) -> Floats:
     return np.asarray(root @ wide @ np.linalg.inv(root))
 
 
-def _influences(data: Outcomes, clusters: Integers, fitted: Probit) -> Floats:
+def _influences(data: Outcomes, clusters: Integers, alike: Floats, fitted: Probit) -> Floats:
     """Score of each cluster over the observed information: what an infinitesimal jackknife leaves."""
     centre = data.z.mean()
     best = Probit(fitted.intercept + fitted.slope * centre, fitted.slope)
     pulls, bends = _by_cluster(data._replace(z=data.z - centre), clusters, best)
-    intercept, slope = solved(bends.sum(axis=0, keepdims=True), pulls).T
+    intercept, slope = solved(np.tensordot(alike, bends, axes=1)[None], pulls).T
     return np.stack([intercept - slope * centre, slope], axis=1)
 
 

@@ -78,7 +78,8 @@ class FragilityCurve:
     intensity, exceeded, trials : ndarray, shape (n,)
         The data: outcomes that exceeded, of how many, at each intensity. Those of blocks with weights count in parts.
     clusters : int
-        Number of clusters of outcomes that belong together: of motions, where outcomes were simulated.
+        Number of clusters of outcomes that belong together: of motions, where outcomes were simulated; of outcomes,
+        where each is on its own.
     independent : bool
         Whether every outcome is on its own, so that tests which know of no clusters may be asked.
     fitted : Probit
@@ -362,14 +363,13 @@ def fitted_curve(
             f"{'above' if middle > z.max() else 'below'} all intensities by a factor of more than 1000: motions nearer "
             "to it, or another measure, are needed"
         )
-    groups = np.arange(z.size) if clusters is None else clusters
-    count = int(groups.max()) + 1
+    count = round(float(trials.sum())) if clusters is None else int(clusters.max()) + 1
     independent = clusters is None or (count == z.size and bool(np.all(trials <= 1.0)))
     uncertainty: Confidence
     if band.kind == "bootstrap":
-        uncertainty = Resamples.of(outcomes, fitted, groups, band.samples, band.seed)
+        uncertainty = Resamples.of(outcomes, fitted, clusters, band.samples, band.seed)
     else:
-        uncertainty = LikelyRegion.of(outcomes, fitted, None if independent else groups, band.confidence)
+        uncertainty = LikelyRegion.of(outcomes, fitted, None if independent else clusters, band.confidence)
     return FragilityCurve(
         limit_state=name,
         limit=limit,

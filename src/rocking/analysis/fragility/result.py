@@ -176,7 +176,7 @@ class Fragility(DrawnResult, TableResult):
         --------
         >>> from rocking import fit_fragility
         >>> fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4).curve("overturning").clusters
-        4
+        16
         """
         curves = {curve.limit_state: curve for curve in self.curves}
         return curves[checks.one_of(limit_state, "limit_state", InvalidOption, list(curves))]
