@@ -15,7 +15,9 @@ from hypothesis import strategies as st
 
 import rocking
 from rocking import HazardCurve, InvalidOption
-from rocking.analysis.hazard import powers
+from rocking.analysis import Band
+from rocking.analysis.fragility.lognormal import Probit
+from rocking.analysis.hazard import log_parts, powers
 from rocking.analysis.input_tables import read_observed
 from rocking.motion.scaling import Measure
 
@@ -206,6 +208,18 @@ def test_the_interval_is_that_of_the_fragility() -> None:
     assert few.interval[0] < few.annual_rate < few.interval[1]
     width, narrow = (math.log(one.interval[1] / one.interval[0]) for one in (few, many))
     assert width / narrow == pytest.approx(10.0, rel=0.03)
+
+
+def test_resamples_in_which_nothing_falls_have_the_rate_zero() -> None:
+    hazard = HazardCurve([0.5, 5.0], [1e-2, 1e-4])
+    fits = Probit(np.array([-np.inf, 0.0, -1e9, 2.0]), np.array([0.0, 0.0, 1e9, 1.0]))
+    rates = np.exp(np.logaddexp.reduce(log_parts(fits, hazard), axis=1))
+    # None ever, half of the weakest motions, all from e m/s^2 on, a lognormal of median exp(-2) and dispersion 1.
+    assert rates[:3] == pytest.approx([0.0, math.inf, 1e-2 * (math.e / 0.5) ** -2.0])
+    assert rates[3] == pytest.approx(1e-2 * (math.exp(-2.0) / 0.5) ** -2.0 * math.exp(2.0))
+    # Of ten outcomes the one that fell is missing in 0.9^10 = 35 % of the resamples.
+    one_fell = rocking.fit_fragility(np.linspace(1.0, 5.0, 10), np.eye(10)[6], band=Band("bootstrap", samples=200))
+    assert one_fell.annual_rate(hazard).rates[0].interval[0] == 0.0
 
 
 def test_a_rock_that_stands_bounds_how_often_it_was_shaken() -> None:

@@ -316,8 +316,9 @@ def log_parts(fits: Probit, hazard: HazardCurve, until: float = math.inf) -> Flo
         fall = np.exp(-0.5 * b * (ends[1] - ends[0]) * (near + far)) * erfcx(far * _ROOT) / erfcx(near * _ROOT)
         tail = log_c - k * end - 0.5 * z * z + np.log(0.5 * erfcx(near * _ROOT)) + np.log1p(-fall)
         middle = log_c + shift * a + 0.5 * shift * shift + np.log(ndtr(upper) - ndtr(lower))
-    # A curve that does not rise is exceeded by the weakest motions as often as they come.
-    return np.where(b > 0.0, np.where(near > 0.0, tail, middle), np.inf)
+    # A curve that does not rise is exceeded by the weakest motions as often as they come; one of probability 0 never.
+    level = np.where(np.isneginf(a), -np.inf, np.inf)
+    return np.where(b > 0.0, np.where(near > 0.0, tail, middle), level)
 
 
 def _extended(values: Floats) -> Floats:
