@@ -144,6 +144,18 @@ def test_units_are_openquakes(tmp_path, measure, imt, unit):
     np.testing.assert_allclose(openquakes_probability(params, unit * at), curve.probability(at), atol=1e-6)
 
 
+def test_a_spectral_acceleration_of_another_damping_is_none_of_openquakes(tmp_path):
+    path, data = tmp_path / "model.xml", ([1.0, 2.0, 3.0, 4.0], [1, 4, 7, 9])
+    light, usual = (
+        fit_fragility(*data, trials=10, measure=rocking.Measure("sa", period=0.5, damping=damping))
+        for damping in (0.02, 0.05)
+    )
+    with pytest.raises(rocking.InvalidOption, match=r"damping of OpenQuake's .* is 0.05 of critical, not 0.02"):
+        light.to_nrml(path)
+    assert not path.exists()
+    usual.to_nrml(path)
+
+
 def test_pooled_blocks_need_one_to_count_for(tmp_path):
     blocks = [BLOCK, rocking.Block.from_parameters(p=3.0, alpha=0.25, restitution=0.9)]
     pooled = fragility(blocks, PULSES, measure="pga_ratio", levels=np.linspace(1.1, 4.0, 9))

@@ -23,6 +23,7 @@ from rocking.arrays import Floats
 from rocking.body import Body
 from rocking.constants import STANDARD_GRAVITY, Model
 from rocking.errors import InvalidOption
+from rocking.motion.measures import DAMPING
 from rocking.motion.scaling import Measure
 from rocking.tables import write_text
 
@@ -97,7 +98,10 @@ def fragility_function(
 
 
 def scale_of(measure: Measure, block: Body | None, model: Model) -> Scale:
-    """OpenQuake's type for a measure, and the factor from SI units or the block's own: PGA and SA in g, PGV in cm/s."""
+    """OpenQuake's type for a measure, and the factor from SI units or the block's own: PGA and SA in g, PGV in cm/s.
+
+    SA(T) does not say its damping: it is that of ground-motion models.
+    """
     if block is not None:
         own = float(units_of(block.alone(), measure, model)[0])
     elif not measure.in_block_units:
@@ -108,6 +112,13 @@ def scale_of(measure: Measure, block: Body | None, model: Model) -> Scale:
         )
     if measure.of_motion == "pgv":
         return Scale("PGV", 100.0 * own)
+    if measure.damping != DAMPING:
+        raise InvalidOption(
+            f"the {{}} of OpenQuake's spectral accelerations is {DAMPING:g} of critical, not {measure.damping:g}: fit "
+            "the fragility against a measure of that damping",
+            "damping",
+            value=measure.damping,
+        )
     imt = "PGA" if measure.of_motion == "pga" else f"SA({measure.period:g})"
     return Scale(imt, own / STANDARD_GRAVITY)
 

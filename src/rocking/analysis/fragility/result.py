@@ -312,7 +312,8 @@ class Fragility(DrawnResult, TableResult):
         Raises
         ------
         InvalidOption
-            If a name has a character that NRML does not allow, a block is needed, or the dispersion is too wide.
+            If a name has a character that NRML does not allow, a block is needed, a spectral acceleration is of another
+            damping than 5 % of critical, which OpenQuake's are of, or the dispersion is too wide.
         OutputError
             If the file cannot be written.
 
