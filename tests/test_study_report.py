@@ -110,6 +110,23 @@ def test_blocks_of_one_curve_count_by_their_weights(study):
     assert "weighted" in found.description
 
 
+@pytest.mark.parametrize("lift", [None, rocking.pulses.one_sine(6.0, 3.0)])
+@pytest.mark.parametrize("alpha", [0.2, (0.2, 0.25)])
+def test_a_study_of_one_block_says_what_a_fragility_at_once_does(tmp_path, alpha, lift):
+    block = rocking.Block.from_parameters(p=2.0, alpha=alpha, restitution=0.9)
+    motions = [motion.with_vertical(lift) for motion in MOTIONS[:6]]
+    levels = np.linspace(1.0, 9.0, 9)
+    of_study = rocking.study(tmp_path / "s", block, motions, levels=levels, polarity="both", unit_blocks=512)
+    of_study.run(progress=False)
+    found, reference = of_study.fragility(), rocking.fragility(block, motions, levels=levels, polarity="both")
+    assert found.description.partition(" model, ")[2] == reference.description.partition(" model, ")[2] != ""
+    for one in (found, reference):
+        one.to_nrml(tmp_path / "model.xml")
+        # Below its uplift acceleration g tan(alpha) no block moves, unless a vertical motion makes it lighter.
+        limits = re.findall('noDamageLimit="(.*?)"', (tmp_path / "model.xml").read_text())
+        assert [float(limit) for limit in limits] == ([pytest.approx(math.tan(0.2))] if lift is None else [])
+
+
 def test_a_spectrum_is_the_fractiles_of_the_simulations(study):
     table = rocking.simulate_many(BLOCKS, MOTIONS, levels=LEVELS, measure="pga")
     found = study.spectrum([0.5])

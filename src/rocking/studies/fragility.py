@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking.analysis.fragility.curve import Band, FragilityCurve, fitted_curve, passed
-from rocking.analysis.fragility.fit import OVERTURNING, fit_fragility
+from rocking.analysis.fragility.fit import OVERTURNING, fit_fragility, of_polarities
 from rocking.analysis.fragility.result import Fragility
 from rocking.analysis.levels import mean_one, only_block, pooled, units_of, values_of
 from rocking.arrays import Floats
-from rocking.ensemble import Product, body_coordinates
+from rocking.ensemble import Product, body_coordinates, verticals_of
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
 from rocking.progress import Progress
@@ -79,11 +79,13 @@ def pooled_fragility(
     return Fragility(
         curves=tuple(curves),
         measure=measure,
-        description=f"{text}, {product.model} model{', both polarities' if product.polarity == 'both' else ''}",
+        description=f"{text}, {product.model} model"
+        + of_polarities(product.polarity, is_symmetric=product.bodies.is_symmetric),
         block=only_block(product.bodies),
         model=product.model,
         outcomes=None,
         one_way=product.polarity != "both" and not product.bodies.is_symmetric,
+        with_vertical=bool(verticals_of(product.motions)),
     )
 
 

@@ -34,9 +34,6 @@ _INTENSITIES: Final = (1e-50, 1e50)
 _MOST_TRIALS: Final = 2.0**53
 _LIKELIHOOD: Final = Band()
 
-_IN_BOTH: Final = ", one polarity, since a symmetric block does the same in both"
-_BOTH: Final = ", both polarities"
-
 #: Limit states: peak rotation over slenderness that is exceeded; infinity is overturning.
 OVERTURNING: Final[Mapping[str, float]] = {"overturning": math.inf}
 
@@ -158,12 +155,20 @@ def fragility(
     return Fragility(
         curves=tuple(curves),
         measure=how,
-        description=f"{text}{_IN_BOTH if mirrored else _BOTH if polarity == 'both' else ''}",
+        description=text + of_polarities(polarity, is_symmetric=many.is_symmetric),
         block=only_block(blocks),
         model=model,
         outcomes=outcomes,
         one_way=polarity != "both" and not many.is_symmetric,
+        with_vertical="vertical" in table.coords,
     )
+
+
+def of_polarities(polarity: Polarity, *, is_symmetric: bool) -> str:
+    """Say, behind a description, which polarities outcomes come from where both were asked for."""
+    if polarity != "both":
+        return ""
+    return ", one polarity, since a symmetric block does the same in both" if is_symmetric else ", both polarities"
 
 
 def _outcomes(

@@ -61,6 +61,8 @@ class Fragility(DrawnResult, TableResult):
         outcomes were given.
     one_way : bool
         Whether sides that differ met motions in one polarity only: reversed, they do something else.
+    with_vertical : bool
+        Whether a vertical motion was simulated.
     source : str
         What a cluster of outcomes comes from: a motion, or, where outcomes were given, a cluster.
     """
@@ -75,6 +77,7 @@ class Fragility(DrawnResult, TableResult):
     model: Model
     outcomes: pd.DataFrame | None
     one_way: bool = False
+    with_vertical: bool = False
     source: str = "motion"
 
     def summary(self) -> str:
@@ -333,8 +336,7 @@ class Fragility(DrawnResult, TableResult):
         chosen = self.block if block is None else block
         scale = nrml.scale_of(self.measure, chosen, self.model)
         lifting = None
-        is_horizontal = self.outcomes is None or "vertical" not in self.outcomes
-        if chosen is not None and scale.imt == "PGA" and is_horizontal:
+        if chosen is not None and scale.imt == "PGA" and not self.with_vertical:
             lifting = min(chosen.uplift_thresholds(self.model)) / STANDARD_GRAVITY
         function = nrml.fragility_function(self.curves, scale, self.range, lifting, taxonomy, format)
         states = [curve.limit_state for curve in self.curves]
