@@ -1,10 +1,11 @@
 """Rocking spectra: what `simulate` says, fractiles over blocks that overturn, equal displacements of similar blocks."""
 
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -81,11 +82,12 @@ def test_finite_fractiles_are_interpolated_linearly(values, shares):
     np.testing.assert_allclose(fractiles_of(values, shares), expected, rtol=1e-12, atol=1e-9)
 
 
-@given(st.integers(1, 6), st.integers(0, 6), st.floats(0.0, 1.0))
+@example(8, 18, Fraction(28, 100))  # 0.28 * 25 is more than 7 in floating point
+@given(st.integers(1, 30), st.integers(0, 30), st.fractions(0, 1, max_denominator=1000))
 def test_a_fractile_is_infinite_where_the_value_at_it_or_next_above_is(finite, infinite, share):
     values = np.concatenate([np.arange(finite, dtype=float), np.full(infinite, np.inf)])[:, None]
     place = share * (finite + infinite - 1)
-    (result,) = fractiles_of(values, np.array([share]))[:, 0]
+    (result,) = fractiles_of(values, np.array([float(share)]))[:, 0]
     assert math.isinf(result) == (math.ceil(place) >= finite)
     assert not math.isnan(result)
 
@@ -200,3 +202,10 @@ def test_peaks_of_asymmetric_blocks_count_in_their_smaller_slenderness():
         assert over == (math.inf if overturned else pytest.approx(peak / 0.2, rel=1e-12))
         judged += not overturned
     assert judged >= 2
+
+
+@pytest.mark.parametrize("scale", [5e-324, 1e-300, 1e308])
+def test_weights_count_over_each_other_however_large_or_small(scale):
+    blocks = rocking.Blocks(p=[2.0, 3.0, 4.0], alpha=0.2, restitution=0.9)
+    found = rocking_spectrum(blocks, PULSES[0], p=[2.0], weights=scale * np.array([1.0, 1.0, 0.0]))
+    assert found.weight.values.tolist() == [1.5, 1.5, 0.0]

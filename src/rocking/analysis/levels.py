@@ -58,8 +58,9 @@ def mean_one(weights: ArrayLike | None, count: int) -> Floats:
     given = checks.numbers(weights, "weights", InvalidOption)
     if given.shape != (count,):
         raise InvalidOption(f"weights must hold one number for each of {counted(count, 'block')}, not {given.shape}")
-    if not (np.all(np.isfinite(given) & (given >= 0.0)) and given.sum() > 0.0):
+    if not (np.all(np.isfinite(given) & (given >= 0.0)) and np.any(given > 0.0)):
         raise InvalidOption("weights must be finite numbers of 0 or more, and not all 0")
+    given = given / given.max()  # else sums of very large or very small weights overflow
     return np.asarray(given * (count / given.sum()))
 
 

@@ -147,6 +147,9 @@ def fractiles_of(peaks: Floats, shares: Floats) -> Floats:
     """
     ordered = np.sort(peaks, axis=0)
     place = shares * (len(ordered) - 1)
+    # Rounding must not take the place of one value for one above it, which may be infinite: 0.28 * 25 > 7.
+    nearest = np.rint(place)
+    place = np.where(np.abs(place - nearest) <= 1e-12 * np.maximum(nearest, 1.0), nearest, place)
     below = np.floor(place).astype(np.int64)
     low, high = ordered[below], ordered[np.ceil(place).astype(np.int64)]
     weight = (place - below).reshape(-1, *[1] * (ordered.ndim - 1))
