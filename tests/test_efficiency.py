@@ -106,7 +106,7 @@ def test_a_block_of_weight_two_counts_as_two_blocks():
         compare_measures(blocks, motions, weights=weights)
         for blocks, weights in (([a, a, b], None), ([a, b], [2.0, 1.0]), ([a, b], None))
     )
-    for name in ("median_intensity", "dispersion"):
+    for name in ("median_intensity", "dispersion", "dispersion_of_all"):
         assert weighted[name].values == pytest.approx(twice[name].values, rel=1e-9)
         assert weighted[name].values != pytest.approx(alike[name].values, rel=1e-3)
     assert "2 blocks, weighted" in weighted.summary()
@@ -140,13 +140,41 @@ def test_dispersions_of_several_blocks_are_written_out_sums(monkeypatch):
         assert float(one.median_intensity) == pytest.approx(math.exp(mean), rel=1e-13)
         assert float(one.dispersion) == pytest.approx(own, rel=1e-12)
         assert float(one.dispersion_of_all) == pytest.approx(
-            math.sqrt(total / (3 * shares[0] + 2 * shares[1] - 1.0)), rel=1e-12
+            math.sqrt(total / (shares[0] * 2.0 + shares[1] * 1.0)), rel=1e-12
         )
         # Two motions remain that both blocks share: one degree of freedom, and no more.
         ends = [math.sqrt(1.0 / chi2.ppf(share, 1)) * own for share in (0.95, 0.05)]
         assert [float(one.dispersion_low), float(one.dispersion_high)] == pytest.approx(ends, rel=1e-12)
     assert found.sizes["measure"] == 5
     assert "left out: 1 pair of block and motion" in found.summary()
+
+
+def test_copies_of_a_block_scatter_as_the_block_does():
+    """Blocks share the motions: twenty copies are no larger sample."""
+    motions = [rocking.pulses.one_sine(1.0, f) for f in (0.5, 0.8, 1.1)]
+    block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    alone, many = (compare_measures(blocks, motions, periods=[1.0], tolerance=1e-2) for blocks in (block, [block] * 20))
+    for name in ("dispersion", "dispersion_low", "dispersion_high", "dispersion_of_all"):
+        assert many[name].values == pytest.approx(alone[name].values, rel=1e-12)
+
+
+def test_a_block_of_no_weight_changes_nothing_and_need_not_overturn(monkeypatch):
+    motions = [rocking.pulses.one_sine(1.0, f) for f in (0.5, 0.8, 1.1)]
+    a, b = (rocking.Block.from_parameters(p=p, alpha=0.2, restitution=0.9) for p in (1.5, 3.0))
+    alone = compare_measures(a, motions, periods=[1.0], tolerance=1e-2)
+    search = efficiency.incremental_dynamic_analysis
+    for stands in (1, 2, 3):
+
+        def standing(*given, **options):
+            scaled = search(*given, **options)
+            scaled.overturning_level[{"motion": slice(stands), "block": 1}] = math.nan  # noqa: B023
+            return scaled
+
+        monkeypatch.setattr(efficiency, "incremental_dynamic_analysis", standing)
+        found = compare_measures([a, b], motions, periods=[1.0], weights=[1.0, 0.0], tolerance=1e-2)
+        assert int(np.isnan(found.intensity.values[0]).sum()) == stands
+        for name in ("median_intensity", "dispersion", "dispersion_low", "dispersion_high", "dispersion_of_all"):
+            assert found[name].values == pytest.approx(alone[name].values, rel=1e-12)
 
 
 def test_the_figure_has_the_order_of_the_table():

@@ -86,7 +86,8 @@ def compare_measures(
     intensity there, ln x, has the standard deviation beta over the motions: the dispersion of the fragility that is the
     distribution of x, and the less, the more efficient the measure. The interval of beta is that of a normal sample.
     Over several blocks beta is pooled from the deviations from each block's own mean; a measure that is to serve them
-    all must also have a small deviation from one mean.
+    all must also have a small deviation from one mean. Both have the same degrees of freedom, those of the motions:
+    blocks share these, so that more blocks are no larger sample.
 
     References
     ----------
@@ -126,7 +127,7 @@ def compare_measures(
     intensity = np.stack(
         [factors * values_of(shaken, measure)[:, None] / units_of(many, measure, model) for measure in measures]
     )
-    if np.any(np.isfinite(level).sum(axis=0) < 2):
+    if np.any(np.isfinite(level).sum(axis=0)[shares > 0.0] < 2):
         raise InvalidOption("fewer than two motions overturn a block, however strong; a dispersion needs more")
     named_motions = {name: scaled[name] for name in ("motion", "vertical") if name in scaled.coords}
     found = _dataset(measures, intensity, named_motions, shares)
@@ -229,12 +230,13 @@ def _dataset(
     logarithm = np.log(intensity)
     weight = np.where(np.isfinite(logarithm[0]), shares, 0.0)
     count = np.isfinite(logarithm[0]).sum(axis=0)
-    within = logarithm - np.nanmean(logarithm, axis=1, keepdims=True)
-    about_own = np.sqrt(np.nansum(weight * within**2, axis=(1, 2)) / np.sum(shares * (count - 1)))
-    mean = np.nansum(weight * logarithm, axis=(1, 2)) / weight.sum()
-    of_all = np.nansum(weight * (logarithm - mean[:, None, None]) ** 2, axis=(1, 2)) / (weight.sum() - 1.0)
     # Motions are what is drawn: those of several blocks are the same.
-    low, high = _interval_factors(int(count.min()) - 1)
+    freedom = np.sum(shares * (count - 1))
+    low, high = _interval_factors(int(count[shares > 0.0].min()) - 1)
+    within = logarithm - np.nansum(logarithm, axis=1, keepdims=True) / np.maximum(count, 1)
+    about_own = np.sqrt(np.nansum(weight * within**2, axis=(1, 2)) / freedom)
+    mean = np.nansum(weight * logarithm, axis=(1, 2)) / weight.sum()
+    of_all = np.nansum(weight * (logarithm - mean[:, None, None]) ** 2, axis=(1, 2)) / freedom
     spread = "standard deviation of the logarithm of the intensity at overturning"
     return xr.Dataset(
         {
