@@ -190,3 +190,14 @@ def test_what_cannot_be_scaled_up_is_refused(changes, word):
     arguments = {"blocks": BLOCK, "motions": PULSE} | changes
     with pytest.raises(rocking.RockingError, match=word):
         incremental_dynamic_analysis(arguments.pop("blocks"), arguments.pop("motions"), **arguments)
+
+
+def test_bands_of_a_block_or_a_motion_that_is_not_there_are_refused(analysis):
+    _, result = analysis
+    for name in ("motion", "block"):
+        assert result.bands(**{name: 1})
+        for wrong in (-1, 2, 0.0):
+            with pytest.raises(rocking.InvalidOption, match=f"{name} must be a whole number from 0 to 1"):
+                result.bands(**{name: wrong})
+    with pytest.raises(rocking.InvalidOption, match="block must be a whole number"):
+        result.plot(block=-1)

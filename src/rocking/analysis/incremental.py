@@ -210,6 +210,11 @@ class IncrementalDynamicAnalysis(DatasetResult):
         list of (float, float)
             Start and end, in SI units or the block's own; NaN where the band goes on below or above the levels.
 
+        Raises
+        ------
+        InvalidOption
+            If there is no such block or motion.
+
         Examples
         --------
         >>> import rocking
@@ -219,9 +224,13 @@ class IncrementalDynamicAnalysis(DatasetResult):
         >>> [(round(start, 4), end) for start, end in found.bands()]
         [(1.4425, nan)]
         """
-        mine = (self.data.band_motion.values == motion) & (self.data.band_block.values == block)
+        m, b = self._position(motion, "motion"), self._position(block, "block")
+        mine = (self.data.band_motion.values == m) & (self.data.band_block.values == b)
         starts, ends = self.data.band_start.values[mine], self.data.band_end.values[mine]
         return list(zip(starts.tolist(), ends.tolist(), strict=True))
+
+    def _position(self, given: object, name: str) -> int:
+        return checks.whole(given, name, InvalidOption, 0, self.data.sizes[name] - 1)
 
     def summary(self) -> str:
         data = self.data
@@ -291,6 +300,11 @@ class IncrementalDynamicAnalysis(DatasetResult):
         matplotlib.figure.Figure
             The new figure, or that of `ax`.
 
+        Raises
+        ------
+        InvalidOption
+            If there is no such block.
+
         Examples
         --------
         >>> import rocking
@@ -301,7 +315,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         """
         from rocking.plot.ida import ScaledMotion, ida_figure
 
-        data = self.data
+        data, block = self.data, self._position(block, "block")
         levels = data.level.scale * data.level.values
         ends = np.array([levels[0], levels[-1]])
         peaks = data.peak_over_alpha.isel(block=block).transpose("motion", "level").values
