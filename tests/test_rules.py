@@ -193,6 +193,31 @@ def test_a_block_that_stands_here_and_falls_under_less_is_counted_by_itself(run)
     assert f"stands here, falls at x {factor:.2f}" in out
 
 
+@pytest.mark.parametrize("frequency", [0.8, 0.9, 1.1, 1.2])
+@pytest.mark.parametrize(("factor", "falls"), [(1.0 - 1e-6, False), (1.0 + 1e-6, True)])
+def test_the_margin_lies_on_the_side_of_1_on_which_the_motion_lies(frequency, factor, falls):
+    """No weaker pulse overturns the block: a bisection finds the change within 1e-9, closer than the margin is read."""
+    block, pulse = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9), (1.0, frequency)
+    critical = rocking.critical_scale(block, rocking.pulses.one_sine(*pulse), 2.0, 8.0).scale
+    (row,) = rules.check(block, [rocking.pulses.one_sine(*pulse) * (factor * critical)], rules=["west"]).rows()
+    assert (row["overturned"], row["falls_under_less"]) == (falls, False)
+    assert (row["exact"] >= 1.0) is falls
+    assert row["exact"] == pytest.approx(factor, rel=1e-4)
+
+
+def test_a_check_of_unequal_sides_says_that_reversed_motions_differ():
+    block, pulse = rocking.Block.from_parameters(2.0, (0.1, 0.4), 0.8), rocking.pulses.half_sine(3.0, 1.0)
+    one, other = (rules.check(block, [pulse * sign], rules=["west"]) for sign in (1.0, -1.0))
+    assert one.rows()[0]["overturned"] is not other.rows()[0]["overturned"]
+    assert one.summary().endswith(
+        "note: the sides differ, so motions that are reversed (scaled by -1) overturn at other levels"
+    )
+    assert "the sides differ" in one.to_dict()["notes"][0]
+    equal = rules.check(TOMBSTONE, [pulse], rules=["west"])
+    assert "note:" not in equal.summary()
+    assert equal.to_dict()["notes"] == []
+
+
 @pytest.mark.slow
 def test_the_tables_of_the_trial_are_those_that_the_script_makes():
     path = Path(__file__).resolve().parents[1] / "scripts" / "rules_trial.py"

@@ -6,9 +6,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
+import numpy as np
+
 from rocking import checks
 from rocking.analysis.incremental import incremental_dynamic_analysis
-from rocking.analysis.levels import values_of
+from rocking.analysis.levels import REVERSED_TOO, values_of
 from rocking.analysis.rules.criteria import TITLES, rate
 from rocking.analysis.survey import BlockUnderRecords, motion_of
 from rocking.block import Block
@@ -96,8 +98,15 @@ class Check(BlockUnderRecords):
                 "",
                 table,
                 *(["", *self._disagreements(rules)] if rules else []),
+                *(f"note: {note}" for note in self._notes()),
             ]
         )
+
+    def to_dict(self) -> dict[str, Any]:
+        return super().to_dict() | {"notes": self._notes()}
+
+    def _notes(self) -> list[str]:
+        return [] if self.block.alone().is_symmetric else [REVERSED_TOO]
 
     def _headline(self) -> str:
         return f"{super()._headline()}; by {', '.join(self.ratios[0]) or 'no rule'}"
@@ -165,7 +174,8 @@ def check(
     Notes
     -----
     The exact margin comes from `incremental_dynamic_analysis`, whose levels are 5 % apart: a thinner band of levels
-    that overturn may lie below it.
+    that overturn may lie below it. The factor that overturns is known to 1e-4. Where 1 is within that of it, the
+    response to the motion as it is decides on which side of 1 the margin is.
 
     Examples
     --------
@@ -196,12 +206,16 @@ def check(
 
 
 def _margin(response: Response, block: Block, motion: Motion, model: Model, threads: int | None) -> float:
-    """One over the lowest factor on the motion that overturns the block; 1 at least where the motion itself does."""
+    """One over the lowest factor on the motion that overturns the block, on the side of 1 that the response tells."""
     scaled = incremental_dynamic_analysis(
         block, motion, model=model, tolerance=_TOLERANCE, threads=threads, progress=False
     )
     margin = motion.pga / float(scaled.overturning_level[0, 0])
-    return float(max(margin, 1.0)) if response.overturned else margin
+    if response.overturned:
+        return float(max(margin, 1.0))
+    # The level is the middle of a bracket: where that holds the motion itself, which stands, the change lies above it.
+    is_near = 1.0 <= margin <= 1.0 + _TOLERANCE and not response.unfinished
+    return float(np.nextafter(1.0, 0.0)) if is_near else margin
 
 
 def _verdict(response: Response, margin: float, *, falls_under_less: bool) -> str:
