@@ -47,6 +47,20 @@ def test_the_law_that_made_the_times_is_preferred(law, names):
     assert [fit.criterion for fit in found.laws] == sorted(fit.criterion for fit in found.laws)
 
 
+@pytest.mark.parametrize("alpha", [1.0, 1.2])
+def test_of_a_stocky_block_a_narrow_contact_explains_what_housner_cannot(alpha):
+    """By Housner such a block would not rock on; e = (A - k s^2)/(A + k s^2) of 0.6 tells the contact k."""
+    block = Block.from_parameters(p=3.0, alpha=alpha, restitution=0.6)
+    runs = [rocking.simulate(block, None, initial_rotation=share * alpha) for share in (0.3, 0.6)]
+    found = compare_restitution([run.impacts["time"][:8] for run in runs], block)
+    fits = {fit.name: fit for fit in found.laws}
+    contact = 0.4 / 1.6 * (1.0 / 3.0 + math.cos(alpha) ** 2) / math.sin(alpha) ** 2
+    assert len(fits) == 6
+    assert fits["narrow contact"].estimates["contact"] == pytest.approx(contact, rel=1e-5)
+    assert fits["angular momentum (Housner)"].weight < 1e-9
+    assert found.plot().axes
+
+
 @pytest.mark.parametrize("model", ["linear", "nonlinear"])
 def test_times_without_errors_tell_the_factors(model):
     found = compare_restitution(releases(0.9, timing=0.0, model=model), COLUMN, timing=1e-6, model=model)
