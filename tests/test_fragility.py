@@ -563,6 +563,25 @@ def test_a_block_of_weight_two_counts_as_two_blocks():
         assert one.median_interval == pytest.approx(other.median_interval, rel=1e-9)
 
 
+def test_a_block_of_weight_zero_is_none_of_the_data():
+    # One motion for each outcome, at intensities that the second block's unit puts elsewhere.
+    a, b = (rocking.Block.from_parameters(p=2.0, alpha=alpha, restitution=0.9) for alpha in (0.2, 0.05))
+    motions = [
+        rocking.pulses.one_sine(size, f) for size in (2.0, 2.5, 3.0, 4.0, 5.0, 6.0) for f in (0.6, 0.8, 1.0, 1.2)
+    ]
+    both = fragility([a, b], motions, measure="pga_ratio", weights=[1.0, 0.0])
+    alone = fragility(a, motions, measure="pga_ratio")
+    one, other = both.curves[0], alone.curves[0]
+    assert both.range == alone.range
+    assert one.independent and one.goodness.freedom == other.goodness.freedom
+    assert one.goodness.p_value == pytest.approx(other.goodness.p_value, rel=1e-9)
+    assert one.trials.sum() == other.trials.sum() == len(motions)
+    assert one.median_interval == pytest.approx(other.median_interval, rel=1e-9)
+    # The table still has both blocks' simulations; the figure is drawn without a warning.
+    assert both.outcomes.groupby("block").weight.unique().tolist() == [[1.0], [0.0]]
+    both.plot()
+
+
 @pytest.mark.parametrize("weights, word", [([1.0], "2 blocks"), ([1.0, -1.0], "0 or more"), ([0.0, 0.0], "not all 0")])
 def test_weights_that_weigh_nothing_are_refused(weights, word):
     block = rocking.Block.from_parameters(p=1.5, alpha=0.2, restitution=0.9)

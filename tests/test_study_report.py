@@ -108,6 +108,9 @@ def test_blocks_of_one_curve_count_by_their_weights(study):
         assert one.median_interval == pytest.approx(other.median_interval, rel=1e-6)
     assert abs(found.curves[0].median / study.fragility().curves[0].median - 1.0) > 1e-3
     assert "weighted" in found.description
+    first = np.eye(len(BLOCKS))[0]
+    alone, reference = study.fragility(weights=first).curves[0], rocking.fragility(BLOCKS[0], MOTIONS, levels=LEVELS)
+    assert alone.trials.sum() == reference.curves[0].trials.sum() == len(MOTIONS) * len(LEVELS)
 
 
 @pytest.mark.parametrize("lift", [None, rocking.pulses.one_sine(6.0, 3.0)])

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking.analysis.fragility.curve import Band, FragilityCurve, fitted_curve, passed
-from rocking.analysis.fragility.fit import OVERTURNING, fit_fragility, of_polarities
+from rocking.analysis.fragility.fit import OVERTURNING, fit_fragility, of_polarities, weights_of
 from rocking.analysis.fragility.result import Fragility
-from rocking.analysis.levels import mean_one, only_block, pooled, units_of, values_of
+from rocking.analysis.levels import only_block, pooled, units_of, values_of
 from rocking.arrays import Floats
 from rocking.ensemble import Product, body_coordinates, verticals_of
 from rocking.errors import InvalidOption
@@ -52,7 +52,7 @@ def pooled_fragility(
     require_limits(store.grid.outcomes, limits)
     product = store.product
     units, which = np.unique(units_of(product.bodies, measure, product.model), return_inverse=True)
-    shares, band = mean_one(weights, len(product.bodies)), Band(confidence=confidence)
+    shares, band = weights_of(weights, len(product.bodies)), Band(confidence=confidence)
     motions, scales, _, _ = product.shape
     counts = {name: np.zeros((motions, scales, len(units))) for name in limits}
     trials = np.zeros((motions, scales, len(units)))

@@ -79,7 +79,8 @@ def fragility(
         Motions as they are, reversed, or both. With both each motion counts twice, unless all blocks are symmetric:
         they do the same under a motion and its mirror image, which is no second outcome.
     weights : array_like, optional
-        How much the outcomes of each block count, one number for each; by default all alike.
+        How much the outcomes of each block count, one number for each; by default all alike. A block of weight 0 is
+        simulated, and is none of the data.
     band : Band
         How intervals and bands are made; the clusters are the motions, each with all its outcomes.
     threads : int, optional
@@ -112,7 +113,7 @@ def fragility(
     """
     many, how = bodies_of(blocks), Measure.of(measure)
     slenderness = slenderness_of(many)
-    shares = mean_one(weights, len(many))
+    shares = weights_of(weights, len(many))
     mirrored = checks.one_of(polarity, "polarity", InvalidOption, get_args(Polarity)) == "both" and many.is_symmetric
     _check_band(band)
     states = _limit_states(limits, "limits")
@@ -144,9 +145,12 @@ def fragility(
     outcomes = _outcomes(table, how, x, ratio, states)
     if weights is not None:
         outcomes["weight"] = trials
-    data = {name: (x, trials * passed(ratio, limit, name).ravel(), trials) for name, limit in states.items()}
+    # What a block without weight does is told, but is none of the data.
+    counts = trials > 0.0
+    x, trials, clusters = x[counts], trials[counts], clusters.ravel()[counts]
+    data = {name: (x, trials * passed(ratio, limit, name).ravel()[counts], trials) for name, limit in states.items()}
     try:
-        curves = [fitted_curve(name, data[name], clusters.ravel(), band, how, states[name]) for name in states]
+        curves = [fitted_curve(name, data[name], clusters, band, how, states[name]) for name in states]
     except Unfitted as refused:
         refused.outcomes = outcomes
         raise
@@ -162,6 +166,12 @@ def fragility(
         one_way=polarity != "both" and not many.is_symmetric,
         with_vertical="vertical" in table.coords,
     )
+
+
+def weights_of(weights: ArrayLike | None, count: int) -> Floats:
+    """Weights of blocks, 1 in the mean of those that have any: outcomes are as many as without the others."""
+    shares = mean_one(weights, count)
+    return np.asarray(shares / shares[shares > 0.0].mean())
 
 
 def of_polarities(polarity: Polarity, *, is_symmetric: bool) -> str:
