@@ -498,6 +498,34 @@ def test_counts_groups_and_motions_are_taken(tmp_path: Path) -> None:
         read_observed(path, Measure("pgv_ratio"))
 
 
+def test_counted_outcomes_under_motions_are_those_at_their_intensities(tmp_path: Path) -> None:
+    path, rows = tmp_path / "seen.csv", [(0.1, 0, 10), (0.2, 3, 10), (0.3, 1, 2), (0.4, 0, 1), (0.5, 9, 10)]
+    path.write_text("pga_g,overturned,trials\n" + "".join(f"{x},{fell},{of}\n" for x, fell, of in rows))
+    at_intensities = read_observed(path, Measure("pga"))
+    pulses = [(f"one-sine:amplitude={x}g,frequency=1Hz", fell, of) for x, fell, of in rows]
+    path.write_text("Motion,overturned,trials\n" + "".join(f'"{pulse}",{fell},{of}\n' for pulse, fell, of in pulses))
+    under_motions = read_observed(path, Measure("pga"))
+    for name in ("intensity", "exceeded", "trials"):
+        assert [*under_motions[name]] == pytest.approx([*at_intensities[name]], rel=1e-9)
+    assert under_motions["description"] == "33 observed outcomes in seen.csv"
+
+
+def test_rows_belong_together_by_motion_and_by_group_and_not_without_a_label(tmp_path: Path) -> None:
+    path = tmp_path / "seen.csv"
+    names = [f"one-sine:amplitude={x}g,frequency=1Hz" for x in (0.1, 0.2, 0.3)]
+    # Motion and group of each row: the second motion and the third have group b in common, the first has none of both.
+    given = [(0, ""), (1, "a"), (2, ""), (1, "b"), (0, ""), (1, ""), (2, "c"), (0, "d"), (2, "b")]
+    path.write_text("motion,overturned,group\n" + "".join(f'"{names[k]}",1,{group}\n' for k, group in given))
+    reach = np.array([[a == c or (b == d != "") for c, d in given] for a, b in given])
+    together = np.linalg.matrix_power(reach.astype(int), len(given)) > 0
+    found = np.array(read_observed(path, Measure("pga"))["clusters"])
+    assert np.array_equal(found[:, None] == found, together)
+    assert len({*found.tolist()}) == 2
+    path.write_text("pga_g,overturned,group\n0.1,0,\n0.2,1,a\n0.3,1,\n0.4,1,a\n")
+    found = np.array(read_observed(path, Measure("pga"))["clusters"])
+    assert len({*found.tolist()}) == 3 and found[1] == found[3]
+
+
 @pytest.mark.thorough
 def test_an_ensemble_has_its_weights_and_its_model_on_the_command_line(run, tmp_path: Path) -> None:
     table = tmp_path / "ensemble.csv"

@@ -304,47 +304,54 @@ def read_observed(
     It has a column overturned (1 or 0, yes or no; with a column trials, how many of them), and either an intensity
     (`HEADINGS`; "PGA (g)" is pga_g as well) or a motion (a record file, or a shipped record; with columns scale and
     channel where wanted), of which the measure is taken. A column group holds labels of outcomes that belong together,
-    as those of one earthquake; tests under one motion do in any case. Channel, dt and units are what record files do
-    not say.
+    as those of one earthquake; tests under one motion do in any case, and so do groups that have a motion in common.
+    A row without a label belongs to no group. Channel, dt and units are what record files do not say.
     """
-    table = read_table(path)
-    names = {heading_of(cell): cell for cell in table.columns}
-    found = [name for name in names if name in HEADINGS]
-    if "overturned" not in names or len(found) + ("motion" in names) != 1:
+    given = read_table(path)
+    columns = tuple(heading_of(cell) for cell in given.columns)
+    rows = tuple((line, {heading_of(name): cell for name, cell in row.items()}) for line, row in given.rows)
+    table = _Table(path, columns, rows)
+    found = [name for name in dict.fromkeys(columns) if name in HEADINGS]
+    if "overturned" not in columns or len(found) + ("motion" in columns) != 1:
         raise table.error(
             f"the columns must be overturned and either motion or one of {', '.join(HEADINGS)}, "
-            f"not {','.join(table.columns)}"
+            f"not {','.join(given.columns)}"
         )
+    counts = "trials" in columns
+    observed: dict[str, Any] = {
+        "exceeded": table.numbers("overturned") if counts else [*table.answers("overturned")],
+        "trials": table.numbers("trials") if counts else 1,
+        "clusters": _clusters(table) if {"motion", "group"} & {*columns} else None,
+    }
     if found:
-        observed = _against_intensity(table, names, found[0], measure)
+        observed |= _against_intensity(table, found[0], measure)
     else:
-        observed = _under_motions(table, measure, channel=channel, dt=dt, units=units)
-    outcomes = round(float(np.sum(np.broadcast_to(observed["trials"], len(table.rows)))))
+        observed |= _under_motions(table, measure, channel=channel, dt=dt, units=units)
+    outcomes = round(float(np.sum(np.broadcast_to(observed["trials"], len(rows)))))
     return observed | {"description": f"{counted(outcomes, 'observed outcome')} in {path.name}"}
 
 
-def _against_intensity(table: _Table, names: dict[str, str], heading: str, measure: Measure) -> dict[str, Any]:
+def _against_intensity(table: _Table, heading: str, measure: Measure) -> dict[str, Any]:
     kind, factor = HEADINGS[heading]
     if kind == "sa" and measure.period is None:
         raise InvalidOption("{} must be given, in s, for a spectral acceleration", "period", path=str(table.path))
-    counts = "trials" in names
-    return {
-        "intensity": factor * table.numbers(names[heading]),
-        "exceeded": table.numbers(names["overturned"]) if counts else [*table.answers(names["overturned"])],
-        "trials": table.numbers(names["trials"]) if counts else 1,
-        "clusters": [row[names["group"]] for _, row in table.rows] if "group" in names else None,
-        "measure": measure if kind == "sa" else Measure(kind),
-    }
+    return {"intensity": factor * table.numbers(heading), "measure": measure if kind == "sa" else Measure(kind)}
 
 
 def _under_motions(table: _Table, measure: Measure, **files: Any) -> dict[str, Any]:
     if measure.in_block_units:
         raise InvalidOption(f"{measure.name} counts in a block's own unit, which outcomes do not tell: take pga")
-    tests = outcomes_of(table, **files)
-    return {
-        "intensity": [measure.value(motion) for motion in tests.motions],
-        "exceeded": [*tests.overturned],
-        "trials": 1,
-        "clusters": tests.groups or [row["motion"] for _, row in table.rows],
-        "measure": measure,
-    }
+    motions = _motions_of(table, **files)
+    return {"intensity": [measure.value(motion) for motion in motions], "measure": measure}
+
+
+def _clusters(table: _Table) -> list[int]:
+    """One number for all rows that belong together, because they share a motion or a group, perhaps through others."""
+    clusters = [*range(len(table.rows))]
+    first: dict[tuple[str, str], int] = {}
+    for k, (_, row) in enumerate(table.rows):
+        for column in ("motion", "group"):
+            if label := row.get(column):
+                one, other = clusters[first.setdefault((column, label), k)], clusters[k]
+                clusters = [one if cluster == other else cluster for cluster in clusters]
+    return clusters
