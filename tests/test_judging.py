@@ -288,6 +288,17 @@ def test_a_calibration_says_of_tests_what_it_predicts(coarse):
         rocking.validate(tests, validation, one_block_in="specimen")
 
 
+def test_peaks_that_no_block_explains_are_those_of_the_specimens_that_have_blocks():
+    left = [ShakeTest(WEAK, False, specimen="a"), ShakeTest(WEAK, peak_rotation=0.05, specimen="a")]
+    # The block overturns in the strong motion, in which a peak was measured.
+    right = [ShakeTest(STRONG, peak_rotation=0.05, specimen="b"), ShakeTest(WEAK, peak_rotation=0.0, specimen="b")]
+    alone = rocking.validate(right, BLOCK)
+    both = rocking.validate(left + right, {"a": left_out([0.2, 0.3]), "b": BLOCK})
+    assert rocking.validate(left, left_out([0.2, 0.3])).unexplained == 0
+    assert both.unexplained == alone.unexplained == 1
+    assert [note for note in both.notes if "ranked" in note] == [note for note in alone.notes if "ranked" in note] != []
+
+
 def test_a_known_block_is_certain_and_a_lapse_is_not():
     tests = [ShakeTest(STRONG, False), ShakeTest(WEAK, False)]
     found = rocking.validate(tests, BLOCK)

@@ -180,17 +180,17 @@ def validate(
         ranks=ranks,
         ranks_chance=ranks_chance,
         coverage=_coverage(judged, ranked),
-        unexplained=0 if not _has_blocks(found) else int(np.isfinite(seen.peaks).sum()) - len(ranked),
+        unexplained=sum(
+            int(np.sum(np.isfinite(seen.peaks[one.tests]) & np.isnan(known[one.tests])))
+            for one in found.of_specimens
+            if one.has_blocks
+        ),
         repeated_outcomes=_repeated_outcomes(seen, found, simulations, rng),
         repeated_peaks=_repeated_peaks(seen, found, ranked, simulations, rng),
         description=found.description,
         model=found.model,
         one_block_in=one_block_in,
     )
-
-
-def _has_blocks(found: Prediction) -> bool:
-    return all(one.has_blocks for one in found.of_specimens)
 
 
 def _judged(tests: Sequence[ShakeTest], seen: Observed, found: Prediction) -> list[JudgedTest]:
