@@ -9,7 +9,7 @@ import pytest
 from matplotlib.figure import Figure
 from oracles import closed_orbits, exact_arcs
 
-from rocking import Block, InvalidMotion, InvalidOption, dynamics, pulses
+from rocking import Block, InvalidMotion, InvalidOption, Motion, dynamics, pulses
 from rocking.chattering import critical_amplitude
 
 G = 10.0
@@ -256,6 +256,25 @@ def test_a_linear_block_that_hits_once_every_half_period_loses_stability_where_h
 
 
 @pytest.mark.slow
+def test_symmetric_orbits_do_not_hang_on_where_a_motion_has_its_breakpoints():
+    """Those that lie on a straight line change nothing, also where half a period after one there is none."""
+    block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.85)
+    corners, heights = [0.0, 0.25, 0.5, 0.75, 1.0], [0.0, 1.0, 0.0, -1.0, 0.0]
+    times = np.sort([*corners, 0.02, 0.05, 0.09, 0.12, 0.16, 0.2, 0.3, 0.34, 0.37, 0.42, 0.46])
+    unit = np.interp(times, corners, heights)
+
+    def family(amplitude):
+        return block, Motion.from_points(times, amplitude * unit)
+
+    found = dynamics.periodic_orbits(*family(6.0), model="linear", starts=48)
+    orbit = next(each for each in found if each.symmetric and each.impacts)
+    branch = dynamics.continue_orbit(orbit, family, 6.0, (5.4, 7.2)).to_dataframe()
+    assert len(branch) > 8
+    for value, *state in branch.iloc[:, :3].to_numpy():
+        after = dynamics.stroboscopic_map(*family(value), model="linear")(state)
+        assert after == pytest.approx(state, abs=1e-8)
+
+
 def test_grazing_is_found_from_both_sides():
     """The linear response touches the stop at a known amplitude; orbits with an impact begin there, too."""
     body = dynamics.ImpactOscillator(1.0, 0.8, damping_ratio=0.05, stop=0.01)

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from rocking.arrays import Floats
+from rocking.arrays import Flags, Floats
 from rocking.dynamics.courses import response_of
 from rocking.dynamics.maps import StroboscopicMap
 from rocking.dynamics.repeated import repeated, scale_of
@@ -67,10 +67,17 @@ def _first_half(motion: Motion) -> Motion:
     return Motion(motion.breakpoints[: middle + 1], motion.coefficients[:middle], error=motion.error)
 
 
+def are_halved(motion: Motion) -> Flags:
+    """Of each breakpoint but the last: whether there is another one half a period later."""
+    starts, period = motion.breakpoints[:-1] - motion.breakpoints[0], motion.duration
+    away = np.abs(starts[:, None] - np.mod(starts + 0.5 * period, period))
+    return np.asarray(np.min(np.minimum(away, period - away), axis=0) <= 1e-14 * period)
+
+
 def _is_antisymmetric(motion: Motion) -> bool:
     """Whether the second half of a motion is the first one with the opposite sign, to rounding."""
     half = 0.5 * motion.duration
-    if np.min(np.abs(motion.breakpoints - half)) > 1e-14 * motion.duration:
+    if not are_halved(motion)[0]:
         return False
     times = half * (np.arange(200) + 0.5) / 200.0
     sums = motion.acceleration(times) + motion.acceleration(times + half)
