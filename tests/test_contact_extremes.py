@@ -217,6 +217,21 @@ def test_a_level_between_the_highest_sample_of_a_step_and_its_peak_is_passed(sha
     assert np.isnan(response.sliding_time(0.2 * (1.0 + 1e-9)))
 
 
+def test_friction_is_sought_in_every_step_where_the_ground_hardly_presses() -> None:
+    """At rest it is |a|/(g + v): it has a peak in each of 150 cycles of v that come near -g."""
+    block, share = Block.from_parameters(p=2.0, alpha=0.26), 2.7e-4
+    lift = rocking.pulses.sine((1.0 - share) * GRAVITY, 4.0, cycles=150, phase=3.6)
+    motion = rocking.pulses.sine(0.07 * share * GRAVITY, 4.8, cycles=150, phase=0.4).with_vertical(lift)
+    response = simulate(block, motion, duration=motion.end)
+    assert not len(response.impacts)
+    lowest = (np.arange(150) + 0.75 - 3.6 / (2.0 * np.pi)) / 4.0
+    near = (lowest[lowest > 0.1, None] + np.linspace(-0.01, 0.01, 4001)).ravel()
+    seen = friction_demand(motion.acceleration(near) / GRAVITY, 1.0 + lift.acceleration(near) / GRAVITY).max()
+    assert seen * (1.0 - 1e-9) <= response.required_friction <= seen * (1.0 + 1e-4)
+    assert np.isnan(response.sliding_time(response.required_friction))
+    assert response.sliding_time(response.required_friction * (1.0 - 1e-6)) > 0.0
+
+
 def test_a_base_lifts_off_where_the_normal_force_ends() -> None:
     judged = 0
     for seed, response in [*responses(), *under_vertical_motions()]:

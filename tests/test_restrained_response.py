@@ -224,6 +224,24 @@ def test_a_wall_presses_on_the_ground_as_it_rocks_and_what_is_behind_it_helps_at
     assert "friction needed" in response.summary()
 
 
+@pytest.mark.parametrize(
+    ("restraint", "held", "stiffness"),
+    [(Spring(6e3), 0.0, 6e3), (Tendon(1e4, prestress=3e3), 3e3 * 0.3, 1e4 * 0.3**2)],
+    ids=["spring", "tendon"],
+)
+def test_a_linear_response_tips_at_the_balance_of_its_own_model(restraint, held, stiffness):
+    """There m g R (alpha - u), what a tendon's prestress holds and what restraints add with u are zero together."""
+    block = Block(width=0.6, height=2.0, mass=1e3)
+    response = rocking.simulate(RestrainedBlock(block, restraint), rocking.pulses.half_sine(14.0, 0.3), model="linear")
+    weight = 1e3 * G * block.radius
+    balance = (weight * block.alpha + held) / (weight - stiffness)
+    assert response.overturned and response.balance == pytest.approx((balance, balance), rel=1e-12)
+    tips = response.tipping_time
+    assert abs(float(response.rotation(tips))) == pytest.approx(balance, rel=1e-9)
+    assert float(response.potential_energy(tips)) == pytest.approx(1.0, rel=1e-9)
+    assert f"{balance:.5g} rad" in response.summary() and response.to_dict()["balance_rad"] == [*response.balance]
+
+
 def test_what_is_not_known_of_a_wall_is_said():
     wall = Block.one_sided(Thrust(8e2, height=4.0), width=0.5, height=5.0, mass=6e3).alone()[0]
     response = rocking.simulate(wall, rocking.pulses.one_sine(1.5, 0.8))

@@ -18,8 +18,8 @@ from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.trace import Trail
 from rocking.motion.motion import Motion
-from rocking.response.contact import Contact, friction_coefficient, friction_demand
-from rocking.response.energy import Energy, energy_of
+from rocking.response.contact import Contact, friction_coefficient, friction_demand, pull
+from rocking.response.energy import Energy, energy_of, linear_balance
 from rocking.response.history import History, with_all_impacts
 from rocking.response.sensitivity import Sensitivity, ambiguities, sensitivity_along
 from rocking.treatment import Treatment
@@ -69,6 +69,17 @@ class Answers:
         return History(trail, self.duration, self.body.stops)
 
     @cached_property
+    def balance(self) -> tuple[float, float]:
+        """Rotation of the unstable balance on each side, rad, in the model of this response; infinite without one.
+
+        Of a free block it is the slenderness in both models.
+        """
+        if isinstance(self.body, RestrainedBlock) and not self._trail.rules["nonlinear"]:
+            plus, minus = linear_balance(self._trail.block).tolist()
+            return plus, minus
+        return self.body.balance
+
+    @cached_property
     def peak_over_slenderness(self) -> float:
         """Peak rotation over the slenderness of the side where it is reached; infinite where the block overturns."""
         if self.overturned:
@@ -76,7 +87,7 @@ class Answers:
         if self.peak_rotation == 0.0:
             return 0.0
         leaning = float(self.rotation(self.peak_time))
-        return self.peak_rotation / self.body.balance[0 if leaning > 0.0 else 1]
+        return self.peak_rotation / self.balance[0 if leaning > 0.0 else 1]
 
     @cached_property
     def tendons(self) -> NDArray[np.void]:
@@ -111,7 +122,7 @@ class Answers:
         From then on a block that overturns only falls; one that is beyond it where the simulation was `stopped` may yet
         be caught by the motion.
         """
-        return self._history.tipping_time(self.body.balance)
+        return self._history.tipping_time(self.balance)
 
     @cached_property
     def sensitivity(self) -> Sensitivity:
@@ -288,12 +299,11 @@ class Answers:
     @cached_property
     def minimum_normal_force(self) -> float:
         """Smallest normal force over the weight, between impacts and until the block tips (`tipping_time`)."""
-        return -self._extremes[1]
+        return self._extremes[1]
 
     @cached_property
-    def _extremes(self) -> list[float]:
-        """Largest demand of friction and largest pull, from the same samples: to take them is most of the work."""
-        return self._contact.largest(friction_demand, _pull)
+    def _extremes(self) -> tuple[float, float]:
+        return self._contact.extremes()
 
     def sliding_time(self, friction: float) -> float:
         """Return the first time, s, at which sticking needs more than a friction coefficient; NaN if it never does.
@@ -322,7 +332,9 @@ class Answers:
         '0.2489, 234.3559 s, nan'
         """
         level = friction_coefficient(friction)
-        return self._contact.first(friction_demand, lambda demand: demand > level)
+        if not self.required_friction > level:
+            return math.nan
+        return self._contact.first(lambda push, normal: np.abs(push) - level * normal, lambda excess: excess > 0.0)
 
     @cached_property
     def lift_off_time(self) -> float:
@@ -332,7 +344,7 @@ class Answers:
         """
         if self.minimum_normal_force > 0.0:
             return math.nan
-        return self._contact.first(_pull, lambda pull: pull >= 0.0)
+        return self._contact.first(pull, lambda pulled: pulled >= 0.0)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the data alone: answers are found again."""
@@ -370,8 +382,3 @@ def energy_in(response: Answers) -> Energy:
         If that is not known.
     """
     return response._energy
-
-
-def _pull(_: Floats, vertical: Floats) -> Floats:
-    """Return how much the ground would have to pull: the normal force's opposite."""
-    return -vertical

@@ -20,10 +20,9 @@ from rocking.kernels.ground import components
 from rocking.motion import piecewise
 from rocking.response.history import History, elongation, plastic_elongations
 
-#: Samples per step, rounds, and steps that are looked at again, when the forces' extremes are searched.
+#: Samples per step, and rounds of sampling again around the largest, when the forces' extremes are searched.
 _SAMPLES: Final = 9
 _REFINEMENTS: Final = 10
-_MOST_REFINED: Final = 64
 
 #: Coefficients of friction beyond those of any two materials.
 _ROUGHEST: Final = 3.0
@@ -58,6 +57,16 @@ def friction_demand(horizontal: Floats, vertical: Floats) -> Floats:
     return demand
 
 
+def pull(_: Floats, vertical: Floats) -> Floats:
+    """Return how much the ground would have to pull: the normal force's opposite."""
+    return -vertical
+
+
+def _reach(values: Floats) -> Floats:
+    """How high a smooth quantity may rise within each step: above its samples by less than they span."""
+    return np.asarray(2.0 * values.max(axis=1) - values.min(axis=1))
+
+
 @dataclass(frozen=True, eq=False)
 class Contact:
     """Horizontal and vertical force of the ground over the weight, up to the time `until` (s).
@@ -84,26 +93,27 @@ class Contact:
         horizontal[outside] = vertical[outside] = np.nan
         return horizontal.reshape(times.shape), vertical.reshape(times.shape)
 
-    def largest(self, *measures: Measure) -> list[float]:
-        """Largest value of each measure: steps whose samples come near it are sampled again, around their best."""
+    def extremes(self) -> tuple[float, float]:
+        """Largest friction that sticking needs, and least normal force, from the same samples."""
         times, rows = self._samples()
-        forces = self._forces_in(times.ravel(), rows.ravel())
-        found = []
-        for measure in measures:
-            highest = measure(*forces).reshape(times.shape).max(axis=1)
-            kept = np.argsort(highest)[-_MOST_REFINED:]
-            found.append(float(max(highest.max(), self._peaks(measure, times[kept], rows[kept])[1].max())))
-        return found
+        horizontal, vertical = (force.reshape(times.shape) for force in self._forces_in(times.ravel(), rows.ravel()))
+        friction, least = float(friction_demand(horizontal, vertical).max()), float(vertical.min())
+
+        def refined(measure: Measure, beyond: Floats) -> float:
+            """Largest value of a measure in the steps where what is positive beyond the samples may be so."""
+            near = np.flatnonzero(_reach(beyond) > 0.0)
+            return float(self._peaks(measure, times[near], rows[near])[1].max(initial=-math.inf))
+
+        if math.isfinite(friction):
+            # Unlike the demand it is smooth, and bounded, where the normal force nearly vanishes.
+            friction = max(friction, refined(friction_demand, np.abs(horizontal) - friction * vertical))
+        return friction, min(least, -refined(pull, least - vertical))
 
     def first(self, measure: Measure, is_beyond: Callable[[Floats], Flags]) -> float:
         """First time, s, at which a measure is beyond a level, as then all greater values are; NaN if it never is."""
         times, rows = self._samples()
         values = self._measured(measure, times, rows)
-        highest = values.max(axis=1)
-        with np.errstate(invalid="ignore"):
-            # Between its samples, a smooth step rises above them by less than they span.
-            reach = np.where(np.isfinite(highest), 2.0 * highest - values.min(axis=1), highest)
-        near = np.flatnonzero(is_beyond(reach))
+        near = np.flatnonzero(is_beyond(_reach(values)))
         if not len(near):
             return math.nan
         at, peaks = self._peaks(measure, times[near], rows[near])

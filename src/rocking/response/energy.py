@@ -55,16 +55,7 @@ class Energy:
     @cached_property
     def balance(self) -> Floats:
         """Rotation of the unstable balance on each side in this model, rad; infinite where there is none."""
-        if self.nonlinear:
-            return np.array(self.body.balance)
-        made, found = self.record, np.full(2, math.inf)
-        for k in range(2):
-            weight = 1.0 + made["added_weight"][k]
-            falls = made["stiffness"][k] * weight - made["spring"][k]
-            stands = made["gain"][k] * (made["threshold"][k] * weight + made["added_push"][k]) + made["prestress"][k]
-            if falls > 0.0:
-                found[k] = stands / falls
-        return found
+        return np.array(self.body.balance) if self.nonlinear else linear_balance(self.record)
 
     @cached_property
     def highest(self) -> Floats:
@@ -130,6 +121,18 @@ class Energy:
         """Energy that each impact of a response takes."""
         left, entered = self.sides_at(impacts)
         return self.kinetic(impacts["speed_before"], left) - self.kinetic(impacts["speed_after"], entered)
+
+
+def linear_balance(made: Record) -> Floats:
+    """Rotation of the unstable balance on each side in the linear model, rad; infinite where there is none."""
+    found = np.full(2, math.inf)
+    for k in range(2):
+        weight = 1.0 + made["added_weight"][k]
+        falls = made["stiffness"][k] * weight - made["spring"][k]
+        stands = made["gain"][k] * (made["threshold"][k] * weight + made["added_push"][k]) + made["prestress"][k]
+        if falls > 0.0:
+            found[k] = stands / falls
+    return found
 
 
 def energy_of(body: Body, record: Record, *, nonlinear: bool) -> Energy:

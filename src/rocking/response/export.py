@@ -155,7 +155,7 @@ def figure(
     (pair,), (own,) = thresholds_of(body.alone(), response.model)
     with np.errstate(invalid="ignore"):  # of a body of one side, which nothing lifts to the other
         plus, minus = ((pair[k] + (weight - 1.0) * own[k]) / STANDARD_GRAVITY for k in range(2))
-    balance = (body.balance[0], body.balance[0 if math.isinf(pair[1]) else 1])
+    balance = (response.balance[0], response.balance[0 if math.isinf(pair[1]) else 1])
     if units == "slenderness" and any(map(math.isinf, balance)):
         units = "rad"
     sequence = _longest_sequence(response, start, end) if longest_sequence else None

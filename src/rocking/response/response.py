@@ -72,7 +72,7 @@ class Response(Answers, DrawnResult):
     def _repr_html_(self) -> str:
         start, end = export.active_span(self)
         times = export.drawing_times(self, start, end)
-        coordinate, balance = self.body.coordinate, min(self.body.balance)
+        coordinate, balance = self.body.coordinate, min(self.balance)
         drawn, label = self.states(times)[:, 0], f"{coordinate.name} ({coordinate.unit})"
         if coordinate.limit and math.isfinite(balance):
             drawn = np.clip(drawn / balance, -_HIGHEST_PICTURED, _HIGHEST_PICTURED)

@@ -9,7 +9,6 @@ import numpy as np
 
 from rocking.block import Block, RestrainedBlock
 from rocking.block.sides import in_line
-from rocking.body import Body
 from rocking.constants import STANDARD_GRAVITY
 from rocking.problem import thresholds_of
 from rocking.response.answers import Answers
@@ -47,7 +46,7 @@ def summary_rows(response: Answers, friction: float | None) -> list[Row]:
     rows = [
         Row("block" if isinstance(body, Block) else "body", body.description),
         Row("parameters", in_line(body.sides)),
-        *_balance_rows(body),
+        *_balance_rows(response),
         Row("motion", _motion_text(response)),
         Row("uplift above", _thresholds_text(response)),
         *_event_rows(response),
@@ -116,7 +115,7 @@ def facts(response: Answers, friction: float | None) -> list[Row]:
     if limit:
         rows.append(Row(f"peak_over_{limit}", response.peak_over_slenderness))
     if isinstance(body, RestrainedBlock):
-        rows += [Row("balance", list(body.balance), unit), Row("tendons", records(response, "tendons"))]
+        rows += [Row("balance", list(response.balance), unit), Row("tendons", records(response, "tendons"))]
     rows.append(Row("peak_time", response.peak_time, "s"))
     if body.contact is not None:
         rows += [
@@ -297,11 +296,12 @@ def _peak_rows(response: Answers) -> list[Row]:
     return [Row(f"peak {name}", f"{response.peak_rotation:.{_peak_digits(response)}g}", unit, note)]
 
 
-def _balance_rows(body: Body) -> list[Row]:
+def _balance_rows(response: Answers) -> list[Row]:
     """Unstable balance of a block that is not free, which its slenderness does not tell."""
+    body = response.body
     if not isinstance(body, RestrainedBlock):
         return []
-    plus, minus = (f"{value:.5g} rad" if math.isfinite(value) else "none" for value in body.balance)
+    plus, minus = (f"{value:.5g} rad" if math.isfinite(value) else "none" for value in response.balance)
     text = plus if plus == minus or body.is_one_sided else f"{plus} (side +), {minus} (side -)"
     return [Row("balance", text, note=": restraints hold it at any rotation" if text == "none" else "")]
 
@@ -319,7 +319,7 @@ def _tendon_rows(response: Answers) -> list[Row]:
 def _balance_of(response: Answers) -> float:
     """Unstable balance on the side of the peak, rad."""
     leaning = float(response.rotation(response.peak_time))
-    return response.body.balance[0 if leaning > 0.0 else 1] if response.peak_rotation > 0.0 else 1.0
+    return response.balance[0 if leaning > 0.0 else 1] if response.peak_rotation > 0.0 else 1.0
 
 
 def _contact_rows(response: Answers, friction: float | None, sliding: float) -> list[Row]:
