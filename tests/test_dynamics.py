@@ -161,6 +161,25 @@ def test_the_ball_on_a_table_that_goes_down_fast_leaves_it():
     assert found.events["time"][0] == pytest.approx(0.5 + math.asin(1.0 / 1.5) / (2.0 * math.pi), abs=1e-12)
 
 
+def test_a_body_that_rests_does_so_beside_one_that_need_not():
+    pressed, free = (dynamics.ImpactOscillator(1.0, 0.8, stop=stop) for stop in (-0.02, 0.05))
+    motion = rocking.pulses.sine(8.0, 1.0, cycles=2)
+    found = dynamics.simulate_many([pressed, free, pressed], motion)
+    alone = [dynamics.simulate(body, motion) for body in (pressed, free, pressed)]
+    assert found.stopped.values[0].tolist() == [False, True, False]
+    assert found.rests.values[0].tolist() == [len(each.chattering) for each in alone] == [1, 0, 1]
+    assert found.peak_position.values[0] == pytest.approx([each.peak_rotation for each in alone], rel=1e-12)
+    assert found.stop.values.tolist() == [-0.02, 0.05, -0.02]
+
+
+def test_bodies_may_be_gathered_and_one_that_balances_has_no_verdict():
+    still = rocking.Motion.from_samples([0.0, 0.0, 0.0], 0.1)
+    pendulums = dynamics.LinearBodies([dynamics.InvertedPendulum(3.0, 0.1, 0.6)])
+    assert dynamics.simulate_many(pendulums, still, initial_position=0.0).stopped.values.tolist() == [[True]]
+    moved = dynamics.simulate_many(pendulums, still, initial_position=0.01)
+    assert moved.stopped.values.tolist() == [[False]] and moved.impacts.values[0, 0] > 0
+
+
 def test_many_bodies_as_one_by_one():
     bodies = [
         dynamics.ImpactOscillator(0.7, e, damping_ratio=d, stop=s)

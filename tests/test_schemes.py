@@ -208,6 +208,45 @@ def test_schemes_that_do_not_apply_are_listed_with_the_reason():
     assert "not applicable" in str(comparison)
 
 
+YIELDING = rocking.RestrainedBlock(
+    rocking.Block(width=0.4, height=2.0, mass=1000.0), rocking.Tendon(4.9e4, prestress=490.0, strength=1200.0)
+)
+FALLING = rocking.RestrainedBlock(
+    rocking.Block(width=0.4, height=2.0), restitution=rocking.FallingRestitution(0.95, 0.2, 0.6)
+)
+
+
+@pytest.mark.parametrize(("body", "word"), [(YIELDING, "yields"), (FALLING, "varies")], ids=["yielding", "falling"])
+def test_time_stepping_is_refused_where_it_would_converge_to_another_body(body, word):
+    motion = rocking.pulses.one_sine(5.0, 1.0)
+    comparison = compare_schemes(body, motion, schemes=["velocity=1e-6", "moreau-jean=1e-3"])
+    assert [outcome.scheme for outcome in comparison.outcomes] == [rocking.VelocityThreshold(1e-6)]
+    ((scheme, reason),) = comparison.not_applicable
+    assert scheme == dynamics.MoreauJean(1e-3) and word in reason
+    with pytest.raises(rocking.InvalidBlock, match=word):
+        dynamics.integrate(body, motion, dynamics.MoreauJean(1e-3), 1.0)
+
+
+def test_a_block_that_nothing_restrains_is_that_block_by_default_too():
+    block = rocking.Block(width=0.4, height=1.0, restitution=0.85)
+    free, motion = rocking.RestrainedBlock(block), rocking.pulses.sine(5.0, 1.5, cycles=1)
+    maps = [dynamics.stroboscopic_map(body, motion) for body in (block, free)]
+    assert [each.model for each in maps] == ["nonlinear", "nonlinear"]
+    assert maps[1]([-0.1, 0.2]) == pytest.approx(maps[0]([-0.1, 0.2]), rel=1e-12)
+    responses = [compare_schemes(body, motion, schemes=["velocity=1e-6"]).certified.response for body in (block, free)]
+    assert responses[1].peak_rotation == pytest.approx(responses[0].peak_rotation, rel=1e-12)
+    diagrams = [
+        dynamics.bifurcation_diagram(
+            lambda value, body=body: (body, rocking.pulses.sine(value, 1.5, cycles=1)), [4.0, 4.5],
+            starts=[[-0.1, 0.0]], transient=3, kept=4, progress=False,
+        )
+        for body in (block, free)
+    ]  # fmt: skip
+    found = [each.data.coordinate.values for each in diagrams]
+    assert found[1] == pytest.approx(found[0], rel=1e-9, nan_ok=True)
+    assert np.isfinite(found[0]).any()
+
+
 def test_a_mistake_in_the_case_is_no_scheme_s_fault():
     with pytest.raises(rocking.InvalidOption, match="model"):
         compare_schemes(BLOCK, sine(1.03), model="cubic")

@@ -320,7 +320,9 @@ def _outcomes(states: Records, motion_end: float) -> NDArray[np.void]:
     outcomes["overturned"] = states["ending"] == state.Ending.OVERTURNED
     outcomes["unfinished"] = states["ending"] == state.Ending.UNFINISHED
     early = (states["side"] >= 0) | (states["end"] < motion_end)
-    outcomes["stopped"] = (states["ending"] == state.Ending.DONE) & early
+    # A body that balances for ever has no verdict either.
+    undecided = np.isin(states["ending"], (state.Ending.DONE, state.Ending.BALANCED))
+    outcomes["stopped"] = undecided & early
     for name, field in (
         ("peak_rotation", "peak"), ("peak_time", "peak_time"), ("impacts", "impacts"), ("uplifts", "uplifts"),
         ("rests", "rests"), ("time_at_rest", "resting"), ("first_uplift", "first_uplift"),

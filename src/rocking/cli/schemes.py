@@ -8,12 +8,12 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from rocking.block import Block
 from rocking.cli.options import BLOCK, MODEL, BodyOptions, ModelOptions
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results, write_tables
 from rocking.cli.records import RECORDS, MotionOptions, Names
 from rocking.dynamics import compare_schemes, scheme_of
 from rocking.dynamics.comparison import Scheme
+from rocking.dynamics.linear_bodies import LinearBody
 from rocking.dynamics.schemes import STEPPINGS, TREATMENTS
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
@@ -63,7 +63,7 @@ def schemes(
         (*TREATMENTS, *STEPPINGS) if schemes is None else [scheme_of(text) for text in schemes.split(",")]
     )
     what = body.body()
-    read_position = tilt if isinstance(what, Block) else position
+    read_position = position if isinstance(what, LinearBody) else tilt
     at = None if start.initial_position is None else read_position(start.initial_position, "initial_position")
     with output.folder() as folder:
         found = compare_schemes(

@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike
 
 from rocking import checks
 from rocking.arrays import Floats
-from rocking.block import Block
 from rocking.body import Body
 from rocking.constants import VERSION, Model
 from rocking.dynamics.attractors import RETURN
 from rocking.dynamics.kept import Kept, key_of
+from rocking.dynamics.linear_bodies import LinearBody
 from rocking.dynamics.maps import StroboscopicMap, stroboscopic_map
 from rocking.dynamics.repeated import described
 from rocking.engine import in_threads
@@ -374,7 +374,7 @@ class _Work:
 def _in_front(strobe: StroboscopicMap, states: Floats) -> Floats:
     """States put back to the stop where a parameter has moved it past them."""
     low, high = strobe.body.stops
-    if isinstance(strobe.body, Block):
+    if not isinstance(strobe.body, LinearBody):
         return states
     inside = np.clip(states[:, 0], low, high if high > low else np.inf)
     held = (inside != states[:, 0]) | ((inside == low) & (states[:, 1] < 0.0))

@@ -261,7 +261,7 @@ def stroboscopic_map(
     motion : Motion
         One period, which repeats for ever: as ``pulses.sine(a, f, cycles=1)``.
     model : {"nonlinear", "linear"}, optional
-        Equation of motion; by default nonlinear of a block.
+        Equation of motion; by default nonlinear of a body that rocks.
     chattering : str or treatment
         As for `rocking.simulate`.
 

@@ -64,7 +64,7 @@ def periodic_orbits(
     period : int
         Periods of the motion after which orbits repeat. Those of a shorter period that divides it are found as well.
     model : {"nonlinear", "linear"}, optional
-        Equation of motion; by default nonlinear of a block.
+        Equation of motion; by default nonlinear of a body that rocks.
     chattering : str or treatment
         As for `rocking.simulate`.
     starts : int or array_like, shape (..., 2), optional

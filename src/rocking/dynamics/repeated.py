@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 
 from rocking import checks
 from rocking.arrays import Floats, Integers
-from rocking.block import Block
 from rocking.block.sides import in_line
 from rocking.body import Body
 from rocking.constants import Model
+from rocking.dynamics.linear_bodies import LinearBody
 from rocking.dynamics.simulation import model_of
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
 from rocking.kernels import state
@@ -159,9 +159,9 @@ class Scale(NamedTuple):
 def scale_of(strobe: Repeated) -> Scale:
     """Sizes of coordinate and velocity that are natural to a body under a motion."""
     record, period = strobe._records[0], strobe.period
-    if isinstance(strobe.body, Block):
+    if not isinstance(strobe.body, LinearBody):
         alpha = float(np.max(record["slenderness"]))
-        return Scale(alpha, alpha * math.sqrt(float(np.max(record["stiffness"]))))
+        return Scale(alpha, alpha * math.sqrt(float(np.max(np.abs(record["stiffness"])))))
     pull = float(np.max(np.abs(record["gain"] * record["threshold"])[: 2 if record["facing"] else 1]))
     speed = period * max(mean_size(strobe.motion), pull, 1e-300)
     rate = math.sqrt(abs(float(record["stiffness"][0])))

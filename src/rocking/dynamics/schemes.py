@@ -25,7 +25,7 @@ from rocking.dynamics.stepping import (
     integrate,
 )
 from rocking.engine import in_threads, require_finished
-from rocking.errors import InvalidOption
+from rocking.errors import InvalidBlock, InvalidOption
 from rocking.kernels import state
 from rocking.kernels.march import march
 from rocking.motion.motion import Motion
@@ -97,7 +97,7 @@ def compare_schemes(
         (both in the paper's Fig. 11), intervals from 1e-9 to 1e-3 s, the paper's asymptotic time, the geometric bypass,
         and both schemes of time stepping with steps of 0.01, 0.001 and 0.0001 s.
     model : {"nonlinear", "linear"}, optional
-        Equation of motion, of a block by default the nonlinear one.
+        Equation of motion, by default the nonlinear one of a body that rocks.
     duration : float, optional
         As for `rocking.simulate` or `rocking.dynamics.simulate`.
     initial_position, initial_velocity : float
@@ -170,7 +170,7 @@ def compare_schemes(
         run = partial(stepped, scheme) if isinstance(scheme, TimeStepping) else partial(marched, scheme)
         try:
             found = _outcome(scheme, run(), proof, exact)
-        except InvalidOption as error:
+        except (InvalidBlock, InvalidOption) as error:
             # The certified run has checked everything but the scheme itself.
             return str(error)
         return replace(found, processor_time=_least_time(run, again)) if again else found

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 import rocking.response
 from rocking import checks
 from rocking.arrays import Floats, as_asked
-from rocking.block import Block
 from rocking.body import Body
 from rocking.constants import Model
 from rocking.dynamics.linear_bodies import LinearBodies, LinearBody
@@ -194,8 +194,23 @@ def simulate_many(
     >>> found.restitution.values.tolist(), bool((found.peak_position > 0.0).all())
     ([0.3, 0.6, 0.9], True)
     """
-    given = bodies if isinstance(bodies, Iterable) else [bodies]
-    gathered = given if isinstance(given, LinearBodies) else LinearBodies([_one_body(each) for each in given])
+    gathered = bodies
+    if not isinstance(gathered, LinearBodies):
+        given = gathered if isinstance(gathered, Iterable) else [gathered]
+        gathered = LinearBodies([_one_body(each) for each in given])
+    pressed = np.array([min(each.thresholds) > 0.0 for each in gathered.members])
+    if duration is None and pressed.any() and not pressed.all():
+        # Those that nothing presses against a stop end with the motion; the others go on until they rest.
+        import xarray as xr
+
+        kinds = np.flatnonzero(pressed), np.flatnonzero(~pressed)
+        options: dict[str, Any] = {
+            "chattering": chattering, "initial_position": initial_position, "initial_velocity": initial_velocity,
+            "derivatives": derivatives, "threads": threads, "progress": progress,
+        }  # fmt: skip
+        parts = [simulate_many(gathered.select(kind), motions, **options) for kind in kinds]
+        whole = xr.concat(parts, "body", data_vars="all", coords="minimal", compat="override", join="override")
+        return whole.isel(body=np.argsort(np.concatenate(kinds)))
     product = product_of(gathered, motions, None, "factor", "+", "linear", chattering, duration)
     for motion in product.motions:
         _along_one_line(motion)
@@ -240,10 +255,10 @@ def simulate_any(
 
 
 def model_of(body: Body, model: Model | None) -> Model:
-    """Return the equation of motion: as it is given, else nonlinear for a block and linear for other bodies."""
+    """Return the equation of motion: as it is given, else nonlinear for a body that rocks."""
     if model is not None:
         return model
-    return "nonlinear" if isinstance(body, Block) else "linear"
+    return "linear" if isinstance(body, LinearBody) else "nonlinear"
 
 
 def position_at_start(body: Body, position: float | None) -> float:

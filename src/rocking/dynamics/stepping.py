@@ -220,7 +220,7 @@ def integrate(
     duration : float
         Time to stop at, s; the last step ends there or later.
     model : {"nonlinear", "linear"}, optional
-        Equation of motion, of a block by default the nonlinear one.
+        Equation of motion, by default the nonlinear one of a body that rocks.
     initial_position, initial_velocity : float
         As for `rocking.dynamics.simulate`; of a block its rotation.
 
@@ -232,7 +232,8 @@ def integrate(
     Raises
     ------
     InvalidBlock, InvalidMotion
-        If the body is none, or the motion no `Motion`.
+        If the body is none, its restitution varies from impact to impact, or a tendon of it yields; or if the motion is
+        no `Motion`.
     InvalidOption
         If an argument is out of its range, or the step too long for the body, or too short for the duration.
 
@@ -264,6 +265,8 @@ def integrate(
     record = records[0]
     if record["varying"]:
         raise InvalidBlock("time stepping knows no {} that varies from impact to impact: give a number", "restitution")
+    if record["yielding"]:
+        raise InvalidBlock("time stepping knows no tendon that yields: leave its {} out", "strength")
     longest = _LONGEST_STEP / math.sqrt(float(np.max(np.abs(record["stiffness"]))) or math.inf)
     if not isinstance(scheme, TimeStepping):
         raise InvalidOption(f"{{}} must be one of time stepping, as MoreauJean(1e-3), not {scheme!r}", "scheme")
