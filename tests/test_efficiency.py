@@ -177,6 +177,16 @@ def test_a_block_of_no_weight_changes_nothing_and_need_not_overturn(monkeypatch)
             assert found[name].values == pytest.approx(alone[name].values, rel=1e-12)
 
 
+def test_spectral_accelerations_of_other_damping_than_5_percent_have_another_name():
+    pulses = [rocking.pulses.one_sine(1.0, f) for f in (0.5, 0.8)]
+    block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    for damping, name in ((0.05, "SA(1 s)"), (0.02, "SA(1 s, damping 0.02)"), (0, "SA(1 s, damping 0)")):
+        found = compare_measures(block, pulses, periods=[1.0], damping=damping, tolerance=1e-2)
+        assert found.to_dict()["measures"][2]["measure"] == name
+        assert name in found.summary()
+        assert found.to_dict()["damping"] == damping
+
+
 def test_the_figure_has_the_order_of_the_table():
     motions = [rocking.pulses.one_sine(1.0, f) for f in (0.4, 0.7, 1.0, 1.4)]
     found = compare_measures(rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9), motions)

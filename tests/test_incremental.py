@@ -201,3 +201,13 @@ def test_bands_of_a_block_or_a_motion_that_is_not_there_are_refused(analysis):
                 result.bands(**{name: wrong})
     with pytest.raises(rocking.InvalidOption, match="block must be a whole number"):
         result.plot(block=-1)
+
+
+def test_levels_of_a_spectral_acceleration_say_its_period_and_damping():
+    measure = rocking.Measure("sa", 1.0, 0.02)
+    found = incremental_dynamic_analysis(BLOCK, PULSE, measure=measure, levels=[3.0, 9.0])
+    about = found.to_dict()
+    assert (about["period"], about["damping"]) == (1.0, 0.02)
+    assert about["measure"] == "spectral acceleration at 1 s, damping 0.02"
+    assert "spectral acceleration at 1 s, damping 0.02 (g) that overturns" in found.summary()
+    assert "damping" not in incremental_dynamic_analysis(BLOCK, PULSE, levels=[3.0, 9.0]).to_dict()

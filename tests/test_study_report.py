@@ -138,6 +138,20 @@ def test_a_spectrum_is_the_fractiles_of_the_simulations(study):
     np.testing.assert_array_equal(found.overturned_share.values, table.overturned.values.mean(axis=0))
 
 
+def test_what_is_written_of_spectral_accelerations_says_their_period_and_damping(tmp_path):
+    measure, about = rocking.Measure("sa", 0.7, 0.02), {"measure": "sa", "period": 0.7, "damping": 0.02}
+    made = rocking.study(tmp_path / "study", BLOCKS, MOTIONS[:2], levels=[1.0, 2.0], measure=measure, unit_blocks=512)
+    made.run(threads=1)
+    made.to_json(tmp_path / "all.json")
+    made.to_json(tmp_path / "critical.json", critical="overturning")
+    spectrum = made.spectrum()
+    spectrum.to_json(tmp_path / "spectrum.json")
+    written = [json.loads((tmp_path / f"{name}.json").read_text("utf-8")) for name in ("all", "critical", "spectrum")]
+    for found in (written[0]["study"], written[1]["study"], written[2]):
+        assert {name: found[name] for name in about} == about
+    assert "SA(0.7 s, damping 0.02) 0.102 g" in spectrum.summary()
+
+
 def test_what_is_read_in_small_parts_is_the_same(study, monkeypatch):
     whole = study.block_fragilities(limits=LIMITS), study.spectrum(), study.fragility(measure="pga_ratio")
     monkeypatch.setattr(reading, "_HELD", 5 * len(MOTIONS) * len(LEVELS))

@@ -131,8 +131,8 @@ def compare_measures(
         raise InvalidOption("fewer than two motions overturn a block, however strong; a dispersion needs more")
     named_motions = {name: scaled[name] for name in ("motion", "vertical") if name in scaled.coords}
     found = _dataset(measures, intensity, named_motions, shares)
-    about = {"blocks": pooled(blocks, weights), "model": model, "sides_differ": scaled.sides_differ}
-    return MeasureComparison(found.assign_attrs(about))
+    about = {"blocks": pooled(blocks, weights), "model": model, "damping": measures[2].damping}
+    return MeasureComparison(found.assign_attrs(about, sides_differ=scaled.sides_differ))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -147,7 +147,7 @@ class MeasureComparison(DatasetResult):
         Over (measure, motion, block): intensity, the lowest that overturns, in the measure's unit; NaN where none does.
         Over (measure): median_intensity; dispersion (standard deviation of the logarithm about each block's own mean),
         with dispersion_low and dispersion_high, its 90 % interval; dispersion_of_all, about one mean of all blocks;
-        unit.
+        unit. Its attribute damping is that of the spectral accelerations.
     """
 
     TABLES = MappingProxyType(
@@ -193,6 +193,7 @@ class MeasureComparison(DatasetResult):
         return {
             "blocks": data.blocks,
             "model": data.model,
+            "damping": data.damping,
             "motions": [str(name) for name in data.motion.values],
             **({"verticals": [str(name) for name in data.vertical.values]} if "vertical" in data.coords else {}),
             "measures": [
@@ -250,7 +251,7 @@ def _dataset(
             "dispersion_of_all": variable("measure", np.sqrt(of_all), f"{spread} about one mean of all blocks", "1"),
         },
         {
-            "measure": [_name(measure) for measure in measures],
+            "measure": [measure.short_name for measure in measures],
             "unit": ("measure", [measure.units for measure in measures]),
             **motions,
         },
@@ -263,8 +264,3 @@ def _interval_factors(freedom: int) -> tuple[float, float]:
 
     tail = 0.5 * (1.0 - _CONFIDENCE)
     return float(np.sqrt(freedom / chdtri(freedom, tail))), float(np.sqrt(freedom / chdtri(freedom, 1.0 - tail)))
-
-
-def _name(measure: Measure) -> str:
-    short = {"pga": "PGA", "pgv": "PGV", "sa": f"SA({measure.period:g} s)" if measure.period else ""}
-    return short.get(measure.name, measure.quantity)

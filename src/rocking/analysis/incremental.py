@@ -260,6 +260,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
             "blocks": data.blocks,
             "model": data.model,
             "measure": data.level.long_name,
+            **{name: data.level.attrs[name] for name in ("period", "damping") if name in data.level.attrs},
             named("level", units): data.level.values,
             named("lowest_uplift", units): data.lowest_uplift,
             "motions": [
@@ -393,6 +394,7 @@ def _dataset(table: xr.Dataset, bands: _Bands, alpha: Floats, measure: Measure) 
     np.minimum.at(lowest, (motion, block), bands.start)
     lowest[np.isinf(lowest)] = np.nan
     level = {"units": measure.units, "long_name": measure.quantity, "label": measure.label, "scale": measure.scale}
+    level |= measure.options()
     table = table.assign_coords(level=("level", table.level.values, level))
     slenderness = xr.DataArray(alpha, dims="block")
     over_alpha = (table.peak_rotation / slenderness).where(~table.overturned, np.inf)

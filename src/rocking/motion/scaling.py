@@ -137,8 +137,19 @@ class Measure:
 
     @property
     def quantity(self) -> str:
-        """Name in words."""
-        return _MEASURES[self.name][1] + ("" if self.period is None else f" at {self.period:g} s")
+        """Name in words, with the damping where it is not 5 %."""
+        return _MEASURES[self.name][1] + ("" if self.period is None else f" at {self._oscillator}")
+
+    @property
+    def short_name(self) -> str:
+        """Name for a table or a figure: PGA, PGV, SA(1 s), with the damping where it is not 5 %."""
+        if self.period is not None:
+            return f"SA({self._oscillator})"
+        return self.name.upper() if self.name in ("pga", "pgv") else self.quantity
+
+    @property
+    def _oscillator(self) -> str:
+        return f"{self.period:g} s" + ("" if self.damping == measures.DAMPING else f", damping {self.damping:g}")
 
     @property
     def label(self) -> str:

@@ -96,7 +96,8 @@ class WrittenToFiles(ABC):
     def to_json(self, path: str | Path, *, critical: StudyVerdict | None = None, progress: bool | None = None) -> None:
         """Write an object for each simulation as JSON; parameters and errors as of `to_csv`.
 
-        The keys are those of its columns, and NaN is null; attributes of the study stand under "study".
+        The keys are those of its columns, and NaN is null; attributes of the study and of its measure stand under
+        "study".
         """
         self._write(path, critical, progress, _write_json)
 
@@ -140,8 +141,12 @@ _Writer = Callable[[Iterator["pd.DataFrame"], "xr.Dataset", Path], None]
 
 
 def _for_tables(dataset: xr.Dataset) -> xr.Dataset:
-    """Name the scales for what they are, factors or values of a measure, and impacts as other tables do."""
+    """Name the scales for what they are, factors or values of a measure, and impacts as other tables do.
+
+    What a measure is stands among the attributes.
+    """
     if "scale" in dataset.dims:
+        dataset = dataset.assign_attrs({name: of for name, of in dataset.scale.attrs.items() if name != "units"})
         names = {"scale": dataset.scale.attrs["measure"], "impacts": "impacts_resolved"}
         return dataset.rename({name: other for name, other in names.items() if name in dataset})
     return dataset.rename({name: f"{dataset.measure}_{name}" for name in ("low", "high") if name in dataset})

@@ -14,10 +14,10 @@ from rocking import checks
 from rocking.analysis.fragility.curve import checked_limit
 from rocking.analysis.spectrum import fractiles_of
 from rocking.arrays import Floats, evenly
-from rocking.constants import STANDARD_GRAVITY
 from rocking.engine import require_finished
 from rocking.ensemble import body_coordinates
 from rocking.errors import InvalidOption, StudyError
+from rocking.motion.scaling import Measure
 from rocking.problem import slenderness_of
 from rocking.progress import Progress
 from rocking.result import DatasetResult, table_of_some
@@ -140,7 +140,6 @@ def study_spectrum(store: Store, fractiles: Sequence[float] = FRACTILES, progres
             values[:, :, blocks] = fractiles_of(pooled, shares)
             overturned[:, blocks] = np.isinf(pooled).mean(axis=0)
             bar.advance(blocks.stop - blocks.start)
-    about = {name: product.scales.about[name] for name in ("measure", "units")}
     words = "peak rotation over the slenderness, infinite where that share overturns"
     return StudySpectrum(
         xr.Dataset(
@@ -150,7 +149,7 @@ def study_spectrum(store: Store, fractiles: Sequence[float] = FRACTILES, progres
             },
             {
                 "fractile": shares,
-                "scale": ("scale", product.scales.values, about),
+                "scale": ("scale", product.scales.values, product.scales.about),
                 **body_coordinates(product.bodies),
             },
             {"motions": len(product.motions), "model": product.model},
@@ -201,7 +200,7 @@ class StudySpectrum(BlocksResult):
         data = self.data
         return {
             **data.attrs,
-            "measure": data.scale.attrs["measure"],
+            **{name: value for name, value in data.scale.attrs.items() if name != "units"},
             "scale": data.scale.values,
             "blocks": self.block_parameters,
             "fractile": data.fractile.values,
@@ -265,6 +264,7 @@ class StudySpectrum(BlocksResult):
 
     def _scale_name(self, i: int) -> str:
         value, about = float(self.data.scale.values[i]), self.data.scale.attrs
-        if about["units"] == "m/s^2":
-            return f"{about['measure'].upper()} {value / STANDARD_GRAVITY:.4g} g"
-        return f"{about['measure'].upper()} {value:.4g} m/s" if about["units"] == "m/s" else f"factor {value:.4g}"
+        if about["measure"] == "factor":
+            return f"factor {value:.4g}"
+        measure = Measure(about["measure"], *(about[name] for name in ("period", "damping") if name in about))
+        return f"{measure.short_name} {measure.scale * value:.4g} {measure.shown_in}"
