@@ -489,6 +489,20 @@ def test_the_least_push_chooses_the_side_of_an_uplift_without_weight(push: float
     assert rocking.simulate(block, motion).events["side"][0] == -np.sign(push)
 
 
+@pytest.mark.parametrize("model", MODELS)
+def test_a_push_that_only_rounding_makes_is_no_push_and_calls_the_side_ambiguous(model: str) -> None:
+    """A half sine starts at 5e-16 of its peak in place of zero: in exact arithmetic that chooses the other side."""
+    lift = Motion.from_points([0.0, 0.4, 0.8], [-1.8 * G, -1.2 * G, 0.0])
+    block = rocking.Block.from_parameters(p=(1.7, 2.1), alpha=(0.13, 0.31), restitution=0.8)
+    rounded = rocking.pulses.half_sine(-3.0, 0.5)
+    assert 0.0 < abs(rounded.acceleration(0.0)) < 1e-14
+    exact = Motion.from_points([0.0, 0.25, 0.5], [0.0, rounded.acceleration(0.25), 0.0])
+    found, known = (rocking.simulate(block, motion.with_vertical(lift), model=model) for motion in (rounded, exact))
+    assert found.events["side"][0] == known.events["side"][0] and found.events["time"][0] == 0.0
+    assert (found.near_ties, known.near_ties) == (1, 0)
+    assert found.ambiguous
+
+
 def test_a_touch_without_speed_is_no_impact_and_calls_itself_ambiguous() -> None:
     """Without a push and with a weight of -1 a block swings about alpha as a pendulum, back to zero and zero speed."""
     seconds, block = 12.0, rocking.Block.from_parameters(p=3.0, alpha=0.2, restitution=0.5)

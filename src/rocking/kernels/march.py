@@ -39,7 +39,7 @@ from rocking.kernels.state import (
     write_sequence,
 )
 from rocking.kernels.tendon import adopt, change_law, elongation_at, next_law
-from rocking.kernels.uplift import next_uplift
+from rocking.kernels.uplift import is_hardly_pushed, next_uplift
 
 #: Distance below zero rotation that is within rounding, over the highest rotation so far.
 _TOUCH = 2.0**-46
@@ -150,9 +150,12 @@ def rest_until_uplift(
     if state.uplifts == 0:
         state.first_uplift = state.uplifted
     state.uplifts += 1
-    if has_vertical(ground) and state.rests > 0 and state.uplifted - state.rested <= _NEAR_TIE * state.uplifted:
-        # The last of its impacts may have come too late.
-        state.near_ties += is_weightless(ground, block, state, state.offset)
+    if has_vertical(ground) and is_weightless(ground, block, state, state.offset):
+        left = length_of(ground, state.piece) - state.offset
+        if block.entered[0] != 0 and is_hardly_pushed(ground, state.piece, state.offset, left, scratch.ground):
+            state.near_ties += 1
+        elif state.rests > 0 and state.uplifted - state.rested <= _NEAR_TIE * state.uplifted:
+            state.near_ties += 1  # the last of its impacts may have come too late
     write_event(rules, table, state, state.uplifted, EventKind.UPLIFT)
     return Ending.RUNNING
 

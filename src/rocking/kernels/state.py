@@ -123,8 +123,8 @@ RULES = _record(nonlinear="?", treatment="i8", tolerance="f8", stop="f8", endles
 #: iterations left; ``run`` counts the impacts since chattering was proven; ``smooth`` marks an uplift that is not a
 #: jump; a proof is tried only at a speed below ``proof_speed``; ``stalled`` counts the rests only because time hardly
 #: advanced from one impact to the next. ``uplifted`` and ``rested`` are the last such times. ``near_ties`` counts the
-#: decisions by the last digits whether a block without weight touches the ground. ``law`` and ``plastic`` are those of
-#: a tendon that yields.
+#: decisions by the last digits whether a block without weight touches the ground, or to which side it goes. ``law``
+#: and ``plastic`` are those of a tendon that yields.
 STATE = _record(
     piece="i8", offset="f8", side="i8", u="f8", v="f8", peak="f8", until="i8", budget="i8",
     run="i8", proof_speed="f8", last_impact_time="f8", impacts="i8", ending="i8", smooth="?", peak_time="f8",

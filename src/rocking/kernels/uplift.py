@@ -88,6 +88,19 @@ def pushed_side(ground: Ground, piece: int, offset: float, h: float, A: Floats) 
 
 
 @inlined
+def is_hardly_pushed(ground: Ground, piece: int, offset: float, h: float, A: Floats) -> bool:
+    """Whether a push that counts as none within h is first: rounding decides the side of an uplift without weight.
+
+    ``A`` is scratch space.
+    """
+    degree = local_series(ground, piece, offset, 1.0, A)
+    for k in range(min(leading_power(A, degree, h, rounding_of(A, degree, h)), degree + 1)):
+        if A[k] != 0.0:
+            return True
+    return False
+
+
+@inlined
 def push_series(ground: Ground, piece: int, offset: float, threshold: float, sign: float, A: Floats, d: Floats) -> int:
     """Write the polynomial that, times ``sign``, is compared with a threshold into A, and return its degree.
 

@@ -63,7 +63,8 @@ class Response(Answers, DrawnResult):
     stalled : int
         Sequences that ended because time no longer advanced between impacts, without proof.
     near_ties : int
-        Times that the last digits decided whether a block that nothing weighs down touches the ground.
+        Times that the last digits decided whether a block that nothing weighs down touches the ground, or to which side
+        it leaves it.
     """
 
     def _headline(self) -> str:
