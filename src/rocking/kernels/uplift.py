@@ -94,10 +94,10 @@ def is_hardly_pushed(ground: Ground, piece: int, offset: float, h: float, A: Flo
     ``A`` is scratch space.
     """
     degree = local_series(ground, piece, offset, 1.0, A)
-    for k in range(min(leading_power(A, degree, h, rounding_of(A, degree, h)), degree + 1)):
-        if A[k] != 0.0:
-            return True
-    return False
+    hidden = 0.0
+    for k in range(leading_power(A, degree, h, rounding_of(A, degree, h))):
+        hidden += abs(A[k])
+    return hidden > 0.0
 
 
 @inlined
