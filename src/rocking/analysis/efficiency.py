@@ -131,7 +131,7 @@ def compare_measures(
         raise InvalidOption("fewer than two motions overturn a block, however strong; a dispersion needs more")
     named_motions = {name: scaled[name] for name in ("motion", "vertical") if name in scaled.coords}
     found = _dataset(measures, intensity, named_motions, shares)
-    about = {"blocks": pooled(blocks, weights), "model": model, "damping": measures[2].damping}
+    about = {"blocks": pooled(blocks, weights), "model": model, "damping": damping}
     return MeasureComparison(found.assign_attrs(about, sides_differ=scaled.sides_differ))
 
 
