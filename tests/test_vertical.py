@@ -503,6 +503,17 @@ def test_a_push_that_only_rounding_makes_is_no_push_and_calls_the_side_ambiguous
     assert found.ambiguous
 
 
+@pytest.mark.parametrize("model", MODELS)
+def test_a_push_as_small_as_rounding_acts_from_the_uplift_on(model: str) -> None:
+    """The weight is zero at the uplift, at 0.1 s, and jumps at 0.2 s: the rotation is the same just before the jump."""
+    lift = Motion([0.0, 0.1, 0.2], [[0.0, -10.0 * G], [-G, -5.0 * G]])
+    motion = Motion([0.0, 1.0], [[-1e-15 * G]]).with_vertical(lift)
+    response = rocking.simulate(block_for(7.0, 0.33), motion, model=model)
+    assert response.events["time"][0] == pytest.approx(0.1, rel=1e-15)
+    before, after = response.states(np.array([np.nextafter(0.2, 0.0), 0.2]))
+    assert before[:2] == pytest.approx(after[:2], rel=2e-15, abs=0.0)
+
+
 def test_a_touch_without_speed_is_no_impact_and_calls_itself_ambiguous() -> None:
     """Without a push and with a weight of -1 a block swings about alpha as a pendulum, back to zero and zero speed."""
     seconds, block = 12.0, rocking.Block.from_parameters(p=3.0, alpha=0.2, restitution=0.5)

@@ -305,7 +305,8 @@ class _Follower:
                 after = passings[first]
                 if len(passed) == 2 and abs(passings[1] - passings[-1]) <= _digits(0.5) * (end - time):
                     first = _pushed_side(push, after, end - time)
-                return (time + after).mid(), first
+                # A little later than the root: just before it, rounding would let the block fall back at once.
+                return (time + after * (1 + _digits(0.8))).mid(), first
             time = end
 
     def excess(self, side: int, push: list[arb], weight: list[arb]) -> list[arb]:

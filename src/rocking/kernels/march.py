@@ -180,10 +180,10 @@ def follow_arc(ground: Ground, block: Record, rules: Record, scratch: Record, st
 def long_step(ground: Ground, block: Record, rules: Record, scratch: Record, state: Record, left: float) -> StepEnd:
     """Step along the full series of the arc."""
     order, h, _ = expand(ground, block, rules, scratch, state, left)
+    if state.smooth:  # rounding may say that the body is pushed back at an uplift
+        scratch.rotation[2] = max(0.0, scratch.rotation[2])
     if block.yielding:
         return yielding_step(block, rules, scratch, state, order, h)
-    if state.smooth:  # the acceleration at an uplift is zero, whatever rounding says
-        scratch.rotation[2] = 0.0
     balanced = state.v == 0.0 and scratch.rotation[2] == 0.0
     if balanced and state.piece == last_piece(ground) and rules.endless:
         return StepEnd(Outcome.BALANCED, 0.0, state.u, 0.0, 0.0, 0.0)
@@ -193,8 +193,6 @@ def long_step(ground: Ground, block: Record, rules: Record, scratch: Record, sta
 @shared
 def yielding_step(block: Record, rules: Record, scratch: Record, state: Record, order: int, h: float) -> StepEnd:
     """Step along a series up to its first event, or to where the law of the tendon changes."""
-    if state.smooth:
-        scratch.rotation[2] = 0.0
     change, law = next_law(block, rules, scratch, state, order, h)
     end = advance(state, scratch, order, min(h, change), block.fallen)
     if end.outcome == Outcome.STEP and end.time >= change:
