@@ -13,7 +13,8 @@ import xarray as xr
 import rocking
 from rocking import Block, InvalidOption, OutputError, dynamics, simulate
 from rocking.analysis.survey import survey
-from rocking.response import QUANTITIES, answers, history, sensitivity, summary
+from rocking.kernels import state
+from rocking.response import QUANTITIES, history, sensitivity, summary
 from rocking.response.contact import Contact
 from rocking.response.summary import time_text
 from rocking.tables import named
@@ -88,7 +89,7 @@ def test_a_summary_and_a_dictionary_pass_once_along_the_response_for_each_quanti
     monkeypatch.setattr(history, "trace", counting("trace", history.trace))
     response = simulate(Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
     response.summary()
-    assert counted["vary"] == len(QUANTITIES) == 6
+    assert counted["vary"] == len(QUANTITIES) - 2 == 4  # it starts at rest
     once = dict(counted)
     for _ in range(2):
         response.summary()
@@ -112,7 +113,7 @@ def test_a_summary_is_its_rows(shaken):
 
 def test_a_response_of_a_million_impacts_shows_itself_at_once(shaken, monkeypatch):
     """A sensitivity is a pass along all steps."""
-    monkeypatch.setattr(answers, "sensitivity_along", None)
+    monkeypatch.setattr(sensitivity, "vary", None)
     assert "rocks" in repr(shaken)
     assert "rocks" in shaken._repr_html_()
 
@@ -163,6 +164,23 @@ def test_digits_are_those_that_are_left_by_whatever_drives_the_block(name):
     slopes = (more.impacts["time"][:3] - less.impacts["time"][:3]) / (2.0 * h)
     assert impacts[:3] == pytest.approx(np.abs(slopes), rel=1e-3)
     assert min(peak, *impacts[:3]) > 1e-3 and len(events) == len(response.events)
+
+
+def test_each_sensitivity_is_one_pass_when_asked_for_and_a_share_of_nothing_is_none(shaken, monkeypatch):
+    passes, vary = [], sensitivity.vary
+    monkeypatch.setattr(sensitivity, "vary", lambda *given: (passes.append(given[3]), vary(*given)))
+    found = simulate(shaken.body, shaken.motion).sensitivity
+    peak, _, impacts = sensitivity.driving(found)
+    assert passes == [0]
+    assert peak == abs(found.peak["motion"][0]) > 0.0
+    assert impacts.tolist() == np.abs(found.impacts["motion"]).tolist()
+    assert passes == [0, 3, 4, 5]
+    for quantity, name in ((1, "initial_rotation"), (2, "initial_velocity")):
+        changes = np.ones(1), np.ones(len(found.impacts)), np.ones(len(found.events))
+        scratch, work = state.new_scratch(), state.record(state.VARIATION)
+        vary(shaken._trail, scratch, work, quantity, np.array([shaken.peak_time]), *changes)
+        assert not np.any(np.concatenate(changes))
+        assert not np.any(found.events[name]) and not np.any(found.impacts[name]) and not found.peak[name][0]
 
 
 def test_a_motion_changed_by_a_millionth_keeps_the_digits_that_are_shown():

@@ -60,7 +60,8 @@ def lines_in(shown: Simulated, start: float, end: float, points: int = POINTS) -
     impact_times = response.impacts["time"]
     inside = impact_times[(impact_times >= start) & (impact_times <= end)]
     marked = inside if len(inside) <= _MARKED else inside[:: math.ceil(len(inside) / _MARKED)]
-    times = np.union1d(np.linspace(start, end, min(_TIMES, 4 * points)), marked)
+    times = np.sort(np.concatenate([np.linspace(start, end, min(_TIMES, 4 * points)), marked]), kind="stable")
+    times = times[np.diff(times, prepend=-math.inf) > 0.0]
     rotation = response.rotation(times)
     kept = extremes(rotation, points)
     return {
@@ -82,10 +83,12 @@ def extremes(values: Floats, most: int) -> Integers:
     if len(values) <= most:
         return np.arange(len(values))
     width = math.ceil(2 * len(values) / most)
-    rows = np.pad(values, (0, -len(values) % width), mode="edge").reshape(-1, width)
+    rows = np.concatenate([values, np.full(-len(values) % width, values[-1])]).reshape(-1, width)
     starts = width * np.arange(len(rows))
-    kept: Integers = np.union1d(starts + rows.argmin(axis=1), starts + rows.argmax(axis=1))
-    return np.minimum(kept, len(values) - 1)
+    low, high = starts + rows.argmin(axis=1), starts + rows.argmax(axis=1)
+    both = np.column_stack([np.minimum(low, high), np.maximum(low, high)]).ravel()
+    kept: Integers = np.minimum(both, len(values) - 1)
+    return kept[np.diff(kept, prepend=-1) > 0]
 
 
 def _shaking(case: Case, start: float, end: float, points: int) -> dict[str, Floats]:

@@ -21,7 +21,7 @@ from rocking.motion.motion import Motion
 from rocking.response.contact import Contact, friction_coefficient, friction_demand, pull
 from rocking.response.energy import Energy, energy_of, linear_balance
 from rocking.response.history import History, with_all_impacts
-from rocking.response.sensitivity import Sensitivity, ambiguities, sensitivity_along
+from rocking.response.sensitivity import Sensitivity, ambiguities
 from rocking.treatment import Treatment
 
 
@@ -128,14 +128,13 @@ class Answers:
     def sensitivity(self) -> Sensitivity:
         """How the peak and the times of events and impacts change with the motion, the initial state and the block."""
         drawn = int(self._trail.block["seed"]) >= 0 and bool(self._trail.block["varying"])
-        return sensitivity_along(
+        return Sensitivity(
             self._trail,
             # What is drawn goes by the number of the impact, which those beyond a proof do not count in.
             History(self._trail, self.duration, self.body.stops) if drawn else self._history,
             self.peak_time,
-            len(self.impacts),
-            len(self.events),
-            fixed=self.overturned or self._reaches_second_stop,
+            (len(self.impacts), len(self.events)),
+            self.overturned or self._reaches_second_stop,
         )
 
     @property

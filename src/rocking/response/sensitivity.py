@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -13,7 +14,7 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.kernels import state
-from rocking.kernels.trace import Trail, vary
+from rocking.kernels.trace import Quantity, Trail, vary
 from rocking.response.history import History
 from rocking.tables import counted
 
@@ -34,28 +35,56 @@ DRIVING: Final = QUANTITIES[:3]
 #: What a rotation may be differentiated by, in the order of the kernels.
 _NAMES: Final = (*QUANTITIES, *(f"{name}_{side}" for side in ("plus", "minus") for name in QUANTITIES[3:]))
 
+#: What a node holds of a start, by the quantity that changes it.
+_STARTS: Final[dict[int, str]] = {Quantity.ROTATION: "u", Quantity.VELOCITY: "v"}
+
 _ULP: Final = 2.0**-52
 
+#: Of peak, impacts and events; in rows where there are several quantities.
+Changes = tuple[Floats, Floats, Floats]
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Sensitivity:
-    """Changes of a response per unit of relative change of what it was computed from.
+    """Changes of a response per unit of relative change of what it was computed from, found when first asked for.
 
     Structured arrays with the fields motion, initial_rotation, initial_velocity, p, alpha and restitution (of both
     sides together): a field times 1e-3 is what 0.1 % more of that quantity changes, to first order.
-
-    Attributes
-    ----------
-    peak : structured array, shape (1,)
-        Of the peak rotation, rad; 0 when overturned.
-    impacts, events : structured array
-        Of the times of the response's impacts and events, s.
     """
 
-    peak: NDArray[np.void]
-    impacts: NDArray[np.void]
-    events: NDArray[np.void]
+    _trail: Trail
     _history: History
+    _peak_time: float
+    _sizes: tuple[int, int]
+    _fixed: bool
+    _found: dict[int, Changes] = field(default_factory=dict)
+
+    @cached_property
+    def peak(self) -> NDArray[np.void]:
+        """Of the peak rotation, rad, shape (1,); 0 when overturned."""
+        return _by_quantity(self._along(QUANTITIES)[0])
+
+    @cached_property
+    def impacts(self) -> NDArray[np.void]:
+        """Of the times of the response's impacts, s."""
+        return _by_quantity(self._along(QUANTITIES)[1])
+
+    @cached_property
+    def events(self) -> NDArray[np.void]:
+        """Of the times of the response's events, s."""
+        return _by_quantity(self._along(QUANTITIES)[2])
+
+    def _along(self, names: tuple[str, ...]) -> Changes:
+        """Return changes of peak, impacts and events, in a row for each name: one pass along the steps for each."""
+        at = np.array([self._peak_time])
+        at.flags.writeable = False
+        quantities = [_NAMES.index(name) for name in names]
+        for each in quantities:
+            if each not in self._found:
+                self._found[each] = _varied(self._trail, each, at, *self._sizes)
+        rows = zip(*(self._found[each] for each in quantities), strict=True)
+        peak, impacts, events = (np.array(values) for values in rows)
+        return np.zeros_like(peak) if self._fixed else peak, impacts, events
 
     def rotation(self, time: ArrayLike, of: Iterable[str] = QUANTITIES) -> dict[str, Floats]:
         """Return the change of the rotation at given times with each quantity.
@@ -105,26 +134,13 @@ class Sensitivity:
         )
 
 
-def sensitivity_along(
-    trail: Trail, history: History, peak_time: float, impacts: int, events: int, *, fixed: bool
-) -> Sensitivity:
-    """Sensitivity of a response with that many impacts and events: one pass along its steps for each quantity.
-
-    A fixed peak is that of a body that has fallen, or has reached a stop.
-    """
-    at = np.array([peak_time])
-    at.flags.writeable = False
-    found = [_varied(trail, k, at, impacts, events) for k in range(len(QUANTITIES))]
-    peak, impact_times, event_times = (np.array(values) for values in zip(*found, strict=True))
-    if fixed:
-        peak[:] = 0.0
-    return Sensitivity(_by_quantity(peak), _by_quantity(impact_times), _by_quantity(event_times), history)
-
-
-def _varied(trail: Trail, quantity: int, times: Floats, impacts: int, events: int) -> tuple[Floats, Floats, Floats]:
+def _varied(trail: Trail, quantity: int, times: Floats, impacts: int, events: int) -> Changes:
     """Change heights at given times, so many impacts, and so many events with a quantity."""
-    heights, at_impacts, at_events = np.empty(len(times)), np.zeros(impacts), np.zeros(events)
-    vary(trail, state.new_scratch(), state.record(state.VARIATION), quantity, times, heights, at_impacts, at_events)
+    heights, at_impacts, at_events = np.zeros(len(times)), np.zeros(impacts), np.zeros(events)
+    start = _STARTS.get(quantity)
+    if start is None or trail.nodes[start][0] != 0.0:  # a share of nothing changes nothing
+        scratch, work = state.new_scratch(), state.record(state.VARIATION)
+        vary(trail, scratch, work, quantity, times, heights, at_impacts, at_events)
     return heights, at_impacts, at_events
 
 
@@ -144,7 +160,8 @@ def ambiguities(found: Sensitivity, height: float, near_ties: int) -> tuple[str,
 
 def driving(found: Sensitivity) -> tuple[float, Floats, Floats]:
     """Sizes of the changes of peak, events and impacts with all that drives the block, per relative change."""
-    return float(_total(found.peak, DRIVING)[0]), _total(found.events, DRIVING), _total(found.impacts, DRIVING)
+    peak, impacts, events = (np.sum(np.abs(rows), axis=0) for rows in found._along(DRIVING))
+    return float(peak[0]), events, impacts
 
 
 def driver(motion: object | None) -> str:

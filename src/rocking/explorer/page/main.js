@@ -133,6 +133,7 @@ const afterPause = new Latest(async () => {
   const {header} = shown, of = texts;
   if (state.texts === of) forms.block.show(of, header.block.sides);
   const tracks = json("/api/tracks", of).catch(() => ({}));
+  entitle(header);
   showNotes(header);
   showLegend(header);
   chattering.window(header.window);
@@ -256,7 +257,6 @@ async function go(name) {
 function draw() {
   if (!page.shown) return;
   const {header, arrays} = page.shown;
-  entitle(header);
   tell(one("verdict"), inWords(header.verdict));
   showFigures(header);
   const [plus, minus] = header.block.thresholds_g;
