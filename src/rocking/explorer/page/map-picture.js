@@ -144,7 +144,8 @@ export class MapPicture {
     const {colours, shape} = picture(inks, [rows, columns], one("map").clientWidth - 80, kinds, hatched);
     const {ndarray} = bokeh().require("core/util/ndarray");
     const [x0, x1, y0, y1] = this.box();
-    this.image.data = {image: [ndarray(colours, {shape, dtype: "uint32"})], x: [x0], y: [y0], dw: [x1 - x0], dh: [y1 - y0]};
+    Object.assign(this.image.data, {image: [ndarray(colours, {shape, dtype: "uint32"})], x: [x0], y: [y0], dw: [x1 - x0], dh: [y1 - y0]});
+    this.image.change.emit(); // new data would be compared with the old, pixel by pixel
   }
 
   /** Colour of every point, those that stand for an outcome, and what is hatched; and the legend or the bar that says what they mean.

@@ -233,7 +233,7 @@ export class View {
    * painting takes little from computing, which is done on the same cores. @param {number} started */
   recolourSoon(started) {
     if (this.waiting) return;
-    const wait = Math.max(90, 0.1 * (performance.now() - started));
+    const wait = Math.max(90, 0.2 * (performance.now() - started));
     this.waiting = window.setTimeout(() => { this.waiting = 0; if (!this.complete) this.recolour(); }, wait);
   }
 
