@@ -1616,6 +1616,7 @@ def test_no_view_has_a_barrier(opened, viewport, scheme):
     page.until("document.getElementById('main').classList.contains('old')")
     for view in views[:2]:
         page.page.click(f"[data-view={view}]")
+        assert page.page.title().startswith(f"{view.capitalize()}:")
         page.js("scrollTo(0, 0)")  # what the head covers elsewhere is no barrier
         assert barriers(page) == [], f"{view}, dimmed"
         judged.append(view)

@@ -248,7 +248,10 @@ async function go(name) {
   examples.check();
   for (const [each, view] of Object.entries(views)) if (each !== name) { view.leave?.(); problem(null, `view-${each}`); }
   views[name]?.enter?.();
-  if (page.shown) draw();
+  if (page.shown) {
+    entitle(page.shown.header);
+    draw();
+  }
   stale = true;
   void load.ask();
 }

@@ -80,14 +80,14 @@ export function figure(given, label) {
   return made;
 }
 
-/** Bokeh asks the style sheet (--bk-...) for each colour and width of an axis at every painting, and this page says none there.
+/** Keep Bokeh from asking the style sheet (--bk-...) for each colour and width of an axis at every painting: this page has none there.
  * @param {any} view of a plot or of several */
 function askNoStyleSheet(view) {
-  for (let kind of Object.values(view.visuals ?? {})) {
+  for (let kind of Object.values(view?.visuals ?? {})) {
     while (kind && !Object.hasOwn(kind, "_get_css_value")) kind = Object.getPrototypeOf(kind);
     if (kind) { kind._get_css_value = () => ""; return; }
   }
-  for (const each of view.child_views ?? []) askNoStyleSheet(each);
+  for (const each of view?.child_views ?? []) askNoStyleSheet(each);
 }
 
 /** Put a plot into an element. Keys go to the element: within the plot the keyboard does not stop, where nobody would see it.
