@@ -141,7 +141,9 @@ export class MapPicture {
     const values = all[Math.max(0, this.about.quantities.indexOf(quantity))];
     const [rows, columns] = this.about.shape;
     const {inks, kinds, hatched} = this.coloured(quantity, values, label);
-    const {colours, shape} = picture(inks, [rows, columns], one("map").clientWidth - 80, kinds, hatched);
+    // One pixel a point until all are computed: lines take time that computing has a use for.
+    const width = complete ? one("map").clientWidth - 80 : columns;
+    const {colours, shape} = picture(inks, [rows, columns], width, kinds, hatched);
     const {ndarray} = bokeh().require("core/util/ndarray");
     const [x0, x1, y0, y1] = this.box();
     Object.assign(this.image.data, {image: [ndarray(colours, {shape, dtype: "uint32"})], x: [x0], y: [y0], dw: [x1 - x0], dh: [y1 - y0]});
