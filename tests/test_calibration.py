@@ -15,6 +15,7 @@ from rocking.analysis.calibration import evidence as population
 from rocking.analysis.calibration.diagnostics import Scores, bounds_reached
 from rocking.analysis.calibration.evidence import WIDENED, Candidates, Evidence
 from rocking.analysis.calibration.history import HistoryCalibration
+from rocking.analysis.calibration.result import group_labels
 from rocking.analysis.calibration.search import AGREEMENT, Problem, posterior, r_hat, search
 from rocking.analysis.calibration.space import Space
 from rocking.analysis.input_tables import read_calibration, read_ensemble
@@ -800,6 +801,15 @@ def test_an_error_within_a_table_keeps_what_it_is_about(tmp_path):
         read_calibration(outcomes, channel=None, dt=-1.0, units=None)
     error = caught.value
     assert (error.argument, error.path, error.line, error.value) == ("dt", str(outcomes), 3, -1.0)
+
+
+def test_rows_without_a_group_belong_to_none(tmp_path):
+    table = tmp_path / "outcomes.csv"
+    scales = enumerate(["near", "", "", "near"], start=1)
+    rows = [f"ridgecrest-clc-090,{scale},1,{group}" for scale, group in scales]
+    table.write_text("\n".join(["motion,scale,overturned,group", *rows]))
+    read = read_calibration(table, channel=None, dt=None, units=None)
+    assert group_labels(read.groups, 4, folds=3).tolist() == [2, 0, 1, 2]
 
 
 def test_a_pair_of_equal_numbers_is_known_and_nothing_unknown_says_what_to_call(shaken):

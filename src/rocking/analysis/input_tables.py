@@ -91,8 +91,9 @@ def read_calibration(
     """Read a table; its columns say what it is.
 
     Outcomes: `motion` (a record file, relative to the table's folder, or a shipped record) and `overturned` (1 or 0,
-    yes or no); also, if there are such columns, `group` and those of a motion as `read_tests` has them. With a column
-    `specimen`, outcomes of several specimens by their names. A history: `time_s`, and `rotation_rad` or `rotation_deg`.
+    yes or no); also, if there are such columns, `group` (a row without a label belongs to none) and those of a motion
+    as `read_tests` has them. With a column `specimen`, outcomes of several specimens by their names. A history:
+    `time_s`, and `rotation_rad` or `rotation_deg`.
     """
     table = read_table(path)
     if {"motion", "overturned"} <= set(table.columns):
@@ -171,7 +172,8 @@ def outcomes_of(table: _Table, *, channel: Any, dt: Any, units: Any) -> Outcomes
     """Return motions and outcomes of a table with these columns; an error says the line."""
     overturned = table.answers("overturned")
     motions = _motions_of(table, channel=channel, dt=dt, units=units)
-    groups = tuple(row["group"] for _, row in table.rows) if "group" in table.columns else None
+    # A row without a label belongs to no group: it has one of its own.
+    groups = tuple(row["group"] or f"line {line}" for line, row in table.rows) if "group" in table.columns else None
     return Outcomes(motions, overturned, groups)
 
 
