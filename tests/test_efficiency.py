@@ -194,3 +194,12 @@ def test_the_figure_has_the_order_of_the_table():
     rows = found.summary().splitlines()[3:]
     assert len(drawn) == found.sizes["measure"] == 7
     assert all(row.startswith(name) for row, name in zip(rows, drawn, strict=True))
+
+
+def test_multiples_of_a_motion_count_once(rectangles):
+    pulses = [rocking.pulses.rectangular(size, length) for length in LENGTHS for size in (1.0, 2.5)]
+    found = compare_measures(SLENDER, pulses, periods=[0.7], model="linear", tolerance=1e-9, progress=False)
+    for name in ("median_intensity", "dispersion", "dispersion_low", "dispersion_high", "dispersion_of_all"):
+        np.testing.assert_allclose(found[name].values, rectangles[name].values, rtol=1e-7)
+    with pytest.raises(rocking.InvalidOption, match="not multiples of one another"):
+        compare_measures(SLENDER, pulses[:2], model="linear", progress=False)

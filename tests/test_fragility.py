@@ -13,6 +13,7 @@ from scipy.optimize import minimize
 import rocking
 from rocking import InvalidOption, fit_fragility, fragility
 from rocking.analysis import Band
+from rocking.analysis.levels import families_of
 from rocking.block import Blocks
 
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
@@ -567,7 +568,7 @@ def test_a_block_of_weight_zero_is_none_of_the_data():
     # One motion for each outcome, at intensities that the second block's unit puts elsewhere.
     a, b = (rocking.Block.from_parameters(p=2.0, alpha=alpha, restitution=0.9) for alpha in (0.2, 0.05))
     motions = [
-        rocking.pulses.one_sine(size, f) for size in (2.0, 2.5, 3.0, 4.0, 5.0, 6.0) for f in (0.6, 0.8, 1.0, 1.2)
+        rocking.pulses.one_sine(size, f + 0.001 * size) for size in (2.0, 2.5, 3.0, 4.0, 5.0, 6.0) for f in (0.6, 0.8, 1.0, 1.2)
     ]
     both = fragility([a, b], motions, measure="pga_ratio", weights=[1.0, 0.0])
     alone = fragility(a, motions, measure="pga_ratio")
@@ -637,3 +638,43 @@ def test_a_finite_limit_counts_in_the_smaller_slenderness_of_an_asymmetric_block
     assert 0 < np.sum(peaks / 0.3 > 0.5) < np.sum(exceeded) < len(motions)
     assert np.count_nonzero(peaks < 0.2) >= 3
     assert result.outcomes.peak_over_alpha.values[peaks < 0.2] == pytest.approx(peaks[peaks < 0.2] / 0.2, rel=1e-9)
+
+
+def test_multiples_of_a_motion_are_one_cluster_however_they_are_given():
+    """Stripes, and the same motions scaled beforehand or reversed, are the same data."""
+    levels = np.geomspace(2.0, 6.0, 9)
+    stripes = fragility(BLOCK, PULSES, levels=levels).curves[0]
+    scaled = [pulse.scaled_to(level) for pulse in PULSES for level in levels]
+    cloud = fragility(BLOCK, [-motion if k % 2 else motion for k, motion in enumerate(scaled)])
+    curve = cloud.curves[0]
+    assert curve.clusters == stripes.clusters == len(PULSES)
+    assert not curve.independent
+    assert curve.median_interval == pytest.approx(stripes.median_interval, rel=1e-6)
+    assert any("belong together" in note for note in cloud.notes)
+    # Twice the same data say no more: only the count of trials differs.
+    twice = fragility(BLOCK, [*PULSES, *PULSES], levels=levels).curves[0]
+    assert twice.clusters == len(PULSES)
+    assert twice.median == pytest.approx(curve.median, rel=1e-6)
+
+
+def test_motions_of_one_shape_and_another_length_or_vertical_component_are_not_one():
+    pulse = rocking.pulses.one_sine(1.0, 1.0)
+    up, down = (pulse.with_vertical(rocking.pulses.one_sine(a, 3.0)) for a in (0.5, -0.5))
+    longer = rocking.pulses.one_sine(1.0, 1.5)
+    given = [pulse, longer, up, pulse.scaled(-3.0), up.scaled(0.3), down, longer.scaled(1e-6)]
+    assert families_of(given).tolist() == [0, 1, 2, 0, 2, 3, 1]
+
+
+@pytest.mark.parametrize("missing", [None, "", math.nan, np.nan])
+def test_outcomes_without_a_label_are_on_their_own(missing):
+    x, y = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0], [0, 1, 0, 1, 0, 1]
+    own = fit_fragility(x, y, clusters=[missing] * 6).curves[0]
+    assert own.clusters == 6
+    assert own.independent
+    assert fit_fragility(x, y, clusters=["a", missing, "a", missing, 3, 3.0]).curves[0].clusters == 4
+
+
+@pytest.mark.parametrize("labels", [[1, 2], [[1], [1, 2], 3, 4], "abcd", 3])
+def test_labels_that_are_none_are_refused(labels):
+    with pytest.raises(InvalidOption, match="clusters must"):
+        fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 0, 1], clusters=labels)

@@ -270,3 +270,13 @@ def test_a_law_of_restitution_is_carried_back_as_it_is_carried_forwards():
             )
             judged += 1
     assert judged >= 3
+
+
+def test_scales_in_the_wrong_order_are_refused_where_a_stronger_motion_lets_the_block_stand() -> None:
+    """The block stands at 14 and overturns at 8: neither is next to a change."""
+    block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    pulse = rocking.pulses.one_sine(1.0, 5.0 / np.pi)
+    assert rocking.simulate(block, pulse * 8.0).overturned
+    assert not rocking.simulate(block, pulse * 14.0).overturned
+    with pytest.raises(rocking.InvalidOption, match="low = 14 must be below high = 8"):
+        rocking.critical_scale(block, pulse, 14.0, 8.0)

@@ -275,6 +275,10 @@ def test_the_figure_names_every_mode_that_it_shows():
         ({"pulse": "sine"}, "cycles"),
         ({"pulse": "half-sine", "cycles": 2.0}, "cycles"),
         ({"pulse": rocking.pulses.half_sine, "cycles": 2.0}, "bind"),
+        ({"pulse": lambda a, f: a * f}, "a Motion is needed, not a float"),
+        ({"pulse": lambda a, f: None}, "is None; return a Motion"),
+        ({"pulse": lambda a, f: rocking.pulses.half_sine(a, 1.0), "frequencies": [1.0, 3.0]}, "one shape"),
+        ({"pulse": lambda a, f: rocking.pulses.n_lobe([a, a * a], f)}, "one shape"),
         ({"amplitudes": []}, "amplitudes"),
         ({"amplitudes": [2.0, 1.0]}, "increase"),
         ({"amplitudes": [1.0, math.nan]}, "finite"),
@@ -322,3 +326,13 @@ def test_a_map_of_one_column_or_one_row_is_drawn(amplitudes, frequencies):
     assert corners.min(axis=0).tolist() == [axes.get_xlim()[0], axes.get_ylim()[0]]
     assert corners.max(axis=0).tolist() == [axes.get_xlim()[1], axes.get_ylim()[1]]
     assert (np.ptp(corners, axis=0) > 0.0).all()
+
+
+def test_a_function_of_samples_at_a_constant_step_is_of_one_shape():
+    def sampled(amplitude, frequency):
+        times = np.arange(0.0, 1.0 / frequency, 0.005)
+        return rocking.Motion.from_samples(amplitude * np.sin(2.0 * np.pi * frequency * times), 0.005)
+
+    grid = {"amplitudes": np.linspace(0.5, 6.0, 12), "frequencies": [1.0, 4.0]}
+    by_function, by_name = overturning_map(BLOCK, sampled, **grid), overturning_map(BLOCK, "one-sine", **grid)
+    np.testing.assert_allclose(by_function.overturning_amplitude, by_name.overturning_amplitude, rtol=1e-2)

@@ -110,6 +110,8 @@ def test_a_comparison_shows_itself():
         (([[1.0, 2.0]], COLUMN), InvalidOption, "each of tests must hold three increasing times or more, s; test 0"),
         (([[1.0, 2.0, 1.5]], COLUMN), InvalidOption, "three increasing times"),
         (([[1.0, 2.0, 30.0]], COLUMN), InvalidOption, "farther than this block's can be"),
+        (([[1.0, 1.5, 1.9, 2.2]], COLUMN), InvalidOption, "tests tell 2 factors of restitution"),
+        ((None, COLUMN), InvalidOption, "tests must be a list, not None"),
         (([[1.0, 1.5, 1.9]], 0.4), InvalidBlock, "a Block is needed"),
         (([[1.0, 1.5, 1.9]], Block(width=0.4, height=2.0, offset=0.02)), InvalidOption, "must have equal sides"),
     ],
@@ -123,3 +125,10 @@ def test_what_cannot_be_is_refused_in_one_sentence(arguments, error, says):
 def test_the_timing_must_be_positive():
     with pytest.raises(InvalidOption, match="timing must be a positive number"):
         compare_restitution([[1.0, 1.5, 1.9]], COLUMN, timing=0.0)
+
+
+def test_impacts_at_one_speed_tell_no_slope_and_no_warning():
+    # Times between impacts repeat: every speed is the same, and every factor 1.
+    found = compare_restitution([0.4 * np.arange(9)], COLUMN)
+    assert found.factors == pytest.approx(np.ones(7), abs=1e-9)
+    assert all(np.isfinite(law.criterion) for law in found.laws)

@@ -19,6 +19,7 @@ from rocking.analysis import Band
 from rocking.analysis.fragility.lognormal import Probit
 from rocking.analysis.hazard import log_parts, powers
 from rocking.analysis.input_tables import read_observed
+from rocking.analysis.survival import _log_standing
 from rocking.motion.scaling import Measure
 
 G = 9.80665
@@ -278,8 +279,22 @@ def test_an_openquake_curve_that_rises_once_keeps_what_falls_below_all_before(tm
         "10.0,45.0,0.0,0.5,0.3,0.4,0.35,0.3,0.2\n"
     )
     hazard = HazardCurve.read(path)
-    assert hazard.intensity == pytest.approx(np.array([0.1, 0.2, 0.6]) * G)
-    assert hazard.rate == pytest.approx(-np.log1p(-np.array([0.5, 0.3, 0.2])) / 50.0)
+    assert hazard.intensity == pytest.approx(np.array([0.1, 0.2, 0.5, 0.6]) * G)
+    assert hazard.rate == pytest.approx(-np.log1p(-np.array([0.5, 0.3, 0.3, 0.2])) / 50.0)
+
+
+def test_an_openquake_curve_keeps_its_rate_up_to_the_end_of_a_plateau(tmp_path: Path) -> None:
+    path = tmp_path / "hazard_curve-mean-PGA.csv"
+    levels, chances = (0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0, 1.2), (0.9, 0.9, 0.1, 0.05, 0.05, 0.01, 0.005, 0.005)
+    path.write_text(
+        "#,,,,\"kind='mean', investigation_time=50.0, imt='PGA'\"\n"
+        f"lon,lat,depth,{','.join(f'poe-{x}' for x in levels)}\n10.0,45.0,0.0,{','.join(map(str, chances))}\n"
+    )
+    hazard = HazardCurve.read(path)
+    rates = -np.log1p(-np.array(chances)) / 50.0
+    assert hazard.rate_of(np.array(levels[:7]) * G) == pytest.approx(rates[:7], rel=1e-8)
+    # The line from 0.8 g to 1 g goes on: the curve would never end with that of the plateau at its end.
+    assert hazard.rate_of(1.2 * G) < 0.7 * rates[-1]
 
 
 @pytest.mark.parametrize(
@@ -437,6 +452,49 @@ def test_survival_is_what_the_rate_and_the_curve_say() -> None:
         fitted.survival(0.0)
 
 
+def test_a_survival_of_one_block_of_several_is_likelier_than_of_their_mean() -> None:
+    """Of a weak and a strong block the strong one stands: what each does alone says how probably."""
+    blocks = [
+        rocking.Block.from_parameters(p=p, alpha=alpha, restitution=0.9) for p, alpha in ((3.0, 0.08), (1.5, 0.35))
+    ]
+    pulses = [rocking.pulses.one_sine(1.0, f) for f in np.linspace(0.5, 2.0, 25)]
+    hazard = HazardCurve([0.01, 0.1, 1.0, 10.0, 100.0], [9e-1, 1e-1, 1e-2, 1e-4, 1e-8])
+    options = {"levels": np.geomspace(0.1, 60.0, 40)}
+    both = rocking.fragility(blocks, pulses, **options).survival(2000.0, hazard)
+    alone = [rocking.fragility(block, pulses, **options).survival(2000.0, hazard) for block in blocks]
+    true = 0.5 * sum(one.probability for one in alone)
+    assert both.probability < 0.05 < true < both.most_probable
+    assert not both.contradicts
+    assert alone[0].contradicts
+    assert "if one of them has stood all the time" in both.summary()
+    assert "if one of them" not in alone[0].summary()
+
+
+@pytest.mark.parametrize(("a", "b"), [(-1.0, 1.5), (2.0, 0.7), (-6.0, 9.0), (20.0, 2.0), (-20.0, 1.0)])
+def test_a_block_of_which_the_intensity_alone_decides_stands_as_quadrature_says(a: float, b: float) -> None:
+    hazard = HazardCurve([0.5, 1.0, 2.0, 4.0, 8.0], [5e-2, 2e-2, 6e-3, 1.2e-3, 1.5e-4])
+    low, high = (a + b * math.log(x) for x in hazard.intensity[[0, -1]])
+
+    def integrand(z: mpmath.mpf) -> mpmath.mpf:
+        return mpmath.npdf(z) * mpmath.exp(-100.0 * float(hazard.rate_of(math.exp((float(z) - a) / b))))
+
+    corners = [a + b * math.log(x) for x in hazard.intensity]
+    expected = mpmath.ncdf(low) * mpmath.exp(-5.0) + mpmath.ncdf(-high) + mpmath.quad(integrand, corners)
+    found = _log_standing(Probit(np.array([a]), np.array([b])), hazard, 100.0)
+    assert found[0, 0] == pytest.approx(float(mpmath.log(expected)), abs=1e-5)
+
+
+def test_motions_beyond_the_hazard_curve_contradict_nothing() -> None:
+    fitted = fragility_with(0.53 * G, 0.5)
+    found = fitted.survival(10_000.0, HazardCurve([0.005 * G, 0.05 * G], [5e-2, 1e-2]))
+    assert found.interval[1] < 0.05
+    assert found.most_probable > 0.99
+    assert not found.contradicts
+    assert "100 % of the rate is from above the hazard curve" in found.summary()
+    assert "(its line extended)" in found.summary()
+    assert found.to_dict()["share_above_hazard_curve"] > 0.99
+
+
 def test_observed_outcomes_make_a_fragility_a_rate_and_a_survival(run, tmp_path: Path) -> None:
     site = tmp_path / "site.csv"
     site.write_text("pga_g,annual_rate\n0.05,0.05\n0.2,0.005\n1.0,0.00005\n")
@@ -548,3 +606,22 @@ def test_an_ensemble_has_its_weights_and_its_model_on_the_command_line(run, tmp_
     assert "leave --p out" in run(*given, "--p", "3")[2]
     assert "2 blocks, weighted" in run("spectrum", *records[:2], "--ensemble", table)[1]
     assert "2 blocks, weighted" in run("measures", *records[:2], "--ensemble", table)[1]
+
+
+@pytest.mark.parametrize("heading", ["PGA (g),pga_g,overturned", "pga_g,overturned,Overturned"])
+def test_two_columns_of_one_name_are_refused(heading: str, tmp_path: Path) -> None:
+    path = tmp_path / "seen.csv"
+    path.write_text(f"{heading}\n0.1,1,0\n0.2,0,1\n")
+    with pytest.raises(rocking.RockingError, match="several times"):
+        read_observed(path, Measure("pga"))
+    hazard = tmp_path / "hazard.csv"
+    hazard.write_text("pga_g,annual_rate,Annual rate\n0.1,1e-2,1e-3\n0.2,1e-3,1e-4\n")
+    with pytest.raises(InvalidOption, match="annual_rate"):
+        HazardCurve.read(hazard)
+
+
+def test_what_cannot_be_written_for_openquake_is_said(tmp_path: Path) -> None:
+    fitted = fragility_with(3.0, 0.4)
+    for arguments, said in (({"block": "x"}, "Block"), ({"asset_category": 3}, "asset_category")):
+        with pytest.raises(rocking.RockingError, match=said):
+            fitted.to_nrml(tmp_path / "model.xml", **arguments)

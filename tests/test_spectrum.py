@@ -209,3 +209,14 @@ def test_weights_count_over_each_other_however_large_or_small(scale):
     blocks = rocking.Blocks(p=[2.0, 3.0, 4.0], alpha=0.2, restitution=0.9)
     found = rocking_spectrum(blocks, PULSES[0], p=[2.0], weights=scale * np.array([1.0, 1.0, 0.0]))
     assert found.weight.values.tolist() == [1.5, 1.5, 0.0]
+
+
+def test_a_line_goes_along_its_abscissa_in_whatever_order_p_was_given():
+    def lines(p):
+        found = rocking_spectrum(rocking.Blocks.grid(alpha=[0.1, 0.2], p=p, restitution=[0.9]), PULSES)
+        return [line.get_xydata() for axes in found.plot().axes for line in axes.get_lines()]
+
+    sorted_, mixed = lines([1.0, 2.0, 4.0]), lines([4.0, 1.0, 2.0])
+    assert len(mixed) == len(sorted_) > 4
+    for one, other in zip(sorted_, mixed, strict=True):
+        np.testing.assert_array_equal(one, other)

@@ -86,7 +86,8 @@ def critical_scale(
     InvalidMotion
         If the motion is no `Motion`.
     InvalidOption
-        If there is none, the block overturns at the lower scale, or not at the higher one, or a scale is not positive.
+        If there is none, the block overturns at the lower scale, or not at the higher one, or the scales are not
+        positive and in this order.
 
     Notes
     -----
@@ -106,6 +107,8 @@ def critical_scale(
     if one_motion(motion) is None:
         raise InvalidOption("there is no {} to scale: give one", "motion")
     least, most = (checks.positive(value, name, InvalidOption) for value, name in ((low, "low"), (high, "high")))
+    if least >= most:
+        raise InvalidOption(f"{{}} = {least:g} must be below {{}} = {most:g}", "low", "high", value=low)
 
     def response(scale: float) -> Response:
         return simulate(

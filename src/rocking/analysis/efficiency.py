@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 
 from rocking import checks
 from rocking.analysis.incremental import incremental_dynamic_analysis
-from rocking.analysis.levels import REVERSED_TOO, mean_one, pooled, units_of, values_of
-from rocking.arrays import Floats, Integers
+from rocking.analysis.levels import REVERSED_TOO, families_of, mean_one, pooled, units_of, values_of
+from rocking.arrays import Flags, Floats, Integers
 from rocking.body import Bodies, Body
 from rocking.constants import Model
 from rocking.errors import InvalidOption
@@ -87,7 +87,8 @@ def compare_measures(
     distribution of x, and the less, the more efficient the measure. The interval of beta is that of a normal sample.
     Over several blocks beta is pooled from the deviations from each block's own mean; a measure that is to serve them
     all must also have a small deviation from one mean. Both have the same degrees of freedom, those of the motions:
-    blocks share these, so that more blocks are no larger sample.
+    blocks share these, so that more blocks are no larger sample. Of motions that are multiples of one another the first
+    counts, since all of them overturn a block at one intensity.
 
     References
     ----------
@@ -127,10 +128,15 @@ def compare_measures(
     intensity = np.stack(
         [factors * values_of(shaken, measure)[:, None] / units_of(many, measure, model) for measure in measures]
     )
-    if np.any(np.isfinite(level).sum(axis=0)[shares > 0.0] < 2):
-        raise InvalidOption("fewer than two motions overturn a block, however strong; a dispersion needs more")
+    families = families_of(shaken)
+    is_first = np.isin(np.arange(len(shaken)), np.unique(families, return_index=True)[1])
+    if np.any(np.isfinite(level[is_first]).sum(axis=0)[shares > 0.0] < 2):
+        raise InvalidOption(
+            "fewer than two motions that are not multiples of one another overturn a block, however strong; a "
+            "dispersion needs more"
+        )
     named_motions = {name: scaled[name] for name in ("motion", "vertical") if name in scaled.coords}
-    found = _dataset(measures, intensity, named_motions, shares)
+    found = _dataset(measures, intensity, named_motions, shares, is_first)
     about = {"blocks": pooled(blocks, weights), "model": model, "damping": damping}
     return MeasureComparison(found.assign_attrs(about, sides_differ=scaled.sides_differ))
 
@@ -223,12 +229,19 @@ class MeasureComparison(DatasetResult):
 
 
 def _dataset(
-    measures: Sequence[Measure], intensity: Floats, motions: dict[str, xr.DataArray], shares: Floats
+    measures: Sequence[Measure],
+    intensity: Floats,
+    motions: dict[str, xr.DataArray],
+    shares: Floats,
+    is_first: Flags,
 ) -> xr.Dataset:
-    """Intensities at overturning and their dispersions; `shares` are the weights of the blocks, 1 in the mean."""
+    """Intensities at overturning and their dispersions.
+
+    `shares` are the weights of the blocks, 1 in the mean; only motions that are the first of their kind count.
+    """
     import xarray as xr
 
-    logarithm = np.log(intensity)
+    logarithm = np.where(is_first[:, None], np.log(intensity), np.nan)
     weight = np.where(np.isfinite(logarithm[0]), shares, 0.0)
     count = np.isfinite(logarithm[0]).sum(axis=0)
     # Motions are what is drawn: those of several blocks are the same.

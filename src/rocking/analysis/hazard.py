@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import re
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from rocking import checks
 from rocking.analysis.fragility.lognormal import Probit
-from rocking.arrays import Floats, as_asked
+from rocking.arrays import Floats, Integers, as_asked
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import IntensityName, Measure, intensities
@@ -48,6 +49,9 @@ _DRAWN: Final = (1e-200, 1e200)
 _QUANTILES: Final = (0.16, 0.5, 0.84)
 
 _ROOT: Final = math.sqrt(0.5)
+
+#: Share by which the rate at the end of a plateau is lowered.
+_ALMOST: Final = 1e-9
 
 _POE: Final = re.compile(r"poe-([0-9.eE+-]+)")
 
@@ -241,6 +245,11 @@ def heading_of(cell: str) -> str:
     return re.sub(r"[^a-z0-9]+", "_", cell.lower().replace("^", "")).strip("_")
 
 
+def doubled_among(columns: Sequence[str], read: Container[str]) -> list[str]:
+    """Names of columns, of those that are read, which are there several times."""
+    return [name for name in dict.fromkeys(columns) if name in read and columns.count(name) > 1]
+
+
 def _from_table(lines: list[str], period: float | None) -> tuple[Floats, Floats, Measure]:
     """Intensities (SI), annual rates and measure of a table of two columns; lines that begin with # are remarks."""
     (_, header), *rows = csv_rows("\n".join("" if line.lstrip().startswith("#") else line for line in lines)) or [
@@ -248,7 +257,7 @@ def _from_table(lines: list[str], period: float | None) -> tuple[Floats, Floats,
     ]
     heading = [heading_of(cell) for cell in header]
     found = [cell for cell in heading if cell in HEADINGS]
-    if len(found) != 1 or "annual_rate" not in heading:
+    if len(found) != 1 or heading.count("annual_rate") != 1:
         raise InvalidOption(
             f"a hazard curve needs a heading with annual_rate and one of {', '.join(HEADINGS)}, "
             f"not {', '.join(header) or 'nothing'}"
@@ -289,8 +298,21 @@ def _from_openquake(lines: list[str], site: int) -> tuple[Floats, Floats, Measur
     # Probabilities that are printed as 0 or 1 say nothing of the rate.
     useful = (exceeded > 0.0) & (exceeded < 1.0)
     rate = -np.log1p(-exceeded[useful]) / years
-    falling = np.append(True, np.diff(np.minimum.accumulate(rate)) < 0.0) if len(rate) else np.zeros(0, dtype=bool)
-    return factor * intensity[useful][falling], rate[falling], measure
+    kept, rate = _corners(rate)
+    return factor * intensity[useful][kept], rate, measure
+
+
+def _corners(rate: Floats) -> tuple[Integers, Floats]:
+    """Points of a curve that hardly falls in places, and its rates there, made to decrease.
+
+    Of a plateau the first point stays, and the last, lowered by almost nothing, unless the curve ends with it: then
+    the line before goes on.
+    """
+    lowest = np.minimum.accumulate(rate)
+    falls = np.diff(lowest) < 0.0
+    first, last = np.append(True, falls)[: len(rate)], np.append(falls, False)[: len(rate)]
+    kept = np.flatnonzero(first | last)
+    return kept, np.where(first, lowest, lowest * (1.0 - _ALMOST))[kept]
 
 
 def log_parts(fits: Probit, hazard: HazardCurve, until: float = math.inf) -> Floats:

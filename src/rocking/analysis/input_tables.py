@@ -12,7 +12,7 @@ from typing import Any, Final, get_args
 import numpy as np
 
 from rocking import checks
-from rocking.analysis.hazard import HEADINGS, heading_of
+from rocking.analysis.hazard import HEADINGS, doubled_among, heading_of
 from rocking.analysis.validation.tested import ShakeTest
 from rocking.arrays import Floats
 from rocking.block import Blocks
@@ -189,7 +189,7 @@ def _motions_of(table: _Table, *, channel: Any, dt: Any, units: Any) -> tuple[Mo
         scale = table.convert(line, row.get("scale") or "1", _finite, "a number")
         step = row.get("dt_s") or ""
         own = row.get("channel"), table.convert(line, step, float, "a number") if step else None, row.get("units")
-        about = {"channel": own[0] or channel, "dt": own[1] or dt, "units": own[2] or units}
+        about = {"channel": own[0] or channel, "dt": dt if own[1] is None else own[1], "units": own[2] or units}
         name, vertical = row["motion"], row.get("vertical") or ""
         try:
             if (key := (name, vertical, *own)) not in read:
@@ -313,6 +313,8 @@ def read_observed(
     columns = tuple(heading_of(cell) for cell in given.columns)
     rows = tuple((line, {heading_of(name): cell for name, cell in row.items()}) for line, row in given.rows)
     table = _Table(path, columns, rows)
+    if doubled := doubled_among(columns, {*HEADINGS, "overturned", "trials", "motion", "group"}):
+        raise table.error(f"each column must be there once, but {' and '.join(doubled)} several times")
     found = [name for name in dict.fromkeys(columns) if name in HEADINGS]
     if "overturned" not in columns or len(found) + ("motion" in columns) != 1:
         raise table.error(

@@ -1,14 +1,40 @@
-"""Names of motions and of curves, from the dataset of an analysis."""
+"""Names of motions and of curves, from the dataset of an analysis, and numbers of what has one label."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Hashable, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from rocking import checks
+from rocking.arrays import Integers
+from rocking.errors import InvalidOption
 from rocking.motion.description import labelled
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+def numbered(labels: Sequence[object]) -> Integers:
+    """Give each label that is new the next number."""
+    places: dict[object, int] = {}
+    return np.array([places.setdefault(label, len(places)) for label in labels], dtype=np.int64)
+
+
+def groups_of(labels: object, name: str, count: int) -> Integers:
+    """Numbers of given labels, one for each of so many; what has None, NaN or no text for a label is on its own."""
+    given = checks.several(labels, name, InvalidOption)
+    if len(given) != count or not all(isinstance(label, Hashable) for label in given):
+        raise InvalidOption(
+            f"{{}} must hold {count} labels, numbers or texts, one for each outcome", name, value=labels
+        )
+    return numbered([(k,) if _is_missing(label) else label for k, label in enumerate(given)])
+
+
+def _is_missing(label: object) -> bool:
+    return label is None or label == "" or (isinstance(label, float) and math.isnan(label))
 
 
 def labels_of(data: xr.Dataset, of: str = "motion", *, with_history: bool = True) -> list[str]:

@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 #: Where only motions as they are were simulated, though the sides of a block differ.
 REVERSED_TOO: Final = "the sides differ, so motions that are reversed (scaled by -1) overturn at other levels"
 
+#: Two motions are one at two scales where they differ by no more than this share of their largest values.
+_ROUNDING: Final = 1e-9
+
 #: From so many changes on, no further ones are looked for in an interval of the grid.
 _MOST: Final = 64
 
@@ -78,6 +81,42 @@ def _pair(sides: Floats) -> str:
 def values_of(motions: Sequence[Motion], measure: Measure) -> Floats:
     """Return what each motion alone measures, in SI units."""
     return np.array([measure.positive(motion, motion.name) for motion in motions])
+
+
+def families_of(motions: Sequence[Motion]) -> Integers:
+    """Whole numbers, the same for motions that are multiples of one another: together they tell no more than one."""
+    times, values = zip(*map(_as_rows, motions), strict=True)
+    # Neither of these changes with the scale or the sign: only motions that are alike in both are compared in full.
+    alike = np.array([(np.abs(row).mean(), np.sqrt((row * row).mean())) for row in values])
+    firsts: list[int] = []
+    families = np.empty(len(motions), dtype=np.int64)
+    for k in range(len(motions)):
+        near = np.flatnonzero(np.all(np.abs(alike[firsts] - alike[k]) <= _ROUNDING, axis=1))
+        same = (
+            int(j) for j in near if _is_same(times[firsts[j]], times[k]) and _is_multiple(values[firsts[j]], values[k])
+        )
+        families[k] = next(same, len(firsts))
+        if families[k] == len(firsts):
+            firsts.append(k)
+    return families
+
+
+def _as_rows(motion: Motion) -> tuple[Floats, Floats]:
+    """Breakpoints of a motion and its vertical component, and their coefficients over the largest."""
+    parts = [part for part in (motion, motion.vertical) if part is not None]
+    values = np.concatenate([part.coefficients.ravel() for part in parts])
+    return np.concatenate([part.breakpoints for part in parts]), values / np.abs(values).max()
+
+
+def _is_same(times: Floats, others: Floats) -> bool:
+    return times.shape == others.shape and np.allclose(times, others, rtol=_ROUNDING, atol=0.0)
+
+
+def _is_multiple(row: Floats, other: Floats) -> bool:
+    if row.shape != other.shape:
+        return False
+    factor = (row @ other) / (row @ row)
+    return bool(np.abs(other - factor * row).max() <= _ROUNDING)
 
 
 def units_of(blocks: Bodies, measure: Measure, model: Model) -> Floats:

@@ -18,8 +18,9 @@ from rocking.arrays import Flags, Floats, Integers
 from rocking.block import Block, Blocks, one_block
 from rocking.constants import VERSION, Model
 from rocking.engine import OUTCOME, Setup, simulate_each
-from rocking.errors import InvalidOption
+from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion.motion import Motion
+from rocking.motion.named import one_motion
 from rocking.named_pulses import pulse_family
 from rocking.progress import Progress
 from rocking.result import DatasetResult, table_of_some, variable
@@ -65,6 +66,11 @@ _NAMES: Final = {
 #: given as functions.
 PULSES: Final = ("sine", "half-sine", "one-sine", "one-cosine", "ricker", "mavroeidis-papageorgiou")
 
+#: Times at which two motions are compared to know whether they are of one shape, and by which share they may differ:
+#: those of samples at a constant step do.
+_PHASES: Final = 400
+_SAME: Final = 0.02
+
 #: Share of a map that is written as a number.
 _LEAST_SHARE: Final = 1e-3
 
@@ -90,7 +96,8 @@ def overturning_map(
     pulse : str or callable
         "sine" (give `cycles`), "half-sine", "one-sine", "one-cosine", "ricker" (`kind`) or "mavroeidis-papageorgiou"
         (`phase`, `gamma`); or a function of amplitude (m/s^2) and frequency (Hz) that returns a motion proportional to
-        the amplitude.
+        the amplitude, and of one shape: at twice the frequency it is over in half the time. It is called at the ends
+        of the frequencies, of which one would do.
     amplitudes : array_like, shape (m,)
         Increasing amplitudes, over the smallest acceleration that lifts the block: g tan(alpha), in the linear model
         g alpha. The amplitude of a Mavroeidis-Papageorgiou pulse is here its peak acceleration.
@@ -115,7 +122,10 @@ def overturning_map(
     Raises
     ------
     InvalidOption
-        If an argument is out of its range, or the block never comes to rest (restitution 1).
+        If an argument is out of its range, the shape of a function's motion changes with the frequency or the
+        amplitude, or the block never comes to rest (restitution 1).
+    InvalidMotion
+        If a function returns no motion.
 
     Notes
     -----
@@ -152,6 +162,9 @@ def overturning_map(
         )
     slowest = min(side.p for side in block.sides)
     unit = _unit_pulse(pulse, slowest / (2.0 * math.pi), parameters)
+    if callable(pulse):
+        for ratio in {ratios[0], ratios[-1]}:
+            _check_shape(unit, pulse, slowest / (2.0 * math.pi), float(ratio))
     chattering = Certified(width * unit.duration)
     setup = Setup(_resized(block, ratios), model, chattering)
     count = None if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
@@ -342,12 +355,40 @@ def _unit_pulse(pulse: str | Callable[[float, float], Motion], frequency: float,
             raise InvalidOption(
                 f"a {{}} given as a function takes no {', '.join(parameters)}: bind them to it", "pulse"
             )
-        return pulse(1.0, frequency)
+        return _called(pulse, 1.0, frequency)
     family = pulse_family(pulse)
     if family.name not in PULSES:
         raise InvalidOption(f"{{}} must be one of {', '.join(PULSES)}, or a function, not {pulse!r}", "pulse")
     unit = family.motion({"amplitude": 1.0, "frequency": frequency} | parameters)
     return unit.scaled_to(1.0) if family.is_of_velocity else unit
+
+
+def _called(pulse: Callable[[float, float], Motion], amplitude: float, frequency: float) -> Motion:
+    motion = one_motion(pulse(amplitude, frequency))
+    if motion is None:
+        raise InvalidMotion(
+            f"the pulse of amplitude {amplitude:g} and frequency {frequency:g} is None; return a Motion"
+        )
+    return motion
+
+
+def _check_shape(unit: Motion, pulse: Callable[[float, float], Motion], frequency: float, ratio: float) -> None:
+    """Refuse a function whose motion is another one than `unit` when it is as many times as fast, and stronger."""
+    stronger = 1.0 + ratio
+    other = _called(pulse, stronger, ratio * frequency)
+    phases = (np.arange(_PHASES) + 0.5) / _PHASES
+    first, second = (
+        (motion.acceleration(phases * motion.duration) / factor, motion.duration * times)
+        for motion, factor, times in ((unit, 1.0, 1.0), (other, stronger, ratio))
+    )
+    apart = np.abs(second[0] - first[0]).mean() > _SAME * np.abs(first[0]).max()
+    if apart or abs(second[1] - first[1]) > _SAME * first[1]:
+        raise InvalidOption(
+            "the {} must have one shape: a function of amplitude and frequency whose motion is proportional to the "
+            f"amplitude, and over in half the time at twice the frequency; that of {frequency:g} Hz is another one "
+            f"than that of {ratio * frequency:g} Hz",
+            "pulse",
+        )
 
 
 def _resized(block: Block, ratios: Floats) -> Blocks:

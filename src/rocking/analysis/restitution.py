@@ -44,6 +44,9 @@ _SAME: Final = 1e-4
 #: Least factor that is thinkable.
 _LEAST: Final = 0.05
 
+#: Parameters of the laws with the most.
+_MOST_PARAMETERS: Final = 3
+
 #: Logarithm of the factor, and its variance, from the speeds of impact and the parameters of a law.
 _Moments = Callable[[Floats, Floats], tuple[Floats, Floats]]
 
@@ -217,9 +220,17 @@ def compare_restitution(
     error = checks.positive(timing, "timing", InvalidOption, "s")
     checks.one_of(model, "model", InvalidOption, MODELS)
     speed_of = _speeds(one, model)
-    made = [_factors(_times(each, k), speed_of, error) for k, each in enumerate(tests)]
+    given = checks.several(tests, "tests", InvalidOption)
+    made = [_factors(_times(each, k), speed_of, error) for k, each in enumerate(given)]
     if not made:
         raise InvalidOption("give at least one of {}: the times of its impacts, s", "tests")
+    known = sum(len(test.logs) for test in made)
+    if known <= _MOST_PARAMETERS:
+        raise InvalidOption(
+            f"laws have up to {_MOST_PARAMETERS} parameters, and the {{}} tell {counted(known, 'factor')} of "
+            "restitution, one for each impact between two others: give more impacts",
+            "tests",
+        )
     fits = [_fitted(name, law, made) for name, law in _laws(one).items()]
     least = min(fit.criterion for fit in fits)
     shares = np.exp([-0.5 * (fit.criterion - least) for fit in fits])
@@ -359,10 +370,11 @@ def _falling(values: Floats, speeds: Floats) -> tuple[Floats, Floats]:
 
 
 def _starts_of_falling(speeds: Floats, factors: Floats) -> list[list[float]]:
-    slope, largest = np.polyfit(speeds, factors, 1)
-    low = float(factors.min())
-    falls = max(0.0, -float(slope))
-    return [[float(largest), falls * more, low * below] for more in (1.0, 2.0) for below in (0.8, 1.0)]
+    apart = speeds - speeds.mean()
+    # Speeds that are all alike tell no slope.
+    falls = max(0.0, -float(apart @ factors) / max(float(apart @ apart), 1e-12 * float(speeds @ speeds)))
+    low, largest = float(factors.min()), float(factors.mean() + falls * speeds.mean())
+    return [[largest, falls * more, low * below] for more in (1.0, 2.0) for below in (0.8, 1.0)]
 
 
 def _drawn(values: Floats, speeds: Floats) -> tuple[Floats, Floats]:

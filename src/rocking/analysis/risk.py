@@ -245,13 +245,7 @@ class Risk(DrawnResult):
             f"probability in {counted(years, 'year')}", between,
             f"{self.hazard.measure.label} below which 16, 50, 84 % of the rate arises",
         ]  # fmt: skip
-        notes = [
-            f"{one.limit_state}: {100 * share:.{0 if share > 0.1 else 1}f} % of the rate is from {what} the hazard "
-            "curve"
-            for one in self.rates
-            for share, what in ((one.below, "below"), (one.above, "above"))
-            if share > 0.01
-        ]
+        notes = [note for one in self.rates for note in beyond_notes(one)]
         notes += [
             f"{one.limit_state}: the upper end, {one.interval[1]:.2g} a year, is above the highest rate of the hazard "
             "curve: it comes from weaker motions, to which the first line of the curve is extended; more motions "
@@ -349,6 +343,15 @@ def risk_of(curves: Sequence[FragilityCurve], hazard: HazardCurve, measure: Meas
     return Risk(tuple(_rate(curve, hazard) for curve in curves), tuple(curves), hazard, description)
 
 
+def beyond_notes(rate: Rate) -> list[str]:
+    """Say how much of a rate is from where the lines of a hazard curve are only extended."""
+    return [
+        f"{rate.limit_state}: {100 * share:.{0 if share > 0.1 else 1}f} % of the rate is from {what} the hazard curve"
+        for share, what in ((rate.below, "below"), (rate.above, "above"))
+        if share > 0.01
+    ]
+
+
 def check_measure(hazard: HazardCurve, measure: Measure) -> None:
     """Raise an InvalidOption unless a hazard curve is of the measure that a fragility is against."""
     if measure != hazard.measure:
@@ -365,7 +368,7 @@ def _rate(curve: FragilityCurve, hazard: HazardCurve) -> Rate:
     def logarithm(fits: Probit) -> Floats:
         return np.asarray(np.logaddexp.reduce(log_parts(fits, hazard), axis=1)[:, None])
 
-    low, high = interval_of(curve, logarithm, logarithm(curve.fitted)[0], _gradient(logarithm, curve.fitted))
+    low, high = interval_of(curve, logarithm, logarithm(curve.fitted)[0], gradient_of(logarithm, curve.fitted))
     with np.errstate(over="ignore", under="ignore"):
         rate, lower, upper = (float(np.exp(value)) for value in (total, low[0], high[0]))
     return Rate(
@@ -377,7 +380,7 @@ def _rate(curve: FragilityCurve, hazard: HazardCurve) -> Rate:
     )
 
 
-def _gradient(quantity: Any, fitted: Probit) -> Floats:
+def gradient_of(quantity: Any, fitted: Probit) -> Floats:
     """Change of a quantity with intercept and slope, shape (2, n)."""
     rows = []
     for name in Probit._fields:

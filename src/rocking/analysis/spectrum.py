@@ -272,7 +272,9 @@ class RockingSpectrum(DatasetResult):
         from rocking.plot.spectrum import SpectrumCurves, spectrum_figure
 
         checks.one_of(against, "against", InvalidOption, get_args(Abscissa))
-        named_curves = curves_of(self.data)
+        # A line goes along its abscissa, in whatever order p was given.
+        data = self.data.sortby("p") if "p" in self.data.dims else self.data
+        named_curves = curves_of(data)
         alone = len(named_curves) == 1
         curves = [
             SpectrumCurves(
@@ -284,7 +286,7 @@ class RockingSpectrum(DatasetResult):
             for name, one in named_curves
         ]
         return spectrum_figure(
-            x=self.data[against].values,
+            x=data[against].values,
             curves=curves,
             fractiles=self.data.fractile.values.tolist(),
             motions=labels_of(self.data),

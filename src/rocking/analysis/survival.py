@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from rocking import checks
-from rocking.analysis.fragility.curve import FragilityCurve, in_units
+from rocking.analysis.fragility.curve import FragilityCurve, in_units, interval_of
+from rocking.analysis.fragility.lognormal import Probit
 from rocking.analysis.hazard import HazardCurve, hazard_line
-from rocking.analysis.risk import Rate
+from rocking.analysis.risk import Rate, beyond_notes, gradient_of
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
@@ -29,12 +30,21 @@ _CHANCES: Final = (0.05, 0.16, 0.5, 0.84, 0.95)
 _SHOWN: Final = (0.01, 0.999)
 _POINTS: Final = 200
 
+#: An integral over a normal distribution: its farthest ends, and its points.
+_FARTHEST: Final = 38.0
+_STEPS: Final = np.linspace(0.0, 1.0, 4001)
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Survival(DrawnResult):
     """A limit state that was not exceeded in a time, and what that says of the shaking; from `Fragility.survival`.
 
     Its figure has the largest rates that fit with the survival, and the hazard curve beside them.
+
+    A curve of several blocks (an ensemble that stands for one which is not quite known, say) does not tell which part
+    of its dispersion is theirs. Rates and `probability` are then those of motions that each meet another of the blocks;
+    if one of them has stood all the time, it may well be a strong one: `most_probable` counts all of the dispersion as
+    the blocks', and the truth is between the two.
 
     Attributes
     ----------
@@ -52,6 +62,8 @@ class Survival(DrawnResult):
         Annual rates of intensities at the site.
     rate : Rate or None
         Annual rate of the limit state under that hazard curve.
+    several_blocks : bool
+        Whether outcomes of several blocks count together in the curve.
     """
 
     curve: FragilityCurve
@@ -61,6 +73,7 @@ class Survival(DrawnResult):
     confidence: float
     hazard: HazardCurve | None
     rate: Rate | None
+    several_blocks: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "years", checks.positive(self.years, "years", InvalidOption))
@@ -78,12 +91,18 @@ class Survival(DrawnResult):
 
     @property
     def largest_rate(self) -> Floats:
-        """Annual rates of motions of each `intensity` or more above which the limit would have been exceeded."""
+        """Annual rates of motions of each `intensity` or more above which the limit would have been exceeded.
+
+        Of several blocks, if each motion met another of them.
+        """
         return self.curve.largest_rate(self.intensity, self.years, self.confidence)
 
     @property
     def probability(self) -> float:
-        """Probability, under the hazard curve, that the limit is not exceeded in the time; NaN without one."""
+        """Probability, under the hazard curve, that the limit is not exceeded in the time; NaN without one.
+
+        Of several blocks the least it can be: if each motion met another of them.
+        """
         return math.nan if self.rate is None else self.rate.survival(self.years)
 
     @property
@@ -95,9 +114,29 @@ class Survival(DrawnResult):
         return math.exp(-high * self.years), math.exp(-low * self.years)
 
     @property
+    def most_probable(self) -> float:
+        """The largest `probability` that fits with all that is known: with the interval, the hazard curve, the blocks.
+
+        It is at the upper end of the interval, and without motions below the hazard curve's first point or above its
+        last, where its lines are only extended. Of several blocks it is that of one which has stood all the time, and
+        of which the intensity alone decides whether it falls: the integral of exp(-rate(x) years) dP(x).
+        """
+        if self.rate is None or self.hazard is None:
+            return math.nan
+        if not self.several_blocks:
+            return math.exp(-self.rate.interval[0] * (1.0 - self.rate.below - self.rate.above) * self.years)
+        hazard, fitted = self.hazard, self.curve.fitted
+
+        def logarithm(fits: Probit) -> Floats:
+            return _log_standing(fits, hazard, self.years)
+
+        _, high = interval_of(self.curve, logarithm, logarithm(fitted)[0], gradient_of(logarithm, fitted))
+        return math.exp(min(float(high[0]), 0.0))
+
+    @property
     def contradicts(self) -> bool:
-        """Whether the hazard curve makes the survival less probable than 1 - confidence, all through its interval."""
-        return self.rate is not None and self.interval[1] < 1.0 - self.confidence
+        """Whether the survival, at its `most_probable`, is less probable than 1 - confidence."""
+        return self.most_probable < 1.0 - self.confidence
 
     def summary(self) -> str:
         measure, share = self.measure, f"{100.0 * self.confidence:g} %"
@@ -111,17 +150,24 @@ class Survival(DrawnResult):
         if self.hazard is not None:
             rates = self.hazard.rate_of(self.intensity)
             header += ["hazard curve, a year", "too often"]
-            columns += [[f"{rate:.2g}" for rate in rates], (rates > self.largest_rate).tolist()]
+            low, high = self.hazard.intensity[[0, -1]]
+            held = (low <= self.intensity) & (self.intensity <= high)
+            told = ["" if inside else " (its line extended)" for inside in held]
+            columns += [
+                [f"{rate:.2g}{said}" for rate, said in zip(rates, told, strict=True)],
+                (rates > self.largest_rate).tolist(),
+            ]
         return "\n".join(
             [
                 f"{self.curve.limit_state}: not in {counted(self.years, 'year')}; intensity: {measure.label}",
                 f"most likely no motion reached {in_units(self.unlikely, self.measure)}: one that did would have "
                 f"exceeded the limit with {share}",
                 f"largest rates of motions of an intensity or more; with larger ones the limit would have been "
-                f"exceeded with {share}",
+                f"exceeded with {share}" + (", if each met another of the blocks" if self.several_blocks else ""),
                 "",
                 text_table(header, [*map(list, zip(*columns, strict=True))]),
                 *([] if self.hazard is None else ["", self._verdict(self.hazard)]),
+                *([] if self.rate is None else beyond_notes(self.rate)),
             ]
         )
 
@@ -132,11 +178,16 @@ class Survival(DrawnResult):
             f"under the hazard curve {hazard.name!r} the probability of {counted(self.years, 'year')} without it is "
             f"{chance} ({100.0 * self.curve.confidence:g} % interval {between})"
         )
+        if self.several_blocks:
+            text += (
+                " if each motion met another of the blocks, and no more than "
+                f"{self.most_probable:.2g} if one of them has stood all the time"
+            )
         least = f"{1.0 - self.confidence:.3g}"
         if self.probability >= 1.0 - self.confidence:
             return f"{text}, so they do not contradict each other"
         if not self.contradicts:
-            return f"{text}; below {least} they would contradict each other, which the interval does not settle"
+            return f"{text}; below {least} they would contradict each other, which is not settled"
         return (
             f"{text}; all of that is below {least}, so they contradict each other: the hazard curve is too high, or "
             "the block stronger than its fragility, or younger"
@@ -159,6 +210,9 @@ class Survival(DrawnResult):
             "hazard_annual_rate": self.hazard.rate_of(self.intensity),
             "probability": self.probability,
             "probability_interval": [*self.interval],
+            "most_probable": self.most_probable,
+            "share_below_hazard_curve": math.nan if self.rate is None else self.rate.below,
+            "share_above_hazard_curve": math.nan if self.rate is None else self.rate.above,
             "contradicts": self.contradicts,
         }
 
@@ -185,3 +239,22 @@ class Survival(DrawnResult):
     def _headline(self) -> str:
         time, never = counted(self.years, "year"), in_units(self.unlikely, self.measure)
         return f"{self.curve.limit_state}: not in {time}; most likely never {never} or more"
+
+
+def _log_standing(fits: Probit, hazard: HazardCurve, years: float) -> Floats:
+    """Logarithms of the integral of exp(-rate(x) years) dP(x), shape (fits, 1).
+
+    Motions below the hazard curve's first point, or above its last, add nothing.
+    """
+    from scipy.special import log_ndtr
+
+    a, b = (values[:, None] for values in fits)
+    log_x, log_rate = np.log(hazard.intensity), np.log(hazard.rate)
+    with np.errstate(all="ignore"):
+        first, last = (np.clip(a + b * end, -_FARTHEST, _FARTHEST) for end in log_x[[0, -1]])
+        z = first + (last - first) * _STEPS
+        density = -0.5 * z * z - years * np.exp(np.interp((z - a) / b, log_x, log_rate))
+        between = np.logaddexp(density[:, 1:], density[:, :-1]) + np.log(np.diff(z) * math.sqrt(0.125 / math.pi))
+        parts = np.column_stack([log_ndtr(first) - years * hazard.rate[0], between, log_ndtr(-last)])
+    # Under a curve that does not rise, what falls at all falls under the weakest motions.
+    return np.where(b > 0.0, np.logaddexp.reduce(parts, axis=1)[:, None], log_ndtr(-a))

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from rocking.analysis.fragility.curve import Band, FragilityCurve, fitted_curve, passed
 from rocking.analysis.fragility.fit import OVERTURNING, fit_fragility, of_polarities, weights_of
 from rocking.analysis.fragility.result import Fragility
-from rocking.analysis.levels import only_block, pooled, units_of, values_of
+from rocking.analysis.levels import families_of, only_block, pooled, units_of, values_of
 from rocking.arrays import Floats
 from rocking.ensemble import Product, body_coordinates, verticals_of
 from rocking.errors import InvalidOption
@@ -63,7 +63,7 @@ def pooled_fragility(
             counts[name] += passed(ratios, limit, name).sum(axis=2) @ belongs
     x = _intensities(product, measure)[:, :, None] / units
     found = trials.ravel() > 0
-    clusters = np.broadcast_to(np.arange(motions)[:, None, None], x.shape).ravel()[found]
+    clusters = np.broadcast_to(families_of(product.motions)[:, None, None], x.shape).ravel()[found]
     curves = [
         fitted_curve(
             name,
@@ -86,6 +86,7 @@ def pooled_fragility(
         outcomes=None,
         one_way=product.polarity != "both" and not product.bodies.is_symmetric,
         with_vertical=bool(verticals_of(product.motions)),
+        several_blocks=bool(np.count_nonzero(shares) > 1),
     )
 
 
@@ -105,7 +106,7 @@ def block_fragilities(
     intensities = _intensities(store.product, measure).ravel()
     units = units_of(store.product.bodies, measure, store.product.model)
     options: dict[str, Any] = {
-        "clusters": np.repeat(np.arange(motions), scales),
+        "clusters": np.repeat(families_of(store.product.motions), scales),
         "measure": measure,
         "band": Band(confidence=confidence),
     }

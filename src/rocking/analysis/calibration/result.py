@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Sized
 from dataclasses import asdict, astuple, dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final
 
@@ -17,6 +17,7 @@ from rocking.analysis.calibration.search import posterior
 from rocking.analysis.calibration.space import unit_of
 from rocking.analysis.fragility.fit import fragility
 from rocking.analysis.fragility.result import Fragility
+from rocking.analysis.labels import groups_of
 from rocking.analysis.spectrum import RockingSpectrum, rocking_spectrum
 from rocking.arrays import Flags, Floats
 from rocking.block import Blocks
@@ -174,7 +175,7 @@ class Calibration(DrawnResult, TableResult):
         >>> bool(found.predict(rocking.pulses.one_sine(9.0, 1.0))[0] > 0.5)
         True
         """
-        if not isinstance(motions, Motion) and not len(motions):
+        if isinstance(motions, Sized) and not isinstance(motions, Motion) and not len(motions):
             return np.empty(0)
         outcomes = overturned_under(self.blocks, motions, self.model, threads, progress)
         return blurred(expected_share(self.weights @ outcomes, self.diagnostics.effective), self.lapse)
@@ -388,9 +389,6 @@ def overturned_under(
 
 def group_labels(groups: Sequence[object] | None, count: int, folds: int) -> NDArray[np.int64]:
     """Give each group a number from 0; without groups each motion is its own."""
-    names = [str(label) for label in (range(count) if groups is None else groups)]
-    if len(names) != count:
-        raise InvalidOption(f"{{}} must hold one label for each of the {count} motions, not {len(names)}", "groups")
-    labels = np.unique(names, return_inverse=True)[1]
+    labels = groups_of(range(count) if groups is None else groups, "groups", count)
     checks.whole(folds, "folds", InvalidOption, 2, int(labels.max()) + 1)
-    return np.asarray(labels, dtype=np.int64)
+    return labels

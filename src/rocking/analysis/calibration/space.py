@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final, Literal
@@ -179,7 +179,9 @@ def unit_of(estimate: str) -> str:
 
 def is_known(given: Any) -> bool:
     """Whether a parameter has a value: a number, or a pair of equal ones."""
-    return np.ndim(given) == 0 or (np.shape(given) == (2,) and given[0] == given[1])
+    if not isinstance(given, Sequence | np.ndarray):
+        return True
+    return len(given) == 2 and all(np.ndim(end) == 0 for end in given) and bool(given[0] == given[1])
 
 
 def known_value(value: object, name: str) -> float:

@@ -12,8 +12,17 @@ from numpy.typing import ArrayLike, NDArray
 from rocking import checks
 from rocking.analysis.fragility.curve import Band, fitted_curve, passed
 from rocking.analysis.fragility.result import Fragility
-from rocking.analysis.levels import mean_one, only_block, pooled, simulate_levels, units_of, values_of
-from rocking.arrays import Floats, Integers
+from rocking.analysis.labels import groups_of
+from rocking.analysis.levels import (
+    families_of,
+    mean_one,
+    only_block,
+    pooled,
+    simulate_levels,
+    units_of,
+    values_of,
+)
+from rocking.arrays import Floats
 from rocking.body import Bodies, Body
 from rocking.constants import Model
 from rocking.engine import require_finished
@@ -82,7 +91,8 @@ def fragility(
         How much the outcomes of each block count, one number for each; by default all alike. A block of weight 0 is
         simulated, and is none of the data.
     band : Band
-        How intervals and bands are made; the clusters are the motions, each with all its outcomes.
+        How intervals and bands are made; the clusters are the motions, each with all its outcomes. Motions that are
+        multiples of one another, as one record scaled to several levels beforehand, are one cluster.
     threads : int, optional
         As for `simulate_many`.
     progress : bool, optional
@@ -140,7 +150,7 @@ def fragility(
     table = table.transpose("level", "motion", "block", "polarity")
     ratio = table.peak_rotation.values / slenderness[:, None]
     ratio[table.overturned.values] = np.inf
-    clusters = np.broadcast_to(np.arange(len(shaken))[None, :, None, None], ratio.shape)
+    clusters = np.broadcast_to(families_of(shaken)[None, :, None, None], ratio.shape)
     x, trials = (np.broadcast_to(each, ratio.shape).ravel() for each in (intensity, shares[:, None]))
     outcomes = _outcomes(table, how, x, ratio, states)
     if weights is not None:
@@ -165,6 +175,7 @@ def fragility(
         outcomes=outcomes,
         one_way=polarity != "both" and not many.is_symmetric,
         with_vertical="vertical" in table.coords,
+        several_blocks=bool(np.count_nonzero(shares) > 1),
     )
 
 
@@ -229,8 +240,9 @@ def fit_fragility(
         from their names. One without a name is called "overturning".
     trials : array_like
         Number of trials at each intensity.
-    clusters : array_like of int, shape (n,), optional
-        Which outcomes belong together (the motion, for instance), for the bands; by default each is on its own. Fewer
+    clusters : array_like of labels, shape (n,), optional
+        Which outcomes belong together (the motion, for instance), for the bands; by default each is on its own, as is
+        one whose label is NaN, None or empty. Fewer
         than three clusters of several outcomes bound nothing: then intervals go from 0 to infinity.
     measure : {"pga", "pgv", "pga_ratio", "pgv_ratio"} or Measure
         What the intensity is, as for `fragility`.
@@ -283,7 +295,7 @@ def fit_fragility(
         raise InvalidOption(f"{{}} must be from {low:g} to {high:g}: check its units", "intensity", value=intensity)
     count = _whole(trials, "trials", x.size, 1.0, _MOST_TRIALS)
     outcomes = _limit_states(exceeded if isinstance(exceeded, Mapping) else {"overturning": exceeded}, "exceeded")
-    groups = None if clusters is None else _clusters(clusters, x.size)
+    groups = None if clusters is None else groups_of(clusters, "clusters", x.size)
     _check_band(band)
     curves = [
         fitted_curve(name, (x, _whole(values, "exceeded", x.size, 0.0, count), count), groups, band, how)
@@ -318,11 +330,3 @@ def _whole(values: ArrayLike, name: str, size: int, least: float, most: ArrayLik
         bound = f"{most:g}" if isinstance(most, float) else "the trials"
         raise InvalidOption(f"{{}} must be whole numbers, at least {least:g} and no more than {bound}", name)
     return numbers
-
-
-def _clusters(clusters: ArrayLike, size: int) -> Integers:
-    """Return the number of each label, one for each intensity."""
-    labels = np.asarray(clusters)
-    if labels.shape != (size,):
-        raise InvalidOption(f"{{}} must hold one label for each of the {size} intensities", "clusters")
-    return np.asarray(np.unique(labels, return_inverse=True)[1], dtype=np.int64)

@@ -50,7 +50,8 @@ def write(path: str | Path, function: ET.Element, limit_states: Sequence[str], d
     """Write a model with one fragility function; `model` holds its id, assetCategory and lossCategory."""
     checks.one_of(model["lossCategory"], "loss_category", InvalidOption, get_args(LossCategory))
     root = ET.Element("nrml", {"xmlns": NAMESPACE})
-    element = ET.SubElement(root, "fragilityModel", model | {"id": _name(model["id"], "model_id")})
+    named = {"id": _name(model["id"], "model_id"), "assetCategory": _name(model["assetCategory"], "asset_category")}
+    element = ET.SubElement(root, "fragilityModel", model | named)
     # The manual asks for a brief string in ASCII.
     ET.SubElement(element, "description").text = description.encode("ascii", "replace").decode("ascii")
     ET.SubElement(element, "limitStates").text = " ".join(_name(state, "a limit state") for state in limit_states)

@@ -22,6 +22,7 @@ from rocking.body import Body
 from rocking.constants import STANDARD_GRAVITY, Model
 from rocking.errors import InvalidOption, Message
 from rocking.motion.scaling import Measure
+from rocking.problem import bodies_of
 from rocking.progress import spelled
 from rocking.result import DrawnResult, TableResult
 from rocking.tables import as_written, counted, text_table
@@ -63,6 +64,8 @@ class Fragility(DrawnResult, TableResult):
         Whether sides that differ met motions in one polarity only: reversed, they do something else.
     with_vertical : bool
         Whether a vertical motion was simulated.
+    several_blocks : bool
+        Whether outcomes of several blocks count together.
     source : str
         What a cluster of outcomes comes from: a motion, or, where outcomes were given, a cluster.
     """
@@ -78,6 +81,7 @@ class Fragility(DrawnResult, TableResult):
     outcomes: pd.DataFrame | None
     one_way: bool = False
     with_vertical: bool = False
+    several_blocks: bool = False
     source: str = "motion"
 
     def summary(self) -> str:
@@ -261,7 +265,9 @@ class Fragility(DrawnResult, TableResult):
         """
         curve = self.curve(limit_state)
         rate = None if hazard is None else self.annual_rate(hazard).rate(limit_state)
-        return Survival(curve, self.measure, self.description, years, confidence, hazard, rate)
+        return Survival(
+            curve, self.measure, self.description, years, confidence, hazard, rate, several_blocks=self.several_blocks
+        )
 
     @property
     def range(self) -> tuple[float, float]:
@@ -333,7 +339,10 @@ class Fragility(DrawnResult, TableResult):
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4).to_nrml(f"{folder}/model.xml")
         """
-        chosen = self.block if block is None else block
+        chosen = self.block
+        if block is not None:
+            bodies_of(block)
+            chosen = block
         scale = nrml.scale_of(self.measure, chosen, self.model)
         lifting = None
         if chosen is not None and scale.imt == "PGA" and not self.with_vertical:

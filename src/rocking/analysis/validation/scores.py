@@ -107,7 +107,8 @@ def crps_of_all_alike(observed: Floats) -> _Mean:
 
 def half_mean_difference(points: Floats, weights: Floats) -> float:
     """Half the mean distance of two draws from a distribution, whose points are in order."""
-    return float((weights * points * (2.0 * np.cumsum(weights) - weights - 1.0)).sum())
+    # Points that are all alike have none: from the first on, no rounding remains of what they are.
+    return float((weights * (points - points[0]) * (2.0 * np.cumsum(weights) - weights - 1.0)).sum())
 
 
 def crps(points: Floats, weights: Floats, observed: float) -> float:

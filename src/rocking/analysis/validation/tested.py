@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rocking import checks
+from rocking.analysis.labels import numbered
 from rocking.arrays import Flags, Floats, Integers
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion.motion import Motion
@@ -116,9 +117,9 @@ class Observed:
         return cls(
             overturned=np.array([test.overturned for test in tests], dtype=bool),
             peaks=np.array([math.nan if test.peak_rotation is None else test.peak_rotation for test in tests]),
-            specimens=_numbers(specimens),
-            repetitions=_numbers([*zip(specimens, motions, strict=True)]),
-            clusters=_numbers(belonging),
+            specimens=numbered(specimens),
+            repetitions=numbered([*zip(specimens, motions, strict=True)]),
+            clusters=numbered(belonging),
             names=tuple(dict.fromkeys(specimens)),
             distinct=tuple(distinct),
             which=np.array(which),
@@ -136,12 +137,6 @@ def checked_tests(tests: object) -> list[ShakeTest]:
                 f"{{}} must hold tests, ShakeTest(motion, overturned), not {checks.shown(test)}", "tests", value=test
             )
     return given
-
-
-def _numbers(labels: Sequence[object]) -> Integers:
-    """Give each label that is new the next number."""
-    places: dict[object, int] = {}
-    return np.array([places.setdefault(label, len(places)) for label in labels], dtype=np.int64)
 
 
 def _checked_outcome(given: object) -> bool | None:
