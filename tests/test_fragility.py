@@ -568,7 +568,9 @@ def test_a_block_of_weight_zero_is_none_of_the_data():
     # One motion for each outcome, at intensities that the second block's unit puts elsewhere.
     a, b = (rocking.Block.from_parameters(p=2.0, alpha=alpha, restitution=0.9) for alpha in (0.2, 0.05))
     motions = [
-        rocking.pulses.one_sine(size, f + 0.001 * size) for size in (2.0, 2.5, 3.0, 4.0, 5.0, 6.0) for f in (0.6, 0.8, 1.0, 1.2)
+        rocking.pulses.one_sine(size, f + 0.001 * size)
+        for size in (2.0, 2.5, 3.0, 4.0, 5.0, 6.0)
+        for f in (0.6, 0.8, 1.0, 1.2)
     ]
     both = fragility([a, b], motions, measure="pga_ratio", weights=[1.0, 0.0])
     alone = fragility(a, motions, measure="pga_ratio")
