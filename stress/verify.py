@@ -98,8 +98,9 @@ def _modules(module: str) -> list[Path]:
 
 def _counts(file: Path, package: Path, promise: Promise) -> bool:
     """Whether a file of the package is a source, and of a part that the promise hangs on."""
-    parts = file.relative_to(package).parts
-    return not {"__pycache__", "shipped"} & {*parts} and parts[0] not in promise.above
+    within = file.relative_to(package)
+    above = any(within.is_relative_to(each) for each in promise.above)
+    return not above and not {"__pycache__", "shipped"} & {*within.parts}
 
 
 def _version(library: str) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from oracles import vertical_referee
 
-from promises.promise import ABOVE_ENSEMBLES, Found, Promise
+from promises.promise import OF_NO_SIMULATION, Found, Promise
 
 #: Cases of a part, six to fifteen seconds of processor time.
 CASES = 200
@@ -57,5 +57,5 @@ PROMISE = Promise(
     judge=judge,
     least=0.85,
     table=table,
-    above=ABOVE_ENSEMBLES,
+    above=OF_NO_SIMULATION,
 )

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 import rocking
-from promises.promise import ABOVE_ENSEMBLES, Found, Promise
+from promises.promise import OF_NO_SIMULATION, Found, Promise
 
 #: Blocks of a part, which has one motion.
 BLOCKS = 100
@@ -168,5 +168,5 @@ PROMISE = Promise(
     judge=judge,
     least=0.97,
     table=table,
-    above=ABOVE_ENSEMBLES,
+    above=OF_NO_SIMULATION,
 )

@@ -17,7 +17,7 @@ import scipy.integrate
 
 import rocking
 from promises.exact import GRAVITY, Side, impacts, lowest, mp, over_gravity, root, state
-from promises.promise import ABOVE_ENSEMBLES, Found, Promise
+from promises.promise import OF_NO_SIMULATION, Found, Promise
 
 #: Cases of each kind in a part.
 CASES = 200
@@ -331,5 +331,5 @@ PROMISE = Promise(
     judge=judge,
     least=0.85,
     table=table,
-    above=ABOVE_ENSEMBLES,
+    above=OF_NO_SIMULATION,
 )

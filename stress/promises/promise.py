@@ -10,6 +10,9 @@ from typing import Any, Protocol
 #: Parts of the package above single simulations and ensembles.
 ABOVE_ENSEMBLES = ("cli", "explorer", "studies", "analysis", "chattering", "dynamics")
 
+#: And kernels that no simulation with certified chattering calls: of periodic motion, time stepping and sines.
+OF_NO_SIMULATION = (*ABOVE_ENSEMBLES, "kernels/periodic.py", "kernels/stepping.py", "kernels/sine")
+
 #: Failures of a part that are told in words; all are counted.
 MOST_TOLD = 20
 
@@ -73,7 +76,8 @@ class Promise:
     table : callable, optional
         Makes a table of its own from all parts.
     above : tuple of str
-        Parts of the package above all that is judged: their sources change no answer, as the import contracts say.
+        Files and folders of the package above all that is judged: their sources change no answer, as the import
+        contracts say.
     """
 
     name: str
