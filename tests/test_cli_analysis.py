@@ -473,3 +473,82 @@ def test_what_was_simulated_is_kept_where_no_curve_can_be_fitted(run, tmp_path):
     with pytest.raises(rocking.Unfitted) as refused:
         rocking.fragility(block, [rocking.records.load(RECORD)], levels=[0.1, 0.2, 0.3])
     assert refused.value.outcomes["peak_rotation_rad"].tolist() == [float(row["peak_rotation_rad"]) for row in rows]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--restitution", "0.5"],
+        ["--one-sided"],
+        ["--lean", "1deg"],
+        ["--tendon", "stiffness=2e6"],
+        ["--spring", "100"],
+        ["--scale", "2"],
+        ["--pga", "0.5g"],
+        ["--pgv", "0.4"],
+        ["--sa", "0.4g@1"],
+        ["--vertical", "nothing"],
+        ["--keep-going"],
+        ["--model", "linear"],
+        ["--chattering", "bypass"],
+    ],
+)
+def test_observed_outcomes_go_without_what_is_simulated(run, tmp_path, arguments):
+    table = tmp_path / "seen.csv"
+    table.write_text("pga_g,overturned\n0.1,0\n0.2,1\n0.3,0\n0.4,1\n0.5,0\n0.6,1\n")
+    assert run("fragility", "--outcomes", table)[0] == 0
+    code, out, err = run("fragility", "--outcomes", table, *arguments)
+    assert (code, out) == (2, "")
+    assert f"leave {arguments[0]} out" in err
+
+
+@pytest.mark.parametrize("command", ["fragility", "measures", "validate"])
+def test_an_ensemble_goes_without_a_restitution(run, tmp_path, command):
+    ensemble = tmp_path / "ensemble.csv"
+    ensemble.write_text("p_plus_rad_s\n")
+    table = tmp_path / "tests.csv"
+    table.write_text(f"motion,overturned\n{RECORD},1\n")
+    given = table if command == "validate" else RECORD
+    code, _, err = run(command, given, "--ensemble", ensemble, "--restitution", "0.5")
+    assert code == 2
+    assert "leave --restitution out" in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--limits", "half=0.5,half=0.7"], "has half twice"),
+        (["--limits", "=0.5"], "gives a rotation the name ''"),
+        (["--limits", "overturning=0.5"], "gives a rotation the name 'overturning'"),
+        (["--site", "2"], "--site is for a curve of --hazard"),
+        (["--years", "100"], "--years is for a curve of --hazard"),
+        (["--seed", "1.5"], "--seed takes a whole number, not '1.5'"),
+        (["--bootstrap", "0x10"], "--bootstrap takes a whole number"),
+    ],
+)
+def test_what_a_fragility_would_pass_over_is_refused(run, arguments, said):
+    code, _, err = run("fragility", RECORD, *SIZES, *arguments)
+    assert code == 2
+    assert said in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--scale", "3"], "--scale is for the motions of --motion or --pulse"),
+        (["--vertical", "up"], "--vertical is for the motions"),
+        (["--candidates", "512"], "--candidates is for outcomes"),
+    ],
+)
+def test_a_free_history_goes_without_what_is_said_of_motions(run, tmp_path, arguments, said):
+    history = tmp_path / "history.csv"
+    history.write_text("time_s,rotation_rad\n0,0.1\n0.1,0.09\n0.2,0.05\n0.3,-0.01\n0.4,-0.03\n")
+    code, _, err = run("calibrate", history, *arguments)
+    assert code == 2
+    assert said in err
+
+
+def test_outcomes_go_without_what_is_said_of_motions_to_predict(run, outcomes_table):
+    code, _, err = run("calibrate", outcomes_table, "--scale", "3")
+    assert code == 2
+    assert "--scale is for the motions of --predict or --pulse" in err

@@ -442,3 +442,34 @@ def test_a_fragility_names_the_options_and_counts_the_years(run, tmp_path):
     stripes = [RECORD, "ridgecrest-clc-090", "--width", "0.24", "--height", "1.1", "--offset", "0.03"]
     out = run("fragility", *stripes, "--measure", "pgv", "--levels", "0.4:1.2:9")[1]
     assert 'give another curve; --polarity "both" counts both' in out
+
+
+def test_only_what_this_run_has_written_is_listed(run, tmp_path):
+    first = ("simulate", RECORD, "--width", "0.24", "--height", "1", "--out", tmp_path)
+    assert "energy.png" in run(*first, "--energy")[1]
+    code, out, err = run(*first)
+    assert code == 0
+    assert "energy" not in out
+    assert "response.png" in out
+    assert f"from before in {tmp_path}: energy.pdf, energy.png, phase-plane.pdf, phase-plane.png" in err
+
+
+def test_a_file_in_the_way_of_a_folder_is_one_sentence(run, tmp_path):
+    (tmp_path / RECORD).write_text("")
+    code, _, err = run(
+        *("simulate", RECORD, "el-centro-meloland-360", "--width", "0.24", "--height", "1", "--each"), "--out", tmp_path
+    )
+    assert code == 2
+    assert err.splitlines()[-1] == f"rocking: {tmp_path / RECORD}: this folder cannot be made: File exists"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("study", "new"), ("study", "status"), ("explore",), ("simulate", RECORD, "--alpha", "0.2", "--p", "2", "--out")],
+)
+def test_a_name_that_no_file_can_have_is_one_sentence(run, tmp_path, monkeypatch, arguments):
+    monkeypatch.chdir(tmp_path)
+    code, _, err = run(*arguments, 300 * "a" + ".toml")
+    assert code == 2
+    assert err.count("\n") == 1
+    assert "Traceback" not in err

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -469,3 +470,139 @@ def test_a_mistake_in_restraints_is_a_sentence_with_its_line(walls, old, new, li
         read_study(walls)
     assert "\n" not in str(caught.value)
     assert caught.value.line == line
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (("[blocks]", "[[blocks]]"), "must be one table, [blocks], once"),
+        (("[scales]", "[[scales]]"), "must be one table, [scales], once"),
+        (("[motions]", "[[motions]]"), "must be one table, [motions], once"),
+        (("factor = [0.5, 1.0]", "damping = 0.1"), "damping goes with sa"),
+        (('records = ["el-centro-meloland-270"]', 'vertical = "el-centro-meloland-up"'), "of the records, and there"),
+        (("[simulation]", "[report.spectrum]\n[simulation]\nduration = 5"), "a report needs whole responses"),
+        (("[simulation]", "[report.spectrum]\nfractiles = []\n[simulation]"), "fractiles must hold a share"),
+        (("[simulation]", '[report.fragility]\nmeasure = "factor"\n[simulation]'), "measure must be one of pga"),
+    ],
+)
+def test_what_would_be_dropped_without_a_word_is_refused(file, change, sentence):
+    file.write_text(TEXT.replace(*change, 1))
+    assert file.read_text() != TEXT
+    with pytest.raises(rocking.StudyError, match=re.escape(sentence)):
+        read_study(file)
+
+
+@pytest.mark.parametrize(
+    ("table", "sentence"),
+    [
+        ("width,height\n1,2,3,6\n", "line 2: 4 cells under 2 columns"),
+        ("width,height,spring\n1,3,2000\n", "column spring"),
+        ("p,alpha,restituton\n2,0.2,0.9\n", "did you mean restitution"),
+        ("p,p,alpha\n2,3,0.2\n", "column p of"),
+        ("width,height,gyration\n1,3,0.5\n", "it has gyration, height and width"),
+        ("p,alpha,mass\n2,0.2,100\n", "it has alpha, mass and p"),
+    ],
+)
+def test_a_table_of_blocks_says_all_of_them_or_is_refused(file, tmp_path, table, sentence):
+    (tmp_path / "blocks.csv").write_text(table)
+    file.write_text(TEXT.replace(GRID, 'csv = "blocks.csv"\n'))
+    with pytest.raises(rocking.StudyError, match=re.escape(sentence)):
+        read_study(file)
+
+
+def test_a_table_may_say_more_than_a_block_needs(file, tmp_path):
+    (tmp_path / "blocks.csv").write_text("name,p,alpha,found in\na,2,0.2,1950\nb,3,0.1,1960\n")
+    file.write_text(TEXT.replace(GRID, 'csv = "blocks.csv"\n'))
+    assert read_study(file).product.bodies.p[:, 0].tolist() == [2.0, 3.0]
+
+
+def test_a_study_gives_the_notes_of_the_commands(run, file, tmp_path):
+    text = TEXT.replace(GRID, "width = 0.6\nheight = 0.5\n").replace("-270", "-up").replace("factor", "pga")
+    file.write_text(text)
+    code, _, err = run("study", "create", file, tmp_path / "made")
+    assert code == 0
+    for said in ("looks vertical", "0.5 is taken for 0.5 m/s^2", "are the sizes swapped"):
+        assert said in err
+    code, _, err = run("study", "create", file, tmp_path / "quiet", "--quiet")
+    assert (code, err) == (0, "")
+
+
+def test_files_are_found_beside_the_studys_own_wherever_it_is_called(file, tmp_path, monkeypatch):
+    """Neither the folder of the call, nor a bracket in the name of a folder, makes another study."""
+    folder, away = tmp_path / "in [1]", tmp_path / "away"
+    for each in (folder, away):
+        each.mkdir()
+    one, other = (rocking.Motion.from_samples([0.0, size, -size, 0.0], 0.1) for size in (1.0, 2.0))
+    for place, motion in ((folder, one), (away, other)):
+        lines = [f"{k * 0.1:.1f},{value}" for k, value in enumerate(motion.acceleration([0.0, 0.1, 0.2, 0.3]))]
+        (place / "mine.csv").write_text("\n".join(["time (s),acceleration (m/s2)", *lines]) + "\n")
+    monkeypatch.chdir(away)
+    inside = folder / "study.toml"
+    inside.write_text(TEXT.replace('"el-centro-meloland-270"', '"*.csv", "el-centro-meloland-3*"'))
+    motions = read_study(inside).product.motions
+    assert motions[0].pga == 1.0
+    assert motions[1].name == "el-centro-meloland-360"
+    (folder / "mine.csv").unlink()
+    inside.write_text(TEXT.replace("el-centro-meloland-270", "mine.csv"))
+    with pytest.raises(rocking.UnreadableRecord, match=re.escape(str(folder / "mine.csv"))):
+        read_study(inside)
+
+
+def test_a_file_with_a_byte_order_mark_is_read(file):
+    file.write_bytes(b"\xef\xbb\xbf" + TEXT.encode())
+    assert read_study(file).product.shape == (5, 2, 2, 10)
+
+
+def test_results_without_their_description_are_no_new_study(run, file, tmp_path):
+    assert run("study", "run", file, tmp_path / "made")[0] == 0
+    (tmp_path / "made" / "study.json").unlink()
+    for name in ("records.json", "report.json"):
+        (tmp_path / "made" / name).unlink(missing_ok=True)
+    file.write_text(TEXT.replace("1:6:5", "2:9:5"))
+    code, _, err = run("study", "create", file, tmp_path / "made")
+    assert code == 2
+    assert "study.json is gone" in err
+
+
+def test_what_is_taken_out_of_the_file_is_taken_out_of_the_report(run, file, tmp_path):
+    file.write_text(TEXT + "\n[report.spectrum]\nfractiles = [0.5]\n")
+    assert run("study", "run", file, tmp_path / "made")[0] == 0
+    assert run("study", "report", tmp_path / "made")[0] == 0
+    file.write_text(TEXT)
+    assert run("study", "create", file, tmp_path / "made")[0] == 0
+    code, _, err = run("study", "report", tmp_path / "made")
+    assert code == 2
+    assert "says nothing of a report" in err
+
+
+def test_units_of_a_study_that_is_there_are_not_changed_without_a_word(run, file, tmp_path):
+    file.write_text(TEXT.replace("1:6:5", "1:6:600"))
+    for width, code in (("512", 0), ("512", 0), ("1024", 2)):
+        found, _, err = run("study", "create", file, tmp_path / "made", "--unit-blocks", width)
+        assert found == code
+    assert "in units of 512 blocks: leave --unit-blocks out" in err
+
+
+def test_only_what_was_repaired_counts_as_repaired(run, file, tmp_path):
+    made = tmp_path / "made"
+    assert run("study", "run", file, made)[0] == 0
+    (made / "records.json").write_text("{}")
+    code, out, err = run("study", "verify", made, "--repair")
+    assert code == 2
+    assert "1 fault cannot be repaired" in err
+    assert "repaired" not in out.splitlines()[-1]
+    assert run("study", "verify", made, "--recompute", "-1")[0] == 2
+
+
+def test_scales_of_changes_and_tables_of_reports_say_what_they_are(run, file, tmp_path):
+    text = TEXT.replace("[motions]", '[motions]\nvertical = "el-centro-meloland-up"').replace("factor = [0.5, 1.0]", "")
+    text = text.replace("[scales]", "[scales]\npga = [1.0, 3.0, 9.0]\nrefine = 0.2")
+    file.write_text(text + "\n[report.spectrum]\nfractiles = [0.5]\n")
+    made = tmp_path / "made"
+    assert run("study", "run", file, made)[0] == 0
+    assert run("study", "export", made, tmp_path / "changes.csv", "--critical", "overturning")[0] == 0
+    rows = [*csv.DictReader((tmp_path / "changes.csv").read_text().splitlines())]
+    verticals = {row["vertical"] for row in rows if row["motion"].startswith("el-centro")}
+    assert verticals == {"el-centro-meloland-up"}
+    assert run("study", "report", made)[0] == 0
+    assert "pga_m_s2" in (made / "report" / "spectrum.csv").read_text().splitlines()[0].split(",")

@@ -78,17 +78,24 @@ def main(arguments: Sequence[str] | None = None) -> None:
         except Exception as error:
             if interrupts.asked:
                 _end_interrupted()
-            if isinstance(error, (RockingError, CycloptsError)):
-                print(f"rocking: {wording.of(error, app, given)}", file=sys.stderr)
-                sys.exit(2)
-            # Files have their own sentence: this is what is printed, to a disk that is full.
-            if not isinstance(error, OSError) or error.errno not in _FULL:
+            sentence = _sentence(error, given)
+            if not sentence:
                 raise
-            _close_output()
-            print(
-                f"rocking: the output cannot be written: {os.strerror(error.errno)}; send it elsewhere", file=sys.stderr
-            )
+            print(f"rocking: {sentence}", file=sys.stderr)
             sys.exit(2)
+
+
+def _sentence(error: Exception, given: list[str]) -> str:
+    """Say what is wrong; nothing where it is a fault of the program."""
+    if isinstance(error, (RockingError, CycloptsError)):
+        return wording.of(error, app, given)
+    if isinstance(error, OSError) and error.errno in _FULL:
+        # Files have their own sentence: this is what is printed, to a disk that is full.
+        _close_output()
+        return f"the output cannot be written: {os.strerror(error.errno)}; send it elsewhere"
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"{error.filename}: {error.strerror}; name another place"
+    return ""
 
 
 def _run(given: list[str]) -> None:

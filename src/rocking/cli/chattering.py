@@ -9,6 +9,7 @@ from typing import Annotated
 from cyclopts import Group, Parameter
 
 from rocking.chattering.report import chattering_report, critical_report
+from rocking.cli.options import WHOLE
 from rocking.cli.output import OUTPUT, OutputOptions, QuietOptions, output_folder, print_result, write_results
 from rocking.errors import InvalidOption
 from rocking.quantities import angle
@@ -20,8 +21,8 @@ def chatter(
     eta: float,
     *,
     p: float | None = None,
-    order: int = 4,
-    resolved: int | None = None,
+    order: Annotated[int, WHOLE] = 4,
+    resolved: Annotated[int | None, WHOLE] = None,
     table: Annotated[bool, Parameter(negative="")] = False,
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
@@ -58,7 +59,7 @@ def chatter(
             if report.cycles is not None:
                 report.to_csv(folder / "cycles.csv", "cycles")
             write_results(folder, figures={"chatter": report.plot}, result=report.to_dict())
-        print_result(result, text, as_json=output.as_json, folder=folder)
+        print_result(result, text, as_json=output.as_json)
 
 
 def critical(omega: float, eta: float, *, output: Annotated[OutputOptions, OUTPUT] = OutputOptions()) -> None:
@@ -77,7 +78,7 @@ def critical(omega: float, eta: float, *, output: Annotated[OutputOptions, OUTPU
         report = critical_report(omega, eta)
         if folder is not None:
             report.to_json(folder / "result.json")
-        print_result(report.to_dict(), report.summary(), as_json=output.as_json, folder=folder)
+        print_result(report.to_dict(), report.summary(), as_json=output.as_json)
 
 
 _CASE = Parameter(name="*", group=Group("Other parameters than the paper's, for one figure", sort_key=1))
@@ -103,7 +104,7 @@ class _CaseOptions:
 def paper(
     *,
     out: Path,
-    figure: int | None = None,
+    figure: Annotated[int | None, WHOLE] = None,
     case: Annotated[_CaseOptions, _CASE] = _CaseOptions(),
     output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
 ) -> None:

@@ -15,7 +15,7 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.block import Block, RestrainedBlock
 from rocking.body import Body
-from rocking.cli.options import BLOCK, MODEL, BodyOptions, ModelOptions, written
+from rocking.cli.options import BLOCK, MODEL, WHOLE, BodyOptions, ModelOptions, written
 from rocking.cli.output import OUTPUT, OutputOptions, deliver, print_result, write_results, write_tables
 from rocking.dynamics.basin_maps import basins
 from rocking.dynamics.bifurcation import Direction, bifurcation_diagram
@@ -46,9 +46,9 @@ KEPT = Annotated[
 def orbits(
     *,
     pulse: str,
-    period: int = 1,
+    period: Annotated[int, WHOLE] = 1,
     along: str | None = None,
-    orbit: int | None = None,
+    orbit: Annotated[int | None, WHOLE] = None,
     switch: str | None = None,
     body: Annotated[BodyOptions, BLOCK] = BodyOptions(),
     model: Annotated[ModelOptions, MODEL] = ModelOptions(),
@@ -93,7 +93,7 @@ def orbits(
         if folder is not None:
             _write(folder, found, branches, result)
         text = "\n\n".join([_text(found), *(each.summary() for each in branches)])
-        print_result(result, text, as_json=output.as_json, folder=folder)
+        print_result(result, text, as_json=output.as_json)
 
 
 def bifurcation(
@@ -104,8 +104,8 @@ def bifurcation(
         "0.01,0"
     ),
     direction: Direction = "both",
-    transient: int = 200,
-    kept: int = 64,
+    transient: Annotated[int, WHOLE] = 200,
+    kept: Annotated[int, WHOLE] = 64,
     folder: KEPT = None,
     body: Annotated[BodyOptions, BLOCK] = BodyOptions(),
     model: Annotated[ModelOptions, MODEL] = ModelOptions(),
@@ -162,7 +162,7 @@ def basin(
     velocities: Annotated[
         str | None, written("Velocities, rad/s or m/s; by default up to p times the balance, or what is natural.")
     ] = None,
-    periods: int = 200,
+    periods: Annotated[int, WHOLE] = 200,
     folder: KEPT = None,
     body: Annotated[BodyOptions, BLOCK] = BodyOptions(),
     model: Annotated[ModelOptions, MODEL] = ModelOptions(),

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from rocking.cli.options import WHOLE
 from rocking.cli.output import OUTPUT, QuietOptions
 from rocking.errors import InvalidOption, UnreadableRecord
 from rocking.motion.named import is_shipped
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 def explore(
     motion: str | None = None,
     *,
-    port: int = 0,
+    port: Annotated[int, WHOLE] = 0,
     no_open: Annotated[bool, Parameter(negative="")] = False,
     address: str = "127.0.0.1",
     output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),

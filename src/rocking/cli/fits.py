@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import Parameter
 
@@ -25,8 +25,8 @@ from rocking.analysis.fragility.result import Fragility
 from rocking.analysis.hazard import HazardCurve
 from rocking.analysis.input_tables import History, Outcomes, read_calibration, read_observed
 from rocking.analysis.risk import check_measure
-from rocking.cli.options import BLOCK, MEASURE, MODEL, EnsembleOptions, MeasureOptions, TreatmentOptions
-from rocking.cli.output import OUTPUT, OutputOptions, left_out, print_result, write_results
+from rocking.cli.options import BLOCK, MEASURE, MODEL, WHOLE, EnsembleOptions, MeasureOptions, TreatmentOptions
+from rocking.cli.output import OUTPUT, OutputOptions, left_out, print_result, subfolder, write_results
 from rocking.cli.records import RECORDS, MotionOptions, Names, ReadRecords, ScaledPulseOptions
 from rocking.constants import Model
 from rocking.ensemble import Polarity
@@ -41,6 +41,12 @@ from rocking.tables import counted, text_table, write_csv
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+#: Time of probabilities, unless it is said.
+_YEARS: Final = 50.0
+
+#: Blocks to try, unless it is said.
+_CANDIDATES: Final = 8192
+
 
 def fragility(
     *names: Names,
@@ -48,12 +54,12 @@ def fragility(
     limits: str = "overturning",
     polarity: Annotated[Polarity, Parameter(allow_leading_hyphen=True)] = "+",
     confidence: float = 0.9,
-    bootstrap: int = 0,
-    seed: int = 0,
+    bootstrap: Annotated[int, WHOLE] = 0,
+    seed: Annotated[int, WHOLE] = 0,
     taxonomy: str = "rocking-block",
     hazard: Path | None = None,
-    site: int = 0,
-    years: float = 50.0,
+    site: Annotated[int, WHOLE] = 0,
+    years: float = _YEARS,
     standing: float | None = None,
     measure: Annotated[MeasureOptions, MEASURE] = MeasureOptions(),
     block: Annotated[EnsembleOptions, BLOCK] = EnsembleOptions(),
@@ -99,10 +105,10 @@ def fragility(
         probable that is; survival.png and .pdf to --out.
     """
     if outcomes is not None:
-        _refuse_beside_outcomes(names, block, motion, measure, limits, polarity)
+        _refuse_beside_outcomes(names, block, motion, measure, model, limits=limits, polarity=polarity)
     bodies = {} if outcomes is not None else block.blocks(model)
-    curve = None if hazard is None else _hazard(hazard, site, measure.period)
     checks.positive(years, "years", InvalidOption)
+    curve = _hazard(hazard, site, years, measure.period)
     states = _limits(limits)
     if output.out is not None:
         nrml.check_names([taxonomy], "taxonomy")
@@ -147,7 +153,7 @@ def fragility(
                 together = fitted if read is None else _with_records(fitted, read)
                 together.to_csv(folder / "outcomes.csv", "outcomes")
             write_results(folder, figures=figures, result=found)
-        print_result(found, "\n\n".join(text), as_json=output.as_json, folder=folder)
+        print_result(found, "\n\n".join(text), as_json=output.as_json)
 
 
 @contextlib.contextmanager
@@ -162,8 +168,13 @@ def _outcomes_kept(folder: Path | None) -> Iterator[None]:
         raise
 
 
-def _hazard(file: Path, site: int, period: float | None) -> HazardCurve:
-    """Read a hazard curve, with notes on what looks like a mistake."""
+def _hazard(file: Path | None, site: int, years: float, period: float | None) -> HazardCurve | None:
+    """Read a hazard curve, where there is one, with notes on what looks like a mistake."""
+    if file is None:
+        for name, is_given in {"site": site != 0, "years": years != _YEARS}.items():
+            if is_given:
+                raise InvalidOption("{} is for a curve of {}: give one, or leave it out", name, "hazard")
+        return None
     curve = HazardCurve.read(file, site=site, period=period)
     for sentence in hazard_notes(curve.intensity, curve.measure):
         note(f"{file}: {sentence}")
@@ -191,20 +202,25 @@ def _refuse_beside_outcomes(
     block: EnsembleOptions,
     motion: MotionOptions,
     measure: MeasureOptions,
+    model: TreatmentOptions,
+    *,
     limits: str,
     polarity: Polarity,
 ) -> None:
     """Refuse options that do not go with observed outcomes."""
+    motions = ("pulse", "scale", "pga", "pgv", "sa", "vertical", "keep_going")
     given = {
         "records": names,
-        "pulse": motion.pulse,
         "levels": measure.levels,
         "ensemble": block.ensemble,
         "limits": limits if limits != "overturning" else None,
         "polarity": polarity if polarity != "+" else None,
-        **block.given(),
+        "model": model.equation,
+        "chattering": model.chattering if model.chattering != "certified" else None,
+        **{name: getattr(motion, name) for name in motions},
+        **dict.fromkeys(block.of_block(), True),
     }
-    found = [option for option, value in given.items() if value]
+    found = [option for option, value in given.items() if value not in (None, False, ())]
     if found:
         sentence = "{} are observed, of a block and under motions of their own: leave {} out"
         raise InvalidOption(sentence, "outcomes", found[0])
@@ -218,6 +234,9 @@ def _limits(text: str) -> dict[str, float]:
             raise InvalidOption(
                 f"{{}} takes overturning or NAME=ROTATION over slenderness, not {part.strip()!r}", "limits"
             )
+        if name in limits or (given and name in ("", "overturning")):
+            why = f"has {name} twice" if name in limits else f"gives a rotation the name {name!r}"
+            raise InvalidOption(f"{{}} {why}; name each limit state once, as half=0.5", "limits")
         try:
             limits[name] = number(value, "limits") if given else math.inf
         except InvalidOption:
@@ -233,12 +252,12 @@ def calibrate(
     alpha: str | None = None,
     restitution: str | None = None,
     two_sided: bool | None = None,
-    candidates: int = 8192,
-    folds: int = 0,
+    candidates: Annotated[int, WHOLE] = _CANDIDATES,
+    folds: Annotated[int, WHOLE] = 0,
     predict: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = (),
     motion: str | None = None,
     initial_rotation: str | None = None,
-    seed: int = 0,
+    seed: Annotated[int, WHOLE] = 0,
     file: Annotated[ScaledPulseOptions, RECORDS] = ScaledPulseOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
@@ -290,19 +309,24 @@ def calibrate(
         table = read_calibration(data, channel=file.channel, dt=file.dt, units=file.units)
         if not isinstance(table, History):
             _refuse("a history", motion=motion, initial_rotation=initial_rotation)
+            if not (predict or file.pulse):
+                _refuse_without("predict", file)
             others = {name: file.read(name) for name in predict} | file.pulses()
             how = _How(seed, folds, others, {"candidates": candidates, **choices})
             results = _of_specimens(table, how, folder) if isinstance(table, dict) else _of_outcomes(table, how)
         else:
             _refuse("outcomes", predict=predict or None, folds=folds or None)
+            _refuse("outcomes", candidates=candidates if candidates != _CANDIDATES else None)
             shaking = _shaking(motion, file)
+            if shaking is None:
+                _refuse_without("motion", file)
             history = calibrate_history(
                 table.times, table.rotation, shaking, **choices, initial_rotation=start, seed=seed
             )
             results = _history_results(history)
         if folder is not None:
             results.write(folder)
-        print_result(results.numbers, results.text, as_json=output.as_json, folder=folder)
+        print_result(results.numbers, results.text, as_json=output.as_json)
 
 
 @dataclass(frozen=True)
@@ -336,6 +360,13 @@ def _refuse(belong_to: str, **given: object) -> None:
             raise InvalidOption(f"{{}} is for {belong_to}; the columns of this table are not", name)
 
 
+def _refuse_without(option: str, file: ScaledPulseOptions) -> None:
+    """Refuse what is said of motions where none is given that it could be said of."""
+    for name in ("scale", "pga", "pgv", "sa", "vertical"):
+        if getattr(file, name) is not None:
+            raise InvalidOption("{} is for the motions of {} or {}: give one, or leave it out", name, option, "pulse")
+
+
 def _shaking(record: str | None, file: ScaledPulseOptions) -> Motion | None:
     """Motion of the base, if it moved."""
     motions = file.pulses() if record is None else {record: file.read(record)} | file.pulses()
@@ -354,8 +385,7 @@ def _of_specimens(tables: Mapping[str, Outcomes], how: _How, folder: Path | None
         with _naming(name):
             results[name] = _of_outcomes(table, how)
         if folder is not None:
-            (folder / name).mkdir(exist_ok=True)
-            results[name].write(folder / name)
+            results[name].write(subfolder(folder, name))
     numbers = {"specimens": {name: one.numbers for name, one in results.items()}}
     return _Results(None, numbers, "\n\n".join(f"specimen {name}\n{one.text}" for name, one in results.items()))
 

@@ -87,7 +87,7 @@ def mesh(
 
                 write_csv(folder / "blocks.csv", pd.DataFrame(blocks))
             write_results(folder, figures={"rose": rose.plot}, result=found)
-        print_result(found, "\n\n".join(text), as_json=output.as_json, folder=folder)
+        print_result(found, "\n\n".join(text), as_json=output.as_json)
 
 
 def _row(azimuth: float, block: Block) -> dict[str, float]:

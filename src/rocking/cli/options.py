@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
     from rocking.body import Body
 
 Made = TypeVar("Made")
+
+_WHOLE: Final = re.compile(r"[+-]?\d+")
 
 #: What describes a block, together, and what may go with it.
 _Descriptions = Mapping[tuple[str, ...], tuple[str, ...]]
@@ -63,6 +66,16 @@ def measured(text: str, quantity: Quantity) -> Parameter:
         return quantity(tokens[0].value, (tokens[0].keyword or "").lstrip("-").replace("-", "_"))
 
     return Parameter(help=text, converter=read, allow_leading_hyphen=True)
+
+
+def _whole(_: Any, tokens: Sequence[Token]) -> int:
+    if not _WHOLE.fullmatch(tokens[0].value):
+        raise ValueError(tokens[0].value)
+    return int(tokens[0].value)
+
+
+#: How a whole number is read: the parser itself would round 1.5 to one.
+WHOLE: Final = Parameter(converter=_whole)
 
 
 @dataclass(frozen=True)
@@ -344,9 +357,13 @@ class EnsembleOptions(HeldOptions):
 
     def refuse_a_block(self) -> None:
         """Refuse what is given of a block beside an ensemble."""
-        given = self.given() | self.held()
+        given = self.of_block()
         if given:
-            raise InvalidBlock(f"{{}} has blocks of its own: leave {_all_of([*given])} out", "ensemble", *given)
+            raise InvalidBlock(f"{{}} has blocks of its own: leave {_all_of(given)} out", "ensemble", *given)
+
+    def of_block(self) -> list[str]:
+        """Return the options of a block that are given."""
+        return [*self.given(), *([] if self.restitution is None else ["restitution"]), *self.held()]
 
 
 def ensemble_of(file: Path, model: ModelOptions) -> dict[str, Any]:

@@ -28,6 +28,10 @@ _DOTS_PER_INCH: Final = 160
 OUTPUT: Final = Parameter(name="*", group=Group("Output", sort_key=4))
 
 
+#: Of the files that commands write.
+_SUFFIXES: Final = frozenset({".png", ".pdf", ".csv", ".nc", ".json", ".xml"})
+
+
 @dataclass(frozen=True)
 class QuietOptions:
     """What every command takes."""
@@ -50,7 +54,7 @@ class OutputOptions(PrintOptions):
 
     def folder(self) -> AbstractContextManager[Path | None]:
         """Make the folder, if one is wanted, before the work; on failure, remove it again where it is empty."""
-        return nullcontext() if self.out is None else output_folder(self.out)
+        return nullcontext() if self.out is None else output_folder(self.out, listed=not self.as_json)
 
 
 def write_results(folder: Path, *, figures: Mapping[str, Callable[[], Figure]], result: Mapping[str, Any]) -> None:
@@ -99,22 +103,19 @@ def deliver(
         write_tables(folder, found)
         found.to_netcdf(folder / f"{stem}.nc")
         write_results(folder, figures={stem: functools.partial(found.plot, **figure)}, result=result)
-    print_result(result, found.summary(), as_json=as_json, folder=folder)
+    print_result(result, found.summary(), as_json=as_json)
 
 
-def print_result(result: Mapping[str, Any], text: str, *, as_json: bool, folder: Path | None) -> None:
-    """Print a result, for machines or for people, and what was written."""
-    if as_json:
-        print(to_json(result))
-        return
-    print(text)
-    if folder is not None:
-        print(f"\nwritten to {folder}: {', '.join(sorted(path.name for path in folder.iterdir()))}")
+def print_result(result: Mapping[str, Any], text: str, *, as_json: bool) -> None:
+    """Print a result, for machines or for people."""
+    print(to_json(result) if as_json else text)
 
 
 @contextmanager
-def output_folder(folder: Path) -> Iterator[Path]:
-    """Make a folder for results, and note which files were replaced; on failure, remove what was made and is empty.
+def output_folder(folder: Path, *, listed: bool = False) -> Iterator[Path]:
+    """Make a folder for results, and say what was written; on failure, remove what was made and is empty.
+
+    What was replaced, and what is left of an earlier run, is noted; what was written is printed where it is `listed`.
 
     Raises
     ------
@@ -136,14 +137,34 @@ def output_folder(folder: Path) -> Iterator[Path]:
             raise OutputError(sentence, "out", path=str(folder)) from error
         yield folder
         now = _written_at(folder)
-        replaced = [name for name, time in before.items() if now.get(name, time) != time]
-        if replaced:
+        written = [name for name, time in now.items() if before.get(name) != time]
+        if listed:
+            print(f"\nwritten to {folder}: {', '.join(sorted({Path(name).parts[0] for name in written}))}")
+        if replaced := [name for name in written if name in before]:
             note(f"replaced in {folder}: {', '.join(replaced)}")
+            new = {Path(name).parts[0] for name in written}
+            if kept := sorted({name for name in now if Path(name).suffix in _SUFFIXES} - new):
+                note(f"from before in {folder}: {', '.join(kept)}")
     except BaseException:
         with suppress(OSError):
             for each in made:
                 each.rmdir()
         raise
+
+
+def subfolder(folder: Path, name: str) -> Path:
+    """Make a folder in that of the results, unless it is there.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be made, as where a file has its name.
+    """
+    try:
+        (folder / name).mkdir(exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"this folder cannot be made: {error.strerror}", path=str(folder / name)) from error
+    return folder / name
 
 
 def _written_at(folder: Path) -> dict[str, int]:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from rocking.cli.options import BLOCK, MODEL, BodyOptions, ModelOptions
+from rocking.cli.options import BLOCK, MODEL, WHOLE, BodyOptions, ModelOptions
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results, write_tables
 from rocking.cli.records import RECORDS, MotionOptions, Names
 from rocking.dynamics import compare_schemes, scheme_of
@@ -39,7 +39,7 @@ class _Start:
 def schemes(
     *names: Names,
     schemes: str | None = None,
-    repetitions: int = 3,
+    repetitions: Annotated[int, WHOLE] = 3,
     start: Annotated[_Start, MODEL] = _Start(),
     body: Annotated[BodyOptions, BLOCK] = BodyOptions(),
     motion: Annotated[MotionOptions, RECORDS] = MotionOptions(),
@@ -79,7 +79,7 @@ def schemes(
         if folder is not None:
             write_tables(folder, found)
             write_results(folder, figures={"schemes": found.plot}, result=found.to_dict())
-        print_result(found.to_dict(), found.summary(), as_json=output.as_json, folder=folder)
+        print_result(found.to_dict(), found.summary(), as_json=output.as_json)
 
 
 def _one_motion(names: Sequence[str], motion: MotionOptions, *, free: bool) -> Motion | None:

@@ -13,7 +13,7 @@ from rocking import quantities
 from rocking.analysis.rules.check import check as apply_rules
 from rocking.analysis.survey import folder_names, survey
 from rocking.cli.options import BLOCK, MODEL, BlockOptions, HeldOptions, ModelOptions, TreatmentOptions, measured
-from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results
+from rocking.cli.output import OUTPUT, OutputOptions, print_result, subfolder, write_results
 from rocking.cli.records import RECORDS, MotionOptions, Names
 from rocking.errors import InvalidOption
 from rocking.response import Response
@@ -92,10 +92,9 @@ def simulate(
             if folder is not None and each:
                 folders = folder_names(found.records)
                 for name, record, response in zip(folders, found.records, found.responses, strict=True):
-                    (folder / name).mkdir(exist_ok=True)
-                    _result(response, record, start.friction, folder / name, energy)
+                    _result(response, record, start.friction, subfolder(folder, name), energy)
             result, text = found.to_dict(), found.summary()
-        print_result(result, text, as_json=output.as_json, folder=folder)
+        print_result(result, text, as_json=output.as_json)
 
 
 def _result(
@@ -144,4 +143,4 @@ def check(
         if folder is not None:
             found.to_csv(folder / "check.csv")
             write_results(folder, figures={}, result=result)
-        print_result(result, found.summary(), as_json=output.as_json, folder=folder)
+        print_result(result, found.summary(), as_json=output.as_json)

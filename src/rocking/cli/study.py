@@ -12,13 +12,14 @@ from cyclopts import App, Parameter
 
 import rocking
 from rocking import checks
-from rocking.cli.output import output_folder, print_result, write_results
+from rocking.cli.options import WHOLE
+from rocking.cli.output import OUTPUT, PrintOptions, QuietOptions, output_folder, print_result, write_results
 from rocking.errors import InvalidOption, OutputError, StudyError
 from rocking.progress import note
 from rocking.studies.file import TEMPLATE, read_study
 from rocking.studies.place import place_of
 from rocking.studies.refine import StudyVerdict
-from rocking.studies.results import FORMATS
+from rocking.studies.results import FORMATS, ReportPlan
 from rocking.studies.run import local_executor, scheduler_executor
 from rocking.studies.study import Study, study_of
 from rocking.tables import counted, to_json, write_text
@@ -27,7 +28,7 @@ study = App(name="study")
 
 
 @study.command
-def new(file: Path) -> None:
+def new(file: Path, *, output: Annotated[QuietOptions, OUTPUT] = QuietOptions()) -> None:
     """Write a commented file to start from.
 
     Parameters
@@ -42,7 +43,13 @@ def new(file: Path) -> None:
 
 
 @study.command
-def create(file: Path, folder: str, *, unit_blocks: int | None = None) -> None:
+def create(
+    file: Path,
+    folder: str,
+    *,
+    unit_blocks: Annotated[int | None, WHOLE] = None,
+    output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
+) -> None:
     """Create the study of a file in a folder; with the folder there, check that it is the same study.
 
     Parameters
@@ -62,9 +69,10 @@ def run(
     folder: str,
     into: str | None = None,
     *,
-    threads: int | None = None,
-    workers: int | None = None,
+    threads: Annotated[int | None, WHOLE] = None,
+    workers: Annotated[int | None, WHOLE] = None,
     scheduler: str | None = None,
+    output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
 ) -> None:
     """Compute what is missing. Ctrl-C finishes the units in hand and stops; run it again to go on.
 
@@ -98,25 +106,29 @@ def run(
 
 
 @study.command
-def status(folder: str, *, as_json: Annotated[bool, Parameter(name="--json", negative="")] = False) -> None:
+def status(folder: str, *, output: Annotated[PrintOptions, OUTPUT] = PrintOptions()) -> None:
     """Say how far a study has come, also while it runs.
 
     Parameters
     ----------
     folder
         Where the study is kept.
-    as_json
-        Print it as JSON.
     """
     state = rocking.study(folder).status
     running = None if state.running is None else asdict(state.running)
     about = {name: getattr(state, name) for name in ("done", "units", "simulations", "failed")}
     about |= {"running": running, "refinement": None if state.refinement is None else asdict(state.refinement)}
-    print(to_json({"folder": folder, **about}) if as_json else f"{folder}: {state}")
+    print(to_json({"folder": folder, **about}) if output.as_json else f"{folder}: {state}")
 
 
 @study.command
-def verify(folder: str, *, recompute: int = 0, repair: Annotated[bool, Parameter(negative="")] = False) -> None:
+def verify(
+    folder: str,
+    *,
+    recompute: Annotated[int, WHOLE] = 0,
+    repair: Annotated[bool, Parameter(negative="")] = False,
+    output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
+) -> None:
     """Read every unit and all that describes the study, and check it; compute some units again and compare all bits.
 
     Parameters
@@ -135,11 +147,20 @@ def verify(folder: str, *, recompute: int = 0, repair: Annotated[bool, Parameter
     if faults and not repair:
         found_faults = f"{counted(len(faults), 'fault')} found"
         raise StudyError(f"{found_faults}; {{}} corrects what can be computed or written again", "repair")
-    print(_sound(found, folder, len(faults)))
+    left = found.verify() if faults else []
+    print(_sound(found, folder, len(faults) - len(left)))
+    if left:
+        raise StudyError(f"{counted(len(left), 'fault')} cannot be repaired: {'; '.join(left)}")
 
 
 @study.command
-def export(folder: str, file: Path, *, critical: StudyVerdict | None = None) -> None:
+def export(
+    folder: str,
+    file: Path,
+    *,
+    critical: StudyVerdict | None = None,
+    output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
+) -> None:
     """Write the results to one file.
 
     Parameters
@@ -162,9 +183,7 @@ def export(folder: str, file: Path, *, critical: StudyVerdict | None = None) -> 
 
 
 @study.command
-def report(
-    folder: str, out: Path | None = None, *, as_json: Annotated[bool, Parameter(name="--json", negative="")] = False
-) -> None:
+def report(folder: str, out: Path | None = None, *, output: Annotated[PrintOptions, OUTPUT] = PrintOptions()) -> None:
     """Make what the study's file asks for under [report]: figures, tables (CSV) and result.json.
 
     Parameters
@@ -173,20 +192,18 @@ def report(
         Where the study is kept.
     out
         Folder for what is made; by default the folder report in that of the study.
-    as_json
-        Print the result as JSON.
     """
     found = rocking.study(folder)
     if out is None and "://" in folder:
         raise InvalidOption("this is no folder for figures and tables: name one as well", path=folder)
-    with output_folder(out or Path(folder) / "report") as target:
+    with output_folder(out or Path(folder) / "report", listed=not output.as_json) as target:
         made = found.report()
         for name, one in made.items():
             one.to_csv(target / f"{name}.csv")
         result = {name: one.to_dict() for name, one in made.items()}
         write_results(target, figures={name: one.plot for name, one in made.items()}, result=result)
         text = "\n\n".join(one.summary() for one in made.values())
-        print_result(result, text, as_json=as_json, folder=target)
+        print_result(result, text, as_json=output.as_json)
 
 
 def _opened(folder: str, into: str | None) -> Study:
@@ -202,7 +219,7 @@ def _created(file: Path, folder: str, unit_blocks: int | None) -> Study:
     described = read_study(file)
     for sentence in described.skipped:
         note(f"left out: {sentence}")
-    wanted = described.report, described.refine, described.outcomes
+    wanted = described.report or ReportPlan(), described.refine, described.outcomes
     return study_of(place_of(folder), described.product, unit_blocks, *wanted, described.records)
 
 

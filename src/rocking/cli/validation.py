@@ -10,7 +10,7 @@ from rocking.analysis.input_tables import read_tests
 from rocking.analysis.validation.judging import Scope
 from rocking.analysis.validation.judging import validate as judged
 from rocking.analysis.validation.tested import ShakeTest
-from rocking.cli.options import BLOCK, MODEL, EnsembleOptions, ModelOptions, ensemble_of
+from rocking.cli.options import BLOCK, MODEL, WHOLE, EnsembleOptions, ModelOptions, ensemble_of
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results, write_tables
 from rocking.cli.records import RECORDS, FileOptions
 from rocking.errors import InvalidOption
@@ -23,8 +23,8 @@ def validate(
     lapse: float | None = None,
     peak_error: str = "0",
     one_block_in: Scope = "test",
-    bins: int = 10,
-    seed: int = 0,
+    bins: Annotated[int, WHOLE] = 10,
+    seed: Annotated[int, WHOLE] = 0,
     block: Annotated[EnsembleOptions, BLOCK] = EnsembleOptions(),
     file: Annotated[FileOptions, RECORDS] = FileOptions(),
     model: Annotated[ModelOptions, MODEL] = ModelOptions(),
@@ -70,7 +70,7 @@ def validate(
         if folder is not None:
             write_tables(folder, found)
             write_results(folder, figures={"validation": found.plot}, result=result)
-        print_result(result, found.summary(), as_json=output.as_json, folder=folder)
+        print_result(result, found.summary(), as_json=output.as_json)
 
 
 def _blocks(tests: Sequence[ShakeTest], block: EnsembleOptions, model: ModelOptions) -> dict[str, Any]:

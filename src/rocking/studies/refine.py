@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from rocking import bisection, checks
 from rocking.arrays import Flags, Floats, Integers
-from rocking.ensemble import Product, body_coordinates, dataset_of, measured, setup_of
+from rocking.ensemble import Product, body_coordinates, dataset_of, measured, setup_of, verticals_of
 from rocking.errors import InvalidOption, StudyError
 from rocking.studies import inputs
 from rocking.studies.inputs import require
@@ -385,6 +385,10 @@ def critical_scales(store: Store, verdict: StudyVerdict) -> xr.Dataset:
         },
         {
             "motion": ("change", names[brackets.motion]),
+            **{
+                name: ("change", np.array(verticals)[brackets.motion])
+                for name, (_, verticals) in verticals_of(product.motions).items()
+            },
             "polarity": ("change", np.where(np.array(product.signs)[brackets.polarity] > 0, "+", "-")),
             "block": ("change", brackets.block),
             **named,

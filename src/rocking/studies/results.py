@@ -19,9 +19,9 @@ from rocking import checks
 from rocking.analysis.fragility.fit import OVERTURNING
 from rocking.analysis.fragility.result import Fragility
 from rocking.engine import OUTCOME
-from rocking.errors import InvalidOption, StudyError
-from rocking.motion.scaling import IntensityName, Measure
-from rocking.progress import Progress
+from rocking.errors import InvalidOption, Message, StudyError, Unfitted
+from rocking.motion.scaling import INTENSITIES, IntensityName, Measure
+from rocking.progress import Progress, note
 from rocking.studies.fragility import BlockFragilities, block_fragilities, pooled_fragility
 from rocking.studies.refine import StudyVerdict
 from rocking.studies.spectrum import (
@@ -282,6 +282,7 @@ class FragilityPlan:
     confidence: float = 0.9
 
     def __post_init__(self) -> None:
+        checks.one_of(self.measure, "measure", InvalidOption, INTENSITIES)
         Measure(self.measure, self.period, self.damping)
         checks.share(self.confidence, "confidence", InvalidOption)
         checks.one_of(self.blocks, "blocks", InvalidOption, ["each", "together"])
@@ -346,21 +347,29 @@ def check_part(plan: FragilityPlan | SpectrumPlan, kept: Sequence[str]) -> None:
 def made_report(store: Store, progress: bool | None) -> dict[str, ReportPart]:
     """Make all that is wanted of a complete study, by name."""
     plan = kept_report(store)
-    if plan is None:
+    if plan is None or plan == ReportPlan():
         raise StudyError(
             "the study says nothing of a report: add [report.fragility] to its file and create it again",
             path=str(store.place),
         )
     found: dict[str, ReportPart] = {}
+    refused: Unfitted | None = None
     if (curves := plan.fragility) is not None:
         measure = Measure(curves.measure, curves.period, curves.damping)
-        found["fragility"] = (
-            pooled_fragility(store, measure, curves.limits, curves.confidence)
-            if curves.blocks == "together"
-            else block_fragilities(store, measure, curves.limits, curves.confidence, progress)
-        )
+        try:
+            found["fragility"] = (
+                pooled_fragility(store, measure, curves.limits, curves.confidence)
+                if curves.blocks == "together"
+                else block_fragilities(store, measure, curves.limits, curves.confidence, progress)
+            )
+        except Unfitted as error:
+            refused = error
     if plan.spectrum is not None:
         found["spectrum"] = study_spectrum(store, plan.spectrum.fractiles, progress)
+    if refused is not None:
+        if not found:
+            raise refused
+        note(Message(f"fragility left out: {refused.message.template}", refused.message.arguments))
     return found
 
 

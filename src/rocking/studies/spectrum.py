@@ -160,6 +160,8 @@ def study_spectrum(store: Store, fractiles: Sequence[float] = FRACTILES, progres
 def checked_fractiles(fractiles: Sequence[float]) -> Floats:
     """Return shares between 0 and 1, checked."""
     shares = checks.numbers(fractiles, "fractiles", InvalidOption).ravel()
+    if not shares.size:
+        raise InvalidOption("{} must hold a share of the motions or more, as [0.16, 0.5, 0.84]", "fractiles")
     for value in shares:
         if not 0.0 < value < 1.0:
             raise InvalidOption(
@@ -246,6 +248,10 @@ class StudySpectrum(BlocksResult):
             ax=ax,
             figsize=figsize,
         )
+
+    def _table(self, name: str) -> xr.Dataset:
+        # A table's column is named for what the scales are, as in an export: pga_m_s2, or factor.
+        return super()._table(name).rename(scale=self.data.scale.attrs["measure"])
 
     def _fractile(self, wanted: float) -> xr.DataArray:
         """Return the fractile that is nearest to the wanted one."""

@@ -13,8 +13,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from rocking import checks
 from rocking.compiling import SIMULATIONS, announce
-from rocking.errors import StudyError
+from rocking.errors import InvalidOption, StudyError
 from rocking.progress import Progress
 from rocking.studies.place import Place, this_process
 from rocking.studies.refine import Refinement, kept_plan, refinement, rounds
@@ -88,7 +89,7 @@ class Status:
 
     def __str__(self) -> str:
         """Write it in one line."""
-        share = 100.0 * self.done / self.units
+        share = math.floor(1000.0 * self.done / self.units) / 10.0  # 100 % only where all are
         done = f"{self.done} of {counted(self.units, 'unit')} done ({share:.1f} %)"
         text = f"{done}, {counted(self.simulations, 'simulation')} in all"
         text += f"; {self.refinement}" if self.refinement else ""
@@ -166,6 +167,7 @@ def status_of(store: Store) -> Status:
 
 def verified(store: Store, recompute: int, repair: bool, seed: int, progress: bool | None) -> list[str]:
     """Check, and perhaps repair, all parts of a study, as `Study.verify`."""
+    checks.whole(recompute, "recompute", InvalidOption, 0)
     if recompute or repair:
         store.check_program()
         announce(SIMULATIONS)

@@ -255,6 +255,12 @@ def _require_free(place: Place) -> None:
     if others:
         listed = ", ".join(sorted(others)[:_LISTED]) + (" and more" if len(others) > _LISTED else "")
         raise StudyError(f"this holds no study, but {listed}: name a new folder, or an empty one", path=str(place))
+    # A creation that was cut off has computed nothing: units of a study whose description is gone may be of another.
+    if any(key_of(name) is not None for name in place.names(_ARRAY)):
+        raise StudyError(
+            "this holds results of a study whose study.json is gone: restore that, or name a new folder",
+            path=str(place),
+        )
 
 
 def keep(place: Place, name: str, data: bytes) -> None:

@@ -24,7 +24,15 @@ from rocking.studies.fragility import BlockFragilities, block_fragilities, poole
 from rocking.studies.inputs import OUTCOMES, chosen_outcomes
 from rocking.studies.place import Place, place_of
 from rocking.studies.refine import StudyVerdict, critical_scales, keep_plan, kept_plan, next_round, tolerances_of
-from rocking.studies.results import ReportPart, ReportPlan, WrittenToFiles, keep_report, lazy_outcome, made_report
+from rocking.studies.results import (
+    ReportPart,
+    ReportPlan,
+    WrittenToFiles,
+    keep_report,
+    kept_report,
+    lazy_outcome,
+    made_report,
+)
 from rocking.studies.run import RunReport, Stop, run
 from rocking.studies.spectrum import FRACTILES, StudySpectrum, study_spectrum
 from rocking.studies.state import Log, Status, simulations_done, status_of, verified
@@ -563,12 +571,17 @@ def study_of(
     if exists(place):
         found = Store.open(place)
         found.check_inputs(product, outcomes)
+        width, count = found.grid.unit[3], len(product.bodies)
+        if unit_blocks is not None and min(width_of(unit_blocks), count) != min(width, count):
+            raise InvalidOption(
+                f"the study is there already, in units of {width} blocks: leave {{}} out", "unit_blocks"
+            )
     else:
         unit = fitting_unit(product) if unit_blocks is None else (1, 1, 1, width_of(unit_blocks))
         found = Store.create(place, product, unit, outcomes)
-    if any(records):
+    if any(records) or (records and found.records()):
         found.name_records(records)
-    if plan is not None:
+    if plan is not None and (plan != ReportPlan() or kept_report(found) is not None):
         keep_report(found, plan)
     if tolerances is not None:
         keep_plan(found, tolerances)

@@ -6,7 +6,7 @@ import contextlib
 import inspect
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,7 +16,9 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.block import Block, Blocks, RestrainedBlock, RestrainedBlocks, Restraint
 from rocking.body import Bodies
-from rocking.errors import RockingError, StudyError
+from rocking.errors import Message, RockingError, StudyError
+from rocking.plausibility import block_notes, restraint_notes
+from rocking.progress import note
 from rocking.studies.file.tables import (
     BODIES,
     COUPLES,
@@ -32,11 +34,14 @@ from rocking.studies.file.tables import (
     number,
     read,
 )
-from rocking.tables import csv_rows
+from rocking.tables import counted, csv_rows
 
 #: What both sides of a block may have of their own, in columns of a table that end so.
 _SIDED: Final = ("p", "alpha", "pivots", "restitution")
 _SIDES: Final = ("_plus", "_minus")
+
+#: Blocks that are looked at for what looks like a mistake.
+_NOTED: Final = 100
 
 
 def blocks_of(tables: Tables) -> Bodies:
@@ -66,17 +71,34 @@ def blocks_of(tables: Tables) -> Bodies:
         checks.grid_size({name: len(axis) for name, axis in axes.items()}, StudyError)
         rows = [dict(zip(axes, row, strict=True)) for row in itertools.product(*axes.values())]
         if not held:
-            return Blocks.of([_body(row) for row in rows])
+            return Blocks.of(_noted([_body(row) for row in rows]))
         checks.grid_size({"body": len(rows) * len(lean) * math.prod(map(len, restraints))}, StudyError)
-        return RestrainedBlocks.of(
-            [
-                RestrainedBlock(
-                    _body(row), *chosen, one_sided=held.get("one_sided", False), lean=angle,
-                    restitution=row.get("restitution"),
-                )
-                for row, angle, *chosen in itertools.product(rows, lean, *restraints)
-            ]
-        )  # fmt: skip
+        bodies = [
+            RestrainedBlock(
+                _body(row), *chosen, one_sided=held.get("one_sided", False), lean=angle,
+                restitution=row.get("restitution"),
+            )
+            for row, angle, *chosen in itertools.product(rows, lean, *restraints)
+        ]  # fmt: skip
+        _noted([body.block for body in bodies[:_NOTED]])
+        _say(restraint_notes(body, _height(body.block)) for body in bodies[:_NOTED])
+        return RestrainedBlocks.of(bodies)
+
+
+def _noted(blocks: list[Block]) -> list[Block]:
+    """Return blocks, with notes on what looks like a mistake in the first of them."""
+    _say(block_notes(block) for block in blocks[:_NOTED])
+    return blocks
+
+
+def _height(block: Block) -> float | None:
+    return None if block.half_height is None else 2.0 * block.half_height
+
+
+def _say(notes: Iterable[Sequence[Message | str]]) -> None:
+    """Note each sentence once."""
+    for sentence in {str(each): each for some in notes for each in some}.values():
+        note(sentence)
 
 
 def _restraints(tables: Tables, held: Mapping[str, Any]) -> list[list[Restraint]]:
@@ -123,27 +145,20 @@ def _blocks_of_csv(tables: Tables, table: Path) -> Blocks:
         raise tables.wrong("blocks", "csv", f"{table} cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
         raise tables.wrong("blocks", "csv", f"{table} is no text table in UTF-8; save it as CSV") from None
-    columns: dict[str, Any] = {}
     headings, rows = (rows[0][1], rows[1:]) if len(rows) > 1 else (list[str](), [])
-    for name in PARAMETERS:
-        ends = _SIDES if name in _SIDED and name + _SIDES[0] in headings else ("",)
-        if all(name + end in headings for end in ends):
-            places = [headings.index(name + end) for end in ends]
-            cells = []
-            for line, row in rows:
-                with _in_table(table, line):
-                    cells.append([number(name, row[k] if k < len(row) else "") for k in places])
-            columns[name] = np.squeeze(cells, axis=1) if len(ends) == 1 else np.array(cells)
-    if not any({*needed} <= columns.keys() for needed in BODIES):
+    _check_headings(tables, table, headings)
+    columns = _columns(table, headings, rows)
+    if not any({*needed} <= columns.keys() <= {*needed, *more} for needed, more in BODIES.items()):
+        having = f"; it has {listed([*columns])}" if columns else ""
         raise tables.wrong(
             "blocks",
             "csv",
             f"{table} needs columns p (rad/s) and alpha (rad, or 12deg), or width and height (m), or pivots_plus, "
-            "pivots_minus, height_of_mass and gyration (m), and rows",
+            f"pivots_minus, height_of_mass and gyration (m), and rows{having}",
         )
-    if {"p", "alpha"} <= columns.keys():
+    if "p" in columns:
         try:
-            return Blocks(**{name: columns[name] for name in ("p", "alpha", "restitution") if name in columns})
+            return Blocks(**columns)
         except RockingError as error:
             where = f"{table}, whose block 0 is in line {rows[0][0]}: "
             line = line_of(tables.text, "blocks", "csv", 0)
@@ -152,7 +167,41 @@ def _blocks_of_csv(tables: Tables, table: Path) -> Blocks:
     for (line, _), values in zip(rows, zip(*columns.values(), strict=True), strict=True):
         with _in_table(table, line):
             bodies.append(_body(dict(zip(columns, values, strict=True))))
-    return Blocks.of(bodies)
+    return Blocks.of(_noted(bodies))
+
+
+def _columns(table: Path, headings: Sequence[str], rows: Sequence[tuple[int, list[str]]]) -> dict[str, Any]:
+    """Numbers of each column that says something of a block; those of both sides beside each other."""
+    for line, row in rows:
+        with _in_table(table, line):
+            if len(row) != len(headings):
+                raise StudyError(f"{counted(len(row), 'cell')} under {counted(len(headings), 'column')}; correct it")
+    columns: dict[str, Any] = {}
+    for name in PARAMETERS:
+        ends = _SIDES if name in _SIDED and name + _SIDES[0] in headings else ("",)
+        if all(name + end in headings for end in ends):
+            places = [headings.index(name + end) for end in ends]
+            cells = []
+            for line, row in rows:
+                with _in_table(table, line):
+                    cells.append([number(name, row[k]) for k in places])
+            columns[name] = np.squeeze(cells, axis=1) if len(ends) == 1 else np.array(cells)
+    return columns
+
+
+def _check_headings(tables: Tables, table: Path, headings: Sequence[str]) -> None:
+    """Refuse columns that are there twice, or that a block could have and this table cannot say."""
+    known = [*PARAMETERS, *(name + end for name in _SIDED for end in _SIDES)]
+    for name in dict.fromkeys(headings):
+        fault = ""
+        if name in known and headings.count(name) > 1:
+            fault = "is there twice"
+        elif name in HELD:
+            fault = "cannot be given in a table: give it under [blocks]"
+        elif name not in known and (meant := checks.meant(name, known, "")):
+            fault = f"is no column of blocks; {meant}"
+        if fault:
+            raise tables.wrong("blocks", "csv", f"column {name} of {table} {fault}")
 
 
 @contextlib.contextmanager

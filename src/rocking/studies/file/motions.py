@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import fnmatch
+import glob
 import itertools
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,11 +12,12 @@ from typing import Any
 from rocking.arrays import Floats
 from rocking.ensemble import Scales
 from rocking.errors import InvalidMotion, UnreadableRecord
+from rocking.motion import records
 from rocking.motion.formats.source import Request
 from rocking.motion.motion import Motion
 from rocking.motion.named import expanded, is_there, named_motion, named_vertical
 from rocking.named_pulses import pulse_family
-from rocking.plausibility import vertical_notes
+from rocking.plausibility import motion_notes
 from rocking.progress import note
 from rocking.studies.file.tables import Tables, read
 
@@ -26,15 +29,17 @@ def motions_of(tables: Tables, scales: Scales) -> tuple[list[Motion], list[str],
         Request.checked(given.get("dt"), None)
     with tables.located("motions", key="units"):
         Request.checked(None, given.get("units"))
-    records: dict[str, str] = {}  # by their paths or names, what stands for each in the file
+    if "vertical" in given and not given.get("records"):
+        raise tables.wrong("motions", "vertical", "{} is that of the records, and there are none", "vertical")
+    found: dict[str, str] = {}  # by their paths or names, what stands for each in the file
     for name in given.get("records", []):
         with tables.located_record(name):
-            records |= dict.fromkeys(expanded([_beside(tables, name)]), name)
+            found |= dict.fromkeys(_records_of(tables, name), name)
     motions, names, skipped = [], [], []
-    for path, name in records.items():
+    for path, name in found.items():
         try:
             with tables.located_record(name):
-                motion = _record(tables, path, several=len(records) > 1)
+                motion = _record(tables, path, several=len(found) > 1)
                 scales.factors(motion)  # it can be scaled
         except (UnreadableRecord, InvalidMotion) as error:
             if not given.get("skip_unreadable", False):
@@ -55,18 +60,36 @@ def _record(tables: Tables, path: str, *, several: bool) -> Motion:
     about = {"dt": given.get("dt"), "units": given.get("units")}
     channel = None if "channel" not in given else str(given["channel"])
     motion = named_motion(path, channel=channel, several=several, **about)
-    if "vertical" not in given:
-        return motion
-    both = motion.with_vertical(named_vertical(_beside(tables, given["vertical"]), path, channel=channel, **about))
-    for sentence in vertical_notes(both):
+    if "vertical" in given:
+        vertical = named_vertical(_beside(tables, given["vertical"]), path, channel=channel, **about)
+        motion = motion.with_vertical(vertical)
+    for sentence in motion_notes(motion):
         note(f"{path}: {sentence}")
-    return both
+    return motion
+
+
+def _records_of(tables: Tables, name: str) -> list[str]:
+    """Files beside the study's own, or shipped records, that a name, a folder or a pattern stands for."""
+    parent = tables.file.parent
+    path = str(parent / name)
+    if is_there(path):
+        return expanded([path])
+    if not glob.has_magic(name):
+        # A file of this name in the folder of the call is not meant; without one the name alone tells more.
+        return [path if is_there(name) and name not in records.names() else name]
+    try:
+        return expanded([str(Path(glob.escape(str(parent))) / name)])
+    except UnreadableRecord:
+        shipped = fnmatch.filter(records.names(), name)
+        if not shipped:
+            raise
+        return shipped
 
 
 def _beside(tables: Tables, name: str) -> str:
     """Path of a file that lies beside the study's own, or the name of anything else."""
     path = str(tables.file.parent / name)
-    return path if is_there(path) or any(mark in name for mark in "*?[") else name
+    return path if is_there(path) else name
 
 
 def _as_written(tables: Tables, path: str) -> str:

@@ -11,6 +11,8 @@ from rocking import checks
 from rocking.ensemble import Product, Scales
 from rocking.errors import InvalidOption, StudyError
 from rocking.motion.scaling import FACTOR, Measure, MeasureName
+from rocking.plausibility import level_notes
+from rocking.progress import note
 from rocking.studies.file.blocks import blocks_of
 from rocking.studies.file.motions import motions_of
 from rocking.studies.file.tables import MEASURES, Tables
@@ -87,7 +89,7 @@ def read_study(path: str | Path) -> StudyFile:
     """
     file = checks.path(path, "the file of a study", StudyError)
     try:
-        text = file.read_text("utf-8")
+        text = file.read_text("utf-8-sig")
         content = tomllib.loads(text)
     except OSError as error:
         raise StudyError(f"the file cannot be read: {error.strerror or error}", path=str(file)) from None
@@ -109,6 +111,14 @@ def _study(tables: Tables) -> StudyFile:
         product = Product(blocks, tuple(motions), scales, polarity, model, chattering, rules.get("duration"))
         kept = chosen_outcomes(rules.get("outcomes"))
     report, refine = _report(tables, kept), given.get("refine")
+    longest = max(motion.duration for motion in motions)
+    if report not in (None, ReportPlan()) and product.duration is not None and product.duration < longest:
+        raise tables.wrong(
+            "simulation",
+            "duration",
+            f"{{}} ends before the longest motion, of {longest:g} s, and a report needs whole responses: leave it out",
+            "duration",
+        )
     with tables.located("scales", key="refine"):
         tolerances = None if refine is None else tolerances_of(product, refine, kept)
     return StudyFile(product, tuple(skipped), report, tolerances, kept, tuple(names))
@@ -122,8 +132,9 @@ def _scales(tables: Tables) -> Scales:
         raise tables.wrong(
             "scales", measures[0], f"motions can be scaled to one measure only, not to {listed}", *measures
         )
-    if "period" in given and "sa" not in given:
-        raise tables.wrong("scales", "period", "{} goes with {}, and only with it", "period", "sa")
+    for option in ("period", "damping"):
+        if option in given and "sa" not in given:
+            raise tables.wrong("scales", option, "{} goes with {}, and only with it", option, "sa")
     if "sa" in given and "period" not in given:
         raise tables.wrong("scales", "sa", "{} needs {}, in s", "sa", "period")
     levels = {name: tables.numbers("scales", name, given[name]) for name in measures}
@@ -132,8 +143,18 @@ def _scales(tables: Tables) -> Scales:
             return Scales.of(None, FACTOR)
         ((name, values),) = levels.items()
         checks.positive_numbers(values, name, InvalidOption)
+        _note_levels(name, given[name])
         options = {option: given[option] for option in ("period", "damping") if option in given}
         return Scales.of(values, Measure(cast(MeasureName, name), **options))
+
+
+def _note_levels(name: str, given: object) -> None:
+    """Note levels without a unit that look like accelerations in g."""
+    if name in ("pga", "sa"):
+        for each in given if isinstance(given, list) else [given]:
+            if isinstance(each, (int, float)):
+                for sentence in level_notes(f"{each!r}", float(each), name):
+                    note(sentence)
 
 
 def _report(tables: Tables, kept: tuple[str, ...]) -> ReportPlan | None:

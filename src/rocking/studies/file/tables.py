@@ -112,6 +112,8 @@ class Tables:
             if table not in SCHEMA:
                 hint = nearest(table, (name for name in SCHEMA if "." not in name))
                 raise self.wrong(table, None, f"there is no table [{{}}]; {hint}", table)
+            if not isinstance(self.tables[table], dict):
+                raise self.wrong(table, None, f"{{}} must be one table, [{table}], once", table)
             self._check_keys(table)
         for needed in ("blocks", "motions"):
             if needed not in self.tables:
