@@ -167,7 +167,8 @@ def test_fragility_prints_a_table_and_writes_what_it_says(run, tmp_path):
         (["fragility", RECORD, *SIZES], "overturning"),
         (["fragility", RECORD, *SIZES, "--limits", "half"], "--limits"),
         (["fragility", RECORD, *SIZES, "--limits", "half=much"], "--limits half"),
-        (["fragility", RECORD, *SIZES, "--bootstrap", "-4"], "samples"),
+        (["fragility", RECORD, *SIZES, "--bootstrap", "-4"], "--bootstrap must be a whole number"),
+        (["fragility", RECORD, *SIZES, "--bootstrap", "5"], "samples as 5 do not reach"),
         (["fragility", RECORD, *SIZES, "--confidence", "90"], "confidence"),
     ],
 )

@@ -115,6 +115,7 @@ def fragility(
         nrml.check_names(states, "a limit state")
     if standing is not None:
         checks.positive(standing, "standing", InvalidOption)
+    checks.whole(bootstrap, "bootstrap", InvalidOption, 0)
     band = Band("bootstrap" if bootstrap != 0 else "likelihood", confidence, samples=bootstrap or 1, seed=seed)
     with output.folder() as folder:
         read = None

@@ -292,7 +292,8 @@ class BodyOptions(HeldOptions):
         if others:
             raise InvalidBlock(f"{{}} is a body of its own: leave {_all_of(others)} out", first, *others)
         if self.ball is not None:
-            return BouncingBall(self.ball)
+            with _about("ball"):
+                return BouncingBall(self.ball)
         if self.oscillator is not None:
             return _made(ImpactOscillator, self.oscillator, "oscillator")
         return _made(InvertedPendulum, self.pendulum or "", "pendulum")

@@ -179,7 +179,7 @@ def unit_of(estimate: str) -> str:
 
 def is_known(given: Any) -> bool:
     """Whether a parameter has a value: a number, or a pair of equal ones."""
-    if not isinstance(given, Sequence | np.ndarray):
+    if isinstance(given, str) or not isinstance(given, Sequence | np.ndarray):
         return True
     return len(given) == 2 and all(np.ndim(end) == 0 for end in given) and bool(given[0] == given[1])
 

@@ -20,6 +20,9 @@ from rocking.motion.scaling import Measure, intensities
 
 BandKind = Literal["likelihood", "bootstrap"]
 
+#: Samples of a bootstrap that lie beyond the ends of an interval, in the mean, at least.
+_BEYOND_ENDS: Final = 2.0
+
 #: Logarithm of how far beyond the data a median is still believed.
 _BEYOND: Final = math.log(1000.0)
 
@@ -63,6 +66,13 @@ class Band:
         checks.share(self.confidence, "confidence", InvalidOption)
         checks.whole(self.samples, "samples", InvalidOption, 1)
         checks.whole(self.seed, "seed", InvalidOption, 0)
+        if self.kind == "bootstrap" and self.samples * (1.0 - self.confidence) < _BEYOND_ENDS:
+            least = math.ceil(_BEYOND_ENDS / (1.0 - self.confidence))
+            raise InvalidOption(
+                f"so few {{}} as {self.samples} do not reach the ends of an interval of {self.confidence:g}; take "
+                f"{least} or more",
+                "samples",
+            )
 
 
 @dataclass(frozen=True, eq=False)
