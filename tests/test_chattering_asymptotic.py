@@ -1,5 +1,6 @@
 """The paper's asymptotic scheme: Eq. 65 against its printed terms, and against the exact sequence."""
 
+import mpmath
 import numpy as np
 import pytest
 from oracles.paper_scheme import cycles
@@ -84,6 +85,24 @@ def test_first_interval_and_speed_err_by_the_next_order(omega):
 def test_first_interval_at_the_known_case():
     assert chattering.sequence(1.01, 2.0, 0.92).impacts["interval"][0] == pytest.approx(0.2824230666, abs=1e-10)
     assert chattering.first_interval(1.01, 2.0) == pytest.approx(0.2824230666, abs=5e-6)
+
+
+@pytest.mark.parametrize("a", [1e10, 1e100, 1e206, 1e300, 1.7e308])
+def test_an_amplitude_whose_powers_no_double_holds_has_infinite_times(a):
+    """Warnings of overflows are errors here."""
+    table = chattering.asymptotic_table(a, 2.0, 0.92)
+    assert np.isfinite(table["term"]).all() and (table["speed_before"] > 0.0).all()
+    assert np.isinf(table["speed_before"][0]) == (a > 1e205)
+    with mpmath.workdps(20):
+        eps = mpmath.mpf(a) - 1
+        first = mpmath.sqrt(2 * eps) / 2 * (4 + (1 - mpmath.mpf(32) / 15 * 3 / 4) * eps)
+        speed = 2 * mpmath.sqrt(2 * eps) * eps * (mpmath.mpf(4) / 3 + (1 - mpmath.mpf(32) / 15 * 3 / 4) * eps)
+    assert chattering.first_interval(a, 2.0) == pytest.approx(float(first), rel=1e-14)
+    assert chattering.first_impact_speed(a, 2.0) == pytest.approx(float(speed), rel=1e-14)
+    assert chattering.chattering_time(a, 2.0, 0.92, method="series", order=40) == np.inf
+    assert chattering.series_diagnosis(a, 2.0, 0.92, order=34).error == np.inf
+    report = chattering.chattering_report(a, 2.0, 0.92)
+    assert not report.values["complete"] and "worthless" in report.summary()
 
 
 def test_asymptotic_functions_know_their_ends():

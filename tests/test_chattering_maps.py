@@ -18,10 +18,11 @@ from rocking.motion.exceedance import exceedances
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.92)
 THRESHOLD = BLOCK.gravity * 0.2
 STATUE = rocking.Block(width=0.24, height=1.1)
+ONE = {"a": [1.0], "b": [1.0]}
 
 
 def outcome_of(motion, block=BLOCK, model="linear"):
-    dataset = chattering_map(lambda a, b: SimulationInput(block, motion, model), {"a": [1.0], "b": [1.0]})
+    dataset = chattering_map(lambda a, b: SimulationInput(block, motion, model), ONE)
     return Outcome(dataset.outcome.item())
 
 
@@ -195,6 +196,26 @@ def test_names_that_a_family_does_not_have_keep_their_order():
     np.testing.assert_array_equal(named.outcome.values, usual.outcome.values)
 
 
+@pytest.mark.parametrize(
+    ("make", "error", "words"),
+    [
+        (lambda: chattering_map("sine", ONE), rocking.InvalidOption, "family must be a function"),
+        (lambda: chattering_map(lambda a, b: (BLOCK, None, "linear"), ONE), rocking.InvalidOption, "SimulationInput"),
+        (lambda: chattering_map(lambda a, b: SimulationInput(BLOCK, None), ONE), rocking.InvalidOption, "a Motion"),
+        (lambda: families.sine("block"), rocking.InvalidBlock, "not a str"),
+        (lambda: families.ricker(None), rocking.InvalidBlock, "not a NoneType"),
+        (lambda: families.lobes(BLOCK, count=2.5), rocking.InvalidOption, "count must be a whole number"),
+        (lambda: families.lobes(BLOCK, omega="fast"), rocking.InvalidOption, "omega must be"),
+        (lambda: families.record(None, 0.2), rocking.InvalidMotion, "not None"),
+        (lambda: families.record("a.csv", 0.2), rocking.InvalidMotion, "rocking.read"),
+    ],
+)
+def test_what_makes_no_case_is_refused_in_one_sentence(make, error, words):
+    with pytest.raises(error, match=words) as caught:
+        make()
+    assert "\n" not in str(caught.value)
+
+
 def test_a_map_is_the_same_in_one_thread_and_in_several():
     parameters = {"a": [0.9, 1.03, 1.05, 9.0], "omega": [1.0, 2.0]}
     one, several = (chattering_map(families.sine(BLOCK), parameters, threads=count) for count in (1, 3))
@@ -347,6 +368,14 @@ def test_free_rocking_is_one_episode_without_shaking():
     assert math.isnan(found.share_at_rest)
     assert not found.amid_shaking.any()
     assert "never passes a threshold" in str(found)
+
+
+def test_a_simulation_that_ends_before_the_motion_passes_a_threshold_sees_no_shaking():
+    motion = rocking.pulses.sine(1.5 * THRESHOLD, 0.2, cycles=2)
+    (passes, _), *_ = exceedances(motion, (THRESHOLD, THRESHOLD), BLOCK.gravity)
+    found = chattering_episodes(rocking.simulate(BLOCK, motion, model="linear", duration=0.9 * passes))
+    assert all(map(math.isnan, found.shaking)) and found.at_rest == 0.0
+    assert "nan" not in str(found) and "never passes a threshold" in str(found)
 
 
 def test_a_motion_that_lifts_nothing_has_no_episode():

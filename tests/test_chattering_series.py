@@ -4,6 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 from oracles.sine_chattering import settle
+from oracles.slow_sine import _Arc
 
 from rocking import chattering
 from rocking.errors import InvalidOption
@@ -52,6 +53,26 @@ def test_the_error_rises_by_one_order_per_term(omega, eta, terms):
             for x, e, p in zip(exact, eps, partial, strict=True)
         ]
     assert np.log2(errors[1] / errors[0]) == pytest.approx(terms + 0.5, abs=0.05)
+
+
+@pytest.mark.parametrize("eta", [1e-20, 1e-26, 1e-27, 1e-28, 1e-30, 1e-60, 1e-100, 1e-150, 1e-200, 1e-300])
+@pytest.mark.parametrize("omega", [0.5, 2.0])
+def test_without_a_speed_after_impacts_only_the_first_arc_is_left(omega, eta):
+    a = 1.01
+    with mpmath.workdps(40):
+        amplitude, frequency = mpmath.mpf(a), mpmath.mpf(omega)
+        arc = _Arc(amplitude, frequency, mpmath.asin(1 / amplitude), mpmath.mpf(0), -1)
+        exact = mpmath.findroot(arc.height, 4 * mpmath.sqrt(2 * (amplitude - 1)) / frequency)
+        # Their terms in eps^(1/2) and eps^(3/2), as in the paper's Eq. 32 with its correction.
+        second = mpmath.sqrt(2) / frequency * (1 - mpmath.mpf(32) / 15 * (frequency**2 - 1) / frequency**2)
+    found = [chattering.chattering_time(a, omega, eta, method="series", order=order) for order in (4, 20)]
+    assert found == pytest.approx([float(exact)] * 2, rel=1e-5 if omega < 1.0 else 1e-8)
+    assert found[1] == pytest.approx(float(exact), rel=1e-8 if omega < 1.0 else 1e-15)
+    coefficients = chattering.series_coefficients(omega, eta, order=2)
+    assert coefficients == pytest.approx([4.0 * 2.0**0.5 / omega, float(second)], rel=1e-14)
+    report = chattering.chattering_report(a, omega, eta)
+    assert report.values["chattering_time"]["exact"] == pytest.approx(float(exact), rel=1e-15)
+    assert report.values["series"]["error"] < (1e-4 if omega < 1.0 else 1e-9)
 
 
 def test_four_terms_beat_eq65_fifty_times():

@@ -196,6 +196,9 @@ def test_many_bodies_as_one_by_one():
             assert found.impacts.values[m, k] == len(alone.impacts)
             judged += 1
     assert judged == 8
+    said = [each.attrs["long_name"] for each in found.values()]
+    assert "time of the highest position" in said
+    assert not [each for each in said if "block" in each or "rotation" in each]
     two = dynamics.simulate_many(dynamics.InvertedPendulum(3.0, 0.1, 0.5), motions[0])
     assert two.peak_position.values.tolist() == [[0.1]] and two.impacts.values.min() > 0
 
@@ -209,7 +212,16 @@ def test_many_bodies_as_one_by_one():
         (lambda: dynamics.ImpactOscillator(1.0, 0.5, damping_ratio=1.0), InvalidBlock, "damping_ratio"),
         (lambda: dynamics.ImpactOscillator(1.0, 0.5, stop=0.1, second_stop=-0.2), InvalidBlock, "must be above -stop"),
         (lambda: dynamics.InvertedPendulum(2.0, -0.1, 0.5), InvalidBlock, "gap"),
-        (lambda: dynamics.simulate(dynamics.BouncingBall(1.0), None, initial_position=1.0), InvalidOption, "never"),
+        (
+            lambda: dynamics.simulate(dynamics.BouncingBall(1.0), None, initial_position=1.0),
+            InvalidOption,
+            "as this bouncing ball, never comes to rest; give duration",
+        ),
+        (
+            lambda: dynamics.simulate_many(dynamics.InvertedPendulum(3.0, 0.1, 1.0), rocking.pulses.one_sine(1.0, 1.0)),
+            InvalidOption,
+            "as this inverted pendulum, never comes to rest; give duration",
+        ),
         (lambda: dynamics.simulate(dynamics.BouncingBall(0.5), None, initial_position=-1.0), InvalidOption, "in front"),
         (
             lambda: dynamics.simulate(dynamics.InvertedPendulum(2.0, 0.1, 0.5), None, initial_position=0.2),

@@ -117,6 +117,85 @@ def test_a_branch_that_comes_back_is_followed_round_once():
     assert np.abs(branch.values).max() == pytest.approx(0.3, abs=0.01) and np.any(branch.is_stable)
 
 
+def test_where_an_impact_vanishes_is_extrapolated_from_orbits_that_have_it():
+    """An orbit without impacts passes near: x = a sin(w t)/(p^2 + w^2), which touches the walls at gap (p^2 + w^2)."""
+    pendulum = dynamics.InvertedPendulum(3.0, 0.1, 0.6)
+
+    def family(amplitude):
+        return pendulum, pulses.sine(amplitude, 1.0, cycles=1)
+
+    found = dynamics.periodic_orbits(*family(3.0), starts=[[0.02149176, 0.43097785]])
+    (orbit,) = (each for each in found if each.impacts == 1.0)
+    branch = dynamics.continue_orbit(orbit, family, 3.0, (2.9, 5.0))
+    assert branch.ends == ("limit of the parameter", "grazing")
+    (end,) = branch.bifurcations
+    exact = 0.1 * (9.0 + 4.0 * math.pi**2)
+    assert end.value == pytest.approx(exact, abs=1e-8)
+    assert end.bracket[0] - 1e-8 < exact < end.bracket[1] + 1e-8
+
+
+@pytest.mark.parametrize("limits", [(16.0, 16.1), (16.0, 16.2)])
+def test_an_orbit_whose_slowest_impact_is_always_slow_does_not_end_before_that_vanishes(limits):
+    """Of seven impacts in a period the last leave little; two ranges, whose steps differ, lead to one end."""
+
+    def family(amplitude):
+        return BALL, pulses.sine(amplitude, TABLE, cycles=1)
+
+    found = dynamics.periodic_orbits(*family(16.0), starts=[[0.01063715, 0.12317385]])
+    (orbit,) = (each for each in found if each.impacts == 7.0)
+    assert orbit.response.impacts["speed_before"].min() < 2e-3 * G / TABLE
+    branch = dynamics.continue_orbit(orbit, family, 16.0, limits, step=0.2)
+    assert branch.ends == ("limit of the parameter", "grazing")
+    (end,) = branch.bifurcations
+    assert end.value == pytest.approx(16.0930799, abs=1e-6)
+    judged = 0
+    for value, state in zip(branch.values, branch.states, strict=True):
+        strobe = dynamics.stroboscopic_map(*family(value))
+        after, _, impacts = strobe.followed(state)
+        assert after == pytest.approx(state, abs=1e-9) and impacts == 7
+        judged += value > 16.05
+    assert judged >= 5 and branch.values.max() < end.value
+    # The slowest speed is nearly a straight line in the parameter: its last two values say where it vanishes.
+    (less, more), speeds = (
+        branch.values[-2:],
+        [branch.orbit(k).response.impacts["speed_before"].min() for k in (-2, -1)],
+    )
+    assert more + (more - less) * speeds[1] / (speeds[0] - speeds[1]) == pytest.approx(end.value, abs=2e-4)
+
+
+def test_a_branch_reaches_limits_beyond_which_there_is_no_body():
+    """A ball that loses nothing is the last one; below the fold, in closed form, there is no orbit."""
+    level = 1.2
+
+    def family(restitution):
+        return dynamics.BouncingBall(restitution, gravity=G), pulses.sine(level * G, TABLE, cycles=1)
+
+    found = dynamics.periodic_orbits(*family(0.5), starts=200)
+    start = next(each for each in found if each.is_stable and each.impacts == 1.0)
+    branch = dynamics.continue_orbit(start, family, 0.5, (0.45, 1.0), step=0.2)
+    assert branch.ends == ("limit of the parameter", "limit of the parameter")
+    assert (branch.values[0], branch.values[-1]) == (0.45, 1.0)
+    (flip,) = branch.bifurcations
+    expected = brentq(lambda e: closed_orbits.Ball(e, 1).flip - level, 0.45, 0.99)
+    assert flip.kind == "flip" and flip.value == pytest.approx(expected, abs=1e-9)
+    for k in (0, -1):
+        ball = closed_orbits.Ball(float(branch.values[k]), 1)
+        assert branch.multipliers[k].sum().real == pytest.approx(ball.trace(level, stable=True), abs=1e-9)
+
+
+@pytest.mark.parametrize("limits", [(12.0, 13.0), (11.0, 12.0)])
+def test_an_orbit_at_a_limit_of_the_parameter_is_written_once(limits):
+    def family(amplitude):
+        return BALL, pulses.sine(amplitude, TABLE, cycles=1)
+
+    found = dynamics.periodic_orbits(*family(12.0), starts=64)
+    start = next(each for each in found if each.is_stable and each.impacts == 1.0)
+    branch = dynamics.continue_orbit(start, family, 12.0, limits)
+    assert branch.ends == ("limit of the parameter", "limit of the parameter")
+    assert (branch.values[0], branch.values[-1]) == limits
+    assert np.all(np.diff(branch.values) > 1e-6)
+
+
 @pytest.mark.slow
 def test_two_orbits_near_each_other_are_not_where_the_branch_began():
     """Beyond a fold the branch comes back to the same values, near its first point but the other way."""

@@ -77,6 +77,21 @@ def test_a_body_that_overturns_has_none():
     assert "overturns" in found.summary() and found.to_dict()["fate"] == "OVERTURNED"
 
 
+def test_a_body_that_overturns_after_a_rest_has_none_either():
+    block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    found = dynamics.lyapunov_exponents(block, pulses.sine(12.0, 1.0, cycles=1), [0.0, 0.0], 20, transient=0)
+    assert found.fate == dynamics.Fate.OVERTURNED and np.isneginf(found.stretches[0]).all()
+    assert math.isnan(found.largest) and math.isnan(found.smallest) and math.isnan(found.standard_error)
+    assert found.resting == 1.0 / np.count_nonzero(~np.isnan(found.stretches[:, 0]))
+    assert "overturns" in found.summary()
+
+
+def test_of_a_body_that_overturns_at_once_no_share_of_rests_is_known():
+    block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    found = dynamics.lyapunov_exponents(block, pulses.sine(20.0, 0.5, cycles=1), [0.1, 0.2], 100)
+    assert math.isnan(found.resting)
+
+
 def chaotic_cases():
     damped = dynamics.ImpactOscillator(1.0, 0.9, damping_ratio=0.01, stop=0.02)
     return {

@@ -117,6 +117,45 @@ def test_a_rest_that_the_ground_ends_at_once_is_not_forgotten(body, motion, chat
     assert np.count_nonzero(smooth & flat & np.any(change != 0.0, axis=(1, 2))) >= 10
 
 
+STOPPED = dynamics.ImpactOscillator(1.0, 0.7, damping_ratio=0.1, stop=0.02, second_stop=0.03)
+
+
+@pytest.mark.parametrize(
+    ("body", "motion", "state", "inwards"),
+    [
+        (dynamics.ImpactOscillator(1.0, 0.7, damping_ratio=0.1, stop=0.02), (0.4, 0.7, 0.0), (-0.02, 0.0), 1.0),
+        (dynamics.ImpactOscillator(1.0, 0.7, damping_ratio=0.1), (-0.4, 0.7, 0.0), (0.0, 0.0), 1.0),  # with no jump
+        (STOPPED, (0.4, 0.7, 0.0), (-0.02, 0.0), 1.0),
+        (STOPPED, (0.4, 0.7, 0.0), (0.03, 0.0), -1.0),
+        (dynamics.InvertedPendulum(3.0, 0.1, 0.6), (2.0, 1.0, 0.5 * math.pi), (0.1, 0.0), -1.0),
+        (BLOCK, (3.0, 3.0, 0.5 * math.pi), (0.0, 0.0), -1.0),
+        (BLOCK, (-3.0, 3.0, 0.5 * math.pi), (0.0, 0.0), 1.0),
+    ],
+)
+def test_a_body_on_a_stop_that_does_not_hold_it_is_not_at_rest(body, motion, state, inwards):
+    """Its derivative is that of what begins in front of the stop, in differences to that side."""
+    amplitude, frequency, phase = motion
+    strobe = dynamics.stroboscopic_map(body, pulses.sine(amplitude, frequency, cycles=1, phase=phase))
+    after, change = strobe.derivative(state)
+    h = inwards * np.array([1e-7, 2e-7])
+    once, twice = (np.column_stack([strobe(state + each * step) - after for each in np.eye(2)]) / step for step in h)
+    assert np.abs(change).max() > 0.05
+    assert change == pytest.approx(2.0 * once - twice, rel=2e-5, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("body", "state"),
+    [
+        (BLOCK, (0.0, 0.0)),
+        (dynamics.BouncingBall(0.7), (0.0, 0.0)),
+        (dynamics.ImpactOscillator(1.0, 0.7, stop=0.1, second_stop=-0.03), (-0.03, 0.0)),
+    ],
+)
+def test_a_body_that_is_held_at_rest_forgets_how_it_began(body, state):
+    _, change = dynamics.stroboscopic_map(body, pulses.sine(0.4, 0.7, cycles=1)).derivative(state)
+    assert not np.any(change)
+
+
 def test_area_shrinks_by_the_square_of_the_restitution_at_each_impact_and_by_damping():
     damped = dynamics.ImpactOscillator(1.0, 0.8, damping_ratio=0.05, stop=0.01)
     body, motion = damped, pulses.sine(3.0, 1.3, cycles=1)
@@ -292,6 +331,18 @@ TABLE = pulses.sine(12.0, 5.0, cycles=1)
         (lambda ball: dynamics.basins(ball, TABLE, [0.0, 1.0], [0.0, 1e308]), "velocities must be finite"),
         (lambda ball: dynamics.continue_orbit(None, lambda v: (ball, TABLE), 1.0, (0.0, 2.0)), "periodic_orbits"),
         (lambda ball: dynamics.switch_branch(None, 0), "continue_orbit"),
+        (lambda ball: dynamics.stroboscopic_map(BLOCK, TABLE, model="cubic"), "model must be one of nonlinear, linear"),
+        (lambda ball: dynamics.impact_map(BLOCK, TABLE, model="cubic"), "model must be one of nonlinear, linear"),
+        (lambda ball: dynamics.basins(ball, TABLE, [0.0, 1.0], [-1.0, 1.0]), "^velocities must not lead into a stop"),
+        (lambda ball: dynamics.basins(ball, TABLE, [-1.0, 1.0], [0.0, 1.0]), "^positions must be at least 0 m"),
+        (
+            lambda ball: dynamics.basins(STOPPED, TABLE, [0.0, 0.03], [0.0, 1.0]),
+            "^velocities must not lead into a stop, as 1 m/s at 0.03 m does",
+        ),
+        (lambda ball: dynamics.periodic_orbits(ball, TABLE, starts=[[0.0, -1.0]]), "^starts must not lead into a stop"),
+        (lambda ball: dynamics.stroboscopic_map(ball, TABLE)([0.0, -1.0]), "^states must not lead into a stop"),
+        (lambda ball: dynamics.stroboscopic_map(ball, TABLE)([-1.0, 0.0]), "^states must be at least 0 m"),
+        (lambda ball: dynamics.lyapunov_exponents(ball, TABLE, [0.0, -1.0]), "^state must not lead into a stop"),
         (lambda ball: dynamics.compare_schemes(ball, TABLE, schemes=[]), "at least one scheme"),
     ],
 )

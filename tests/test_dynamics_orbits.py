@@ -11,6 +11,7 @@ from oracles import closed_orbits, exact_arcs
 
 from rocking import Block, InvalidMotion, InvalidOption, Motion, dynamics, pulses
 from rocking.chattering import critical_amplitude
+from rocking.dynamics.orbits import sizes_of
 
 G = 10.0
 TABLE = 5.0  # Hz
@@ -414,6 +415,39 @@ def test_an_orbit_near_which_nothing_grows_or_shrinks_is_neutral():
     (orbit,) = (each for each in found if each.impacts == 0.0)
     assert not orbit.is_stable and "neutral orbit of 1 period with 0 impacts" in orbit.summary()
     assert orbit.multipliers[0] == pytest.approx(np.exp(2j * math.pi / 1.3).conjugate(), abs=1e-9)
+
+
+def test_a_rest_that_attracts_nothing_is_neutral():
+    """A ball that loses nothing bounces for ever, however near the table it begins."""
+    motion = pulses.sine(0.4, 0.7, cycles=1)
+    for restitution, word in ((1.0, "neutral"), (0.9, "stable")):
+        ball = dynamics.BouncingBall(restitution)
+        (orbit,) = dynamics.periodic_orbits(ball, motion, starts=[[0.0, 0.0]])
+        assert orbit.rests and orbit.is_stable == (word == "stable")
+        assert f"{word} orbit of 1 period always at rest" in orbit.summary()
+        branch = dynamics.continue_orbit(orbit, lambda level, ball=ball: (ball, motion.scaled(level)), 1.0, (0.9, 1.1))
+        assert np.all(branch.is_stable == (word == "stable"))
+        near = dynamics.stroboscopic_map(ball, motion)([1e-6, 0.0], 20)
+        assert (near[0] > 1e-8) == (word == "neutral")
+
+
+def test_orbits_of_a_ball_that_loses_nothing_are_never_stable():
+    """Areas stay as they are, so that multipliers are a complex pair of size one, or a real one and its inverse."""
+    starts = [[2.41991718e-06, -7.13992044e-03], [3.03476625e-06, 8.32868209e-03]]  # of those with many impacts
+    found = dynamics.periodic_orbits(dynamics.BouncingBall(1.0), pulses.sine(1e-3, 0.7, cycles=1), starts=starts)
+    assert [each.impacts for each in found] == [617.0, 706.0]
+    for orbit in found:
+        assert orbit.multipliers[0].imag != 0.0
+        assert np.abs(orbit.multipliers) == pytest.approx([1.0, 1.0], abs=1e-9)
+        assert not orbit.is_stable and "neutral" in orbit.summary()
+
+
+@pytest.mark.parametrize("off", [1e-9, 3e-8])
+def test_a_double_multiplier_of_one_is_neutral_however_rounding_parts_it(off):
+    pair = np.array([[1.0 + off, 1.0 / (1.0 + off)], [0.5, 0.4], [1.0 + 1e-8, 0.25], [1.0 - 1e-8, 0.25]], dtype=complex)
+    sizes = sizes_of(pair)
+    assert np.array_equal(sizes[0], [1.0, 1.0])
+    assert np.array_equal(sizes[1:], np.abs(pair[1:]))  # what loses area is told as it is
 
 
 @pytest.mark.thorough

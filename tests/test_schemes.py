@@ -160,6 +160,16 @@ def test_a_coarse_threshold_hides_overturning():
     assert "does not overturn, wrongly" in outcome.verdict
 
 
+@pytest.mark.parametrize("scheme", ["moreau-jean=1e-4", "schatzman-paoli=1e-4"])
+def test_a_scheme_by_which_a_block_overturns_some_steps_late_has_the_right_verdict(scheme):
+    block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.85)
+    comparison = compare_schemes(block, rocking.pulses.sine(6.0, 1.0, cycles=3), schemes=[scheme], model="linear")
+    (outcome,) = comparison.outcomes
+    late = outcome.response.times[-1] - comparison.certified.response.overturn_time
+    assert 0.0 < late < 50.0 * 1e-4
+    assert outcome.response.overturned and outcome.is_right
+
+
 def test_a_rest_that_a_scheme_does_not_find_is_missed():
     block = rocking.Block.from_parameters(p=1.0, alpha=0.2, restitution=0.705)
     motion = rocking.pulses.n_lobe([3.34, 2.59, 1.85, 1.98, 3.1, 2.34], 0.3045)

@@ -59,6 +59,19 @@ def test_schatzman_paoli_is_what_a_plain_program_computes(model):
     np.testing.assert_allclose(found.position, plain[:, 0] * plain[:, 1], rtol=0.0, atol=1e-11)
 
 
+@pytest.mark.parametrize("kind", BOTH)
+def test_each_impact_has_the_restitution_of_the_side_that_is_hit(kind):
+    """Between impacts a free block keeps its energy, so that each leaves the speed before it times one of the two."""
+    own = (0.85, 0.6)
+    block, h = rocking.Block.from_parameters(p=P, alpha=ALPHA, restitution=own), 1e-5
+    found = integrate(block, None, kind(h), 3.0, model="linear", initial_position=0.1)
+    at = np.rint(found.impact_times[:4] / h).astype(int)
+    apart = 10  # steps before and after, of which an impact takes three
+    before, after = (np.abs(found.velocity[at + off]) for off in (-apart, apart))
+    slope = P * P * ALPHA * apart * h  # by which the speed changes until and from then
+    assert (after + slope) / (before + slope) == pytest.approx(own * 2, abs=5e-4)
+
+
 def siconos(example):
     """Time, position and velocity, a row for each step."""
     return np.loadtxt(SICONOS / f"BouncingBall{example}.ref.gz", unpack=True)

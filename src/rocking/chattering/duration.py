@@ -93,7 +93,8 @@ def chattering_time(
         p times the chattering time, of the broadcast shape of a, omega and eta (a number for numbers). NaN where
         a < 1, 0 where a = 1. "exact" and "semianalytical" give NaN for incomplete chattering, and infinity where
         double precision decides nothing (known nowhere but possible within rounding of the critical amplitude); the two
-        expansions are finite for every a >= 1 (infinite at eta = 1) and know nothing of it.
+        expansions have a value for every a >= 1 (infinity at eta = 1, and beyond the range of a double) and know
+        nothing of it.
 
     Raises
     ------

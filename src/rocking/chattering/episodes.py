@@ -42,7 +42,7 @@ class ChatteringEpisodes(Result):
         rest, m/s^2).
     shaking : tuple of float
         Bracketed duration: when the motion first passes a threshold of the block, and when it falls below one for the
-        last time or the block has overturned, s; NaN where it never does.
+        last time or the block has overturned, s; NaN where it never does before the simulation ends.
     at_rest : float
         Time at rest within the bracketed duration, s.
     """
@@ -83,7 +83,7 @@ class ChatteringEpisodes(Result):
         ]
         start, end = self.shaking
         about = (
-            "the motion never passes a threshold of the block"
+            "the motion never passes a threshold of the block before the simulation ends"
             if math.isnan(start)
             else f"at rest for {self.share_at_rest:.1%} of the shaking from {start:.3f} s to {end:.3f} s"
         )
@@ -147,7 +147,7 @@ def chattering_episodes(response: Response) -> ChatteringEpisodes:
         return ChatteringEpisodes(episodes, (math.nan, math.nan), 0.0)
     episodes["ground"] = response.motion.acceleration(proven["end"])
     beyond = exceedances(response.motion, response.block.uplift_thresholds(response.model), response.block.gravity)
-    if not len(beyond):
+    if not len(beyond) or beyond[0, 0] >= response.duration:
         return ChatteringEpisodes(episodes, (math.nan, math.nan), 0.0)
     start, end = float(beyond[0, 0]), min(float(beyond[-1, 1]), response.duration)
     at_rest = np.diff(np.clip(response.rest_intervals, start, end)).sum()

@@ -27,6 +27,9 @@ from rocking.kernels.sine.series import phase_coefficients
 #: Terms of the consistent expansion.
 HIGHEST_ORDER: Final = 40
 
+#: Powers of an amplitude that no block is shaken with are infinite; so is what is made of them.
+_BEYOND_RANGE: Final = np.errstate(over="ignore", invalid="ignore")
+
 #: Coefficients beyond the order asked for that the diagnosis looks at, and how many it needs at least.
 _LOOK_AHEAD: Final = 6
 _FEWEST: Final = 16
@@ -46,6 +49,7 @@ CYCLE: Final = np.dtype(
 )
 
 
+@_BEYOND_RANGE
 def asymptotic_times(a: Floats, omega: Floats, eta: Floats) -> Floats:
     """Eq. 65; its sums depend on eta alone and are formed once for each value of it."""
     values, where = np.unique(eta, return_inverse=True)
@@ -59,6 +63,7 @@ def asymptotic_times(a: Floats, omega: Floats, eta: Floats) -> Floats:
     return times.reshape(shape)[()]
 
 
+@_BEYOND_RANGE
 def asymptotic_table(a: float, omega: float, eta: float) -> NDArray[np.void]:
     """Run the paper's iterative procedure, cycle by cycle.
 
@@ -117,11 +122,12 @@ def asymptotic_table(a: float, omega: float, eta: float) -> NDArray[np.void]:
     table["phase"] = frequency * table["time"] + math.asin(1.0 / (1.0 + excess))
     # An arc of the second side takes as long, in these units, as the speed that it starts with, and keeps it.
     entering = np.repeat(terms[1, :count], 2)
-    table["speed_before"] = np.where(even, entering / restitution, entering) * excess**1.5 / frequency
+    table["speed_before"] = np.where(even, entering / restitution, entering) * np.float64(excess) ** 1.5 / frequency
     table["speed_after"] = restitution * table["speed_before"]
     return table
 
 
+@_BEYOND_RANGE
 def first_interval(a: ArrayLike, omega: ArrayLike) -> Floats:
     """Time from uplift to the first impact, to two orders (Eq. 32).
 
@@ -157,6 +163,7 @@ def first_interval(a: ArrayLike, omega: ArrayLike) -> Floats:
     return (math.sqrt(2.0) / frequency * np.sqrt(eps) * (4.0 + second * eps))[()]
 
 
+@_BEYOND_RANGE
 def first_impact_speed(a: ArrayLike, omega: ArrayLike) -> Floats:
     """Angular velocity just before the first impact, to two orders (Eq. 34).
 
@@ -267,6 +274,7 @@ class SeriesDiagnosis:
     radius: Floats
 
 
+@_BEYOND_RANGE
 def series_diagnosis(a: ArrayLike, omega: ArrayLike, eta: ArrayLike, *, order: int = 4) -> SeriesDiagnosis:
     """Partial sum of the expansion, its error and where it stops converging.
 
@@ -319,17 +327,17 @@ def _radius(coefficients: Floats) -> Floats:
     """Limit of the ratios of successive coefficients, extrapolated linearly in 1/k."""
     k = coefficients.shape[-1] - 1
     ratios = coefficients[..., :-1] / coefficients[..., 1:]
-    radius: Floats = k * ratios[..., -1] - (k - 1) * ratios[..., -2]
+    radius: Floats = np.abs(k * ratios[..., -1] - (k - 1) * ratios[..., -2])  # the signs may take turns
     return radius
 
 
+@_BEYOND_RANGE
 def _summed(coefficients: Floats, eps: Floats) -> Floats:
     """Horner's scheme; exactly zero at eps = 0."""
     total = np.zeros(eps.shape)
     for k in reversed(range(coefficients.shape[-1])):
         total = total * eps + coefficients[..., k]
-    with np.errstate(invalid="ignore"):
-        return np.where(eps == 0.0, 0.0, np.sqrt(eps) * total)
+    return np.where(eps == 0.0, 0.0, np.sqrt(eps) * total)
 
 
 def _coefficients(omega: Floats, eta: Floats, order: int) -> Floats:
@@ -343,6 +351,6 @@ def _coefficients(omega: Floats, eta: Floats, order: int) -> Floats:
         if not np.isfinite(coefficients[i]).all():
             raise InvalidOption(
                 f"the expansion at omega = {w:g}, eta = {restitution:g} is not resolved to order {order} "
-                "in double precision: lower the order, or take eta further from 1"
+                "in double precision: lower the order, or take a higher omega, or eta further from 1"
             )
     return coefficients[where.ravel()].reshape((*shape, order))

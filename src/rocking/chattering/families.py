@@ -12,10 +12,13 @@ import math
 from collections.abc import Callable
 from typing import Literal, NamedTuple
 
-from rocking.block import Block
+from rocking import checks
+from rocking.block import Block, one_block
 from rocking.constants import Model
+from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion import pulses
 from rocking.motion.motion import Motion
+from rocking.motion.named import one_motion
 
 
 class SimulationInput(NamedTuple):
@@ -98,10 +101,12 @@ def lobes(block: Block, *, omega: float = 2.0, count: int = 5, model: Model = "n
     >>> round(case.motion.pga / block.minimum_acceleration, 9)
     4.8
     """
-    scale, frequency = _threshold(block, model), _hertz(block, omega)
+    scale = _threshold(block, model)
+    frequency = _hertz(block, checks.positive(omega, "omega", InvalidOption))
+    number = checks.whole(count, "count", InvalidOption, least=1)
 
     def case(a: float, ratio: float) -> SimulationInput:
-        return SimulationInput(block, pulses.n_lobe([a * scale * ratio**k for k in range(count)], frequency), model)
+        return SimulationInput(block, pulses.n_lobe([a * scale * ratio**k for k in range(number)], frequency), model)
 
     return case
 
@@ -198,6 +203,8 @@ def record(
     >>> record(rocking.pulses.one_sine(1.0, 1.0), 0.2, 0.9)(1.5, 2.0).block.p
     2.0
     """
+    if one_motion(motion) is None:
+        raise InvalidMotion("a Motion is needed, as rocking.pulses.one_sine(1, 1), not None")
 
     def case(a: float, p: float) -> SimulationInput:
         block = Block.from_parameters(p, alpha, restitution)
@@ -207,7 +214,7 @@ def record(
 
 
 def _threshold(block: Block, model: Model) -> float:
-    return min(block.uplift_thresholds(model))
+    return min(one_block(block).uplift_thresholds(model))
 
 
 def _hertz(block: Block, omega: float) -> float:

@@ -126,7 +126,8 @@ def chattering_map(
     Raises
     ------
     InvalidOption
-        If there are not two parameters, or their values are not one-dimensional, finite and in increasing order.
+        If there are not two parameters, or their values are not one-dimensional, finite and in increasing order, or the
+        family is no function that returns a `SimulationInput`.
     RockingError
         What the family itself raises for a pair of numbers.
 
@@ -150,9 +151,19 @@ def chattering_map(
     if len(parameters) != 2:
         raise InvalidOption(f"{{}} must be two, not {len(parameters)}", "parameters")
     count = None if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
+    if not callable(family):
+        raise InvalidOption(
+            f"{{}} must be a function of two numbers, as rocking.chattering.families.sine(block), not {family!r}",
+            "family",
+        )
     (first, x), (second, y) = ((name, _axis(values, name)) for name, values in parameters.items())
     swapped = _is_swapped(family, str(first), str(second))
     inputs = [family(*map(float, (other, one) if swapped else (one, other))) for one in x for other in y]
+    for each in inputs:
+        if not (isinstance(each, SimulationInput) and isinstance(each.motion, Motion)):
+            raise InvalidOption(
+                "{} must return a SimulationInput of a block and a Motion for each pair", "family", value=each
+            )
     points = []
     with Progress("mapping", len(inputs), show=progress) as bar:
         for point in in_threads(_simulated, inputs, threads=count):

@@ -186,7 +186,7 @@ def chattering_report(
     a, omega, eta : float
         As in `chattering_time`, each one number.
     order, resolved : int
-        As in `chattering_time`.
+        As in `chattering_time`, but the order up to 34: six coefficients more say what the terms left out add.
     p : float, optional
         The block's frequency parameter, rad/s: times are then given in seconds as well.
 

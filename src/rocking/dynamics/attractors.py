@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rocking.arrays import Flags, Floats, Integers, evenly
 from rocking.dynamics.maps import StroboscopicMap
-from rocking.dynamics.orbits import NEUTRAL, multipliers_of
+from rocking.dynamics.orbits import multipliers_at, sizes_of
 from rocking.errors import InvalidOption
 from rocking.kernels.periodic import TRAP
 from rocking.kernels.state import Records
@@ -110,8 +110,8 @@ def attractor_from(strobe: StroboscopicMap, state: Floats, size: Floats) -> Attr
     for shorter in range(1, period):  # a slow approach may come near twice in a period only
         if period % shorter == 0 and np.abs((strobe(at, shorter) - at) / size).max() < 1e-3 * RETURN:
             return None
-    multipliers = multipliers_of(change)
-    if np.abs(multipliers).max() >= NEUTRAL:
+    multipliers = multipliers_at(strobe, change)
+    if sizes_of(multipliers).max() >= 1.0:
         return None
     _, _, impacts = strobe.followed(at, period)
     return Attractor(strobe.orbit(at, period)[:-1], multipliers, int(impacts), not change.any())

@@ -48,7 +48,8 @@ class Grid:
         self.taken = np.zeros(len(x) * len(v), dtype=np.int32)
         self.known = Known(strobe, self.size)
         self.kept: Kept | None = None
-        strobe._states(self._states(np.array([0, len(x) * len(v) - 1])))  # a start behind a stop is refused at once
+        corners = self._states(np.array([0, len(x) * len(v) - 1]))
+        strobe._states(corners, "positions", "velocities")  # a start behind a stop, or into one, is refused at once
 
     def keep_in(self, folder: str | Path) -> None:
         """Go on from what a folder holds, and keep what is computed there."""

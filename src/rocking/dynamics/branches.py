@@ -16,7 +16,7 @@ from rocking.body import Body, title_of
 from rocking.constants import Model
 from rocking.dynamics.courses import course_of
 from rocking.dynamics.maps import StroboscopicMap
-from rocking.dynamics.orbits import NEUTRAL, PeriodicOrbit, orbit_at
+from rocking.dynamics.orbits import PeriodicOrbit, orbit_at, sizes_of
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.result import DrawnResult, TableResult
@@ -130,7 +130,7 @@ class Branch(DrawnResult, TableResult):
     @property
     def is_stable(self) -> Flags:
         """Whether the orbit at each point is stable, shape (n,)."""
-        return np.asarray(np.all(np.abs(self.multipliers) < NEUTRAL, axis=1))
+        return np.asarray(np.all(sizes_of(self.multipliers) < 1.0, axis=1))
 
     def __len__(self) -> int:
         return len(self.values)

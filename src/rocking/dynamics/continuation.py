@@ -14,6 +14,7 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.body import Body
 from rocking.dynamics.branches import CLOSED, GRAZING, LIMIT, LOST, SHORT, Bifurcation, Branch
+from rocking.dynamics.courses import Course
 from rocking.dynamics.locating import LEAST_STEP, Location, ending, joined, passed, vanishing
 from rocking.dynamics.orbit_equations import AT_VALUE, OrbitEquations, Solved, Tests
 from rocking.dynamics.orbits import PeriodicOrbit
@@ -77,7 +78,7 @@ def continue_orbit(
     value : float
         The parameter of the orbit.
     limits : (float, float)
-        Range of the parameter.
+        Range of the parameter; beyond it the family may raise a `RockingError`.
     name, unit : str
         What the parameter is, for tables and figures.
     step : float
@@ -135,10 +136,10 @@ def continue_orbit(
     count = checks.whole(most, "most", InvalidOption, least=1)
     equations = OrbitEquations.of(orbit, family, start, (low, high))
     z = np.append(orbit.state, start) / equations.sizes
-    backward = _followed(equations, z, -1.0, (low, high), longest, count)
+    backward = _followed(equations, z, -1.0, longest, count)
     # What has come back to where it began is all there is.
     onwards = backward.end != CLOSED
-    forward = _followed(equations, z, 1.0, (low, high), longest, count) if onwards else _Path([], [], CLOSED)
+    forward = _followed(equations, z, 1.0, longest, count) if onwards else _Path([], [], CLOSED)
     points = [*reversed(backward.points), *forward.points[1:]]
     return Branch(
         family, name, unit, orbit.model, orbit.treatment, (low, high), orbit.period,
@@ -169,20 +170,20 @@ class _Path(NamedTuple):
     end: str
 
 
-def _followed(
-    equations: OrbitEquations, z: Floats, direction: float, limits: tuple[float, float], longest: float, most: int
-) -> _Path:
+def _followed(equations: OrbitEquations, z: Floats, direction: float, longest: float, most: int) -> _Path:
     """Follow the branch in one direction of the parameter, as it leaves the orbit."""
     course = equations.course(z)
     equations, z = equations.moved(z, course)
     path = _Path([_point(equations, z, course.peak)], [], SHORT)
+    if path.points[0].value == equations.limits[0 if direction < 0.0 else 1]:
+        return path._replace(end=LIMIT)
     step = min(_FIRST_STEP, longest)
     equations.for_step(step)
     found = equations.solved(z, AT_VALUE)
     if found is None:
         return path._replace(end=LOST)
     tangent = found.tangent(direction * AT_VALUE)
-    walk = _Walk(equations, found.z, tangent, found.tests(tangent), course, step, longest, limits)
+    walk = _Walk(equations, found.z, tangent, found.tests(tangent), course, step, longest)
     for _ in range(_TRIALS * most):
         if len(path.points) >= most:
             break
@@ -199,7 +200,6 @@ class _Walk(Location):
 
     step: float
     longest: float
-    limits: tuple[float, float]
     #: How far ahead there is no point of this kind, as far as is known, and successful steps since that was found.
     ahead: float = math.inf
     successes: int = 0
@@ -208,6 +208,8 @@ class _Walk(Location):
 
     def __post_init__(self) -> None:
         self.written = self.z
+        #: Speed of the slowest impact and parameter, over its size, at all points so far.
+        self.slowest = [(self.course.slowest, self.z[2])]
 
     def advance(self, path: _Path) -> str:
         """Take a step along the branch, or find that it is too long; returns why the branch ends, if it does."""
@@ -227,7 +229,7 @@ class _Walk(Location):
             path.bifurcations.append(joined(self, new))
             return path.bifurcations[-1].kind
         path.bifurcations.extend(passed(self, new, tests))
-        course, before, length = equations.course(new), self.course, float(np.linalg.norm(new - self.z))
+        course, before = equations.course(new), self.course
         if len(path.points) > 1 and np.max(np.abs(new - self.written)) < _NEAR:
             path.points.pop()
         else:
@@ -238,8 +240,7 @@ class _Walk(Location):
         self.ahead = math.inf if self.successes > _SUCCESSES else self.ahead - self.step
         if at_limit:
             return LIMIT
-        if not equations.kind.rests and course.slowest < min(_SLOW * equations.sizes[1], before.slowest):
-            path.bifurcations.append(vanishing(self, before, length))
+        if self.comes_to_graze(path, before):
             return GRAZING
         if self.has_returned(path):
             return CLOSED
@@ -249,6 +250,16 @@ class _Walk(Location):
         elif solved.steps <= _QUICK:
             self.step = min(self.step * _LONGER, self.longest)
         return ""
+
+    def comes_to_graze(self, path: _Path, before: Course) -> bool:
+        """Whether the slowest impact comes to have no speed, and where."""
+        equations, speed = self.equations, self.course.slowest
+        self.slowest.append((speed, self.z[2]))
+        if equations.kind.rests or speed >= min(_SLOW * equations.sizes[1], before.slowest):
+            return False
+        grazing = vanishing(self, self.slowest)
+        path.bifurcations.extend([] if grazing is None else [grazing])
+        return grazing is not None
 
     def has_returned(self, path: _Path) -> bool:
         """Whether the branch has passed its first point again, in the direction in which it left it."""
@@ -281,17 +292,16 @@ class _Walk(Location):
         equations, z, tangent, self.turned = self.equations, self.z, self.tangent, False
         guess = z + self.step * tangent
         found = equations.solved(guess, tangent)
-        if found is None:
-            return None
-        low, high = (each / equations.sizes[2] for each in self.limits)
-        at_limit = not low <= found.z[2] <= high
+        new = guess if found is None else found.z  # beyond a limit there may be no body or motion
+        low, high = (each / equations.sizes[2] for each in equations.limits)
+        at_limit = not low <= new[2] <= high
         if at_limit:
-            wanted = low if found.z[2] < low else high
-            guess = z + (wanted - z[2]) / (found.z[2] - z[2]) * (found.z - z)
+            wanted = low if new[2] < low else high
+            guess = z + (wanted - z[2]) / (new[2] - z[2]) * (new - z)
             guess[2] = wanted
             found = equations.solved(guess, AT_VALUE)
-            if found is None:
-                return None
+        if found is None:
+            return None
         onwards = found.tangent(tangent)
         # Far from the prediction it is another branch.
         self.turned = bool(np.linalg.norm(found.z - guess) > _ASIDE * self.step or onwards @ tangent < _COSINE)

@@ -47,7 +47,7 @@ class LyapunovExponents(Result):
     impacts : float
         Impacts per period.
     resting : float
-        Share of the periods in which the body comes to rest.
+        Share of the periods in which the body comes to rest, of those that are known; NaN where none is.
     fate : Fate
         What the state is in the end.
     stretches : ndarray, shape (periods, 2)
@@ -167,7 +167,10 @@ def lyapunov_exponents(
     before = checks.whole(transient, "transient", InvalidOption, least=0)
     logs, impacts, fate = strobe._stretches(given, before, count)
     weights = _weights(count)
-    mean = np.array([-np.inf if np.isneginf(each).any() else weights @ each for each in logs.T])
+    known = ~np.isnan(logs).any(axis=1)
+    mean = np.full(2, np.nan)
+    if known.all():  # else nothing is known of what would follow, whatever rests came before
+        mean[:] = [-np.inf if np.isneginf(each).any() else weights @ each for each in logs.T]
     return LyapunovExponents(
         largest=float(mean[0]),
         smallest=float(mean[1]),
@@ -175,7 +178,7 @@ def lyapunov_exponents(
         period=strobe.period,
         periods=count,
         impacts=impacts / count,
-        resting=float(np.mean(np.isneginf(logs[:, 0]))),
+        resting=float(np.mean(np.isneginf(logs[known, 0]))) if known.any() else float("nan"),
         fate=fate,
         stretches=logs,
     )

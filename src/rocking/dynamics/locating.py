@@ -37,8 +37,11 @@ _GRAZES: Final = 1e-4
 #: Steps beyond the end of a branch at which the kind of its orbits is looked at.
 _BEYOND: Final = (0.0, *np.geomspace(1e-12, 1e-4, 9).tolist())
 
-#: Points from which grazing is extrapolated.
+#: Points from which grazing is extrapolated, at least and at most, and how far the last two estimates may differ, over
+#: the range of the parameter.
+_FEWEST: Final = 4
 _EXTRAPOLATED: Final = 6
+_AGREEMENT: Final = 1e-6
 
 #: Points from which the crossing of two branches is interpolated.
 _CROSSING: Final = 4
@@ -115,18 +118,27 @@ def joined(here: Location, new: Floats) -> Bifurcation:
     return here.bifurcation(BRANCHES, middle, [here.z[2], new[2]])
 
 
-def vanishing(here: Location, before: Course, length: float) -> Bifurcation:
-    """Grazing, where the speed of the slowest impact vanishes: extrapolated, as the equations are singular there."""
-    equations, z, tangent = here.equations, here.z, here.tangent
-    speeds, values = [here.course.slowest], [z[2]]
-    back = length * here.course.slowest / (before.slowest - here.course.slowest)
-    for count in range(1, _EXTRAPOLATED):
-        found = equations.solved(z - count * back * tangent, tangent)
-        if found is not None:
-            speeds.append(equations.course(found.z).slowest)
-            values.append(found.z[2])
-    estimates = [_at_zero(speeds[:most], values[:most]) for most in range(max(1, len(speeds) - 2), len(speeds) + 1)]
-    return here.bifurcation(GRAZING, z, estimates)._replace(value=float(estimates[-1] * equations.sizes[2]))
+def vanishing(here: Location, slowest: Sequence[tuple[float, float]]) -> Bifurcation | None:
+    """Grazing, where the speed of the slowest impact vanishes: extrapolated, as the equations are singular there.
+
+    ``slowest`` holds that speed and the parameter, over its size, at all points up to this one. None where the speed
+    has not fallen far enough yet for estimates that agree.
+    """
+    (least, value), *others = reversed(slowest)
+    speeds, values = [least], [value]
+    for speed, value in others:
+        if len(speeds) == _EXTRAPOLATED or speed < speeds[-1]:
+            break
+        if speed >= speeds[-1] + least:
+            speeds.append(speed)
+            values.append(value)
+    if len(speeds) < _FEWEST:
+        return None
+    estimates = [_at_zero(speeds[:most], values[:most]) for most in range(len(speeds) - 2, len(speeds) + 1)]
+    if abs(estimates[-1] - estimates[-2]) > _AGREEMENT:
+        return None
+    found = here.bifurcation(GRAZING, here.z, estimates)
+    return found._replace(value=float(estimates[-1] * here.equations.sizes[2]))
 
 
 def ending(here: Location, ahead: float) -> tuple[str, list[Bifurcation]]:

@@ -151,7 +151,8 @@ class StroboscopicMap(Repeated):
         states : ndarray, shape (..., 2)
             As of the map.
         derivatives : ndarray, shape (..., 2, 2)
-            Exactly zero where the body comes to rest on the way: it has forgotten how it began. NaN where it overturns;
+            Exactly zero where the body comes to rest on the way, or is held at rest at the start: it forgets how it
+            began. On a stop that does not hold it, that of the states in front of the stop. NaN where it overturns;
             infinite at an impact of no speed (a grazing one).
 
         Notes

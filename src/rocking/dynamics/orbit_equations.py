@@ -6,6 +6,7 @@ it was given, by a shift of some pieces: where an impact falls on the start, the
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -19,7 +20,7 @@ from rocking.body import Body
 from rocking.constants import Model
 from rocking.dynamics.courses import Course, course_of, response_of
 from rocking.dynamics.maps import Fate, StroboscopicMap
-from rocking.dynamics.orbits import SAME, PeriodicOrbit, multipliers_of, orbit_at
+from rocking.dynamics.orbits import SAME, PeriodicOrbit, multipliers_at, orbit_at
 from rocking.dynamics.repeated import scale_of
 from rocking.dynamics.symmetry import HalfMap, are_halved, is_mirrored
 from rocking.errors import InvalidOption, RockingError
@@ -41,6 +42,9 @@ _RESIDUAL: Final = 1e-12
 _LEAST_DIFFERENCE: Final = 1e-13
 _DIFFERENCE: Final = 1e-6
 _OF_STEP: Final = 1e-3
+
+#: Distance from a limit of the parameter, over it, that is only rounding.
+_ROUNDING: Final = 2.0**-50
 
 #: An impact nearer to the start of a period than this share of it moves that start.
 _TOO_NEAR: Final = 0.03
@@ -96,6 +100,8 @@ class OrbitEquations:
     by_half: bool
     sizes: Floats
     kind: Kind
+    #: Range of the parameter: the family need not be made beyond.
+    limits: tuple[float, float]
     shift: int = 0
     difference: float = _DIFFERENCE
 
@@ -120,7 +126,7 @@ class OrbitEquations:
         by_half = orbit.symmetric and not orbit.rests and is_mirrored(strobe)
         sizes = np.array([*scale, limits[1] - limits[0]])
         kind = _kind_of(strobe, orbit.state, orbit.period)
-        return cls(family, orbit.model, orbit.treatment, orbit.period, by_half, sizes, kind)
+        return cls(family, orbit.model, orbit.treatment, orbit.period, by_half, sizes, kind, limits)
 
     def _strobe(self, value: float) -> StroboscopicMap:
         """Map of the body and the motion at a value, with the start of the period shifted."""
@@ -131,8 +137,10 @@ class OrbitEquations:
         return HalfMap(self.strobe(value))
 
     def physical(self, z: Floats) -> tuple[Floats, float]:
-        """State and parameter of numbers z."""
-        return z[:2] * self.sizes[:2], float(z[2] * self.sizes[2])
+        """State and parameter of numbers z; exactly a limit where it differs from that by rounding."""
+        value = float(z[2] * self.sizes[2])
+        at_limit = (each for each in self.limits if math.isclose(value, each, rel_tol=_ROUNDING))
+        return z[:2] * self.sizes[:2], next(at_limit, value)
 
     def for_step(self, step: float) -> None:
         """Choose the differences by the parameter for steps of some length along the branch."""
@@ -151,11 +159,12 @@ class OrbitEquations:
         """Residual, its derivative by z, and the derivative of the map."""
         state, value = self.physical(z)
         after, change = self.returned(state, value)
-        h = self.difference * self.sizes[2]
-        ahead, _ = self.returned(state, value + h)
-        behind, _ = self.returned(state, value - h)
+        h, (low, high) = self.difference * self.sizes[2], self.limits
+        less = low if value - h < low <= value else value - h
+        more = high if value <= high < value + h else value + h
+        by_value = (self.returned(state, more)[0] - self.returned(state, less)[0]) / (more - less)
         scaled = change / self.sizes[:2, None] * self.sizes[:2]
-        by_value = (ahead - behind) / (2.0 * h) * self.sizes[2] / self.sizes[:2]
+        by_value = by_value * self.sizes[2] / self.sizes[:2]
         return (after - state) / self.sizes[:2], np.column_stack([scaled - np.eye(2), by_value]), change
 
     def solved(self, guess: Floats, normal: Floats) -> Solved | None:
@@ -206,7 +215,8 @@ class OrbitEquations:
     def multipliers(self, z: Floats) -> NDArray[np.complex128]:
         """Floquet multipliers at a point."""
         state, value = self.physical(z)
-        return multipliers_of(self.strobe(value).derivative(state, self.period)[1])
+        strobe = self.strobe(value)
+        return multipliers_at(strobe, strobe.derivative(state, self.period)[1])
 
     def at_start(self, z: Floats) -> Floats:
         """State at the start of the period as it was given."""

@@ -30,8 +30,10 @@ if TYPE_CHECKING:
 #: Distance, over the scale of the states, within which two orbits are the same.
 SAME: Final = 1e-7
 
-#: Size of a multiplier that rounding may have made of 1.
-NEUTRAL: Final = 1.0 - 1e-9
+#: Difference from 1 that rounding may have made in a multiplier, in the product of two, and in two whose product is 1,
+#: which may be equal: then it is a root of rounding.
+_NEUTRAL: Final = 1e-9
+_NEUTRAL_PAIR: Final = 1e-6
 
 #: Points of a figure for each period, and letters of the column of names in a summary.
 _DRAWN: Final = 400
@@ -54,7 +56,8 @@ class PeriodicOrbit(DrawnResult, TableResult):
         Impacts in its period: a whole number, or infinity with complete chattering.
     multipliers : ndarray of complex, shape (2,)
         Floquet multipliers, the largest first: eigenvalues of the derivative of the state after a period of the orbit
-        by that before. Exactly zero with a proven rest.
+        by that before. Exactly zero with a proven rest; one at rest where impacts lose nothing, for what is near it
+        never rests.
     symmetric : bool
         Whether it is its own mirror image half a period later.
     rests : bool
@@ -77,7 +80,7 @@ class PeriodicOrbit(DrawnResult, TableResult):
     @property
     def is_stable(self) -> bool:
         """Whether what is near it comes nearer: all multipliers are within the unit circle, by more than rounding."""
-        return bool(np.all(np.abs(self.multipliers) < NEUTRAL))
+        return bool(np.all(sizes_of(self.multipliers) < 1.0))
 
     @property
     def duration(self) -> float:
@@ -100,7 +103,7 @@ class PeriodicOrbit(DrawnResult, TableResult):
 
     @property
     def _kind(self) -> str:
-        grows = float(np.max(np.abs(self.multipliers))) > 1.0 / NEUTRAL
+        grows = np.any(sizes_of(self.multipliers) > 1.0)
         words = [
             "stable" if self.is_stable else "unstable" if grows else "neutral",
             *(["symmetric"] if self.symmetric else []),
@@ -194,7 +197,8 @@ def orbit_at(strobe: StroboscopicMap, state: Floats, period: int) -> PeriodicOrb
     complete = rests and bool(impacts) and strobe.treatment.bracket > 0.0 and float(np.max(strobe.bodies.restitution))
     return PeriodicOrbit(
         strobe.body, strobe.motion, strobe.model, strobe.treatment, state, period,
-        math.inf if complete else float(impacts), multipliers_of(change), is_symmetric(strobe, state, period), rests,
+        math.inf if complete else float(impacts), multipliers_at(strobe, change), is_symmetric(strobe, state, period),
+        rests,
     )  # fmt: skip
 
 
@@ -202,6 +206,28 @@ def multipliers_of(change: Floats) -> NDArray[np.complex128]:
     """Floquet multipliers of a derivative, the largest first."""
     found = np.linalg.eigvals(change).astype(np.complex128)
     return found[np.lexsort((-found.imag, -np.abs(found)))] + 0.0
+
+
+def multipliers_at(strobe: StroboscopicMap, change: Floats) -> NDArray[np.complex128]:
+    """Floquet multipliers of an orbit with this derivative of the map, also of a body whose impacts lose nothing.
+
+    What is near the rest of such a body bounces for ever, so that they are one there, not zero.
+    """
+    record = strobe._records[0]
+    if np.prod(record["restitution"]) < 1.0:
+        return multipliers_of(change)
+    if not np.any(change):
+        return np.ones(2, dtype=np.complex128)
+    keeps_areas = not (record["varying"] or np.any(record["damping"]))
+    # By the rounding of many impacts the product of both would differ from 1, as if the orbit attracted.
+    return multipliers_of(change / np.sqrt(np.abs(np.linalg.det(change)))) if keeps_areas else multipliers_of(change)
+
+
+def sizes_of(multipliers: NDArray[np.complex128]) -> Floats:
+    """Sizes of multipliers, pairs along the last axis: exactly 1 where they differ from that by rounding."""
+    sizes = np.abs(multipliers)
+    is_pair = np.abs(np.prod(sizes, axis=-1, keepdims=True) - 1.0) < _NEUTRAL
+    return np.where(np.abs(sizes - 1.0) < np.where(is_pair, _NEUTRAL_PAIR, _NEUTRAL), 1.0, sizes)
 
 
 def _number(value: complex) -> str:

@@ -86,21 +86,37 @@ class Repeated:
         sensible(states, name)
         return states.reshape(-1, 2)
 
-    def _states(self, states: ArrayLike, name: str | None = None) -> tuple[Floats, state.Records]:
-        """States as given, flat, and as records; ``name`` is what a caller calls them, if it checks them."""
-        given = checks.numbers(states, name or "states", InvalidOption)
+    def _states(self, states: ArrayLike, name: str = "states", velocities: str = "") -> tuple[Floats, state.Records]:
+        """States as given, flat, and as records; ``name`` is what a caller calls them, or their positions."""
+        given = checks.numbers(states, name, InvalidOption)
         if given.ndim == 0 or given.shape[-1] != 2:
             raise InvalidOption(
                 f"{{}} must hold pairs ({self.body.coordinate.name}, velocity) along the last axis, not have the shape "
                 f"{given.shape}",
-                name or "states",
+                name,
             )
         flat = given.reshape(-1, 2)
+        self._refuse_into_stop(flat[:, 0], flat[:, 1], velocities or name)
         made = state.new_states(len(flat), 0)
         set_start(made, self._records, self.bodies, flat[:, 0], flat[:, 1], name)
         fallen = float(self._records["fallen"][0])
         made["peak"] = fallen if np.isinf(fallen) else fallen * _ALMOST
         return given, made
+
+    def _refuse_into_stop(self, at: Floats, speed: Floats, name: str) -> None:
+        """Refuse states at a stop that lead into it."""
+        record, (low, high) = self._records[0], self.body.stops
+        if record["entered"][0] != 0:  # no stop, but the ground on both sides
+            return
+        wrong = (at == low) & (speed < 0.0) | (bool(record["facing"]) & (at == high) & (speed > 0.0))
+        if np.any(wrong):
+            x, v = float(at[wrong][0]), float(speed[wrong][0])
+            raise InvalidOption(
+                f"{{}} must not lead into a stop, as {v:g} m/s at {x:g} m does; change its sign, or begin in front of "
+                "the stop",
+                name,
+                value=v,
+            )
 
     def _coordinates(self, u: Floats, v: Floats, side: Integers) -> Floats:
         """Coordinates and velocities of states given in the frames of their sides."""

@@ -13,13 +13,14 @@ import rocking.response
 from rocking import checks
 from rocking.arrays import Floats, as_asked
 from rocking.body import Body
-from rocking.constants import Model
+from rocking.constants import MODELS, Model
 from rocking.dynamics.linear_bodies import LinearBodies, LinearBody
 from rocking.ensemble import dataset_of, outcomes_of, product_of, setup_of
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.named import Motions, one_motion
 from rocking.peak_changes import BETWEEN_STOPS
+from rocking.problem import never_rests
 from rocking.simulation import response_to
 from rocking.treatment import Treatment
 
@@ -135,6 +136,7 @@ def simulate(
     '1.800000000000'
     """
     body, motion = _one_body(body), _along_one_line(one_motion(motion))
+    _check_rests(body, duration)
     at = position_at_start(body, initial_position)
     found = response_to(body, motion, "linear", chattering, _duration(body, motion, duration), (at, initial_velocity))
     return Response(**{entry.name: getattr(found, entry.name) for entry in fields(found)})
@@ -198,6 +200,8 @@ def simulate_many(
     if not isinstance(gathered, LinearBodies):
         given = gathered if isinstance(gathered, Iterable) else [gathered]
         gathered = LinearBodies([_one_body(each) for each in given])
+    for each in gathered.members:
+        _check_rests(each, duration)
     pressed = np.array([min(each.thresholds) > 0.0 for each in gathered.members])
     if duration is None and pressed.any() and not pressed.all():
         # Those that nothing presses against a stop end with the motion; the others go on until they rest.
@@ -228,6 +232,9 @@ def simulate_many(
     results = outcomes_of(product, setup, threads, progress, by)
     found = dataset_of(product, results).drop_vars("overturned").rename(peak_rotation="peak_position", block="body")
     found["peak_position"].attrs.update(units="m", long_name="highest position")
+    found["peak_time"].attrs.update(long_name="time of the highest position")
+    for kept in found.values():
+        kept.attrs["long_name"] = kept.attrs["long_name"].replace("the block", "the body")
     for name in by or ():
         found[name].attrs.update(units="m")
     return found
@@ -257,6 +264,7 @@ def simulate_any(
 def model_of(body: Body, model: Model | None) -> Model:
     """Return the equation of motion: as it is given, else nonlinear for a body that rocks."""
     if model is not None:
+        checks.one_of(model, "model", InvalidOption, MODELS)
         return model
     return "linear" if isinstance(body, LinearBody) else "nonlinear"
 
@@ -288,6 +296,15 @@ def _along_one_line(motion: Motion | None) -> Motion | None:
 def _start_of(body: LinearBody) -> float:
     """Return position zero, or the stop that zero is behind."""
     return min(max(0.0, body.law.low), body.law.high)
+
+
+def _check_rests(body: LinearBody, duration: float | None) -> None:
+    """Ask for a duration where a body that is pressed against its stop bounces for ever."""
+    if duration is None and min(body.thresholds) > 0.0 and never_rests(body.alone()):
+        raise InvalidOption(
+            f"a body with {{}} 1, as this {body.description}, never comes to rest; give {{}} to say when to stop",
+            *("restitution", "duration"),
+        )
 
 
 def _duration(body: LinearBody, motion: Motion | None, duration: float | None) -> float | None:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rocking.arrays import Floats, Integers
-from rocking.kernels.arc import evaluate, expand, restoring
+from rocking.kernels.arc import evaluate, expand, restoring, sign_of
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.ground import ROUNDING, Ground, length_of, start_of
 from rocking.kernels.march import march
@@ -20,6 +20,7 @@ from rocking.kernels.recurrences import variation_coefficients
 from rocking.kernels.restitution import factor, relative_slope
 from rocking.kernels.state import AT_REST, Ending, Record, Records
 from rocking.kernels.trace import Trail, add_restraints, expand_coefficients
+from rocking.kernels.uplift import next_uplift
 
 #: Turns of a march that one period, or one impact, may take, and the coordinate and the speed from which on none is
 #: taken: a state beyond all sense, or that is no number, would take all of them.
@@ -254,9 +255,10 @@ def put_back(ground: Ground, block: Record, state: Record, ending: int) -> int:
 def differentiate(trail: Trail, scratch: Record, work: Record, table: Records, states: Records, out: Floats) -> None:
     """Write the derivative of each state after one period by the state before it, in the frames of their sides.
 
-    It is exactly zero where the body has come to rest on the way, for any time. The rules of the trail have the march
-    write its table, whose rows are used again and again. The states are those after the period; ``ending`` is their
-    `Fate`.
+    It is exactly zero where the body has come to rest on the way, for any time, and where it is held at rest at the
+    start. From a stop that does not hold it, it is that of the states off the stop. The rules of the trail have the
+    march write its table, whose rows are used again and again. The states are those after the period; ``ending`` is
+    their `Fate`.
     """
     for k in range(states.shape[0]):
         differentiate_period(trail, scratch, work, table, states[k], out[k])
@@ -266,7 +268,12 @@ def differentiate(trail: Trail, scratch: Record, work: Record, table: Records, s
 def differentiate_period(trail: Trail, scratch: Record, work: Record, table: Records, state: Record, M: Floats) -> int:
     """Take one state through a period and write its derivative, as `differentiate`; returns the number of impacts."""
     ground, block, rules, _ = trail
-    one = 1.0 if state.side >= 0 else 0.0  # a body at rest has forgotten what was before
+    one = 1.0
+    if state.side < 0:
+        lifted = next_uplift(ground, block, scratch, state.side, state.piece, state.offset, rules.stop)
+        held = lifted.side < 0 or lifted.piece > state.piece or lifted.offset > state.offset
+        # A body at rest has forgotten what was before; the frame of one that leaves at once is that of no side.
+        one = 0.0 if held else sign_of(lifted.side)
     M[0, 0], M[0, 1], M[1, 0], M[1, 1] = one, 0.0, 0.0, one
     state.until = pieces_of(ground)
     state.budget = turns_from(state)

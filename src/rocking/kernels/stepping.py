@@ -78,21 +78,24 @@ def schatzman_paoli(ground: Ground, block: Record, rules: Record, state: Record,
     """Schatzman and Paoli's scheme: central differences, and u_{k+1} + e u_{k-1} >= 0; rows as of `moreau_jean`.
 
     An impact takes two steps in contact or three, of which the first changes the side; in contact for longer, every
-    third does. The velocity is the difference from the step before.
+    third does. All of them have the restitution of the side that was hit. The velocity is the difference from the step
+    before.
     """
     side, u, v = start_of_steps(block, state)
-    before, piece, in_contact = u, 0, 0
+    before, piece, in_contact, restitution = u, 0, 0, 0.0
     write_step(out, 0, side, (u, v, 0.0))
     for k in range(1, out.shape[0]):
         time = (k - 1) * h
         piece = piece_at(ground, piece, time)
         force, _ = acceleration_of(ground, block, rules, side, piece, time, u)
+        if in_contact % _IMPACT_STEPS == 0:
+            restitution = block.restitution[side]
         if k == 1:
             free, least = u + h * (v + 0.5 * h * (force - block.damping[side] * v)), 0.0
         else:
             drag = 0.5 * h * block.damping[side]  # by the central difference
             free = u + ((1.0 - drag) * (u - before) + h * h * force) / (1.0 + drag)
-            least = -block.restitution[side] * before
+            least = -restitution * before
         end = max(free, least)
         if block.facing:
             gap = block.fallen - before

@@ -109,7 +109,7 @@ def proven(x: float, entered: State, delta: float, eta: float, remaining: float)
 
 
 #: Below this speed a block is at rest: no phase changes by what remains.
-_STILL: Final = 1e-120
+STILL: Final = 1e-120
 
 #: Impact pairs after which a sequence is UNRESOLVED (eta = 0.99999 takes about a million).
 _MAXIMUM_PAIRS: Final = 5_000_000
@@ -134,7 +134,7 @@ def rest_after_impact(x: float, entered: State, delta: float, eta: float) -> tup
     row = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     passed = 0.0
     for pair in range(_MAXIMUM_PAIRS):
-        if entered.V < _STILL:
+        if entered.V < STILL:
             return Verdict.FOUND, x
         last = row
         row = extrapolate(remaining_phase(entered, delta, eta), passed, weights, last)
@@ -156,7 +156,7 @@ def rest_after_impact(x: float, entered: State, delta: float, eta: float) -> tup
 @inlined
 def next_arc(x: float, start: State, s: float, delta: float) -> tuple[int, float, State]:
     """Status and duration of the arc that starts at phase x, and the state before its impact; a block at rest stays."""
-    if start.V < _STILL:
+    if start.V < STILL:
         return Verdict.FOUND, 0.0, State(0.0, start.P, start.D)
     return arc(start, estimated_duration(start, s, delta), s, delta, math.pi - x)
 

@@ -16,7 +16,7 @@ from rocking.arrays import Floats
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.remaining import Restoring, remaining_time
 from rocking.kernels.sine.eq65 import positive_root
-from rocking.kernels.sine.sequence import LEVELS, richardson_weights
+from rocking.kernels.sine.sequence import LEVELS, STILL, richardson_weights
 
 
 class PowerSeries:
@@ -188,10 +188,22 @@ def series_arcs(
     """Write what `_arcs` returns; ``space`` is scratch space, of `_ROWS` series."""
     state = start
     for n in range(durations.shape[0]):
-        series_arc(state, first_side, delta, space, durations[n], states[n])
+        lifts = n == 0 and first_side  # at a speed of zero
+        if state[0, 0] < STILL and not lifts:
+            stay(state, durations[n], states[n])
+        else:
+            series_arc(state, first_side, delta, space, durations[n], states[n])
         state, first_side = states[n], not first_side
         for k in range(start.shape[1]):
             state[0, k] *= eta
+
+
+@inlined
+def stay(state: Series, z: Series, end: Series) -> None:
+    """Write what becomes of a block that is at rest, as of `next_arc`: it stays, and is as it was."""
+    for k in range(z.size):
+        z[k] = end[0, k] = 0.0
+        end[1, k], end[2, k] = state[1, k], state[2, k]
 
 
 #: Series that `series_arc` needs space for.
