@@ -7,7 +7,7 @@ import pytest
 from explorer_texts import in_english
 
 import rocking
-from rocking.explorer.assessment import assessment_of, described, parts
+from rocking.explorer.assessment import as_python, assessment_of, described, parts
 from rocking.explorer.inputs import read_case
 from rocking.explorer.uploads import UploadStore
 
@@ -96,6 +96,40 @@ def test_the_margin_is_the_critical_scale():
     assert last(assessed(LEANING, records=PLAIN, **LEVELS)).header["margin"] is None
 
 
+@pytest.mark.parametrize(("motion", "scale"), [("el-centro-meloland-270", "2000"), ("ridgecrest-clc-090", "1e12")])
+def test_the_margin_of_a_motion_however_strong_is_next_to_what_does_not_overturn(motion, scale):
+    case = {**STATUE, "motion": motion, "scale": scale}
+    margin = last(assessed(case, records=PLAIN, **LEVELS)).header["margin"]
+    block, shaken = rocking.Block(width=0.24, height=1.1), rocking.records.load(motion) * float(scale)
+    assert margin["factor"] < 1.0 / 256.0
+    assert rocking.simulate(block, shaken * margin["factor"]).overturned
+    assert not rocking.simulate(block, shaken * (margin["factor"] * (1.0 - 1e-6))).overturned
+
+
+def test_the_margin_has_the_treatment_of_the_case():
+    treated = {**STATUE, "motion": "ridgecrest-clc-090", "chattering": "velocity=0.5"}
+    found, plain = (
+        last(assessed(case, records=PLAIN, **LEVELS)).header["margin"]["factor"]
+        for case in (treated, {**treated, "chattering": ""})
+    )
+    block, motion = rocking.Block(width=0.24, height=1.1), rocking.records.load("ridgecrest-clc-090")
+    assert found != pytest.approx(plain, rel=1e-3)
+    assert rocking.simulate(block, motion * found, chattering="velocity=0.5").overturned
+    assert not rocking.simulate(block, motion * (found * (1.0 - 1e-6)), chattering="velocity=0.5").overturned
+
+
+def test_motions_of_the_program_are_variables_of_the_script():
+    store = UploadStore()
+    motions = [rocking.Motion.from_samples(np.sin(np.arange(400) / k), 0.02, name=f"own {k}") for k in (8.0, 9.0)]
+    records = ";".join(f"motion=given:{store.add_motion(motion)}" for motion in motions)
+    found = assessment_of(read_case(STATUE, store), {"records": records, **LEVELS}, store)
+    lines = as_python(found).splitlines()
+    names = [line.partition(" = ...  # ") for line in lines if "the motion that this page was opened with" in line]
+    assert [name for _, _, name in names] == [f"own {k}: the motion that this page was opened with" for k in (8.0, 9.0)]
+    assert [f"    {name}," for name, _, _ in names] == lines[lines.index("motions = [") + 1 :][:2]
+    assert len({name for name, _, _ in names}) == 2
+
+
 def test_levels_go_from_where_a_record_lifts_the_block_to_where_most_overturn_it():
     for measure in ("pga", "sa"):
         found = assessed(STATUE, records=PLAIN, measure=measure, levels="4")
@@ -117,8 +151,14 @@ def test_levels_go_from_where_a_record_lifts_the_block_to_where_most_overturn_it
         ({"records": PLAIN, "friction": "7"}, "coefficient"),
         ({"records": "motion=none"}, "shakes nothing"),
         ({"records": "motion=file:00"}, "not here any more"),
+        ({"records": PLAIN, "level_from": "1", "level_to": "1e40"}, "are simulated here"),
     ],
 )
 def test_what_cannot_be_assessed_is_refused_in_a_sentence(texts, words):
     with pytest.raises(rocking.RockingError, match=words):
-        assessed(STATUE, **texts)
+        last(assessed(STATUE, **texts))
+
+
+def test_a_block_that_hardly_comes_to_rest_is_refused_whatever_the_duration_of_the_case():
+    with pytest.raises(rocking.RockingError, match="hardly comes to rest: lower it"):
+        assessed({**STATUE, "restitution": "1", "duration": "10"}, records=PLAIN, **LEVELS)

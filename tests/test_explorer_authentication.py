@@ -1,6 +1,7 @@
 """Who is let in: hosts, the one-time link, the secret, and from which pages something may be read or sent."""
 
 import itertools
+import sys
 from urllib.parse import parse_qs, urlsplit
 
 import pytest
@@ -224,6 +225,36 @@ def test_the_printed_link_has_a_token_of_its_own_where_no_browser_sends_it():
 
 
 # Names
+
+
+@pytest.mark.parametrize(
+    ("port", "hosts", "sent", "status"),
+    [
+        (80, ("127.0.0.1",), "127.0.0.1", 200),
+        (80, ("127.0.0.1",), "127.0.0.1:80", 200),
+        (PORT, ("127.0.0.1",), "127.0.0.1", 421),
+        (PORT, ("MyPC",), f"mypc:{PORT}", 200),
+        (80, ("MyPC",), "mypc", 200),
+    ],
+)
+def test_a_server_is_known_by_its_name_as_browsers_send_it(port, hosts, sent, status):
+    async def inside(scope, receive, send):
+        await PlainTextResponse("inside")(scope, receive, send)
+
+    application = RequestAuthentication(inside, port, hosts)
+    headers = [(b"host", sent.encode()), (b"origin", f"http://{sent}".encode())]
+    assert answered(application, "GET", "/", headers)[0] == status
+
+
+@pytest.mark.skipif(sys.platform == "darwin", reason="macOS has one address of this machine alone")
+def test_an_address_is_known_as_a_browser_writes_it(capsys):
+    here = served(Explorer(), {}, address="127.2")
+    try:
+        assert here.socket.getsockname()[0] == "127.0.0.2" and capsys.readouterr().err == ""
+        names = here.authentication._hosts
+        assert {f"{host}:{here.port}".encode() for host in ("127.2", "127.0.0.2")} <= names
+    finally:
+        here.socket.close()
 
 
 @pytest.mark.parametrize("host", LOOPBACK)

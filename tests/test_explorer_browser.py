@@ -434,6 +434,21 @@ def test_the_phase_plane_and_the_energy_are_drawn_where_they_are_seen(opened):
     assert page.js("document.body.dataset.phases") == "1"
 
 
+def test_the_mark_in_the_phase_plane_is_where_the_time_went_while_nobody_saw_it(opened):
+    page = opened(f"{STATUE}&from=231&to=235&at=232", viewport={"width": 1280, "height": 700})
+    page.page.locator("#phase-legend").scroll_into_view_if_needed()
+    page.until("document.body.dataset.phases === '1'")
+    page.js("scrollTo(0, 0)")
+    page.page.wait_for_timeout(200)
+    entered(page, "at", "232.5")
+    page.says("cursor", "At 232.500 s")
+    page.page.locator("#phase-legend").scroll_into_view_if_needed()
+    now = f"({MODELS}).find((each) => each.name === 'phase-now').data"
+    response = statue(0.4 * 9.80665)
+    expected = float(response.rotation(232.5)) / response.block.alpha
+    page.until(f"Math.abs({now}.x[0] - ({expected!r})) < 1e-4", "the mark is at the time", timeout=5.0)
+
+
 def test_a_time_is_read_by_mouse_by_keys_and_typed_and_the_block_follows(opened):
     page = opened(f"{STATUE}&from=231&to=235", allowed=["422"])
     response = statue(0.4 * 9.80665)
@@ -499,6 +514,63 @@ def test_dragging_across_a_plot_zooms_in(opened):
     page.says("cursor", "the block")
 
 
+def test_a_reading_is_of_the_case_and_of_the_time_that_are_shown(opened):
+    page = opened(STATUE, allowed=["422"])
+    problem = "!document.getElementById('problem').hidden"
+    entered(page, "at", "9999")
+    page.until(problem)
+    page.rested(lambda: page.page.select_option("#record", "el-centro-meloland-270"))
+    assert not page.js(problem) and page.page.input_value("#at") == ""
+    entered(page, "at", "2")
+    page.says("cursor", "At 2.0")
+    page.rested(lambda: page.page.select_option("#record", "ridgecrest-clc-090"))
+    assert page.page.input_value("#at") == "" and page.text("#cursor").startswith("Click on the plots")
+    # What the pointer asked for comes when it has left the plots.
+    box = page.page.locator("#histories").bounding_box()
+    with held(page, "**/api/at?*") as waiting:
+        page.page.mouse.move(box["x"] + 400, box["y"] + 80)
+        asked(page, waiting)
+        page.page.mouse.move(box["x"] + 400, box["y"] - 60)
+        page.page.wait_for_timeout(100)
+    page.page.wait_for_timeout(300)
+    assert page.text("#cursor").startswith("Click on the plots")
+    # A mistake in the settings is said before an older one of the reading.
+    entered(page, "at", "9999")
+    page.until(problem)
+    entered(page, "width", "-1")
+    page.until("document.getElementById('problem').textContent.includes('Width')")
+
+
+def test_what_never_moves_is_read_and_where_no_case_is_shown_nothing_is(opened, here):
+    page = opened("width=0.24&height=1.1&motion=none&view=block")
+    page.page.wait_for_timeout(300)
+    assert page.page.locator("#problem").is_hidden()
+    page.page.click("[data-view=response]")
+    page.says("cursor", "At 0.000 s the block stands on both corners")
+    page = opened(STATUE, allowed=["422"])
+    page.page.goto(here.link({"width": "-1", "height": "1.1"}))
+    page.until("document.body?.dataset.ready && !document.getElementById('problem').hidden")
+    entered(page, "at", "2")
+    page.page.click("[data-view=block]")
+    page.page.click("#to-uplift")
+    page.page.click("#play")
+    page.page.wait_for_timeout(200)
+    assert page.text("#problem").startswith("“Width”")
+
+
+def test_a_window_that_begins_after_the_response_is_given_up(opened):
+    page = opened(f"{STATUE}&from=240&to=250")
+    page.rested(lambda: entered(page, "pga", "1.2"))
+    assert "It overturns" in page.text("#verdict") and page.page.locator("#problem").is_hidden()
+    assert "from" not in query_of(page)
+    other = "view=compare&compare=motion&other.motion=ridgecrest-clc-090&other.pga=0.4g&from=100&to=150"
+    page = opened(f"{SINE}&{other}")
+    page.until("document.body.dataset.compared")
+    assert query_of(page)["from"] == "100"
+    page.rested(lambda: page.page.click("[data-view=response]"))
+    assert page.page.locator("#problem").is_hidden() and "from" not in query_of(page)
+
+
 def test_ratios_of_intervals_are_drawn_against_eta_squared(opened):
     page = opened(STATUE)
     response = statue(0.4 * 9.80665)
@@ -534,6 +606,34 @@ def test_a_pulse_is_chosen_and_changed(opened):
         rocking.Block(width=0.24, height=1.1), rocking.pulses.ricker(0.35 * 9.80665, 1.0, kind="antisymmetric")
     )
     assert page.text("#figures div:first-child dd").startswith("overturns") == response.overturned
+
+
+def test_a_field_shows_what_is_computed_where_the_case_leaves_it_out(opened):
+    sine = "p=2&alpha=0.2&restitution=0.92&motion=sine:amplitude%3D2.02,frequency%3D0.63,cycles%3D2.5"
+    page = opened(sine)
+    page.rested(lambda: entered(page, "pulse-phase", "90"))
+    assert query_of(page)["motion"].endswith(",phase=90deg")
+    page.rested(page.page.go_back)
+    assert page.page.input_value("#pulse-phase") == "0" and "phase" not in page.text("#python")
+    page = opened("width=0.24&height=1.1&motion=ricker:amplitude%3D0.5g,frequency%3D2")
+    page.rested(lambda: page.page.select_option("#pulse-kind", "antisymmetric"))
+    page.rested(page.page.go_back)
+    assert page.page.input_value("#pulse-kind") == "symmetric" and "kind" not in page.text("#python")
+    page = opened(f"{STATUE}&chattering=velocity")
+    assert float(page.page.input_value("#velocity-limit")) == rocking.VelocityThreshold().threshold
+    assert "chattering='velocity'" in page.text("#python")
+
+
+def test_another_description_has_the_value_that_was_changed_before_it(opened):
+    page = opened(STATUE)
+    with held(page, "**/api/case?*") as waiting:
+        entered(page, "width", "0.3")
+        asked(page, waiting)
+        page.page.select_option("#shape", "parameters")
+        page.page.wait_for_timeout(300)
+    page.until("new URLSearchParams(location.search).has('alpha')")
+    alpha = quantities.angle(query_of(page)["alpha"], "alpha")
+    assert alpha == pytest.approx(rocking.Block(width=0.3, height=1.1).alpha, rel=1e-12)
 
 
 def test_a_block_by_its_parameters_with_two_sides(opened):
@@ -630,6 +730,33 @@ DROP = """async ([name, text]) => {
 
 
 HOSTILE = ["x<img src=x id=hostile onerror=alert(1)>", '"><style id=hostile>*{display:none}', "$$hostile{$$"]
+
+
+def test_a_step_and_a_tolerance_take_a_comma(opened, tmp_path):
+    page = opened(STATUE, allowed=["422"])
+    file = tmp_path / "nothing said.txt"
+    file.write_text("\n".join(str(0.1 * ((k * 7) % 11 - 5)) for k in range(300)), "utf-8")
+    page.page.set_input_files("#file", file)
+    page.page.locator(".missing button", has_text="m/s2: PGA").first.click()
+    # The question that is left has the keys.
+    assert page.js("document.activeElement.closest('.missing')?.textContent ?? ''") != ""
+    page.rested(lambda: entered(page, "dt", "0,02"))
+    assert query_of(page)["dt"] == "0.02" == page.page.input_value("#dt")
+    page = opened("mesh=statue&azimuth=90&motion=ridgecrest-clc-090&pga=0.4g")
+    page.page.click("#block-form details summary")
+    page.rested(lambda: entered(page, "tolerance", "0,001"))
+    assert query_of(page)["tolerance"] == "0.001"
+
+
+def test_a_folder_that_is_dropped_is_said_to_be_one(opened, tmp_path):
+    only_chromium("drop a folder")
+    page = opened(STATUE)
+    session = page.page.context.new_cdp_session(page.page)
+    data = {"items": [], "files": [str(tmp_path)], "dragOperationsMask": 1}
+    for kind in ("dragEnter", "dragOver", "drop"):
+        session.send("Input.dispatchDragEvent", {"type": kind, "x": 600, "y": 400, "data": data})
+    page.until("!document.getElementById('problem').hidden")
+    assert page.text("#problem") == f"{tmp_path.name} cannot be read: is it a folder, or gone?"
 
 
 @MORE
@@ -1079,6 +1206,74 @@ def test_a_small_response_is_shown_where_the_pointer_lies_still(opened, explorer
     assert len(asked) == before + 1
 
 
+def test_a_map_that_has_changed_shows_nothing_of_the_one_before(opened):
+    page = opened(f"{SINE}&view=map&points=12")
+    complete(page)
+    page.page.focus("#map")
+    page.page.keyboard.press("ArrowUp")
+    page.page.locator("#map-small").wait_for(state="visible")
+    # Another case: what the keys pointed at is gone, and until a part is computed nothing is known.
+    page.js("""new MutationObserver((_, seen) => {
+      document.body.dataset.seen = (document.body.dataset.seen ?? "") + document.getElementById("map-at").textContent;
+    }).observe(document.getElementById("map-at"), {childList: true, characterData: true, subtree: true})""")
+    entered(page, "restitution", "0.6")
+    page.until("location.search.includes('restitution=0.6')")
+    complete(page)
+    assert page.page.locator("#map-small").is_hidden() and ": ." not in page.js("document.body.dataset.seen")
+    # Another axis, closer, and back in the browser's history: there is nothing to zoom out to.
+    first = query_of(page)
+    page.page.select_option("#map-x", "p")
+    page.until("location.search.includes('x=p&')")
+    page.page.focus("#map")
+    page.page.keyboard.press("+")
+    page.until("location.search.includes('x_from')")
+    while query_of(page).get("x") == "p":
+        page.page.go_back()
+        page.page.wait_for_timeout(200)
+    complete(page)
+    assert query_of(page) == first and page.page.locator("#map-out").is_disabled()
+    # Another motion has another axis to the right, with its own ends.
+    page.page.focus("#map")
+    page.page.keyboard.press("+")
+    page.until("location.search.includes('x_from')")
+    page.page.select_option("#kind", "record")
+    page.until("location.search.includes('x=p&')")
+    assert not {"x_from", "x_to"} & query_of(page).keys()
+
+
+def test_a_map_says_what_is_other_than_in_the_case(opened):
+    page = opened(f"{SINE}&view=map&points=9&initial_rotation=1deg")
+    complete(page)
+    assert page.text("#map-notes").startswith("Every point begins at rest")
+    page.page.click("text=Response")
+    page.page.fill("[data-argument=initial_rotation]", "0")
+    page.page.keyboard.press("Tab")
+    page.page.click("text=Map")
+    complete(page)
+    assert page.page.locator("#map-notes").is_hidden()
+
+
+def test_a_map_has_the_units_of_the_page_and_its_address_those_of_the_axes(opened):
+    query = f"{STATUE}&view=map&points=9&x=alpha&x_from=5&x_to=25&y=pga&y_from=0.1&y_to=0.9"
+    page = opened(f"{query}&angle_in=rad&acceleration_in=m/s2", allowed=["422"])
+    complete(page)
+    assert "α = 0.262 rad, Peak ground acceleration = 4.9 m/s²" in page.text("#map-at")
+    label = "document.getElementById('map-{}').selectedOptions[0].text"
+    assert page.js(label.format("x")) == "Slenderness α (rad)"
+    assert page.js(label.format("y")) == "Peak ground acceleration (m/s²)"
+    labels = page.js(f"{MODELS}.filter((each) => each.type === 'LinearAxis').map((each) => each.axis_label)")
+    assert {"Slenderness α (rad)", "Peak ground acceleration (m/s²)"} <= {*labels}
+    ranges = page.js(f"{MODELS}.find((each) => each.type === 'Figure').x_range.end")
+    assert ranges == pytest.approx(math.radians(25 + 20 / 16))
+    assert float(page.page.input_value("#map-y-to")) == pytest.approx(0.9 * 9.80665, rel=1e-5)
+    entered(page, "map-y-to", "7.845320")
+    page.until("new URLSearchParams(location.search).get('y_to') === '0.8'")
+    complete(page)
+    page.rested(lambda: page.page.click("#map-open"))
+    found = query_of(page)
+    assert quantities.acceleration(found["pga"], "pga") == pytest.approx(0.5375 * 9.80665)
+
+
 def test_a_map_is_taken_away_and_computed_again(opened, tmp_path):
     only_chromium("hand over what it has saved")
     page = opened(f"view=map&{SINE}&points=8&x=omega&x_from=1&x_to=4&y=a&y_from=1&y_to=8&quantity=mode")
@@ -1175,6 +1370,25 @@ def test_a_study_opens_as_a_map(browser, opened, tmp_path_factory):
     complete(page)
     assert "Study museum" in page.text("#study-tools")
     assert "overturns" in page.text("#map-legend")
+    # Another slice, and back: the choice is that of the slice that is drawn.
+    scale = page.page.locator("#study-tools label", has_text="scale").locator("select")
+    shares = page.text("#map-legend")
+    scale.select_option("1")
+    page.until("location.search.includes('scale_index=1')")
+    assert page.text("#map-legend") != shares
+    page.page.go_back()
+    page.until("!location.search.includes('scale_index')")
+    page.says("map-legend", shares)
+    assert scale.input_value() == "0"
+    # What is printed is of the study, and not of a case that nobody chose.
+    page.js("window.print = () => { document.body.dataset.printed = '1'; }; 1")
+    page.page.click("#print")
+    page.until("document.body.dataset.printed")
+    head = page.text("#print-head")
+    assert (
+        head.startswith("Studymuseum: ") and "scale 0.203943 g" in head and "ridgecrest" not in head.split("Address")[0]
+    )
+    assert page.text("#print-summary") == ""
     # A rectangle of its cells is shown larger, and left again; a response is shown where the pointer lies still.
     ends = f"({MODELS}).filter((each) => each.type === 'Figure').map((each) => [each.x_range.start, each.x_range.end])"
     (whole,) = page.js(ends)
@@ -1300,6 +1514,32 @@ def test_a_diagram_is_taken_away_and_computed_again(opened, tmp_path):
     assert page.text("#command").startswith("rocking bifurcation --pulse sine:frequency=2.0 --along amplitude:")
 
 
+def test_files_are_those_of_what_is_shown_also_after_a_refusal(opened):
+    only_chromium("hand over what it has saved")
+
+    def saved(page, label):
+        with page.page.expect_download(timeout=20_000) as download:
+            page.page.click(f"#exports button:text-is('{label}')")
+        return Path(download.value.path()).read_bytes()
+
+    page = opened(f"{STATUE}&view=assessment&levels=4&records={RECORDS}", allowed=["422"])
+    page.until("document.body.dataset.assessment === 'complete'")
+    labels = ("Curve, CSV", "Records, CSV")
+    files = [saved(page, label) for label in labels]
+    entered(page, "friction", "-1")
+    page.until("!document.getElementById('problem').hidden")
+    assert [saved(page, label) for label in labels] == files
+    assert files[1].count(b"\n") == 4
+    page = periodic(opened, f"{CASCADE}&sweep_points=12", allowed=["422"])
+    numbers = saved(page, "Numbers, CSV")
+    entered(page, "sweep_to", "-5")
+    page.until("!document.getElementById('problem').hidden")
+    assert saved(page, "Numbers, CSV") == numbers
+    # An end that is emptied is the one that is drawn by default.
+    entered(page, "sweep_to", "")
+    page.until("document.getElementById('problem').hidden && document.getElementById('sweep_to').value")
+
+
 def test_a_mistake_in_a_sweep_is_marked_there(opened):
     page = periodic(opened, f"{CASCADE}&sweep_points=24", allowed=["422"])
     assert page.page.input_value("#sweep_points") == "24"
@@ -1360,6 +1600,34 @@ def test_two_blocks_or_two_motions_are_compared(opened, what):
     page.says("compare-verdict", words)
 
 
+def test_a_comparison_with_a_pinned_case_shows_that_or_nothing(opened):
+    page = opened(f"{STATUE}&view=compare")
+    page.until("document.body.dataset.compared")
+    page.page.select_option("#compare-with", "case")
+    page.until("new URLSearchParams(location.search).get('compare') === 'case'")
+    for name in ("#compare-verdict", "#compare-plots", "#compare-legend", "#exports button"):
+        assert page.page.locator(name).first.is_hidden()
+    page.page.click("#pin")
+    page.page.fill("#pin-name", "mine")
+    page.page.click("#pin")
+    page.says("compare-verdict", "The other (mine)")
+    assert page.page.locator("#compare-plots").is_visible()
+    page.page.click(".chip .remove")
+
+
+def test_a_late_answer_of_a_view_that_was_left_changes_nothing(opened):
+    page = opened(SINE)
+    for view, pattern in (("compare", "**/api/compare?*"), ("periodic", "**/api/orbit?*")):
+        with held(page, pattern) as waiting:
+            page.page.click(f"[data-view={view}]")
+            asked(page, waiting)
+            page.rested(lambda: page.page.click("[data-view=response]"))
+            before = [page.text("#python-title"), page.page.locator("#exports button").all_text_contents()]
+        page.page.wait_for_timeout(500)
+        assert [page.text("#python-title"), page.page.locator("#exports button").all_text_contents()] == before
+        assert len(before[1]) == 6 and page.js("document.body.dataset.sweep") is None
+
+
 # Records, assessment, units, paper
 
 
@@ -1377,8 +1645,7 @@ def dropped(page, files):
 
 
 def test_many_files_are_dropped_asked_about_once_sorted_searched_and_shake_the_block(opened, explorer):
-    for key in explorer.uploads.kept():
-        explorer.uploads.remove(key)
+    emptied(explorer)
     page = opened("width=0.24&height=1.1&motion=ridgecrest-clc-090")
     level = np.random.default_rng(5).normal(size=600)
     names = [f"station{k}_{part}.txt" for k in (1, 2) for part in ("ns", "ew", "up")]
@@ -1410,6 +1677,107 @@ def test_many_files_are_dropped_asked_about_once_sorted_searched_and_shake_the_b
     for left in (1, 0):
         page.page.locator("tr.station button").first.click()
         page.until(f"document.querySelectorAll('tr.station').length === {left}")
+
+
+ROWS = "time (s),a (g)\n" + "".join(f"{0.01 * k:.2f},{0.3 * (-1) ** (k // 20)}\n" for k in range(100))
+LISTED = "Number(document.body.dataset.listed ?? 0) > 0 && document.querySelectorAll('[data-record]').length"
+
+
+def emptied(explorer):
+    """Forget the files of other tests."""
+    for key in explorer.uploads.kept():
+        explorer.uploads.remove(key)
+
+
+def test_what_is_ticked_is_what_the_address_says_and_what_is_assessed(opened, explorer):
+    emptied(explorer)
+    page = opened(f"{STATUE}&view=records&levels=3", allowed=["422"])
+    page.until(LISTED)
+    boxes = page.page.locator("#records-table tbody input[type=checkbox]")
+    ticked = "Array.from(document.querySelectorAll('#records-table input'), (each) => each.checked)"
+    before = page.js(ticked)
+    boxes.nth(0).set_checked(not before[0])
+    one_ = query_of(page)["records"]
+    boxes.nth(1).set_checked(not before[1])
+    assert query_of(page)["records"] != one_
+    page.page.go_back()
+    page.until(f"new URLSearchParams(location.search).get('records') === {one_!r}")
+    page.until(f"JSON.stringify({ticked}) === {json.dumps(json.dumps([not before[0], *before[1:]]).replace(' ', ''))}")
+    page.page.go_back()
+    page.until("!new URLSearchParams(location.search).has('records')")
+    page.until(f"JSON.stringify({ticked}) === {json.dumps(json.dumps(before).replace(' ', ''))}")
+    for k in range(boxes.count()):
+        boxes.nth(k).uncheck()
+    page.page.wait_for_timeout(250)
+    page.page.reload()
+    page.until(f"document.body?.dataset.ready && {LISTED}")
+    assert True not in page.js(ticked)
+    page.page.click("#records-assess")
+    page.until("!document.getElementById('problem').hidden")
+    assert page.text("#problem").endswith("tick one or more in the list")
+
+
+def test_a_file_that_is_taken_out_is_no_longer_assessed(opened, explorer):
+    emptied(explorer)
+    page = opened(f"{STATUE}&levels=2")
+    dropped(page, {"a.csv": ROWS, "b.csv": f"{ROWS}1.00,0.2\n"})
+    boxes = page.page.locator("#records-table tbody input[type=checkbox]")
+    names = page.page.locator("#records-table [data-record]").all_text_contents()
+    for k, name in enumerate(names):
+        boxes.nth(k).set_checked(name in ("a.csv", "b.csv"))
+    assert query_of(page)["records"].count("file") == 2
+    button = page.page.locator("tr.station button").first
+    button.focus()
+    button.press("Enter")
+    page.until(f"{LISTED} === {len(names) - 1}")
+    assert query_of(page)["records"].count("file") == 1
+    assert page.js("document.activeElement.textContent") == "Take out"  # of the next file
+    page.page.click("#records-assess")
+    page.until("document.body.dataset.assessment === 'complete'")
+    assert page.text("#assessment-about").startswith("1 record of the list")
+
+
+def test_what_is_wrong_with_dropped_files_is_said_and_the_next_are_read(opened, explorer):
+    emptied(explorer)
+    page = opened(STATUE, allowed=["422", "ERR_FAILED"])
+    with held(page, "**/api/list*") as waiting:
+        page.page.click("[data-view=records]")
+        asked(page, waiting)
+        page.page.fill("#records-search", "el")  # before there is a list
+        page.page.fill("#records-search", "")
+        page.js(
+            """() => { const carried = new DataTransfer();
+              for (const [name, text] of [["good.csv", "0.1\\n0.2\\n"], ["bad.csv", "no"], ["worse.csv", "nothing"]])
+                carried.items.add(new File([text], name));
+              window.dispatchEvent(new DragEvent("drop", {dataTransfer: carried, cancelable: true})); }"""
+        )
+        page.says("problem", "worse.csv")
+    page.until("document.body.dataset.added")
+    page.page.wait_for_timeout(300)
+    assert page.page.locator("#problem").is_visible() and "bad.csv" in page.text("#problem")
+    # One file that is dropped on the list is in it.
+    before = page.js(LISTED)
+    page.rested(lambda: page.js(DROP, ["single.csv", ROWS]))
+    page.until(f"{LISTED} === {before + 1}")
+    # The list does not come, and the next file is read all the same.
+    page.page.route("**/api/list*", lambda route: route.abort())
+    count = page.js("Number(document.body.dataset.added)")
+    page.js(
+        """([text]) => { const carried = new DataTransfer();
+          for (const k of [1, 2]) carried.items.add(new File([`${text}1.00,0.${k}\\n`], `${k}.csv`));
+          window.dispatchEvent(new DragEvent("drop", {dataTransfer: carried, cancelable: true})); }""",
+        [ROWS],
+    )
+    page.until(f"Number(document.body.dataset.added) > {count}")
+    assert page.text("#problem").startswith("The explorer does not answer")
+    page.page.unroute("**/api/list*")
+    page.rested(lambda: page.js(DROP, ["last.csv", f"{ROWS}1.00,0.3\n"]))
+    page.until("document.getElementById('said').textContent.includes('last.csv')")
+
+
+def test_an_entry_of_the_list_without_a_motion_is_left_out(opened):
+    page = opened(f"{STATUE}&records=dt%3D0.01")
+    assert not page.js("document.body.inert")
 
 
 def test_an_assessment_is_the_packages_fragility_and_stops_when_the_reader_goes(opened):
@@ -2134,6 +2502,48 @@ def test_a_pinned_case_is_returned_to_compared_with_and_kept(opened):
     assert page.js("localStorage.getItem('rocking-snapshots')") == "[]"
 
 
+def test_a_case_is_pinned_as_it_was_when_its_name_was_asked_for_and_replaces_no_other(opened):
+    page = opened(STATUE)
+    other = opened(STATUE)
+    pins = "JSON.parse(localStorage.getItem('rocking-snapshots') ?? '[]').map(({name, texts}) => [name, texts.pga])"
+    page.page.click("#pin")
+    name = page.page.input_value("#pin-name")
+    assert name == "p = 3.61 rad/s, α = 12.3°, ridgecrest-clc-090 0.4 g"
+    page.rested(lambda: entered(page, "pga", "0.5"))
+    page.page.click("#pin")
+    assert page.js(pins) == [[name, "0.4g"]]
+    # Another tab knows, keeps its own beside it, and replaces none.
+    other.until("document.querySelectorAll('.chip').length === 1")
+    other.rested(lambda: other.page.select_option("#model", "linear"))
+    other.page.click("#pin")
+    assert other.page.input_value("#pin-name") == f"{name} (2)"
+    other.page.click("#pin")
+    page.until("document.querySelectorAll('.chip').length === 2")
+    page.page.click("#pin")
+    page.page.fill("#pin-name", name)
+    page.page.click("#pin")
+    assert page.js(pins) == [[name, "0.4g"], [f"{name} (2)", "0.4g"], [f"{name} (3)", "0.5g"]]
+    for _ in range(3):
+        page.page.locator(".chip .remove").first.click()
+    assert page.js(pins) == []
+
+
+def test_back_out_of_a_lecture_leaves_its_large_text(opened):
+    page = opened(STATUE)
+    page.page.click("[data-view=block]")
+    page.until("document.getElementById('stage').checkVisibility() && location.search.includes('view=block')")
+    page.page.click("#lecture")
+    page.until("location.search.includes('lecture=1')")
+    while "lecture" in query_of(page):
+        page.page.go_back()
+        page.page.wait_for_timeout(200)
+    page.until("!document.body.classList.contains('lecture')", timeout=5.0)
+    shown = query_of(page).get("view", "response")
+    assert page.page.locator("nav").is_visible() and page.page.locator(f"#view-{shown}").is_visible()
+    page.page.go_forward()
+    page.until("document.body.classList.contains('lecture')", timeout=5.0)
+
+
 # What is chosen while an answer is on its way
 
 
@@ -2439,6 +2849,26 @@ def test_a_case_that_is_opened_from_a_map_has_the_keys_and_so_has_the_map_afterw
     page.page.go_back()
     page.until("!document.getElementById('view-map').hidden")
     page.until("document.activeElement.dataset.view === 'map'")
+
+
+def test_a_choice_that_is_drawn_anew_keeps_the_keys(opened):
+    page = opened(STATUE)
+    button = page.page.locator("#sequences button").first
+    button.focus()
+    press(page, "Enter")
+    page.until("location.search.includes('from=')")
+    assert page.js(HAS_KEYS) == "Show 1"
+    pressed = "Array.from(document.querySelectorAll('#sequences button'), (each) => each.ariaPressed)"
+    assert page.js(pressed) == ["true", "false", "false", "false"]
+    page.page.click("[data-view=records]")
+    page.until(LISTED)
+    page.page.focus(".sorting >> nth=1")
+    press(page, "Enter")
+    assert page.js(HAS_KEYS) == "PGA"
+    with page.page.expect_event("load"):
+        page.page.focus("#length_in")
+        page.page.select_option("#length_in", "cm")
+    page.until("document.body.dataset.ready && document.activeElement.id === 'length_in'", timeout=10.0)
 
 
 @pytest.mark.parametrize(

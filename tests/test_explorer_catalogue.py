@@ -100,6 +100,21 @@ def test_nothing_is_said_of_a_file_before_its_units_and_step_are_answered():
     assert row["measures"]["pga"] == read_motion(row["texts"], store).motion.pga
 
 
+@pytest.mark.parametrize(
+    ("answer", "words"),
+    [({"dt": "0"}, "“Sampling step”"), ({"dt": "soon"}, "“Sampling step”"), ({"units": "furlong"}, "furlong")],
+)
+def test_a_wrong_answer_is_said_of_its_file_and_leaves_the_list(answer, words):
+    store = UploadStore()
+    wrong, right = (store.add_file(f"{name}.txt", samples(seed).encode()) for seed, name in enumerate(("odd", "even")))
+    given = {"dt": "0.01", "units": "g"}
+    groups = groups_of(store, [{"key": wrong, **given, **answer}, {"key": right, **given}])
+    assert len(groups) == 2 and [group["rows"][0]["key"] for group in groups] == [wrong, right]
+    assert groups[0]["reason"].startswith("odd.txt: ") and words in groups[0]["reason"]
+    assert set(groups[0]["rows"][0]["missing"]) == {"dt", "units"}
+    assert groups[1]["reason"] == "" and groups[1]["rows"][0]["missing"] == []
+
+
 def test_entries_of_an_address_are_those_of_motions_and_not_too_many():
     assert entries_of("") == []
     with pytest.raises(InvalidOption, match="not 'width'"):

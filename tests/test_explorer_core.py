@@ -5,6 +5,8 @@ import math
 import random
 import runpy
 import shlex
+import sys
+import types
 from pathlib import Path
 
 import explorer_addresses
@@ -23,6 +25,7 @@ from rocking.explorer.parameters import DEFAULT
 from rocking.explorer.parameters import PULSES as OFFERED
 from rocking.explorer.payload import pack
 from rocking.explorer.studies import StudyView
+from rocking.explorer.sweeps import sweep_of
 from rocking.explorer.uploads import LARGEST, MOST, UploadStore, bare_name
 from rocking.explorer.windows import extremes
 from rocking.motion.exceedance import exceedances
@@ -328,6 +331,25 @@ def test_what_the_command_line_cannot_do_is_not_given_as_a_command():
     assert case_as_command(read_case({**STATUE, "gravity": "1.62"}, UploadStore())) is None
 
 
+def test_code_names_a_motion_of_the_program_on_a_line_of_its_own(tmp_path):
+    uploads = UploadStore()
+    motion = rocking.Motion.from_samples(np.sin(np.arange(400) / 9.0), 0.02, name="my\nmotion")
+    texts = {"p": "2", "alpha": "0.2", "motion": f"given:{uploads.add_motion(motion)}", "pga": "3"}
+    case = read_case(texts, uploads)
+    grid = maps.grid_of(case, {"x": "p", "y": "pga", "points": "8"})
+    for code, peak in ((case_as_python(case), 3.0), *((map_as_python(grid, name), None) for name in maps.QUANTITIES)):
+        (line,) = [
+            line for line in code.splitlines() if "# mymotion: the motion that this page was opened with" in line
+        ]
+        variable = line.partition(" = ...")[0]
+        script = tmp_path / "code.py"
+        script.write_text(code.replace(line, f"from rocking_given import motion as {variable}"), "utf-8")
+        sys.modules["rocking_given"] = types.SimpleNamespace(motion=motion)
+        found = runpy.run_path(str(script))
+        assert peak is None or found["motion"].pga == pytest.approx(peak, rel=1e-12)
+    del sys.modules["rocking_given"]
+
+
 RESPONSES = {
     "sizes": lambda: rocking.simulate(
         rocking.Block(width=0.24, height=1.1), rocking.records.load("ridgecrest-clc-090")
@@ -458,6 +480,16 @@ def test_intervals_do_not_reach_across_a_rest(explorer):
         assert not ((arrays["impact_time"][finite] < uplift) & (ends > uplift)).any()
 
 
+def test_a_window_that_begins_when_the_response_is_over_is_where_it_moves(explorer):
+    short = {"p": "2", "alpha": "0.2", "motion": "none", "initial_rotation": "0.02"}
+    usual = explorer.case(short).header["window"]
+    assert explorer.case(short, (400.0, 500.0)).header["window"] == usual
+    both = explorer.compare(short, {"model": "linear"}).header["window"]
+    assert explorer.compare(short, {"model": "linear"}, (400.0, 500.0)).header["window"] == both
+    with pytest.raises(InvalidOption, match="window"):
+        explorer.case(short, (math.nan, 1.0))
+
+
 @pytest.mark.parametrize("window", [(5.0, 5.0), (6.0, 5.0), (math.nan, 1.0), (0.0, math.inf), (400.0, 500.0)])
 def test_a_window_that_is_none_is_refused(explorer, window):
     with pytest.raises(InvalidOption, match="window"):
@@ -562,7 +594,32 @@ def test_responses_are_kept_so_many_at_most():
     assert len(explorer._kept) <= 48
 
 
+def test_what_is_kept_is_bounded_by_the_motions_too_and_forgotten_with_their_file(monkeypatch):
+    explorer = Explorer()
+    monkeypatch.setattr("rocking.explorer.core._KEPT_ROWS", 100_000)
+    table = "time (s), a (m/s2)\n" + "\n".join(f"{0.01 * k:.2f}, {math.sin(0.1 * k):.6f}" for k in range(20_000))
+    key = explorer.take_record("long.csv", table.encode())["key"]
+    texts = {**_BLOCK, "motion": f"file:{key}"}
+    for k in range(12):  # of a motion for each scale no more than five find room
+        explorer.show({**texts, "scale": f"{0.01 + 0.001 * k}"})
+        assert len(explorer._kept) <= 5
+    for k in range(12):  # and of one motion there is room for all
+        explorer.show({**texts, "p": f"{2 + 0.1 * k}", "scale": "0.01"})
+    assert len(explorer._kept) >= 12
+    explorer.show(STATUE)
+    assert explorer.forget(key)["files"] == 0
+    assert [dict(case).get("motion") for case in explorer._kept] == [STATUE["motion"]]
+
+
 # Files
+
+
+def test_a_content_has_the_name_under_which_it_came_first(explorer):
+    table = "time (s), a (m/s2)\n" + "\n".join(f"{0.01 * k:.2f}, {math.cos(0.1 * k):.6f}" for k in range(500))
+    names = [explorer.take_record(name, table.encode())["name"] for name in ("first.csv", "second.csv")]
+    key = explorer.take_record("third.csv", table.encode())["key"]
+    assert names == ["first.csv"] * 2
+    assert "rocking.read('first.csv'" in explorer.code({**_BLOCK, "motion": f"file:{key}"})["python"]
 
 
 def test_a_file_that_needs_no_word_is_read_at_once(explorer):
@@ -797,6 +854,139 @@ def test_a_map_that_is_not_read_on_stops():
         next(found)
 
 
+_PULSE = "mavroeidis-papageorgiou:amplitude=0.6,frequency=1,phase=0,gamma=2"
+_SIDES = {"p": "2,2.4", "alpha": "0.2,0.25", "restitution": "0.9,0.85"}
+_BLOCK = {"p": "2", "alpha": "0.2", "restitution": "0.9"}
+
+
+@pytest.mark.parametrize(
+    ("texts", "axes"),
+    [
+        ({**_BLOCK, "motion": _PULSE}, {"x": "omega", "y": "restitution"}),
+        ({**_SIDES, "motion": _PULSE, "scale": "-1.5"}, {"x": "omega", "y": "a", "y_to": "4"}),
+        ({**_BLOCK, "motion": "one-sine:amplitude=3,frequency=1", "pgv": "0.9"}, {"x": "omega", "y": "restitution"}),
+        ({**_SIDES, "motion": "ridgecrest-clc-090", "scale": "-2"}, {"x": "p", "y": "pga"}),
+        ({**_SIDES, "motion": "one-sine:amplitude=3,frequency=1", "scale": "-2"}, {"x": "omega", "y": "restitution"}),
+        (
+            {**_BLOCK, "motion": "one-sine:amplitude=3,frequency=3", "initial_rotation": "0.1", "duration": "1"},
+            {"x": "p", "y": "pga"},
+        ),
+        ({**_BLOCK, "motion": "ridgecrest-clc-090", "chattering": "velocity=0.05"}, {"x": "p", "y": "pga"}),
+        (_BLOCK, {"x": "p", "y": "pga"}),
+    ],
+)
+def test_points_and_scripts_of_a_map_are_what_it_shows(texts, axes, tmp_path):
+    """Whatever the amplitude of a pulse means, and whatever scales, reverses, starts, treats or ends the case."""
+    grid, mapped = _mapped(texts, axes)
+    judged = 0
+    for row, column in np.random.default_rng(1).integers(0, 8, (16, 2)):
+        at = maps.texts_at(grid, float(grid.x.values[column]), float(grid.y.values[row]))
+        response = read_case(at, UploadStore()).simulate()
+        smaller = min(side.alpha for side in response.block.sides)
+        peak = math.inf if response.overturned else response.peak_rotation / smaller
+        assert mapped["peak"][row, column] == pytest.approx(peak, rel=1e-4)
+        judged += 0.0 < peak < math.inf
+    assert judged >= 3
+    for quantity in ("outcome", "peak"):
+        (tmp_path / "map.py").write_text(map_as_python(grid, quantity), "utf-8")
+        found = runpy.run_path(str(tmp_path / "map.py"))["found"]
+        found = found.data.outcome.values if quantity == "outcome" else found
+        assert np.mean(np.isclose(np.float32(found), mapped[quantity], rtol=1e-4, equal_nan=True)) == 1.0, quantity
+
+
+def test_a_map_says_what_is_other_than_in_the_case():
+    sine = {"motion": "one-sine:amplitude=3,frequency=1"}
+    for texts, keys in (
+        (_BLOCK, []),
+        ({**_BLOCK, "duration": "2"}, ["map.begins"]),
+        ({**_BLOCK, "initial_velocity": "0.1"}, ["map.begins"]),
+        ({**_BLOCK, "chattering": "velocity"}, ["map.begins"]),
+        (_SIDES, ["map.smaller_alpha"]),
+    ):
+        grid = maps.grid_of(read_case(texts | sine, UploadStore()), {"x": "p", "y": "pga", "points": "8"})
+        assert [note["phrase"] for note in maps.described(grid)["notes"]] == keys
+        assert "the smaller one of two" in map_as_python(grid, "peak")
+
+
+def test_a_reversed_pulse_is_a_command_only_where_both_sides_are_alike():
+    axes = {"x": "omega", "y": "a", "points": "8"}
+    for block, scale, amplitude, there in (
+        (_BLOCK, "-2", "3", True),
+        (_SIDES, "-2", "3", False),
+        (_SIDES, "2", "-3", False),
+        (_SIDES, "-2", "-3", True),
+    ):
+        texts = {**block, "motion": f"one-sine:amplitude={amplitude},frequency=1", "scale": scale}
+        command = map_as_command(maps.grid_of(read_case(texts, UploadStore()), axes))
+        assert (command is not None) is there
+
+
+@pytest.mark.parametrize("motion", ["one-sine:amplitude=0,frequency=1", "ridgecrest-clc-090"])
+def test_a_map_of_a_motion_that_shakes_nothing_is_refused(motion):
+    case = read_case({**_BLOCK, "motion": motion, "scale": "0"}, UploadStore())
+    with pytest.raises(InvalidOption, match="something that shakes the block"):
+        maps.grid_of(case, {"x": "p", "y": "pga"})
+
+
+@pytest.mark.parametrize(
+    ("cycles", "phase", "valid"),
+    [("2.5", "0", True), ("2.5", "-20deg", True), ("2.5", "200deg", True), ("2.5", "120deg", True),
+     ("2.5", "80deg", False), ("2.5", "100deg", False), ("0.5", "0", False), ("0.6", "30deg", False)],
+)  # fmt: skip
+def test_the_critical_amplitude_is_drawn_where_it_parts_complete_chattering_from_other(cycles, phase, valid):
+    texts = {**SINE, "motion": f"sine:amplitude=3,frequency=0.3,cycles={cycles},phase={phase}"}
+    case = read_case(texts, UploadStore())
+    grid = maps.grid_of(case, {"x": "omega", "x_from": "1", "x_to": "4", "y": "a", "points": "8"})
+    found = maps.curves(grid)
+    assert bool(found) is valid
+
+    def at(a, omega):
+        motion = pulse_of(maps.texts_at(grid, omega, a)["motion"])
+        return families.SimulationInput(case.block, motion, "linear")
+
+    parted = []
+    for omega, a in zip(grid.x.values, critical_amplitude(grid.x.values, 0.92), strict=True):
+        near = chattering_map(at, {"a": [0.999 * a, 1.001 * a], "omega": [omega]}, progress=False)
+        parted.append(near.complete.values[:, 0].tolist() == [True, False])
+    assert all(parted) is valid
+    if valid:
+        assert np.isfinite(found["exact"]).all()
+
+
+def test_a_motion_beyond_all_mechanics_is_refused_before_it_is_simulated():
+    for scaling in ({"pga": "1e31"}, {"scale": "1e31"}, {"pgv": "1e40"}):
+        with pytest.raises(InvalidMotion, match=r"at most 1e\+30 m/s\^2 are simulated here"):
+            read_case({**_BLOCK, "motion": "one-sine:amplitude=3,frequency=1", **scaling}, UploadStore())
+    upwards = {"motion": "ridgecrest-clc-090", "vertical": "ridgecrest-clc-up", "scale": "1e29"}
+    assert read_case({**_BLOCK, **upwards}, UploadStore()).motion.pga < 1e30
+    case = read_case({**_BLOCK, "motion": "sine:amplitude=3,frequency=1,cycles=2"}, UploadStore())
+    for axes in (
+        {"y": "pga", "y_to": "1e40"}, {"y": "a", "y_to": "1e40"}, {"x": "alpha", "y": "a", "y_to": "1e33"}
+    ):  # fmt: skip
+        with pytest.raises(InvalidMotion, match="are simulated here"):
+            maps.grid_of(case, {"x": "p", **axes, "points": "8"})
+    with pytest.raises(InvalidMotion, match="are simulated here"):
+        sweep_of(case, {"sweep": "a", "sweep_to": "1e40"})
+
+
+@pytest.mark.parametrize("duration", ["5e-324", "1e-13"])
+def test_a_duration_that_no_window_shows_is_refused(duration):
+    with pytest.raises(InvalidOption, match="duration must be 1e-12 s or more here"):
+        read_case({**STATUE, "duration": duration}, UploadStore())
+    explorer = Explorer()
+    shortest = {**STATUE, "duration": "1e-12"}
+    assert pack(explorer.case(shortest)) and explorer.summary(shortest)
+
+
+def test_a_block_that_hardly_comes_to_rest_is_mapped_over_no_points_that_would_be_refused():
+    case = read_case(
+        {**_BLOCK, "restitution": "1", "duration": "10", "motion": "el-centro-meloland-270"}, UploadStore()
+    )
+    with pytest.raises(InvalidOption, match="hardly comes to rest"):
+        maps.grid_of(case, {"x": "p", "y": "pga"})
+    assert maps.grid_of(case, {"x": "p", "y": "restitution"})
+
+
 # Studies
 
 
@@ -859,6 +1049,36 @@ def test_a_point_of_a_study_is_its_simulation(study):
     assert payload.arrays["values"].reshape(rows, columns)[1, column] == pytest.approx(
         response.peak_rotation, rel=1e-12
     )
+
+
+def test_points_of_a_study_have_its_gravity_and_keep_each_motion_once(tmp_path):
+    blocks = rocking.Blocks.grid(p=[2.0, 3.0], alpha=[0.2, 0.3], restitution=[0.9], gravity=1.62)
+    samples = np.random.default_rng(1).normal(size=400)
+    motion = rocking.Motion.from_samples(samples, 0.02, name="own")
+    made = rocking.study(tmp_path / "moon", blocks, motion, levels=[1.0, 2.0, 3.0], measure="pga", polarity="both")
+    made.run(progress=False)
+    view, uploads, results = StudyView(tmp_path / "moon"), UploadStore(), made.results()
+    judged = 0
+    for scale, level in enumerate((1.0, 2.0, 3.0)):
+        for polarity in (0, 1):
+            at = {"x": "p", "y": "scale", "at_x": "3", "at_y": str(level), "polarity_index": str(polarity)}
+            texts = view.texts_at(at | {"fix_alpha": "0.2"}, uploads)
+            response = read_case(texts, uploads).simulate()
+            chosen = np.flatnonzero((results.p == 3.0).values & (results.alpha == 0.2).values)[0]
+            picked = results.isel(scale=scale, polarity=polarity, block=chosen, motion=0)
+            assert response.block.gravity == 1.62
+            assert response.peak_rotation == pytest.approx(float(picked.peak_rotation), rel=1e-9)
+            judged += response.peak_rotation > 0.0
+    assert judged == 6 and len(uploads._motions) == 1
+
+
+@pytest.mark.parametrize("at", ["99", "0", "inf", "nan", "-1"])
+@pytest.mark.parametrize("axis", ["motion", "p", "scale"])
+def test_a_point_beside_a_study_is_refused(study, axis, at):
+    if axis == "motion" or at in ("inf", "nan"):
+        with pytest.raises(InvalidOption, match="at_x must be a") as caught:
+            study.texts_at({"x": axis, "y": "alpha", "at_x": at, "at_y": "0.2"}, UploadStore())
+        assert caught.value.argument == "at_x"
 
 
 @pytest.mark.parametrize("motion", [0, 1])

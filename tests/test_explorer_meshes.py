@@ -165,6 +165,21 @@ def test_meshes_are_known_by_their_content_and_so_many_at_most(here):
     assert read_case({**STATUE, "mesh": f"file:{key}"}, store).block.sides == first.sides
 
 
+def test_a_mesh_that_is_refused_is_not_kept_and_the_oldest_gives_way(here, monkeypatch):
+    explorer = Explorer()
+    with pytest.raises(InvalidBlock):
+        explorer.take_mesh("flat.stl", content(trimesh.creation.box((1.0, 1.0, 1e-9))))
+    assert explorer.uploads.usage()["files"] == 0
+    monkeypatch.setattr("rocking.explorer.uploads.MOST", 3)
+    record = explorer.uploads.add_file("record.txt", b"1 2 3")
+    keys = [explorer.take_mesh(f"{k}.stl", content(box((0.3, 0.2, 1.0 + 0.1 * k))))["key"] for k in range(4)]
+    assert {*explorer.uploads._files} == {record, keys[2], keys[3]}
+    others = [explorer.uploads.add_file(f"{k}.txt", str(k).encode()) for k in range(2)]
+    assert explorer.uploads.kept() == (record, *others)
+    with pytest.raises(UnreadableRecord, match="3 files and 256 MiB are kept at most"):
+        explorer.take_mesh("0.stl", content(box()))
+
+
 def test_a_body_that_is_known_does_not_wait_for_a_file_that_is_read(monkeypatch):
     store, going, free = UploadStore(), threading.Event(), threading.Event()
     known = read_case(STATUE, store).block

@@ -47,11 +47,10 @@ def words_as_a_shell_reads_them(commands, folder):
 @pytest.mark.skipif(sys.platform == "win32", reason="commands are written for the shells of POSIX")
 def test_hostile_names_of_files_are_one_argument_and_one_text(tmp_path):
     assert len(NAMES) >= 150
-    uploads = UploadStore()
-    cases = [case_of(name, uploads) for name in NAMES]
+    cases = [case_of(name, UploadStore()) for name in NAMES]  # in one store a content has one name
     found = words_as_a_shell_reads_them([case_as_command(case) for case in cases], tmp_path)
     assert len(found) == len(NAMES)
-    plain = ast.dump(ast.parse(case_as_python(case_of("x", uploads))))
+    plain = ast.dump(ast.parse(case_as_python(case_of("x", UploadStore()))))
     for name, case, (command, file, *rest) in zip(NAMES, cases, found, strict=True):
         kept = bare_name(name)
         assert (command, *rest) == ("simulate", "--width", "0.24", "--height", "1.1")
@@ -112,4 +111,4 @@ def test_the_name_of_a_motion_ends_no_comment():
     response = rocking.simulate(rocking.Block(width=0.24, height=1.1), motion)
     python = explorer.code(texts_of(response, explorer.uploads))["python"]
     assert "# ximport osimport sysy: the motion" in python
-    assert len(ast.parse(python).body) == 5
+    assert len(ast.parse(python).body) == 6

@@ -20,6 +20,7 @@ from rocking.explorer.parameters import (
 )
 from rocking.explorer.phrases import english
 from rocking.named_pulses import named_pulse
+from rocking.treatment import treatment
 
 #: What the command line takes as an argument, and what it does not do.
 NO_OPTIONS = {"motion", "mesh", "gravity", "initial_rotation", "initial_velocity"}
@@ -119,3 +120,19 @@ def test_the_page_is_given_every_parameter_with_its_label():
     assert {each["name"]: each["suffix"] for each in given if each["suffix"]} == {
         "alpha": "deg", "pga": "g", "sa": "g", "initial_rotation": "deg",
     }  # fmt: skip
+
+
+def test_what_the_page_shows_where_a_text_names_nothing_is_what_the_package_takes():
+    judged = 0
+    for name, pulse in PULSES.items():
+        optional = FAMILIES[name].optional
+        for each in pulse["parameters"]:
+            if each.name in optional:
+                assert each.read(each.default) == optional[each.name]
+                judged += 1
+        for choice, values in pulse.get("choices", {}).items():
+            assert values[0] == optional[choice]
+            judged += 1
+    limited = [each for each in specification()["treatments"] if "limit" in each]
+    assert [float(each["unnamed"]) for each in limited] == [treatment(each["name"]).threshold for each in limited]
+    assert judged >= 2 and len(limited) == 3

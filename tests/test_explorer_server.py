@@ -26,7 +26,7 @@ from explorer_client import Client, clients, let_in, opened_by
 import rocking
 from rocking.engine import _AHEAD, cores
 from rocking.errors import InvalidOption, RockingError, StudyError
-from rocking.explorer import connections, launch, server, uploads
+from rocking.explorer import connections, launch, maps, server, uploads
 from rocking.explorer.authentication import RequestAuthentication
 from rocking.explorer.background import low_priority
 from rocking.explorer.core import Explorer
@@ -294,6 +294,20 @@ def test_a_record_is_uploaded_told_about_and_simulated(page):
     expected = rocking.simulate(block, rocking.records.load("el-centro-meloland-270"))
     assert header["peak_rotation"] == pytest.approx(expected.peak_rotation, rel=1e-6)
     assert page.get(f"/api/records/{found['key']}", params={"dt": "0.01", "units": "g"}).json()["missing"] == []
+
+
+def test_an_address_of_a_block_alone_is_mapped_under_the_motion_that_is_shown(page):
+    point = {"p": "2", "alpha": "0.2", "x": "p", "y": "pga", "at_x": "2", "at_y": "0.5"}
+    texts = page.get("/api/map/point", params=point).json()
+    assert texts["motion"] == "ridgecrest-clc-090"
+    assert page.get("/api/map/response", params=point).status_code == 200
+
+
+def test_what_no_field_of_the_page_is_called_is_not_said(page):
+    for path, words in (("sweep", "needs a sine"), ("map", "something that shakes the block")):
+        answer = page.get(f"/api/{path}", params={"p": "2", "alpha": "0.2", "motion": "none"})
+        assert answer.json()["argument"] == "motion" and words in answer.json()["problem"]
+        assert "“Record”" not in answer.json()["problem"]
 
 
 def test_a_list_of_records_is_assessed_part_by_part_and_a_file_taken_out(page):
@@ -787,6 +801,35 @@ def test_a_map_may_take_longer_than_any_connection_may_wait(running, browser, mo
     assert found.elapsed.total_seconds() > 0.02 and len([*frames(found.content)]) > 4
 
 
+def test_a_map_that_is_not_read_gives_its_turn_to_the_next(running, browser, monkeypatch):
+    """Its parts fill what the connection holds, and it waits for its reader no longer than any answer."""
+    whole, begun = maps.parts, []
+
+    def endless(grid):
+        begun.append(grid.shape)
+        while grid.shape == (200, 200):
+            yield maps.Part(1, np.zeros(8000, int), np.zeros((4, 8000), np.float32))
+        yield from whole(grid)
+
+    monkeypatch.setattr(maps, "parts", endless)
+    monkeypatch.setattr(connections, "ANSWER", 0.5)
+    secret = browser.headers["authorization"].encode()
+    params = {**SINE, "x": "p", "y": "restitution"}
+    query = urlencode({**params, "points": "200"}).encode()
+    request = b"GET /api/map?" + query + b" " + KNOWN.replace(b"SECRET", secret) + b"\r\n"
+    unread = connected(running, request, 2, unread=True)
+    try:
+        deadline = time.monotonic() + 120.0
+        while len(begun) < 2 and time.monotonic() < deadline:
+            time.sleep(0.02)
+        found = browser.get(f"http://127.0.0.1:{running.port}/api/map", params={**params, "points": "8"})
+        assert begun == [(200, 200), (200, 200), (8, 8)]
+        assert len([*frames(found.content)]) > 4
+    finally:
+        for one in unread:
+            one.close()
+
+
 # The command
 
 
@@ -822,6 +865,10 @@ def test_the_command_prints_one_line_and_listens_here_alone():
         (("ridgecrest-cls-090",), "did you mean ridgecrest-clc-090"),
         (("--port", "70000"), "from 0 to 65535"),
         (("--address", "0.0.0.0"), "every address"),
+        (("--address", "0"), "every address"),
+        (("--address", "0x0"), "every address"),
+        (("--address", "::ffff:0.0.0.0"), "every address"),
+        (("--address", ""), "every address"),
         (("--address", "192.0.2.1"), "cannot be used"),
         (("sine:amplitude=1",), "needs frequency and cycles"),
     ],

@@ -19,7 +19,7 @@ from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption, Unfitted
 from rocking.explorer.catalogue import entries_of, title_of
 from rocking.explorer.code import block_options, command_line
-from rocking.explorer.inputs import Case, Found, Texts, read_motion
+from rocking.explorer.inputs import Case, Found, Texts, checked_peak, read_motion, require_rest
 from rocking.explorer.parameters import ASSESSMENT
 from rocking.explorer.payload import Payload
 from rocking.explorer.phrases import phrase
@@ -37,7 +37,7 @@ _POINTS: Final = 121
 #: The highest level stands for this share of the sudden velocity that overturns the block at one blow.
 _STRONG: Final = 2.0
 
-#: The margin is looked for up to these factors on the case's motion, in halves and doubles, and then closed in on.
+#: The margin is looked for up to this factor on the case's motion, in halves and doubles, and then closed in on.
 _FACTORS: Final = 2.0**8
 _HALVINGS: Final = 24
 
@@ -54,7 +54,7 @@ import numpy as np
 import rocking
 
 block = rocking.{block}
-motions = [
+{before}motions = [
 {motions}
 ]
 found = rocking.fragility(block, motions, measure={measure}, levels={levels}, polarity="both"{options})
@@ -94,6 +94,7 @@ def assessment_of(case: Case, texts: Texts, uploads: UploadStore) -> Assessment:
     entries = entries_of(given.get("records", ""))
     if not entries:
         raise InvalidOption("an assessment needs {}: tick one or more in the list", "records")
+    require_rest(case.block)
     measure = _measure(given)
     count = number(given.get("levels", "16"), "levels")
     if not (_LEAST <= count <= _MOST and count == int(count)):
@@ -163,6 +164,7 @@ def parts(assessment: Assessment) -> Generator[Payload]:
 def _stripes(assessment: Assessment, motion: Motion) -> Flags:
     """Return whether the block overturns, at each level and in each polarity."""
     case = assessment.case
+    checked_peak(motion.pga * float(assessment.levels[-1]) / assessment.measure.positive(motion, motion.name))
     many = Blocks.of(case.block)
     table = simulate_levels(
         many, [motion], assessment.measure, assessment.levels, model=case.model, chattering=case.treatment,
@@ -231,11 +233,11 @@ def _margin(case: Case) -> dict[str, Any] | None:
         return None
 
     def falls(factor: float) -> bool:
-        return simulate(case.block, motion * factor, model=case.model).overturned
+        return simulate(case.block, motion * factor, model=case.model, chattering=case.treatment).overturned
 
     high = 1.0
     if falls(high):
-        while high > 1.0 / _FACTORS and falls(high / 2.0):
+        while falls(high / 2.0):  # down to where the motion does not lift the block, at last
             high /= 2.0
     else:
         while not falls(high := 2.0 * high):
@@ -276,9 +278,11 @@ def as_python(assessment: Assessment) -> str:
     """Write a script that computes the same curve; it runs as it stands."""
     case, measure = assessment.case, assessment.measure
     given = {"model": None if case.model == "nonlinear" else case.model, "chattering": case.texts.get("chattering")}
+    found = [assessment.record(k) for k in range(len(assessment.entries))]
     return _PYTHON.format(
         block=case.block_call,
-        motions="\n".join(f"    {assessment.record(k).python}," for k in range(len(assessment.entries))),
+        before="".join(f"{line}\n" for line in dict.fromkeys(each.before for each in found) if line),
+        motions="\n".join(f"    {each.python}," for each in found),
         measure=repr(measure.name) if measure.period is None else f'rocking.Measure("sa", period={measure.period!r})',
         levels=f"np.linspace({assessment.levels[0]!s}, {assessment.levels[-1]!s}, {len(assessment.levels)})",
         options="".join(f", {name}={value!r}" for name, value in given.items() if value is not None),

@@ -55,6 +55,9 @@ _LINKS: Final = 100
 
 _READING: Final = ("GET", "HEAD")
 
+#: Port of an address that names none.
+_ASSUMED: Final = 80
+
 #: Folders of the page's files.
 _FILES: Final = ("/page/", "/library/")
 
@@ -74,7 +77,9 @@ class RequestAuthentication:
 
     def __init__(self, application: Application, port: int, hosts: Iterable[str] = LOOPBACK) -> None:
         self._application = application
-        self._hosts = frozenset(f"{host}:{port}".encode() for host in hosts)
+        # Browsers write names in lower case, and leave out the port that they assume.
+        names = [host.lower().encode() for host in hosts]
+        self._hosts = frozenset([b"%s:%d" % (name, port) for name in names] + (names if port == _ASSUMED else []))
         self._secret = secrets.token_urlsafe(32)
         self._tokens: list[str] = []
         self._lock = threading.Lock()

@@ -10,9 +10,9 @@ from pathlib import PurePath
 from typing import Any, Final
 from urllib.parse import parse_qsl
 
-from rocking.errors import InvalidOption
+from rocking.errors import InvalidOption, RockingError
 from rocking.explorer.inputs import Texts
-from rocking.explorer.parameters import PARAMETERS, names_of
+from rocking.explorer.parameters import PARAMETERS, field_label, names_of
 from rocking.explorer.phrases import phrase
 from rocking.explorer.uploads import UploadStore, measures
 from rocking.motion import records
@@ -88,12 +88,21 @@ def entries_of(text: str) -> list[dict[str, str]]:
 def listing(uploads: UploadStore, answers: Iterable[Texts] = ()) -> dict[str, Any]:
     """Return all records in groups, each of one station, and how much of what may be kept is in use.
 
-    ``answers`` say with which ``dt`` and ``units`` the file of each ``key`` is read.
+    ``answers`` say with which ``dt`` and ``units`` the file of each ``key`` is read. A file that cannot be read
+    with its answer is listed as without one, with what is wrong as the reason of its group.
     """
     known = {answer["key"]: answer for answer in answers if "key" in answer}
-    files = [component for key in uploads.kept() for component in _of_file(uploads, key, known.get(key, {}))]
+    files, problems = [], {}
+    for key in uploads.kept():
+        try:
+            files += _of_file(uploads, key, known.get(key, {}))
+        except RockingError as error:
+            problems[key] = ("" if error.path else f"{uploads.file(key).name}: ") + error.text(field_label)
+            files += _of_file(uploads, key, {})
     groups = [_described(group, "") for group in _by_station(_shipped())]
-    groups += [_described(group, _reason(group)) for group in _by_station(files)]
+    for group in _by_station(files):
+        wrong = [problems[each.key] for each in group if each.key in problems]
+        groups.append(_described(group, " ".join(wrong) or _reason(group)))
     return {"groups": groups, "usage": uploads.usage()}
 
 

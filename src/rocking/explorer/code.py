@@ -11,7 +11,7 @@ from typing import Any, Final
 from rocking.analysis.overturning import PULSES
 from rocking.constants import STANDARD_GRAVITY
 from rocking.explorer.inputs import BLOCK_NAMES, NAMES, Case, arguments_of, as_option, is_pulse, pulse_call
-from rocking.explorer.maps import Axis, MapGrid
+from rocking.explorer.maps import Axis, MapGrid, sign_of
 from rocking.explorer.parameters import QUANTITIES
 from rocking.explorer.periodic import KEPT, PASSED
 from rocking.explorer.sweeps import Sweep, call_at
@@ -29,7 +29,7 @@ import rocking
 from rocking.chattering import chattering_map, families
 
 
-def case({y}, {x}):
+{before}def case({y}, {x}):
     block = rocking.{block}
     motion = {motion}
     return families.SimulationInput(block, motion, {model!r})
@@ -44,7 +44,7 @@ import numpy as np
 
 import rocking
 
-motion = {motion}
+{before}motion = {motion}
 xs, ys = {xs}, {ys}
 
 
@@ -70,6 +70,7 @@ _FOUND: Final = {
 # Time, s, from the first uplift to the first rest; NaN where the block never rests.
 found = np.where(kept("rests") > 0, kept("first_rest") - kept("first_uplift"), np.nan){in_seconds}""",
     "peak": """\
+# Peak rotation over the slenderness, the smaller one of two; infinite where the block overturns.
 slenderness = np.array([min(side.alpha for side in block.sides) for block in blocks]).reshape(-1, len(xs))
 found = np.where(kept("overturned"), np.inf, kept("peak_rotation") / slenderness)""",
     "mode": """\
@@ -132,6 +133,7 @@ def case_as_python(case: Case) -> str:
             "import rocking",
             "",
             f"block = rocking.{case.block_call}",
+            *filter(None, [case.motion_before]),
             f"motion = {case.motion_call}",
             f"response = rocking.simulate(block, motion{options})",
             "print(response.summary())",
@@ -163,8 +165,10 @@ def map_as_python(grid: MapGrid, quantity: str) -> str:
     How the first rocking ends is told by `chattering_map`, everything else by `simulate_many` to the bits of the map.
     """
     texts = {"x": grid.x.name, "y": grid.y.name, "xs": _values(grid.x), "ys": _values(grid.y)}
+    before = grid.case.motion_before
     if quantity == "outcome":
-        return _CHATTERING.format(**texts, block=_block(grid), motion=_motion(grid), model=grid.case.model)
+        texts |= {"block": _block(grid), "motion": _motion(grid), "before": before and f"{before}\n\n\n"}
+        return _CHATTERING.format(**texts, model=grid.case.model)
     model = grid.case.model
     options = ", times=True" + (f", model={model!r}" if model != "nonlinear" else "")
     levels = grid.y.name in ("a", "pga")
@@ -182,6 +186,7 @@ def map_as_python(grid: MapGrid, quantity: str) -> str:
     each = "for x in xs" if levels else "for y in ys for x in xs"
     return _MANY.format(
         **texts,
+        before=before and f"{before}\n",
         motion=grid.case.motion_call,
         names=grid.x.name if levels else f"{grid.y.name}, {grid.x.name}",
         block=_block(grid, by_size=True),
@@ -197,7 +202,10 @@ def map_as_command(grid: MapGrid) -> str | None:
     texts = grid.case.texts
     if not _is_overturning_map(grid) or "gravity" in texts:
         return None
-    name, written, _ = _pulse(grid)
+    name, written, given = _pulse(grid)
+    # The amplitudes of the command are positive, which is another motion only where the sides differ.
+    if given["amplitude"] * sign_of(texts) < 0.0 and not grid.case.block.is_symmetric:
+        return None
     options: dict[str, str] = {
         "amplitudes": _range(grid.y),
         "frequencies": _range(grid.x),
@@ -338,11 +346,15 @@ def _motion(grid: MapGrid) -> str:
     text = grid.case.texts.get("motion", "")
     if "omega" in names and is_pulse(text):
         p = min(side.p for side in grid.case.block.sides)
-        made = pulse_call(text, {**_written(text), "frequency": f"omega * {p!r} / (2.0 * math.pi)"})
+        given = arguments_of(text)
+        written = {name: repr(value) for name, value in given.items()}
+        written |= {
+            "amplitude": repr(sign_of(grid.case.texts) * given["amplitude"]),
+            "frequency": f"omega * {p!r} / (2.0 * math.pi)",
+        }
+        made = pulse_call(text, written)
     if "a" in names:
         return f"{made}.scaled_to(a * min(block.uplift_thresholds({grid.case.model!r})))"
-    return f"{made}.scaled_to(pga * {STANDARD_GRAVITY!r})" if "pga" in names else made
-
-
-def _written(text: str) -> dict[str, str]:
-    return {name: repr(value) for name, value in arguments_of(text).items()}
+    if "pga" in names:
+        return f"{made}.scaled_to(pga * {STANDARD_GRAVITY!r})"
+    return f"{made}.scaled_to({grid.motion.pga!r})" if "omega" in names else made

@@ -68,10 +68,18 @@ class BoundedProtocol(H11Protocol):
         self._drop_oldest()
 
     def pause_writing(self) -> None:
-        """Note since when the other end does not read."""
-        self._since = self.loop.time()
+        """Wait until the other end reads on."""
+        self._wait(ANSWER)
         super().pause_writing()
         self._drop_oldest()
+
+    def resume_writing(self) -> None:
+        """Go on with an answer, for as long as that takes; after its end the next head is waited for."""
+        super().resume_writing()
+        if self.cycle is not None and not self.cycle.response_complete:
+            self._stop()
+            if self.cycle.more_body:
+                self._wait(BODY)
 
     def _wait(self, limit: float) -> None:
         self._stop()

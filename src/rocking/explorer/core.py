@@ -22,12 +22,21 @@ from rocking.explorer.parameters import names_of
 from rocking.explorer.payload import Payload
 from rocking.explorer.simulated import Simulated
 from rocking.explorer.uploads import UploadStore
-from rocking.explorer.windows import POINTS, about_window, checked_window, ends_of, ground_in, lines_in, lines_of
+from rocking.explorer.windows import (
+    POINTS,
+    about_window,
+    begun_window,
+    checked_window,
+    ends_of,
+    ground_in,
+    lines_in,
+    lines_of,
+)
 from rocking.response import Response, active_span, trail_of
 
-#: Responses that are kept, and steps in all of them: a hundred MB at most.
+#: Responses that are kept; their steps and the samples of their motions, some hundreds of MB at most.
 _KEPT: Final = 48
-_KEPT_STEPS: Final = 2_000_000
+_KEPT_ROWS: Final = 2_000_000
 
 #: With what a spreadsheet's formulas begin.
 _FORMULA: Final = ("=", "+", "-", "@", "\t", "\r")
@@ -74,8 +83,17 @@ class Explorer:
             return found | {"azimuth": uploads.meshes.body(f"file:{key}", {}, None, None).solid.weakest_azimuth}
         except InvalidBlock as error:
             if error.argument is None:
+                uploads.remove(key)
                 raise
             return found
+
+    def forget(self, key: str) -> dict[str, int]:
+        """Forget a file with the responses that are of it, and say how many files are kept."""
+        self.uploads.remove(key)
+        with self._lock:
+            for case in [case for case in self._kept if any(f"file:{key}" in text for _, text in case)]:
+                del self._kept[case]
+        return self.uploads.usage()
 
     def show(self, texts: Texts) -> Simulated:
         """Return a case with its response."""
@@ -88,7 +106,7 @@ class Explorer:
         shown = Simulated(case, case.simulate())
         with self._lock:
             self._kept[key] = shown
-            while len(self._kept) > 1 and (len(self._kept) > _KEPT or self._steps() > _KEPT_STEPS):
+            while len(self._kept) > 1 and (len(self._kept) > _KEPT or self._rows() > _KEPT_ROWS):
                 self._kept.popitem(last=False)
         return shown
 
@@ -96,6 +114,7 @@ class Explorer:
         """Return all that the page says of a case, and its arrays in a window (s; by default where it moves)."""
         shown = self.show(texts)
         response = shown.response
+        window = begun_window(window, response.duration)
         start, end = active_span(response) if window is None else checked_window(window, response.duration)
         header = {**facts(shown), "window": about_window(shown, start, end)}
         profile = {} if shown.outline is None else {"profile": shown.outline.ravel()}
@@ -129,6 +148,7 @@ class Explorer:
         shift = shift_of(first.response, second.response, align)
         spans = [active_span(first.response), tuple(end + shift for end in active_span(second.response))]
         longest = max(first.response.duration, second.response.duration + shift)
+        window = begun_window(window, longest)
         if window is None:
             start, end = max(0.0, min(span[0] for span in spans)), max(span[1] for span in spans)
         else:
@@ -205,8 +225,14 @@ class Explorer:
                     _draw(response, file, None if window is None else checked_window(window, response.duration))
             return file.read_bytes()
 
-    def _steps(self) -> int:
-        return sum(len(trail_of(shown.response).nodes) for shown in self._kept.values())
+    def _rows(self) -> int:
+        """Return the steps of all responses that are kept, and the samples of their motions, which many may share."""
+        motions = {}
+        for shown in self._kept.values():
+            for motion in (shown.case.motion, shown.case.motion and shown.case.motion.vertical):
+                if motion is not None:
+                    motions[id(motion)] = len(motion.breakpoints)
+        return sum(motions.values()) + sum(len(trail_of(shown.response).nodes) for shown in self._kept.values())
 
 
 def _changed(texts: Texts, changed: Texts) -> dict[str, str]:

@@ -44,8 +44,15 @@ _LIVELIEST: Final = 0.998
 
 _LONGEST_TEXT: Final = 300
 
+#: Letters of a key in the name of a variable.
+_TOLD_APART: Final = 6
+
 #: Longest pulse, cycles: a page shows no more, and memory is bounded.
 MOST_SHOWN: Final = 1000.0
+
+#: Strongest motion, m/s^2, and shortest duration, s: beyond them arithmetic, and not mechanics, says what is shown.
+_STRONGEST: Final = 1e30
+_SHORTEST: Final = 1e-12
 
 #: What makes a block of each shape, its name in `rocking`, and what it calls the parameters.
 _MAKERS: Final[Mapping[str, tuple[Callable[..., Block], str]]] = {
@@ -60,9 +67,10 @@ _ARGUMENTS: Final = {"pivots": "distances", "height_of_mass": "height", "gyratio
 class Case:
     """What `rocking.simulate` takes, with the texts from which it was read.
 
-    ``block_call`` and ``motion_call`` are the expressions that make block and motion; ``block_options`` are the options
-    that describe the block on the command line, and ``words`` the arguments that name the motion: none where it cannot
-    be named. The block of a mesh has the ``body`` of which it is the plane of an ``azimuth``, degrees.
+    ``block_call`` and ``motion_call`` are the expressions that make block and motion, with the line that the latter
+    needs before it, if any, in ``motion_before``; ``block_options`` are the options that describe the block on the
+    command line, and ``words`` the arguments that name the motion: none where it cannot be named. The block of a mesh
+    has the ``body`` of which it is the plane of an ``azimuth``, degrees.
     """
 
     texts: Texts
@@ -78,6 +86,7 @@ class Case:
     body: Body | None
     azimuth: float
     motion_call: str
+    motion_before: str
     words: tuple[str, ...]
 
     def simulate(self) -> Response:
@@ -118,12 +127,10 @@ def read_case(texts: Texts, uploads: UploadStore) -> Case:
     found_block = _block(given, values, uploads)
     block = found_block.block
     found = _motion(given, values, uploads)
-    if "duration" not in values and math.prod(side.restitution for side in block.sides) > _LIVELIEST:
-        raise InvalidOption(
-            f"the product of {{}} on both sides is above {_LIVELIEST:g}, so that the block hardly comes to rest: lower "
-            "it, or simulate it in Python",
-            "restitution",
-        )
+    if "duration" not in values:
+        require_rest(block)
+    elif values["duration"] < _SHORTEST:
+        raise InvalidOption(f"{{}} must be {_SHORTEST:g} s or more here", "duration", value=values["duration"])
     return Case(
         texts=given,
         block=block,
@@ -138,8 +145,26 @@ def read_case(texts: Texts, uploads: UploadStore) -> Case:
         body=found_block.body,
         azimuth=values.get("azimuth", 0.0),
         motion_call=found.python,
+        motion_before=found.before,
         words=found.words,
     )
+
+
+def require_rest(block: Block) -> None:
+    """Raise `InvalidOption` unless a block comes to rest soon enough for a page to wait for it."""
+    if math.prod(side.restitution for side in block.sides) > _LIVELIEST:
+        raise InvalidOption(
+            f"the product of {{}} on both sides is above {_LIVELIEST:g}, so that the block hardly comes to rest: lower "
+            "it, or simulate it in Python",
+            "restitution",
+        )
+
+
+def checked_peak(peak: float) -> float:
+    """Return a peak acceleration, m/s^2, with which a page simulates; refuse one that is beyond all mechanics."""
+    if peak > _STRONGEST:
+        raise InvalidMotion(f"{{}} reaches {peak:.3g} m/s^2; at most {_STRONGEST:g} m/s^2 are simulated here", "motion")
+    return peak
 
 
 def texts_of(response: Response, uploads: UploadStore) -> dict[str, str]:
@@ -185,7 +210,7 @@ def _given(texts: Texts) -> dict[str, str]:
             raise InvalidOption(f"a case has no {name[:40]!r}; it has {', '.join(NAMES)}")
         if len(value) > _LONGEST_TEXT:
             raise InvalidOption(f"{{}} is {len(value)} letters long; at most {_LONGEST_TEXT} are read", name)
-    return given or dict(DEFAULT)
+    return {"motion": DEFAULT["motion"], **given} if given else dict(DEFAULT)
 
 
 class _FoundBlock(NamedTuple):
@@ -238,11 +263,12 @@ def _written(arguments: Mapping[str, Any]) -> str:
 
 
 class Found(NamedTuple):
-    """A motion, how Python makes it, and how the command line names it."""
+    """A motion, how Python makes it, how the command line names it, and the line that Python needs before it."""
 
     motion: Motion | None
     python: str
     words: tuple[str, ...]
+    before: str = ""
 
 
 def read_motion(texts: Texts, uploads: UploadStore) -> Found:
@@ -253,15 +279,18 @@ def read_motion(texts: Texts, uploads: UploadStore) -> Found:
 
 def _motion(given: Texts, values: Values, uploads: UploadStore) -> Found:
     target = scaling({name: given[name] for name in SCALINGS if name in given}, _level)
-    name = values.get("motion", DEFAULT["motion"])
+    name = values["motion"]
     found = _unscaled(name, values, uploads)
     if "vertical" in values:
         found = _with_vertical(found, name, values, uploads)
-    if target is None:
-        return found
-    if found.motion is None:
-        raise InvalidOption("there is no motion to scale: choose one, or leave the scaling out")
-    return Found(_scaled(found.motion, *target), f"{found.python}.{_scaling_as_python(*target)}", found.words)
+    if target is not None:
+        if found.motion is None:
+            raise InvalidOption("there is no motion to scale: choose one, or leave the scaling out")
+        python = f"{found.python}.{_scaling_as_python(*target)}"
+        found = found._replace(motion=_scaled(found.motion, *target), python=python)
+    if found.motion is not None:
+        checked_peak(max(each.pga for each in (found.motion, found.motion.vertical) if each is not None))
+    return found
 
 
 def _level(text: str, name: str) -> float:
@@ -312,10 +341,9 @@ def _unscaled(name: str, values: Values, uploads: UploadStore) -> Found:
         return Found(pulse_of(name), call, ("--pulse", name))
     if kind == "given":
         motion = uploads.motion(key)
-        name = "".join(
-            letter for letter in motion.name if letter.isprintable()
-        )  # one that ends the line ends the comment
-        return Found(motion, f"...  # {name}: the motion that this page was opened with", ())
+        name = "".join(letter for letter in motion.name if letter.isprintable())  # a new line would end the comment
+        variable = f"given_{key[:_TOLD_APART]}"
+        return Found(motion, variable, (), f"{variable} = ...  # {name}: the motion that this page was opened with")
     if kind == "file":
         return _from_file(key, values, values.get("channel"), uploads)
     return Found(_shipped(name), f"rocking.records.load({name!r})", (name,))
@@ -395,13 +423,20 @@ def pulse_as_text(motion: Motion) -> str | None:
     return text if same else None
 
 
-def texts_of_motion(motion: Motion, uploads: UploadStore) -> dict[str, str]:
-    """Text of a pulse, or of shipped records and their scale, or else of the key under which the motion is kept."""
-    pulse = pulse_as_text(motion)
+def texts_of_motion(motion: Motion, uploads: UploadStore, factor: float = 1.0) -> dict[str, str]:
+    """Texts of a motion times a factor: of a pulse, or shipped records and their scale, or else the key of the motion.
+
+    What is kept under a key is the motion as it is, once for all factors.
+    """
+    scaled = motion if factor == 1.0 else motion.scaled(factor)
+    pulse = pulse_as_text(scaled)
     if pulse is not None:
         return {"motion": pulse}
-    shipped = _texts_of_shipped(motion)
-    return {"motion": f"given:{uploads.add_motion(motion)}"} if shipped is None else shipped
+    shipped = _texts_of_shipped(scaled)
+    if shipped is not None:
+        return shipped
+    kept = {"motion": f"given:{uploads.add_motion(motion)}"}
+    return kept if factor == 1.0 else kept | {"scale": repr(factor)}
 
 
 def _texts_of_shipped(motion: Motion) -> dict[str, str] | None:

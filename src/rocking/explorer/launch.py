@@ -12,6 +12,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from html import escape
 from importlib import util
+from ipaddress import IPv6Address, ip_address
 from typing import TYPE_CHECKING, Final
 from urllib.parse import urlencode
 
@@ -101,9 +102,10 @@ def served(
 
     application = App(explorer, opening, study, framed_by).asgi
     listening = _bound(address, port)
-    number = int(listening.getsockname()[1])
-    host = f"[{address}]" if ":" in address else address
-    authentication = RequestAuthentication(application, number, {*LOOPBACK, host})
+    place, number = (listening.getsockname()[k] for k in (0, 1))
+    host, bound = (f"[{each}]" if ":" in each else each for each in (address, place))
+    # A browser writes an address of numbers in one way, however it was given.
+    authentication = RequestAuthentication(application, number, {*LOOPBACK, host, bound})
     config = uvicorn.Config(
         authentication,
         log_level="error",
@@ -122,20 +124,23 @@ def served(
 def _bound(address: str, port: int) -> socket.socket:
     if not 0 <= port <= 65535:
         raise InvalidOption(f"{{}} must be a whole number from 0 to 65535, not {port}", "port", value=port)
-    if address in ("0.0.0.0", "::", ""):
+    try:
+        # An empty address stands for every one.
+        family, kind, _, _, place = socket.getaddrinfo(address or "::", port, type=socket.SOCK_STREAM)[0]
+    except OSError as error:
+        raise InvalidOption(
+            f"{{}}: this machine has no {address} ({error.strerror})", "address", value=address
+        ) from None
+    found = ip_address(str(place[0]).partition("%")[0])
+    found = (found.ipv4_mapped if isinstance(found, IPv6Address) else None) or found
+    if found.is_unspecified:
         raise InvalidOption(
             f"{{}} {address!r} is every address of this machine: name the one that others shall use",
             "address",
             value=address,
         )
-    if address not in (HERE, "localhost", "::1"):
+    if not found.is_loopback:
         note(f"{address} can be reached from other machines, and what is sent is not encrypted")
-    try:
-        family, kind, _, _, place = socket.getaddrinfo(address, port, type=socket.SOCK_STREAM)[0]
-    except OSError as error:
-        raise InvalidOption(
-            f"{{}}: this machine has no {address} ({error.strerror})", "address", value=address
-        ) from None
     listening = socket.socket(family, kind)
     try:
         if sys.platform != "win32":

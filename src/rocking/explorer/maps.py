@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.analysis.overturning import modes_of
-from rocking.arrays import Floats, Integers
+from rocking.arrays import Flags, Floats, Integers
 from rocking.block import Blocks
 from rocking.block.restitution import housner_restitution
 from rocking.chattering.amplitude import critical_amplitude
@@ -19,8 +19,17 @@ from rocking.chattering.maps import Outcome, last_exceedance, outcomes_of
 from rocking.constants import STANDARD_GRAVITY
 from rocking.engine import Setup, Task, simulate_tasks
 from rocking.errors import InvalidOption
-from rocking.explorer.inputs import BLOCK_NAMES, Case, Texts, arguments_of, is_pulse, pulse_of
-from rocking.explorer.parameters import QUANTITIES
+from rocking.explorer.inputs import (
+    BLOCK_NAMES,
+    Case,
+    Texts,
+    arguments_of,
+    checked_peak,
+    is_pulse,
+    pulse_of,
+    require_rest,
+)
+from rocking.explorer.parameters import QUANTITIES, SCALINGS, names_of
 from rocking.explorer.phrases import phrase
 from rocking.motion.motion import Motion
 from rocking.quantities import number
@@ -121,15 +130,20 @@ def grid_of(case: Case, texts: Texts) -> MapGrid:
     InvalidOption
         If the case has no motion, or an axis is none of it, varies the same as the other or is out of range.
     """
-    if case.motion is None:
-        raise InvalidOption("a map needs a {}: choose a record or a pulse", "motion")
+    if case.motion is None or case.motion.pga == 0.0:
+        raise InvalidOption("a map needs something that shakes the block: choose a record or a pulse", "motion")
     points = number(texts.get("points", "200"), "points")
     if not (_FEWEST <= points <= _MOST and points == int(points)):
         raise InvalidOption(f"a map has from {_FEWEST} to {_MOST} points on each axis, not {points:g}")
     x, y = (_axis(which, case, texts, int(points)) for which in ("x", "y"))
     if x.name == y.name or {x.name, y.name} in _SAME:
         raise InvalidOption("{} and {} vary the same: choose another pair of axes", x.name, y.name)
-    return MapGrid(case, case.motion, x, y)
+    if "restitution" not in (x.name, y.name):
+        require_rest(case.block)
+    grid = MapGrid(case, case.motion, x, y)
+    highest = _peak_at(grid, {axis.name: float(axis.values[-1]) for axis in (x, y)})
+    checked_peak(grid.motion.pga if highest is None else highest)
+    return grid
 
 
 def parts(grid: MapGrid, threads: int | None = None) -> Generator[Part]:
@@ -172,7 +186,8 @@ def _passed(grid: MapGrid, thresholds: Floats, factor: float) -> tuple[tuple[flo
 def curves(grid: MapGrid) -> dict[str, Floats]:
     """Critical amplitudes along the x axis: exact, and by the paper's Eq. 76 where that was fitted.
 
-    Empty but for a symmetric block under a sine, with the amplitude upwards.
+    Empty but for a symmetric block under a sine, with the amplitude upwards. NaN where the sine of that amplitude lifts
+    the block as it begins, or is over before the half period has passed in which the block may come to rest.
     """
     case = grid.case
     motion = case.texts.get("motion", "")
@@ -189,12 +204,25 @@ def curves(grid: MapGrid) -> dict[str, Floats]:
     (low, high), (least, most) = FITTED_FREQUENCIES, FITTED_RESTITUTIONS
     fitted = (omega >= low) & (omega <= high) & (eta >= least) & (eta <= most)
     found["eq76"][fitted] = critical_amplitude(omega[fitted], eta[fitted], method="eq76")
+    for values in found.values():
+        values[~_is_lifted_in_time(values, **arguments_of(motion))] = np.nan
+    return found if np.isfinite(found["exact"]).any() else {}
+
+
+def _is_lifted_in_time(a: Floats, *, cycles: float, phase: float = 0.0, **_: float) -> Flags:
+    """Whether a sine of amplitudes over the threshold passes it from below, more than half a period before its end."""
+    lifts = np.arcsin(1.0 / a)
+    begins = phase % math.pi  # each half of the sine is the mirror image of the last
+    below = (begins < lifts) | (begins > math.pi - lifts)
+    uplift = np.where(begins < lifts, lifts, math.pi + lifts) - begins
+    found: Flags = below & (uplift + math.pi < 2.0 * math.pi * cycles)
     return found
 
 
 def texts_at(grid: MapGrid, x: float, y: float) -> dict[str, str]:
-    """Texts of the case at a point of the map."""
-    texts = dict(grid.case.texts)
+    """Texts of the case at a point of the map, which begins at rest, goes on to its end, and has each rest proven."""
+    gone = {*names_of("start", "treatment"), "duration"}
+    texts = {name: text for name, text in grid.case.texts.items() if name not in gone}
     at = {grid.x.name: x, grid.y.name: y}
     for name in ("p", "alpha", "restitution"):
         if name in at:
@@ -202,16 +230,37 @@ def texts_at(grid: MapGrid, x: float, y: float) -> dict[str, str]:
     if "omega" in at:
         p = min(side.p for side in grid.case.block.sides)
         change_pulse(texts, frequency=at["omega"] * p / (2.0 * math.pi))
-    if "a" in at:
-        _change_amplitude(texts, at["a"] * _lifting(grid, math.radians(at["alpha"]) if "alpha" in at else None))
-    if "pga" in at:
-        _change_amplitude(texts, at["pga"] * STANDARD_GRAVITY)
+    peak = _peak_at(grid, at)
+    if peak is not None:
+        _change_amplitude(texts, grid, peak)
     return texts
 
 
+def _peak_at(grid: MapGrid, at: Mapping[str, float]) -> float | None:
+    """Peak acceleration of the motion at a point of the map, m/s^2; None where it is the case's motion as it is."""
+    if "a" in at:
+        return at["a"] * _lifting(grid, math.radians(at["alpha"]) if "alpha" in at else None)
+    if "pga" in at:
+        return at["pga"] * STANDARD_GRAVITY
+    # The amplitude of some pulses is no acceleration, and what scales a pulse may change with its frequency.
+    return grid.motion.pga if "omega" in at else None
+
+
+def sign_of(texts: Texts) -> float:
+    """Return -1 where the scale of a case reverses its motion, else 1."""
+    return math.copysign(1.0, number(texts.get("scale", "1"), "scale"))
+
+
 def described(grid: MapGrid) -> dict[str, Any]:
-    """Say what a map shows: its axes, and what the numbers of outcomes and modes mean."""
+    """Say what a map shows: its axes, what the numbers of outcomes and modes mean, what is other than in the case."""
+    case, notes = grid.case, []
+    begins = case.initial_rotation or case.initial_velocity
+    if begins or case.duration is not None or str(case.treatment) != str(Certified()):
+        notes.append(phrase("map.begins"))
+    if "alpha" not in (grid.x.name, grid.y.name) and len({side.alpha for side in case.block.sides}) > 1:
+        notes.append(phrase("map.smaller_alpha"))
     return {
+        "notes": notes,
         "shape": list(grid.shape),
         "x": _described(grid.x),
         "y": _described(grid.y),
@@ -331,12 +380,15 @@ def change_pulse(texts: dict[str, str], **numbers: float) -> None:
     texts["motion"] = f"{family}:" + ",".join(f"{name}={value}" for name, value in parts.items())
 
 
-def _change_amplitude(texts: dict[str, str], peak: float) -> None:
-    """Bring the motion to a peak acceleration, m/s^2: a pulse by its amplitude, a record by its scale."""
-    for name in ("scale", "pga", "pgv", "sa"):
+def _change_amplitude(texts: dict[str, str], grid: MapGrid, peak: float) -> None:
+    """Bring the motion to a peak acceleration, m/s^2, in its polarity: a pulse by amplitude, a record by its scale."""
+    scale, sign = number(texts.get("scale", "1"), "scale"), sign_of(texts)
+    for name in SCALINGS:
         texts.pop(name, None)
     if is_pulse(texts["motion"]):
-        amplitude = arguments_of(texts["motion"])["amplitude"]
+        amplitude = sign * arguments_of(texts["motion"])["amplitude"]
         change_pulse(texts, amplitude=amplitude * peak / pulse_of(texts["motion"]).pga)
+    elif sign < 0.0:
+        texts["scale"] = repr(scale * peak / grid.motion.pga)
     else:
         texts["pga"] = repr(peak)

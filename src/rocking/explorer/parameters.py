@@ -32,6 +32,7 @@ from rocking.quantities import (
 )
 from rocking.solid.reading import SHIPPED
 from rocking.solid.reading import UNITS as MESH_UNITS
+from rocking.treatment import treatment
 
 #: Parameters that one form sets together, and that a comparison replaces together.
 Group = Literal[
@@ -306,26 +307,18 @@ PULSES: Final[Mapping[str, dict[str, Any]]] = {
     "triangular": {"parameters": (_AMPLITUDE, _DURATION)},
 }
 
+
+def _limited(name: str, unit: str, default: str, text: str) -> dict[str, Any]:
+    """Return a treatment with the field of its limit, and the limit that it has where a text names none."""
+    limit = Parameter("limit", "treatment", "number", unit, default, 1e-9, 0.1, True, text=text)
+    return {"name": name, "limit": limit.described(), "unnamed": str(treatment(name)).partition("=")[2]}
+
+
 _TREATMENTS: Final = (
     {"name": "certified"},
-    {
-        "name": "velocity",
-        "limit": Parameter(
-            "limit", "treatment", "number", "", "0.05", 1e-9, 0.1, True, text="limit_velocity"
-        ).described(),
-    },
-    {
-        "name": "bypass",
-        "limit": Parameter(
-            "limit", "treatment", "number", "", "0.001", 1e-9, 0.1, True, text="limit_velocity"
-        ).described(),
-    },
-    {
-        "name": "interval",
-        "limit": Parameter(
-            "limit", "treatment", "number", "s", "0.001", 1e-9, 0.1, True, text="limit_interval"
-        ).described(),
-    },
+    _limited("velocity", "", "0.05", "limit_velocity"),
+    _limited("bypass", "", "0.001", "limit_velocity"),
+    _limited("interval", "s", "0.001", "limit_interval"),
     {"name": "time"},
 )
 

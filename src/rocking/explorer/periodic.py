@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from rocking.arrays import Floats
 from rocking.dynamics.bifurcation import period_of, settled_states
 from rocking.dynamics.maps import Fate, StroboscopicMap, stroboscopic_map
-from rocking.dynamics.orbits import multipliers_of
+from rocking.dynamics.orbits import multipliers_at
 from rocking.explorer.inputs import Case, arguments_of, is_pulse, pulse_of
 from rocking.explorer.payload import Payload
 from rocking.explorer.phrases import phrase
@@ -216,7 +216,7 @@ def _about(case: Case, sine: Sine, found: Settled, rock: StroboscopicMap) -> dic
     if found.rests:
         return phrase("orbit.forgets", begins=begins)
     _, change = rock.derivative(found.states[-1], found.period)
-    first, second = (complex(each) for each in multipliers_of(change))
+    first, second = (complex(each) for each in multipliers_at(rock, change))
     if first.imag:
         pair = phrase("orbit.complex_pair", real=first.real, imaginary=abs(first.imag))
     else:

@@ -398,8 +398,8 @@ class App:
 
     async def forget(self, request: Request) -> Response:
         """Forget a file that is kept."""
-        await self._in_thread(lambda: self.explorer.uploads.remove(request.path_params["key"]))
-        return JSONResponse(self.explorer.uploads.usage(), headers=_FRESH)
+        usage = await self._in_thread(lambda: self.explorer.forget(request.path_params["key"]))
+        return JSONResponse(usage, headers=_FRESH)
 
 
 class _Stream(NamedTuple):

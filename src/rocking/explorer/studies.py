@@ -14,6 +14,7 @@ import numpy as np
 import rocking
 from rocking import checks
 from rocking.arrays import Floats
+from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption, StudyError
 from rocking.explorer.inputs import as_path, texts_of_motion
 from rocking.explorer.payload import Payload
@@ -141,18 +142,31 @@ class StudyView:
     def texts_at(self, texts: Mapping[str, str], uploads: UploadStore) -> dict[str, str]:
         """Return the texts of the simulation at a point of a slice."""
         product = self.study.product
-        at = {texts.get(which, ""): number(texts.get(f"at_{which}", ""), f"at_{which}") for which in ("x", "y")}
+        at = {texts.get(which, ""): self._at(texts, which) for which in ("x", "y")}
         nearest = np.argmin(np.abs(self._scales - at.get("scale", 0.0)))
         scale = int(nearest) if "scale" in at else self._index(texts, "scale_index")
-        motion = product.motions[round(at["motion"]) - 1 if "motion" in at else self._index(texts, "motion_index")]
+        motion = product.motions[int(at["motion"]) - 1 if "motion" in at else self._index(texts, "motion_index")]
         sign = product.signs[self._index(texts, "polarity_index")]
         factor = sign * float(product.scales.factors(motion)[scale])
         chosen = {name: [at.get(name, self._value(name, texts))] for name in self._columns}
         block = self._parameters(chosen["block"][0]) if "block" in chosen else chosen
         found = {name: ",".join(map(repr, values)) for name, values in block.items()}
-        found |= texts_of_motion(motion if factor == 1.0 else motion.scaled(factor), uploads)
+        found |= texts_of_motion(motion, uploads, factor)
         found |= {"model": product.model, "chattering": str(product.treatment)}
+        if product.blocks.gravity != STANDARD_GRAVITY:
+            found["gravity"] = repr(float(product.blocks.gravity))
         return found if product.duration is None else found | {"duration": repr(product.duration)}
+
+    def _at(self, texts: Mapping[str, str], which: str) -> float:
+        """Return a coordinate of a point of a slice: a number, and on an axis of numbers of things one of these."""
+        at = number(texts.get(f"at_{which}", ""), f"at_{which}")
+        last = {"motion": len(self.study.product.motions), "block": len(self.study.product.blocks)}.get(
+            texts.get(which, ""), 0
+        )
+        if not math.isfinite(at) or (last and not 1 <= round(at) <= last):
+            wanted = f"a number from 1 to {last}" if last else "a finite number"
+            raise InvalidOption(f"{{}} must be {wanted}, not {at:g}", f"at_{which}", value=at)
+        return float(round(at)) if last else at
 
     def _parameters(self, block: float) -> dict[str, list[float]]:
         """Parameters of a block by its number: one value each, or two where the sides differ."""

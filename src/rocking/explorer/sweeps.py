@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from rocking.dynamics.maps import Fate
 from rocking.errors import InvalidOption
-from rocking.explorer.inputs import Case, Texts, arguments_of, pulse_call
+from rocking.explorer.inputs import Case, Texts, arguments_of, checked_peak, pulse_call
 from rocking.explorer.maps import AXES, Axis, change_pulse
 from rocking.explorer.parameters import SCALINGS
 from rocking.explorer.payload import Payload
@@ -84,7 +84,7 @@ def sweep_of(case: Case, texts: Texts) -> Sweep:
     """
     sine = sine_of(case)
     if sine is None:
-        raise InvalidOption("a diagram needs a sine, of which one period repeats for ever: choose that {}", "motion")
+        raise InvalidOption("a diagram needs a sine, of which one period repeats for ever: choose one", "motion")
     name = texts.get("sweep") or "a"
     if name not in ("a", "omega"):
         raise InvalidOption(f"a case is swept over a or omega, not over {name[:20]!r}")
@@ -99,7 +99,9 @@ def sweep_of(case: Case, texts: Texts) -> Sweep:
     )
     if not 0.0 < low < high < math.inf:
         raise InvalidOption(f"a sweep needs a positive start below its end, not {low:g} to {high:g}", "sweep_from")
-    return Sweep(case, sine, Axis(name, np.linspace(low, high, int(points))))
+    sweep = Sweep(case, sine, Axis(name, np.linspace(low, high, int(points))))
+    checked_peak(sweep.sine_at(high).amplitude)
+    return sweep
 
 
 def parts(sweep: Sweep) -> Generator[Part]:

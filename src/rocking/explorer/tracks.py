@@ -15,7 +15,7 @@ from rocking.explorer.uploads import UploadStore
 STEPS: Final = 1000
 
 #: Texts that say whether a block can be made and simulated.
-_OF_BLOCKS: Final = frozenset({*names_of("block"), "gravity", "model"})
+_OF_BLOCKS: Final = frozenset({*names_of("block"), "gravity", "model", "duration"})
 
 
 def text_at(parameter: Parameter, step: int) -> str:

@@ -6,6 +6,7 @@ import hashlib
 import io
 import threading
 from collections import OrderedDict
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import PurePosixPath, PureWindowsPath
 from typing import Any, Final, NamedTuple
@@ -23,7 +24,8 @@ from rocking.plausibility import motion_notes
 #: Largest file, bytes: twenty times a long record of three channels.
 LARGEST: Final = 16 * 2**20
 
-#: Files that are kept, forty stations of three components, and their bytes; more are refused, since none goes unseen.
+#: Files that are kept, forty stations of three components, and their bytes; of records more are refused, since none
+#: goes unseen.
 MOST: Final = 120
 ALL: Final = 256 * 2**20
 
@@ -97,14 +99,23 @@ class UploadStore:
     def _kept(self, upload: Upload) -> str:
         key = hashlib.sha256(upload.data).hexdigest()[:_HASH]
         with self._lock:
-            others = [each for known, each in self._files.items() if known != key]
-            if len(others) >= MOST or len(upload.data) + sum(len(each.data) for each in others) > ALL:
+            others = {known: each for known, each in self._files.items() if known != key}
+            # No list shows meshes, of which some could be taken out: those that came first make room.
+            for mesh in [known for known, each in others.items() if _is_mesh(each.name)]:
+                if _is_full(upload, others):
+                    del others[mesh]
+            if _is_full(upload, others):
                 raise UnreadableRecord(
                     f"it cannot be kept: {MOST} files and {ALL // 2**20} MiB are kept at most; take some out of "
                     "the list of records first",
                     path=upload.name,
                 )
-            self._files[key] = upload
+            # What was made of a content has the name under which that came first, which stays.
+            same = self._files.get(key)
+            if same is None or _is_mesh(same.name) != _is_mesh(upload.name):
+                self._files[key] = upload
+            for mesh in self._files.keys() - {*others, key}:
+                del self._files[mesh]
         return key
 
     def take(self, name: str, data: bytes) -> dict[str, Any]:
@@ -211,6 +222,11 @@ class UploadStore:
             "missing": missing,
             "channels": [{**_about(each), **_told(_shown(upload, each), missing)} for each in channels],
         }
+
+
+def _is_full(upload: Upload, others: Mapping[str, Upload]) -> bool:
+    """Whether a file finds no room beside others."""
+    return len(others) >= MOST or len(upload.data) + sum(len(each.data) for each in others.values()) > ALL
 
 
 def _samples(motion: Motion) -> int:

@@ -40,6 +40,11 @@ def checked_window(window: tuple[float, float], duration: float) -> tuple[float,
     return start, end
 
 
+def begun_window(window: tuple[float, float] | None, duration: float) -> tuple[float, float] | None:
+    """Return a window, s, or None where it begins when a response is over: it was chosen for a longer one."""
+    return None if window is not None and window[0] >= duration else window
+
+
 def about_window(shown: Simulated, start: float, end: float) -> dict[str, Any]:
     """Say what a window shows: its ends, how many impacts, and how long before a rest the last one is, s."""
     response = shown.resolved(start, end)

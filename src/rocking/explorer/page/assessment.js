@@ -72,8 +72,8 @@ export class View {
     const {texts, assessment} = this.page.state;
     const body = document.body.dataset;
     body.assessment = "running";
-    this.about = this.last = null;
-    this.rows = [];
+    const problem = (/** @type {unknown} */ error) => this.page.problem(error, "view-assessment");
+    let begun = false; // what was there before stays until then
     try {
       if (!assessment.records) {
         await this.page.list.load();
@@ -81,12 +81,15 @@ export class View {
         this.key = JSON.stringify([texts, assessment]);
       }
       for await (const frame of frames("/api/assessment", {...texts, ...assessment}, signal)) {
-        if (!this.about) {
+        if (!begun) {
+          begun = true;
+          this.last = null;
+          this.rows = [];
           this.about = JSON.parse(new TextDecoder().decode(frame));
           this.page.remember({assessment: {...assessment}});
           this.fill();
           this.facts();
-          showExports("assessment", this.about.python, this.about.command, []);
+          showExports("assessment", this.about.python, this.about.command, [], problem);
           continue;
         }
         this.last = unpacked(/** @type {ArrayBuffer} */ (frame.buffer));
@@ -103,7 +106,7 @@ export class View {
       ["rocking-fragility.svg", phrase("save.svg"), () => this.picture("svg")], ["rocking-fragility.png", phrase("save.png"), () => this.picture("png")],
       ["rocking-fragility.csv", phrase("assessment.curve"), async () => new Blob([this.curve()], {type: "text/csv"})],
       ["rocking-records.csv", phrase("assessment.table"), async () => new Blob([this.table()], {type: "text/csv"})],
-    ]);
+    ], problem);
     body.assessment = "complete";
     counted("assessed");
   }
@@ -118,7 +121,7 @@ export class View {
     found.level_to = shown(levels[levels.length - 1] * scale);
     for (const name of FIELDS) {
       const input = /** @type {HTMLInputElement} */ (one(name));
-      if (document.activeElement !== input || name === "measure") input.value = found[name];
+      if (document.activeElement !== input || !input.value || name === "measure") input.value = found[name];
     }
     one("measure-period").hidden = measure !== "sa";
     for (const each of document.querySelectorAll("#view-assessment .of-level")) each.textContent = accelerationAxis()[1];

@@ -94,7 +94,8 @@ export class View {
 
   /** @param {string} to */
   jump(to) {
-    const {arrays} = this.page.shown;
+    const {arrays} = this.page.shown ?? {};
+    if (!arrays) return;
     const sequences = Array.from({length: arrays.sequence.length / 6}, (_, k) => arrays.sequence[6 * k + 1] - 0.4 * Math.min(1, arrays.sequence[6 * k + 1] - arrays.sequence[6 * k] + 0.5));
     const times = to === "uplift" ? Array.from(arrays.uplift, (each) => /** @type {number} */ (each) - 0.1) : sequences;
     const next = times.find((each) => each > this.time + 0.05) ?? times[0];
@@ -103,6 +104,7 @@ export class View {
 
   toggle() {
     if (this.playing) { this.stop(); return; }
+    if (!this.page.shown) return;
     if (this.time >= this.right() - 1e-9) this.seek(this.left());
     this.playing = true;
     one("play").textContent = phrase("stage.pause");

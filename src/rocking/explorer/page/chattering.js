@@ -61,9 +61,17 @@ export class ChatteringPanel {
     }
     fill(table, ["", phrase("chattering.uplift"), phrase("chattering.complete"), phrase("chattering.rest"), phrase(this.shown?.header.motion ? "chattering.off" : "chattering.off_start"), phrase("chattering.bracket"), phrase("chattering.impacts")], this.sequences.map((each, k) => {
       const proven = Number.isFinite(each.upper);
-      const button = make("button", {type: "button", "aria-pressed": String(k === this.chosen), on: {click: () => { this.chosen = k; this.list(); this.plot(); this.showSequence(each); }}}, [phrase("chattering.show", {number: String(k + 1)})]);
+      const button = make("button", {type: "button", "aria-pressed": String(k === this.chosen), on: {click: () => this.choose(k)}}, [phrase("chattering.show", {number: String(k + 1)})]);
       return [button, fixed(each.uplift, 3), proven ? fixed(each.start, 4) : phrase("chattering.unproven"), fixed(each.end, 9), Number.isFinite(each.off) ? phrase("chattering.within", {span: span(each.off)}) : NONE, proven ? phrase("chattering.within", {span: span(0.5 * (each.upper - each.lower))}) : NONE, fixed(this.count(each), 0)];
     }));
+  }
+
+  /** @param {number} number of a sequence */
+  choose(number) {
+    this.chosen = number;
+    one("sequences").querySelectorAll("button").forEach((each, k) => each.setAttribute("aria-pressed", String(k === number)));
+    this.plot();
+    this.showSequence(this.sequences[number]);
   }
 
   /** @param {any} sequence */

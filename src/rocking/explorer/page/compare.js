@@ -5,7 +5,7 @@ import {BlockForm, MotionForm, TreatmentForm} from "./forms.js";
 import {Histories} from "./histories.js";
 import {offer} from "./exports.js";
 import {ends, namesOf, parameter, specification} from "./parameters.js";
-import {snapshots} from "./snapshots.js";
+import {pinnedAs, snapshots} from "./snapshots.js";
 import {colour} from "./theme.js";
 import {caseName, treatmentName} from "./units.js";
 import {counted, fill, legend, make, one, slug, tell} from "./words.js";
@@ -13,6 +13,9 @@ import {short, span} from "./numbers.js";
 import {inWords, phrase} from "./texts.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
+
+/** What shows a comparison; hidden where nothing is compared. */
+const DRAWN = ["compare-verdict", "compare-plots", "compare-legend"];
 
 export class View {
   /** @param {any} page */
@@ -39,7 +42,9 @@ export class View {
 
   /** Other cases are pinned. */
   repinned() {
-    if (this.with.value === "case") this.form();
+    if (this.with.value !== "case") return;
+    this.form();
+    if (this.page.state.view === "compare") this.update();
   }
 
   /** The form of what is other. */
@@ -52,7 +57,7 @@ export class View {
     /** @type {Record<string, () => [any, Texts]>} the form of each kind, and the texts with which it starts */
     const kinds = {
       treatment: () => [new TreatmentForm(element, changed, {prefix: "other-", label: phrase("compare.ends_by")}), {chattering: "velocity=0.05"}],
-      block: () => [new BlockForm(element, changed, "other-"), larger(texts)],
+      block: () => [new BlockForm(element, changed, () => this.load.idle, "other-"), larger(texts)],
       case: () => [new PinnedForm(element, changed), snapshots()[0]?.texts ?? {}],
       motion: () => [new MotionForm(element, changed, "other-"), {motion: specification.records.find((/** @type {any} */ each) => each.name !== texts.motion).name, pga: texts.pga ?? "0.4g"}],
     };
@@ -70,9 +75,16 @@ export class View {
   async run() {
     const {state} = this.page;
     const {other: chosen, compare: kind, align, good} = state;
-    if (!Object.keys(chosen).length) return;
+    const none = !Object.keys(chosen).length;
+    for (const id of DRAWN) one(id).hidden = none;
+    if (none) {
+      offer([], () => {});
+      this.page.remember({other: chosen, compare: kind, align});
+      return;
+    }
     const {header, arrays} = await payload("/api/compare", {...state.texts, ...this.asked(), ...ends(state)});
-    if (state.good !== good) return; // somebody went back meanwhile
+    if (state.good !== good || state.view !== "compare") return; // somebody went back, or elsewhere, meanwhile
+    if (state.window && state.window[0] >= header.duration) state.window = null; // it was of longer responses
     this.page.remember({other: chosen, compare: kind, align});
     this.draw(header, arrays, kind);
     if (state.other === chosen) this.block?.show(chosen, header.cases[1].block.sides);
@@ -147,12 +159,6 @@ class PinnedForm {
     const found = pinnedAs(texts);
     this.select.value = found ? String(snapshots().indexOf(found)) : "";
   }
-}
-
-/** The pinned case that has these texts. @param {Texts} texts */
-function pinnedAs(texts) {
-  const sorted = (/** @type {Texts} */ all) => JSON.stringify(Object.entries(all).sort());
-  return snapshots().find((each) => sorted(each.texts) === sorted(texts));
 }
 
 /** The same shape, half as large again; of a mesh the same body, a quarter turned. @param {Texts} texts @returns {Texts} */

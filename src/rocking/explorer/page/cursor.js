@@ -23,8 +23,14 @@ export class Cursor {
     this.still = this.quiet = 0;
     /** Whether what is read shall be spoken. */
     this.spoken = false;
-    this.latest = new Latest((text) => this.read(text), (error) => page.problem(error, "reading"));
+    /** Whether somebody types in the field, which then stays as it is. */
+    this.typing = false;
+    /** What was asked for last; an answer to anything else comes too late. @type {{text: string} | null} */
+    this.asked = null;
+    this.latest = new Latest((asked) => this.read(asked), (error) => page.problem(error, "reading"));
     this.slider.addEventListener("input", () => this.set(this.left() + (Number(this.slider.value) / STEPS) * this.width()));
+    this.field.addEventListener("input", () => { this.typing = true; });
+    for (const end of ["change", "blur"]) this.field.addEventListener(end, () => { this.typing = false; });
     this.field.addEventListener("change", () => this.typed());
     one("histories").addEventListener("keydown", (event) => this.key(event));
   }
@@ -55,12 +61,14 @@ export class Cursor {
     const known = at !== null && shown && at <= shown.header.duration;
     this.tell.mark(known ? at : null);
     window.clearTimeout(this.still);
+    this.asked = null;
+    this.page.problem(null, "reading"); // it was about another case, or another time
+    const digits = decimals(this.width());
+    if (!this.typing) this.field.value = at === null ? "" : at.toFixed(digits);
     if (!known) {
       one("cursor").textContent = phrase(at !== null && shown ? "reading.late" : coarse() ? "reading.tap" : "reading.hint");
       return;
     }
-    const digits = decimals(this.width());
-    if (document.activeElement !== this.field) this.field.value = at.toFixed(digits);
     this.slider.value = String(Math.round((STEPS * (at - this.left())) / this.width()));
     this.slider.setAttribute("aria-valuetext", phrase("time.seconds", {time: fixed(at, digits)}));
     this.ask(String(at));
@@ -76,7 +84,8 @@ export class Cursor {
   /** @param {string} text */
   ask(text) {
     window.clearTimeout(this.still);
-    this.still = window.setTimeout(() => void this.latest.ask(text), STILL);
+    const asked = this.asked = {text};
+    this.still = window.setTimeout(() => void this.latest.ask(asked), STILL);
   }
 
   /** A time was typed, with a unit or without. */
@@ -85,15 +94,14 @@ export class Cursor {
     if (!text) {
       this.page.state.at = null;
       writeAddress(this.page.state);
-      this.page.problem(null, "reading");
       this.show();
       return;
     }
+    if (!this.page.shown) return;
     const {at} = this.page.state;
     try {
       const {time} = await this.found(text);
       if (this.page.state.at !== at || typed(this.field.value) !== text) return; // another time was chosen meanwhile
-      this.page.problem(null, "reading");
       this.set(time);
     } catch (error) {
       this.page.problem(error, "reading");
@@ -103,12 +111,15 @@ export class Cursor {
   /** What the case is at a time. @param {string} at */
   found(at) {
     const {shown: {header: {window: {from, to}, duration}}, state: {good}} = this.page;
-    return json("/api/at", {...good.texts, at, from: String(from), to: String(Math.min(to, duration) > from ? to : duration)});
+    const end = Math.min(to, duration) > from ? to : duration;
+    return json("/api/at", {...good.texts, at, ...(end > from ? {from: String(from), to: String(end)} : {})});
   }
 
-  /** @param {string} text */
-  async read(text) {
-    const found = await this.found(text);
+  /** @param {{text: string}} asked */
+  async read(asked) {
+    if (asked !== this.asked) return;
+    const found = await this.found(asked.text).catch((error) => { if (asked === this.asked) throw error; });
+    if (asked !== this.asked) return;
     const digits = decimals(this.width());
     const parts = [
       phrase("reading.rotation", {rotation: found.rotation, share: short(found.over_slenderness)}), phrase("reading.velocity", {velocity: short(found.velocity)}),

@@ -19,17 +19,17 @@ export function showFiles(state, problem) {
 }
 
 /** @typedef {[string, string, () => Promise<Blob>][]} Files names, labels, and what makes them */
-/** Buttons that save files. @param {Files} files @param {(error: unknown) => void} [problem] is told what went wrong */
+/** Buttons that save files. @param {Files} files @param {(error: unknown) => void} problem is told what went wrong */
 export function offer(files, problem) {
   one("exports").replaceChildren(...files.map(([name, label, content]) => make("button", {type: "button", on: {click: async () => {
-    try { save(name, await content()); } catch (error) { if (problem) problem(error); else throw error; }
+    try { save(name, await content()); } catch (error) { problem(error); }
   }}}, [label])));
 }
 
 /** Files of a map or a diagram, which the page makes of what it has. @param {string} what @param {string} python @param {string | null} command
- * @param {Files} files */
-export function showExports(what, python, command, files) {
-  offer(files);
+ * @param {Files} files @param {(error: unknown) => void} problem is told what went wrong */
+export function showExports(what, python, command, files, problem) {
+  offer(files, problem);
   showCode(what, python, command);
 }
 

@@ -27,6 +27,18 @@ export function keepingFocus(act, next) {
   if (before && before !== document.body && !before.checkVisibility()) next()?.focus({preventScroll: true});
 }
 
+/** Make controls anew. What had the keys among them has them again, or, where it is gone, what stands in its place.
+ * @param {HTMLElement} around @param {() => void} act */
+export function remaking(around, act) {
+  const all = () => /** @type {HTMLElement[]} */ ([...around.querySelectorAll("button, input, select")]).filter((each) => each.checkVisibility() && !each.matches(":disabled"));
+  const named = (/** @type {HTMLElement} */ each) => each.tagName + (each.getAttribute("aria-label") ?? each.textContent);
+  const before = document.activeElement, place = all().findIndex((each) => each === before);
+  act();
+  if (place < 0 || document.activeElement === before) return;
+  const after = all();
+  (after.find((each) => named(each) === named(/** @type {HTMLElement} */ (before))) ?? after[Math.min(place, after.length - 1)])?.focus({preventScroll: true});
+}
+
 /** Let the keys go on at a picture, which takes them only once it is drawn; unless somebody takes them elsewhere meanwhile.
  * @param {HTMLElement} picture */
 export function goOnAt(picture) {

@@ -2,6 +2,7 @@
 
 import {json} from "./api.js";
 import {check, choice, choose, offer} from "./controls.js";
+import {remaking} from "./focus.js";
 import {MeshFields} from "./mesh.js";
 import {namesOf, parameter, specification} from "./parameters.js";
 import {explained, make, one} from "./words.js";
@@ -92,9 +93,11 @@ class NumberControl {
 }
 
 export class BlockForm {
-  /** @param {HTMLElement} element @param {Changed} changed @param {string} [prefix] */
-  constructor(element, changed, prefix = "") {
+  /** @param {HTMLElement} element @param {Changed} changed @param {() => Promise<void>} answered comes when `known` is of the block that was told
+   * last @param {string} [prefix] */
+  constructor(element, changed, answered, prefix = "") {
     this.changed = changed;
+    this.answered = answered;
     /** @type {Texts} */
     this.texts = {};
     /** @type {any[] | undefined} sides as they are, for what the texts leave out */
@@ -180,7 +183,9 @@ export class BlockForm {
   }
 
   /** From one description to another; the block stays as far as that can describe it. */
-  reshape() {
+  async reshape() {
+    this.showFields();
+    await this.answered();
     if (this.known) {
       const [right, left] = this.known;
       const distances = this.known.map((side) => side.radius * Math.sin(side.alpha));
@@ -266,7 +271,7 @@ export class MotionForm {
     /** Texts of the motion as it is. @type {Texts} */
     this.texts = {};
     const {label, unit} = parameter("dt");
-    const dt = /** @type {HTMLInputElement} */ (make("input", {type: "text", inputMode: "decimal", id: `${prefix}dt`, "data-argument": "dt", on: {change: chosen}}));
+    const dt = /** @type {HTMLInputElement} */ (make("input", {type: "text", inputMode: "decimal", id: `${prefix}dt`, "data-argument": "dt", on: {change: () => { dt.value = typed(dt.value); chosen(); }}}));
     this.dt = {field: dt, element: make("div", {className: "choice"}, [make("label", {className: "field", for: dt.id}, [phrase("form.with_unit", {label, unit})]), dt])};
     this.starts = namesOf("start").map((name) => new NumberControl(parameter(name), this, prefix));
     this.scale = choice(prefix, "scaled", phrase("form.scaled"), specification.scalings.map((/** @type {string} */ name) => [name, phrase(`scaled.${name || "none"}`)]), chosen);
@@ -304,8 +309,9 @@ export class MotionForm {
       this.pulse.select.value = family;
       if (this.family !== family) this.showPulse(family);
       const parts = Object.fromEntries(motion.slice(family.length + 1).split(",").map((part) => part.split("=")));
-      for (const each of this.controls ?? []) if (parts[each.spec.name]) each.show(parts[each.spec.name]);
-      for (const each of this.choices ?? []) each.select.value = parts[each.name] ?? each.select.value;
+      // What a pulse does not name is what the package takes for it: the field's default, and the first choice.
+      for (const each of this.controls ?? []) each.show(parts[each.spec.name] ?? each.spec.default);
+      for (const each of this.choices ?? []) each.select.value = parts[each.name] ?? each.select.options[0].value;
     }
     this.scale.select.value = this.scales.find(({spec}) => texts[spec.name])?.spec.name ?? "";
     for (const each of this.starts) each.show(texts[each.spec.name] ?? each.spec.default);
@@ -432,8 +438,10 @@ export class MotionForm {
       }}}, [phrase(`file.${name}`, {value, ...figures})]));
       return [make("p", {className: "derived"}, [phrase(`file.no_${name}`, {name: file.name})]), make("div", {className: "toolbar"}, choices)];
     });
-    this.missing.replaceChildren(...open);
-    this.missing.hidden = !open.length;
+    remaking(/** @type {HTMLElement} */ (this.missing.parentElement), () => {
+      this.missing.replaceChildren(...open);
+      this.missing.hidden = !open.length;
+    });
   }
 
   /** A file that is used and does not say something itself. @param {string} name @returns {any} */
@@ -490,7 +498,7 @@ export class TreatmentForm {
   show(texts) {
     const [name, value] = (texts.chattering ?? "certified").split("=");
     this.kind.select.value = name;
-    if (value && Object.hasOwn(this.limits, name)) this.limits[name].show(value);
+    if (Object.hasOwn(this.limits, name)) this.limits[name].show(value ?? specification.treatments.find((/** @type {any} */ each) => each.name === name).unnamed);
     this.showFields();
   }
 

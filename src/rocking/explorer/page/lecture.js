@@ -61,7 +61,8 @@ export class Lecture {
     } catch { /* The browser does not let the page fill the screen; the stage is large all the same. */ }
   }
 
-  leave() {
+  /** @param {string} [view] that is shown next */
+  leave(view = "block") {
     this.on = this.full = false;
     this.page.state.lecture = false;
     if (document.fullscreenElement) void document.exitFullscreen();
@@ -69,7 +70,7 @@ export class Lecture {
     /** @type {HTMLSelectElement} */ (one("magnify")).value = this.magnified;
     this.named();
     enlarge(1);
-    void this.page.go("block");
+    void this.page.go(view);
     (this.before?.checkVisibility() ? this.before : one("lecture")).focus({preventScroll: true});
   }
 

@@ -34,8 +34,10 @@ export class RecordList {
   /** Take what the address says. */
   read() {
     const {records} = this.state.assessment;
+    this.ticked = null;
+    this.rising = false;
     if (!records) return;
-    const entries = records.split(";").map((entry) => /** @type {Texts} */ (Object.fromEntries(new URLSearchParams(entry))));
+    const entries = records.split(";").map((entry) => /** @type {Texts} */ (Object.fromEntries(new URLSearchParams(entry)))).filter(({motion}) => motion);
     this.ticked = new Set(entries.map(idOf));
     this.rising = entries.some(({vertical}) => vertical);
     for (const {motion, dt, units} of entries) if (dt || units) this.answers[motion.replace("file:", "")] = {...(dt && {dt}), ...(units && {units})};
@@ -84,8 +86,8 @@ export class RecordList {
     return {...Object.fromEntries(Object.entries(this.state.texts).filter(([name]) => !gone.includes(name))), ...this.motion(row)};
   }
 
-  /** All that are ticked, as an address has them. */
+  /** All that are ticked, as an address has them; a mark alone where none is, since an address without entries means all. */
   entries() {
-    return this.rows().filter((row) => this.has(row)).map((row) => new URLSearchParams(this.motion(row)).toString()).join(";");
+    return this.rows().filter((row) => this.has(row)).map((row) => new URLSearchParams(this.motion(row)).toString()).join(";") || ";";
   }
 }

@@ -26,6 +26,8 @@ import {inWords, phrase} from "./texts.js";
 /** @typedef {import("./api.js").Texts} Texts */
 
 const state = readAddress();
+/** Id of the field that has loaded the page again, where the keys go on. @type {string | undefined} */
+const keysAt = history.state?.focus;
 
 /** What the views share.
  * @type {{state: import("./parameters.js").State, shown: import("./api.js").Payload | null, go: typeof go, problem: typeof problem, restate: typeof restate, follow: typeof follow, list: RecordList, remember: (parts: Partial<import("./parameters.js").Good>) => void}} */
@@ -36,7 +38,7 @@ const views = {};
 let turn = 0;
 
 const forms = {
-  block: new BlockForm(one("block-form"), changed),
+  block: new BlockForm(one("block-form"), changed, () => load.idle),
   motion: new MotionForm(one("motion-form"), changed),
   model: new ModelForm(one("model-form"), changed),
 };
@@ -60,6 +62,8 @@ function problem(error, place = "settings") {
   if (error instanceof DOMException && error.name === "AbortError") return;
   if (!error && !problems[place]) return;
   if (error && !(error instanceof Problem)) console.error(error);
+  if (one(place).closest("[hidden]")) error = null; // what is wrong where nobody looks any more is of no use
+  delete problems[place]; // so that the last is the newest
   problems[place] = error instanceof Problem ? error.message : error ? phrase("page.fault", {error: String(error)}) : null;
   for (const each of one(place).querySelectorAll("[aria-invalid]")) each.removeAttribute("aria-invalid");
   for (const each of one(place).querySelectorAll("[data-problem]")) each.removeAttribute("data-problem");
@@ -74,7 +78,7 @@ function problem(error, place = "settings") {
   }
   one(place === "settings" ? "main" : place).classList.toggle("old", Boolean(error && page.shown));
   one("old").hidden = !(problems.settings && page.shown);
-  const sentence = Object.values(problems).find(Boolean);
+  const sentence = problems.settings ?? Object.values(problems).findLast(Boolean);
   one("problem").hidden = !sentence;
   if (sentence) one("problem").textContent = sentence;
 }
@@ -102,6 +106,9 @@ async function compute() {
     if (state.good !== good) return; // somebody went back meanwhile
     page.shown = found;
     texts = asked;
+    if (state.texts === asked) forms.block.known = found.header.block.sides;
+    // It was chosen for a longer response; where two are compared, the other may be longer.
+    if (state.view !== "compare" && state.window && state.window[0] >= found.header.duration) state.window = null;
     accepted(state, {texts});
     draw();
     counted("drawn");
@@ -196,13 +203,16 @@ function revisit() {
   views[state.view]?.leave?.(); // what is under way belongs to the state that is left
   const units = String(unitsChosen()), before = JSON.stringify(state.texts);
   Object.assign(state, readAddress());
+  page.list.read();
   if (JSON.stringify(state.texts) !== before) page.shown = null;
   cursor.show();
   if (String(unitsChosen()) !== units) { location.reload(); return; } // every field has its unit from the start
   showForms(state.texts);
   views[state.view]?.restore?.();
   void examples.show();
-  void go(state.view);
+  if (state.lecture && !lecture.on) void lecture.enter();
+  else if (lecture.on && !state.lecture) lecture.leave(state.view);
+  else void go(state.view);
 }
 
 /** Whether a view shows something else than a response, with files and code of its own. @param {string} name */
@@ -246,7 +256,8 @@ async function go(name) {
   else if (name === "response") histories.size(290, 190);
   writeAddress(state);
   examples.check();
-  for (const [each, view] of Object.entries(views)) if (each !== name) { view.leave?.(); problem(null, `view-${each}`); }
+  for (const [each, view] of Object.entries(views)) if (each !== name) view.leave?.();
+  for (const place of Object.keys(problems)) if (one(place).closest("[hidden]")) problem(null, place);
   views[name]?.enter?.();
   if (page.shown) {
     entitle(page.shown.header);
@@ -350,6 +361,7 @@ acceptFiles(async (file, use) => {
     const found = await file();
     if (use === "mesh") forms.block.take(found);
     else forms.motion.take(found, use === "vertical");
+    if (state.view === "records") void views.records?.loading.ask();
     say(use === "mesh" ? phrase("file.is_body", {name: found.name}) : phrase("file.is_record", {name: found.name, format: found.format}));
     problem(null);
   } catch (error) {
@@ -358,12 +370,15 @@ acceptFiles(async (file, use) => {
 }, async (files) => {
   await go("records");
   await views.records?.add(files);
-});
+}, problem);
 makePrinting(page, problem);
-unitFields(async () => {
+unitFields(async (name) => {
   await load.idle; // what was changed before belongs into the address that is loaded again
   writeAddress(state);
-  window.setTimeout(() => location.reload(), 250);
+  window.setTimeout(() => {
+    history.replaceState({focus: name}, ""); // the keys go on there
+    location.reload();
+  }, 250);
 });
 window.addEventListener("popstate", revisit);
 await examples.arrive();
@@ -372,4 +387,8 @@ showFigures(null);
 void watchCompilation();
 await (state.lecture ? lecture.enter() : go(state.view));
 document.body.inert = false;
+if (keysAt) {
+  one(keysAt)?.focus({preventScroll: true});
+  history.replaceState(null, "");
+}
 document.body.dataset.ready = String(performance.now());

@@ -7,10 +7,10 @@ import {bokeh, coarse, colour, figure, showPlot, themed} from "./theme.js";
 import {make, one} from "./words.js";
 import {joined, short} from "./numbers.js";
 import {inWords, phrase} from "./texts.js";
-import {angleAxis} from "./units.js";
+import {angleAxis, axisUnit} from "./units.js";
 
-/** What an axis is called, with its unit. @param {any} axis */
-export const labelled = ({label, unit}) => (unit ? phrase("map.axis_unit", {label: inWords(label), unit}) : inWords(label));
+/** What an axis is called, with its unit on the page. @param {any} axis */
+export const labelled = ({label, unit}) => (unit ? phrase("map.axis_unit", {label: inWords(label), unit: axisUnit(unit)[1]}) : inWords(label));
 
 /** What one of a study's quantities is on a bar, and its unit. @type {Record<string, () => [number, string]>} */
 const MEASURED = {peak_rotation: angleAxis, time_at_rest: () => [1, "s"]};

@@ -132,7 +132,7 @@ export class MapReading {
     };
     const index = row * this.view.about.shape[1] + column;
     const said = this.view.about.quantities.map((/** @type {string} */ name, /** @type {number} */ q) => this.said(name, /** @type {Float32Array[]} */ (this.view.values)[q][index])).filter(Boolean);
-    tell(one("map-at"), phrase("map.at", {x: written(this.view.about.x, column), y: written(this.view.about.y, row), what: said.join("; ")}));
+    tell(one("map-at"), phrase("map.at", {x: written(this.view.about.x, column), y: written(this.view.about.y, row), what: said.join("; ") || phrase("orbit.nothing")}));
   }
 
   /** @param {string} name @param {number} value */

@@ -35,7 +35,7 @@ export class MapZoom {
     this.before.push(Object.fromEntries(ENDS.map((end) => [end, state.map[end]])));
     ENDS.forEach((end, k) => {
       const width = kept[k - (k % 2) + 1] - kept[k - (k % 2)];
-      state.map[end] = String(Number(kept[k].toFixed(Math.min(12, Math.max(0, 3 - Math.floor(Math.log10(width)))))));
+      state.map[end] = this.view.asSent(end, String(Number(kept[k].toFixed(Math.min(12, Math.max(0, 3 - Math.floor(Math.log10(width))))))));
     });
     this.move(phrase("map.closer"));
   }

@@ -9,8 +9,9 @@ import {MapReading} from "./map-reading.js";
 import {MapZoom} from "./map-zoom.js";
 import {namesOf, specification} from "./parameters.js";
 import {make, one} from "./words.js";
-import {short, typed} from "./numbers.js";
-import {phrase} from "./texts.js";
+import {joined, short, typed} from "./numbers.js";
+import {inWords, phrase} from "./texts.js";
+import {axisUnit} from "./units.js";
 
 const ENDS = ["x_from", "x_to", "y_from", "y_to"];
 
@@ -33,7 +34,7 @@ export class View {
     });
     this.reading = new MapReading(this);
     this.zoom = new MapZoom(this);
-    /** @type {Record<string, HTMLElement>} */
+    /** @type {Record<string, HTMLSelectElement>} */
     this.slices = {};
     this.form();
     one("map-open").addEventListener("click", () => this.open());
@@ -41,6 +42,9 @@ export class View {
   }
 
   enter() { this.update(); }
+
+  /** Show what the state says: the ends before each step in were those of another one. */
+  restore() { this.zoom.forget(); }
 
   leave() {
     this.running?.abort();
@@ -52,18 +56,18 @@ export class View {
 
   form() {
     for (const name of ["quantity", "x", "y", "points"]) this.select(name).addEventListener("change", () => this.chosen(name));
-    for (const name of ["x-from", "x-to", "y-from", "y-to"]) one(`map-${name}`).addEventListener("change", () => this.ends());
+    for (const name of ["x-from", "x-to", "y-from", "y-to"]) one(`map-${name}`).addEventListener("change", () => this.end(name.replace("-", "_")));
     if (!this.study) return;
     const tools = one("study-tools");
     tools.hidden = false;
     /** @param {string} name @param {string} label @param {string[]} values */
     const slice = (name, label, values) => {
       if (values.length < 2) return;
+      const [scale, unit] = axisUnit(this.axis(name.replace(/^fix_|_index$/g, ""))?.unit);
       const select = /** @type {HTMLSelectElement} */ (make("select", {on: {change: () => { this.page.state.map[name] = select.value; this.update(); }}},
-        values.map((value, k) => make("option", {value: name.startsWith("fix_") ? value : String(k)}, [value.trim() && Number.isFinite(Number(value)) ? short(Number(value), 12) : value]))));
-      select.value = this.page.state.map[name] ?? select.value;
-      this.slices[name] = make("label", {}, [`${label} `, select]);
-      tools.append(this.slices[name]);
+        values.map((value, k) => make("option", {value: name.startsWith("fix_") ? value : String(k)}, [value.trim() && Number.isFinite(Number(value)) ? joined(short(scale * Number(value), scale === 1 ? 12 : 6), unit) : value]))));
+      this.slices[name] = select;
+      tools.append(make("label", {}, [`${label} `, select]));
     };
     tools.append(make("strong", {}, [phrase("map.study", {name: this.study.name})]), make("span", {className: "cursor"}, [this.study.status]));
     slice("motion_index", phrase("map.motion"), this.study.motions);
@@ -76,8 +80,7 @@ export class View {
   /** @param {string} name */
   chosen(name) {
     const {map} = this.page.state;
-    map[name] = this.select(name).value;
-    if (name === "x" || name === "y") { delete map[`${name}_from`]; delete map[`${name}_to`]; this.zoom.forget(); }
+    if (name === "x" || name === "y") this.turn(name, this.select(name).value); else map[name] = this.select(name).value;
     if (name === "quantity" && this.about && !this.study) {
       this.fill();
       this.page.remember({map});
@@ -94,14 +97,33 @@ export class View {
     return {...this.page.state.texts, x, y, ...ends, points: points ?? "200"};
   }
 
-  ends() {
-    for (const end of ENDS) this.page.state.map[end] = typed(/** @type {HTMLInputElement} */ (one(`map-${end.replace("_", "-")}`)).value);
+  /** An end of an axis was typed. @param {string} end */
+  end(end) {
+    this.page.state.map[end] = this.asSent(end, typed(/** @type {HTMLInputElement} */ (one(`map-${end.replace("_", "-")}`)).value));
     this.update();
+  }
+
+  /** What the server says of an axis. @param {string} name */
+  axis(name) { return (this.study ? this.study.axes : specification.axes).find((/** @type {any} */ each) => each.name === name); }
+
+  /** What one of the axis's own unit is in that of the page. @param {string} end of an axis */
+  scale(end) { return axisUnit(this.axis(this.page.state.map[end[0]])?.unit)[0]; }
+
+  /** An end as the address has it, in the axis's own unit, of one in that of the page. @param {string} end @param {string} text */
+  asSent(end, text) { return scaled(text, 1 / this.scale(end), 12); }
+
+  /** Map over another axis, whose ends are its own. @param {string} which @param {string} name */
+  turn(which, name) {
+    const {map} = this.page.state;
+    if (map[which]) for (const end of ["from", "to"]) delete map[`${which}_${end}`];
+    map[which] = name;
+    this.zoom.forget();
   }
 
   /** The case, or what is mapped, has changed. */
   update() {
     this.running?.abort();
+    this.reading.leave();
     void this.latest.ask();
   }
 
@@ -115,8 +137,8 @@ export class View {
     const {texts, map} = this.page.state;
     if (this.study) {
       const varied = this.study.axes.map((/** @type {any} */ each) => each.name);
-      if (!varied.includes(map.x)) map.x = varied[0];
-      if (!varied.includes(map.y) || map.y === map.x) map.y = varied.find((/** @type {string} */ each) => each !== map.x);
+      if (!varied.includes(map.x)) this.turn("x", varied[0]);
+      if (!varied.includes(map.y) || map.y === map.x) this.turn("y", varied.find((/** @type {string} */ each) => each !== map.x));
       return {names: varied, right: varied};
     }
     const motion = texts.motion ?? "";
@@ -125,8 +147,8 @@ export class View {
     const frequency = pulse && motion.includes("frequency=");
     const names = specification.axes.map((/** @type {any} */ each) => each.name).filter((/** @type {string} */ name) => name !== "omega" || frequency);
     const right = names.filter((/** @type {string} */ name) => name !== "a" && name !== "pga");
-    if (!names.includes(map.y)) map.y = pulse ? "a" : "pga";
-    if (!right.includes(map.x)) map.x = frequency ? "omega" : "p";
+    if (!names.includes(map.y)) this.turn("y", pulse ? "a" : "pga");
+    if (!right.includes(map.x)) this.turn("x", frequency ? "omega" : "p");
     one("map-sine").hidden = family === "sine";
     return {names, right};
   }
@@ -134,9 +156,11 @@ export class View {
   fill() {
     const {map} = this.page.state;
     const {names, right} = this.axes();
-    for (const [name, slice] of Object.entries(this.slices)) slice.hidden = [map.x, map.y].some((axis) => name === `fix_${axis}` || name === `${axis}_index`);
-    const offered = this.study ? this.study.axes : specification.axes;
-    const label = (/** @type {string} */ name) => labelled(offered.find((/** @type {any} */ each) => each.name === name));
+    for (const [name, select] of Object.entries(this.slices)) {
+      select.value = map[name] ?? select.options[0].value;
+      /** @type {HTMLElement} */ (select.parentElement).hidden = [map.x, map.y].some((axis) => name === `fix_${axis}` || name === `${axis}_index`);
+    }
+    const label = (/** @type {string} */ name) => labelled(this.axis(name));
     for (const [name, values] of Object.entries({x: right, y: names})) {
       this.select(name).replaceChildren(...values.map((/** @type {string} */ value) => make("option", {value}, [label(value)])));
       this.select(name).value = map[name];
@@ -148,12 +172,12 @@ export class View {
     choose(this.select("points"), map.points ?? "200");
     if (this.study) return;
     for (const which of ["x", "y"]) {
-      const axis = offered.find((/** @type {any} */ each) => each.name === map[which]);
+      const axis = this.axis(map[which]);
       const wide = map.quantity === "peak" || map.quantity === "mode";
       for (const [k, end] of ["from", "to"].entries()) {
         const field = /** @type {HTMLInputElement} */ (one(`map-${which}-${end}`)), name = `${which}_${end}`;
         this.usual[name] = String((wide ? axis.wide : axis.close)[k]);
-        if (document.activeElement !== field) field.value = map[name] || this.usual[name];
+        if (document.activeElement !== field || !field.value) field.value = scaled(map[name] || this.usual[name], this.scale(name), 6);
       }
     }
   }
@@ -185,7 +209,7 @@ export class View {
     this.waiting = 0;
     for await (const frame of frames("/api/map", this.asked(), signal)) {
       if (!this.about || done === 0) {
-        this.about = JSON.parse(new TextDecoder().decode(frame));
+        this.about = inUnits(JSON.parse(new TextDecoder().decode(frame)));
         const count = this.about.shape[0] * this.about.shape[1];
         this.values = this.about.quantities.map(() => new Float32Array(count).fill(NaN));
         this.covered = new Uint8Array(count).fill(255);
@@ -245,12 +269,12 @@ export class View {
     showExports("map", this.study ? python : python[quantity], (this.study ? command : command[quantity]) ?? null, !this.complete ? [] : [
       [`${name}.svg`, phrase("save.svg"), () => this.picture.file("svg")], [`${name}.png`, phrase("save.png"), () => this.picture.file("png")],
       [`${name}.csv`, phrase("save.numbers"), async () => new Blob([this.table()], {type: "text/csv"})],
-    ]);
+    ], (error) => this.page.problem(error, "view-map"));
   }
 
-  /** Every point of the map with all that is known of it. */
+  /** Every point of the map with all that is known of it, in the units of the server. */
   table() {
-    const {x, y, quantities} = this.about;
+    const {quantities, x: {own: x}, y: {own: y}} = this.about;
     const head = [x, y].map((axis) => (axis.unit ? `${axis.name}_${axis.unit.replace("°", "deg").replace(/\W+/g, "_")}` : axis.name));
     const rows = y.values.flatMap((/** @type {number} */ up, /** @type {number} */ row) => x.values.map((/** @type {number} */ right, /** @type {number} */ column) => [
       right, up, ...(this.values ?? []).map((/** @type {Float32Array} */ all) => Number(all[row * x.values.length + column].toPrecision(7))),
@@ -271,6 +295,8 @@ export class View {
 
   drawAxes() {
     this.picture.axes(this.about);
+    const notes = (this.about.notes ?? []).map(inWords).join(" ");
+    Object.assign(one("map-notes"), {textContent: notes, hidden: !notes});
     this.reading.keep();
     if (this.study) this.zoom.forget();
     this.zoom.offer();
@@ -287,7 +313,7 @@ export class View {
     this.fill();
     const {header, arrays} = await payload("/api/study", this.page.state.map);
     this.page.remember({map: this.page.state.map});
-    this.about = {...header, quantities: [header.quantity], curves: {}};
+    this.about = inUnits({...header, quantities: [header.quantity], curves: {}});
     this.values = [Float32Array.from(arrays.values)];
     this.drawAxes();
     this.complete = true;
@@ -299,7 +325,8 @@ export class View {
 
   /** What is asked of the server about a point. @param {string} what @param {number[]} at to the right and upwards @returns {[string, Record<string, string>]} */
   request(what, [x, y]) {
-    const at = {at_x: String(x), at_y: String(y)};
+    const own = (/** @type {any} */ axis, /** @type {number} */ value) => String(axis.own.values[axis.values.indexOf(value)]);
+    const at = {at_x: own(this.about.x, x), at_y: own(this.about.y, y)};
     return this.study ? [`/api/study/${what}`, {...this.page.state.map, ...at}] : [`/api/map/${what}`, {...this.asked(), ...at}];
   }
 
@@ -328,6 +355,19 @@ export class View {
     const block = Object.fromEntries([...namesOf("block"), "model"].filter((name) => texts[name]).map((name) => [name, texts[name]]));
     const motion = `sine:amplitude=${(1.03 * threshold).toPrecision(6)}g,frequency=${(p / Math.PI).toPrecision(6)},cycles=2.5`;
     this.page.state.map = {};
+    this.restore();
     this.page.restate({...block, motion});
   }
+}
+
+/** A number times a factor, to so many digits; what is none, or stays as it is, is the same text. @param {string} text @param {number} factor @param {number} digits */
+const scaled = (text, factor, digits) => (factor === 1 || !text || Number.isNaN(Number(text)) ? text : String(Number((factor * Number(text)).toPrecision(digits))));
+
+/** What a map is said to be, with its axes in the units of the page; `own` is what the server says of each. @param {any} about */
+function inUnits(about) {
+  const [x, y] = [about.x, about.y].map((own) => {
+    const [scale, unit] = axisUnit(own.unit);
+    return {...own, unit, values: own.values.map((/** @type {number} */ each) => scale * each), own};
+  });
+  return {...about, x, y};
 }

@@ -5,6 +5,7 @@ import {choice, choose, offer} from "./controls.js";
 import {namesOf, parameter, specification} from "./parameters.js";
 import {Plan} from "./plan.js";
 import {make} from "./words.js";
+import {typed} from "./numbers.js";
 import {phrase} from "./texts.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
@@ -26,8 +27,11 @@ export class MeshFields {
     this.typed = {};
     const field = (/** @type {string} */ name, /** @type {string} */ hint) => {
       const id = prefix + name;
-      this.typed[name] = /** @type {HTMLInputElement} */ (make("input", {type: "text", id, placeholder: hint, "data-argument": name, on: {change: tell}}));
-      return make("div", {className: "choice"}, [make("label", {className: "field", for: id}, [parameter(name).label]), this.typed[name]]);
+      const input = this.typed[name] = /** @type {HTMLInputElement} */ (make("input", {type: "text", id, placeholder: hint, "data-argument": name, on: {change: () => {
+        if (name !== "density") input.value = typed(input.value); // commas part the densities of several bodies
+        tell();
+      }}}));
+      return make("div", {className: "choice"}, [make("label", {className: "field", for: id}, [parameter(name).label]), input]);
     };
     this.more = make("details", {}, [make("summary", {}, [phrase("mesh.read")]), this.unit.element, this.up.element,
       field("density", phrase("mesh.same_density")), field("tolerance", phrase("mesh.thousandth"))]);

@@ -46,7 +46,6 @@ export class View {
 
   leave() {
     this.running?.abort();
-    this.page.problem(null, "phase-plane");
     one("save").hidden = false;
   }
 
@@ -66,6 +65,7 @@ export class View {
   /** What the case settles on; after that, its diagram, unless that is the one that is drawn or under way. */
   async settle() {
     const {header, arrays} = await payload("/api/orbit", this.page.state.texts);
+    if (this.page.state.view !== "periodic") return; // somebody left meanwhile
     this.offer = header.offer;
     one("orbit").hidden = Boolean(this.offer);
     one("orbit-offer").hidden = !this.offer;
@@ -110,13 +110,14 @@ export class View {
     const {sweep, texts} = this.page.state, chosen = {...sweep};
     const body = document.body.dataset;
     body.sweep = "running";
-    this.complete = false;
-    this.about = null;
-    this.found = {up: new Map(), down: new Map()};
     const {key} = this;
+    let begun = false; // what was there before stays until then
     try {
       for await (const frame of frames("/api/sweep", {...texts, ...sweep}, signal)) {
-        if (!this.about) {
+        if (!begun) {
+          begun = true;
+          this.complete = false;
+          this.found = {up: new Map(), down: new Map()};
           this.about = JSON.parse(new TextDecoder().decode(frame));
           this.page.remember({sweep: chosen});
           this.fill();
@@ -157,9 +158,9 @@ export class View {
     const {sweep} = this.page.state;
     const shown = /** @type {Texts} */ ({sweep: name, sweep_from: String(values[0]), sweep_to: String(values[values.length - 1]), sweep_points: String(values.length)});
     for (const field of FIELDS) {
-      const input = /** @type {HTMLElement} */ (one(field)), value = sweep[field] ?? shown[field];
+      const input = /** @type {HTMLElement} */ (one(field)), value = sweep[field] || shown[field];
       if (input instanceof HTMLSelectElement) choose(input, value);
-      else if (input instanceof HTMLInputElement && document.activeElement !== input) input.value = value;
+      else if (input instanceof HTMLInputElement && (document.activeElement !== input || !input.value)) input.value = value;
     }
   }
 
@@ -358,7 +359,7 @@ export class View {
     showExports("diagram", python, command, !this.complete ? [] : [
       ["rocking-diagram.svg", phrase("save.svg"), () => this.picture("svg")], ["rocking-diagram.png", phrase("save.png"), () => this.picture("png")],
       ["rocking-diagram.csv", phrase("save.numbers"), async () => new Blob([this.table()], {type: "text/csv"})],
-    ]);
+    ], (error) => this.page.problem(error, "view-periodic"));
   }
 
   /** @param {"svg" | "png"} form @returns {Promise<Blob>} */

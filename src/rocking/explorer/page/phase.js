@@ -35,11 +35,13 @@ export class PhasePanel {
     new IntersectionObserver((entries) => {
       this.visible = entries[entries.length - 1].isIntersecting;
       this.update();
+      this.mark(this.time); // what is not seen is not marked
     }, {threshold: 0.15}).observe(one("phase-plots"));
   }
 
   /** Draw the case in its window, if that is seen and not drawn already. */
   update() {
+    this.page.problem(null, "view-phase"); // it was about what was shown before
     if (this.visible && this.page.shown && this.wanted() !== this.drawn) void this.latest.ask();
   }
 

@@ -12,11 +12,12 @@ import {phrase} from "./texts.js";
 export function makePrinting(page, problem) {
   /** Texts of the case whose summary is on the page. */
   let held = "";
+  const ofStudy = () => Boolean(specification.study) && page.state.view === "map";
 
   async function print() {
     try {
       const {texts: shown} = page.state.good, texts = JSON.stringify(shown);
-      if (held !== texts) {
+      if (held !== texts && !ofStudy()) {
         const rows = await json("/api/summary", shown);
         const half = Math.ceil(rows.length / 2);
         fill(/** @type {HTMLTableElement} */ (one("print-summary")), [], Array.from({length: half}, (_, k) => [...rows[k], ...(rows[k + half] ?? ["", ""])]));
@@ -32,8 +33,12 @@ export function makePrinting(page, problem) {
 
   function begin() {
     lit(true);
-    if (held !== JSON.stringify(page.state.good.texts)) one("print-summary").replaceChildren();
-    head(page);
+    if (ofStudy() || held !== JSON.stringify(page.state.good.texts)) {
+      one("print-summary").replaceChildren();
+      held = "";
+    }
+    head([...(ofStudy() ? aboutStudy() : aboutCase(page)), [phrase("print.computed"), `rocking ${specification.version}, ${new Date().toISOString().slice(0, 10)}`],
+      [phrase("print.address"), address(page.state)]]);
   }
 
   one("print").addEventListener("click", print);
@@ -44,21 +49,34 @@ export function makePrinting(page, problem) {
   window.addEventListener("afterprint", () => lit(false));
 }
 
-/** Say which case it is, who computed it, and where it is found again. @param {any} page */
-function head({state, shown}) {
-  if (!shown) return;
+/** Say what it is, who computed it, and where it is found again. @param {string[][]} rows */
+function head(rows) {
+  one("print-head").replaceChildren(...rows.map(([name, text]) => make("div", {}, [make("dt", {}, [name]), make("dd", {}, [text])])));
+}
+
+/** @param {any} state */
+function address({view, assessment, good}) {
+  return view === "assessment" && assessment.records ? phrase("print.listed", {address: `?${new URLSearchParams(good.texts)}&view=assessment`}) : `?${location.search.slice(1)}`;
+}
+
+/** Which study it is, what of it is drawn, and what is fixed. @returns {string[][]} */
+function aboutStudy() {
+  const choices = /** @type {HTMLSelectElement[]} */ ([...document.querySelectorAll(":is(#map-tools, #study-tools) label:not([hidden]) select")]);
+  return [[phrase("print.study"), `${specification.study.name}: ${specification.study.status}`],
+    [phrase("print.slice"), choices.map((each) => `${each.previousSibling?.textContent?.trim()} ${each.selectedOptions[0]?.text}`).join(", ")]];
+}
+
+/** @param {any} page @returns {string[][]} */
+function aboutCase({shown}) {
+  if (!shown) return [];
   const {block, motion, model, treatment} = shown.header;
   const sides = block.sides.map((/** @type {any} */ side, /** @type {number} */ k) => phrase("print.side", {p: short(side.p), alpha: angle(side.alpha), eta: short(side.restitution), threshold: ofG(block.thresholds_g[k])}));
-  const rows = [
+  return [
     [phrase("print.block"), sides[0] === sides[1] ? phrase("print.one_side", {description: block.description, side: sides[0]})
       : phrase("print.two_sides", {description: block.description, right: sides[0], left: sides[1]})],
     [phrase("print.motion"), !motion ? phrase("print.no_motion") : motion.vertical
       ? phrase("print.of_both", {name: motion.name, pga: ofG(motion.pga_g), vertical: motion.vertical.name, peak: ofG(motion.vertical.pga_g)})
       : phrase("print.of_motion", {name: motion.name, pga: ofG(motion.pga_g)})],
     [phrase("print.model"), phrase("print.ends", {model: phrase(`model.${model}`), treatment: treatmentName(treatment)})],
-    [phrase("print.computed"), `rocking ${specification.version}, ${new Date().toISOString().slice(0, 10)}`],
-    [phrase("print.address"), `?${location.search.slice(1)}`],
   ];
-  if (state.view === "assessment" && state.assessment.records) rows[4][1] = phrase("print.listed", {address: `?${new URLSearchParams(state.good.texts)}&view=assessment`});
-  one("print-head").replaceChildren(...rows.map(([name, text]) => make("div", {}, [make("dt", {}, [name]), make("dd", {}, [text])])));
 }

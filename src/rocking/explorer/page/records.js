@@ -1,6 +1,7 @@
 // The list of records: searched, sorted, ticked; a click makes one the case's motion; files that leave something out are asked about.
 
-import {Latest, json} from "./api.js";
+import {Latest, Problem, json} from "./api.js";
+import {remaking} from "./focus.js";
 import {idOf} from "./list.js";
 import {sendFile} from "./upload.js";
 import {acceleration, velocity} from "./units.js";
@@ -24,7 +25,7 @@ export class View {
     this.list = page.list;
     /** Column that the list is sorted by, if any, and whether upwards. @type {[number, boolean] | null} */
     this.order = null;
-    this.loading = new Latest(async () => { await this.list.load(); this.render(); counted("listed"); }, (error) => page.problem(error, "view-records"));
+    this.loading = new Latest(async () => { await this.list.load(); remaking(one("view-records"), () => this.render()); counted("listed"); }, (error) => page.problem(error, "view-records"));
     one("records-search").addEventListener("input", () => this.render());
     one("records-vertical").addEventListener("change", () => {
       this.list.rising = /** @type {HTMLInputElement} */ (one("records-vertical")).checked;
@@ -49,19 +50,23 @@ export class View {
   async add(files) {
     /** @type {string[]} */
     const keys = [];
-    /** @type {unknown[]} */
+    /** @type {string[]} */
     const refused = [];
+    this.page.problem(null, "records-said");
     for (const [k, file] of files.entries()) {
       one("records-said").textContent = phrase("records.reading", {number: k + 1, count: files.length, name: file.name});
-      try { keys.push((await sendFile(file)).key); } catch (error) { refused.push(error); }
+      try { keys.push((await sendFile(file)).key); } catch (error) {
+        if (!(error instanceof Problem)) throw error;
+        refused.push(error.message);
+      }
     }
     if (keys.length) this.list.drops.push(keys);
-    await this.list.load();
-    this.render();
     const words = phrase("records.read", {done: keys.length, count: files.length});
     one("records-said").textContent = words;
     say(words);
-    if (refused.length) this.page.problem(refused[0], "view-records");
+    // It stays whatever becomes of the list.
+    if (refused.length) this.page.problem(new Problem(refused.join("\n")), "records-said");
+    await this.loading.ask();
     counted("added");
   }
 
@@ -71,8 +76,15 @@ export class View {
     this.page.remember({assessment: {...this.page.state.assessment}});
   }
 
+  /** Load the list after a change of what is known of files; what of them is ticked changes in the address, too. */
+  async reload() {
+    await this.loading.ask();
+    if (this.list.ticked) this.remember();
+  }
+
   render() {
-    const {list} = this;
+    const {list} = this, {usage} = list;
+    if (!usage) return; // the list has not come yet
     if (!list.ticked) delete this.page.state.assessment.records; // what was not chosen one by one is all that is known now
     const wanted = /** @type {HTMLInputElement} */ (one("records-search")).value.toLowerCase().split(/\s+/).filter(Boolean);
     const seen = (/** @type {Group} */ group, /** @type {Row} */ row) => wanted.every((word) => `${group.title} ${row.title} ${row.label}`.toLowerCase().includes(word));
@@ -85,7 +97,6 @@ export class View {
       make("thead", {}, [make("tr", {}, [make("td", {}, [""]), ...heads, make("td")])]),
       ...groups.map((/** @type {Group} */ group) => this.body(group)),
     );
-    const {usage} = list;
     one("records-usage").textContent = phrase("records.shown", {
       shown: groups.reduce((/** @type {number} */ sum, /** @type {Group} */ each) => sum + each.rows.length, 0), count: list.rows().length,
       files: usage.files, most: usage.most_files, size: short(usage.bytes / 2 ** 20, 2), most_size: short(usage.most_bytes / 2 ** 20),
@@ -108,8 +119,7 @@ export class View {
   /** @param {number} column */
   sorted(column) {
     this.order = this.order?.[0] === column ? [column, !this.order[1]] : [column, column === 0];
-    this.render();
-    /** @type {HTMLElement} */ (document.querySelectorAll(".sorting")[column]).focus();
+    remaking(one("view-records"), () => this.render());
   }
 
   /** Rows of one station. @param {Group} group */
@@ -150,10 +160,11 @@ export class View {
   async remove(rows) {
     try {
       for (const key of new Set(rows.map((row) => row.key))) await json(`/api/records/${key}`, {}, {method: "DELETE"});
+      if (this.list.ticked) this.list.tick(rows, false);
     } catch (error) {
-      this.page.problem(error, "view-records");
+      this.page.problem(error, "records-said");
     }
-    void this.loading.ask();
+    void this.reload();
   }
 
   /** Ask for what the files of each drop do not say: one answer for all, beside what it would make of each. */
@@ -180,6 +191,6 @@ export class View {
   /** @param {Row[]} rows @param {string} name @param {string} value */
   answer(rows, name, value) {
     for (const {key} of rows) this.list.answers[key] = {...this.list.answers[key], [name]: value};
-    void this.loading.ask();
+    void this.reload();
   }
 }

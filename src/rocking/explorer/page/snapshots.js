@@ -7,7 +7,7 @@ import {phrase} from "./texts.js";
 /** @typedef {{name: string, texts: Texts}} Snapshot */
 
 const KEPT = "rocking-snapshots";
-const MOST = 8, LONGEST = 40;
+const MOST = 8, LONGEST = 120;
 
 /** @param {any} each @returns {each is Snapshot} */
 const isSnapshot = (each) => typeof each?.name === "string" && each.texts !== null && typeof each.texts === "object" &&
@@ -15,13 +15,32 @@ const isSnapshot = (each) => typeof each?.name === "string" && each.texts !== nu
 
 /** Where nothing can be kept, as in a frame of some browsers, they are known until the page is closed. @type {Snapshot[]} */
 let known = [];
-try {
-  const found = JSON.parse(localStorage.getItem(KEPT) ?? "[]");
-  known = Array.isArray(found) ? found.filter(isSnapshot).slice(0, MOST) : [];
-} catch { /* as said above */ }
+read();
+
+/** Read what is kept, which other tabs change, too. */
+function read() {
+  try {
+    const found = JSON.parse(localStorage.getItem(KEPT) ?? "[]");
+    known = Array.isArray(found) ? found.filter(isSnapshot).slice(0, MOST) : [];
+  } catch { /* as said above */ }
+}
 
 /** @returns {Snapshot[]} */
 export const snapshots = () => known;
+
+/** Whether two cases have the same texts. @param {Texts} one_ @param {Texts} other */
+const same = (one_, other) => JSON.stringify(Object.entries(one_).sort()) === JSON.stringify(Object.entries(other).sort());
+
+/** The pinned case that has these texts. @param {Texts} texts */
+export const pinnedAs = (texts) => known.find((each) => same(each.texts, texts));
+
+/** The name of a case, numbered where another case is pinned under it. @param {Snapshot} given */
+function unused({name, texts}) {
+  const numbered = (/** @type {number} */ k) => (k > 1 ? phrase("snapshots.numbered", {name, number: String(k)}) : name);
+  let k = 1;
+  while (known.some((each) => each.name === numbered(k) && !same(each.texts, texts))) k += 1;
+  return numbered(k);
+}
 
 export class Snapshots {
   /** @param {{now: () => Snapshot | null, open: (texts: Texts) => void, changed: () => void}} page the present case with a name for it, what
@@ -33,27 +52,31 @@ export class Snapshots {
     this.button = /** @type {HTMLButtonElement} */ (make("button", {type: "button", id: "pin", on: {click: () => this.pin()}}, [phrase("snapshots.pin")]));
     this.chips = make("span", {className: "chips"});
     one("snapshots").replaceChildren(this.chips, this.name, this.button);
+    /** The case for which a name is asked. @type {Snapshot | null} */
+    this.asked = null;
+    window.addEventListener("storage", ({key}) => { if (key === KEPT) { read(); this.changed(); } });
     this.show();
   }
 
-  /** Ask for a name, and with that keep the case. */
+  /** Ask for a name, and with that keep the case as it was then. */
   pin() {
-    const now = this.page.now();
-    if (!now) return;
-    if (this.name.hidden) {
-      this.name.value = now.name.slice(0, LONGEST);
+    if (!this.asked) {
+      this.asked = this.page.now();
+      if (!this.asked) return;
+      this.name.value = unused(this.asked);
       this.name.hidden = false;
       this.button.textContent = phrase("snapshots.keep");
       this.name.select();
       return;
     }
-    const name = this.name.value.trim() || now.name;
-    this.keep([...known.filter((each) => each.name !== name), {name, texts: now.texts}]);
+    const {texts} = this.asked, name = unused({name: this.name.value.trim() || this.asked.name, texts});
+    this.keep((all) => [...all.filter((each) => each.name !== name), {name, texts}]);
     say(phrase("snapshots.pinned", {name}));
     this.close();
   }
 
   close() {
+    this.asked = null;
     this.name.hidden = true;
     this.button.textContent = phrase("snapshots.pin");
     this.focus();
@@ -64,7 +87,7 @@ export class Snapshots {
 
   /** @param {Snapshot} gone */
   remove(gone) {
-    this.keep(known.filter((each) => each !== gone));
+    this.keep((all) => all.filter(({name}) => name !== gone.name));
     say(phrase("snapshots.removed", {name: gone.name}));
     this.focus();
   }
@@ -77,10 +100,15 @@ export class Snapshots {
     this.pin();
   }
 
-  /** @param {Snapshot[]} all */
-  keep(all) {
-    known = all.slice(-MOST);
+  /** @param {(all: Snapshot[]) => Snapshot[]} change of what is kept */
+  keep(change) {
+    read();
+    known = change(known).slice(-MOST);
     try { localStorage.setItem(KEPT, JSON.stringify(known)); } catch { /* as said above */ }
+    this.changed();
+  }
+
+  changed() {
     this.show();
     this.page.changed();
   }

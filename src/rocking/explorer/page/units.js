@@ -64,14 +64,24 @@ export const accelerationAxis = () => [KNOWN[chosen.acceleration_in][0], KNOWN[c
 export const gAxis = () => [Number((G * KNOWN[chosen.acceleration_in][0]).toPrecision(15)), KNOWN[chosen.acceleration_in][1]];
 /** An angle likewise: what one rad is, and the unit. @returns {[number, string]} */
 export const angleAxis = () => [KNOWN[chosen.angle_in][0], KNOWN[chosen.angle_in][1].trim()];
+/** Units of axes as the server names them: what chooses the page's, and what one is in SI units. @type {Record<string, [string, number]>} */
+const OF_AXES = {"°": ["angle_in", Math.PI / 180], rad: ["angle_in", 1], g: ["acceleration_in", G], "m/s^2": ["acceleration_in", 1], "m/s": ["length_in", 1]};
+/** What one of an axis's unit is in the unit that is chosen, and how the page writes that. @param {string} [unit] @returns {[number, string]} */
+export function axisUnit(unit = "") {
+  const [name, size] = OF_AXES[unit] ?? [];
+  if (!name || !size) return [1, unit];
+  const [scale, plain, rate] = KNOWN[chosen[name]], written_ = (name === "length_in" ? rate : plain).trim();
+  return written_ === unit ? [1, unit] : [Number((size * scale).toPrecision(15)), written_];
+}
 /** A field's text, with the chosen unit where it is a bare number. @param {string} text */
 export const withUnit = (text) => (text && !Number.isNaN(Number(text)) ? `${Number(text)}${chosen.acceleration_in}` : text);
 
-/** Fields that choose the units; another choice loads the page again, so that all of it is in them. @param {() => void} write writes the address */
+/** Fields that choose the units; another choice loads the page again, so that all of it is in them. @param {(name: string) => void} write
+ * writes the address, and is told which was chosen */
 export function unitFields(write) {
   one("units-form").replaceChildren(...Object.entries(offered).map(([name, units]) => {
     const options = units.map((each) => make("option", {value: each, selected: each === chosen[name]}, [KNOWN[each][1].trim()]));
-    const select = /** @type {HTMLSelectElement} */ (make("select", {id: name, on: {change: () => { chosen[name] = select.value; write(); }}}, options));
+    const select = /** @type {HTMLSelectElement} */ (make("select", {id: name, on: {change: () => { chosen[name] = select.value; write(name); }}}, options));
     return make("label", {className: "field"}, [`${phrase(`units.${name}`)} `, select]);
   }));
 }

@@ -15,11 +15,14 @@ const useOf = (file, use) => (specification.mesh_kinds.some((/** @type {string} 
 /** @param {File} file @param {Use} [use] */
 export async function sendFile(file, use = "record") {
   if (file.size > LARGEST) throw new Problem(phrase(use === "mesh" ? "file.large_mesh" : "file.large_record", {name: file.name}));
+  // A folder, or what is no longer there, would fail as if nothing answered.
+  try { await file.slice(0, 1).arrayBuffer(); } catch { throw new Problem(phrase("file.unreadable", {name: file.name})); }
   return json(use === "mesh" ? "/api/meshes" : "/api/records", {name: file.name}, {method: "POST", body: file});
 }
 
-/** @param {(file: () => Promise<any>, use: Use) => Promise<void>} take @param {(files: File[]) => Promise<void>} list takes several records at once */
-export function acceptFiles(take, list) {
+/** @param {(file: () => Promise<any>, use: Use) => Promise<void>} take @param {(files: File[]) => Promise<void>} list takes several records at once
+ * @param {(error: unknown) => void} problem is told what went wrong; the next files are read all the same */
+export function acceptFiles(take, list, problem) {
   const input = /** @type {HTMLInputElement} */ (one("file"));
   const dropping = one("dropping");
   /** @type {Use} */
@@ -28,7 +31,7 @@ export function acceptFiles(take, list) {
   /** What was given before is read first: the last file that was given is the one that is used. @type {Promise<void>} */
   let before = Promise.resolve();
   /** @param {File[]} files @param {Use} wanted */
-  const taken = (files, wanted) => { before = before.then(() => read(files, wanted)); };
+  const taken = (files, wanted) => { before = before.then(() => read(files, wanted)).catch(problem); };
   /** @param {File[]} files @param {Use} wanted */
   const read = async (files, wanted) => {
     const [meshes, records] = [true, false].map((each) => files.filter((file) => (useOf(file, wanted) === "mesh") === each));
