@@ -204,7 +204,7 @@ HEADERS = {
     ("MeasureComparison", "measures"): "measure,unit,median_intensity,dispersion,dispersion_low,dispersion_high,"
     "dispersion_of_all",
     ("MeasureComparison", "intensities"): "measure,motion,block,unit,intensity",
-    ("StudySpectrum", "fractiles"): "fractile,scale_m_s2,block,p_rad_s,alpha_rad,restitution,"
+    ("StudySpectrum", "fractiles"): "fractile,pga_m_s2,block,p_rad_s,alpha_rad,restitution,"
     "fractile_over_alpha,overturned_share",
     ("BlockFragilities", "curves"): "limit_state,block,p_rad_s,alpha_rad,restitution,"
     "median_m_s2,median_lower_m_s2,median_upper_m_s2,dispersion,dispersion_lower,dispersion_upper,exceeded,fault",
