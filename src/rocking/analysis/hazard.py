@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Container, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -243,11 +242,6 @@ def _check_order(what: str, values: Floats, way: float) -> None:
 def heading_of(cell: str) -> str:
     """Name of a column as it is known here: "PGA (m/s^2)" is pga_m_s2."""
     return re.sub(r"[^a-z0-9]+", "_", cell.lower().replace("^", "")).strip("_")
-
-
-def doubled_among(columns: Sequence[str], read: Container[str]) -> list[str]:
-    """Names of columns, of those that are read, which are there several times."""
-    return [name for name in dict.fromkeys(columns) if name in read and columns.count(name) > 1]
 
 
 def _from_table(lines: list[str], period: float | None) -> tuple[Floats, Floats, Measure]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, get_args
@@ -12,7 +12,7 @@ from typing import Any, Final, get_args
 import numpy as np
 
 from rocking import checks
-from rocking.analysis.hazard import HEADINGS, doubled_among, heading_of
+from rocking.analysis.hazard import HEADINGS, heading_of
 from rocking.analysis.validation.tested import ShakeTest
 from rocking.arrays import Floats
 from rocking.block import Blocks
@@ -67,6 +67,10 @@ class _Table:
     def numbers(self, column: str) -> Floats:
         """Return the numbers of a column."""
         return np.array([self.convert(line, row[column], float, "a number") for line, row in self.rows])
+
+    def doubled(self, read: Container[str]) -> list[str]:
+        """Return the names of columns, of those that are read, which are there several times."""
+        return [name for name in dict.fromkeys(self.columns) if name in read and self.columns.count(name) > 1]
 
     def answers(self, column: str) -> tuple[bool, ...]:
         """Return the truth values of a column: 1 or 0, yes or no, true or false."""
@@ -172,8 +176,7 @@ def outcomes_of(table: _Table, *, channel: Any, dt: Any, units: Any) -> Outcomes
     """Return motions and outcomes of a table with these columns; an error says the line."""
     overturned = table.answers("overturned")
     motions = _motions_of(table, channel=channel, dt=dt, units=units)
-    # A row without a label belongs to no group: it has one of its own.
-    groups = tuple(row["group"] or f"line {line}" for line, row in table.rows) if "group" in table.columns else None
+    groups = tuple(row["group"] for _, row in table.rows) if "group" in table.columns else None
     return Outcomes(motions, overturned, groups)
 
 
@@ -273,7 +276,7 @@ def read_tests(
     [<ShakeTest: ridgecrest-clc-090, stood, peak 0.0261799 rad>, <ShakeTest: ridgecrest-clc-090, overturned>]
     """
     table = read_table(checks.path(path, "path of a table", UnreadableRecord))
-    doubled = [name for name in dict.fromkeys(table.columns) if table.columns.count(name) > 1]
+    doubled = table.doubled(table.columns)
     peaks = [name for name in _PEAKS if name in table.columns]
     if "motion" not in table.columns or not ({"overturned", *peaks} & {*table.columns}) or len(peaks) > 1 or doubled:
         raise table.error(
@@ -313,7 +316,7 @@ def read_observed(
     columns = tuple(heading_of(cell) for cell in given.columns)
     rows = tuple((line, {heading_of(name): cell for name, cell in row.items()}) for line, row in given.rows)
     table = _Table(path, columns, rows)
-    if doubled := doubled_among(columns, {*HEADINGS, "overturned", "trials", "motion", "group"}):
+    if doubled := table.doubled({*HEADINGS, "overturned", "trials", "motion", "group"}):
         raise table.error(f"each column must be there once, but {' and '.join(doubled)} several times")
     found = [name for name in dict.fromkeys(columns) if name in HEADINGS]
     if "overturned" not in columns or len(found) + ("motion" in columns) != 1:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 Made = TypeVar("Made")
 
-_WHOLE: Final = re.compile(r"[+-]?\d+")
+_DIGITS: Final = re.compile(r"[+-]?\d+")
 
 #: What describes a block, together, and what may go with it.
 _Descriptions = Mapping[tuple[str, ...], tuple[str, ...]]
@@ -69,7 +69,7 @@ def measured(text: str, quantity: Quantity) -> Parameter:
 
 
 def _whole(_: Any, tokens: Sequence[Token]) -> int:
-    if not _WHOLE.fullmatch(tokens[0].value):
+    if not _DIGITS.fullmatch(tokens[0].value):
         raise ValueError(tokens[0].value)
     return int(tokens[0].value)
 

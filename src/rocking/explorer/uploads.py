@@ -100,7 +100,7 @@ class UploadStore:
         key = hashlib.sha256(upload.data).hexdigest()[:_HASH]
         with self._lock:
             others = {known: each for known, each in self._files.items() if known != key}
-            # No list shows meshes, of which some could be taken out: those that came first make room.
+            # No list shows meshes, so that nobody could take one out: the oldest are removed where there are too many.
             for mesh in [known for known, each in others.items() if _is_mesh(each.name)]:
                 if _is_full(upload, others):
                     del others[mesh]
@@ -225,7 +225,7 @@ class UploadStore:
 
 
 def _is_full(upload: Upload, others: Mapping[str, Upload]) -> bool:
-    """Whether a file finds no room beside others."""
+    """Whether a file and others together are more than are kept."""
     return len(others) >= MOST or len(upload.data) + sum(len(each.data) for each in others.values()) > ALL
 
 
