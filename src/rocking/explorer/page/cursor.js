@@ -84,6 +84,7 @@ export class Cursor {
   /** @param {string} text */
   ask(text) {
     window.clearTimeout(this.still);
+    window.clearTimeout(this.quiet); // else the last reading would be spoken for this one
     const asked = this.asked = {text};
     this.still = window.setTimeout(() => void this.latest.ask(asked), STILL);
   }
@@ -130,7 +131,6 @@ export class Cursor {
     const words = phrase("reading.is", {time: fixed(found.time, digits), state: inWords(found.state), parts: parts.join(", ")});
     one("cursor").textContent = words;
     one("cursor").dataset.time = String(found.time);
-    window.clearTimeout(this.quiet);
     if (this.spoken) this.quiet = window.setTimeout(() => { this.spoken = false; say(words); }, QUIET);
   }
 
