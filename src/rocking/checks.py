@@ -79,7 +79,7 @@ def share(value: object, name: str, error: Error, below: float = 1.0) -> float:
 
 
 def flag(value: object, name: str, error: Error) -> bool:
-    """Return `value`, or raise `error` unless it is a truth value."""
+    """Return `value` as a bool, or raise `error` unless it is True or False, of Python's or NumPy's."""
     if not isinstance(value, bool | np.bool_):
         raise error(f"{{}} must be True or False, not {shown(value)}", name, value=value)
     return bool(value)
@@ -100,13 +100,6 @@ def text(value: object, name: str, error: Error) -> str:
     if not isinstance(value, str):
         raise error(f"{{}} must be text, not {shown(value)}", name, value=value)
     return value
-
-
-def truth(value: object, name: str, error: Error) -> bool:
-    """Return `value` as a bool, or raise `error` unless it is True or False, of Python's or NumPy's."""
-    if not isinstance(value, (bool, np.bool_)):
-        raise error(f"{{}} must be True or False, not {shown(value)}", name, value=value)
-    return bool(value)
 
 
 def path(value: object, name: str, error: Error) -> Path:

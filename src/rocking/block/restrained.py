@@ -94,7 +94,7 @@ class RestrainedBlock:
     ) -> None:
         if isinstance(block, RestrainedBlock):
             raise InvalidBlock("this block has restraints already: give all of them at once, after the Block itself")
-        own, one_way = one_block(block), checks.truth(one_sided, "one_sided", InvalidBlock)
+        own, one_way = one_block(block), checks.flag(one_sided, "one_sided", InvalidBlock)
         _check(restraints, own)
         tilt = checks.finite(lean, "lean", InvalidBlock)
         rest = [f"leaning {tilt:.4g} rad to side +"] * (tilt != 0.0) + ["rocking one way"] * one_way

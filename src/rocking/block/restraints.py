@@ -400,7 +400,7 @@ class Load(Restraint):
         self._positive("mass", "kg")
         self._positive("height", "m")
         self._finite("offset")
-        object.__setattr__(self, "follows", checks.truth(self.follows, "follows", InvalidBlock))
+        object.__setattr__(self, "follows", checks.flag(self.follows, "follows", InvalidBlock))
 
     def _held(self, pivot: Pivot) -> Held:
         """Return the moment of one that does not follow; of one that follows none, which is part of the block."""

@@ -230,7 +230,7 @@ def calibrate_history(
     ['2.50', '0.20', '0.90']
     """
     at, measured = _checked(times, rotation)
-    has_two = checks.truth(two_sided, "two_sided", InvalidOption)
+    has_two = checks.flag(two_sided, "two_sided", InvalidOption)
     settled, unknowns = _split({"p": p, "alpha": alpha, "restitution": restitution}, has_two)
     if initial_rotation is not None:
         settled["initial_rotation"] = checks.finite(initial_rotation, "initial_rotation", InvalidOption)

@@ -131,7 +131,7 @@ def calibrate(
     """
     tested = several_motions(motions)
     observed = checked_outcomes(overturned, len(tested))
-    space = Space.of(p, alpha, restitution, two_sided=checks.truth(two_sided, "two_sided", InvalidOption))
+    space = Space.of(p, alpha, restitution, two_sided=checks.flag(two_sided, "two_sided", InvalidOption))
     checks.share(lapse, "lapse", InvalidOption, below=0.5)
     checks.whole(candidates, "candidates", InvalidOption, 128)
     checks.whole(ensemble, "ensemble", InvalidOption, 1)
