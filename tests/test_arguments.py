@@ -224,16 +224,16 @@ def test_a_fragility_names_its_limit_states():
 @pytest.mark.parametrize("level", [1e60, 1e300, 1e308])
 def test_nothing_is_shaken_more_than_a_motion_may_be(level):
     for scaled in (MOTION.scaled, MOTION.scaled_to):
-        with pytest.raises(InvalidMotion, match=r"the acceleration of a motion must stay below 1e\+50 m/s\^2"):
+        with pytest.raises(InvalidMotion, match=r"the acceleration of a motion must stay below 1e\+30 m/s\^2"):
             scaled(level)
     for scale in ({"levels": level, "measure": "pga"}, {"levels": level}):
-        with pytest.raises(InvalidMotion, match=r"the acceleration of a motion must stay below 1e\+50 m/s\^2"):
+        with pytest.raises(InvalidMotion, match=r"the acceleration of a motion must stay below 1e\+30 m/s\^2"):
             rocking.simulate_many(BLOCK, MOTION, **scale)
 
 
 def test_a_steep_piece_is_told_from_a_strong_motion():
     with pytest.raises(InvalidMotion, match=r"a piece of a motion is too steep: shorter than 1e-09 s"):
-        rocking.Motion([0.0, 1e-20, 1.0], [[0.0, 1e65], [0.0, 0.0]])
+        rocking.Motion([0.0, 1e-20, 1.0], [[0.0, 1e45], [0.0, 0.0]])
 
 
 @pytest.mark.parametrize("period", [1e300, 1e9])

@@ -323,7 +323,7 @@ TABLE = pulses.sine(12.0, 5.0, cycles=1)
         (lambda ball: dynamics.periodic_orbits(ball, TABLE, starts=[[math.nan, 0.0]]), "starts must be finite"),
         (lambda ball: dynamics.periodic_orbits(ball, TABLE, starts=[]), "starts must hold pairs"),
         (lambda ball: dynamics.periodic_orbits(ball, TABLE, starts=[[-1.0, 0.0]]), "starts must be at least 0 m"),
-        (lambda ball: dynamics.periodic_orbits(ball, pulses.sine(1e30, 5.0, cycles=1)), "beyond all sense"),
+        (lambda ball: dynamics.periodic_orbits(ball, pulses.sine(1e29, 5.0, cycles=1)), "beyond all sense"),
         (lambda ball: dynamics.lyapunov_exponents(ball, TABLE, [0.0, math.inf]), "state must be finite"),
         (lambda ball: dynamics.bifurcation_diagram(lambda v: (ball, TABLE), [1.0], [0.0, 1e308]), "starts must be fin"),
         (lambda ball: dynamics.bifurcation_diagram(lambda v: (ball, TABLE), [1.0, math.nan], [0.0, 1.0]), "increasing"),

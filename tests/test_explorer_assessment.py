@@ -151,7 +151,7 @@ def test_levels_go_from_where_a_record_lifts_the_block_to_where_most_overturn_it
         ({"records": PLAIN, "friction": "7"}, "coefficient"),
         ({"records": "motion=none"}, "shakes nothing"),
         ({"records": "motion=file:00"}, "not here any more"),
-        ({"records": PLAIN, "level_from": "1", "level_to": "1e40"}, "are simulated here"),
+        ({"records": PLAIN, "level_from": "1", "level_to": "1e40"}, "must stay below"),
     ],
 )
 def test_what_cannot_be_assessed_is_refused_in_a_sentence(texts, words):

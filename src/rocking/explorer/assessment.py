@@ -19,7 +19,7 @@ from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption, Unfitted
 from rocking.explorer.catalogue import entries_of, title_of
 from rocking.explorer.code import block_options, command_line
-from rocking.explorer.inputs import Case, Found, Texts, checked_peak, read_motion, require_rest
+from rocking.explorer.inputs import Case, Found, Texts, read_motion, require_rest
 from rocking.explorer.parameters import ASSESSMENT
 from rocking.explorer.payload import Payload
 from rocking.explorer.phrases import phrase
@@ -164,7 +164,6 @@ def parts(assessment: Assessment) -> Generator[Payload]:
 def _stripes(assessment: Assessment, motion: Motion) -> Flags:
     """Return whether the block overturns, at each level and in each polarity."""
     case = assessment.case
-    checked_peak(motion.pga * float(assessment.levels[-1]) / assessment.measure.positive(motion, motion.name))
     many = Blocks.of(case.block)
     table = simulate_levels(
         many, [motion], assessment.measure, assessment.levels, model=case.model, chattering=case.treatment,

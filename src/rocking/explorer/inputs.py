@@ -23,6 +23,7 @@ from rocking.explorer.parameters import DEFAULT, PARAMETERS, PULSES, SCALINGS, S
 from rocking.explorer.uploads import UploadStore
 from rocking.motion import records
 from rocking.motion.motion import Motion
+from rocking.motion.piecewise import STRONGEST, TOO_STRONG
 from rocking.motion.scaling import Measure
 from rocking.named_pulses import FAMILIES, pulse_values
 from rocking.quantities import acceleration, scaling
@@ -50,8 +51,7 @@ _TOLD_APART: Final = 6
 #: Longest pulse, cycles: a page shows no more, and memory is bounded.
 MOST_SHOWN: Final = 1000.0
 
-#: Strongest motion, m/s^2, and shortest duration, s: beyond them arithmetic, and not mechanics, says what is shown.
-_STRONGEST: Final = 1e30
+#: Shortest duration, s: below it arithmetic, and not mechanics, says what is shown.
 _SHORTEST: Final = 1e-12
 
 #: What makes a block of each shape, its name in `rocking`, and what it calls the parameters.
@@ -160,11 +160,10 @@ def require_rest(block: Block) -> None:
         )
 
 
-def checked_peak(peak: float) -> float:
-    """Return a peak acceleration, m/s^2, with which a page simulates; refuse one that is beyond all mechanics."""
-    if peak > _STRONGEST:
-        raise InvalidMotion(f"{{}} reaches {peak:.3g} m/s^2; at most {_STRONGEST:g} m/s^2 are simulated here", "motion")
-    return peak
+def require_possible(peak: float) -> None:
+    """Refuse the strongest peak acceleration, m/s^2, of motions that are still to be made where none can have it."""
+    if peak > STRONGEST:
+        raise InvalidMotion(TOO_STRONG)
 
 
 def texts_of(response: Response, uploads: UploadStore) -> dict[str, str]:
@@ -288,8 +287,6 @@ def _motion(given: Texts, values: Values, uploads: UploadStore) -> Found:
             raise InvalidOption("there is no motion to scale: choose one, or leave the scaling out")
         python = f"{found.python}.{_scaling_as_python(*target)}"
         found = found._replace(motion=_scaled(found.motion, *target), python=python)
-    if found.motion is not None:
-        checked_peak(max(each.pga for each in (found.motion, found.motion.vertical) if each is not None))
     return found
 
 

@@ -24,9 +24,9 @@ from rocking.explorer.inputs import (
     Case,
     Texts,
     arguments_of,
-    checked_peak,
     is_pulse,
     pulse_of,
+    require_possible,
     require_rest,
 )
 from rocking.explorer.parameters import QUANTITIES, SCALINGS, names_of
@@ -142,7 +142,7 @@ def grid_of(case: Case, texts: Texts) -> MapGrid:
         require_rest(case.block)
     grid = MapGrid(case, case.motion, x, y)
     highest = _peak_at(grid, {axis.name: float(axis.values[-1]) for axis in (x, y)})
-    checked_peak(grid.motion.pga if highest is None else highest)
+    require_possible(grid.motion.pga if highest is None else highest)
     return grid
 
 

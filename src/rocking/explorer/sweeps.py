@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from rocking.dynamics.maps import Fate
 from rocking.errors import InvalidOption
-from rocking.explorer.inputs import Case, Texts, arguments_of, checked_peak, pulse_call
+from rocking.explorer.inputs import Case, Texts, arguments_of, pulse_call, require_possible
 from rocking.explorer.maps import AXES, Axis, change_pulse
 from rocking.explorer.parameters import SCALINGS
 from rocking.explorer.payload import Payload
@@ -100,7 +100,7 @@ def sweep_of(case: Case, texts: Texts) -> Sweep:
     if not 0.0 < low < high < math.inf:
         raise InvalidOption(f"a sweep needs a positive start below its end, not {low:g} to {high:g}", "sweep_from")
     sweep = Sweep(case, sine, Axis(name, np.linspace(low, high, int(points))))
-    checked_peak(sweep.sine_at(high).amplitude)
+    require_possible(sweep.sine_at(high).amplitude)
     return sweep
 
 

@@ -68,7 +68,7 @@ class Motion:
     ------
     InvalidMotion
         If the arrays do not describe a piecewise polynomial, its degree is above 20, or a number is beyond all sense
-        (accelerations of 1e50 m/s^2, also where a piece would last 1e-9 s; durations below 1e-9 s or above 1e15 s).
+        (accelerations of 1e30 m/s^2, also where a piece would last 1e-9 s; durations below 1e-9 s or above 1e15 s).
 
     Examples
     --------

@@ -21,8 +21,9 @@ _JUMP: Final = 1e-12
 #: Even breakpoints are off their grid by no more than this part of the duration, some units in its last place.
 _ROUNDING: Final = 4.0 * np.finfo(np.float64).eps
 
-#: Far beyond any ground motion, and far enough from overflow for the squares and integrals that measures take.
-STRONGEST: Final = 1e50
+#: Far beyond any ground motion, and far enough from overflow for the squares and integrals that measures take, and for
+#: the solvers: beyond 1e42 m/s^2 they divide for ever.
+STRONGEST: Final = 1e30
 _LONGEST: Final = 1e15
 
 TOO_STRONG: Final = f"the acceleration of a motion must stay below {STRONGEST:g} m/s^2: check units and scale"
