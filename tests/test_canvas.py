@@ -46,6 +46,15 @@ def test_pyplot_knows_the_figures_of_those_who_use_it_and_is_not_loaded_for_a_ba
     assert printed(f"{unknown}; {known}", DISPLAY=":987", WAYLAND_DISPLAY=":987", MPLBACKEND="agg") == "False\nTrue"
 
 
+def test_pyplot_knows_nothing_of_a_figure_of_another_thread():
+    """Windows belong to the main thread; a server draws in others."""
+    script = (
+        "from concurrent.futures import ThreadPoolExecutor as Pool; import matplotlib.pyplot as plt; "
+        "Pool(1).submit(draw).result(); print(plt.get_fignums())"
+    )
+    assert printed(script, MPLBACKEND="agg") == "[]"
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems say nothing of a display in the environment")
 def test_the_command_line_writes_its_figures_without_windows(tmp_path):

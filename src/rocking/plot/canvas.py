@@ -8,6 +8,7 @@ import os
 import re
 import sys
 import textwrap
+import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final
@@ -268,7 +269,9 @@ def _show(figure: Figure) -> None:
 
 
 def _is_shown() -> bool:
-    """Whether there is a pyplot that somebody may ask to show the figure."""
+    """Whether there is a pyplot that somebody may ask to show the figure; windows belong to the main thread alone."""
+    if threading.current_thread() is not threading.main_thread():
+        return False
     return "matplotlib.pyplot" in sys.modules or _in_notebook() or (_has_display() and _may_open_windows())
 
 
