@@ -41,7 +41,9 @@ def test_uncompiled_kernels_obey_the_same_laws() -> None:
 
 
 def played() -> Iterator[np.ndarray]:
-    """Impacts of marches, states of lanes, and changes of responses."""
+    """Critical amplitudes, impacts of marches, states of lanes, and changes of responses."""
+    etas = np.array([5e-324, 1e-300, 1e-100, 1e-28, 1e-20, 1e-6, 0.1, 0.5, 0.9, 0.999])
+    yield rocking.chattering.critical_amplitude(np.array([[0.5], [4.0], [100.0]]), etas)
     for nonlinear in (False, True):
         found = run(record(3), nonlinear=nonlinear)
         yield np.column_stack([found.impacts[name] for name in ("time", "speed_before", "speed_after")])

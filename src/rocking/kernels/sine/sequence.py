@@ -238,6 +238,9 @@ _NEAR: Final = 0.1
 
 _MAXIMUM_STEPS: Final = 400
 
+#: Least part of the half period that the critical sequence leaves over at an impact: its inverse does not overflow.
+_LEAST_LEFT: Final = 1e-300
+
 
 @kernel
 def critical_amplitudes(omega: Floats, eta: Floats, amplitudes: Floats) -> None:
@@ -289,19 +292,20 @@ def distance_exponent(eta: float) -> float:
     s (1 - z) is left and v' = eta^2 (z/2 - z^2/3)/(1 - z)^2. The critical sequence is the fixed point; the distance of
     a neighbouring one grows by the factor dv'/dv per pair while s falls by 1 - z.
     """
-    pair = eta * eta
-    low = 0.0
+    # Of the fixed point's cubic in 1 - z = eta t: for a small eta, t is known to the last digits, and z is not.
+    low = 0.5
     high = 1.0
-    for _ in range(60):
-        z = 0.5 * (low + high)
-        if (0.5 - z / 6.0) * (1.0 - z) ** 2 > pair * (0.5 - z / 3.0):
-            low = z
+    for _ in range(53):
+        t = 0.5 * (low + high)
+        if eta * t * (t * t - 2.0) + 2.0 * t * t < 1.0:
+            low = t
         else:
-            high = z
-    z = 0.5 * (low + high)
-    relative_growth = (0.5 - 2.0 * z / 3.0) / (0.5 * z - z * z / 3.0) + 2.0 / (1.0 - z)
+            high = t
+    left = max(0.5 * eta * (low + high), _LEAST_LEFT)
+    z = 1.0 - left
+    relative_growth = (0.5 - 2.0 * z / 3.0) / (0.5 * z - z * z / 3.0) + 2.0 / left
     growth = relative_growth * (0.5 * z - z * z / 6.0) / (0.5 - z / 3.0)
-    return -math.log(1.0 - z) / math.log(growth)
+    return -math.log(left) / math.log(growth)
 
 
 # ---- The paper's fits of the critical amplitude ----
