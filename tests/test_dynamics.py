@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import rocking
-from rocking import InvalidBlock, InvalidMotion, InvalidOption, dynamics
+from rocking import InvalidBlock, InvalidMotion, InvalidOption, dynamics, pulses
 
 G = 9.81
 
@@ -292,3 +292,28 @@ def test_a_study_of_oscillators_is_taken_up_again_by_another_program(tmp_path):
     expected = rocking.simulate_many(bodies, motion, model="linear", levels=[0.5, 1.0]).peak_rotation.values
     assert told == f"{bodies[1]} {expected.tolist()}\n"
     assert expected.min() < expected.max()
+
+
+@pytest.mark.parametrize("body", [dynamics.BouncingBall(0.5), dynamics.ImpactOscillator(1.0, 0.5, stop=-0.1)], ids=repr)
+def test_what_cannot_overturn_is_not_said_to_rock(body):
+    motion = pulses.sine(15.0, 2.0, cycles=4)
+    assert "moves, and comes to rest" in dynamics.simulate(body, motion).summary()
+    assert "still moving at" in dynamics.simulate(body, motion, duration=1.9).summary()
+    assert "does not move" in dynamics.simulate(body, motion.scaled(1e-3)).summary()
+
+
+@pytest.mark.parametrize("restitution", [0.0, 1e-200, 1e-100])
+def test_a_rest_at_the_first_impact_is_proven(restitution):
+    ball, motion = dynamics.BouncingBall(restitution, gravity=10.0), pulses.sine(15.0, 2.0, cycles=4)
+    dropped = dynamics.simulate(ball, None, initial_position=0.2)
+    assert dropped.stalled == 0 and dropped.chattering["lower"][0] <= 0.2 <= dropped.chattering["upper"][0]
+    for body in (
+        ball,
+        dynamics.InvertedPendulum(2.0, 0.1, restitution),
+        dynamics.ImpactOscillator(1.0, restitution, stop=-0.1),
+    ):
+        found = dynamics.simulate(body, motion, duration=motion.end)
+        rests = found.chattering
+        assert len(rests) >= 2 and found.stalled == 0 and "not proven" not in found.summary()
+        assert np.all(rests["upper"] - rests["lower"] <= 64.0 * np.spacing(rests["end"]))
+        assert np.all((rests["lower"] <= rests["end"]) & (rests["end"] <= rests["upper"]))

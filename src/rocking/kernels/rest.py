@@ -90,7 +90,7 @@ def proven_bounds(ground: Ground, block: Record, rules: Record, scratch: Record,
     """Proven bounds on the time to rest, widened by the rounding of all times; all NaN: no proof."""
     lower, upper, time, height = prove_rest(ground, block, rules, scratch, state)
     rounding = allowance(time_of(ground, state), upper, state)
-    return Proof(max(0.0, lower - rounding), upper + rounding, time, height)
+    return Proof(lower - rounding, upper + rounding, time, height)
 
 
 @inlined
@@ -105,6 +105,9 @@ def rest_after_impact(ground: Ground, block: Record, rules: Record, state: Recor
     """Whether the block comes to rest at an impact, given the bounds that are proven there (NaN: none)."""
     time = time_of(ground, state)
     if rules.treatment == RestRule.CERTIFIED:
+        if state.v == 0.0:
+            rounding = allowance(time, 0.0, state)
+            return Rest(-rounding, rounding, 0.0, False)
         # No rotation that is not resolved may be higher than those that are.
         good = max(rules.tolerance, 4.0 * allowance(time, proof.upper, state))
         if proof.upper - proof.lower <= good and proof.height <= state.peak:

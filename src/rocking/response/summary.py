@@ -148,7 +148,9 @@ def in_words(response: Answers, overturn_time: str) -> str:
         goes_on = motion is not None and response.duration < motion.end
         to_come = f"; the motion goes on to {motion.end:.6g} s" if motion is not None and goes_on else ""
         return f"{_when_stopped(response)}, where the simulation was stopped{to_come}"
-    return "rocks and does not overturn" if _has_moved(response) else "does not move"
+    if not _has_moved(response):
+        return "does not move"
+    return "rocks and does not overturn" if _can_overturn(response) else "moves, and comes to rest"
 
 
 def in_brief(response: Answers) -> str:
@@ -162,7 +164,8 @@ def in_brief(response: Answers) -> str:
         return f"unfinished, given up at {response.duration:.2f} s{doubtful}"
     if response.stopped:
         return f"{_when_stopped(response)}{doubtful}"
-    return f"{'rocks' if _has_moved(response) else 'does not move'}{doubtful}"
+    moves = "rocks" if _can_overturn(response) else "moves"
+    return f"{moves if _has_moved(response) else 'does not move'}{doubtful}"
 
 
 def ratio_text(response: Answers) -> str:
@@ -355,8 +358,13 @@ def _when_stopped(response: Answers) -> str:
     if not math.isnan(response.tipping_time):
         return f"beyond its balance point since {response.tipping_time:.4f} s and not yet fallen at {end}"
     if response.moves_at_end:
-        return f"still rocking at {end}"
+        return f"still {'rocking' if _can_overturn(response) else 'moving'} at {end}"
     return f"at rest at {end}" if _has_moved(response) else f"has not moved by {end}"
+
+
+def _can_overturn(response: Answers) -> bool:
+    """Whether the body is one that rocks, and not a ball or a mass between stops."""
+    return bool(response.body.coordinate.limit)
 
 
 def _has_moved(response: Answers) -> bool:
