@@ -141,7 +141,7 @@ def test_the_response_of_a_ball_is_told_in_its_own_words():
     assert not {"required_friction", "peak_over_slenderness"} & set(values)
     assert list(found.to_dataframe(dt=0.01).columns) == ["height_m", "velocity_m_s", "ground_acceleration_m_s2"]
     assert found.to_xarray()["height"].attrs["units"] == "m"
-    assert "ball on a table under one-sine: rocks" in repr(found) and "height (m)" in found._repr_html_()
+    assert "ball on a table under one-sine: moves" in repr(found) and "height (m)" in found._repr_html_()
     figure = found.plot(title="thrown")
     assert [axes.get_ylabel() for axes in figure.axes] == ["height (m)", "ground\nacceleration (g)"]
     assert figure.get_suptitle() == "thrown"
