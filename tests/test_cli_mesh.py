@@ -75,6 +75,7 @@ def test_every_option_reaches_the_body(run, tmp_path):
         (["statue", "--up", "x"], "does not stand"),
         (["statue", "--azimuth", "north"], "--azimuth takes a number"),
         (["statue", "--tolerance", "-1"], "--tolerance"),
+        (["statue", "--restitution", "0.9"], "--restitution is for the blocks of --azimuth: give one"),
     ],
 )
 def test_a_mistake_is_one_line(run, arguments, sentence):

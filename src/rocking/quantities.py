@@ -184,12 +184,13 @@ def scaling(given: Mapping[str, str | float | None], quantity: Quantity = accele
         raise InvalidOption(f"{' and '.join(['{}'] * len(chosen))} scale the same motion; give one of them", *chosen)
     ((name, value),) = chosen.items()
     if name == "pga":
-        return quantity(str(value), name), Measure("pga")
+        return checks.finite(quantity(str(value), name), name, InvalidOption), Measure("pga")
     if name == "sa":
         level, at, period = str(value).partition("@")
         if not at:
             raise InvalidOption(f"{{}} takes an acceleration at a period, as 0.4g@1.0, not {value!r}", name)
-        return quantity(level, name), Measure("sa", duration(period, name))
+        read_level, read_period = quantity(level, name), duration(period, name)
+        return checks.finite(read_level, name, InvalidOption), Measure("sa", checks.finite(read_period, name, InvalidOption))
     read = number if name == "scale" else velocity
     plain = read(value, name) if isinstance(value, str) else float(value)
     if name == "scale":

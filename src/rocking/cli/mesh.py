@@ -10,6 +10,7 @@ from cyclopts import Parameter
 
 from rocking.block import Block
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results, write_tables
+from rocking.errors import InvalidOption
 from rocking.plausibility import block_notes
 from rocking.progress import note
 from rocking.quantities import densities, length, number, sides, values
@@ -62,6 +63,8 @@ def mesh(
         Factor on the angular speed at an impact, in (0, 1]; one or two; by default from angular momentum.
     """
     with output.folder() as folder:
+        if restitution is not None and azimuth is None:
+            raise InvalidOption("{} is for the blocks of {}: give one, or leave it out", "restitution", "azimuth")
         solid = Solid.from_mesh(
             file,
             density=None if density is None else densities(density, "density"),
