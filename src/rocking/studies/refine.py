@@ -249,12 +249,11 @@ def refinement(store: Store) -> Refinement | None:
     tolerances = kept_plan(store)
     if tolerances is None:
         return None
-    begun = [*rounds(store, tolerances)]
-    if not begun:
+    last = _last_round(store, tolerances)
+    if last is None:
         return Refinement(tolerances, 0, 0, 0, complete=False)
-    last = begun[-1]
     done = sum(map(last.grid.simulations, last.done()))
-    return Refinement(tolerances, len(begun), done, last.grid.total, last.is_last)
+    return Refinement(tolerances, last.number, done, last.grid.total, last.is_last)
 
 
 def tolerances_of(product: Product, refine: float | Mapping[str, float], outcomes: Sequence[str]) -> Tolerances:
@@ -291,28 +290,43 @@ def kept_plan(store: Store) -> Tolerances | None:
 
 def rounds(store: Store, tolerances: Tolerances) -> Iterator[Round]:
     """Give the rounds that have begun, in order; a StudyError if one is damaged."""
-    number = 1
-    while (data := store.place.get(f"round.{number}/round.json")) is not None:
-        about, archive = unsealed(data), store.place.get(f"round.{number}/brackets.npz")
-        if about is None or archive is None or hashlib.sha256(archive).hexdigest() != about["brackets"]:
-            raise StudyError(
-                f"round.{number} is damaged: remove the folders round.* and run the study again", path=str(store.place)
-            )
-        yield Round(store, number, Brackets.from_bytes(archive), tolerances)
-        number += 1
+    for number, about in enumerate(_begun(store), 1):
+        yield _round(store, number, about, tolerances)
 
 
 def next_round(store: Store, tolerances: Tolerances) -> Round:
     """Return the round that comes now: the last one that has begun, or where that is done, the one after it."""
-    last = None
-    for last in rounds(store, tolerances):  # noqa: B007 - the last is wanted
-        pass
+    last = _last_round(store, tolerances)
     if last is not None and (last.is_last or next(last.missing(), None) is not None):
         return last
     brackets = grid_brackets(store, tolerances) if last is None else last.after()
     begun = Round(store, 1 if last is None else last.number + 1, brackets, tolerances)
     begun.create()
     return begun
+
+
+def _last_round(store: Store, tolerances: Tolerances) -> Round | None:
+    """Return the last round that has begun; its brackets alone are read, which hold all that those before it found."""
+    begun = [*_begun(store)]
+    return _round(store, len(begun), begun[-1], tolerances) if begun else None
+
+
+def _begun(store: Store) -> Iterator[bytes]:
+    """Give what describes each round that has begun, in order."""
+    number = 1
+    while (data := store.place.get(f"round.{number}/round.json")) is not None:
+        yield data
+        number += 1
+
+
+def _round(store: Store, number: int, data: bytes, tolerances: Tolerances) -> Round:
+    """Read a round that has begun; a StudyError if it is damaged."""
+    about, archive = unsealed(data), store.place.get(f"round.{number}/brackets.npz")
+    if about is None or archive is None or hashlib.sha256(archive).hexdigest() != about["brackets"]:
+        raise StudyError(
+            f"round.{number} is damaged: remove the folders round.* and run the study again", path=str(store.place)
+        )
+    return Round(store, number, Brackets.from_bytes(archive), tolerances)
 
 
 def _require_order(product: Product) -> None:
@@ -327,12 +341,12 @@ def _found_brackets(store: Store, verdict: StudyVerdict) -> Brackets:
     tolerances = kept_plan(store)
     if tolerances is None or verdict not in tolerances:
         return grid_brackets(store, [verdict])
-    begun = [*rounds(store, tolerances)]
-    if not begun or not begun[-1].is_last:
+    last = _last_round(store, tolerances)
+    if last is None or not last.is_last:
         raise StudyError(
             f"the study is not yet refined to {_text(tolerances)}: run it to its end first", path=str(store.place)
         )
-    return begun[-1].brackets.of(verdict)
+    return last.brackets.of(verdict)
 
 
 def grid_brackets(store: Store, of: Collection[str]) -> Brackets:
