@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from matplotlib.figure import Figure
@@ -40,19 +41,25 @@ def test_pyplot_is_loaded_where_there_is_a_display_and_not_before(name):
     assert printed(f"{script}; import os; os.environ['{name}'] = ':987'; {script}") == "False\nTrue"
 
 
-def test_pyplot_knows_the_figures_of_those_who_use_it_and_is_not_loaded_for_a_backend_without_windows():
-    unknown = "draw(); print('matplotlib.pyplot' in sys.modules)"
-    known = "import matplotlib.pyplot as plt; figure = draw(); print(plt.get_fignums() == [figure.number])"
-    assert printed(f"{unknown}; {known}", DISPLAY=":987", WAYLAND_DISPLAY=":987", MPLBACKEND="agg") == "False\nTrue"
+def test_pyplot_knows_the_figures_of_those_who_use_it_and_is_not_loaded_for_a_backend_without_windows(monkeypatch):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.setenv(name, ":987")
+    sys.modules.pop("matplotlib.pyplot", None)
+    drawn()
+    assert "matplotlib.pyplot" not in sys.modules
+    import matplotlib.pyplot as plt
+
+    assert plt.get_backend() == "agg"
+    assert [drawn().number] == plt.get_fignums()
 
 
 def test_pyplot_knows_nothing_of_a_figure_of_another_thread():
     """Windows belong to the main thread; a server draws in others."""
-    script = (
-        "from concurrent.futures import ThreadPoolExecutor as Pool; import matplotlib.pyplot as plt; "
-        "Pool(1).submit(draw).result(); print(plt.get_fignums())"
-    )
-    assert printed(script, MPLBACKEND="agg") == "[]"
+    import matplotlib.pyplot as plt
+
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(drawn).result()
+    assert plt.get_fignums() == []
 
 
 @pytest.mark.slow

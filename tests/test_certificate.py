@@ -19,6 +19,13 @@ thorough = settings(deadline=None, max_examples=600, suppress_health_check=[Heal
 State = tuple[float, int, float]
 
 
+@pytest.fixture(autouse=True)
+def _bits_enough(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Prove with fewer bits what is fast: impacts that use them up are few there, and too few bits prove nothing."""
+    if not any(request.node.get_closest_marker(tier) for tier in ("thorough", "slow")):
+        monkeypatch.setattr(balls, "PRECISION", 700)
+
+
 def proofs(response: rocking.Response) -> list[tuple[State, float, float, float]]:
     """Of each sequence: the state at its last resolved impact, where the proof was made; rest, bracket."""
     found = []

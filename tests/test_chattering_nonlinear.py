@@ -56,7 +56,9 @@ def test_slender_blocks_approach_the_slender_theory_like_the_square_of_alpha():
     assert cost[:-1] / cost[1:] == pytest.approx(4.0, rel=0.01)
 
 
-@pytest.mark.parametrize(("omega", "eta", "alpha"), [(2.0, 0.92, 0.4), (0.6, 0.6, 0.6)])
+@pytest.mark.parametrize(
+    ("omega", "eta", "alpha"), [pytest.param(2.0, 0.92, 0.4, marks=pytest.mark.thorough), (0.6, 0.6, 0.6)]
+)
 def test_both_sides_of_the_critical_amplitude_by_scipy(omega, eta, alpha):
     critical = float(chattering.critical_amplitude_nonlinear(omega, eta, alpha))
     slender = float(chattering.critical_amplitude(omega, eta))

@@ -38,7 +38,7 @@ AGREEING = [
 ]
 
 
-@pytest.mark.cases(fast=8, thorough=26)
+@pytest.mark.cases(fast=5, thorough=26)
 @pytest.mark.parametrize(("share", "omega", "eta"), AGREEING)
 def test_times_and_verdicts_agree_with_many_digits(share, omega, eta):
     assert_agrees(share, omega, eta)
@@ -54,7 +54,7 @@ NEAR = [
 ]
 
 
-@pytest.mark.cases(fast=3, thorough=12)
+@pytest.mark.cases(fast=2, thorough=12)
 @pytest.mark.parametrize(("omega", "eta", "distance"), NEAR)
 def test_near_the_critical_amplitude_a_time_is_as_accurate_as_the_amplitude_allows(omega, eta, distance):
     """Two ulp of a, by the documented slope, that of the power law, and by the true one, which may be less steep."""
@@ -70,6 +70,7 @@ def test_near_the_critical_amplitude_a_time_is_as_accurate_as_the_amplitude_allo
     assert error < 1e-13 * time + 2.0**-51 * min(slope, law)
 
 
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize("omega", [1e-3, 0.01])
 @pytest.mark.parametrize("share", [1e-3, 1e-6])
 def test_under_very_slow_forcing_too(omega, share):

@@ -26,7 +26,7 @@ def test_basin_json_is_the_basins(run, tmp_path):
 
 
 def test_basin_prints_shares_and_writes_what_it_says(run, tmp_path):
-    grid = ["--positions", "-0.2:0.2:9", "--velocities", "-0.4:0.4:9"]
+    grid = ["--positions", "-0.2:0.2:4", "--velocities", "-0.4:0.4:4"]
     code, out, _ = run("basin", *SINE, *BLOCK, *grid, "--out", tmp_path)
     assert code == 0 and "overturns to side -" in out
     tables = {"attractors.csv", "outcomes.csv", "orbits.csv"}

@@ -56,6 +56,10 @@ def test_branches_that_begin_at_flips_are_followed_one_after_the_other_and_writt
 
 
 @pytest.mark.parametrize(
+    "pulse",
+    ["sine:amplitude=0.05,frequency=5Hz", pytest.param("sine:amplitude=3,frequency=1.3Hz", marks=pytest.mark.thorough)],
+)
+@pytest.mark.parametrize(
     "body",
     [
         ("--oscillator", "frequency=1,restitution=0.8,stop=0.01,damping-ratio=0.05"),
@@ -64,40 +68,49 @@ def test_branches_that_begin_at_flips_are_followed_one_after_the_other_and_writt
         ("--width", 0.5, "--height", 3.0, "--mass", 4000, "--one-sided", "--thrust", "force=500,height=2"),
     ],
 )
-def test_every_body_is_shown_in_a_table(run, body):
-    code, out, _ = run("orbits", *body, "--pulse", "sine:amplitude=3,frequency=1.3Hz")
+def test_every_body_is_shown_in_a_table(run, body, pulse):
+    code, out, _ = run("orbits", *body, "--pulse", pulse)
     assert code == 0
     assert out.splitlines()[0].endswith(("periodic orbit", "periodic orbits"))
     assert "largest multiplier" in out
 
 
+BLOCK = ("--width", 0.8, "--height", 2.0, "--model", "linear", "--pulse", "sine:amplitude=0.05,frequency=5Hz")
+
+MISTAKES = [
+    (("--ball", 0.5, "--width", 1.0), "leave --width out"),
+    (("--oscillator", "frequency=1"), "--oscillator needs restitution"),
+    (("--oscillator", "frequency=1,mass=3"), "--oscillator takes NAME=VALUE"),
+    (("--ball", 0.5, "--along", "phase:0:1"), "--along takes a parameter"),
+    ((*BLOCK, "--along", "amplitude:0.04:0.06", "--orbit", 9), "--orbit must be from 1 to 3"),
+    (("--ball", 0.5, "--along", "amplitude:13:16"), "12"),
+    (("--ball", 0.5, "--period", 0), "--period"),
+    (("--ball", 0.5, "--switch", 15.0), "--along"),
+    (("--ball", 0.5, "--along", "amplitude:16:9"), "a lower value to a higher one"),
+    ((*BLOCK, "--along", "amplitude:0.04:0.06", "--switch", 0.05), "leave --switch"),
+    (("--width", 0.5, "--height", 3.0, "--mass", 9, "--tendon", "stiffness=9,strength=5"), "a tendon that yields"),
+    ((), "a block is needed"),
+]
+MORE = [
+    (("--ball", 0.5, "--oscillator", "frequency=1", "--restitution", 0.5), "leave --oscillator and --restitution"),
+    (("--ball", 0.5, "--along", ":1:2"), "--along takes a parameter"),
+    (("--pendulum", "p=many,gap=1,restitution=0.5"), "--pendulum"),
+    (("--ball", 0.5, "--along", "amplitude:1"), "--along takes a parameter"),
+    (("--ball", 0.5, "--along", "amplitude:9:16", "--orbit", 9), "--orbit must be from 1 to 3"),
+    (("--ball", 0.5, "--orbit", 1), "--along"),
+    (("--ball", 0.5, "--along", "amplitude:11:13", "--switch", 12), "leave --switch"),
+    (("--ball", 0.5, "--along", "amplitude:11:13", "--switch", "wide"), "--switch"),
+    (("--ball", 0.5, "--spring", 9.0), "leave --spring out"),
+    (("--width", 0.5, "--height", 3.0, "--spring", 9.0), "needs its --mass"),
+]
+
+
 @pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("--ball", 0.5, "--width", 1.0), "leave --width out"),
-        (("--ball", 0.5, "--oscillator", "frequency=1", "--restitution", 0.5), "leave --oscillator and --restitution"),
-        (("--ball", 0.5, "--along", ":1:2"), "--along takes a parameter"),
-        (("--oscillator", "frequency=1"), "--oscillator needs restitution"),
-        (("--oscillator", "frequency=1,mass=3"), "--oscillator takes NAME=VALUE"),
-        (("--pendulum", "p=many,gap=1,restitution=0.5"), "--pendulum"),
-        (("--ball", 0.5, "--along", "amplitude:1"), "--along takes a parameter"),
-        (("--ball", 0.5, "--along", "phase:0:1"), "--along takes a parameter"),
-        (("--ball", 0.5, "--along", "amplitude:9:16", "--orbit", 9), "--orbit must be from 1 to 3"),
-        (("--ball", 0.5, "--along", "amplitude:13:16"), "12"),
-        (("--ball", 0.5, "--period", 0), "--period"),
-        (("--ball", 0.5, "--switch", 15.0), "--along"),
-        (("--ball", 0.5, "--orbit", 1), "--along"),
-        (("--ball", 0.5, "--along", "amplitude:16:9"), "a lower value to a higher one"),
-        (("--ball", 0.5, "--along", "amplitude:11:13", "--switch", 12), "leave --switch"),
-        (("--ball", 0.5, "--along", "amplitude:11:13", "--switch", "wide"), "--switch"),
-        (("--ball", 0.5, "--spring", 9.0), "leave --spring out"),
-        (("--width", 0.5, "--height", 3.0, "--mass", 9, "--tendon", "stiffness=9,strength=5"), "a tendon that yields"),
-        (("--width", 0.5, "--height", 3.0, "--spring", 9.0), "needs its --mass"),
-        ((), "a block is needed"),
-    ],
+    ("arguments", "words"), [*MISTAKES, *(pytest.param(*each, marks=pytest.mark.thorough) for each in MORE)]
 )
 def test_a_mistake_is_one_line(run, arguments, words):
-    code, out, err = run("orbits", "--pulse", SINE, *arguments)
+    pulse = () if "--pulse" in arguments else ("--pulse", SINE)
+    code, out, err = run("orbits", *pulse, *arguments)
     assert (code, out) == (2, "")
     assert words in err and len(err.splitlines()) == 1
 

@@ -56,6 +56,7 @@ def test_ida_and_fragility_take_restraints(run):
     assert json.loads(out)["curves"][0]["median"] == pytest.approx(truth.curves[0].median)
 
 
+@pytest.mark.cases(fast=4)
 @pytest.mark.parametrize(
     ("options", "says"),
     [

@@ -24,7 +24,10 @@ def test_json_is_what_the_comparison_says(run):
     assert [*result["not_applicable"]] == ["time=eq76"]
 
 
-def test_processor_times_tables_and_figure_are_written(run, tmp_path):
+@pytest.mark.parametrize("drawn", [False, pytest.param(True, marks=pytest.mark.thorough)])
+def test_processor_times_tables_and_figure_are_written(run, tmp_path, monkeypatch, drawn):
+    if not drawn:  # Drawing takes most of the time, and `test_figures.py` looks at what is drawn.
+        monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda self, file, **_: file.write(b"drawn"))
     pulse = ["--pulse", "sine:amplitude=0.206g,frequency=2rad/s,cycles=2.5", "--p", 1, "--alpha", 0.2]
     code, out, err = run("schemes", *pulse, "--restitution", 0.92, "--model", "linear", *SCHEMES, "--out", tmp_path)
     assert (code, err) == (0, "")

@@ -12,16 +12,17 @@ from rocking.response import trail_of
 from rocking.response.contact import friction_demand
 
 GRAVITY = 9.80665
-COUNT = 100
+COUNT, PARTS = 100, 5
 _WITHIN = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 258))
 """Shares of a stretch: both ends, more closely near them."""
 
 
 @cache
-def responses() -> list[tuple[int, Response]]:
+def responses(part: int) -> list[tuple[int, Response]]:
     """Records, jumps and steps of the ground; blocks with equal sides and two different ones; both models."""
     found = []
-    for seed in range(COUNT):
+    # Kinds repeat themselves after twelve seeds, which five does not divide: every part has them all.
+    for seed in range(part, COUNT, PARTS):
         rng = np.random.default_rng([21, seed])
         count = int(rng.integers(20, 120))
         threshold = 0.2 * GRAVITY
@@ -57,6 +58,7 @@ def under_vertical_motions() -> list[tuple[int, Response]]:
     return found
 
 
+@cache
 def end(response: Response) -> float:
     """End of what counts: the last time, on a dense grid, at which a block that overturns is within its slenderness."""
     if not response.overturned:
@@ -67,6 +69,7 @@ def end(response: Response) -> float:
     return float(times[np.flatnonzero((theta < plus) & (theta > -minus))[-1]])
 
 
+@cache
 def instants(response: Response) -> NDArray[np.float64]:
     """Densely within every stretch without impact, event or corner of the motion, and just before its end."""
     assert response.motion is not None
@@ -84,32 +87,32 @@ def instants(response: Response) -> NDArray[np.float64]:
     return np.unique(np.maximum(dense, ends[:-1, None]))
 
 
-parts = pytest.mark.parametrize("part", [0, 1, *(pytest.param(k, marks=pytest.mark.thorough) for k in (2, 3))])
+parts = pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.thorough) for k in range(1, PARTS))])
 
 
 @parts
 def test_no_instant_presses_less_on_the_ground_than_the_minimum(part: int) -> None:
     wrong = []
-    for seed, response in responses()[part::4]:
+    for seed, response in responses(part):
         dense = float(np.min(response.normal_force(instants(response))))
         # The dense look may stop a little short of the extreme, and is never beyond it.
         if not dense - 1e-4 <= response.minimum_normal_force <= dense + 1e-9:
             wrong.append((seed, response.minimum_normal_force, dense))
-    assert not wrong, f"{len(wrong)} of {COUNT // 4}; (seed, said, found): {wrong[:4]}"
+    assert not wrong, f"{len(wrong)} of {COUNT // PARTS}; (seed, said, found): {wrong[:4]}"
 
 
 @parts
 def test_no_instant_asks_for_more_friction_than_required(part: int) -> None:
     wrong, judged = [], 0
-    for seed, response in responses()[part::4]:
+    for seed, response in responses(part):
         if response.minimum_normal_force < 0.05:
             continue
         judged += 1
         dense = float(np.max(response.friction_demand(instants(response))))
         if not dense - 1e-9 <= response.required_friction <= dense * (1.0 + 1e-4):
             wrong.append((seed, response.required_friction, dense))
-    assert not wrong, f"{len(wrong)} of {COUNT // 4}; (seed, said, found): {wrong[:4]}"
-    assert judged >= 20
+    assert not wrong, f"{len(wrong)} of {COUNT // PARTS}; (seed, said, found): {wrong[:4]}"
+    assert judged >= 16
 
 
 def test_the_ground_that_lets_go_asks_for_infinite_friction() -> None:
@@ -162,9 +165,10 @@ def test_forces_are_those_of_an_independent_program(radius, overturned, force, f
     assert response.required_friction == pytest.approx(friction, abs=5e-5 if radius == 0.25 else 5e-4)
 
 
-def test_a_block_tips_where_it_last_passes_its_slenderness() -> None:
-    fallen = [response for _, response in responses() if response.overturned]
-    assert len(fallen) > 10
+@parts
+def test_a_block_tips_where_it_last_passes_its_slenderness(part: int) -> None:
+    fallen = [response for _, response in responses(part) if response.overturned]
+    assert len(fallen) >= 2
     for response in fallen:
         tipping = response.tipping_time
         plus, minus = (side.alpha for side in response.block.sides)
@@ -188,7 +192,7 @@ def test_what_does_not_overturn_does_not_tip_and_what_starts_beyond_its_slendern
 @parts
 def test_a_block_slides_first_where_a_dense_look_finds_it(part: int) -> None:
     rng = np.random.default_rng(part)
-    for seed, response in responses()[part::4]:
+    for seed, response in responses(part):
         times = instants(response)
         demand = response.friction_demand(times)
         most = response.required_friction
@@ -232,9 +236,10 @@ def test_friction_is_sought_in_every_step_where_the_ground_hardly_presses() -> N
     assert response.sliding_time(response.required_friction * (1.0 - 1e-6)) > 0.0
 
 
-def test_a_base_lifts_off_where_the_normal_force_ends() -> None:
+@parts
+def test_a_base_lifts_off_where_the_normal_force_ends(part: int) -> None:
     judged = 0
-    for seed, response in [*responses(), *under_vertical_motions()]:
+    for seed, response in [*responses(part), *under_vertical_motions()]:
         found = response.lift_off_time
         assert np.isnan(found) == (response.minimum_normal_force > 0.0), seed
         if not np.isnan(found):

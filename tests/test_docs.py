@@ -27,7 +27,10 @@ EXAMPLES = runpy.run_path(str(ROOT / "scripts" / "page_examples.py"))
 EXAMPLE = EXAMPLES["EXAMPLE"]
 PAGES_WITH_EXAMPLES = [page for page in PAGES if EXAMPLE.search(page.read_text("utf-8"))]
 # They take seconds; the other pages show that examples run.
-THOROUGH = ("fragility.md", "from-a-mesh.md", "orbits.md", "overturning-map.md", "risk.md", "walls-and-tendons.md")
+THOROUGH = (
+    "chattering.md", "chattering-maps.md", "first-response.md", "fragility.md", "from-a-mesh.md", "hazard.md",
+    "orbits.md", "overturning-map.md", "results.md", "risk.md", "spectrum.md", "validate.md", "walls-and-tendons.md",
+)  # fmt: skip
 SLOW = ("basins.md", "calibrate.md", "calibration.md", "gradients.md", "periodic-orbits.md", "study.md")
 MARKS = {**dict.fromkeys(THOROUGH, pytest.mark.thorough), **dict.fromkeys(SLOW, pytest.mark.slow)}
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]

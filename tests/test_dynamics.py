@@ -69,7 +69,15 @@ def drawn(seed):
     return body, motion, max(0.0, -stop) + 0.1, rng.uniform(-1.0, 1.0)
 
 
-@pytest.mark.parametrize("seeds", [range(12), pytest.param(range(12, 40), marks=pytest.mark.slow)], ids=str)
+@pytest.mark.parametrize(
+    "seeds",
+    [
+        (0, 1, 4),
+        pytest.param(range(12), marks=pytest.mark.thorough),
+        pytest.param(range(12, 40), marks=pytest.mark.slow),
+    ],
+    ids=str,
+)
 def test_impacts_are_those_of_an_independent_integration(seeds):
     impacts = ends = between = reached = 0  # slow impacts multiply the error of their times
     for seed in seeds:

@@ -13,7 +13,8 @@ G = 9.80665
 
 
 def ball_case(e):
-    return lambda ratio: (dynamics.BouncingBall(e, gravity=10.0), pulses.sine(10.0 * ratio, 5.0, cycles=1))
+    ball, one_g = dynamics.BouncingBall(e, gravity=10.0), pulses.sine(10.0, 5.0, cycles=1)
+    return lambda ratio: (ball, one_g.scaled(ratio))
 
 
 def first_doubling(e, n=1):

@@ -46,7 +46,8 @@ def oscillator(stop):
     return dynamics.ImpactOscillator(0.5 / math.pi, 0.8, stop=stop)
 
 
-@pytest.mark.parametrize("step", [0.3, pytest.param(0.05, marks=pytest.mark.thorough)])
+@pytest.mark.thorough
+@pytest.mark.parametrize("step", [0.3, 0.05])
 def test_an_orbit_that_comes_to_touch_its_stop_once_more_ends_at_grazing(step):
     """Differences by the parameter that reach beyond the touch turned the tangent: it was taken for a branch point."""
     motion = pulses.sine(1.0, 1.1 / math.pi, cycles=1, phase=0.5 * math.pi)
@@ -94,6 +95,7 @@ def test_long_steps_do_not_lead_from_one_branch_to_another():
     assert branch.values.min() >= fold and len(branch) >= 20
 
 
+@pytest.mark.thorough
 def test_a_flip_is_a_branch_point_where_the_motion_is_given_twice():
     """Orbits of twice the sine's period have that of the motion: they cross the branch that goes on.
 
@@ -134,7 +136,7 @@ def test_where_an_impact_vanishes_is_extrapolated_from_orbits_that_have_it():
     assert end.bracket[0] - 1e-8 < exact < end.bracket[1] + 1e-8
 
 
-@pytest.mark.parametrize("limits", [(16.0, 16.1), (16.0, 16.2)])
+@pytest.mark.parametrize("limits", [(16.0, 16.1), pytest.param((16.0, 16.2), marks=pytest.mark.thorough)])
 def test_an_orbit_whose_slowest_impact_is_always_slow_does_not_end_before_that_vanishes(limits):
     """Of seven impacts in a period the last leave little; two ranges, whose steps differ, lead to one end."""
 
@@ -163,6 +165,7 @@ def test_an_orbit_whose_slowest_impact_is_always_slow_does_not_end_before_that_v
     assert more + (more - less) * speeds[1] / (speeds[0] - speeds[1]) == pytest.approx(end.value, abs=2e-4)
 
 
+@pytest.mark.thorough
 def test_a_branch_reaches_limits_beyond_which_there_is_no_body():
     """A ball that loses nothing is the last one; below the fold, in closed form, there is no orbit."""
     level = 1.2
@@ -183,14 +186,21 @@ def test_a_branch_reaches_limits_beyond_which_there_is_no_body():
         assert branch.multipliers[k].sum().real == pytest.approx(ball.trace(level, stable=True), abs=1e-9)
 
 
-@pytest.mark.parametrize("limits", [(12.0, 13.0), (11.0, 12.0)])
-def test_an_orbit_at_a_limit_of_the_parameter_is_written_once(limits):
+@pytest.mark.parametrize(
+    ("limits", "step"),
+    [
+        ((12.0, 13.0), 0.5),
+        pytest.param((12.0, 13.0), 0.1, marks=pytest.mark.thorough),
+        pytest.param((11.0, 12.0), 0.1, marks=pytest.mark.thorough),
+    ],
+)
+def test_an_orbit_at_a_limit_of_the_parameter_is_written_once(limits, step):
     def family(amplitude):
         return BALL, pulses.sine(amplitude, TABLE, cycles=1)
 
     found = dynamics.periodic_orbits(*family(12.0), starts=64)
     start = next(each for each in found if each.is_stable and each.impacts == 1.0)
-    branch = dynamics.continue_orbit(start, family, 12.0, limits)
+    branch = dynamics.continue_orbit(start, family, 12.0, limits, step=step)
     assert branch.ends == ("limit of the parameter", "limit of the parameter")
     assert (branch.values[0], branch.values[-1]) == limits
     assert np.all(np.diff(branch.values) > 1e-6)
@@ -245,11 +255,11 @@ def test_a_ball_that_keeps_no_speed_rests_up_to_a_level_in_closed_form():
     def family(level):
         return dull, pulses.sine(level * G, TABLE, cycles=1)
 
-    (rests,) = dynamics.periodic_orbits(*family(3.2), starts=64)
-    branch = dynamics.continue_orbit(rests, family, 3.2, (3.15, 3.4), step=0.2)
+    (rests,) = dynamics.periodic_orbits(*family(3.29), starts=16)
+    branch = dynamics.continue_orbit(rests, family, 3.29, (3.29, 3.4), step=0.2)
     assert branch.bifurcations[-1].value == pytest.approx(math.hypot(1.0, math.pi), abs=1e-9)
     # Beyond, it leaves at once, and a multiplier is not zero: that of any restitution, with none.
-    (leaves,) = dynamics.periodic_orbits(*family(3.5), starts=64)
+    (leaves,) = dynamics.periodic_orbits(*family(3.5), starts=16)
     assert not leaves.rests and leaves.impacts == 1.0
     trace = closed_orbits.Ball(0.0, 1).trace(3.5, stable=True)
     assert leaves.multipliers.tolist() == pytest.approx([trace, 0.0], abs=1e-9)

@@ -289,11 +289,13 @@ def any_body(rng):
     return body, None
 
 
-@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.thorough)])
-def test_steps_over_pieces_in_closed_form_are_what_the_march_finds(seed):
+@pytest.mark.parametrize(
+    ("seed", "count"), [(0, 50), *(pytest.param(seed, 200, marks=pytest.mark.thorough) for seed in (0, 1))]
+)
+def test_steps_over_pieces_in_closed_form_are_what_the_march_finds(seed, count):
     rng = np.random.default_rng(seed)
     judged = stepped = 0
-    for _ in range(200):
+    for _ in range(count):
         body, model = any_body(rng)
         frequency = 10.0 ** rng.uniform(-0.5, 1.0)
         amplitude = 10.0 ** rng.uniform(-0.5, 1.8)
@@ -311,7 +313,7 @@ def test_steps_over_pieces_in_closed_form_are_what_the_march_finds(seed):
         assert np.all(error <= allowed)
         judged += np.count_nonzero(fates == dynamics.Fate.MOVES)
         stepped += strobe._steps.shape[1] > 0
-    assert judged > 1500 and stepped > 100
+    assert judged > 7.5 * count and stepped > 0.5 * count
 
 
 TABLE = pulses.sine(12.0, 5.0, cycles=1)

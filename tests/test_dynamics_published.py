@@ -80,10 +80,10 @@ def test_chattering_of_the_oscillator_ends_within_its_proven_bracket(restitution
     assert found.time == pytest.approx(float(period - ends), abs=upper - lower + rounding)
 
 
-@pytest.mark.cases(fast=1, thorough=3)
+@pytest.mark.cases(fast=1, thorough=4)
 @pytest.mark.parametrize(
     ("restitution", "sigma", "about"),
-    STICKING,
+    [STICKING[0], *(pytest.param(*each, marks=pytest.mark.thorough) for each in STICKING[1:])],
 )
 def test_complete_chattering_is_lost_where_forty_digits_say(restitution, sigma, about):
     """The mass would come to rest at the instant of its release: nothing is left of the time in which it sticks."""

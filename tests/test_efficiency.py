@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from scipy.stats import chi2
 
 import rocking
@@ -13,7 +14,7 @@ from rocking.analysis import efficiency
 from rocking.constants import STANDARD_GRAVITY as G
 
 SLENDER = rocking.Block.from_parameters(p=1.0, alpha=1e-3, restitution=0.5)
-LENGTHS = np.array([0.3, 0.6, 1.2, 2.4, 4.8])
+LENGTHS = np.array([0.3, 1.2, 4.8])
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +38,7 @@ def test_dispersions_are_those_of_the_closed_form_of_rectangular_pulses(rectangl
 
 def test_the_interval_is_that_of_a_normal_sample(rectangles):
     beta = rectangles.dispersion.values
-    low, high = (np.sqrt(4.0 / chi2.ppf(share, 4)) for share in (0.95, 0.05))
+    low, high = (np.sqrt(2.0 / chi2.ppf(share, 2)) for share in (0.95, 0.05))
     np.testing.assert_allclose(rectangles.dispersion_low.values, low * beta, rtol=1e-12)
     np.testing.assert_allclose(rectangles.dispersion_high.values, high * beta, rtol=1e-12)
 
@@ -68,7 +69,7 @@ def test_a_measure_in_the_blocks_own_units_serves_blocks_of_all_sizes():
     blocks = [rocking.Block.from_parameters(p=p, alpha=0.1, restitution=0.6) for p in (1.0, 2.0, 4.0)]
     # Each pulse is short for every block, so that its velocity counts.
     pulses = [rocking.pulses.rectangular(1.0, length) for length in (0.005, 0.01, 0.02)]
-    found = compare_measures(blocks, pulses, periods=[1.0], model="linear", progress=False)
+    found = compare_measures(blocks, pulses, periods=[1.0], model="linear", tolerance=1e-3, progress=False)
     within, overall = found.dispersion.to_series(), found.dispersion_of_all.to_series()
     assert within["PGV"] == pytest.approx(within["p PGV / (g tan α)"], rel=1e-9)
     assert overall["p PGV / (g tan α)"] < 0.03 < 0.5 < overall["PGV"]
@@ -84,7 +85,8 @@ def test_what_cannot_be_compared_is_told_in_one_sentence():
         compare_measures(SLENDER, [pulse, pulse], periods=[0.0], progress=False)
 
 
-def test_the_command_prints_and_writes_the_comparison(run, tmp_path):
+def test_the_command_prints_and_writes_the_comparison(run, tmp_path, monkeypatch):
+    monkeypatch.setattr(Figure, "savefig", lambda figure, file, **options: file.write(b"not drawn"))
     pulses = ["--pulse", "half-sine:amplitude=1,frequency=1Hz", "--pulse", "half-sine:amplitude=1,frequency=2Hz"]
     sizes = ["--width", "0.24", "--height", "1.1", "--periods", "0.5,2"]
     code, out, err = run("measures", *pulses, *sizes, "--out", tmp_path)
@@ -100,10 +102,10 @@ def test_the_command_prints_and_writes_the_comparison(run, tmp_path):
 
 
 def test_a_block_of_weight_two_counts_as_two_blocks():
-    motions = [rocking.pulses.one_sine(1.0, f) for f in (0.4, 0.7, 1.0, 1.4)]
+    motions = [rocking.pulses.one_sine(1.0, f) for f in (0.5, 1.1)]
     a, b = (rocking.Block.from_parameters(p=p, alpha=0.2, restitution=0.9) for p in (1.5, 3.0))
     twice, weighted, alike = (
-        compare_measures(blocks, motions, weights=weights)
+        compare_measures(blocks, motions, periods=[1.0], weights=weights, tolerance=1e-2)
         for blocks, weights in (([a, a, b], None), ([a, b], [2.0, 1.0]), ([a, b], None))
     )
     for name in ("median_intensity", "dispersion", "dispersion_of_all"):
@@ -150,10 +152,10 @@ def test_dispersions_of_several_blocks_are_written_out_sums(monkeypatch):
 
 
 def test_copies_of_a_block_scatter_as_the_block_does():
-    """Blocks share the motions: twenty copies are no larger sample."""
+    """Blocks share the motions: five copies are no larger sample."""
     motions = [rocking.pulses.one_sine(1.0, f) for f in (0.5, 0.8, 1.1)]
     block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
-    alone, many = (compare_measures(blocks, motions, periods=[1.0], tolerance=1e-2) for blocks in (block, [block] * 20))
+    alone, many = (compare_measures(blocks, motions, periods=[1.0], tolerance=1e-2) for blocks in (block, [block] * 5))
     for name in ("dispersion", "dispersion_low", "dispersion_high", "dispersion_of_all"):
         assert many[name].values == pytest.approx(alone[name].values, rel=1e-12)
 
@@ -162,13 +164,13 @@ def test_a_block_of_no_weight_changes_nothing_and_need_not_overturn(monkeypatch)
     motions = [rocking.pulses.one_sine(1.0, f) for f in (0.5, 0.8, 1.1)]
     a, b = (rocking.Block.from_parameters(p=p, alpha=0.2, restitution=0.9) for p in (1.5, 3.0))
     alone = compare_measures(a, motions, periods=[1.0], tolerance=1e-2)
-    search = efficiency.incremental_dynamic_analysis
+    search, searched = efficiency.incremental_dynamic_analysis, []
     for stands in (1, 2, 3):
 
         def standing(*given, **options):
-            scaled = search(*given, **options)
-            scaled.overturning_level[{"motion": slice(stands), "block": 1}] = math.nan  # noqa: B023
-            return scaled
+            searched[:] = searched or [search(*given, **options)]
+            searched[0].overturning_level[{"motion": slice(stands), "block": 1}] = math.nan  # noqa: B023
+            return searched[0]
 
         monkeypatch.setattr(efficiency, "incremental_dynamic_analysis", standing)
         found = compare_measures([a, b], motions, periods=[1.0], weights=[1.0, 0.0], tolerance=1e-2)
@@ -197,7 +199,7 @@ def test_the_figure_has_the_order_of_the_table():
 
 
 def test_multiples_of_a_motion_count_once(rectangles):
-    pulses = [rocking.pulses.rectangular(size, length) for length in LENGTHS for size in (1.0, 2.5)]
+    pulses = [rocking.pulses.rectangular(*one) for one in ((1.0, LENGTHS[0]), *((2.5, length) for length in LENGTHS))]
     found = compare_measures(SLENDER, pulses, periods=[0.7], model="linear", tolerance=1e-9, progress=False)
     for name in ("median_intensity", "dispersion", "dispersion_low", "dispersion_high", "dispersion_of_all"):
         np.testing.assert_allclose(found[name].values, rectangles[name].values, rtol=1e-7)

@@ -13,6 +13,7 @@ from rocking.explorer.uploads import UploadStore
 
 STATUE = {"width": "0.24", "height": "1.1", "motion": "el-centro-meloland-270"}
 LEANING = {"width": "0.24", "height": "1.1", "offset": "0.01", "model": "linear", "motion": "none"}
+FEW = {"records": "motion=el-centro-meloland-270", "level_from": "0.2g", "level_to": "0.9g", "levels": "2"}
 PLAIN = "motion=el-centro-meloland-270;motion=el-centro-meloland-360;motion=ridgecrest-clc-360"
 RISING = "motion=el-centro-meloland-270&vertical=el-centro-meloland-up;" + PLAIN
 LEVELS = {"level_from": "0.2g", "level_to": "0.9g", "levels": "6"}
@@ -99,7 +100,7 @@ def test_the_margin_is_the_critical_scale():
 @pytest.mark.parametrize(("motion", "scale"), [("el-centro-meloland-270", "2000"), ("ridgecrest-clc-090", "1e12")])
 def test_the_margin_of_a_motion_however_strong_is_next_to_what_does_not_overturn(motion, scale):
     case = {**STATUE, "motion": motion, "scale": scale}
-    margin = last(assessed(case, records=PLAIN, **LEVELS)).header["margin"]
+    margin = last(assessed(case, **FEW)).header["margin"]
     block, shaken = rocking.Block(width=0.24, height=1.1), rocking.records.load(motion) * float(scale)
     assert margin["factor"] < 1.0 / 256.0
     assert rocking.simulate(block, shaken * margin["factor"]).overturned
@@ -109,8 +110,7 @@ def test_the_margin_of_a_motion_however_strong_is_next_to_what_does_not_overturn
 def test_the_margin_has_the_treatment_of_the_case():
     treated = {**STATUE, "motion": "ridgecrest-clc-090", "chattering": "velocity=0.5"}
     found, plain = (
-        last(assessed(case, records=PLAIN, **LEVELS)).header["margin"]["factor"]
-        for case in (treated, {**treated, "chattering": ""})
+        last(assessed(case, **FEW)).header["margin"]["factor"] for case in (treated, {**treated, "chattering": ""})
     )
     block, motion = rocking.Block(width=0.24, height=1.1), rocking.records.load("ridgecrest-clc-090")
     assert found != pytest.approx(plain, rel=1e-3)

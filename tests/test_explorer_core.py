@@ -786,7 +786,7 @@ def test_a_map_of_an_eccentric_block_is_written_with_all_of_it(run):
         case = read_case({**block, "motion": "one-sine:amplitude=4,frequency=1"}, UploadStore())
         grid = maps.grid_of(case, {"x": "omega", "y": "a", "x_from": "2", "x_to": "3", "points": "8"})
         program, *arguments = shlex.split(map_as_command(grid))
-        code, out, _ = run(*arguments, "--json")
+        code, out, _ = run(*arguments, "--tolerance", "0.1", "--json")
         assert (program, code) == ("rocking", 0)
         assert json.loads(out)["restitution"] == [side.restitution for side in case.block.sides]
 
@@ -862,17 +862,25 @@ _BLOCK = {"p": "2", "alpha": "0.2", "restitution": "0.9"}
 @pytest.mark.parametrize(
     ("texts", "axes"),
     [
-        ({**_BLOCK, "motion": _PULSE}, {"x": "omega", "y": "restitution"}),
+        pytest.param({**_BLOCK, "motion": _PULSE}, {"x": "omega", "y": "restitution"}, marks=pytest.mark.thorough),
         ({**_SIDES, "motion": _PULSE, "scale": "-1.5"}, {"x": "omega", "y": "a", "y_to": "4"}),
         ({**_BLOCK, "motion": "one-sine:amplitude=3,frequency=1", "pgv": "0.9"}, {"x": "omega", "y": "restitution"}),
-        ({**_SIDES, "motion": "ridgecrest-clc-090", "scale": "-2"}, {"x": "p", "y": "pga"}),
-        ({**_SIDES, "motion": "one-sine:amplitude=3,frequency=1", "scale": "-2"}, {"x": "omega", "y": "restitution"}),
+        pytest.param(
+            {**_SIDES, "motion": "ridgecrest-clc-090", "scale": "-2"},
+            {"x": "p", "y": "pga"},
+            marks=pytest.mark.thorough,
+        ),
+        pytest.param(
+            {**_SIDES, "motion": "one-sine:amplitude=3,frequency=1", "scale": "-2"},
+            {"x": "omega", "y": "restitution"},
+            marks=pytest.mark.thorough,
+        ),
         (
             {**_BLOCK, "motion": "one-sine:amplitude=3,frequency=3", "initial_rotation": "0.1", "duration": "1"},
             {"x": "p", "y": "pga"},
         ),
         ({**_BLOCK, "motion": "ridgecrest-clc-090", "chattering": "velocity=0.05"}, {"x": "p", "y": "pga"}),
-        (_BLOCK, {"x": "p", "y": "pga"}),
+        pytest.param(_BLOCK, {"x": "p", "y": "pga"}, marks=pytest.mark.thorough),
     ],
 )
 def test_points_and_scripts_of_a_map_are_what_it_shows(texts, axes, tmp_path):
@@ -930,8 +938,9 @@ def test_a_map_of_a_motion_that_shakes_nothing_is_refused(motion):
 
 @pytest.mark.parametrize(
     ("cycles", "phase", "valid"),
-    [("2.5", "0", True), ("2.5", "-20deg", True), ("2.5", "200deg", True), ("2.5", "120deg", True),
-     ("2.5", "80deg", False), ("2.5", "100deg", False), ("0.5", "0", False), ("0.6", "30deg", False)],
+    [("2.5", "-20deg", True), ("2.5", "120deg", True), ("2.5", "80deg", False), ("0.6", "30deg", False),
+     *(pytest.param(*each, marks=pytest.mark.thorough) for each in (
+         ("2.5", "0", True), ("2.5", "200deg", True), ("2.5", "100deg", False), ("0.5", "0", False)))],
 )  # fmt: skip
 def test_the_critical_amplitude_is_drawn_where_it_parts_complete_chattering_from_other(cycles, phase, valid):
     texts = {**SINE, "motion": f"sine:amplitude=3,frequency=0.3,cycles={cycles},phase={phase}"}
@@ -1182,7 +1191,7 @@ def test_a_map_of_overturning_is_a_command(run):
     texts = {**SINE, "motion": "ricker:amplitude=3,frequency=1,kind=antisymmetric", "model": "nonlinear"}
     axes = {"x": "omega", "x_from": "3", "x_to": "5", "y": "a", "y_from": "0.7", "y_to": "9"}
     grid, found = _mapped(texts, axes)
-    code, out, _ = run(*shlex.split(map_as_command(grid))[1:], "--json", "--quiet")
+    code, out, _ = run(*shlex.split(map_as_command(grid))[1:], "--tolerance", "0.1", "--json", "--quiet")
     assert code == 0
     assert np.array_equal(np.array(json.loads(out)["mode"]), found["mode"])
     assert len(np.unique(found["mode"])) > 2
@@ -1201,7 +1210,7 @@ _MAPS = [
 ]
 
 
-@pytest.mark.cases(fast=3)
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize(("texts", "axes"), _MAPS)
 def test_every_map_is_a_script_that_computes_the_same(texts, axes, tmp_path):
     grid, mapped = _mapped(texts, axes)

@@ -377,8 +377,10 @@ def test_the_server_takes_a_mesh_and_shows_it(page, here):
     assert page.post("/api/meshes", params={"name": "a.stl"}, content=b"", headers=large).status_code == 413
 
 
-def test_no_text_of_a_mesh_fails_otherwise_than_by_a_sentence():
-    random = np.random.default_rng(3)
+# The texts of seed 3 have the statue turned, which takes most of the time.
+@pytest.mark.parametrize("seed", [4, pytest.param(3, marks=pytest.mark.thorough)])
+def test_no_text_of_a_mesh_fails_otherwise_than_by_a_sentence(seed):
+    random = np.random.default_rng(seed)
     store, answered = UploadStore(), 0
     wild = ["", "nan", "inf", "-1", "0", "1e308", "x", "{}", "a=b=c", "plinth=", "=1", "0,0,1", "'", "file:", "9" * 40]
     for _ in range(60):

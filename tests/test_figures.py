@@ -317,7 +317,7 @@ def shown_boxes(figure):
             yield "an axis", box
 
 
-@pytest.mark.cases(fast=8, thorough=26)
+@pytest.mark.cases(fast=4, thorough=26)
 @pytest.mark.parametrize(
     ("width", "dpi"),
     [
@@ -332,7 +332,8 @@ def test_no_text_leaves_the_figure(kind, width, dpi):
     draw, height = FIGURES[kind]
     figure = draw(title=LONG, figsize=(width, height))
     figure.set_dpi(dpi)
-    FigureCanvasAgg(figure).draw()
+    FigureCanvasAgg(figure)
+    figure.draw_without_rendering()
     frame = figure.bbox
     boxes = [*shown_boxes(figure)]
     assert len(boxes) > 4
@@ -352,6 +353,7 @@ def test_a_title_of_one_long_word_is_broken_where_the_figure_ends():
     assert box.x0 >= figure.bbox.x0 and box.x1 <= figure.bbox.x1
 
 
+@pytest.mark.cases(fast=9)
 @pytest.mark.parametrize("kind", FIGURES)
 def test_axes_of_the_caller_take_the_main_panel(kind):
     draw, _ = FIGURES[kind]
@@ -402,7 +404,7 @@ def test_where_blocks_overturn_the_lines_of_a_spectrum_end_in_crosses():
     assert not spectrum_figure(x=x, curves=[standing], fractiles=[0.5], motions=["a"], x_label="p").legends
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 15, 200])
+@pytest.mark.parametrize("count", [1, 3, *(pytest.param(n, marks=pytest.mark.thorough) for n in (2, 15, 200))])
 def test_impacts_are_counted_by_whole_numbers(count):
     figure = intervals_figure(intervals=0.8 ** np.arange(1.0, count + 1.0), eta=0.9)
     figure.draw_without_rendering()

@@ -214,19 +214,22 @@ def test_seeds_are_accepted_or_refused_as_they_are(place: Path) -> None:
 SLOW_OR_SHARED = [HealthCheck.too_slow, HealthCheck.function_scoped_fixture]
 
 
-@settings(max_examples=250, deadline=None, suppress_health_check=SLOW_OR_SHARED)
-@given(
-    index=st.integers(0, 10**6), other=st.integers(0, 10**6), operations=OPERATIONS, request_=st.sampled_from(REQUESTS)
+@pytest.mark.parametrize("examples", [40, pytest.param(250, marks=pytest.mark.thorough)])
+def test_damaged_records_end_in_channels_or_one_sentence(place: Path, examples: int) -> None:
+    known = st.sampled_from(seeds())
+
+    @settings(max_examples=examples, deadline=None, suppress_health_check=SLOW_OR_SHARED)
+    @given(known, known, OPERATIONS, st.sampled_from(REQUESTS))
+    def judge(seed: bytes, other: bytes, operations: list[Operation], request: dict[str, object]) -> None:
+        place.write_bytes(mutated(seed, other, operations))
+        attempt(place, request)
+
+    judge()
+
+
+@pytest.mark.parametrize(
+    "every", [16, pytest.param(4, marks=pytest.mark.thorough), pytest.param(1, marks=pytest.mark.slow)]
 )
-def test_damaged_records_end_in_channels_or_one_sentence(
-    place: Path, index: int, other: int, operations: list[Operation], request_: dict[str, object]
-) -> None:
-    known = seeds()
-    place.write_bytes(mutated(known[index % len(known)], known[other % len(known)], operations))
-    attempt(place, request_)
-
-
-@pytest.mark.parametrize("every", [4, pytest.param(1, marks=pytest.mark.slow)])
 def test_any_token_before_a_record_ends_in_channels_or_one_sentence(place: Path, every: int) -> None:
     """As a control character before the title."""
     assert len(seeds()) >= 20

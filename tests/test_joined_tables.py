@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.figure import Figure
 
 import rocking
 from rocking import quantities
@@ -156,13 +157,14 @@ def test_a_block_that_overturns_has_no_largest_rotation_in_any_table(tmp_path):
     assert f"{fallen.peak_rotation:.4f}" == f"{math.pi / 2:.4f}"
 
 
-def test_numbers_are_written_as_people_write_them(run, tmp_path):
+def test_numbers_are_written_as_people_write_them(run, tmp_path, monkeypatch):
+    monkeypatch.setattr(Figure, "savefig", lambda figure, file, **options: file.write(b"not drawn"))
     assert quantities.values("0.1:1:10", "--levels").tolist() == [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]
     assert quantities.values("0.001:1000:7:log", "--p").tolist() == [0.001, 0.01, 0.1, 1.0, 10.0, 100.0, 1000.0]
-    for command in ("simulate", "check"):
-        names = ["el-centro-meloland-270", "el-centro-meloland-360"]
+    names = ["el-centro-meloland-270", "el-centro-meloland-360"]
+    for command, several in (("simulate", names), ("check", names[:1])):
         out = tmp_path / command
-        assert run(command, *names, *SIZES, "--pga", "0.3g", "--out", out)[0] == 0
+        assert run(command, *several, *SIZES, "--pga", "0.3g", "--out", out)[0] == 0
         for file in out.iterdir():
             if file.suffix in (".csv", ".json"):
                 assert "0.3000000000" not in file.read_text() and "0.29999999" not in file.read_text(), file.name

@@ -447,7 +447,9 @@ ridgecrest-clc-090,2,b,1,
 """
 
 
-def test_the_command_writes_figure_tables_and_numbers(run, tmp_path):
+def test_the_command_writes_figure_tables_and_numbers(run, tmp_path, monkeypatch):
+    # The figure is made, and not drawn: `test_figures.py` draws.
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda *given, **options: None)
     table = written(tmp_path / "tests.csv", TABLE)
     how = ("--width", "0.24", "--height", "1.1", "--peak-error", "0.1deg", "--lapse", "0.01")
     code, out, err = run("validate", table, *how, "--out", tmp_path / "out")

@@ -103,17 +103,24 @@ stiffnesses = st.sampled_from([1.0, -1.0, 0.0])
 gains = st.floats(0.1, 3.0)
 
 
-@quick
-@given(rotations, speeds, frequencies, stiffnesses, gains, slendernesses, motions, st.floats(0.01, 1.0))
-def test_a_linear_series_is_the_solution(
-    u: float, v: float, p: float, sign: float, gain: float, threshold: float, A: list[float], share: float
-) -> None:
-    motion = motion_over(A, share / p)
-    system = sign * p * p, gain * p * p, threshold
-    c, order, h = linear_series(u, v, *system, motion, share / p)
-    assert 0.0 < h <= share / p
-    lam, gain, threshold = system
-    assert_series_is(c, order, h, after(System(lam, threshold, gain=gain), u, v, h, list(motion)))
+@pytest.mark.parametrize("examples", [12, pytest.param(40, marks=pytest.mark.thorough)])
+def test_a_linear_series_is_the_solution(examples: int) -> None:
+    judged = []
+
+    @settings(quick, max_examples=examples)
+    @given(rotations, speeds, frequencies, stiffnesses, gains, slendernesses, motions, st.floats(0.01, 1.0))
+    def judge(
+        u: float, v: float, p: float, sign: float, gain: float, threshold: float, A: list[float], share: float
+    ) -> None:
+        motion = motion_over(A, share / p)
+        lam, gain = sign * p * p, gain * p * p
+        c, order, h = linear_series(u, v, lam, gain, threshold, motion, share / p)
+        assert 0.0 < h <= share / p
+        assert_series_is(c, order, h, after(System(lam, threshold, gain=gain), u, v, h, list(motion)))
+        judged.append((sign, len(A) > 2))
+
+    judge()
+    assert len(judged) >= examples and len(set(judged)) >= 4
 
 
 @quick

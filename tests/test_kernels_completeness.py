@@ -46,7 +46,7 @@ def motions(draw: st.DrawFn) -> rocking.Motion:
 
 
 @long_uncompiled
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=20)
 @given(motions(), st.tuples(st.floats(0.05, 1.0), st.floats(0.05, 1.0)), st.floats(0.0, 1.1))
 def test_chattering_is_complete_where_the_next_stretch_beyond_a_threshold_starts_after_the_rest(
     motion: rocking.Motion, thresholds: Pair, share: float

@@ -5,7 +5,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from kernel_records import MINUS, PLUS, ULP, in_units_of_g, rocking_block, rules_for, state_of
 from oracles.exact import exact, first_above, polynomial, turning_points
@@ -46,7 +46,14 @@ def follow(c: np.ndarray, h: float) -> tuple[int, float, float, float, float, fl
 def test_a_step_ends_at_its_first_event() -> None:
     judged: Counter[Outcome] = Counter()
 
+    # What is drawn need not fall, nor come down, three times.
     @quick
+    @example(np.array([1.3, 2.0, -0.5]), 1.0)
+    @example(np.array([1.4, 1.0, 0.2]), 1.0)
+    @example(np.array([1.5, 0.5, 0.1]), 1.5)
+    @example(np.array([0.1, -0.5, 0.1]), 1.0)
+    @example(np.array([0.2, 0.1, -0.9]), 1.5)
+    @example(np.array([0.0, 0.3, -0.6]), 1.5)
     @given(series(), st.floats(0.1, 1.5))
     def judge(c: np.ndarray, h: float) -> None:
         status, time, u, v, _, _ = follow(c, h)

@@ -134,7 +134,7 @@ def unread(choose: Callable[[bool], None], monkeypatch: pytest.MonkeyPatch) -> I
 MOTION, BLOCK = rocking.pulses.sine(4.0, 1.0, cycles=2), rocking.Block.from_parameters(p=2.0, alpha=0.2)
 
 
-@pytest.mark.parametrize("when", [1, 40, 100])
+@pytest.mark.parametrize("when", [40, *(pytest.param(each, marks=pytest.mark.thorough) for each in (1, 100))])
 def test_an_interrupt_while_kernels_are_read_leaves_nothing_half_done(
     when: int, unread: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -159,8 +159,8 @@ def test_threads_that_simulate_first_at_once_compile_nothing(unread: None, monke
         return FunctionType(*arguments)
 
     monkeypatch.setattr(reading, "FunctionType", slowly)
-    with ThreadPoolExecutor(4) as pool:
-        found = list(pool.map(rocking.simulate, [BLOCK] * 4, [MOTION] * 4))
+    with ThreadPoolExecutor(2) as pool:
+        found = list(pool.map(rocking.simulate, [BLOCK] * 2, [MOTION] * 2))
     assert len({bits(response) for response in found}) == 1
     assert len(found[0].impacts) > 3
 

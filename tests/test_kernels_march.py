@@ -128,6 +128,7 @@ def test_a_march_that_runs_out_of_room_resumes_bit_for_bit(nonlinear: bool) -> N
 
 
 @long_uncompiled
+@pytest.mark.cases(fast=2)
 @pytest.mark.parametrize("nonlinear", [False, True])
 @pytest.mark.parametrize("columns", [2, 3])
 def test_a_march_writes_into_its_table_and_never_behind_it(nonlinear: bool, columns: int) -> None:

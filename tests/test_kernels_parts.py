@@ -32,6 +32,7 @@ def chain(first: Callable[[Unary], Unary], second: Callable[[Unary], Unary]) -> 
     return longer, twice
 
 
+@pytest.mark.cases(fast=2)
 @pytest.mark.parametrize("first", [inlined, shared])
 @pytest.mark.parametrize("second", [inlined, shared])
 def test_a_part_serves_kernels_and_python_in_any_order(

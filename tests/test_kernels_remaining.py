@@ -62,7 +62,7 @@ def exact(v: float, sides: Sides) -> one_piece.Number:
     return one_piece.rest_time(v, (sides[0][:5], sides[1][:5]))
 
 
-@many
+@few
 @given(sequences())
 def test_the_bracket_holds_the_time_to_rest(case: tuple[float, Sides]) -> None:
     v, sides = case
@@ -101,8 +101,15 @@ def test_a_body_without_stiffness_under_a_constant_motion_rests_at_the_geometric
     assert remaining_time(v, i, j) == pytest.approx(expected, rel=1e-13)
 
 
-@pytest.mark.parametrize("slope, order", [(0.9, 3), (0.0, 5)], ids=["changing", "constant"])
-@pytest.mark.parametrize("stiffness", [4.0, -4.0])
+@pytest.mark.parametrize(
+    "stiffness, slope, order",
+    [
+        (4.0, 0.9, 3),
+        (-4.0, 0.0, 5),
+        pytest.param(-4.0, 0.9, 3, marks=pytest.mark.thorough),
+        pytest.param(4.0, 0.0, 5, marks=pytest.mark.thorough),
+    ],
+)
 def test_the_estimate_is_accurate_to_its_order(stiffness: float, slope: float, order: int) -> None:
     i = Restoring(1.0, 4.0 * slope, 0.0, stiffness, 0.7, 0.0)
     j = Restoring(1.3, -9.0 * slope, 0.0, 2.0 * stiffness, 0.5, 0.0)
@@ -153,7 +160,7 @@ def test_the_bracket_holds_the_time_to_rest_under_any_disturbance_within_the_err
     assert not plain_lower <= rest <= plain_upper
 
 
-@quick
+@settings(quick, max_examples=10)
 @given(sequences(weakest=-3.0), st.sampled_from([1.0, -1.0]))
 def test_a_curvature_left_out_is_an_error_of_its_own(case: tuple[float, Sides], sign: float) -> None:
     v, sides = case

@@ -22,6 +22,7 @@ def node_of(side: int, u: float, v: float, time: float = 0.0) -> Record:
     return state.record(state.NODE_ROW, time=time, piece=0, offset=time, side=side, u=u, v=v)
 
 
+@pytest.mark.cases(fast=8)
 @pytest.mark.parametrize("model", ["linear", "nonlinear"])
 @pytest.mark.parametrize("side", [0, 1])
 @pytest.mark.parametrize(

@@ -140,7 +140,7 @@ def test_other_commands_take_pulses_too(run):
     assert (code, err) == (0, "")
 
 
-def test_a_history_is_calibrated_under_a_pulse(run, tmp_path):
+def test_a_history_is_calibrated_under_a_pulse(run, tmp_path, coarse):
     block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     response = rocking.simulate(block, named_pulse("one-sine:amplitude=0.3g,frequency=1"), duration=3.0)
     time = np.linspace(0.0, 3.0, 301)

@@ -1,5 +1,6 @@
 """The tests of a change are found: for every module some, and first those that are about it."""
 
+import os
 import subprocess
 import sys
 
@@ -24,19 +25,25 @@ def test_every_module_has_tests_and_they_are_near(tests):
         assert all(path.is_file() and path.name.startswith("test_") for path in found)
 
 
+# A case of a module has every file read; `test_of_few_files_the_nearest_come_first` reads few.
+OF_MODULES = [
+    ("src/rocking/kernels/march.py", "kernels_march"),
+    ("src/rocking/kernels/lanes.py", "kernels_lanes"),
+    ("src/rocking/studies/refine.py", "study_refine"),
+    ("src/rocking/analysis/calibration/search.py", "calibration"),
+    ("src/rocking/analysis/spectrum.py", "spectrum"),
+    ("src/rocking/motion/__init__.pyi", "motion"),
+    ("src/rocking/cli/analysis.py", "cli_analysis"),
+    ("src/rocking/explorer/server.py", "explorer_server"),
+    ("tests/oracles/balls.py", "certificate"),
+]
+
+
 @pytest.mark.parametrize(
     ("change", "first"),
     [
-        ("src/rocking/kernels/march.py", "kernels_march"),
-        ("src/rocking/kernels/lanes.py", "kernels_lanes"),
-        ("src/rocking/studies/refine.py", "study_refine"),
-        ("src/rocking/analysis/calibration/search.py", "calibration"),
-        ("src/rocking/analysis/spectrum.py", "spectrum"),
-        ("src/rocking/motion/__init__.pyi", "motion"),
-        ("src/rocking/cli/analysis.py", "cli_analysis"),
-        ("src/rocking/explorer/server.py", "explorer_server"),
+        *(pytest.param(*each, marks=pytest.mark.thorough) for each in OF_MODULES),
         ("src/rocking/explorer/page/map.js", "explorer_server"),
-        ("tests/oracles/balls.py", "certificate"),
         ("tests/test_vertical.py", "vertical"),
         ("scripts/validation.py", "validation"),
         ("docs/howto/notebook.md", "notebook"),
@@ -48,6 +55,7 @@ def test_what_is_about_a_file_comes_first(tests, change, first):
     assert found[0] == ROOT / "tests" / f"test_{first}.py"
 
 
+@pytest.mark.thorough
 def test_of_several_changes_each_file_of_tests_has_its_nearest_place(tests):
     far, near = tests.of(ROOT / "src/rocking/simulation.py"), tests.of(ROOT / "src/rocking/kernels/march.py")
     both = ordered([far, near])
@@ -55,22 +63,38 @@ def test_of_several_changes_each_file_of_tests_has_its_nearest_place(tests):
     assert both[0] == ordered([near])[0]
 
 
-def test_a_module_that_no_test_reaches_and_no_name_tells_of_has_none(tmp_path):
+@pytest.fixture
+def few(tmp_path):
     for name, text in {
         "src/rocking/__init__.py": "",
+        "src/rocking/__init__.pyi": "from .studies.refine import refined",
         "src/rocking/alone.py": "",
         "src/rocking/used.py": "from rocking import far",
         "src/rocking/far.py": "",
+        "src/rocking/studies/refine.py": "",
         "tests/helper.py": "import rocking.used as used",
+        "tests/test_other.py": "import rocking, helper\nrocking.refined()",
+        "tests/test_study_refine.py": "",
         "tests/test_this.py": "from helper import used",
     }.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text, "utf-8")
-    known = FilesOfTests(tmp_path)
-    this = tmp_path / "tests" / "test_this.py"
-    assert known.of(tmp_path / "src/rocking/alone.py") == {}
-    assert known.of(tmp_path / "src/rocking/used.py") == {this: (2, 1)}
-    assert known.of(tmp_path / "src/rocking/far.py") == {this: (3, 1)}
+    return FilesOfTests(tmp_path)
+
+
+def test_a_module_that_no_test_reaches_and_no_name_tells_of_has_none(few):
+    other, _, this = few.files
+    assert few.of(few.root / "src/rocking/alone.py") == {}
+    assert few.of(few.root / "src/rocking/used.py") == {this: (2, 1), other: (2, 3)}
+    assert few.of(few.root / "src/rocking/far.py") == {this: (3, 1), other: (3, 3)}
+
+
+def test_of_few_files_the_nearest_come_first(few):
+    other, refine, this = few.files
+    near, far = (few.of(few.root / f"src/rocking/{name}.py") for name in ("studies/refine", "used"))
+    assert near == {refine: (1, 0), other: (1, 3)}
+    assert ordered([far]) == [this, other]
+    assert ordered([far, near]) == ordered([near, far]) == [refine, other, this]
 
 
 def test_a_change_is_staged_unstaged_untracked_or_since_a_commit(tmp_path):
@@ -107,6 +131,7 @@ def test_a_test_that_comes_too_late_is_left_out_and_said(tmp_path):
         "import time\ndef test_one(): time.sleep(0.1)\ndef test_other(): assert False\n", "utf-8"
     )
     command = [sys.executable, "-m", "pytest", "-q", *options, "--within", "0.05", "test_it.py"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    environment = os.environ | {"PYTEST_ADDOPTS": ""}  # those of whoever runs this test would change the output
+    done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True)
     assert "left out for lack of time: 1 of test_it.py" in done.stdout
     assert "1 passed, 1 skipped" in done.stdout

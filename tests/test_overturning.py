@@ -58,10 +58,11 @@ def test_a_half_sine_overturns_a_slender_block_from_the_closed_form_on():
     np.testing.assert_allclose(exact[:4], [1.3223965979, 1.8007239306, 2.2938723134, 3.2891467775], atol=1e-10)
 
 
-def test_a_one_sine_overturns_a_slender_block_without_impact_from_the_closed_form_on():
+@pytest.mark.parametrize("frequencies", [FREQUENCIES[::3], pytest.param(FREQUENCIES, marks=pytest.mark.thorough)])
+def test_a_one_sine_overturns_a_slender_block_without_impact_from_the_closed_form_on(frequencies):
     grid = np.linspace(0.5, 14.0, 46)
-    dataset = overturning_map(THIN, "one-sine", amplitudes=grid, frequencies=FREQUENCIES, model="linear")
-    for k, ratio in enumerate(FREQUENCIES):
+    dataset = overturning_map(THIN, "one-sine", amplitudes=grid, frequencies=frequencies, model="linear")
+    for k, ratio in enumerate(frequencies):
         modes, edges = sequence(dataset, k)
         assert modes[-1] == 0
         assert edges[-1] == pytest.approx(one_sine_amplitude(ratio), rel=0.0, abs=1e-8)
@@ -156,10 +157,11 @@ def test_a_mirrored_two_sided_block_under_a_mirrored_pulse():
     def reversed_sine(amplitude, frequency):
         return -rocking.pulses.one_sine(amplitude, frequency)
 
-    grid = {"amplitudes": np.linspace(0.5, 8.0, 9), "frequencies": [2.0, 4.0]}
+    grid = {"amplitudes": np.linspace(0.5, 8.0, 6), "frequencies": [2.0, 4.0], "tolerance": 1e-3}
     here, there = overturning_map(sided, "one-sine", **grid), overturning_map(mirrored, reversed_sine, **grid)
     np.testing.assert_array_equal(here.mode, there.mode)
     np.testing.assert_array_equal(here.boundary_amplitude, there.boundary_amplitude)
+    assert here.sizes["boundary"] >= 6
 
 
 @pytest.mark.parametrize(
@@ -249,7 +251,7 @@ def test_a_map_that_never_overturns_has_no_overturning_amplitude():
 
 def test_the_figure_names_every_mode_that_it_shows():
     dataset = overturning_map(
-        BLOCK, "one-sine", amplitudes=np.linspace(0.5, 10.0, 20), frequencies=np.linspace(2, 6, 5)
+        BLOCK, "one-sine", amplitudes=np.linspace(0.5, 10.0, 20), frequencies=np.linspace(2, 6, 5), tolerance=1e-3
     )
     figure = dataset.plot()
     texts = [text.get_text() for text in figure.legends[0].get_texts()]
@@ -296,7 +298,7 @@ def test_what_makes_no_map_is_refused(changes, word):
 
 
 def test_a_map_is_the_same_in_one_thread_and_in_several():
-    grid = {"amplitudes": [0.5, 2.0, 6.0], "frequencies": [1.0, 4.0]}
+    grid = {"amplitudes": [0.5, 2.0, 6.0], "frequencies": [1.0, 4.0], "tolerance": 1e-4}
     one, several = (overturning_map(BLOCK, "one-sine", threads=count, **grid) for count in (1, 3))
     assert one.data.identical(several.data)
 
@@ -333,6 +335,6 @@ def test_a_function_of_samples_at_a_constant_step_is_of_one_shape():
         times = np.arange(0.0, 1.0 / frequency, 0.005)
         return rocking.Motion.from_samples(amplitude * np.sin(2.0 * np.pi * frequency * times), 0.005)
 
-    grid = {"amplitudes": np.linspace(0.5, 6.0, 12), "frequencies": [1.0, 4.0]}
+    grid = {"amplitudes": np.linspace(0.5, 6.0, 6), "frequencies": [1.0, 4.0], "tolerance": 1e-4}
     by_function, by_name = overturning_map(BLOCK, sampled, **grid), overturning_map(BLOCK, "one-sine", **grid)
     np.testing.assert_allclose(by_function.overturning_amplitude, by_name.overturning_amplitude, rtol=1e-2)

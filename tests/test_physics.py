@@ -39,30 +39,32 @@ def assert_no_impact_is_missed(case: Case) -> int:
     return len(arcs)
 
 
-def test_no_impact_is_missed_in_the_linear_model() -> None:
+@pytest.mark.parametrize("examples", [12, pytest.param(40, marks=pytest.mark.thorough)])
+def test_no_impact_is_missed_in_the_linear_model(examples: int) -> None:
     judged = 0
 
-    @quick
+    @settings(quick, max_examples=examples)
     @given(cases(model="linear"))
     def judge(case: Case) -> None:
         nonlocal judged
         judged += assert_no_impact_is_missed(case)
 
     judge()
-    assert judged >= 40
+    assert judged >= examples
 
 
-def test_no_impact_is_missed_in_the_nonlinear_model() -> None:
+@pytest.mark.parametrize("examples", [5, pytest.param(10, marks=pytest.mark.thorough)])
+def test_no_impact_is_missed_in_the_nonlinear_model(examples: int) -> None:
     judged = 0
 
-    @settings(quick, max_examples=10)
+    @settings(quick, max_examples=examples)
     @given(cases(model="nonlinear"))
     def judge(case: Case) -> None:
         nonlocal judged
         judged += assert_no_impact_is_missed(case)
 
     judge()
-    assert judged >= 10
+    assert judged >= examples
 
 
 @pytest.mark.slow

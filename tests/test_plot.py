@@ -183,7 +183,7 @@ def test_a_narrow_figure_has_the_sequence_below_and_a_wide_one_beside():
     boxes = []
     for width in (3.4, 7.0):
         figure = figure_of(chattering=sequence, figsize=(width, 5.0))
-        figure.draw_without_rendering()
+        figure.get_layout_engine().execute(figure)
         boxes.append([axes.get_position() for axes in figure.axes])
     (_, motion, zoom), (_, beside, other) = boxes
     assert zoom.y1 < motion.y0
@@ -198,7 +198,7 @@ def test_impacts_closer_than_the_spacing_of_times_are_left_out_of_the_zoom():
     assert zoom.lines[0].get_xdata().size < 60
 
 
-@pytest.mark.cases(fast=3, thorough=7)
+@pytest.mark.cases(fast=2, thorough=7)
 @pytest.mark.parametrize("extension", ["png", "pdf", "svg"])
 @pytest.mark.parametrize(
     "changes",
@@ -217,7 +217,7 @@ def test_every_response_is_drawn_to_every_format_without_a_warning(changes, exte
     assert buffer.tell() > 5000
 
 
-@pytest.mark.parametrize("extension", ["pdf", "svg"])
+@pytest.mark.parametrize("extension", [pytest.param("pdf", marks=pytest.mark.thorough), "svg"])
 def test_the_fullest_response_is_drawn_in_vectors_without_a_warning(unarranged, extension):
     sequence = DrawnSequence(bouncing_times(9.8, 0.5, 0.8, 60), 9.8 - 1e-9, 9.8 + 1e-9)
     buffer = io.BytesIO()

@@ -108,7 +108,7 @@ def test_responses_to_short_records_are_those_of_sixty_digit_arithmetic(model: s
         assert_allclose(response.impacts[name][:resolved], exact, rtol=1e-9, atol=1e-12)
 
 
-@pytest.mark.cases(fast=2, thorough=5)
+@pytest.mark.cases(fast=1, thorough=5)
 @pytest.mark.parametrize("model", ["linear", "nonlinear"])
 @pytest.mark.parametrize("seed", [4, 5, 6, 7])
 def test_responses_from_initial_states_are_those_of_scipy(model: str, seed: int) -> None:
@@ -126,6 +126,7 @@ def test_responses_from_initial_states_are_those_of_scipy(model: str, seed: int)
     assert_allclose(response.peak_time, run.peak_time, rtol=0.0, atol=1e-7)
 
 
+@pytest.mark.cases(fast=7)
 @pytest.mark.parametrize("model", ["linear", "nonlinear"])
 @pytest.mark.parametrize("excess", [10.0**-k for k in range(1, 11)])
 def test_a_peak_that_hardly_passes_the_threshold_uplifts_the_block_for_a_moment(model: str, excess: float) -> None:

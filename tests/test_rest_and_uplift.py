@@ -43,6 +43,7 @@ def test_no_rest_is_proven_before_the_highest_rotation(model: str, sign: float) 
     assert response.peak_time > response.impacts["time"][0]
 
 
+@pytest.mark.cases(fast=3)
 @MODELS
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("second", [1.0, -1.0])
@@ -72,6 +73,7 @@ def test_a_passing_before_the_rest_is_not_taken_for_one_after_it(model: str) -> 
     assert_allclose(response.events["time"], [float(e[0]) for e in course.events], rtol=1e-11)
 
 
+@pytest.mark.cases(fast=2)
 @MODELS
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_block_rests_and_uplifts_again_between_two_samples(model: str, sign: float) -> None:

@@ -143,8 +143,11 @@ def drawn(seed, motion_over_threshold=(0.05, 1.2)):
     return ours, body, motion, 0.3 * min(*ours.balance, 0.5)
 
 
-def test_impacts_are_those_of_an_integration():
-    assert compared(drawn, [13, 14, 17, 35])[0] >= 20
+@pytest.mark.parametrize(
+    ("seeds", "least"), [([8, 13, 35], 12), pytest.param([13, 14, 17, 35], 20, marks=pytest.mark.thorough)]
+)
+def test_impacts_are_those_of_an_integration(seeds, least):
+    assert compared(drawn, seeds)[0] >= least
 
 
 @pytest.mark.slow
@@ -176,9 +179,10 @@ def rests(seeds, model):
 
 
 @pytest.mark.parametrize("model", ["linear", "nonlinear"])
-def test_rests_are_within_what_is_proven(model):
-    judged, narrow = rests(range(40), model)
-    assert judged >= 30
+@pytest.mark.parametrize("count", [12, pytest.param(40, marks=pytest.mark.thorough)])
+def test_rests_are_within_what_is_proven(model, count):
+    judged, narrow = rests(range(count), model)
+    assert judged >= 0.75 * count
     assert narrow == judged
 
 

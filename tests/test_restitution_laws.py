@@ -28,7 +28,7 @@ def releases(law, seed=1, timing=1e-3, impacts=12, model="nonlinear"):
     return [run.impacts["time"][:impacts] + noise.normal(0.0, timing, impacts) for run in runs]
 
 
-@pytest.mark.cases(fast=2)
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize(
     ("law", "names"),
     [
@@ -61,7 +61,7 @@ def test_of_a_stocky_block_a_narrow_contact_explains_what_housner_cannot(alpha):
     assert found.plot().axes
 
 
-@pytest.mark.parametrize("model", ["linear", "nonlinear"])
+@pytest.mark.parametrize("model", ["linear", pytest.param("nonlinear", marks=pytest.mark.thorough)])
 def test_times_without_errors_tell_the_factors(model):
     found = compare_restitution(releases(0.9, timing=0.0, model=model), COLUMN, timing=1e-6, model=model)
     assert len(found.factors) == 30

@@ -36,19 +36,16 @@ def fragility_with(median: float, dispersion: float) -> rocking.Fragility:
 
 
 def by_quadrature(curve: object, hazard: HazardCurve) -> float:
-    """Integral of rate(x) dP(x), digit by digit."""
-    a, b = (mpmath.mpf(float(value[0])) for value in curve.fitted)
+    """Integral of rate(x) dP(x) by forty points of Gauss to each of many pieces."""
+    a, b = (float(value[0]) for value in curve.fitted)
     exponents, factors = powers(hazard)
-    corners = [float(x) for x in hazard.intensity]
-
-    def integrand(z: mpmath.mpf) -> mpmath.mpf:
-        log = (z - a) / b
-        k = int(np.clip(np.searchsorted(np.log(corners), float(log), side="right") - 1, 0, len(exponents) - 1))
-        return mpmath.exp(float(factors[k]) - float(exponents[k]) * log) * mpmath.npdf(z)
-
-    inside = [float(a + b * mpmath.log(x)) for x in corners]
-    ends = {*inside, *np.linspace(min(*inside, 0.0) - 40.0, max(*inside, 0.0) + 40.0, 60)}
-    return float(mpmath.quad(integrand, sorted(ends)))
+    inside = a + b * np.log(hazard.intensity)
+    ends = np.union1d(inside, np.linspace(min(*inside, 0.0) - 40.0, max(*inside, 0.0) + 40.0, 60))
+    points, weights = np.polynomial.legendre.leggauss(40)
+    z = 0.5 * (ends[1:] + ends[:-1])[:, None] + 0.5 * np.diff(ends)[:, None] * points
+    k = np.clip(np.searchsorted(inside, z, side="right") - 1, 0, len(exponents) - 1)
+    logs = factors[k] - exponents[k] * (z - a) / b - 0.5 * z * z
+    return float(np.diff(ends) @ np.exp(logs) @ weights) / math.sqrt(8.0 * math.pi)
 
 
 @quick
@@ -95,7 +92,7 @@ def test_the_rate_below_an_intensity_is_that_of_the_weaker_motions(exponent: flo
     assert y == pytest.approx(from_motions(x * G / 1.001, x * G * 1.001) / everything / (2 * math.log(1.001)), rel=1e-4)
 
 
-@settings(deadline=None, max_examples=4)
+@settings(deadline=None, max_examples=6)
 @given(st.floats(0.5, 8.0), st.floats(0.05, 0.9), st.integers(0, 10_000))
 def test_against_any_hazard_curve_the_rate_is_the_integral(median: float, beta: float, seed: int) -> None:
     random = np.random.default_rng(seed)
@@ -455,11 +452,11 @@ def test_survival_is_what_the_rate_and_the_curve_say() -> None:
 def test_a_survival_of_one_block_of_several_is_likelier_than_of_their_mean() -> None:
     """Of a weak and a strong block the strong one stands: what each does alone says how probably."""
     blocks = [
-        rocking.Block.from_parameters(p=p, alpha=alpha, restitution=0.9) for p, alpha in ((3.0, 0.08), (1.5, 0.35))
+        rocking.Block.from_parameters(p=p, alpha=alpha, restitution=0.6) for p, alpha in ((3.0, 0.08), (1.5, 0.35))
     ]
-    pulses = [rocking.pulses.one_sine(1.0, f) for f in np.linspace(0.5, 2.0, 25)]
+    pulses = [rocking.pulses.one_sine(1.0, f) for f in np.linspace(0.5, 2.0, 10)]
     hazard = HazardCurve([0.01, 0.1, 1.0, 10.0, 100.0], [9e-1, 1e-1, 1e-2, 1e-4, 1e-8])
-    options = {"levels": np.geomspace(0.1, 60.0, 40)}
+    options = {"levels": np.geomspace(0.4, 40.0, 16)}
     both = rocking.fragility(blocks, pulses, **options).survival(2000.0, hazard)
     alone = [rocking.fragility(block, pulses, **options).survival(2000.0, hazard) for block in blocks]
     true = 0.5 * sum(one.probability for one in alone)
@@ -495,19 +492,20 @@ def test_motions_beyond_the_hazard_curve_contradict_nothing() -> None:
     assert found.to_dict()["share_above_hazard_curve"] > 0.99
 
 
-def test_observed_outcomes_make_a_fragility_a_rate_and_a_survival(run, tmp_path: Path) -> None:
+@pytest.mark.parametrize("drawn", [False, pytest.param(True, marks=pytest.mark.thorough)])
+def test_observed_outcomes_make_a_fragility_a_rate_and_a_survival(run, tmp_path: Path, drawn: bool) -> None:
     site = tmp_path / "site.csv"
     site.write_text("pga_g,annual_rate\n0.05,0.05\n0.2,0.005\n1.0,0.00005\n")
     seen = tmp_path / "seen.csv"
     intensity = [0.1, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6] * 3
     fell = [0, 0, 1, 0, 1, 1, 0, 1, 0, 0, 0, 1, 0, 1, 1, 1, 0, 0, 0, 1, 1, 1, 1, 1]
     seen.write_text("PGA (g),overturned\n" + "".join(f"{x},{y}\n" for x, y in zip(intensity, fell, strict=True)))
-    out = tmp_path / "out"
-    code, text, _ = run("fragility", "--outcomes", seen, "--hazard", site, "--standing", "5000", "--out", out)
+    out, given = tmp_path / "out", ("fragility", "--outcomes", seen, "--hazard", site, "--standing", "5000")
+    code, text, _ = run(*given, *(("--out", out) if drawn else ()))
     assert code == 0
     assert "24 observed outcomes in seen.csv" in text
     assert "the probability of 5000 years without it" in text
-    written = json.loads((out / "result.json").read_text())
+    written = json.loads((out / "result.json").read_text() if drawn else run(*given, "--json")[1])
     expected = rocking.fit_fragility(np.multiply(intensity, G), fell)
     assert written["curves"][0]["median"] == pytest.approx(expected.curves[0].median)
     hazard = HazardCurve.read(site)
@@ -515,7 +513,7 @@ def test_observed_outcomes_make_a_fragility_a_rate_and_a_survival(run, tmp_path:
         expected.annual_rate(hazard).rates[0].annual_rate
     )
     assert written["survival"]["probability"] == pytest.approx(expected.survival(5000.0, hazard).probability)
-    assert (out / "survival.png").stat().st_size > 10_000
+    assert not drawn or (out / "survival.png").stat().st_size > 10_000
 
 
 @pytest.mark.parametrize(

@@ -193,7 +193,9 @@ def test_a_block_that_stands_here_and_falls_under_less_is_counted_by_itself(run)
     assert f"stands here, falls at x {factor:.2f}" in out
 
 
-@pytest.mark.parametrize("frequency", [0.8, 0.9, 1.1, 1.2])
+@pytest.mark.parametrize(
+    "frequency", [0.8, *(pytest.param(each, marks=pytest.mark.thorough) for each in (0.9, 1.1, 1.2))]
+)
 @pytest.mark.parametrize(("factor", "falls"), [(1.0 - 1e-6, False), (1.0 + 1e-6, True)])
 def test_the_margin_lies_on_the_side_of_1_on_which_the_motion_lies(frequency, factor, falls):
     """No weaker pulse overturns the block: a bisection finds the change within 1e-9, closer than the margin is read."""

@@ -44,7 +44,8 @@ def test_a_release_is_followed_whatever_coefficients_of_its_series_vanish(lean: 
     assert_allclose(float(response.rotation(time)), released(1.0, alpha, lean, 1.0, time), rtol=0.0, atol=1e-13)
 
 
-@pytest.mark.parametrize("push", [0.25, 1.0, 2.0, 5.0])
+@pytest.mark.cases(fast=4)
+@pytest.mark.parametrize("push", [0.25, 1.0, 2.0, pytest.param(5.0, marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("p", [0.3, 1.0, 4.0])
 def test_a_release_where_the_fourth_power_vanishes_has_its_first_impact_when_it_must(p: float, push: float) -> None:
     """cos(lean) = push sin(lean), for any push and p; to the impact, in sixty digits."""

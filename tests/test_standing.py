@@ -20,9 +20,14 @@ def test_an_ensemble_of_each_kind_gives_what_single_simulations_give(kind, pairs
         assert found.still < 0.4 * pairs
 
 
-@pytest.mark.cases(fast=5, thorough=10)
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("cases", [4, pytest.param(100, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("kind", "cases"),
+    [
+        *((kind, 2) for kind in ("two-sided", "thrust, load and lean", "yielding tendon")),
+        *(pytest.param(kind, 4, marks=pytest.mark.thorough) for kind in KINDS),
+        *(pytest.param(kind, 100, marks=pytest.mark.slow) for kind in KINDS),
+    ],
+)
 def test_each_kind_moves_as_an_integration_of_forces_says(kind, cases):
     found = single_and_integrated(kind, 2, cases)
     assert found.different == []

@@ -44,8 +44,8 @@ study.run(threads=int(sys.argv[2]))
 """
 
 
-def made(folder, **changes):
-    return rocking.study(folder, BLOCKS, MOTIONS, **(OPTIONS | changes))
+def made(folder, *, blocks=BLOCKS, **changes):
+    return rocking.study(folder, blocks, MOTIONS, **(OPTIONS | changes))
 
 
 def digest(folder):
@@ -107,7 +107,11 @@ def test_units_may_hold_several_motions_scales_and_polarities(reference, tmp_pat
 
 
 @pytest.mark.parametrize(
-    ("blocks", "motions", "scales"), [(1, 200, 5), pytest.param(700, 3, 20, marks=pytest.mark.thorough), (9_000, 2, 2)]
+    ("blocks", "motions", "scales"),
+    [
+        *((1, 40, 3), (3_000, 2, 2)),
+        *(pytest.param(*sizes, marks=pytest.mark.thorough) for sizes in ((1, 200, 5), (700, 3, 20), (9_000, 2, 2))),
+    ],
 )
 def test_a_study_is_cut_into_some_dozens_of_units_whatever_it_is_long_of(tmp_path, blocks, motions, scales):
     pulses = [rocking.pulses.one_sine(4.0, frequency) for frequency in np.linspace(0.5, 2.0, motions)]
@@ -146,13 +150,18 @@ def test_whoever_computes_it_the_store_is_the_same_to_the_byte(complete, tmp_pat
     assert digest(tmp_path) == digest(complete)
 
 
-def kill_again_and_again(folder, times, rng):
-    """Run the study in a process that is killed at a random moment, so many times; the units that were seen stay."""
+def kill_again_and_again(folder, times, rng, least=0):
+    """Run the study in a process that is killed at a random moment, so many times; the units that were seen stay.
+
+    A moment comes after the least number of units is there.
+    """
     seen = {}
     for _ in range(times):
         command = [sys.executable, "-c", SCRIPT, str(folder), "2"]
         with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
             process.stdout.readline()
+            while len([*(folder / "result").glob("c.*")]) < least:
+                assert process.poll() is None
             time.sleep(float(rng.uniform(0.0, 0.15)))
             process.send_signal(signal.SIGKILL)
         units = {path.name: path.read_bytes() for path in (folder / "result").glob("c.*")}
@@ -161,11 +170,14 @@ def kill_again_and_again(folder, times, rng):
     return seen
 
 
+@pytest.mark.parametrize("times", [1, pytest.param(2, marks=pytest.mark.thorough)])
 @pytest.mark.skipif(os.name == "nt", reason="signals are sent the POSIX way")
-def test_a_killed_study_loses_no_unit_and_goes_on_to_the_same_bytes(complete, tmp_path):
-    kill_again_and_again(tmp_path, 2, np.random.default_rng(0))
-    report = made(tmp_path).run()
+def test_a_killed_study_loses_no_unit_and_goes_on_to_the_same_bytes(complete, tmp_path, times):
+    seen = kill_again_and_again(tmp_path, times, np.random.default_rng(0), least=1)
+    study = made(tmp_path)
+    report = study.run()
     assert not report.failed
+    assert seen and report.units == len(study._store.grid) - len(seen)
     assert digest(tmp_path) == digest(complete)
     assert not list(tmp_path.rglob("*.part"))
 
@@ -188,8 +200,26 @@ def test_a_hundred_kills(complete, tmp_path):
         assert digest(folder) == digest(complete)
 
 
+def test_the_first_signal_finishes_what_is_in_hand(tmp_path, monkeypatch):
+    study = made(tmp_path)
+    put = study._store.put
+
+    def put_and_ask(key, data):
+        put(key, data)
+        if study.status.done == 1:
+            signal.raise_signal(signal.SIGTERM)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(study._store, "put", put_and_ask)
+        study.run(threads=1)
+    last = study.status.runs[-1]
+    assert (last["event"], last["stopped"]) == ("end", True)
+    assert 1 <= study.status.done == last["units"] <= 3
+
+
+@pytest.mark.thorough
 @pytest.mark.skipif(os.name == "nt", reason="signals are sent the POSIX way")
-def test_the_first_signal_finishes_what_is_in_hand(tmp_path):
+def test_a_signal_of_another_process_finishes_what_is_in_hand(tmp_path):
     with subprocess.Popen(
         [sys.executable, "-c", SCRIPT + "print(study.status.runs[-1]['event'])", str(tmp_path), "1"],
         stdout=subprocess.PIPE,
@@ -312,6 +342,7 @@ def small_complete(tmp_path_factory):
     return folder
 
 
+@pytest.mark.cases(fast=16)
 @pytest.mark.parametrize("code", [errno.ENOSPC, errno.EIO])
 @pytest.mark.parametrize("call", ["fsync", "open", "write", "rename"])
 @pytest.mark.parametrize("n", [1, 2, 3, 5, 6, 9])
@@ -434,11 +465,13 @@ def test_a_damaged_plan_of_a_report_is_told(tmp_path):
     assert fault.startswith("report.json is damaged")
 
 
-def test_a_unit_that_is_another_s_is_found_by_computing_it_again(tmp_path):
-    study = made(tmp_path)
-    study.run()
+def test_a_unit_that_is_another_s_is_found_by_computing_it_again(small_complete, tmp_path):
+    shutil.copytree(small_complete, tmp_path, dirs_exist_ok=True)
+    study = rocking.study(tmp_path)
     names = [name_of(key) for key in study._store.grid]
-    (tmp_path / "result" / names[0]).write_bytes((tmp_path / "result" / names[7]).read_bytes())
+    assert study.verify(recompute=len(names)) == []
+    (tmp_path / "result" / names[0]).write_bytes((tmp_path / "result" / names[1]).read_bytes())
+    assert study.verify() == []
     assert any(names[0] in fault for fault in study.verify(recompute=len(names)))
 
 
@@ -583,9 +616,10 @@ COLUMNS = [
 ]
 
 
-def test_a_study_is_exported(complete, tmp_path, reference):
+def test_a_study_is_exported(tmp_path, reference):
     pandas = pytest.importorskip("pandas")
-    study = rocking.study(complete)
+    study, reference = made(tmp_path / "study", blocks=BLOCKS.select(slice(0, 50))), reference.isel(block=slice(0, 50))
+    study.run(threads=1)
     study.to_netcdf(tmp_path / "all.nc")
     with xr.open_dataset(tmp_path / "all.nc", engine="h5netcdf") as found:
         np.testing.assert_array_equal(found.peak_rotation.values, reference.peak_rotation.values)
@@ -593,7 +627,7 @@ def test_a_study_is_exported(complete, tmp_path, reference):
     table = pandas.read_csv(tmp_path / "all.csv")
     assert [*table.columns] == COLUMNS
     np.testing.assert_array_equal(table.peak_rotation_rad, reference.peak_rotation.values.ravel())
-    assert table.iloc[1300][["pga_m_s2", "polarity", "block"]].tolist() == [2.0, "-", 0]
+    assert table.iloc[50][["pga_m_s2", "polarity", "block"]].tolist() == [2.0, "-", 0]
     study.to_json(tmp_path / "all.json")
     written = json.loads((tmp_path / "all.json").read_text())
     assert written["study"]["model"] == "linear"

@@ -114,7 +114,7 @@ def test_a_scheduler_s_workers_compute_the_same_bytes(complete, tmp_path, run):
 
 
 def test_the_caller_s_own_dask_goes_on_as_it_was():
-    here = {"protocol": "tcp", "host": "127.0.0.1", "dashboard_address": "127.0.0.1:0", "processes": False}
+    here = {"protocol": "tcp", "host": "127.0.0.1", "dashboard_address": None, "processes": False}
     with (
         distributed.LocalCluster(n_workers=1, threads_per_worker=1, **here) as pool,
         scheduler_executor(pool.scheduler_address) as executor,

@@ -90,10 +90,10 @@ def test_a_unit_holds_only_what_is_kept(complete, whole):
 @pytest.mark.parametrize(
     "outcomes", [None, OUTCOMES, OUTCOMES[::-1], [name for name in OUTCOMES if name not in ALWAYS_KEPT]]
 )
-def test_without_a_choice_or_with_all_outcomes_a_study_is_what_it_always_was(whole, tmp_path, outcomes):
-    made(tmp_path, outcomes=outcomes).run(threads=1)
+def test_without_a_choice_or_with_all_outcomes_a_study_is_what_it_always_was(few_blocks, tmp_path, outcomes):
+    made(tmp_path, FEW, outcomes=outcomes).run(threads=1)
     found = contents(tmp_path)
-    assert found == contents(whole)
+    assert found == contents(few_blocks.place)
     about = json.loads(found["study.json"])
     assert [*about] == ["format", "version", "kernels", "unit", "shape", "inputs", "parts", "seal"]
     assert about["format"] == 2

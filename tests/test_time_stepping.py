@@ -34,7 +34,7 @@ def shaken(amplitude, frequency=1.0, cycles=3, model="linear"):
 
 
 @pytest.mark.parametrize("model", ["linear", "nonlinear"])
-@pytest.mark.parametrize("theta", [0.5, 1.0, 0.0])
+@pytest.mark.parametrize("theta", [0.5, pytest.param(1.0, marks=pytest.mark.thorough), 0.0])
 def test_moreau_jean_is_what_a_plain_program_computes(model, theta):
     motion, acceleration = shaken(1.4, 3.0, 8, model=model)
     h, steps = 1.7e-3, 2500  # no step ends with the motion
@@ -108,8 +108,15 @@ def test_the_exact_response_is_what_siconos_computes_event_by_event():
 
 
 @long_uncompiled
-@pytest.mark.parametrize("second", [None, 0.03])
-@pytest.mark.parametrize("kind", BOTH)
+@pytest.mark.parametrize(
+    ("kind", "second"),
+    [
+        (MoreauJean, None),
+        (SchatzmanPaoli, 0.03),
+        pytest.param(MoreauJean, 0.03, marks=pytest.mark.thorough),
+        pytest.param(SchatzmanPaoli, None, marks=pytest.mark.thorough),
+    ],
+)
 def test_an_oscillator_with_damping_and_stops_is_followed_with_order_one(kind, second):
     oscillator = ImpactOscillator(1.0, 0.7, damping_ratio=0.05, stop=0.01, second_stop=second)
     motion, until = rocking.pulses.sine(0.5, 0.7, cycles=4), 1.0 if second is None else 0.5

@@ -113,7 +113,7 @@ def integrated(block: rocking.Block, motion: Motion, model: str, end: float) -> 
 
 
 @pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize("seed", [3, 4])
+@pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.thorough)])
 def test_a_response_agrees_with_another_integrator(model: str, seed: int) -> None:
     motion = wave(2.5, seed).with_vertical(wave(2.0, seed + 100))
     block = block_for(2.5, 0.18)
@@ -362,14 +362,14 @@ def test_levels_begin_where_a_motion_with_its_vertical_component_lifts_a_block(m
     block = block_for(2.0, 0.2, 0.5)
     alone = wave(2.0, 5)
     motion = alone.with_vertical(wave(5.0, 6))
-    found = rocking.incremental_dynamic_analysis(block, motion, model=model, tolerance=1e-2)
+    found = rocking.incremental_dynamic_analysis(block, motion, model=model, tolerance=0.2)
     lifting = found.lowest_uplift / motion.pga
     for excess, uplifts in ((1.0 - 1e-9, 0), (1.0 + 1e-9, 1)):
         response = rocking.simulate(block, motion.scaled(lifting * excess), model=model)
         assert min(len(response.events), 1) == uplifts
     assert found.lowest_uplift < min(block.uplift_thresholds(model))
     assert found.level.values[0] == found.lowest_uplift
-    horizontal = rocking.incremental_dynamic_analysis(block, alone, model=model, tolerance=1e-2)
+    horizontal = rocking.incremental_dynamic_analysis(block, alone, model=model, tolerance=0.2)
     assert horizontal.lowest_uplift == pytest.approx(min(block.uplift_thresholds(model)))
 
 
@@ -390,11 +390,12 @@ def test_a_motion_that_lifts_no_block_at_any_level_is_told() -> None:
         rocking.incremental_dynamic_analysis(block_for(2.0, 0.2, 0.5), heavy)
 
 
-def test_a_map_on_the_page_tells_chattering_as_its_points_do_with_a_vertical_component() -> None:
+@pytest.mark.parametrize("points", ["8", pytest.param("16", marks=pytest.mark.thorough)])
+def test_a_map_on_the_page_tells_chattering_as_its_points_do_with_a_vertical_component(points: str) -> None:
     uploads = UploadStore()
     key = uploads.add_motion(wave(20.0, 2).with_vertical(wave(40.0, 3)))
     case = read_case({"p": "2", "alpha": "0.2", "restitution": "0.5", "motion": f"given:{key}"}, uploads)
-    axes = {"x": "p", "x_from": "1", "x_to": "6", "y": "pga", "y_from": "0.1", "y_to": "0.3", "points": "16"}
+    axes = {"x": "p", "x_from": "1", "x_to": "6", "y": "pga", "y_from": "0.1", "y_to": "0.3", "points": points}
     grid = grid_of(case, axes)
     found = np.empty(grid.x.values.size * grid.y.values.size)
     for part in parts(grid, threads=1):
@@ -467,18 +468,19 @@ def test_a_duration_within_the_vertical_component_leaves_the_verdict_open(second
     assert not bool(rocking.simulate_many(rocking.Blocks.of([block]), motion, duration=3.0).stopped.item())
 
 
+@pytest.mark.parametrize("count", [40, pytest.param(200, marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("model", MODELS)
-def test_without_a_push_a_two_sided_block_lifts_off_to_side_plus(model: str) -> None:
+def test_without_a_push_a_two_sided_block_lifts_off_to_side_plus(model: str, count: int) -> None:
     """As the documentation says, whatever rounding makes of the two instants at which its thresholds vanish."""
     random, flat, sides = np.random.default_rng(0), Motion.from_samples([0.0, 0.0], 1.0), []
-    for _ in range(200):
+    for _ in range(count):
         times = [0.0, random.uniform(0.05, 0.3), 0.4 + random.uniform(0.0, 0.2), 0.8]
         lift = Motion.from_points(times, [0.0, -G * random.uniform(1.01, 3.0), random.uniform(-0.2, 2.0), 0.0])
         block = rocking.Block.from_parameters(
             p=tuple(random.uniform(1.0, 3.0, 2)), alpha=tuple(random.uniform(0.1, 0.4, 2)), restitution=0.8
         )
         sides.append(int(rocking.simulate(block, flat.with_vertical(lift), model=model).events["side"][0]))
-    assert sides == [1] * 200
+    assert sides == [1] * count
 
 
 @pytest.mark.parametrize("push", [1e-15, -1e-15])
@@ -609,17 +611,18 @@ def test_the_summary_says_by_what_the_vertical_motion_multiplies_the_thresholds(
 @pytest.mark.parametrize(
     ("vertical", "said"),
     [
-        ("el-centro-meloland-270", "the vertical motion is the horizontal one itself"),
-        ("el-centro-meloland-360", "the channel '360' looks horizontal"),
-        ("ridgecrest-clc-up", "the vertical motion is of the station 'CI.CLC"),
-        ("ridgecrest-clc-up", "do both start at the same time?"),
+        ("el-centro-meloland-270", ["the vertical motion is the horizontal one itself"]),
+        ("el-centro-meloland-360", ["the channel '360' looks horizontal"]),
+        ("ridgecrest-clc-up", ["the vertical motion is of the station 'CI.CLC", "do both start at the same time?"]),
     ],
 )
-def test_a_vertical_component_that_looks_like_a_mistake_is_computed_with_a_note(run, vertical: str, said: str) -> None:
+def test_a_vertical_component_that_looks_like_a_mistake_is_computed_with_a_note(
+    run, vertical: str, said: list[str]
+) -> None:
     statue = ["--width", "0.24", "--height", "1.1"]
     code, _, err = run("simulate", "el-centro-meloland-270", "--vertical", vertical, *statue)
     assert code == 0
-    assert "rocking: note: el-centro-meloland-270: " in err and said in err
+    assert "rocking: note: el-centro-meloland-270: " in err and all(each in err for each in said)
     code, _, err = run("simulate", "el-centro-meloland-270", "--vertical", "el-centro-meloland-up", *statue)
     assert (code, err) == (0, "")
 
