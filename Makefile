@@ -38,7 +38,7 @@ quick: .venv/.all ## run the tests of what has changed since the last commit, or
 	@files=$$($(BIN)/python tests/of_changes.py $(BASE)) && { test -z "$$files" || \
 	    $(PYTEST) --dist load --maxschedchunk 4 --within 14 -m $(FAST) $$files; }
 
-test: .venv/.all ## run the tests (ten minutes on two slow cores)
+test: .venv/.all ## run the tests (four minutes on two slow cores)
 	$(PYTEST) -m $(FAST)
 
 test-all: .venv/.all ## run them with more cases each (twice as long)

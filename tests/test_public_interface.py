@@ -97,6 +97,7 @@ def test_every_figure_takes_axes_a_title_and_a_size(name: str) -> None:
     assert {"ax", "title", "figsize"} <= {*parameters_of(FUNCTIONS[name])}
 
 
+@pytest.mark.thorough  # `make lint` asks the same
 def test_public_docstrings_are_complete(monkeypatch: pytest.MonkeyPatch) -> None:
     from numpydoc import validate
 
