@@ -189,8 +189,9 @@ def scaling(given: Mapping[str, str | float | None], quantity: Quantity = accele
         level, at, period = str(value).partition("@")
         if not at:
             raise InvalidOption(f"{{}} takes an acceleration at a period, as 0.4g@1.0, not {value!r}", name)
-        read_level, read_period = quantity(level, name), duration(period, name)
-        return checks.finite(read_level, name, InvalidOption), Measure("sa", checks.finite(read_period, name, InvalidOption))
+        both = quantity(level, name), duration(period, name)
+        read_level, read_period = (checks.finite(each, name, InvalidOption) for each in both)
+        return read_level, Measure("sa", read_period)
     read = number if name == "scale" else velocity
     plain = read(value, name) if isinstance(value, str) else float(value)
     if name == "scale":
