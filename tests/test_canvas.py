@@ -44,7 +44,7 @@ def test_pyplot_is_loaded_where_there_is_a_display_and_not_before(name):
 def test_pyplot_knows_the_figures_of_those_who_use_it_and_is_not_loaded_for_a_backend_without_windows(monkeypatch):
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.setenv(name, ":987")
-    sys.modules.pop("matplotlib.pyplot", None)
+    monkeypatch.delitem(sys.modules, "matplotlib.pyplot", raising=False)
     drawn()
     assert "matplotlib.pyplot" not in sys.modules
     import matplotlib.pyplot as plt
