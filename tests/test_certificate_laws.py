@@ -94,6 +94,7 @@ def test_no_rest_is_proven_where_the_motion_may_reach_the_threshold(
     assert np.any(proven) if provable else not np.any(proven)
 
 
+@pytest.mark.cases(fast=10)
 @pytest.mark.parametrize("tolerance", [1e-12, 1e-8, 1e-4])
 @pytest.mark.parametrize("alpha, share", [(1.4, 0.85), (1.4, -0.85), (1.3, 0.5), (1.5, -0.9), (0.9, 0.7)])
 @pytest.mark.parametrize("e", [0.3, 0.8])

@@ -105,6 +105,7 @@ MORE = [
 ]
 
 
+@pytest.mark.cases(fast=6)
 @pytest.mark.parametrize(
     ("arguments", "words"), [*MISTAKES, *(pytest.param(*each, marks=pytest.mark.thorough) for each in MORE)]
 )

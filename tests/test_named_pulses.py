@@ -70,6 +70,7 @@ MISTAKES = [
 ]
 
 
+@pytest.mark.cases(fast=6)
 @pytest.mark.parametrize(("text", "sentence"), MISTAKES)
 def test_a_mistake_in_a_text_is_one_sentence(run, text, sentence):
     with pytest.raises(rocking.RockingError, match=sentence):

@@ -82,7 +82,9 @@ def test_a_full_disk_leaves_no_part_of_a_file_and_keeps_the_old_one(response, an
     assert path.stat().st_size > 1000
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".json", ".parquet", ".nc"])
+@pytest.mark.parametrize(
+    "suffix", [".csv", ".nc", *(pytest.param(x, marks=pytest.mark.thorough) for x in (".json", ".parquet"))]
+)
 def test_an_export_of_a_study_is_whole_or_not_there(tmp_path, suffix):
     if suffix == ".parquet":
         pytest.importorskip("pyarrow")

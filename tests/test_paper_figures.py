@@ -360,7 +360,7 @@ def test_figure_7_has_no_kinks(figures):
     assert np.max(np.abs(straight - critical_amplitude(middles, 0.92))) < 2e-3 * height
 
 
-@pytest.mark.parametrize("number", [9, 10, 11])
+@pytest.mark.parametrize("number", [9, *(pytest.param(number, marks=pytest.mark.thorough) for number in (10, 11))])
 def test_histories_are_drawn_as_they_are_computed(figures, number):
     figure = figures[number]
     axes = figure.draw().axes[0]
@@ -523,6 +523,7 @@ def test_every_parameter_that_a_figure_takes_changes_its_data(figures):
     assert judged >= 25
 
 
+@pytest.mark.cases(fast=4)
 @pytest.mark.parametrize("number", [number for number in FIGURES if number not in (6, 8)])
 def test_titles_and_captions_say_the_values_used_and_no_other(number):
     given = {name: PARAMETERS[name] for name in accepted(number)}
