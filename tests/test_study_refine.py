@@ -194,6 +194,16 @@ def test_a_refinement_says_how_far_it_is_and_goes_on_at_the_unit_that_is_missing
     assert digest(folder) == digest(complete)
 
 
+def test_before_each_round_the_last_one_alone_is_read(tmp_path, monkeypatch):
+    read, from_bytes = [], refine.Brackets.from_bytes
+    monkeypatch.setattr(refine.Brackets, "from_bytes", lambda data: read.append(len(data)) or from_bytes(data))
+    study = made(tmp_path)
+    study.run()
+    count, rounds = len(read), study.status.refinement.rounds
+    assert rounds > 4
+    assert rounds - 1 <= count <= 2 * rounds  # those of all before would be twice the sum of their numbers
+
+
 def test_damage_to_a_round_is_named_and_corrected(complete, tmp_path):
     folder = tmp_path / "study"
     study = made(folder)
