@@ -93,3 +93,9 @@ def test_what_no_floor_can_be_is_refused_in_one_sentence(given, says):
     assert "\n" not in str(refused.value)
     with pytest.raises(InvalidMotion, match="ringing must be a time of at least 0 s"):
         GROUNDS["record"].floor(1.0, ringing=-1.0)
+
+
+@pytest.mark.parametrize("given", [{"damping": 1e-7}, {"damping": 0.05, "ringing": 3e6}])
+def test_a_floor_that_would_move_for_days_is_refused_at_once(given):
+    with pytest.raises(InvalidMotion, match="too long for a period of 1 s; give a shorter time for it"):
+        rocking.pulses.sine(1.0, 2.0, cycles=2).floor(1.0, **given)

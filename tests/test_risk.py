@@ -623,3 +623,14 @@ def test_what_cannot_be_written_for_openquake_is_said(tmp_path: Path) -> None:
     for arguments, said in (({"block": "x"}, "Block"), ({"asset_category": 3}, "asset_category")):
         with pytest.raises(rocking.RockingError, match=said):
             fitted.to_nrml(tmp_path / "model.xml", **arguments)
+
+
+def test_per_cent_in_a_heading_are_not_passed_over(tmp_path):
+    path = tmp_path / "hazard.csv"
+    path.write_text("PGA (%g),annual rate\n10,1e-2\n40,1e-4\n")
+    assert HazardCurve.read(path).intensity == pytest.approx(np.array([0.1, 0.4]) * 9.80665)
+    path.write_text("SA (m/s²),annual rate\n1,1e-2\n4,1e-4\n")
+    assert HazardCurve.read(path, period=1.0).intensity.tolist() == [1.0, 4.0]
+    path.write_text("PGA (g),annual rate (%)\n0.1,1\n0.4,0.01\n")
+    with pytest.raises(InvalidOption, match=r"annual_rate and one of .*, not PGA \(g\), annual rate \(%\)"):
+        HazardCurve.read(path)

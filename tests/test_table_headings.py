@@ -1,5 +1,6 @@
 """Text tables as spreadsheets, loggers and programs write them: what is read of each, or the line that is refused."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 from rocking.errors import UnreadableRecord
 from rocking.motion.formats import channels, identify, read
+from rocking.motion.named import named_motion, named_vertical
 from rocking.plausibility import reading_notes
 
 G = 9.80665
@@ -131,7 +133,13 @@ REFUSED = [
     ("a time of 9999", "time (s),a (g)\n0,0.1\n0.01,0.1\n9999,0.3\n", 4, "9999 seems to stand for a missing value"),
     ("dates", "Time,a (g)\n2024-01-31 10:00:00.00,0.1\n2024-01-31 10:00:00.01,0.2\n", 2, "write times in seconds"),
     ("an unknown unit of time", "Time (fortnights),a (g)\n" + rows(), 1, "not clear from 'fortnights'"),
-    ("a unit of time of something", "Duration (min): 3\nTime,a (g)\n" + rows(), 2, "not clear from 'min'"),
+    ("a unit of time of something", "Recorded (min)\nTime,a (g)\n" + rows(), 2, "not clear from 'min'"),
+    ("a peak in brackets", "# PGA (g) = 0.312\n# Time   Acc\n" + rows(), 3, "the file does not say its units"),
+    ("a peak in words", "# Kobe 1995, PGA = 8.18 m/s2\n" + rows(), 2, "the file does not say its units"),
+    ("a conversion", "# 1 g = 981 cm/s2\n# t   acc\n" + rows(), 3, "the file does not say its units"),
+    ("a station's name", "# station XX_G recorded by us\n" + rows(), 2, "the file does not say its units"),
+    ("-99", "time (s),a (g)\n0,0.1\n0.01,-99\n0.02,0.2\n", 3, "-99 seems to stand for a missing value"),
+    ("24 bits", "time (s),a (gal)\n0,1\n0.01,8388607\n0.02,2\n", 3, "8.38861e+06 seems to stand for a missing value"),
     ("metres", "Time (m),a (g)\n" + rows(), 1, "not clear from 'm'"),
     ("volts", "Time (s),Sensor (mV)\n" + rows(), 1, "the heading says 'mV', which is no unit of acceleration"),
     ("velocities", "Time (s),v (cm/s)\n" + rows(), 1, "the heading says 'cm/s'"),
@@ -231,3 +239,54 @@ def test_a_missing_row_among_even_times_is_noted(tmp_path):
     (note,) = written("gap.csv", {17})
     assert note.startswith("the times go on by 0.01 s, but by 0.02 s after 0.16 s: are rows missing?")
     assert written("whole.csv", set()) == ()
+
+
+@pytest.mark.parametrize("name", ["acc % g", "acc_%_g", "a [%g]", "acc, %g"])
+def test_a_name_has_the_longest_of_the_units_that_end_it(tmp_path, name):
+    path = tmp_path / "table.csv"
+    path.write_text(f"time;{name}\n" + rows(sign=";"))
+    assert channels(path)[0].units == "%g"
+
+
+def test_a_duration_among_the_remarks_is_no_unit_of_the_times(tmp_path):
+    path = tmp_path / "table.txt"
+    path.write_text("# duration (min): 2\n# t, acc (g)\n" + rows())
+    assert (channels(path)[0].dt, channels(path)[0].units) == (0.01, "g")
+
+
+@pytest.mark.parametrize("names", ["NS,EW,UD", "N-S E-W U-D", "ch1;ch2;ch3"])
+def test_components_alone_are_read_with_a_step(tmp_path, names):
+    path = tmp_path / "table.csv"
+    sign = "," if "," in names else ";" if ";" in names else " "
+    path.write_text(names + "\n" + wide(SAMPLES, OTHER, OTHER[::-1], sign=sign))
+    found = channels(path, dt=0.01, units="gal")
+    assert [channel.name for channel in found] == [name.strip() for name in re.split("[,; ]", names)]
+    assert found[0].acceleration == pytest.approx(0.01 * np.array(SAMPLES), rel=1e-15)
+    with pytest.raises(UnreadableRecord, match=r"no column is named as that of times, and .* or give dt of a table"):
+        channels(path, units="gal")
+
+
+def test_of_a_folder_those_that_say_something_else_keep_it_or_are_refused(tmp_path):
+    path = tmp_path / "table.csv"
+    for heading, says in (("t (s),v (cm/s)", "no unit of an acceleration"), ("t (s),a (counts)", "no unit of acc")):
+        path.write_text(heading + "\n" + rows())
+        with pytest.raises(UnreadableRecord, match=says):
+            named_motion(str(path), units="g", several=True)
+    path.write_text("t (s),a (g)\n0,0\n0.01,1\n0.05,0.5\n0.06,0\n")
+    assert named_motion(str(path), dt=0.01, several=True).step is None
+    with pytest.raises(UnreadableRecord, match="not evenly"):
+        named_motion(str(path), dt=0.01)
+
+
+def test_both_components_of_a_table_have_the_units_that_are_given(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text("t (s),x (g),z (g)\n0,0,0\n0.01,3,2\n0.02,-3,-2\n0.03,0,0\n")
+    assert named_motion(str(path), channel="x", units="m/s2").pga == 3.0
+    assert named_vertical("z", str(path), channel="x", units="m/s2").pga == 2.0
+
+
+def test_a_column_is_found_by_its_name_before_its_number(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text("t (s),2 (g),1 (g)\n0,0,0\n0.01,0.1,0.2\n0.02,0,0\n")
+    by_name, by_number = (read(path, channel=channel).pga / 9.80665 for channel in ("2", 2))
+    assert (by_name, by_number) == pytest.approx((0.1, 0.2))

@@ -20,6 +20,9 @@ _PLACE: Final = re.compile(r"\{\{\}\}|\{\}")
 #: What a command says that Ctrl-C has ended.
 INTERRUPTED: Final = "rocking: this was interrupted; every file that it wrote is whole"
 
+#: Longest path that is shown whole, in characters.
+_LONGEST_PATH: Final = 400
+
 #: How a name of an argument is written: the command line writes its option, a page the label of its field.
 Spelling = Callable[[str], str]
 
@@ -133,10 +136,12 @@ class RockingError(Exception):
         >>> InvalidOption("{} must be positive", "half_width").text(lambda name: "--" + name.replace("_", "-"))
         '--half-width must be positive'
         """
-        where = (
-            "" if self.path is None else f"{self.path}: " if self.line is None else f"{self.path}, line {self.line}: "
-        )
-        return where + self.message.text(spelling)
+        if self.path is None:
+            return self.message.text(spelling)
+        half = _LONGEST_PATH // 2
+        path = self.path if len(self.path) <= _LONGEST_PATH else f"{self.path[:half]}...{self.path[-half:]}"
+        where = path if self.line is None else f"{path}, line {self.line}"
+        return f"{where}: {self.message.text(spelling)}"
 
     def __str__(self) -> str:
         return self.text()

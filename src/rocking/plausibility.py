@@ -104,7 +104,7 @@ def vertical_notes(motion: Motion) -> tuple[str, ...]:
         return ("the vertical motion is the horizontal one itself: name its own channel or file",)
     notes = [f"the vertical motion: {sentence}" for sentence in reading_notes(vertical)]
     direction = _origin(vertical).channel
-    if _HORIZONTAL.fullmatch(direction):
+    if _HORIZONTAL.fullmatch(direction) and not _VERTICAL.fullmatch(direction):
         notes.append(f"the channel {direction!r} looks horizontal, but it is taken for the vertical motion")
     for what in ("station", "event"):
         theirs, ours = (getattr(_origin(each), what) for each in (vertical, motion))

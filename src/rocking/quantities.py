@@ -91,7 +91,7 @@ def velocity(text: str, name: str) -> float:
 
 def rate(text: str, name: str) -> float:
     """Return an angular velocity, rad/s, from "2rad/s", "5deg/s" or "2" (rad/s)."""
-    return _in_units("rate", text, name, "a number of rad/s as 2 or 2rad/s")
+    return _in_units("rate", text, name, "an angular velocity as 2, 2rad/s or 5deg/s")
 
 
 def duration(text: str, name: str) -> float:
@@ -122,6 +122,11 @@ def tilt(text: str, name: str) -> float:
             f"{{}} {text.strip()} is taken for rad, and pi/2 is the limit; did you mean {text.strip()}deg?", name
         )
     raise InvalidOption(f"{{}} must be below 90deg in size, not {text.strip()}", name)
+
+
+def of_state(unit: str) -> tuple[Quantity, Quantity]:
+    """Return what reads a coordinate in a unit, rad or m, and what reads its velocity."""
+    return (tilt, rate) if unit == "rad" else (position, velocity)
 
 
 def sides(text: str, name: str, quantity: Quantity = number) -> float | list[float]:

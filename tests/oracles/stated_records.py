@@ -144,7 +144,7 @@ def _blocks(
         found = re.fullmatch(head, line)
         if found is None:
             continue
-        end = next((j for j in range(k + 1, len(lines)) if re.search(r"[A-DF-Za-df-z]", lines[j])), len(lines))
+        end = next((j for j in range(k + 1, len(lines)) if re.search(r"[A-CF-Za-cf-z]", lines[j])), len(lines))
         if found["units"] not in FACTORS:
             return None
         count, dt = int(found["count"]), read(found, lines[:k])

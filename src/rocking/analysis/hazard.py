@@ -27,10 +27,12 @@ if TYPE_CHECKING:
 #: Headings of an intensity in a table, with its measure and the factor to SI units.
 HEADINGS: Final[dict[str, tuple[IntensityName, float]]] = {
     "pga_g": ("pga", STANDARD_GRAVITY),
+    "pga_percent_g": ("pga", 0.01 * STANDARD_GRAVITY),
     "pga_m_s2": ("pga", 1.0),
     "pgv_m_s": ("pgv", 1.0),
     "pgv_cm_s": ("pgv", 0.01),
     "sa_g": ("sa", STANDARD_GRAVITY),
+    "sa_percent_g": ("sa", 0.01 * STANDARD_GRAVITY),
     "sa_m_s2": ("sa", 1.0),
 }
 
@@ -116,10 +118,11 @@ class HazardCurve(Result):
         Parameters
         ----------
         path : str or Path
-            CSV file. A table has a heading that names the intensity with its units (pga_g, pga_m_s2, pgv_m_s, pgv_cm_s,
-            sa_g or sa_m_s2; "PGA (g)" is pga_g as well) and the rate (annual_rate), with commas between, or with
-            semicolons where numbers have decimal commas. OpenQuake's ``hazard_curve-...csv`` says all in its first
-            line, and its probabilities of exceedance in T years become rates by -ln(1 - probability)/T.
+            CSV file. A table has a heading that names the intensity with its units (pga_g, pga_percent_g, pga_m_s2,
+            pgv_m_s, pgv_cm_s, sa_g, sa_percent_g or sa_m_s2; "PGA (g)" is pga_g as well) and the rate (annual_rate),
+            with commas between, or with semicolons where numbers have decimal commas. OpenQuake's
+            ``hazard_curve-...csv`` says all in its first line, and its probabilities of exceedance in T years become
+            rates by -ln(1 - probability)/T.
         site : int
             Which row of OpenQuake's file; a table has one site only.
         period : float, optional
@@ -240,8 +243,9 @@ def _check_order(what: str, values: Floats, way: float) -> None:
 
 
 def heading_of(cell: str) -> str:
-    """Name of a column as it is known here: "PGA (m/s^2)" is pga_m_s2."""
-    return re.sub(r"[^a-z0-9]+", "_", cell.lower().replace("^", "")).strip("_")
+    """Name of a column as it is known here: "PGA (m/s²)" is pga_m_s2, "PGA (%g)" pga_percent_g."""
+    plain = cell.lower().replace("^", "").replace("²", "2").replace("%", " percent ")
+    return re.sub(r"[^a-z0-9]+", "_", plain).strip("_")
 
 
 def _from_table(lines: list[str], period: float | None) -> tuple[Floats, Floats, Measure]:

@@ -90,14 +90,15 @@ def impact_restitution(
     ------
     InvalidBlock
         If a number is out of its range, there are both a slenderness and sizes or neither, or both a `contact` and
-        `points`, or the body would not rock on.
+        `points`, the body would not rock on, or a `contact` is so narrow that an uneven body would gain energy.
 
     Notes
     -----
     With A = k^2 + h^2 and pivots at d_i and d_j from the centre of mass: e_i = (A - kappa d_i d_j)/(A + kappa d_j^2)
-    for a contact kappa (Kalliontzis, Sritharan and Schultz 2016); the product of (A + x y)/(A + y^2) over points x and
-    their successors y, from one pivot to the other (after Ther and Kollar 2017). More points lose less, infinitely many
-    no energy. (Derived in the documentation.)
+    for a contact kappa (after Kalliontzis, Sritharan and Schultz 2016, whose formula is mostly quoted with kappa^2 in
+    the place of kappa: give the square of such a share); the product of (A + x y)/(A + y^2) over points x and their
+    successors y, from one pivot to the other (after Ther and Kollar 2017). More points lose less, infinitely many no
+    energy. (Derived in the documentation.)
 
     References
     ----------
@@ -137,7 +138,16 @@ def impact_restitution(
         raise InvalidBlock(
             f"angular momentum leaves this body a restitution of {min(found):.3g}: it is too stocky to rock that way"
         )
+    if share < (least := _narrowest(away, inertia)):
+        raise InvalidBlock(f"{{}} must be at least {least:.4g} for this body, which would gain energy", "contact")
     return found
+
+
+def _narrowest(away: Sequence[float], inertia: float) -> float:
+    """Least share at which no impact adds energy: a body gains some where it passes to the pivot further away."""
+    near, far = sorted(away)
+    ratio = math.sqrt((inertia + far * far) / (inertia + near * near))
+    return inertia * (ratio - 1.0) / (far * (far + ratio * near))
 
 
 def _on_leaving(away: Sequence[float], inertia: float, share: float, points: int) -> float:

@@ -29,7 +29,7 @@ from rocking.dynamics.switching import LEAVING, switch_branch
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.named_pulses import PulseFamily, pulse_values
-from rocking.quantities import Quantity, number, position, tilt, values
+from rocking.quantities import Quantity, of_state, values
 from rocking.tables import cell, counted, text_table
 
 if TYPE_CHECKING:
@@ -100,9 +100,9 @@ def bifurcation(
     *,
     pulse: str,
     along: str,
-    start: Annotated[str, written("Initial coordinate and velocity, with a comma between (rad, m; rad/s, m/s).")] = (
-        "0.01,0"
-    ),
+    start: Annotated[
+        str, written("Initial coordinate and velocity, with a comma between: 0.01,0 (rad, rad/s; m, m/s) or 1deg,0.")
+    ] = "0.01,0",
     direction: Direction = "both",
     transient: Annotated[int, WHOLE] = 200,
     kept: Annotated[int, WHOLE] = 64,
@@ -131,9 +131,10 @@ def bifurcation(
     kept
         Periods whose states are kept.
     """
-    moving, shaking, first = body.body(), _Repeating(pulse), values(start, "start")
-    if first.size != 2:
+    moving, shaking, given = body.body(), _Repeating(pulse), start.split(",")
+    if len(given) != 2:
         raise InvalidOption("{} takes a coordinate and a velocity, as 0.01,0", "start")
+    first = [read(text, "start") for read, text in zip(of_state(moving.coordinate.unit), given, strict=True)]
     name, quantity, rest = shaking.parameter(along, "amplitude:0.1g:0.5g:101")
     unit = shaking.family.unit(name).replace("^2", "²")
     levels = checks.axis(values(rest, "along", quantity), "along", InvalidOption)
@@ -157,10 +158,11 @@ def basin(
     pulse: str,
     positions: Annotated[
         str | None,
-        written("Rotations of a block, rad, or positions, m; by default up to its balance, or between the stops."),
+        written("Rotations of a block, rad or 1deg,2deg, or positions, m; by default up to its balance or stops."),
     ] = None,
     velocities: Annotated[
-        str | None, written("Velocities, rad/s or m/s; by default up to p times the balance, or what is natural.")
+        str | None,
+        written("Velocities, rad/s or 5deg/s, or m/s; by default up to p times the balance, or what is natural."),
     ] = None,
     periods: Annotated[int, WHOLE] = 200,
     folder: KEPT = None,
@@ -184,14 +186,14 @@ def basin(
         Most periods that a state is followed for.
     """
     moving, motion = body.body(), _Repeating(pulse).motion()
-    read = tilt if moving.coordinate.unit == "rad" else position
+    read_position, read_velocity = of_state(moving.coordinate.unit)
     at, rates = _natural_axes(moving, motion)
     with output.folder() as place:
         found = basins(
             moving,
             motion,
-            at if positions is None else values(positions, "positions", read),
-            rates if velocities is None else values(velocities, "velocities", number),
+            at if positions is None else values(positions, "positions", read_position),
+            rates if velocities is None else values(velocities, "velocities", read_velocity),
             periods,
             model=model.equation,
             folder=folder,

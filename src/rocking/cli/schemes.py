@@ -6,18 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
-from cyclopts import Parameter
-
-from rocking.cli.options import BLOCK, MODEL, WHOLE, BodyOptions, ModelOptions
+from rocking.cli.options import BLOCK, MODEL, WHOLE, BodyOptions, ModelOptions, measured, written
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results, write_tables
 from rocking.cli.records import RECORDS, MotionOptions, Names
 from rocking.dynamics import compare_schemes, scheme_of
 from rocking.dynamics.comparison import Scheme
-from rocking.dynamics.linear_bodies import LinearBody
 from rocking.dynamics.schemes import STEPPINGS, TREATMENTS
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.quantities import position, tilt
+from rocking.quantities import duration, of_state
 
 
 @dataclass(frozen=True)
@@ -25,15 +22,14 @@ class _Start:
     """How a simulation starts and ends."""
 
     duration: Annotated[
-        float | None, Parameter(help="Time to stop at, s; by default when the body is at rest after the motion.")
+        float | None, measured("Time to stop at, s; by default when the body is at rest after the motion.", duration)
     ] = None
     initial_position: Annotated[
-        str | None,
-        Parameter(
-            help="Rotation at the start, 2deg or 0.03 (rad); position of another body, 1m.", allow_leading_hyphen=True
-        ),
+        str | None, written("Rotation at the start, 2deg or 0.03 (rad); position of another body, 1m.")
     ] = None
-    initial_velocity: Annotated[float, Parameter(help="Velocity at the start, rad/s or m/s.")] = 0.0
+    initial_velocity: Annotated[
+        str, written("Angular velocity at the start, 5deg/s or 0.09 (rad/s); velocity of another body, 1m/s.")
+    ] = "0"
 
 
 def schemes(
@@ -63,17 +59,18 @@ def schemes(
         (*TREATMENTS, *STEPPINGS) if schemes is None else [scheme_of(text) for text in schemes.split(",")]
     )
     what = body.body()
-    read_position = position if isinstance(what, LinearBody) else tilt
+    read_position, read_velocity = of_state(what.coordinate.unit)
     at = None if start.initial_position is None else read_position(start.initial_position, "initial_position")
+    velocity = read_velocity(start.initial_velocity, "initial_velocity")
     with output.folder() as folder:
         found = compare_schemes(
             what,
-            _one_motion(names, motion, free=at is not None or start.initial_velocity != 0.0),
+            _one_motion(names, motion, free=at is not None or velocity != 0.0),
             schemes=chosen,
             model=model.equation,
             duration=start.duration,
             initial_position=at,
-            initial_velocity=start.initial_velocity,
+            initial_velocity=velocity,
             repetitions=repetitions,
         )
         if folder is not None:

@@ -35,7 +35,9 @@ class _Start:
     initial_rotation: Annotated[
         str, Parameter(help="Rotation at the start, 2deg or 0.03 (rad).", allow_leading_hyphen=True)
     ] = "0"
-    initial_velocity: Annotated[float, Parameter(help="Angular velocity at the start, rad/s.")] = 0.0
+    initial_velocity: Annotated[
+        float, measured("Angular velocity at the start, 5deg/s or 0.09 (rad/s).", quantities.rate)
+    ] = 0.0
     friction: Annotated[
         float | None, Parameter(help="Coefficient of friction: say whether the block would slide, and when first.")
     ] = None

@@ -26,7 +26,7 @@ SHORT_NONLINEAR = 1.2e-3
 _WORTH = 0.125
 
 #: Largest sum of the last two terms of a linear velocity, over the first two: as lam t^2 is small, the truncation is
-#: smaller by a factor of 20,000 or more.
+#: smaller by a factor of 18,000 or more.
 _LAST_TERMS = 2.0**-40
 
 #: Largest of what `is_complete_weighted` tests over the first two terms: the truncation is a sixtieth of it.

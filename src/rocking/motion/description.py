@@ -11,6 +11,7 @@ from typing import Any, Final
 from rocking import checks
 from rocking.errors import InvalidMotion
 
+_DOWN: Final = re.compile(r"\s*(?:down|dwn|dn)\b", re.IGNORECASE)
 _SCALED: Final = re.compile(r"(scaled by \S+) to .*")
 
 
@@ -36,6 +37,8 @@ class Origin:
         Units of the numbers in the file, as it spells them.
     heading_units : str
         Units that the heading of a text table names, where it has one.
+    reversed : bool
+        Whether the motion is the opposite of what `channel` says; `azimuth` is that of the motion.
     """
 
     format: str = ""
@@ -47,6 +50,12 @@ class Origin:
     azimuth: float | None = None
     units: str = ""
     heading_units: str = ""
+    reversed: bool = False
+
+    @property
+    def downwards(self) -> bool:
+        """Whether the motion is positive downwards, by the name of its channel."""
+        return _DOWN.match(self.channel) is not None and not self.reversed
 
 
 @dataclass(frozen=True)
@@ -122,7 +131,11 @@ class Description:
         <Description: sine, amplitude -1, frequency 3>
         """
         parameters = {k: v * factor if k.startswith("amplitude") else v for k, v in self.parameters.items()}
-        return replace(self, parameters=parameters)
+        origin = self.origin
+        if origin is not None and factor < 0.0:
+            turned = None if origin.azimuth is None else (origin.azimuth + 180.0) % 360.0
+            origin = replace(origin, azimuth=turned, reversed=not origin.reversed)
+        return replace(self, parameters=parameters, origin=origin)
 
     def changed(self, how: str) -> Description:
         """Return the description of a motion that no longer is what its formula says.

@@ -23,6 +23,9 @@ _FADED: Final = 1e-3
 #: Shortest period over the duration: 25 pieces for each.
 _SHORTEST: Final = 1e-4
 
+#: Most pieces of the oscillation itself: 0.1 GiB.
+_MOST_PIECES: Final = 1e6
+
 
 def floor_pieces(
     motion: Piecewise, period: float, damping: float, ringing: float | None, error: float = 0.0
@@ -36,6 +39,14 @@ def floor_pieces(
     rate, ratio = _checked(period, damping, end)
     after = _ringing(rate, ratio, ringing)
     step = _RADIANS / rate
+    if not (end + after) / step <= _MOST_PIECES:
+        raise InvalidMotion(
+            f"the floor moves for {end + after:.4g} s, which is too long for a {{}} of {period:g} s; give a shorter "
+            "time for it after the motion, {}",
+            "period",
+            "ringing",
+            value=ringing,
+        )
     whole = np.append(motion.breakpoints, end + after) if after > 0.0 else motion.breakpoints
     shares = np.maximum(1, np.ceil(np.diff(whole) / step)).astype(np.int64)
     start, width = np.repeat(whole[:-1], shares), np.repeat(np.diff(whole) / shares, shares)

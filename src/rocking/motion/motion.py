@@ -501,7 +501,8 @@ class Motion:
         """Return the motion with a vertical component, which changes the weight of what stands on the ground.
 
         It goes with the motion wherever that is scaled, delayed, processed or added to another; reversing the polarity
-        leaves it as it is. Intensity measures are those of the horizontal component.
+        leaves it as it is. Intensity measures are those of the horizontal component. A record whose file calls the
+        channel "Down" or "DWN" is turned round, which its history says.
 
         Parameters
         ----------
@@ -527,6 +528,9 @@ class Motion:
         >>> [f"{rocking.simulate(block, motion).peak_rotation:.6f}" for motion in (horizontal, both)]
         ['0.006366', '0.003524']
         """
+        origin = vertical.description.origin if isinstance(vertical, Motion) else None
+        if vertical is not None and origin is not None and origin.downwards:
+            vertical = vertical._times(-1.0, f"turned upwards, as its channel is called {origin.channel!r}")
         return self if vertical is self.vertical else replace(self, vertical=vertical)
 
     def rotated(self, other: Motion, azimuth: float, *, recorded: tuple[float, float] | None = None) -> Motion:
@@ -575,7 +579,9 @@ class Motion:
             raise InvalidMotion("each component has a vertical one: give it to one of the two with with_vertical")
         mine, theirs = shares((first, second), wanted)
         breakpoints, (one, two) = piecewise.together(self, other)
-        origin = replace(self.description.origin or Origin(), channel=f"{wanted:g} deg", number=None, azimuth=wanted)
+        origin = replace(
+            self.description.origin or Origin(), channel=f"{wanted:g} deg", number=None, azimuth=wanted, reversed=False
+        )
         described = replace(
             self.description.changed("rotated"),
             parameters={},

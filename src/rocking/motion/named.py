@@ -142,8 +142,8 @@ def named_vertical(
 ) -> Motion:
     """Vertical motion by name: a file or a shipped record of its own, or else a channel of the horizontal one's file.
 
-    That file is `record`, and `channel` the horizontal motion in it. There are two motions then, so `dt` and `units`
-    are for the one that does not say its own.
+    That file is `record`, and `channel` the horizontal motion in it; `dt` and `units` hold for both. With a file of its
+    own there are two motions, so they are for the one that does not say its own.
     """
     if os.path.isfile(name) or name in records.names():  # noqa: PTH113 - see `is_there`
         return named_motion(name, dt=dt, units=units, several=True)
@@ -152,7 +152,7 @@ def named_vertical(
             f"there is no file or shipped record {name!r} for the vertical motion, and {record} has no channels; check "
             "the name"
         )
-    return formats.read_vertical(record, name, Request.checked(dt, units, channel, several=True))
+    return formats.read_vertical(record, name, Request.checked(dt, units, channel))
 
 
 def refuse_what_is_known(name: str, **said: object) -> None:

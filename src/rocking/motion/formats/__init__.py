@@ -230,9 +230,9 @@ def _hint(found: list[Channel], wanted: int | str | None) -> str:
 
 
 def _matching(found: list[Channel], wanted: int | str) -> list[Channel]:
-    """Return the channels of that number; or else of that name, or whose name begins with that word."""
+    """Return the channels of that name, or else of that number, or whose name begins with that word."""
     text = " ".join(str(wanted).casefold().split())
     by_number = [channel for channel in found if str(channel.number) == text]
     by_name = [channel for channel in found if " ".join(channel.name.casefold().split()) == text]
     by_word = [channel for channel in found if channel.name.casefold().split()[:1] == [text]]
-    return by_number or by_name or by_word
+    return by_name or by_number or by_word if isinstance(wanted, str) else by_number or by_name or by_word

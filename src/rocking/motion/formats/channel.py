@@ -80,8 +80,10 @@ def _simplest_fit(times: NDArray[np.float64], step: float, drift: float, allowed
     return simplest if spread <= allowed else None
 
 
-#: Numbers that files have where a value is missing: nines before and after the point, and the lowest of 16 bits.
-_MARKS = [float("9" * whole + "." + "9" * decimals) for whole in range(3, 9) for decimals in range(5)] + [32768.0]
+#: Numbers that files have where a value is missing: nines before and after the point, those of well logs and of SAC,
+#: the ends of 16 and 24 bits.
+_MARKS = [float("9" * whole + "." + "9" * decimals) for whole in range(2, 9) for decimals in range(5)]
+_MARKS += [999.25, 12345.0, 32767.0, 32768.0, 8388607.0, 8388608.0]
 #: No acceleration is so large, in any unit.
 _LARGEST = 1e9
 #: A number stands for a missing value where those beside it are smaller than this share of it.
@@ -229,6 +231,9 @@ def to_acceleration(
     """
     if len(values) < 2:
         raise source.error(f"{len(values)} values are too few for a record; get the whole file", at)
+    if np.isnan(values).any():
+        where = int(np.argmax(np.isnan(values)))
+        raise missing_value(source, values[where], at if row_at is None else row_at(where))
     acceleration = unit.to_si(values)
     if not np.isfinite(acceleration).all():
         raise source.error("some values are too large for an acceleration; check the file and its units", at)

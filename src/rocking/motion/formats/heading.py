@@ -21,12 +21,16 @@ Kind = Literal["time", "count", "spectrum", "channel"]
 
 _LONGEST: Final = 10_000
 _COMMENT_SIGNS: Final = "#%!/"
-_BRACKETS: Final = re.compile(r"[(\[{<]\s*([^()\[\]{}<>]{1,40}?)\s*[)\]}>]")
+#: What is in brackets, unless a value follows, as in "PGA (g) = 0.3".
+_BRACKETS: Final = re.compile(r"[(\[{<]\s*([^()\[\]{}<>]{1,40}?)\s*[)\]}>](?!\s*[=:]\s*[+-]?[\d.])")
+#: What stands before the unit of a value, as in "PGA = 8.2 m/s2".
+_VALUE: Final = re.compile(r"[=:]\s*[+-]?[\d.,]+(?:[eE][+-]?\d+)?$")
 _BRACKET_SIGNS: Final = "()[]{}<> "
 _UP_TO_BRACKET: Final = re.compile(r"[^()\[\]]*[(\[][^()\[\]]*[)\]]")
 _WORD_WITH_BRACKETS: Final = re.compile(r'"[^"]*"|(?:[^\s()\[\]]+\s*)?[(\[][^()\[\]]*[)\]]|[^\s()\[\]]+')
 _WORD: Final = re.compile(r"[^\W\d_]+")
-_SUFFIX: Final = re.compile(r"(?<=[A-Za-z0-9])_(?=([A-Za-z]\w{0,12})\b)")
+#: What follows the name of an acceleration, in running text.
+_SUFFIX: Final = re.compile(r"(?:(?<![^\W_])a|(?:acc|acel|beschl)[^\W_]*)_(?=([A-Za-z]\w{0,12})\b)", re.IGNORECASE)
 _BREAK: Final = re.compile(r"[\s_/,;:.-]+(?:in\s+)?")
 #: A line that holds nothing: it divides, or has delimiters only.
 RULE: Final = re.compile(r"[-=_~+|\s]{3,}|#+|[,;\s]*")
@@ -54,11 +58,15 @@ class Column(NamedTuple):
 
 @dataclass(frozen=True)
 class Heading:
-    """What a heading says of each column, whether it names them, and where (the offset of that line)."""
+    """What a heading says of each column, whether it names them and where (the offset of that line).
+
+    Where it names no column as that of times, the first of several is `assumed` to be.
+    """
 
     columns: tuple[Column, ...]
     named: bool
     at: int
+    assumed: bool = False
 
     def places(self, kind: Kind) -> list[int]:
         """Return the places of the columns of one kind."""
@@ -82,8 +90,10 @@ def heading_of(source: Source, end: int, count: int, delimiter: str) -> Heading:
     names = _cells(texts[-1], count, delimiter) if texts else ()
     above = _cells(texts[-2], count, delimiter) if names and len(texts) > 1 else ()
     rest = "\n".join(texts[: len(texts) - bool(names) - bool(above)])
-    columns = _Names(names, above, rest).columns() if names else _unnamed(rest, count)
-    return Heading(tuple(columns), bool(names), lines[-1][1] if lines else end)
+    named = _Names(names, above, rest)
+    columns = named.columns() if names else _unnamed(rest, count)
+    assumed = count > 1 and not (names and named.names_times())
+    return Heading(tuple(columns), bool(names), lines[-1][1] if lines else end, assumed)
 
 
 def names_columns(line: bytes, count: int, delimiter: str) -> bool:
@@ -112,6 +122,10 @@ class _Names:
         for place, kind in enumerate(kinds):
             unit, strange = self._time_unit(place) if kind == "time" else self._acceleration_unit(place)
             yield Column(kind, _without_brackets(self._label(place)), unit, strange)
+
+    def names_times(self) -> bool:
+        """Whether a name is that of times."""
+        return any(self._kind(place) == "time" for place in range(len(self.names)))
 
     def understood(self) -> bool:
         """Whether a name is that of times, row numbers or a spectrum, or has a unit of acceleration."""
@@ -164,10 +178,10 @@ class _Names:
             units = {unit for text in _BRACKETS.findall(line) if (unit := find_unit(text))}
             if len(units) > 1:
                 return None, _strange(line)
-            if not units:
-                units = {unit for text in _ends(line) if (unit := find_unit(text))}
-            if units:
-                return units.pop(), ""
+            # The longest end first: "acc % g" ends with "% g" and with "g".
+            unit = next(iter(units), None) or next((unit for text in _ends(line) if (unit := find_unit(text))), None)
+            if unit is not None:
+                return unit, ""
         strange = _strange(self.names[place])
         if strange or place != len(self.names) - 1 or place > 1:
             return None, strange
@@ -223,6 +237,8 @@ def _ends(name: str) -> Iterator[str]:
     text = _without_brackets(name).rstrip("_. ")
     for found in _BREAK.finditer(text):
         end = text[found.end() :]
+        if _VALUE.search(text[: found.start()]):
+            continue
         sure = found[0] == "_" or re.search(r"[/\d]", end) is not None or not find_unit(end)
         if end and (sure or _ACCELERATION.search(text[: found.start()])):
             yield end

@@ -135,8 +135,9 @@ def open_source(path: str | os.PathLike[str] | BinaryIO) -> Source:
     except PermissionError as error:
         raise UnreadableRecord("this file may not be read; ask for permission to read it", path=name) from error
     except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or error
         raise UnreadableRecord(
-            f"this file could not be read ({error}); check the name and the disk", path=name
+            f"this file could not be read ({why}); check the name and the disk", path=name
         ) from error
     if len(raw) > SIZE_LIMIT:
         limit = SIZE_LIMIT // 2**20
@@ -244,7 +245,8 @@ class Request:
     def units(self, source: Source, stated: Unit | str | None, at: int | None) -> Unit:
         """Return the unit that the file states at the offset `at`, in its own spelling, or else the one asked for."""
         spelling = stated.strip() if isinstance(stated, str) else ""
-        unit = (find_unit(spelling) if isinstance(stated, str) else stated) or self.unit
+        unit = find_unit(spelling) if isinstance(stated, str) else stated
+        unit = unit or (None if spelling and self.several else self.unit)
         if unit is None:
             fault = "the file does not say its units"
             if spelling:

@@ -13,6 +13,7 @@ import functools
 import itertools
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -39,7 +40,8 @@ NAME = "text table"
 _DELIMITERS = {",": "a comma", ";": "a semicolon", " ": "a blank"}
 
 _HEADING_LINES = 64
-_LINES_AT_ONCE = 50_000
+#: So many rows, as Python keeps them, take some twenty times the memory of their text.
+_LINES_AT_ONCE = 5_000
 
 #: What spreadsheets write after a # where they have no number.
 _ERRORS = r"(?:(?:n/?a|nv)(?!\w)|div/0!|value!|ref!|num!|name\?|null!|wert!|zahl!)"
@@ -157,14 +159,16 @@ def _read(source: Source, shape: _Shape, heading: Heading, request: Request) -> 
             "decimal points, or blanks between two numbers",
             shape.start,
         )
+    values = _values(source, shape)
+    table = values.reshape(-1, shape.columns)
+    if heading.assumed and (fault := first_fault(table[:, 0])) is not None:
+        heading = _without_times(source, request, shape, heading, fault)
     held = _channels(source, heading)
     if not heading.places("time") and request.dt is None:
         raise source.error("the file does not say its sampling step; give {} in seconds", shape.start, "dt")
     for place in heading.places("time"):
         _refuse_strange_times(source, heading, place)
     units = [_unit(source, request, heading, place, shape.start) for place in held]
-    values = _values(source, shape)
-    table = values.reshape(-1, shape.columns)
     for place in heading.places("count"):
         _check_count(source, shape, table[:, place])
     channels = []
@@ -178,6 +182,20 @@ def _read(source: Source, shape: _Shape, heading: Heading, request: Request) -> 
         name = source.stem if shape.columns <= 2 and len(held) == 1 else column.name
         channels.append(Channel(name, number, acceleration, dt, times, units=unit.name, metadata=facts))
     return channels
+
+
+def _without_times(source: Source, request: Request, shape: _Shape, heading: Heading, fault: int) -> Heading:
+    """Return the heading of a table whose first column does not hold times, as was assumed, at a row that shows it."""
+    if request.dt is None or not heading.named:
+        named = "no column is named as that of times, and " if heading.named else ""
+        raise source.error(
+            f"{named}the time does not increase from the row before; correct the column of times, or give {{}} of a "
+            "table without one, whose columns are named",
+            shape.row_at(source, fault),
+            "dt",
+        )
+    columns = [each._replace(kind="channel") if each.kind == "time" else each for each in heading.columns]
+    return replace(heading, columns=tuple(columns))
 
 
 def _channels(source: Source, heading: Heading) -> list[int]:
@@ -198,12 +216,13 @@ def _channels(source: Source, heading: Heading) -> list[int]:
 def _unit(source: Source, request: Request, heading: Heading, place: int, at: int) -> Unit:
     """Return the unit of a column of accelerations."""
     column = heading.columns[place]
-    if request.unit is None and _LENGTH_OR_SPEED.fullmatch(column.strange):
+    asked = None if request.several else request.unit  # for several files: for those that do not say
+    if asked is None and _LENGTH_OR_SPEED.fullmatch(column.strange):
         raise source.error(
             f"the heading says {column.strange!r}, which is no unit of an acceleration; give a table of accelerations",
             heading.at,
         )
-    if request.unit is None and column.strange:
+    if asked is None and column.strange:
         raise source.error(
             f"the heading says {column.strange!r}, which is no unit of acceleration that is known here; give {{}} as "
             f"one of {', '.join(CHOICES)}",
@@ -449,6 +468,6 @@ def _timing(
     gap = gap_at(written)
     if gap is not None:
         raise missing_value(source, written[gap], shape.row_at(source, gap))
-    if request.dt is not None:
+    if request.dt is not None and not request.several:
         raise source.error(f"the times are not evenly {request.dt:g} s apart; leave {{}} out", shape.start, "dt")
     return None, times

@@ -53,6 +53,12 @@ def _read(source: Source, name: str, request: Request) -> list[Channel]:
     if isinstance(traces, str):
         raise source.error(f"ObsPy's {name} reader cannot read this ({traces}); get the record again")
     _refuse_cut(source, traces)
+    ids = [str(trace.id) for trace in traces]
+    for each in ids:
+        if ids.count(each) > 1:
+            raise source.error(
+                f"{each} is in {ids.count(each)} pieces, with gaps or overlaps; get a record without gaps"
+            )
     form = f"{name} (through ObsPy)"
     return [_channel(source, request, unit, trace, form, number) for number, trace in enumerate(traces, 1)]
 
