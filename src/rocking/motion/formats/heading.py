@@ -156,8 +156,10 @@ class _Names:
         return name
 
     def _is_unit_of_time(self, place: int) -> bool:
-        """Whether a name is a unit of time and nothing else; "min", "h" and "d" only in brackets."""
+        """Whether a name is a unit of time and nothing else; "min", "h" and "d" only in brackets, no NS beside EW."""
         name = self.names[place]
+        if name == "NS" and "EW" in self.names:
+            return False
         unit = find_time_unit(_bare(name))
         return unit is not None and (unit.multiplier == 1.0 or name != _bare(name))
 

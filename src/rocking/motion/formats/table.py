@@ -194,7 +194,7 @@ def _without_times(source: Source, request: Request, shape: _Shape, heading: Hea
             shape.row_at(source, fault),
             "dt",
         )
-    columns = [each._replace(kind="channel") if each.kind == "time" else each for each in heading.columns]
+    columns = [each._replace(kind="channel", unit=None) if each.kind == "time" else each for each in heading.columns]
     return replace(heading, columns=tuple(columns))
 
 
