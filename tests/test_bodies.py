@@ -11,7 +11,7 @@ import pytest
 from kernel_records import one_sided
 
 import rocking
-from rocking import InvalidBlock, InvalidOption, checks, simulate, simulate_many
+from rocking import InvalidBlock, InvalidOption, Motion, checks, dynamics, simulate, simulate_many
 from rocking.body import KINDS, Bodies, Body, Coordinate
 from rocking.constants import STANDARD_GRAVITY
 from rocking.engine import Setup, Task, simulate_each, simulate_tasks
@@ -198,3 +198,46 @@ def test_a_study_of_balls_keeps_its_inputs_and_takes_them_up_again(tmp_path):
     assert isinstance(again.product.bodies, Balls)
     expected = simulate_many(BALLS, table(), model="linear", levels=[0.5, 1.0])
     assert again.results().peak_rotation.values.tolist() == expected.peak_rotation.values.tolist()
+
+
+def test_a_rest_that_the_ground_ends_at_once_passes_on_what_shifts_it():
+    ball = dynamics.BouncingBall(0.0, gravity=10.0)
+    table = Motion.from_samples([-25.0] * 3 + [-22.0] * 3 + [-18.0, -12.0, 0.0, 0.0], 0.1)
+
+    def run(factor=1.0, position=0.01, velocity=-1.0):
+        return dynamics.simulate(
+            ball, table.scaled(factor), initial_position=position, initial_velocity=velocity, duration=0.55
+        )
+
+    response, h = run(), 1e-5
+    found = response.sensitivity.rotation(0.5, of=["motion", "initial_rotation", "initial_velocity"])
+    expected = {
+        "motion": (run(1.0 + h).position(0.5) - run(1.0 - h).position(0.5)) / (2.0 * h),
+        "initial_rotation": (
+            run(position=0.01 * (1.0 + h)).position(0.5) - run(position=0.01 * (1.0 - h)).position(0.5)
+        )
+        / (2.0 * h),
+        "initial_velocity": (run(velocity=-1.0 - h).position(0.5) - run(velocity=-1.0 + h).position(0.5)) / (2.0 * h),
+    }
+    for name, value in expected.items():
+        assert float(found[name]) == pytest.approx(float(value), rel=1e-6), name
+
+
+@pytest.mark.parametrize(
+    ("block", "rotation"),
+    [
+        (rocking.Block.from_parameters(p=1.0, alpha=0.2, restitution=0.5), 5e-324),
+        (rocking.Block.from_parameters(p=1e-6, alpha=1e-9, restitution=0.5), 1e-308),
+    ],
+)
+def test_a_start_of_next_to_nothing_ends_next_to_at_once(block, rotation):
+    response = rocking.simulate(block, None, initial_rotation=rotation)
+    assert response.peak_rotation == rotation and response.events["time"][-1] < 1e-130
+
+
+def test_a_sequence_begins_after_the_last_impact_at_the_other_stop():
+    between = dynamics.ImpactOscillator(1.0, 0.9, stop=-1.0, second_stop=1.001)
+    response = dynamics.simulate(between, None, initial_position=1.0, initial_velocity=1.0, duration=20.0)
+    (sequence,) = response.chattering
+    others = response.impacts["time"][response.impacts["side"] != response.impacts["side"][-1]]
+    assert len(others) > 5 and sequence["start"] > others.max()

@@ -341,3 +341,13 @@ if __name__ == "__main__":
         if these[1]:
             print(number, *these, flush=True)
     print("cells", total[0], "contradicted", total[1], "ambiguous", total[2])
+
+
+def test_an_attractor_that_rests_at_the_start_of_a_period_is_known_after_one():
+    ball, table = dynamics.BouncingBall(0.3, gravity=10.0), pulses.sine(11.0, 2.0, cycles=1)
+    found = dynamics.basins(ball, table, np.linspace(0.0, 0.1, 41), np.linspace(0.01, 0.5, 41), periods=5)
+    assert not dynamics.stroboscopic_map(ball, table)([0.05, 0.0]).any()
+    taken, counts = np.unique(found.data.periods.values, return_counts=True)
+    # The coarse cells come before the attractor is known, and all others after it.
+    assert (taken.tolist(), counts.tolist()) == ([1, 5], [1240, 441])
+    assert len(np.unique(found.data.attractor.values)) == 1

@@ -13,6 +13,7 @@ from oracles import closed_orbits, exact_arcs
 from rocking import Block, InvalidMotion, InvalidOption, Motion, dynamics, pulses
 from rocking.chattering import critical_amplitude
 from rocking.dynamics.orbits import sizes_of
+from rocking.dynamics.repeated import scale_of
 
 G = 10.0
 TABLE = 5.0  # Hz
@@ -515,3 +516,30 @@ def test_a_branch_is_refused_in_one_sentence(branch, changes, words):
     with pytest.raises(InvalidOption, match=words) as caught:
         dynamics.continue_orbit(orbit, family, given.pop("value"), given.pop("limits"), **given)
     assert "\n" not in str(caught.value)
+
+
+def test_long_orbits_in_chaos_come_back_or_are_left_out():
+    ball, table = dynamics.BouncingBall(0.8, gravity=10.0), pulses.sine(40.0, 5.0, cycles=1)
+    strobe = dynamics.stroboscopic_map(ball, table)
+    orbits = dynamics.periodic_orbits(ball, table, period=16, starts=60)
+    away = [np.max(np.abs(strobe(each.state, each.period) - each.state) / scale_of(strobe)) for each in orbits]
+    assert len(orbits) > 5 and max(away) < 1e-5
+
+
+def test_a_family_that_loses_its_mirror_image_is_followed_as_orbits():
+    block, times = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9), np.linspace(0.0, 1.0 / 1.2, 401)
+
+    def family(second):
+        wave = 3.5 * np.sin(2.4 * np.pi * times) + second * np.cos(4.8 * np.pi * times)
+        return block, Motion.from_samples(wave, times[1])
+
+    (symmetric, *_) = (
+        each for each in dynamics.periodic_orbits(*family(0.0), starts=100) if each.symmetric and not each.rests
+    )
+    branch = dynamics.continue_orbit(symmetric, family, 0.0, (-0.1, 0.1))
+    away = []
+    for value, state in zip(branch.values, branch.states, strict=True):
+        strobe = dynamics.stroboscopic_map(*family(float(value)))
+        away.append(np.max(np.abs(strobe(state, symmetric.period) - state)))
+    assert len(away) > 5 and max(away) < 1e-9
+    assert (branch.values.min(), branch.values.max()) == (-0.1, 0.1)

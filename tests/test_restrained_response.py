@@ -273,3 +273,52 @@ def test_a_figure_of_a_wall_counts_by_its_balance(vertical):
     assert figure.axes[0].get_ylabel() == "rotation / balance"
     drawn = figure.axes[0].lines[1].get_ydata()
     assert np.max(drawn) == pytest.approx(response.peak_over_slenderness, rel=1e-3)
+
+
+@pytest.mark.parametrize("push", [0.0, 0.02, -0.02])
+def test_a_thrust_lifts_a_lighter_block_to_the_side_to_which_it_pushes(push):
+    block, times = Block(width=0.4, height=2.0, mass=2000.0, restitution=0.7), np.linspace(0.0, 2.0, 41)
+    lighter = rocking.Motion.from_samples(-8.0 * np.sin(0.5 * math.pi * times), 0.05)
+    found = []
+    for sign in (1.0, -1.0):
+        sideways = rocking.Motion.from_samples(sign * push * 9.80665 * np.sin(0.5 * math.pi * times), 0.05)
+        body = RestrainedBlock(block, Thrust(sign * 2500.0, height=1.0))
+        found.append(rocking.simulate(body, sideways.with_vertical(lighter), duration=2.0))
+        # The thrust turns the block about its edge, and the weight that is left turns it back.
+        assert found[-1].events[0]["side"] == sign
+        lift = float(found[-1].events[0]["time"])
+        down = 2000.0 * (9.80665 + float(lighter.acceleration(lift)))
+        pushed = 2500.0 - sign * 2000.0 * float(sideways.acceleration(lift))
+        assert pushed * 1.0 == pytest.approx(down * 0.2, rel=1e-12)  # moments about the edge
+    times = np.linspace(0.0, 1.9, 40)
+    np.testing.assert_allclose(found[0].rotation(times), -found[1].rotation(times), rtol=0.0, atol=1e-12)
+    assert found[0].peak_rotation > 0.1
+
+
+def test_a_thrust_and_its_mirror_image_do_the_same_to_a_block_that_becomes_lighter():
+    rng, judged = np.random.default_rng(2), 0
+    for _ in range(60):
+        block = Block(width=0.4, height=rng.uniform(1.0, 3.0), mass=2000.0, restitution=rng.uniform(0.3, 0.9))
+        force, step, waves = rng.uniform(500.0, 1500.0), 0.05 * rng.uniform(0.3, 1.5), int(rng.integers(1, 4))
+        times = np.arange(41) * step
+        lighter = rocking.Motion.from_samples(
+            -rng.uniform(5.0, 9.5) * np.sin(math.pi * times / times[-1] * waves), step
+        )
+        still = rocking.Motion.from_samples(np.zeros(41), step).with_vertical(lighter)
+        both = [RestrainedBlock(block, Thrust(sign * force, height=1.0)) for sign in (1.0, -1.0)]
+        one, other = (rocking.simulate(body, still, duration=times[-1] + 3.0) for body in both)
+        assert one.peak_rotation == other.peak_rotation and one.overturned == other.overturned
+        assert one.events["side"].tolist() == (-other.events["side"]).tolist()
+        judged += len(one.events) > 0
+    assert judged > 20
+
+
+def test_reading_a_response_leaves_the_law_of_its_tendon_alone():
+    block = Block(width=0.6, height=3.0, mass=3000.0, restitution=0.8)
+    body = RestrainedBlock(block, Tendon(5e6, prestress=5e3, strength=2e4))
+    response = rocking.simulate(body, rocking.records.load("ridgecrest-clc-090").scaled(2.0))
+    before = trail_of(response).block.tobytes()
+    response.rotation(np.linspace(0.0, 0.5 * response.duration, 500))
+    assert np.isfinite(response.sensitivity.peak["motion"][0])
+    rocking.gradient(response, "rotation", 0.5 * response.duration)
+    assert trail_of(response).block.tobytes() == before

@@ -33,9 +33,10 @@ Family = Callable[[float], tuple[Body, Motion]]
 #: The plane of one parameter, by its normal.
 AT_VALUE: Final = np.array([0.0, 0.0, 1.0])
 
-#: Newton steps to a branch, and its residual over the scale and the size of the derivative.
+#: Newton steps to a branch, and its residual over the scale and the size of the derivative; and the largest one.
 _CORRECTIONS: Final = 10
 _RESIDUAL: Final = 1e-12
+_LARGEST_RESIDUAL: Final = 1e-6
 
 #: Step of differences by the parameter, over its range: least and greatest, and over the step along the branch, so that
 #: near the end of a branch few of them reach across it.
@@ -48,6 +49,9 @@ _ROUNDING: Final = 2.0**-50
 
 #: An impact nearer to the start of a period than this share of it moves that start.
 _TOO_NEAR: Final = 0.03
+
+#: Values of the parameter at which a family is looked at.
+_LOOKS: Final = 5
 
 #: Maps that are kept, by the parameter.
 _KEPT: Final = 64
@@ -123,7 +127,7 @@ class OrbitEquations:
             raise InvalidOption(
                 f"the orbit is none of what {{}} makes at {{}} = {value:g}", "family", "value", value=value
             )
-        by_half = orbit.symmetric and not orbit.rests and is_mirrored(strobe)
+        by_half = orbit.symmetric and not orbit.rests and _stays_mirrored(family, strobe, limits)
         sizes = np.array([*scale, limits[1] - limits[0]])
         kind = _kind_of(strobe, orbit.state, orbit.period)
         return cls(family, orbit.model, orbit.treatment, orbit.period, by_half, sizes, kind, limits)
@@ -134,7 +138,10 @@ class OrbitEquations:
         return StroboscopicMap(body, _shifted(motion, self.shift), self.model, self.treatment)
 
     def _half(self, value: float) -> HalfMap:
-        return HalfMap(self.strobe(value))
+        strobe = self.strobe(value)
+        if not is_mirrored(strobe):
+            raise InvalidOption(f"the family has no mirror images at {{}} = {value:g}", "value", value=value)
+        return HalfMap(strobe)
 
     def physical(self, z: Floats) -> tuple[Floats, float]:
         """State and parameter of numbers z; exactly a limit where it differs from that by rounding."""
@@ -174,7 +181,8 @@ class OrbitEquations:
             residual, jacobian, _ = self.at(z)
             if not np.all(np.isfinite(jacobian)):
                 return None
-            sharp = np.max(np.abs(residual)) < _RESIDUAL * max(1.0, float(np.max(np.abs(jacobian[:, :2]))))
+            allowed = _RESIDUAL * max(1.0, float(np.max(np.abs(jacobian[:, :2]))))
+            sharp = np.max(np.abs(residual)) < min(allowed, _LARGEST_RESIDUAL)
             try:
                 step = np.linalg.solve(np.vstack([jacobian, normal]), -np.append(residual, normal @ (z - guess)))
             except np.linalg.LinAlgError:
@@ -255,6 +263,19 @@ class OrbitEquations:
         time = float(np.mod(motion.breakpoints[shift] - motion.breakpoints[self.shift], motion.duration))
         after = response_of(self.strobe(value), state, self.period).states(time)[:2]
         return np.append(after, value) / self.sizes
+
+
+def _stays_mirrored(family: Family, strobe: StroboscopicMap, limits: tuple[float, float]) -> bool:
+    """Whether the mirror image of every course is one half a period later, at a value and over the whole range."""
+    if not is_mirrored(strobe):
+        return False
+    for value in np.linspace(*limits, _LOOKS):
+        try:
+            if not is_mirrored(StroboscopicMap(*family(float(value)), strobe.model, strobe.treatment)):
+                return False
+        except RockingError:  # no body or motion there: the branch ends before
+            continue
+    return True
 
 
 def tangent_of(jacobian: Floats, like: Floats) -> Floats:

@@ -35,6 +35,8 @@ _EVERY: Final = 8
 #: Residual of an orbit, over the scale of its states and the size of the derivative.
 _RESIDUAL: Final = 1e-11
 
+#: Largest residual: what comes back no nearer is called no orbit, however large the derivative.
+_LARGEST_RESIDUAL: Final = 1e-6
 
 #: Speeds of starts: least and greatest gain over the impulse of a period, and what a block that overturns has at most.
 _LEAST_GAIN: Final = 0.5
@@ -187,7 +189,7 @@ class _Search:
         done = np.zeros(len(x), dtype=bool)
         for _ in range(_NEWTON_STEPS):
             residual = self._size(after - x)
-            sharp = residual < _RESIDUAL * np.maximum(1.0, np.max(np.abs(change), axis=(1, 2)))
+            sharp = residual < _tolerance(change)
             finished = done & sharp
             open_ = np.flatnonzero(~finished & np.isfinite(residual))
             if not len(open_):
@@ -212,7 +214,7 @@ class _Search:
                 new_after[stuck], new_change[stuck] = self._mapped(moved, count)
             x[open_], after[open_], change[open_] = new, new_after, new_change
         residual = self._size(after - x)
-        good = residual < _RESIDUAL * np.maximum(1.0, np.max(np.abs(change), axis=(1, 2)))
+        good = residual < _tolerance(change)
         found: Floats = x[good]
         return found
 
@@ -249,6 +251,12 @@ class _Search:
             if not any(np.max(self._size(shift - other.states)) < SAME for other in same for shift in shifts):
                 kept.append(each)
         return sorted(kept, key=lambda each: (each.period, each.impacts, *each.state))
+
+
+def _tolerance(change: Floats) -> Floats:
+    """Residual, over the scale, up to which a state comes back: rounding grows with the derivative, to a limit."""
+    found: Floats = np.minimum(_RESIDUAL * np.maximum(1.0, np.max(np.abs(change), axis=(-2, -1))), _LARGEST_RESIDUAL)
+    return found
 
 
 def _newton_step(x: Floats, after: Floats, change: Floats) -> Floats:

@@ -160,7 +160,9 @@ def prove_rest(ground: Ground, block: Record, rules: Record, scratch: Record, st
     height = v * v * (1.0 + 2.0 * change / least) / least
     if has_vertical(ground) and not is_greatest_at_zero(block, height):
         return unproven()
-    if block.yielding and may_change_below(block, rules, state.plastic, height):
+    if (block.facing and height >= block.fallen) or (
+        block.yielding and may_change_below(block, rules, state.plastic, height)
+    ):
         return unproven()
     local_series(ground, state.piece, state.offset, 1.0, clear(scratch.ground))
     weight_series(ground, state.piece, state.offset, clear(scratch.weight))

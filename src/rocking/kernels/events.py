@@ -46,6 +46,8 @@ def first_root(c: Floats, lead: int, order: int, h: float) -> float:
     bound = curvature_bound(c, lead, order, window)
     for n in range(1, _MAXIMUM_STEPS + 1):
         root = math.sqrt(slope * slope + 2.0 * bound * f)
+        if root == 0.0:  # by underflow, where it is not
+            root = math.sqrt(2.0 * bound) * math.sqrt(f)
         # The two forms of the parabola's root; neither subtracts numbers of the same sign.
         above, below = (slope + root, bound) if slope > 0.0 else (2.0 * f, root - slope)
         if above <= below * (window - t):

@@ -152,7 +152,8 @@ def rest_until_uplift(
     state.uplifts += 1
     if has_vertical(ground) and is_weightless(ground, block, state, state.offset):
         left = length_of(ground, state.piece) - state.offset
-        if block.entered[0] != 0 and is_hardly_pushed(ground, state.piece, state.offset, left, scratch.ground):
+        A, d = scratch.ground, scratch.other
+        if block.entered[0] != 0 and is_hardly_pushed(ground, block, state.piece, state.offset, left, A, d):
             state.near_ties += 1
         elif state.rests > 0 and state.uplifted - state.rested <= _NEAR_TIE * state.uplifted:
             state.near_ties += 1  # the last of its impacts may have come too late

@@ -98,7 +98,8 @@ def settle(
         for n in range(periods):
             fate = pass_period(setting, scratch, state)
             if fate != Fate.OVERTURNED and fate != Fate.UNFINISHED:
-                found[k] = trap_of(traps, state)
+                rests = fate == Fate.RESTS or fate == Fate.RESTS_FOR_EVER
+                found[k] = trap_of(traps, state, rests, setting.block.facing)
             if found[k] >= 0 or (fate != Fate.MOVES and fate != Fate.RESTS):
                 taken[k] = n + 1
                 break
@@ -106,12 +107,17 @@ def settle(
 
 
 @inlined
-def trap_of(traps: Floats, state: Record) -> int:
+def trap_of(traps: Floats, state: Record, rests: bool, facing: bool) -> int:
     """Row of the first trap that a state is in, or -1."""
     for j in range(traps.shape[0]):
         row = traps[j]
+        if row[0] < 0.0:
+            # At rest, on the same stop; the march may have taken the state to its next uplift, and given it a side.
+            if rests and (not facing or row[0] == min(state.side, -1 - state.side)):
+                return j
+            continue
         du, dv = state.u - row[1], state.v - row[2]
-        if state.side == row[0] and row[3] * du * du + 2.0 * row[4] * du * dv + row[5] * dv * dv <= 1.0:
+        if not rests and state.side == row[0] and row[3] * du * du + 2.0 * row[4] * du * dv + row[5] * dv * dv <= 1.0:
             return j
     return -1
 

@@ -33,6 +33,11 @@ class Trail(NamedTuple):
     nodes: Records
 
 
+def own(trail: Trail) -> Trail:
+    """Trail with a block of its own where a tendon yields: what follows its steps changes the law of that block."""
+    return trail._replace(block=trail.block.copy()) if trail.block["yielding"] else trail
+
+
 #: Three variations.
 Three = tuple[float, float, float]
 
@@ -149,11 +154,11 @@ def vary(
         following = nodes[k + 1]
         first, done = done, count_until(times, done, following.time)
         if node.side < 0:
-            events[event_count] = uplift_shift(
-                trail, following, quantity, restoring_by_tendon(trail.block, following.side, plastic, dp)
-            )
+            by_tendon = restoring_by_tendon(trail.block, following.side, plastic, dp)
+            landing = events[event_count - 1] if event_count > 0 else 0.0
+            du = 0.0
+            events[event_count], dv = leaving(trail, node, following, quantity, by_tendon, landing)
             event_count += 1
-            du = dv = 0.0
         elif following.side < 0:
             shift = impacts[impact_count - 1] if impact_count > 0 else 0.0
             events[event_count] = rest_shift(trail, node, quantity, (dv, shift, plastic, dp), following)
@@ -176,6 +181,17 @@ def vary(
                 du, dv = saltation(trail, node, following, quantity, shift, rates, impact_count)
                 impacts[impact_count] = shift
                 impact_count += 1
+
+
+@inlined
+def leaving(
+    trail: Trail, node: Record, following: Record, quantity: int, by_tendon: float, landing: float
+) -> tuple[float, float]:
+    """Shift of an uplift and variation of the velocity after it, from a rest whose own start shifts by ``landing``."""
+    if following.time > node.time or node.time == trail.nodes[0].time:
+        return uplift_shift(trail, following, quantity, by_tendon), 0.0
+    # The ground ends the rest at once: the arc starts where that does.
+    return landing, landing * restoring(trail.ground, trail.block, following.side, following.piece, following.offset)
 
 
 @inlined

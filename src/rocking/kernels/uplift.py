@@ -69,35 +69,48 @@ def next_uplift(
             if offset + passed < length:
                 side = stop_of(resting) if block.facing else 0
                 if block.entered[0] != 0:  # it rests on both sides
-                    side = pushed_side(ground, piece, offset + passed, length - offset - passed, A)
+                    side = lifted_side(ground, block, piece, offset + passed, length - offset - passed, A, d)
                 return Uplift(piece, offset + passed, side, jump_minus if side == 1 else jump_plus)
         piece += 1
         offset = 0.0
 
 
 @inlined
-def pushed_side(ground: Ground, piece: int, offset: float, h: float, A: Floats) -> int:
-    """Side to which the horizontal motion pushes a block within h from here, + without a push; ``A`` is scratch space.
+def lifted_side(ground: Ground, block: Record, piece: int, offset: float, h: float, A: Floats, d: Floats) -> int:
+    """Side of an uplift of a body that rests on both: that whose threshold is exceeded by more within h from here.
 
-    That is the side of an uplift. With a positive weight it is the side of the threshold that is passed; without one
-    both are passed at instants that differ by rounding only.
+    With what presses the body down it is the side of the threshold that is passed. Without it both are passed at
+    instants that differ by rounding only, and what pushes the body decides: side + without a push. ``A`` and ``d`` are
+    scratch space.
     """
-    degree = local_series(ground, piece, offset, 1.0, A)
+    degree = difference_series(ground, block, piece, offset, A, d)
     lead = leading_power(A, degree, h, rounding_of(A, degree, h))
     return 1 if lead <= degree and A[lead] > 0.0 else 0
 
 
 @inlined
-def is_hardly_pushed(ground: Ground, piece: int, offset: float, h: float, A: Floats) -> bool:
+def is_hardly_pushed(ground: Ground, block: Record, piece: int, offset: float, h: float, A: Floats, d: Floats) -> bool:
     """Whether a push that counts as none within h is first: rounding decides the side of an uplift without weight.
 
-    ``A`` is scratch space.
+    ``A`` and ``d`` are scratch space.
     """
-    degree = local_series(ground, piece, offset, 1.0, A)
+    degree = difference_series(ground, block, piece, offset, A, d)
     hidden = 0.0
     for k in range(leading_power(A, degree, h, rounding_of(A, degree, h))):
         hidden += abs(A[k])
     return hidden > 0.0
+
+
+@inlined
+def difference_series(ground: Ground, block: Record, piece: int, offset: float, A: Floats, d: Floats) -> int:
+    """Write half of what the excess over the threshold of side - has beyond that of side + into A; return its degree.
+
+    For equal sides it is the horizontal motion. ``d`` is scratch space.
+    """
+    uneven = 0.5 * (block.threshold[1] - block.threshold[0])
+    degree = push_series(ground, piece, offset, uneven, 1.0, A, d)
+    A[0] -= uneven + 0.5 * (block.hold[1] - block.hold[0])
+    return degree
 
 
 @inlined

@@ -15,7 +15,7 @@ from rocking.kernels import state
 from rocking.kernels.adjoint import Ends, adjoint, of_ending
 from rocking.kernels.march import follow
 from rocking.kernels.state import Records
-from rocking.kernels.trace import Trail
+from rocking.kernels.trace import Trail, own
 from rocking.motion import piecewise
 from rocking.motion.motion import Motion
 from rocking.response.answers import history_of, trail_of
@@ -261,7 +261,7 @@ def _ties_before(trail: Trail, instant: float) -> bool:
         start[name] = first[name]
     start["peak"] = first["u"]
     rules["stop"], rules["endless"], rules["record"] = math.nextafter(instant, math.inf), False, False
-    follow(trail.ground, trail.block, rules, state.new_table(0), state.new_scratch(), start)
+    follow(trail.ground, own(trail).block, rules, state.new_table(0), state.new_scratch(), start)
     return bool(start["near_ties"] > 0)
 
 
@@ -271,7 +271,7 @@ def _taken_back(asked: _Asked, change: Floats, out: Floats) -> str:
     starts_at_rest, begin = int(nodes["side"][0]) < 0, float(nodes["time"][0])
     ends = Ends.START
     if asked.by_state is None:
-        ends = Ends(of_ending(asked.trail, scratch, asked.row, change, out))
+        ends = Ends(of_ending(own(asked.trail), scratch, asked.row, change, out))
     else:
         change[:2] = asked.by_state
         if not np.any(change) or (asked.instant == begin and not asked.is_height):
@@ -280,7 +280,7 @@ def _taken_back(asked: _Asked, change: Floats, out: Floats) -> str:
         return _REASONS[ends]
     if asked.instant > begin:
         work = state.record(state.VARIATION)
-        ends = Ends(adjoint(asked.trail, scratch, work, asked.row, asked.since, change, out))
+        ends = Ends(adjoint(own(asked.trail), scratch, work, asked.row, asked.since, change, out))
         if ends in _REASONS:
             return _REASONS[ends]
         waits = starts_at_rest and (len(nodes) == 1 or nodes["time"][1] > begin)

@@ -16,7 +16,7 @@ from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.march import follow
 from rocking.kernels.state import Records
-from rocking.kernels.trace import Trail, trace
+from rocking.kernels.trace import Trail, own, trace
 
 #: Times at which each step of the last arc is looked at for its last passage of the balance point.
 _LOOKS: Final = 33
@@ -60,7 +60,7 @@ class History:
         found = np.empty((len(times), 3))
         given = times.view()
         given.flags.writeable = False  # one type, whatever the caller may do: `trace` is compiled once
-        trace(self.trail, state.new_scratch(), given, rows, found)
+        trace(own(self.trail), state.new_scratch(), given, rows, found)
         if any(self.stops):
             side = self.trail.nodes["side"][rows]
             found[:, 0] += np.array(self.stops)[np.where(side < 0, -1 - side, side)]

@@ -14,7 +14,7 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.kernels import state
-from rocking.kernels.trace import Quantity, Trail, vary
+from rocking.kernels.trace import Quantity, Trail, own, vary
 from rocking.response.history import History
 from rocking.tables import counted
 
@@ -140,7 +140,7 @@ def _varied(trail: Trail, quantity: int, times: Floats, impacts: int, events: in
     start = _STARTS.get(quantity)
     if start is None or trail.nodes[start][0] != 0.0:  # a share of nothing changes nothing
         scratch, work = state.new_scratch(), state.record(state.VARIATION)
-        vary(trail, scratch, work, quantity, times, heights, at_impacts, at_events)
+        vary(own(trail), scratch, work, quantity, times, heights, at_impacts, at_events)
     return heights, at_impacts, at_events
 
 
