@@ -1,6 +1,7 @@
 """The command line: results, files, exit codes, and one line for every mistake."""
 
 import contextlib
+import gc
 import inspect
 import json
 import os
@@ -16,6 +17,7 @@ import numpy as np
 import pytest
 
 import rocking
+from rocking import cli
 from rocking.cli import app
 from rocking.cli.interrupts import Interrupts
 from rocking.errors import INTERRUPTED
@@ -237,6 +239,25 @@ def test_what_is_dropped_after_an_interrupt_is_not_printed(monkeypatch, interrup
         finally:
             Failing()
     assert [each.exc_type for each in told] == [KeyError] * (not interrupted)
+
+
+def test_what_an_interrupt_leaves_half_made_is_given_up_before_the_end(monkeypatch, capsys):
+    class HalfMade:
+        def __del__(self):
+            raise AttributeError("what its making would have set")
+
+    def run(_):
+        half = HalfMade()
+        signal.raise_signal(signal.SIGINT)
+        assert half
+
+    told = []
+    monkeypatch.setattr(sys, "unraisablehook", told.append)
+    monkeypatch.setattr(cli, "_run", run)
+    with pytest.raises(SystemExit) as ended:
+        cli.main([])
+    gc.collect()
+    assert (ended.value.code, capsys.readouterr().err, told) == (130, f"{INTERRUPTED}\n", [])
 
 
 @pytest.mark.parametrize("interrupted", [True, False])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import _thread
+import gc
 import signal
 import sys
 import threading
@@ -43,6 +44,9 @@ class Interrupts:
         if self._listens:
             if self._again is not None:
                 self._again.cancel()
+            if self.asked and error is not None:
+                error.__context__ = None  # what was half made is given up here, where nothing of it is printed
+                gc.collect()
             sys.unraisablehook = self._before
             signal.signal(signal.SIGINT, signal.default_int_handler)
 
