@@ -593,3 +593,12 @@ def test_a_vertical_record_that_is_positive_downwards_is_turned_round(channel):
     assert np.array_equal(horizontal.with_vertical(-down).vertical.coefficients, up.coefficients)
     assert vertical_notes(both) == ()
     assert horizontal.with_vertical(up).vertical is up
+
+
+def test_a_drawing_shows_jumps_where_they_are():
+    twice = pulses.rectangular(4.0, 1.0) + pulses.rectangular(-8.0, 0.5)
+    times = twice.drawing_times(-1.0, 3.0)
+    drawn = np.interp([0.25, 0.499999, 0.500001, 0.999999, 1.000001, 2.0], times, twice.acceleration(times))
+    assert drawn == pytest.approx([-4.0, -4.0, 4.0, 4.0, 0.0, 0.0], abs=1e-12)
+    even = Motion.from_samples([0.0, 1.0, -2.0, 1.0], 0.5)
+    assert even.drawing_times(0.0, 2.0).tolist() == [0.0, 0.5, 1.0, 1.5, np.nextafter(1.5, 2.0), 2.0]

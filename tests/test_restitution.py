@@ -21,6 +21,7 @@ from rocking import (
     VelocityThreshold,
     dynamics,
     impact_restitution,
+    one_sided_restitution,
 )
 from rocking.block import RestrainedBlocks, housner_restitution
 from rocking.kernels import compiled
@@ -369,3 +370,14 @@ def test_what_needs_the_same_factor_each_time_refuses_a_law():
     for body in (random, falling):
         with pytest.raises(InvalidBlock, match="time stepping knows no restitution that varies"):
             dynamics.integrate(body, None, dynamics.MoreauJean(0.001), 0.1, initial_position=0.1)
+
+
+@pytest.mark.parametrize("alpha", ["a", math.nan, 5.0])
+def test_a_wall_has_a_slenderness(alpha):
+    with pytest.raises(InvalidBlock, match="alpha"):
+        one_sided_restitution(alpha)
+
+
+def test_several_points_below_a_flat_body_leave_nothing():
+    with pytest.raises(InvalidBlock, match="too stocky"):
+        impact_restitution(distances=(1.0, 5.0), height=0.1, radius_of_gyration=0.1, points=3)

@@ -4,6 +4,7 @@ import copy
 import inspect
 import math
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -325,3 +326,29 @@ def test_why_a_file_cannot_be_written_is_said_without_the_library_s_internals(tm
     said = f"{path}: cannot be written: File too large; nothing of it was kept; choose another place"
     assert str(caught.value) == said
     assert not path.exists()
+
+
+def test_a_part_has_no_numbers_of_the_whole(results, spectrum):
+    for name, dimension in (
+        ("RockingSpectrum", "motion"), ("IncrementalDynamicAnalysis", "motion"), ("MeasureComparison", "motion"),
+        ("ResponseRose", "pair"), ("ResponseRose", "azimuth"), ("Basins", "attractor"), ("Basins", "rotation"),
+    ):  # fmt: skip
+        assert dimension in results[name].sizes, name
+        with pytest.raises(rocking.InvalidOption, match=f"of all its values of {dimension} together; compute a part"):
+            results[name].select(**{dimension: results[name][dimension].values[0]})
+
+
+def test_a_part_of_an_overturning_map_has_the_boundaries_within_it():
+    whole = rocking.overturning_map(BLOCK, "one-sine", amplitudes=np.arange(1.0, 9.0), frequencies=[2.0, 3.0, 4.0])
+    part = whole.select(frequency=[2.0, 4.0], amplitude=[3.0, 5.0, 7.0])
+    kept = [each for each in whole.to_dict()["boundaries"] if each["boundary_frequency"] != 3.0]
+    kept = [each for each in kept if 3.0 < each["boundary_amplitude"] <= 7.0]
+    assert part.to_dict()["boundaries"] == kept and 0 < len(kept) < len(whole.to_dict()["boundaries"])
+    assert len(part.plot().axes) == 1
+
+
+def test_names_are_no_html(spectrum):
+    motion = replace(PULSE, name="A&B <b>PGA<0.3</b>")
+    found = rocking.overturning_map(BLOCK, "one-sine", amplitudes=[1.0, 4.0], frequencies=[2.0])
+    ida = rocking.incremental_dynamic_analysis(BLOCK, motion)
+    assert "<b>PGA" not in ida._repr_html_() and "OverturningMap" in found._repr_html_()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
@@ -260,9 +261,12 @@ class DatasetResult(DrawnResult, TableResult):
         All numbers, with units and meaning of each variable.
     TABLES : mapping of str to tuple of str
         Tables, the default one first, and the variables of each.
+    POOLED : tuple of str
+        Dimensions over which some of the numbers were taken together: a part of one of them has no numbers of its own.
     """
 
     TABLES: ClassVar[Mapping[str, tuple[str, ...]]]
+    POOLED: ClassVar[tuple[str, ...]] = ()
 
     data: xr.Dataset
 
@@ -272,7 +276,7 @@ class DatasetResult(DrawnResult, TableResult):
         Parameters
         ----------
         **labels : object
-            Label or labels for each dimension, as ``alpha=0.2`` or ``motion=["a", "b"]``; the nearest of numbers.
+            Label or labels for each dimension, as ``alpha=0.2`` or ``alpha=[0.1, 0.2]``; the nearest of numbers.
 
         Returns
         -------
@@ -282,7 +286,7 @@ class DatasetResult(DrawnResult, TableResult):
         Raises
         ------
         InvalidOption
-            If there is no such dimension or label.
+            If there is no such dimension or label, or numbers over all of that dimension stand in the result.
 
         Examples
         --------
@@ -292,6 +296,12 @@ class DatasetResult(DrawnResult, TableResult):
         >>> spectrum.select(alpha=0.2).sizes["alpha"]
         1
         """
+        for name in labels.keys() & {*self.POOLED}:
+            raise InvalidOption(
+                f"some numbers of this result are of all its values of {name} together; compute a part of them anew, "
+                "or take what is of each from `data`",
+                value=labels,
+            )
         wanted = {name: np.atleast_1d(values) for name, values in labels.items()}
         data = self.data
         try:
@@ -304,7 +314,12 @@ class DatasetResult(DrawnResult, TableResult):
             raise InvalidOption(
                 f"there is nothing at {checks.shown(labels)}; the dimensions are {names}", value=labels
             ) from None
-        return type(self)(data)
+        return type(self)(self._kept_of(data))
+
+    @staticmethod
+    def _kept_of(data: xr.Dataset) -> xr.Dataset:
+        """Return the data of a part without what belongs to another part."""
+        return data
 
     def _frame(self, table: str) -> pd.DataFrame:
         return data_frame(self._table(table))
@@ -353,7 +368,7 @@ class DatasetResult(DrawnResult, TableResult):
 
     def _repr_html_(self) -> str:
         html: str = self.data._repr_html_()
-        return f"<p><b>{type(self).__name__}</b>: {self._headline()}</p>{html}"
+        return f"<p><b>{type(self).__name__}</b>: {escape(self._headline())}</p>{html}"
 
 
 def variable(dims: str | tuple[str, ...], values: Any, meaning: str = "", unit: str = "") -> tuple[Any, Any, Any]:

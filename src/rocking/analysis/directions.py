@@ -178,6 +178,7 @@ class ResponseRose(DatasetResult):
             "levels": ("anywhere",),
         }
     )
+    POOLED = ("pair", "azimuth")
 
     def _headline(self) -> str:
         data = self.data

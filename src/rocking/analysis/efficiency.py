@@ -162,6 +162,7 @@ class MeasureComparison(DatasetResult):
             "intensities": ("intensity",),
         }
     )
+    POOLED = ("motion",)
 
     def _order(self) -> Integers:
         """Positions of the measures, the most efficient first."""

@@ -183,6 +183,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
             "bands": ("band_motion", "band_block", "band_start", "band_end"),
         }
     )
+    POOLED = ("motion", "block", "band")
 
     def _table(self, name: str) -> xr.Dataset:
         part = super()._table(name)

@@ -244,6 +244,13 @@ class OverturningMap(DatasetResult):
             "boundaries": ("boundary_frequency", "boundary_amplitude", "mode_below", "mode_above"),
         }
     )
+    POOLED = ("boundary",)
+
+    @staticmethod
+    def _kept_of(data: xr.Dataset) -> xr.Dataset:
+        at, level = data.boundary_frequency.values, data.boundary_amplitude.values
+        low, high = data.amplitude.values.min(), data.amplitude.values.max()
+        return data.isel(boundary=np.isin(at, data.frequency.values) & (low < level) & (level <= high))
 
     def summary(self) -> str:
         modes, counts = np.unique(self.data.mode, return_counts=True)

@@ -41,6 +41,11 @@ def one_sided_restitution(alpha: float) -> float:
     float
         The size of (1 - 1.5 sin(alpha)^2)^2 (1 - 1.5 cos(alpha)^2): 0.47 for a slenderness of 0.1.
 
+    Raises
+    ------
+    InvalidBlock
+        If alpha is no slenderness.
+
     Notes
     -----
     After Sorrentino, AlShawa and Decanini (2011), who measured about as much and less; give a measured value where
@@ -51,7 +56,8 @@ def one_sided_restitution(alpha: float) -> float:
     >>> round(one_sided_restitution(0.1), 4)
     0.4707
     """
-    sine, cosine = math.sin(alpha), math.cos(alpha)
+    angle = checked_parameter(checks.finite(alpha, "alpha", InvalidBlock), "alpha")
+    sine, cosine = math.sin(angle), math.cos(angle)
     return abs((1.0 - 1.5 * sine * sine) ** 2 * (1.0 - 1.5 * cosine * cosine))
 
 
@@ -158,7 +164,10 @@ def _on_leaving(away: Sequence[float], inertia: float, share: float, points: int
     loss = 0.0
     for n in range(1, points):
         x = away[0] - n * step
-        loss += math.log1p(step * x / (inertia + x * x))
+        factor = 1.0 + step * x / (inertia + x * x)
+        if factor <= 0.0:
+            return factor
+        loss += math.log(factor) if factor < 0.5 else math.log1p(step * x / (inertia + x * x))
     return math.exp(loss)
 
 

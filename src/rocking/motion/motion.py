@@ -812,6 +812,8 @@ class Motion:
     def drawing_times(self, start: float, end: float) -> Floats:
         """Return times at which to draw a stretch: ends, breakpoints, and between them where pieces are curved.
 
+        Where the motion jumps there are two times, one just before; its end is a jump to zero.
+
         Parameters
         ----------
         start, end : float
@@ -830,6 +832,9 @@ class Motion:
         corners = self.breakpoints
         if self.coefficients.shape[1] > 2:
             corners = (corners[:-1, None] + np.linspace(0.0, 1.0, _DRAWN) * np.diff(corners)[:, None]).ravel()
+        after = piecewise.jumps_after(self)
+        inner, last = self.breakpoints[1:-1][after[:-1]], self.breakpoints[-1:][after[-1:]]
+        corners = np.concatenate([corners, np.nextafter(inner, -np.inf), np.nextafter(last, np.inf)])
         times = np.union1d([start, end], corners[(corners > start) & (corners < end)])
         return times if self.vertical is None else np.union1d(times, self.vertical.drawing_times(start, end))
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.arrays import Floats, Integers
+from rocking.arrays import Flags, Floats, Integers
 from rocking.constants import HIGHEST_DEGREE
 from rocking.errors import InvalidMotion
 from rocking.motion.exact import exact_product, exact_sum
@@ -63,9 +63,14 @@ def even_step(pieces: Piecewise) -> float | None:
 
 def jumps(pieces: Piecewise) -> bool:
     """Whether a piece starts off the end of the one before, beyond rounding."""
+    return bool(np.any(jumps_after(pieces)[:-1]))
+
+
+def jumps_after(pieces: Piecewise) -> Flags:
+    """Whether what follows each piece starts off its end, beyond rounding: the next piece, or zero after the last."""
     widths, coefficients = np.diff(pieces.breakpoints), pieces.coefficients
-    gaps = np.abs(coefficients[1:, 0] - value(coefficients, widths)[:-1])
-    return bool(np.any(gaps > _JUMP * largest_magnitude(widths, coefficients)))
+    gaps = np.abs(np.append(coefficients[1:, 0], 0.0) - value(coefficients, widths))
+    return gaps > _JUMP * largest_magnitude(widths, coefficients)
 
 
 def samples(pieces: Piecewise) -> tuple[Floats, Floats]:

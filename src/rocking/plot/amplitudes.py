@@ -58,7 +58,7 @@ def duration_figure(*, amplitude: Floats, durations: Mapping[str, Floats], criti
         lower.set_ylabel("relative error")
         lower.set_xlabel(r"amplitude of the ground acceleration, $a = \ddot u_g / (g\alpha)$")
         lower.ticklabel_format(axis="x", useOffset=False)
-        lower.grid()
+        lower.grid(True)
     return figure
 
 

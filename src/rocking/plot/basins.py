@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.arrays import Floats
-from rocking.plot.canvas import ABOVE, INK, add_labels, add_legend, figure_for
+from rocking.plot.canvas import ABOVE, INK, add_labels, add_legend, cell_edges, figure_for
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -57,7 +57,7 @@ def basins_figure(
     colours, norm = ListedColormap(shades), BoundaryNorm(np.arange(len(shades) + 1) - 1.5, len(shades))
     with figure_for(ax, (5.4, 4.6), figsize, title) as figure:
         axes = ax or figure.add_subplot()
-        axes.pcolormesh(x, y, outcome, cmap=colours, norm=norm, shading="nearest", rasterized=True)
+        axes.pcolormesh(cell_edges(x), cell_edges(y), outcome, cmap=colours, norm=norm, rasterized=True)
         handles: list[Artist] = []
         if np.any(outcome < 0):
             handles.append(Patch(facecolor=shades[0], edgecolor=INK, linewidth=0.5, hatch="....", label="not reached"))

@@ -116,7 +116,7 @@ def factors_figure(
         span = max(float(np.ptp(factor)), 0.02)
         axes.set_ylim(float(factor.min()) - 0.4 * span, min(float(factor.max()) + 0.4 * span, 1.05))
         axes.set_xlim(0.0, 1.05 * float(speed.max()))
-        axes.grid()
+        axes.grid(True)
         add_labels(axes, "speed before the impact (rad/s)", "factor on the speed")
         add_legend(figure, ax, handles_of(axes))
     return figure
@@ -135,7 +135,7 @@ def _draw_tests(axes: Axes, probabilities: Floats, overturned: Flags) -> None:
     axes.plot(number[fell], np.ones(fell.sum()), "v", color=ABOVE, label="overturned", **_DOTS)
     axes.plot(number[~fell], np.zeros((~fell).sum()), "o", color=INK, mfc="white", label="did not overturn", **_DOTS)
     axes.set_ylim(0.0, 1.0)
-    axes.grid()
+    axes.grid(True)
     add_labels(axes, "test, by its probability", "probability of overturning")
 
 

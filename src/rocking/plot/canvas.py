@@ -181,11 +181,20 @@ def add_ticks(axes: Axes, places: Floats, height: float, marker: str = "|", **lo
     axes.plot(places, np.full(places.size, height), marker, transform=axes.get_xaxis_transform(), **shown)
 
 
+def cell_edges(x: Floats) -> Floats:
+    """Edges of the cells about some places: midway between them; of one place alone a tenth of it away."""
+    if x.size == 1:
+        half = max(0.1 * abs(float(x[0])), 1e-9)
+        return np.array([x[0] - half, x[0] + half])
+    middles = 0.5 * (x[1:] + x[:-1])
+    return np.concatenate([[2.0 * x[0] - middles[0]], middles, [2.0 * x[-1] - middles[-1]]])
+
+
 def scale_by_ratio(axes: Axes, x: Floats) -> None:
     """Scale an axis that these numbers go along logarithmically, with as many numbers as fit."""
     from matplotlib.ticker import LogLocator, NullFormatter
 
-    decades = float(np.log10(x[-1] / x[0])) if x.size > 1 else 0.0
+    decades = abs(float(np.log10(x[-1] / x[0]))) if x.size > 1 else 0.0
     axes.set_xscale("log")
     axes.xaxis.set_major_locator(LogLocator(subs=_DIGITS if decades < 1.0 else _FEW_DIGITS))
     axes.xaxis.set_major_formatter("{x:g}")

@@ -63,7 +63,7 @@ def fragility_figure(
             axes.plot([], [], linestyle="none", label=band_label)
         axes.plot([], [], "o", color=GROUND, label=_dots(lines), **_DOT)
         axes.set(xlim=(0.0, float(lines[0].intensity[-1])), ylim=(0.0, 1.0))
-        axes.grid()
+        axes.grid(True)
         add_labels(axes, intensity_label, probability_label)
         add_legend(figure, ax, handles_of(axes))
     return figure

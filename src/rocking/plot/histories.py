@@ -302,7 +302,7 @@ def intervals_figure(
             panel.axhline(eta**2, color=ABOVE, linewidth=1.2, linestyle=(0, (5, 1.5)), label=f"η² = {eta**2:.5g}")
             add_labels(panel, "impact", "interval over that two impacts before")
         for panel in panels:
-            panel.grid()
+            panel.grid(True)
             if intervals.size:
                 panel.set_xlim(1.0 - margin, intervals.size + margin)
                 panel.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))

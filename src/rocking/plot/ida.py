@@ -87,7 +87,7 @@ def ida_figure(
         for motion, style in zip(motions, styles, strict=True):
             _draw_ways(curves, motion, style["color"])
         curves.set_ylim(0.0, _highest_shown(motions))
-        curves.grid()
+        curves.grid(True)
         add_labels(curves, "peak rotation / slenderness", level_label)
         for panel in strips:
             _draw_strips(panel, motions, styles if few else [{"color": INK}] * len(motions))
@@ -111,7 +111,7 @@ def levels_reaching(motion: ScaledMotion, peaks: Floats) -> Floats:
     first = np.searchsorted(np.maximum.accumulate(peak), peaks)
     after = np.minimum(first, level.size - 1)
     before = np.maximum(after - 1, 0)
-    rise = np.where(after > before, peak[after] - peak[before], np.inf)
+    rise = np.where(peak[after] > peak[before], peak[after] - peak[before], np.inf)
     between = level[before] + (peaks - peak[before]) / rise * (level[after] - level[before])
     return np.where(first < level.size, between, overturns)
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.plot.boundaries import Stack, runs
-from rocking.plot.canvas import ABOVE, INK, add_labels, add_legend, figure_for, handles_of
+from rocking.plot.canvas import ABOVE, INK, add_labels, add_legend, cell_edges, figure_for, handles_of
 from rocking.tables import as_written
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ def outcome_figure(
     with figure_for(ax, (5.4, 4.2), figsize, title) as figure:
         axes = ax or figure.add_subplot()
         colours, norm = ListedColormap(_COLOURS[:count]), BoundaryNorm(np.arange(count + 1) - 0.5, count)
-        axes.pcolormesh(x, y, outcome, cmap=colours, norm=norm, shading="nearest", rasterized=True)
+        axes.pcolormesh(cell_edges(x), cell_edges(y), outcome, cmap=colours, norm=norm, rasterized=True)
         present = sorted(set(np.unique(outcome).tolist()))
         handles = [_patch((_COLOURS[k], ""), meanings[k]) for k in present]
         if later.any():
@@ -85,7 +85,7 @@ def outcome_figure(
             for ink, width in (("#ffffff", 2.0), (_LATER, 0.9)):
                 with rc_context({"hatch.linewidth": width}):
                     axes.pcolor(
-                        x, y, np.ma.masked_where(~later, outcome), shading="nearest", facecolor="none",
+                        cell_edges(x), cell_edges(y), np.ma.masked_where(~later, outcome), facecolor="none",
                         cmap=ListedColormap(["none"]), hatch="////", edgecolor=ink, linewidth=0.0,
                     )  # fmt: skip
             handles.append(_patch(("#ffffff", "////"), "overturns later"))

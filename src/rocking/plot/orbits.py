@@ -52,7 +52,7 @@ def orbit_figure(
     with figure_for(ax, (7.0, 3.2), figsize, title) as figure:
         plane, history = (ax, None) if ax is not None else figure.subplots(1, 2)
         # Arcs end at impacts: a jump of the velocity is no part of the course.
-        at = np.searchsorted(time, impact_times)
+        at = np.searchsorted(time, impact_times, side="right") - 1  # division may have made two times one
         x, v = (np.insert(each, at, np.nan) for each in (coordinate, velocity))
         plane.plot(x, v, label="orbit", **_STABLE)
         before = np.maximum(at - 1, 0)

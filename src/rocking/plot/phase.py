@@ -37,13 +37,13 @@ def phase_figure(
     """Draw velocity over p times what `limit` names, against the rotation over that.
 
     Both have gaps (NaN) at impacts, which are dotted lines between the velocities of `jumps`, shape (n, 2), at no
-    rotation; uplift and rest are at the origin. `boundary` parts what overturns without shaking from what does not.
+    rotation; uplift and rest are at the origin. `boundary` has the states with as much energy as at the balance.
     """
     with figure_for(ax, (4.6, 4.2), figsize, title) as figure:
         axes = figure.add_subplot() if ax is None else ax
         axes.axhline(0.0, color=INK, linewidth=0.4)
         axes.axvline(0.0, color=INK, linewidth=0.4)
-        axes.plot(*boundary, label="overturns beyond, if nothing shakes", **_BOUNDARY)
+        axes.plot(*boundary, label="as much energy as at the balance", **_BOUNDARY)
         if len(jumps):
             x = np.zeros(3 * len(jumps))
             axes.plot(x, np.insert(jumps, 2, np.nan, axis=1).ravel(), label="impact", **_JUMP)
@@ -93,7 +93,7 @@ def energy_figure(
         axes.plot(impact_times, np.zeros(impact_times.size), "|", color=INK, markersize=6, markeredgewidth=0.5)
         levels = sorted({level for level in needed if math.isfinite(level) and level < 1.6 * top})
         for level in levels:
-            axes.axhline(level, label="" if level != levels[0] else "overturns beyond, if nothing shakes", **_BOUNDARY)
+            axes.axhline(level, label="" if level != levels[0] else "as much energy as at the balance", **_BOUNDARY)
         axes.set_xlim(time[0], time[-1])
         axes.set_ylim(0.0, 1.08 * max([min(top, 2.0 * max([1.0, *levels])), *levels]))
         add_labels(axes, "time (s)", "energy / least that overturns")

@@ -275,7 +275,7 @@ def _draw_sequence(axes: Axes, sequence: DrawnSequence) -> None:
     axes.loglog(rest - start[shown], interval[shown], "o", **look)
     axes.invert_xaxis()
     add_labels(axes, "time to rest (s)", "interval to next impact (s)")
-    axes.grid()
+    axes.grid(True)
     width = sequence.rest_upper - sequence.rest_lower
     decimals = 6 if sequence.off < 1e-6 else max(0, math.floor(-math.log10(sequence.off)))
     axes.set_title(f"A: at rest at {rest:.{decimals}f}\N{NO-BREAK SPACE}s", color=ABOVE, loc="left", wrap=True)

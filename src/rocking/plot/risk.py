@@ -67,7 +67,7 @@ def risk_figure(
         scale_by_ratio(shares, intensity[shown])
         shares.set(xlim=(float(intensity[shown][0]), float(intensity[shown][-1])))
         shares.set_ylim(bottom=0.0)
-        shares.grid()
+        shares.grid(True)
         add_labels(shares, intensity_label, "share of the rate per factor of e")
         add_legend(figure, ax, handles_of(*panels))
     return figure
@@ -101,7 +101,7 @@ def survival_figure(
         if hazard is not None:
             lowest, highest = min(lowest, float(hazard.rate.min())), float(hazard.rate.max())
         axes.set(xlim=(float(intensity[0]), float(intensity[-1])), ylim=(0.5 * lowest, min(_MARGIN * highest, 10.0)))
-        axes.grid()
+        axes.grid(True)
         add_labels(axes, intensity_label, "exceeded, times a year")
         add_legend(figure, ax, handles_of(axes))
     return figure
@@ -118,5 +118,5 @@ def _draw_hazard(axes: Axes, intensity: Floats, hazard: HazardLine) -> None:
     axes.plot(intensity, hazard.rate, color=GROUND, linewidth=1.0, linestyle=":")
     axes.plot(intensity[inside], hazard.rate[inside], color=GROUND, linewidth=2.0, label=label)
     axes.set_yscale("log")
-    axes.grid()
+    axes.grid(True)
     add_labels(axes, "", "exceeded, times a year")

@@ -90,7 +90,7 @@ def _draw(axes: Axes, curves: Sequence[SchemeCurve], errors: Sequence[Floats]) -
     else:
         axes.set_xscale("log")
     axes.set_yscale("log")
-    axes.grid()
+    axes.grid(True)
     ends = []
     for curve, error, style, mark in zip(curves, errors, styles_of(len(curves)), _MARKS, strict=False):
         seen = error > 0.0  # not NaN

@@ -84,7 +84,7 @@ def spectrum_figure(
             for panel in shares:
                 panel.step(x, curve.overturned, where="mid", linewidth=1.2, **style)
         for panel in panels:
-            panel.grid(which="both")
+            panel.grid(True, which="both")
         scale_by_ratio(panels[-1], x)
         peaks.set_ylim(bottom=0.0)
         add_labels(peaks, "" if shares else x_label, "peak rotation / slenderness")
@@ -125,8 +125,9 @@ def _draw(axes: Axes, x: Floats, values: Floats, style: dict[str, Any]) -> None:
 
 
 def _ends(finite: Flags) -> Flags:
-    """Points with a value beside which there is one without."""
-    before, after = np.append(True, finite[:-1]), np.append(finite[1:], True)
+    """Points with a value beside which there is one without; one alone is an end, too."""
+    alone = finite.size == 1
+    before, after = np.append(not alone, finite[:-1]), np.append(finite[1:], not alone)
     ends: Flags = finite & ~(before & after)
     return ends
 

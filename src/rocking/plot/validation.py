@@ -87,7 +87,7 @@ def _draw_reliability(axes: Axes, bars: Bars) -> None:
         bars.predicted, bars.observed, "o-", color=INK, linewidth=0.9, markersize=4.0, clip_on=False, label="observed"
     )
     axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
-    axes.grid()
+    axes.grid(True)
     add_labels(axes, "predicted probability of overturning", "share that overturned")
 
 
@@ -121,7 +121,7 @@ def _draw_peaks(axes: Axes, peaks: PeaksPlot) -> None:
     axes.vlines(at, low, high, color=INK, linewidth=0.6, label="90 % of the blocks that stand")
     axes.plot(at, middle, "s", color=INK, mfc="white", markersize=3.2, label="their median")
     axes.set(xlim=(0.0, top), ylim=(0.0, top))
-    axes.grid()
+    axes.grid(True)
     add_labels(axes, "measured peak rotation (rad)", "predicted peak rotation (rad)")
 
 

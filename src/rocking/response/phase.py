@@ -95,9 +95,9 @@ def course_of(response: Answers, start: float, end: float) -> Course:
 
 
 def boundary_of(response: Answers) -> tuple[Floats, Floats]:
-    """Rotations and velocities, in units of a `Course`, that part what overturns from what does not if nothing shakes.
+    """Rotations and velocities, in units of a `Course`, with as much energy as at the balance.
 
-    Not a number between its branches.
+    What moves outwards beyond them overturns if nothing shakes. Not a number between its branches.
     """
     energy, gap = energy_in(response), np.array([np.nan])
     x: list[Floats] = []

@@ -73,10 +73,11 @@ class Response(Answers, DrawnResult):
     def _repr_html_(self) -> str:
         start, end = export.active_span(self)
         times = export.drawing_times(self, start, end)
-        coordinate, balance = self.body.coordinate, min(self.balance)
+        coordinate, (plus, minus) = self.body.coordinate, self.balance
         drawn, label = self.states(times)[:, 0], f"{coordinate.name} ({coordinate.unit})"
-        if coordinate.limit and math.isfinite(balance):
-            drawn = np.clip(drawn / balance, -_HIGHEST_PICTURED, _HIGHEST_PICTURED)
+        if coordinate.limit and math.isfinite(min(plus, minus)):
+            drawn = drawn / np.where((drawn >= 0.0) & math.isfinite(plus) | (not math.isfinite(minus)), plus, minus)
+            drawn = np.clip(drawn, -_HIGHEST_PICTURED, _HIGHEST_PICTURED)
             label = f"{coordinate.name} / {coordinate.limit}"
         return svg.captioned(f"Response: {self._headline()}", svg.history(times, drawn, label))
 
@@ -338,7 +339,7 @@ class Response(Answers, DrawnResult):
         title: str = "",
         figsize: tuple[float, float] | None = None,
     ) -> Figure:
-        """Figure of the velocity against the rotation, with impacts as jumps and what overturns if nothing shakes.
+        """Figure of the velocity against the rotation, with impacts as jumps and the energy of the balance.
 
         Rotations are over the slenderness of their side (of a restrained block over its balance), velocities over p
         times that.

@@ -121,7 +121,6 @@ class Calibration(DrawnResult, TableResult):
     """
 
     TABLES = ("ensemble",)
-    _FORMAT = "%.10g"
 
     blocks: Blocks
     weights: Floats

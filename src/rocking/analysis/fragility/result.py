@@ -71,7 +71,6 @@ class Fragility(DrawnResult, TableResult):
     """
 
     TABLES = ("curves", "outcomes")
-    _FORMAT = "%.10g"
 
     curves: tuple[FragilityCurve, ...]
     measure: Measure
