@@ -118,16 +118,15 @@ def _draw_family(
 
 def _draw(axes: Axes, x: Floats, values: Floats, style: dict[str, Any]) -> None:
     """Draw a line with gaps where its values are infinite, and mark its ends there."""
-    axes.plot(x, _cut(values), **style)
+    axes.plot(x, _cut(values), **style, **({"marker": "o", "markersize": 4.0} if x.size == 1 else {}))
     ends = _ends(np.isfinite(values))
     if ends.any():
         axes.plot(x[ends], values[ends], color=style["color"], **_END)
 
 
 def _ends(finite: Flags) -> Flags:
-    """Points with a value beside which there is one without; one alone is an end, too."""
-    alone = finite.size == 1
-    before, after = np.append(not alone, finite[:-1]), np.append(finite[1:], not alone)
+    """Points with a value beside which there is one without."""
+    before, after = np.append(True, finite[:-1]), np.append(finite[1:], True)
     ends: Flags = finite & ~(before & after)
     return ends
 
