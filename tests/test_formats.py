@@ -975,6 +975,16 @@ def test_traces_with_gaps_or_without_numbers_are_refused(
         assert what in complaint(path, units="g")
 
 
+def test_files_say_when_their_first_sample_is(file: Callable[[bytes], Path]) -> None:
+    obspy = pytest.importorskip("obspy")
+    buffer, header = io.BytesIO(), {"station": "X", "channel": "HNE", "delta": 0.01}
+    header["starttime"] = obspy.UTCDateTime(1999, 1, 2, 18, 0, 19, 870000)
+    obspy.Stream([obspy.Trace(np.arange(50, dtype=np.int32), header)]).write(buffer, format="MSEED")
+    (trace,) = channels(file(buffer.getvalue()), units="g")
+    (esm,) = channels(written.FOLDER / "esm.asc")
+    assert trace.start == pytest.approx(esm.start, abs=1e-6) and pickle.loads(pickle.dumps(esm)).start == esm.start
+
+
 def test_a_trace_in_pieces_is_refused(file: Callable[[bytes], Path]) -> None:
     obspy = pytest.importorskip("obspy")
     buffer, header = io.BytesIO(), {"station": "X", "channel": "HNE", "delta": 0.01}

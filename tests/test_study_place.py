@@ -33,6 +33,17 @@ def test_an_object_is_on_the_disk_before_it_has_its_name(tmp_path: Path, monkeyp
     assert (tmp_path / "c.0.1").read_bytes() == b"outcomes"
 
 
+@pytest.mark.parametrize("when", ["fsync", "replace"])
+def test_an_interrupt_leaves_no_part_of_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, when: str) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(*((os, "fsync") if when == "fsync" else (Path, "replace")), interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        Folder(tmp_path).put("c.0.1", b"outcomes")
+    assert not [*tmp_path.iterdir()]
+
+
 @pytest.mark.skipif(os.name == "nt", reason="there the folder says who may read its files")
 @pytest.mark.parametrize(("umask", "mode"), [(0o022, 0o644), (0o002, 0o664), (0o077, 0o600)])
 def test_who_may_read_a_study_is_for_the_umask_to_say(tmp_path: Path, umask: int, mode: int) -> None:

@@ -9,7 +9,7 @@ import pytest
 from rocking.errors import UnreadableRecord
 from rocking.motion.formats import channels, identify, read
 from rocking.motion.named import named_motion, named_vertical
-from rocking.plausibility import reading_notes
+from rocking.plausibility import reading_notes, vertical_notes
 
 G = 9.80665
 FT, IN = 0.3048, 0.0254
@@ -290,3 +290,16 @@ def test_a_column_is_found_by_its_name_before_its_number(tmp_path):
     path.write_text("t (s),2 (g),1 (g)\n0,0,0\n0.01,0.1,0.2\n0.02,0,0\n")
     by_name, by_number = (read(path, channel=channel).pga / 9.80665 for channel in ("2", 2))
     assert (by_name, by_number) == pytest.approx((0.1, 0.2))
+
+
+def test_components_that_begin_apart_are_noted(tmp_path):
+    path = tmp_path / "table.csv"
+    both = [f"{0.01 * k:.2f},{k % 3},{0.01 * k + 0.2:.2f},{(k + 1) % 3}" for k in range(50)]
+    path.write_text("t1 (s),a1 (g),t2 (s),a2 (g)\n" + "\n".join(both) + "\n")
+    found = named_motion(str(path), channel="a1").with_vertical(named_vertical("a2", str(path), channel="a1"))
+    (note,) = (each for each in vertical_notes(found) if "begins" in each)
+    assert "by its file the vertical motion begins 0.2 s after the horizontal one" in note
+    assert not [each for each in vertical_notes(found.delayed(0.2)) if "begins" in each]
+    path.write_text("t (s),a1 (g),a2 (g)\n" + "\n".join(f"{0.01 * k:.2f},{k % 3},{(k + 1) % 3}" for k in range(50)))
+    found = named_motion(str(path), channel="a1").with_vertical(named_vertical("a2", str(path), channel="a1"))
+    assert vertical_notes(found) == ()

@@ -37,6 +37,9 @@ class Origin:
         Units of the numbers in the file, as it spells them.
     heading_units : str
         Units that the heading of a text table names, where it has one.
+    start : float or None
+        Instant of the first sample by the file's own clock, s; None where that is not known, or the motion was delayed
+        or cut.
     reversed : bool
         Whether the motion is the opposite of what `channel` says; `azimuth` is that of the motion.
     """
@@ -50,6 +53,7 @@ class Origin:
     azimuth: float | None = None
     units: str = ""
     heading_units: str = ""
+    start: float | None = None
     reversed: bool = False
 
     @property
@@ -156,7 +160,8 @@ class Description:
         <Description: delayed sine>
         """
         family = self.family if self.family.startswith(f"{how} ") else f"{how} {self.family}"
-        return replace(self, family=family)
+        origin = None if self.origin is None else replace(self.origin, start=None)
+        return replace(self, family=family, origin=origin)
 
 
 def labelled(name: str, history: Sequence[str], vertical: str = "") -> str:

@@ -118,7 +118,7 @@ def _draw_family(
 
 def _draw(axes: Axes, x: Floats, values: Floats, style: dict[str, Any]) -> None:
     """Draw a line with gaps where its values are infinite, and mark its ends there."""
-    axes.plot(x, _cut(values), **style, **({"marker": "o", "markersize": 4.0} if x.size == 1 else {}))
+    axes.plot(x, _cut(values), marker="o" if x.size == 1 else "", markersize=4.0, **style)
     ends = _ends(np.isfinite(values))
     if ends.any():
         axes.plot(x[ends], values[ends], color=style["color"], **_END)

@@ -90,12 +90,8 @@ class Folder:
         target = self.path / name
         with _refused("written", target, kept="; nothing of it was kept"):
             target.parent.mkdir(parents=True, exist_ok=True)
-            written = _written(target.parent, data)
-            try:
+            with _written(target.parent, data) as written:
                 written.replace(target)
-            except OSError:
-                written.unlink(missing_ok=True)
-                raise
             _flush_folder(target.parent)
 
     def get(self, name: str) -> bytes | None:
@@ -193,8 +189,9 @@ def _holder(file: IO[bytes]) -> str:
     return file.read().decode(errors="replace").strip()
 
 
-def _written(folder: Path, data: bytes) -> Path:
-    """Temporary file of these bytes, on the disk; who may read it is for the process's umask to say."""
+@contextlib.contextmanager
+def _written(folder: Path, data: bytes) -> Iterator[Path]:
+    """Give a file of these bytes, on the disk, which goes unless it is renamed; the umask says who may read it."""
     part = folder / f".{uuid.uuid4().hex}{_PART}"
     try:
         with part.open("xb") as file:
@@ -202,10 +199,9 @@ def _written(folder: Path, data: bytes) -> Path:
             file.flush()
             os.fsync(file.fileno())
             _drop_from_cache(file.fileno())
-    except OSError:
+        yield part
+    finally:
         part.unlink(missing_ok=True)
-        raise
-    return part
 
 
 def _drop_from_cache(handle: int) -> None:

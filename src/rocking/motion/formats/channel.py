@@ -121,6 +121,8 @@ class Channel:
         As the file gives them, or empty.
     metadata : mapping of str to str
         Other facts: format, file, location, what was kept, ...
+    start : float or None
+        Instant of the first sample by the file's own clock, s; None where that is not known.
 
     Raises
     ------
@@ -143,6 +145,7 @@ class Channel:
     station: str = ""
     event: str = ""
     metadata: Mapping[str, str] = field(default_factory=dict)
+    start: float | None = None
 
     def __post_init__(self) -> None:
         if (self.dt is None) == (self.times is None):
@@ -154,7 +157,7 @@ class Channel:
 
     def __reduce__(self) -> tuple[Any, ...]:
         samples = (self.name, self.number, self.acceleration, self.dt, self.times)
-        return Channel, (*samples, self.azimuth, self.units, self.station, self.event, dict(self.metadata))
+        return Channel, (*samples, self.azimuth, self.units, self.station, self.event, dict(self.metadata), self.start)
 
     def __repr__(self) -> str:
         taken = f"in steps of {self.dt:g} s" if self.dt is not None else "at uneven times"
@@ -198,6 +201,7 @@ class Channel:
             azimuth=self.azimuth,
             units=self.units,
             heading_units=self.metadata.get("heading units", ""),
+            start=self.start,
         )
 
     def _facts(self) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import re
+from datetime import datetime
 
 from rocking.motion.formats.channel import Channel, Identification, Recognised, to_acceleration
 from rocking.motion.formats.source import Entry, Request, Source
@@ -50,8 +51,17 @@ def _read(source: Source, entries: dict[str, Entry], start: int, request: Reques
             station=".".join(text[key] for key in ("NETWORK", "STATION_CODE") if key in text),
             event=text.get("EVENT_ID", text.get("EVENT_NAME", "")),
             metadata={"format": NAME, "file": source.file, **processing},
+            start=_start(text.get("DATE_TIME_FIRST_SAMPLE_YYYYMMDD_HHMMSS", "")),
         )
     ]
+
+
+def _start(written: str) -> float | None:
+    """Return the instant that a file writes, s since 1970; None where it is not understood."""
+    try:
+        return datetime.strptime(f"{written}+0000", "%Y%m%d_%H%M%S.%f%z").timestamp()
+    except ValueError:
+        return None
 
 
 def _entries(source: Source) -> tuple[dict[str, Entry], int]:

@@ -180,7 +180,8 @@ def _read(source: Source, shape: _Shape, heading: Heading, request: Request) -> 
         )
         facts = {"format": NAME, "file": source.file} | _heading_units(column)
         name = source.stem if shape.columns <= 2 and len(held) == 1 else column.name
-        channels.append(Channel(name, number, acceleration, dt, times, units=unit.name, metadata=facts))
+        start = _start(heading, table, place)
+        channels.append(Channel(name, number, acceleration, dt, times, units=unit.name, metadata=facts, start=start))
     return channels
 
 
@@ -446,14 +447,25 @@ def _first_bad(source: Source, rows: list[_Row], shape: _Shape) -> UnreadableRec
     raise AssertionError("among rows that do not convert one is bad")
 
 
+def _time_column(heading: Heading, place: int) -> int | None:
+    """Column of times of a channel: the nearest before it, or else the first; None without one."""
+    columns = heading.places("time")
+    return max((each for each in columns if each < place), default=columns[0]) if columns else None
+
+
+def _start(heading: Heading, table: Floats, place: int) -> float | None:
+    column = _time_column(heading, place)
+    unit = None if column is None else heading.columns[column].unit
+    return None if unit is None or column is None else float(unit.to_si(table[:1, column])[0])
+
+
 def _timing(
     source: Source, request: Request, shape: _Shape, heading: Heading, table: Floats, place: int
 ) -> tuple[float | None, Floats | None]:
     """Return step or times (s) of a column: those in the nearest column of times before it, or else the first one."""
-    columns = heading.places("time")
-    if not columns:
+    column = _time_column(heading, place)
+    if column is None:
         return request.dt, None
-    column = max((each for each in columns if each < place), default=columns[0])
     unit = heading.columns[column].unit
     assert unit is not None
     written = table[:, column]

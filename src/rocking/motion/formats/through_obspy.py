@@ -81,6 +81,7 @@ def _channel(source: Source, request: Request, unit: Unit, trace: Any, form: str
         units=unit.name,
         station=station,
         metadata={"format": form, "file": source.file},
+        start=float(stats.starttime.timestamp),
     )
 
 
