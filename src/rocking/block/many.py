@@ -147,6 +147,9 @@ class Blocks:
     def of(cls, blocks: Blocks | Block | Iterable[Block]) -> Blocks:
         """Gather single blocks, all under the same gravity; what is gathered already stays as it is.
 
+        Many blocks know p, alpha and restitution, which decide all motion, but not their sizes: a block that is taken
+        out again has those of a rectangle, as by `Block.from_parameters`, and so have its forces on the ground.
+
         Parameters
         ----------
         blocks : Block, iterable of Block, or Blocks
