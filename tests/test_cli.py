@@ -2,6 +2,7 @@
 
 import contextlib
 import gc
+import importlib
 import inspect
 import json
 import os
@@ -239,6 +240,32 @@ def test_what_is_dropped_after_an_interrupt_is_not_printed(monkeypatch, interrup
         finally:
             Failing()
     assert [each.exc_type for each in told] == [KeyError] * (not interrupted)
+
+
+@pytest.mark.parametrize("swallowed", [1, 3])
+def test_an_interrupt_that_an_import_catches_comes_again(tmp_path, monkeypatch, swallowed):
+    (tmp_path / "greedy.py").write_text(
+        "import signal, time\ncaught = []\n"
+        "def wait():\n    late = time.monotonic() + 60.0\n"
+        "    while time.monotonic() < late:\n        time.sleep(0.001)\n"
+        "try:\n    signal.raise_signal(signal.SIGINT)\nexcept BaseException as error:\n    caught.append(error)\n"
+        f"for _ in range({swallowed - 1}):\n    try:\n        wait()\n    except BaseException as error:\n"
+        "        caught.append(error)\nwait()\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    start = time.monotonic()
+    with pytest.raises(KeyboardInterrupt), Interrupts() as interrupts:
+        importlib.import_module("greedy")
+    assert interrupts.asked and time.monotonic() - start < 50.0
+
+
+def test_an_interrupt_that_gets_through_an_import_comes_once(tmp_path, monkeypatch):
+    (tmp_path / "plain.py").write_text("import signal\nsignal.raise_signal(signal.SIGINT)\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with Interrupts():
+        with pytest.raises(KeyboardInterrupt):
+            importlib.import_module("plain")
+        time.sleep(0.2)  # what has caught it goes on undisturbed
 
 
 def test_what_an_interrupt_leaves_half_made_is_given_up_before_the_end(monkeypatch, capsys):

@@ -7,6 +7,7 @@ import gc
 import signal
 import sys
 import threading
+from collections.abc import Callable
 from types import FrameType, TracebackType
 from typing import Any, Final, Self
 
@@ -17,9 +18,9 @@ _AGAIN: Final = 0.02
 class Interrupts:
     """What became of Ctrl-C within a block of code.
 
-    Python drops an exception that is raised in a finaliser or in a callback, and a library that calls Python may raise
-    another in its place. The first is raised again; for the second, `asked` says where the error comes from. What
-    Python drops of the second kind is not printed.
+    Python drops an exception that is raised in a finaliser or in a callback, a library that is imported may catch it,
+    and one that calls Python may raise another in its place. The first two are raised again; for the third, `asked`
+    says where the error comes from. What Python drops of that kind is not printed.
 
     Attributes
     ----------
@@ -30,6 +31,9 @@ class Interrupts:
     def __init__(self) -> None:
         self.asked = False
         self._again: threading.Timer | None = None
+        #: The import that was interrupted, and whether it is asked now whether that goes on.
+        self._import: FrameType | None = None
+        self._asks = False
 
     def __enter__(self) -> Self:
         # Other threads get no signals, and who listens already keeps what he listens with.
@@ -44,6 +48,7 @@ class Interrupts:
         if self._listens:
             if self._again is not None:
                 self._again.cancel()
+            self._import = None
             if self.asked and error is not None:
                 error.__context__ = None  # what was half made is given up here, where nothing of it is printed
                 gc.collect()
@@ -51,12 +56,46 @@ class Interrupts:
             signal.signal(signal.SIGINT, signal.default_int_handler)
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
+        asks, self._asks = self._asks, False
+        if asks and self._import not in _frames(frame):
+            self._import = None  # the interrupt got through
+            return
         self.asked = True
+        self._import = next((each for each in reversed(_frames(frame)) if _is_imported(each)), None)
+        if self._import is not None:
+            self._later(self._ask)
         raise KeyboardInterrupt
+
+    def _ask(self) -> None:
+        self._asks = True
+        _thread.interrupt_main()
+
+    def _later(self, call: Callable[[], None]) -> None:
+        self._again = threading.Timer(_AGAIN, call)
+        self._again.daemon = True
+        self._again.start()
 
     def _dropped(self, unraisable: Any) -> None:
         if issubclass(unraisable.exc_type, KeyboardInterrupt):
-            self._again = threading.Timer(_AGAIN, _thread.interrupt_main)
-            self._again.start()
+            self._later(_thread.interrupt_main)
         elif not self.asked:
             self._before(unraisable)
+
+
+def _frames(frame: FrameType | None) -> list[FrameType]:
+    """Frames that are executed, from the innermost to the outermost."""
+    found = []
+    while frame is not None:
+        found.append(frame)
+        frame = frame.f_back
+    return found
+
+
+def _is_imported(frame: FrameType) -> bool:
+    """Whether a frame is that of a module which is being imported."""
+    caller = frame.f_back
+    return (
+        frame.f_code.co_name == "<module>"
+        and caller is not None
+        and caller.f_code.co_filename.startswith("<frozen importlib")
+    )
