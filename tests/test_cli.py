@@ -259,6 +259,19 @@ def test_an_interrupt_that_an_import_catches_comes_again(tmp_path, monkeypatch, 
     assert interrupts.asked and time.monotonic() - start < 50.0
 
 
+def test_an_interrupt_that_the_end_of_an_import_catches_comes_again(tmp_path, monkeypatch):
+    (tmp_path / "hasty.py").write_text(
+        "import signal\ntry:\n    signal.raise_signal(signal.SIGINT)\nexcept BaseException:\n    pass\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    late = time.monotonic() + 60.0
+    with pytest.raises(KeyboardInterrupt), Interrupts():
+        importlib.import_module("hasty")
+        while time.monotonic() < late:
+            time.sleep(0.001)
+    assert time.monotonic() < late
+
+
 def test_an_interrupt_that_gets_through_an_import_comes_once(tmp_path, monkeypatch):
     (tmp_path / "plain.py").write_text("import signal\nsignal.raise_signal(signal.SIGINT)\n")
     monkeypatch.syspath_prepend(tmp_path)

@@ -31,7 +31,7 @@ class Interrupts:
     def __init__(self) -> None:
         self.asked = False
         self._again: threading.Timer | None = None
-        #: The import that was interrupted, and whether it is asked now whether that goes on.
+        #: The import that was interrupted, and whether it is asked now what became of it.
         self._import: FrameType | None = None
         self._asks = False
 
@@ -57,7 +57,7 @@ class Interrupts:
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
         asks, self._asks = self._asks, False
-        if asks and self._import not in _frames(frame):
+        if asks and not _is_whole(self._import):
             self._import = None  # the interrupt got through
             return
         self.asked = True
@@ -71,6 +71,8 @@ class Interrupts:
         _thread.interrupt_main()
 
     def _later(self, call: Callable[[], None]) -> None:
+        if self._again is not None:
+            self._again.cancel()
         self._again = threading.Timer(_AGAIN, call)
         self._again.daemon = True
         self._again.start()
@@ -80,6 +82,14 @@ class Interrupts:
             self._later(_thread.interrupt_main)
         elif not self.asked:
             self._before(unraisable)
+
+
+def _is_whole(imported: FrameType | None) -> bool:
+    """Whether the module of a frame is still there: an import that an exception ends takes it away again."""
+    if imported is None:
+        return False
+    module = sys.modules.get(imported.f_globals.get("__name__", ""))
+    return module is not None and vars(module) is imported.f_globals
 
 
 def _frames(frame: FrameType | None) -> list[FrameType]:
