@@ -224,3 +224,9 @@ def test_braces_in_a_value_are_no_place_of_a_name():
     assert error.text(lambda name: f"--{name}") == "a{}b and '{}' need --dt, not {}"
     with pytest.raises(InvalidBlock, match=r"not as '\{\}': width and height for the full sizes"):
         Block("{}")
+
+
+def test_a_sentence_shows_both_ends_of_a_long_word():
+    error = InvalidOption("{} takes a number, not " + "9" * 3000 + "x", "dt", value="9" * 3000 + "x")
+    assert str(error) == "dt takes a number, not " + "9" * 200 + "..." + "9" * 199 + "x"
+    assert len(error.value) == 3001

@@ -20,8 +20,8 @@ _PLACE: Final = re.compile(r"\{\{\}\}|\{\}")
 #: What a command says that Ctrl-C has ended.
 INTERRUPTED: Final = "rocking: this was interrupted; every file that it wrote is whole"
 
-#: Longest path that is shown whole, in characters.
-_LONGEST_PATH: Final = 400
+#: Longest path or word that a sentence shows whole, in characters.
+_LONGEST_WORD: Final = 400
 
 #: How a name of an argument is written: the command line writes its option, a page the label of its field.
 Spelling = Callable[[str], str]
@@ -30,6 +30,12 @@ Spelling = Callable[[str], str]
 def as_argument(name: str) -> str:
     """Write the name of an argument as Python does."""
     return name
+
+
+def _shortened(text: str) -> str:
+    """Show both ends of a long word: nobody reads thousands of digits."""
+    half = _LONGEST_WORD // 2
+    return text if len(text) <= _LONGEST_WORD else f"{text[:half]}...{text[-half:]}"
 
 
 def literal(text: str) -> str:
@@ -61,9 +67,8 @@ class Message:
         '--sa needs --period, in s'
         """
         names = map(spelling, self.arguments)
-        return " ".join(
-            _PLACE.sub(lambda place: "{}" if place[0] == "{{}}" else next(names, "{}"), self.template).split()
-        )
+        sentence = _PLACE.sub(lambda place: "{}" if place[0] == "{{}}" else next(names, "{}"), self.template)
+        return " ".join(map(_shortened, sentence.split()))
 
     def __str__(self) -> str:
         return self.text()
@@ -138,8 +143,7 @@ class RockingError(Exception):
         """
         if self.path is None:
             return self.message.text(spelling)
-        half = _LONGEST_PATH // 2
-        path = self.path if len(self.path) <= _LONGEST_PATH else f"{self.path[:half]}...{self.path[-half:]}"
+        path = _shortened(self.path)
         where = path if self.line is None else f"{path}, line {self.line}"
         return f"{where}: {self.message.text(spelling)}"
 
