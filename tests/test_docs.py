@@ -391,3 +391,25 @@ def test_the_page_and_the_help_say_how_far_an_ida_goes(capsys):
     found = rocking.incremental_dynamic_analysis(block, motions, tolerance=1e-2)
     by_which = float(found.overturning_level.max())
     assert 3.0 / 1.05 <= float(found.level[-1]) / by_which <= 3.0 * 1.05**2
+
+
+def test_the_readme_tells_what_the_last_run_has_judged():
+    rows = [
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for line in (ROOT / "docs" / "_tables" / "reliability-all.txt").read_text("utf-8").splitlines()[2:]
+    ]
+    judged = {row[0]: int(row[3]) for row in rows}
+    readme = (ROOT / "README.md").read_text("utf-8")
+    told = [
+        name
+        for name in (
+            "rotation, times and peak within the stated error",
+            "no event missed, none made up",
+            "rest inside its bracket, at a bounded cost",
+        )
+        if f"{judged[name]:,}" in readme
+    ]
+    assert len(told) == 3
+    events = (ROOT / "docs" / "_tables" / "reliability-events.txt").read_text("utf-8").splitlines()[2:]
+    missed = sum(int(row.strip("|").split("|")[5].split("/")[0]) for row in events)
+    assert f"{missed:,} of them SciPy" in readme

@@ -145,7 +145,9 @@ class Folder:
                     _unlock(file)
 
     def holder(self) -> str:
-        """Read the lock, where somebody holds it."""
+        """Read the lock, where somebody holds it; none is made to be looked at."""
+        if not (self.path / _LOCK).exists():
+            return ""
         with contextlib.suppress(OSError), self._lock_file() as file:  # who may not write here does not run it
             if not _lock(file):
                 return _holder(file)
