@@ -4,7 +4,6 @@ import pickle
 import re
 import subprocess
 import sys
-from dataclasses import replace
 from fractions import Fraction
 from xml.etree import ElementTree
 
@@ -18,10 +17,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion import pulses, records
-from rocking.motion.description import Origin
 from rocking.motion.motion import Description, Motion
 from rocking.motion.scaling import Measure
-from rocking.plausibility import vertical_notes
 
 values = st.floats(-10.0, 10.0).map(lambda x: round(x, 3))
 
@@ -579,20 +576,6 @@ def test_a_reversed_record_points_the_other_way():
     times = np.linspace(0.0, 20.0, 501)
     assert turned.acceleration(times) == pytest.approx(east.acceleration(times), abs=1e-12)
     assert not turned.description.origin.reversed
-
-
-@pytest.mark.parametrize("channel", ["DWN", "Down", "down (Sta Chn: 3)", "DN"])
-def test_a_vertical_record_that_is_positive_downwards_is_turned_round(channel):
-    horizontal = records.load("el-centro-meloland-270")
-    up = records.load("el-centro-meloland-up")
-    down = replace(-up, description=replace(up.description, origin=Origin(channel=channel)))
-    both = horizontal.with_vertical(down)
-    assert np.array_equal(both.vertical.coefficients, up.coefficients)
-    assert f"turned upwards, as its channel is called {channel!r}" in both.vertical.history
-    assert horizontal.with_vertical(both.vertical).vertical is both.vertical  # not a second time
-    assert np.array_equal(horizontal.with_vertical(-down).vertical.coefficients, up.coefficients)
-    assert vertical_notes(both) == ()
-    assert horizontal.with_vertical(up).vertical is up
 
 
 def test_a_drawing_shows_jumps_where_they_are():

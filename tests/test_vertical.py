@@ -1,5 +1,6 @@
 """Vertical ground motion: the weight changes with 1 + a_v/g, in both models and in all that follows from them."""
 
+import dataclasses
 import json
 import math
 import pickle
@@ -23,6 +24,7 @@ from rocking.explorer.maps import grid_of, parts
 from rocking.explorer.uploads import UploadStore
 from rocking.kernels import state
 from rocking.kernels.certificate import arc_bounds, bounds_on_motion, prove_rest, side_bounds
+from rocking.motion.description import Origin
 from rocking.motion.exceedance import exceedances, lifting_factors
 from rocking.plausibility import vertical_notes
 from rocking.problem import ground_of, rules_of
@@ -694,3 +696,17 @@ def test_a_grazing_turn_of_a_block_that_has_weight_is_no_touch_in_doubt() -> Non
         )
         assert response.rotation(0.5) == pytest.approx(6.727e-5, abs=1e-8)
         assert response.ambiguities == ()
+
+
+@pytest.mark.parametrize("channel", ["DWN", "Down", "down (Sta Chn: 3)", "DN"])
+def test_a_vertical_record_that_is_positive_downwards_is_turned_round(channel):
+    horizontal = rocking.records.load("el-centro-meloland-270")
+    up = rocking.records.load("el-centro-meloland-up")
+    down = dataclasses.replace(-up, description=dataclasses.replace(up.description, origin=Origin(channel=channel)))
+    both = horizontal.with_vertical(down)
+    assert np.array_equal(both.vertical.coefficients, up.coefficients)
+    assert f"turned upwards, as its channel is called {channel!r}" in both.vertical.history
+    assert horizontal.with_vertical(both.vertical).vertical is both.vertical  # not a second time
+    assert np.array_equal(horizontal.with_vertical(-down).vertical.coefficients, up.coefficients)
+    assert vertical_notes(both) == ()
+    assert horizontal.with_vertical(up).vertical is up

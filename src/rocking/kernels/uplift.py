@@ -105,8 +105,11 @@ def is_hardly_pushed(ground: Ground, block: Record, piece: int, offset: float, h
 def difference_series(ground: Ground, block: Record, piece: int, offset: float, A: Floats, d: Floats) -> int:
     """Write half of what the excess over the threshold of side - has beyond that of side + into A; return its degree.
 
-    For equal sides it is the horizontal motion. ``d`` is scratch space.
+    Without restraints it is the horizontal motion, of unequal sides as well: both thresholds vanish with the weight.
+    ``d`` is scratch space.
     """
+    if block.hold[0] == 0.0 and block.hold[1] == 0.0:
+        return local_series(ground, piece, offset, 1.0, A)
     uneven = 0.5 * (block.threshold[1] - block.threshold[0])
     degree = push_series(ground, piece, offset, uneven, 1.0, A, d)
     A[0] -= uneven + 0.5 * (block.hold[1] - block.hold[0])
