@@ -347,8 +347,8 @@ def test_a_part_of_an_overturning_map_has_the_boundaries_within_it():
     assert len(part.plot().axes) == 1
 
 
-def test_names_are_no_html(spectrum):
+def test_names_are_no_html():
     motion = replace(PULSE, name="A&B <b>PGA<0.3</b>")
-    found = rocking.overturning_map(BLOCK, "one-sine", amplitudes=[1.0, 4.0], frequencies=[2.0])
-    ida = rocking.incremental_dynamic_analysis(BLOCK, motion)
-    assert "<b>PGA" not in ida._repr_html_() and "OverturningMap" in found._repr_html_()
+    blocks = rocking.Blocks.grid(p=[1.0, 2.0], alpha=[0.2], restitution=[0.9])
+    found = rocking.rocking_spectrum(blocks, motion)
+    assert "<b>PGA" in repr(found) and "<b>PGA" not in found._repr_html_()

@@ -164,10 +164,10 @@ def _on_leaving(away: Sequence[float], inertia: float, share: float, points: int
     loss = 0.0
     for n in range(1, points):
         x = away[0] - n * step
-        factor = 1.0 + step * x / (inertia + x * x)
-        if factor <= 0.0:
-            return factor
-        loss += math.log(factor) if factor < 0.5 else math.log1p(step * x / (inertia + x * x))
+        change = step * x / (inertia + x * x)
+        if change <= -1.0:
+            return 1.0 + change
+        loss += math.log1p(change)
     return math.exp(loss)
 
 

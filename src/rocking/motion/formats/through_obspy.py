@@ -6,6 +6,7 @@ import functools
 import io
 import re
 import warnings
+from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -53,12 +54,9 @@ def _read(source: Source, name: str, request: Request) -> list[Channel]:
     if isinstance(traces, str):
         raise source.error(f"ObsPy's {name} reader cannot read this ({traces}); get the record again")
     _refuse_cut(source, traces)
-    ids = [str(trace.id) for trace in traces]
-    for each in ids:
-        if ids.count(each) > 1:
-            raise source.error(
-                f"{each} is in {ids.count(each)} pieces, with gaps or overlaps; get a record without gaps"
-            )
+    for each, pieces in Counter(str(trace.id) for trace in traces).most_common(1):
+        if pieces > 1:
+            raise source.error(f"{each} is in {pieces} pieces, with gaps or overlaps; get a record without gaps")
     form = f"{name} (through ObsPy)"
     return [_channel(source, request, unit, trace, form, number) for number, trace in enumerate(traces, 1)]
 
