@@ -765,6 +765,26 @@ def test_a_missing_sample_is_not_even() -> None:
         assert even_step(times) == pytest.approx(step, rel=1e-9)
 
 
+@pytest.mark.parametrize("step", [0.005, 0.0078125, 1.0 / 3.0])
+@pytest.mark.parametrize("printed", [".2f", ".3f", ".4g", ".5g"])
+def test_a_step_that_is_given_holds_where_times_are_its_own_with_few_digits(step: float, printed: str, file) -> None:
+    exact = 0.5 + step * np.arange(4000)
+
+    def table(times) -> Path:
+        return file("\n".join(["time (s),acc (g)", *(f"{time:{printed}},0.1" for time in times)]).encode())
+
+    (channel,) = channels(table(exact), dt=step)
+    assert channel.dt == pytest.approx(step, rel=1e-5)
+    complaint(table(exact), dt=1.02 * step)
+    complaint(table(np.delete(exact, 2000)), dt=step)
+    complaint(table(np.concatenate([exact[:2000], exact[:1999:-1]])), dt=step)
+
+
+def test_times_that_are_the_same_are_told_of_the_step(file) -> None:
+    said = complaint(file(b"time (s),acc (g)\n0.00,0.1\n0.01,0.2\n0.01,0.1\n0.02,0.0\n"))
+    assert "line 4: the time does not increase" in said and said.endswith("give dt")
+
+
 def test_a_step_of_short_digits_is_found_exactly() -> None:
     assert even_step(np.round(0.005 * np.arange(5000), 3)) == 0.005
     assert even_step(0.01 * np.arange(5000)) == 0.01
@@ -932,6 +952,25 @@ def test_other_formats_go_through_obspy(form: str, file: Callable[[bytes], Path]
     (channel,) = channels(path, units="cm/s2")
     assert (channel.name, channel.dt, len(channel.acceleration)) == ("HNZ", 0.01, 50)
     np.testing.assert_allclose(channel.acceleration, 0.03 * np.arange(50), rtol=1e-6, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("header", "azimuth"),
+    [
+        ({"cmpaz": 40.0, "cmpinc": 90.0}, 40.0),
+        ({"cmpaz": -50.0, "cmpinc": 88.0}, 310.0),
+        ({"cmpaz": 0.0, "cmpinc": 0.0}, None),
+        ({"cmpaz": 40.0}, None),
+        ({}, None),
+    ],
+)
+@pytest.mark.filterwarnings("ignore")
+def test_a_horizontal_component_of_sac_has_the_azimuth_of_its_header(header, azimuth, file) -> None:
+    content = io.BytesIO()
+    sac = pytest.importorskip("obspy.io.sac")
+    sac.SACTrace(data=np.linspace(0.0, 3.0, 40, dtype=np.float32), delta=0.01, **header).write(content)
+    (channel,) = channels(file(content.getvalue()), units="g")
+    assert channel.azimuth == (None if azimuth is None else pytest.approx(azimuth))
 
 
 @pytest.mark.parametrize("form", ["MSEED", "SLIST", "TSPAIR"])

@@ -4,6 +4,7 @@ import pickle
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from fractions import Fraction
 from xml.etree import ElementTree
 
@@ -565,6 +566,23 @@ def test_a_direction_that_is_not_known_is_refused(arguments, sentence):
     one = Motion([0.0, 1.0], [[1.0]], name="one")
     with pytest.raises(InvalidMotion, match=sentence):
         one.rotated(**{"other": one, "azimuth": 30.0} | arguments)
+
+
+def test_components_that_begin_at_different_times_are_refused_until_they_are_cut(two_components):
+    def beginning(motion, start):
+        origin = replace(motion.description.origin, start=start)
+        return replace(motion, description=replace(motion.description, origin=origin))
+
+    west, north = two_components
+    one, other = beginning(west, 100.0), beginning(north, 100.5)
+    for first, second in ((one, other), (other, one)):
+        with pytest.raises(InvalidMotion, match=r"360' begins 0.5 s after '\S+270': cut .* processed\(trim=\(0.5, "):
+            first.rotated(second, 30.0)
+    found = one.processed(trim=(0.5, one.duration)).rotated(other, 30.0)
+    wanted = west.delayed(1e-3).rotated(north.delayed(0.501), 30.0)
+    times = np.linspace(0.0, 20.0, 333)
+    np.testing.assert_allclose(found.acceleration(times), wanted.acceleration(times + 0.501), rtol=0.0, atol=1e-12)
+    assert beginning(west, 100.0).rotated(beginning(north, 100.001), 30.0).pga == west.rotated(north, 30.0).pga
 
 
 def test_a_reversed_record_points_the_other_way():

@@ -14,7 +14,7 @@ from rocking.block.rigid_body import rigid_bodies
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import Message
 from rocking.motion import measures
-from rocking.motion.description import Origin
+from rocking.motion.description import Origin, begins_later
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
 
@@ -315,15 +315,12 @@ def _strength_notes(motion: Motion) -> Iterator[str]:
 
 def _timing_notes(motion: Motion, vertical: Motion) -> Iterator[str]:
     """Sentences on components that seem to start at different times."""
-    ours, theirs = _origin(motion), _origin(vertical)
-    if ours.start is not None and theirs.start is not None and ours.format == theirs.format:
-        later = theirs.start - ours.start
-        if abs(later) > 0.5 * (motion.step or 0.0) + 1e-6:
-            yield (
-                f"by its file the vertical motion begins {abs(later):.4g} s {'after' if later > 0.0 else 'before'} the "
-                "horizontal one, but both are taken to start together: cut what comes first"
-            )
-            return
+    if later := begins_later(motion.description, vertical.description, motion.step):
+        yield (
+            f"by its file the vertical motion begins {abs(later):.4g} s {'after' if later > 0.0 else 'before'} the "
+            "horizontal one, but both are taken to start together: cut what comes first"
+        )
+        return
     (start, end), (first, last) = (measures.significant_span(each) for each in (motion, vertical))
     if last < start or first > end:
         yield (

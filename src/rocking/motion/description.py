@@ -164,6 +164,18 @@ class Description:
         return replace(self, family=family, origin=origin)
 
 
+def begins_later(first: Description, second: Description, step: float | None) -> float:
+    """Return how much later the second of two records begins, s, by the clock of their files.
+
+    It is 0 where that is not known, or less than half a `step` of the samples, s.
+    """
+    one, other = (each.origin or Origin() for each in (first, second))
+    if one.start is None or other.start is None or one.format != other.format:
+        return 0.0
+    later = other.start - one.start
+    return later if abs(later) > 0.5 * (step or 0.0) + 1e-6 else 0.0
+
+
 def labelled(name: str, history: Sequence[str], vertical: str = "") -> str:
     """Return the name of a motion, and of its vertical one, with what was done to it but not what it was scaled to.
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidMotion
-from rocking.motion.description import Description
+from rocking.motion.description import Description, begins_later
 
 #: Components that are nearer to one line than this, degrees, hardly tell what happened across it.
 _NEAR: Final = 15.0
@@ -25,7 +25,15 @@ class Component(Protocol):
 
     @property
     def description(self) -> Description:
-        """How it was made, and of a record its azimuth."""
+        """How it was made, and of a record its azimuth and the instant when it begins."""
+
+    @property
+    def duration(self) -> float:
+        """Its end, s."""
+
+    @property
+    def step(self) -> float | None:
+        """Step of its samples, s; None if they are uneven."""
 
 
 def sine_cosine(degrees: ArrayLike) -> tuple[Floats, Floats]:
@@ -43,6 +51,16 @@ def sine_cosine(degrees: ArrayLike) -> tuple[Floats, Floats]:
     quarter = np.mod(quarters, 4.0).astype(np.int64)
     found = np.choose(quarter, [sine, cosine, -sine, -cosine]), np.choose(quarter, [cosine, -sine, -cosine, sine])
     return found[0] + 0.0, found[1] + 0.0  # no negative zeros
+
+
+def check_start(one: Component, other: Component) -> None:
+    """Refuse two components that begin at different times, by the clock of their files."""
+    if later := begins_later(one.description, other.description, one.step):
+        early, late = (one, other) if later > 0.0 else (other, one)
+        raise InvalidMotion(
+            f"by their files {checks.shown(late.name)} begins {abs(later):.6g} s after {checks.shown(early.name)}: cut "
+            f"what comes first with processed(trim=({abs(later):.6g}, {early.duration:.6g})) of the latter"
+        )
 
 
 def recorded_azimuths(one: Component, other: Component, recorded: Any) -> tuple[float, float]:

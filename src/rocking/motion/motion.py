@@ -15,7 +15,7 @@ from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion
 from rocking.motion import measures, piecewise, processing
 from rocking.motion.description import Description, Origin, check_description, checked_history, labelled
-from rocking.motion.directions import recorded_azimuths, shares
+from rocking.motion.directions import check_start, recorded_azimuths, shares
 from rocking.motion.floors import floor_pieces
 from rocking.motion.measures import DAMPING
 from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
@@ -553,8 +553,8 @@ class Motion:
         Raises
         ------
         InvalidMotion
-            If an azimuth is not known or no number, both components lie nearly along one line, or each brings a
-            vertical component of its own.
+            If an azimuth is not known or no number, both components lie nearly along one line, begin at different
+            times by the clock of their files, or each brings a vertical component of its own.
 
         Notes
         -----
@@ -573,6 +573,7 @@ class Motion:
                 f"{{}} must be a Motion, the other horizontal component, not {type(other).__name__}", "other"
             )
         first, second = recorded_azimuths(self, other, recorded)
+        check_start(self, other)
         wanted = checks.finite(azimuth, "azimuth", InvalidMotion)
         verticals = [motion.vertical for motion in (self, other) if motion.vertical is not None]
         if len(verticals) == 2 and verticals[0] is not verticals[1]:

@@ -56,7 +56,8 @@ def read(
     channel : int or str, optional
         Number or name of the channel; needed only where the file holds several.
     dt : float, optional
-        Sampling step, s; needed only for one column of accelerations. Elsewhere it must agree with the file.
+        Sampling step, s; needed only for one column of accelerations, and for times that are printed with so few digits
+        that they do not tell it. Elsewhere it must agree with the file.
     units : {"g", "m/s2", "cm/s2", "gal", "mm/s2", "mg"}, optional
         Units of the accelerations; needed only where the file does not say: ObsPy's formats, and text tables without
         a heading such as "acceleration (cm/s2)" or "a_g". They overrule a heading. Times in a text table are in the

@@ -21,6 +21,10 @@ from rocking.motion.units import Unit
 #: Even times may be off their grid by this share of the step (or by what the printed decimals round away).
 _JITTER = 1e-6
 _MOST_DECIMALS = 9
+#: Significant digits that times are printed with.
+_FEWEST_DIGITS, _MOST_DIGITS = 4, 9
+#: No more times than this are printed alike.
+_MOST_ALIKE = 10.0
 
 #: Rounded times leave the best even grid by one unit of their last decimal, and a little for that grid's own error.
 _SPREAD = 1.25
@@ -55,6 +59,29 @@ def even_step(times: NDArray[np.float64]) -> float | None:
         return None
     allowed = max(_SPREAD * resolution, _JITTER * mean) + rounding
     return _simplest_fit(times, _slope(times), (_SPREAD - 1.0) * resolution + rounding, allowed)
+
+
+def prints_as(times: NDArray[np.float64], step: float) -> bool:
+    """Whether even times with this step may be printed as `times` are: with so many decimals or significant digits.
+
+    Some that follow each other may be printed alike.
+    """
+    sizes = np.abs(times)
+    if not sizes.max() <= _LATEST or not np.all(np.diff(times) >= 0.0):
+        return False
+    off = times - times[0] - step * np.arange(len(times))
+    rounding = 4.0 * float(np.spacing(sizes.max()))
+    last = np.full(len(times), _resolution(times, rounding))
+    rounded = last[0] and abs(step / last[0] - round(step / last[0])) > _JITTER
+    if not np.ptp(off) <= (last[0] if rounded else _JITTER * step) + rounding:
+        powers = np.floor(np.log10(np.where(sizes > 0.0, sizes, 1.0)))
+        for digits in range(_FEWEST_DIGITS, _MOST_DIGITS + 1):
+            last = 10.0 ** (powers - digits + 1)
+            if np.abs(times / last - np.rint(times / last)).max() <= _JITTER:
+                break
+        if not np.all(np.abs(off) <= 0.5 * _SPREAD * (last + last[0]) + rounding):
+            return False
+    return bool(last.max() <= _MOST_ALIKE * step)
 
 
 def _resolution(times: NDArray[np.float64], rounding: float) -> float:

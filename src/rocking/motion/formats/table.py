@@ -28,6 +28,7 @@ from rocking.motion.formats.channel import (
     first_fault,
     gap_at,
     missing_value,
+    prints_as,
     to_acceleration,
 )
 from rocking.motion.formats.heading import RULE, Column, Heading, heading_of, names_columns
@@ -471,15 +472,22 @@ def _timing(
     written = table[:, column]
     times = unit.to_si(written)
     fault = first_fault(times)
-    if fault is not None:
-        at = shape.row_at(source, fault)
-        raise source.error("the time does not increase from the row before; correct the column of times", at)
-    step = even_step(written) if len(written) > 1 else None
+    step = even_step(written) if fault is None and len(written) > 1 else None
     if step is not None:
         return request.step(source, step * unit.multiplier / unit.divisor, shape.start), None
+    given = None if request.several else request.dt
+    if given is not None and prints_as(written, given * unit.divisor / unit.multiplier):
+        return given, None
+    if fault is not None:
+        same = "; if the times are even, but printed with too few digits, give {}" if given is None else ""
+        raise source.error(
+            f"the time does not increase from the row before; correct the column of times{same}",
+            shape.row_at(source, fault),
+            *(("dt",) if same else ()),
+        )
     gap = gap_at(written)
     if gap is not None:
         raise missing_value(source, written[gap], shape.row_at(source, gap))
-    if request.dt is not None and not request.several:
-        raise source.error(f"the times are not evenly {request.dt:g} s apart; leave {{}} out", shape.start, "dt")
+    if given is not None:
+        raise source.error(f"the times are not evenly {given:g} s apart; leave {{}} out", shape.start, "dt")
     return None, times

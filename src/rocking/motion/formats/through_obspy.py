@@ -7,6 +7,7 @@ import io
 import re
 import warnings
 from collections import Counter
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,8 @@ from rocking.motion.units import Unit
 #: PICKLE runs what a file tells it to; the other two open further files that a file names.
 _REFUSED = frozenset({"PICKLE", "CSS", "NNSA_KB_CORE"})
 _REASON_LENGTH = 200
+#: A component that dips by no more than this, degrees, is horizontal.
+_HORIZONTAL = 5.0
 _TITLE = re.compile(rb"(?m)^TIMESERIES [^\n]*?, (\d{1,12}) samples,")
 
 
@@ -76,11 +79,20 @@ def _channel(source: Source, request: Request, unit: Unit, trace: Any, form: str
         number=number,
         acceleration=to_acceleration(source, None, values, unit),
         dt=request.step(source, dt, None),
+        azimuth=_azimuth(stats.get("sac", {})),
         units=unit.name,
         station=station,
         metadata={"format": form, "file": source.file},
         start=float(stats.starttime.timestamp),
     )
+
+
+def _azimuth(header: Mapping[str, Any]) -> float | None:
+    """Return the azimuth that a header of SAC gives a horizontal component, degrees; None of any other one."""
+    azimuth, from_above = (header.get(name) for name in ("cmpaz", "cmpinc"))
+    if azimuth is None or from_above is None or abs(from_above - 90.0) > _HORIZONTAL:
+        return None
+    return float(azimuth) % 360.0
 
 
 def _refuse_long(source: Source, name: str, most: int) -> None:
