@@ -7,15 +7,14 @@ Each mutant (`mutations.py` says what is drawn) is put into a copy of the tree, 
 that `make quick` would run for a change of its file, up to the first failure. Kernels are run uncompiled. What a mutant
 showed is kept under a hash of its text, and holds as long as the tests that showed it are what they were; a run that
 was stopped goes on where it was. Every survivor is printed; those of `equivalent_mutants.json` change nothing that can
-be seen, for the reason said there, and do not count. The table of docs/reliability.md is written from all parts that
-are kept.
+be seen, for the reason said there, and do not count. The table of docs/reliability.md has the last judgement of each
+part.
 """
 
 from __future__ import annotations
 
 import argparse
 import dataclasses
-import datetime
 import hashlib
 import importlib
 import json
@@ -41,6 +40,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from mutations import Mutant, mutants
 from of_changes import MOST, FilesOfTests, ordered
+from rows import markdown, with_earlier
 
 ROOT = Path(__file__).resolve().parents[1]
 TABLE = ROOT / "docs/_tables/tests-mutants.txt"
@@ -312,7 +312,7 @@ class Shown:
             [place, reason(mutant), mutant.before, mutant.after] for place, mutant in zip(places, spared, strict=True)
         ]
         counts = len(drawn), sum(bool(each[1]) for each in named), len(drawn) - len(spared)
-        return cls(*counts, named, seed, datetime.date.today().isoformat())
+        return cls(*counts, named, seed)
 
     def report(self, part: str) -> Iterator[str]:
         """Write a line with the counts, and every survivor."""
@@ -327,12 +327,11 @@ class Shown:
 def table(shown: dict[str, Shown]) -> str:
     """Table of all parts, and below it every survivor that changes something."""
     heads = ("part", "mutants", "equivalent", "killed", "killed, %", "date")
-    lines = ["| " + " | ".join(heads) + " |", "|---" + "|--:" * (len(heads) - 1) + "|"]
+    rows: dict[str, tuple[object, ...]] = {}
     for part in PARTS:
-        cells: tuple[object, ...] = (part, "not judged yet", *[""] * (len(heads) - 2))
-        if each := shown.get(part):
-            cells = (part, each.drawn, each.equivalent, each.killed, f"{100 * each.share:.0f}", each.date)
-        lines.append("| " + " | ".join(map(str, cells)) + " |")
+        each = shown.get(part)
+        rows[part] = (each.drawn, each.equivalent, each.killed, f"{100 * each.share:.0f}", each.date) if each else ()
+    lines = markdown(heads, rows, "not judged yet")
     spared = [survivor for each in shown.values() for survivor in each.spared if not survivor[1]]
     if spared:
         lines += ["", "Not seen by any test:"]
@@ -365,14 +364,12 @@ def main() -> int:
         for part in given.parts or PARTS:
             some = drawn(part, given.number, given.seed)
             shown = Shown.of(some, tree.judged(some, uncompiled=part == "kernels"), given.seed)
-            (given.kept / f"{part}.json").write_text(json.dumps(dataclasses.asdict(shown)), "utf-8")
+            rows = with_earlier(TABLE, {part: dataclasses.asdict(shown)})
+            TABLE.write_text(table({name: Shown(**row) for name, row in rows.items()}), "utf-8")
             enough = enough and shown.share >= WANTED
             print("\r" + "\n".join(shown.report(part)), flush=True)
     finally:
         tree.remove()
-    kept = {part: given.kept / f"{part}.json" for part in PARTS}
-    shown_by = {part: Shown(**json.loads(path.read_text("utf-8"))) for part, path in kept.items() if path.exists()}
-    TABLE.write_text(table(shown_by), "utf-8")
     return 0 if enough else 1
 
 

@@ -21,14 +21,16 @@ import os
 import platform
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from promises import ALL
 from promises.promise import Found, Promise
+from rows import markdown, with_earlier
 
 import rocking
 from rocking.progress import Progress
@@ -36,6 +38,8 @@ from rocking.progress import Progress
 ROOT = Path(__file__).resolve().parents[1]
 LIBRARIES = ("numpy", "numba", "scipy", "python-flint", "heyoka")
 STOPPED = 130
+#: What the overview shows of a promise.
+_SHOWN = ("parts", "cases", "judged", "failures", "worst", "seconds")
 
 
 def main() -> int:
@@ -56,7 +60,7 @@ def main() -> int:
         print(f"stopped; what is done is kept in {given.kept}, and the same command goes on from there")
         return status
     found = {promise.name: _together(folders[promise.name], wanted[promise.name]) for promise in promises}
-    print(overview(promises, found))
+    print(overview(promises, {name: vars(each) for name, each in found.items()}))
     if tables:
         write(tables, promises, found)
     faults = [fault for promise in promises for fault in promise.faults(found[promise.name])]
@@ -163,23 +167,25 @@ def _together(folder: Path, parts: list[int]) -> Found:
     return found
 
 
-def overview(promises: list[Promise], found: dict[str, Found]) -> str:
-    """Table of all promises."""
-    heads = ("promise", "parts", "cases", "judged", "failures", "worst", "processor time, s")
-    lines = ["| " + " | ".join(heads) + " |", "|---" + "|--:" * (len(heads) - 1) + "|"]
+def overview(promises: list[Promise], rows: Mapping[str, Mapping[str, Any]]) -> str:
+    """Table of promises."""
+    cells = {}
     for promise in promises:
-        each = found[promise.name]
-        cells = (f"{each.parts} of {promise.parts}", each.cases, each.judged, each.failures, f"{each.worst:.2g}")
-        lines.append(f"| {promise.says} | " + " | ".join(map(str, cells)) + f" | {each.seconds:.0f} |")
-    return "\n".join(lines) + "\n"
+        if row := rows.get(promise.name):
+            numbers = (row["cases"], row["judged"], row["failures"], f"{row['worst']:.2g}", f"{row['seconds']:.0f}")
+            cells[promise.says] = (f"{row['parts']} of {promise.parts}", *numbers, row.get("date", ""))
+        else:
+            cells[promise.says] = ()
+    heads = ("promise", "parts", "cases", "judged", "failures", "worst", "processor time, s", "date")
+    return "\n".join([*markdown(heads, cells, "not judged yet"), ""])
 
 
 def made() -> str:
     """Say when, with what and on what this was judged."""
     libraries = ", ".join(map(_version, LIBRARIES))
     return (
-        f"Judged on {datetime.date.today().isoformat()}: rocking {rocking.__version__} with {libraries} and Python "
-        f"{platform.python_version()}, on {_processor()}.\n"
+        f"Judged last on {datetime.date.today().isoformat()}: rocking {rocking.__version__} with {libraries} and "
+        f"Python {platform.python_version()}, on {_processor()}.\n"
     )
 
 
@@ -194,12 +200,12 @@ def _lines(file: Path) -> Iterator[str]:
 
 
 def write(folder: Path, promises: list[Promise], found: dict[str, Found]) -> None:
-    """Write the overview, and the table of each promise that has one."""
-    texts = {"all": overview(promises, found), "made": made()}
-    for each in promises:
-        if each.table:
-            texts[each.name] = each.table(found[each.name]) if found[each.name].parts else "Nothing is judged yet.\n"
+    """Write the overview, with what earlier runs say of other promises, and the table of each of these that has one."""
     folder.mkdir(parents=True, exist_ok=True)
+    judged = {name: {key: vars(each)[key] for key in _SHOWN} for name, each in found.items() if each.parts}
+    rows = with_earlier(folder / "reliability-all.txt", judged)
+    texts = {"all": overview([*ALL.values()], rows), "made": made()}
+    texts |= {each.name: each.table(found[each.name]) for each in promises if each.table and each.name in judged}
     for name, text in texts.items():
         (folder / f"reliability-{name}.txt").write_text(text, encoding="utf-8")
 

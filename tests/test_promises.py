@@ -1,5 +1,6 @@
 """The promises of docs/reliability.md at a small size, and the program that runs them."""
 
+import datetime
 import itertools
 import platform
 import re
@@ -165,6 +166,22 @@ def test_a_part_that_cannot_be_judged_does_not_stop_the_others(monkeypatch, tmp_
     assert sorted(path.name for path in tmp_path.iterdir()) == ["0.json", "2.json"]
     assert verify._parts(MADE_UP, "kept", tmp_path) == [0, 2]
     assert verify._parts(MADE_UP, "full", tmp_path) == [0, 1, 2, 3]
+
+
+def test_a_run_of_some_promises_leaves_the_rows_of_the_others(tmp_path):
+    verify.write(
+        tmp_path, [ALL["soak"], ALL["reading"]], {"soak": Found(6, 12, 12, 0, 0.03, 297.0), "reading": Found()}
+    )
+    verify.write(tmp_path, [ALL["rounding"]], {"rounding": Found(1, 60, 60, 1, 0.5, 9.0)})
+    lines = (tmp_path / "reliability-all.txt").read_text("utf-8").splitlines()
+    today = datetime.date.today().isoformat()
+    assert len(lines) == 2 + len(ALL)
+    assert f"| {ALL['soak'].says} | 6 of 6 | 12 | 12 | 0 | 0.03 | 297 | {today} |" in lines
+    assert f"| {ALL['rounding'].says} | 1 of 2 | 60 | 60 | 1 | 0.5 | 9 | {today} |" in lines
+    assert sum("not judged yet" in line for line in lines) == len(ALL) - 2
+    assert not (tmp_path / "reliability-reading.txt").exists()
+    verify.write(tmp_path, [ALL["soak"]], {"soak": Found(6, 13, 13, 0, 0.03, 297.0)})
+    assert f"| {ALL['soak'].says} | 6 of 6 | 13 |" in (tmp_path / "reliability-all.txt").read_text("utf-8")
 
 
 def test_too_few_decided_cases_are_a_fault():
