@@ -67,9 +67,9 @@ def timed() -> Iterator[list[Times]]:
     taken: list[Times] = []
     simulating: list[float] = []
 
-    def watched(*arguments: Any) -> Any:
+    def watched(*arguments: Any, **named: Any) -> Any:
         start = time.thread_time()
-        outcomes = simulate_task(*arguments)
+        outcomes = simulate_task(*arguments, **named)
         simulating.append(time.thread_time() - start)
         return outcomes
 

@@ -192,18 +192,24 @@ def test_a_full_disk_behind_the_output_is_one_sentence(run, monkeypatch, is_smal
 
 
 def test_an_interrupt_while_the_command_line_is_imported_is_no_traceback():
-    probe = (
-        "import sys\n"
-        "class Interrupted:\n"
-        "    def find_spec(self, name, path=None, target=None):\n"
-        "        if name == 'cyclopts':\n"
-        "            raise KeyboardInterrupt\n"
-        "sys.meta_path.insert(0, Interrupted())\n"
-        "from rocking.__main__ import main\n"
-        "main()\n"
-    )
-    done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (130, f"{INTERRUPTED}\n")
+    for raised, code in (
+        ("KeyboardInterrupt", 130),
+        ("RuntimeError('error calling __set_name__') from KeyboardInterrupt()", 130),
+        ("RuntimeError('another one')", 1),
+    ):
+        probe = (
+            "import sys\n"
+            "class Interrupted:\n"
+            "    def find_spec(self, name, path=None, target=None):\n"
+            "        if name == 'cyclopts':\n"
+            f"            raise {raised}\n"
+            "sys.meta_path.insert(0, Interrupted())\n"
+            "from rocking.__main__ import main\n"
+            "main()\n"
+        )
+        done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=False)
+        assert done.returncode == code
+        assert (done.stderr == f"{INTERRUPTED}\n") == (code == 130)
     project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text("utf-8"))
     assert project["project"]["scripts"]["rocking"] == "rocking.__main__:main"
     done = subprocess.run([sys.executable, "-m", "rocking", "--version"], capture_output=True, text=True, check=True)
@@ -269,6 +275,27 @@ def test_an_interrupt_that_the_end_of_an_import_catches_comes_again(tmp_path, mo
         importlib.import_module("hasty")
         while time.monotonic() < late:
             time.sleep(0.001)
+    assert time.monotonic() < late
+
+
+def test_an_interrupt_waits_until_locks_are_given_back_but_not_for_ever():
+    """Between the lines of `threading`; there it comes after a while if whoever is there waits for something."""
+    named = {"__name__": "threading", "signal": signal, "time": time}
+    exec(
+        "def locked():\n    signal.raise_signal(signal.SIGINT)\n    given_back.append(True)\n"
+        "def waiting():\n    signal.raise_signal(signal.SIGINT)\n"
+        "    late = time.monotonic() + 60.0\n    while time.monotonic() < late:\n        time.sleep(0.001)\n",
+        named,
+    )
+    given_back = named["given_back"] = []
+    late = time.monotonic() + 60.0
+    with pytest.raises(KeyboardInterrupt), Interrupts():
+        named["locked"]()
+        while time.monotonic() < late:
+            time.sleep(0.001)
+    assert given_back == [True] and time.monotonic() < late
+    with pytest.raises(KeyboardInterrupt), Interrupts():
+        named["waiting"]()
     assert time.monotonic() < late
 
 

@@ -203,7 +203,7 @@ def test_a_folder_that_cannot_be_written_to_is_refused_before_work(run, tmp_path
 def no_work(monkeypatch):
     """Fail where anything is simulated."""
 
-    def simulated(*arguments):
+    def simulated(*arguments, **named):
         raise AssertionError("this was simulated")
 
     monkeypatch.setattr("rocking.engine.simulate_task", simulated)

@@ -24,7 +24,6 @@ import pytest
 from explorer_client import Client, clients, let_in, opened_by
 
 import rocking
-from rocking.engine import _AHEAD, cores
 from rocking.errors import InvalidOption, RockingError, StudyError
 from rocking.explorer import connections, launch, maps, server, uploads
 from rocking.explorer.authentication import RequestAuthentication
@@ -34,6 +33,7 @@ from rocking.explorer.launch import served
 from rocking.explorer.server import App
 from rocking.explorer.studies import StudyView
 from rocking.explorer.uploads import LARGEST, MOST, UploadStore
+from rocking.threads import AHEAD, cores
 
 PORT = 8123
 OURS = f"http://127.0.0.1:{PORT}"
@@ -131,7 +131,7 @@ def test_a_map_comes_coarse_to_fine_and_whole(page):
     order = np.array(strides)
     overtaken = [int(np.sum(order[k:] > stride)) for k, stride in enumerate(strides)]
     assert sorted(set(strides)) == [1, 2, 4, 8] and len(strides) == 45
-    assert max(overtaken) < _AHEAD * cores()
+    assert max(overtaken) < AHEAD * cores()
 
 
 def test_the_case_at_a_point_of_a_map(page):

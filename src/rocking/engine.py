@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 import math
-import os
-import threading
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from collections.abc import Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from dataclasses import dataclass
-from typing import Final, TypeVar
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +25,7 @@ from rocking.kernels.state import Record, Records
 from rocking.kernels.uplift import note_complete
 from rocking.motion.motion import Motion
 from rocking.problem import ground_of, highest, rules_of, set_start, step_of
+from rocking.threads import AHEAD, Cancellation, as_done, cores
 from rocking.treatment import Treatment
 
 #: What is kept of a simulation. ``unfinished``: it took more than its budget of steps; ``stopped``: the duration ended
@@ -40,9 +40,6 @@ OUTCOME = np.dtype(
     ]
 )  # fmt: skip
 
-Item = TypeVar("Item")
-Found = TypeVar("Found")
-
 #: Steps that a simulation may take, besides a few for every piece of its motion.
 BUDGET: Final = 3_000_000
 _BUDGET_OF_A_PIECE: Final = 4
@@ -56,9 +53,6 @@ _TOGETHER: Final = 16 * WIDTH
 
 #: Steps of all bodies of one task: enough to pay for the call, few enough to stop soon when interrupted.
 _TASK: Final = 8_000_000
-
-#: Tasks that are handed out ahead of the results, for each thread.
-_AHEAD: Final = 2
 
 
 @dataclass(frozen=True)
@@ -127,39 +121,11 @@ def simulate_tasks(
     """
     announce(SIMULATIONS)
     if executor is not None:
-        yield from _in_flight(setup, tasks, executor, _AHEAD * cores(), None)
+        yield from _in_flight(setup, tasks, executor, AHEAD * cores())
         return
-    count = threads or cores()
-    stop = threading.Event()
-    with ThreadPoolExecutor(count) as pool:
-        try:
-            yield from _in_flight(setup, tasks, pool, _AHEAD * count, stop)
-        except BaseException:
-            stop.set()
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-
-
-def cores() -> int:
-    """Count the cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def in_threads(work: Callable[[Item], Found], items: Sequence[Item], *, threads: int | None = None) -> Iterator[Found]:
-    """Results of some work on each item, in their order; by default in a thread for every core.
-
-    An interrupt leaves the rest undone.
-    """
-    count = min(cores() if threads is None else threads, len(items))
-    if count < 2:
-        yield from map(work, items)
-        return
-    with ThreadPoolExecutor(count) as pool:
-        try:
-            yield from pool.map(work, items)
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    cancelled = Cancellation()
+    work = functools.partial(simulate_task, setup, cancelled=cancelled)
+    yield from as_done(work, tasks, threads or cores(), cancelled=cancelled)
 
 
 def parts_of(count: int, motion: Motion) -> Iterator[slice]:
@@ -208,13 +174,12 @@ def require_finished(unfinished: Flags) -> None:
 
 
 def _in_flight(
-    setup: Setup, tasks: Iterable[Task], executor: Executor, most: int, stop: threading.Event | None
+    setup: Setup, tasks: Iterable[Task], executor: Executor, most: int
 ) -> Iterator[tuple[Task, NDArray[np.void]]]:
     """Keep a number of tasks with an executor, and give results as they come."""
     pending: dict[Future[NDArray[np.void]], Task] = {}
     for task in tasks:
-        arguments = (setup, task) if stop is None else (setup, task, stop)
-        pending[executor.submit(simulate_task, *arguments)] = task
+        pending[executor.submit(simulate_task, setup, task)] = task
         if len(pending) >= most:
             for future in wait(pending, return_when=FIRST_COMPLETED).done:
                 yield pending.pop(future), future.result()
@@ -223,8 +188,8 @@ def _in_flight(
             yield pending.pop(future), future.result()
 
 
-def simulate_task(setup: Setup, task: Task, stop: threading.Event | None = None) -> NDArray[np.void]:
-    """Outcomes of one task; where ``stop`` is set on the way, of no use."""
+def simulate_task(setup: Setup, task: Task, cancelled: Cancellation | None = None) -> NDArray[np.void]:
+    """Outcomes of one task; where it is ``cancelled`` on the way, of no use."""
     bodies = setup.bodies.select(task.bodies)
     limits = setup.treatment.limits(bodies, task.motion, setup.model, task.factor)
     rules = rules_of(bodies, setup.model, setup.treatment, setup.duration, record=False)
@@ -234,10 +199,10 @@ def simulate_task(setup: Setup, task: Task, stop: threading.Event | None = None)
     set_start(states, records, bodies, *setup.start)
     step = step_of(task.motion)
     for chosen, substeps in _groups(ground, records, task.motion, setup.model):
-        if stop is not None and stop.is_set():
+        if cancelled is not None and cancelled.asked:
             break
         _march_together(ground, rules, (records, states), chosen, step, substeps)
-    _march_on(ground, rules, records, states, stop)
+    _march_on(ground, rules, records, states, cancelled)
     outcomes = _outcomes(states, task.motion.end)
     outcomes["peak_rotation"] = highest(states, records, bodies.stops)
     outcomes["complete_chattering"] = complete_chattering(ground, records, states)
@@ -286,14 +251,14 @@ def _march_together(
     states[chosen] = together.states
 
 
-def _march_on(ground: Ground, rules: Record, records: Records, states: Records, stop: threading.Event | None) -> None:
+def _march_on(ground: Ground, rules: Record, records: Records, states: Records, cancelled: Cancellation | None) -> None:
     """Take those on that have used up their first slice of steps, until their budget is spent."""
     nothing, scratch = state.new_table(0), state.new_scratch()
     for k in np.flatnonzero(np.isin(states["ending"], (state.Ending.RUNNING, state.Ending.PAUSED))):
         one = states[k]
         one["until"] = state.TO_THE_END
         for _ in range(slices(ground)):
-            if stop is not None and stop.is_set():
+            if cancelled is not None and cancelled.asked:
                 return
             one["budget"] = SLICE
             one["ending"] = march(ground, records[k], rules, nothing, scratch, one)

@@ -15,7 +15,7 @@ from rocking.arrays import Floats
 from rocking.block import Blocks
 from rocking.body import Bodies, Body
 from rocking.constants import VERSION, Model
-from rocking.engine import OUTCOME, Setup, Task, cores, parts_of, simulate_tasks
+from rocking.engine import OUTCOME, Setup, Task, parts_of, simulate_tasks
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.named import Motions, names_of, several_motions
@@ -24,6 +24,7 @@ from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
 from rocking.peak_changes import BETWEEN_STOPS, OF_BLOCKS, By, peak_changes
 from rocking.problem import bodies_of, rules_of
 from rocking.progress import Progress
+from rocking.threads import cores
 from rocking.treatment import Treatment, treatment
 
 if TYPE_CHECKING:

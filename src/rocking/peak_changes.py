@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.arrays import Flags, Floats, Integers
-from rocking.engine import Setup, Task, in_threads
+from rocking.engine import Setup, Task
 from rocking.kernels import state
 from rocking.kernels.trace import NO_NODES, Quantity, Trail, vary
 from rocking.problem import ground_of, highest, rules_of, set_start
 from rocking.progress import Progress
 from rocking.simulation import marched
+from rocking.threads import in_threads
 
 #: What peaks are differentiated by, and its name in words, by the name of the derivative in a dataset.
 By = Mapping[str, tuple[Quantity, str]]

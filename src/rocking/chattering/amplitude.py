@@ -18,12 +18,13 @@ from rocking.block import Block
 from rocking.chattering.coefficients import COEFFICIENTS
 from rocking.chattering.parameters import broadcast, checked_frequency, checked_restitution, checked_slenderness
 from rocking.compiling import AMPLITUDES, announce
-from rocking.engine import in_threads, require_finished
+from rocking.engine import require_finished
 from rocking.errors import InvalidOption
 from rocking.kernels.sine.sequence import critical_amplitudes, fitted_amplitudes
 from rocking.motion import pulses
 from rocking.progress import Progress
 from rocking.simulation import simulate
+from rocking.threads import in_threads
 from rocking.treatment import warn_outside_fit
 
 #: Where the Chebyshev expansion holds.

@@ -22,7 +22,6 @@ from rocking.chattering.parameters import (
     single,
 )
 from rocking.compiling import SEQUENCES, announce
-from rocking.engine import cores, in_threads
 from rocking.errors import InvalidOption
 from rocking.kernels.sine import Verdict
 from rocking.kernels.sine.arc import first_impact
@@ -30,6 +29,7 @@ from rocking.kernels.sine.lanes import GROUP, GROUPS, WIDTH, Answers, rest_phase
 from rocking.kernels.sine.sequence import IMPACT as RESOLVED
 from rocking.kernels.sine.sequence import resolve, semianalytical_phases
 from rocking.tables import counted
+from rocking.threads import cores, in_threads
 
 #: Sequences of a part, which is sorted and computed by one thread: few enough for a core's own cache.
 _PART: Final = 1 << 14

@@ -17,7 +17,7 @@ from rocking import checks
 from rocking.arrays import Floats, Integers
 from rocking.chattering.families import Family, SimulationInput
 from rocking.constants import VERSION
-from rocking.engine import OUTCOME, complete_chattering, in_threads
+from rocking.engine import OUTCOME, complete_chattering
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.motion.exceedance import exceedances
@@ -27,6 +27,7 @@ from rocking.response import Response, trail_of
 from rocking.result import DatasetResult
 from rocking.simulation import simulate
 from rocking.tables import as_written, text_table
+from rocking.threads import in_threads
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

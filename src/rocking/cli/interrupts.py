@@ -7,12 +7,19 @@ import gc
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable
 from types import FrameType, TracebackType
 from typing import Any, Final, Self
 
-#: Time until an interrupt that was lost is tried again, s.
+#: Time until an interrupt that was lost, or has to wait, is tried again, s.
 _AGAIN: Final = 0.02
+
+#: Modules in which an exception at the wrong moment leaves a lock that nobody opens any more, so that other threads,
+#: and whoever waits for them, wait for ever; and how often an interrupt waits until they are left: a thread that is
+#: still in one of them then, waits there itself, as it may.
+_LOCKING: Final = ("threading", "concurrent.futures._base", "concurrent.futures.thread")
+_WAITS: Final = 10
 
 
 class Interrupts:
@@ -20,7 +27,8 @@ class Interrupts:
 
     Python drops an exception that is raised in a finaliser or in a callback, a library that is imported may catch it,
     and one that calls Python may raise another in its place. The first two are raised again; for the third, `asked`
-    says where the error comes from. What Python drops of that kind is not printed.
+    says where the error comes from. What Python drops of that kind is not printed. While locks are taken and given
+    back an interrupt waits.
 
     Attributes
     ----------
@@ -30,10 +38,12 @@ class Interrupts:
 
     def __init__(self) -> None:
         self.asked = False
-        self._again: threading.Timer | None = None
+        #: Number of the last call that is to come later: those before it are off.
+        self._later_call = 0
         #: The import that was interrupted, and whether it is asked now what became of it.
         self._import: FrameType | None = None
         self._asks = False
+        self._waited = 0
 
     def __enter__(self) -> Self:
         # Other threads get no signals, and who listens already keeps what he listens with.
@@ -46,8 +56,7 @@ class Interrupts:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         if self._listens:
-            if self._again is not None:
-                self._again.cancel()
+            self._later_call += 1
             self._import = None
             if self.asked and error is not None:
                 error.__context__ = None  # what was half made is given up here, where nothing of it is printed
@@ -60,6 +69,11 @@ class Interrupts:
         if asks and not _is_whole(self._import):
             self._import = None  # the interrupt got through
             return
+        if self._waited < _WAITS and frame is not None and frame.f_globals.get("__name__") in _LOCKING:
+            self._waited += 1
+            self._later(_thread.interrupt_main)
+            return
+        self._waited = 0
         self.asked = True
         self._import = next((each for each in reversed(_frames(frame)) if _is_imported(each)), None)
         if self._import is not None:
@@ -71,11 +85,14 @@ class Interrupts:
         _thread.interrupt_main()
 
     def _later(self, call: Callable[[], None]) -> None:
-        if self._again is not None:
-            self._again.cancel()
-        self._again = threading.Timer(_AGAIN, call)
-        self._again.daemon = True
-        self._again.start()
+        self._later_call += 1
+        # Not by `threading`, in the middle of which the interrupt may have come.
+        _thread.start_new_thread(self._call, (call, self._later_call))
+
+    def _call(self, call: Callable[[], None], number: int) -> None:
+        time.sleep(_AGAIN)
+        if number == self._later_call:
+            call()
 
     def _dropped(self, unraisable: Any) -> None:
         if issubclass(unraisable.exc_type, KeyboardInterrupt):

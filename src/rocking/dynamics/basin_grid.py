@@ -15,11 +15,11 @@ from rocking.dynamics.attractors import Known
 from rocking.dynamics.kept import Kept, key_of
 from rocking.dynamics.maps import StroboscopicMap
 from rocking.dynamics.repeated import described, parts_of
-from rocking.engine import in_threads
 from rocking.kernels import state
 from rocking.kernels.periodic import Fate, settle
 from rocking.progress import Progress
 from rocking.result import variable
+from rocking.threads import in_threads
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -17,12 +17,12 @@ from rocking.dynamics.basin_grid import NAMES, NOT_REACHED, Grid
 from rocking.dynamics.basin_measures import basin_entropy, uncertainty_exponent
 from rocking.dynamics.maps import StroboscopicMap
 from rocking.dynamics.repeated import sensible
-from rocking.engine import cores
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.progress import note
 from rocking.result import DatasetResult
 from rocking.tables import as_written, counted, text_table
+from rocking.threads import cores
 from rocking.treatment import Treatment
 
 if TYPE_CHECKING:

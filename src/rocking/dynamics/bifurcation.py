@@ -20,12 +20,12 @@ from rocking.dynamics.kept import Kept, key_of
 from rocking.dynamics.linear_bodies import LinearBody
 from rocking.dynamics.maps import StroboscopicMap, stroboscopic_map
 from rocking.dynamics.repeated import described
-from rocking.engine import in_threads
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.progress import Progress
 from rocking.result import DatasetResult, table_of_some, variable
 from rocking.tables import as_written, counted
+from rocking.threads import in_threads
 from rocking.treatment import Treatment
 
 if TYPE_CHECKING:

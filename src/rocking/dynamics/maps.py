@@ -13,12 +13,12 @@ from rocking.body import Body
 from rocking.compiling import SIMULATIONS, announce
 from rocking.constants import Model
 from rocking.dynamics.repeated import TOGETHER, Repeated, parts_of
-from rocking.engine import cores, in_threads
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.periodic import Fate as Fate
 from rocking.kernels.periodic import differentiate, iterate, stretch
 from rocking.motion.motion import Motion
+from rocking.threads import cores, in_threads
 from rocking.treatment import Treatment
 
 

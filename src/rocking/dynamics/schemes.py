@@ -24,7 +24,7 @@ from rocking.dynamics.stepping import (
     TimeStepping,
     integrate,
 )
-from rocking.engine import in_threads, require_finished
+from rocking.engine import require_finished
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.kernels import state
 from rocking.kernels.march import march
@@ -33,6 +33,7 @@ from rocking.progress import Progress
 from rocking.response import Response, trail_of
 from rocking.response.answers import history_of
 from rocking.response.history import History
+from rocking.threads import in_threads
 from rocking.treatment import (
     AsymptoticTime,
     Certified,

@@ -27,12 +27,12 @@ from types import FrameType
 from typing import Any, Final
 
 from rocking.compiling import SIMULATIONS, announce
-from rocking.engine import cores
 from rocking.errors import InvalidOption, RockingError, StudyError
 from rocking.progress import Progress, note
 from rocking.studies.store import UnitArray
 from rocking.studies.units import Key, Work, compute
 from rocking.tables import counted
+from rocking.threads import Cancellation, cores
 
 #: Errors of a unit whose worker went away, or that was lost with it; every other one is the unit's own.
 _LOST: Final = (CancelledError, BrokenExecutor, OSError, EOFError)
@@ -212,11 +212,11 @@ def _outcome(future: Future[bytes]) -> bytes | str | BaseException:
 class Workers:
     """An executor, as far as a run needs to know it; that of dask.distributed knows its workers, and whether it lives.
 
-    `stop` is what threads look at to stop in the middle of a unit.
+    Threads look at whether they are `cancelled` to stop in the middle of a unit.
     """
 
-    def __init__(self, pool: Executor, stop: threading.Event | None = None) -> None:
-        self._pool, self._stop = pool, stop
+    def __init__(self, pool: Executor, cancelled: Cancellation | None = None) -> None:
+        self._pool, self._cancelled = pool, cancelled
         self._client: Any = getattr(pool, "_client", None)
         self._count, self._counted = 0, -_RECOUNT
 
@@ -236,7 +236,7 @@ class Workers:
     def submit(self, work: Work) -> Future[bytes]:
         """Hand a unit to a worker, with all that it needs."""
         try:
-            return self._pool.submit(compute, work, *([] if self._stop is None else [self._stop]))
+            return self._pool.submit(compute, work, *([] if self._cancelled is None else [self._cancelled]))
         except RuntimeError as error:
             raise _gone(error) from error
 
@@ -253,12 +253,12 @@ def workers_of(executor: Executor | None, threads: int | None) -> Iterator[Worke
     if executor is not None:
         yield Workers(executor)
         return
-    stop = threading.Event()
+    cancelled = Cancellation()
     with ThreadPoolExecutor(threads or cores()) as pool:
         try:
-            yield Workers(pool, stop)
+            yield Workers(pool, cancelled)
         except BaseException:
-            stop.set()
+            cancelled.asked = True
             pool.shutdown(wait=False, cancel_futures=True)
             raise
 

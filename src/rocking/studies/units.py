@@ -9,7 +9,6 @@ import json
 import math
 import re
 import socket
-import threading
 import time
 import zlib
 from abc import ABC, abstractmethod
@@ -30,6 +29,7 @@ from rocking.errors import InvalidOption, StudyError
 from rocking.kernels.compiled import fingerprint
 from rocking.motion.motion import Motion
 from rocking.studies.inputs import OUTCOMES
+from rocking.threads import Cancellation
 
 #: Units are multiples of so many blocks, which the engine takes through a motion together.
 _GROUP: Final = 512
@@ -220,12 +220,12 @@ class Work(ABC):
     def parts(self) -> Iterator[tuple[tuple[Any, ...], Task]]:
         """Give each task, and where its outcomes belong in the array of the unit."""
 
-    def values(self, stop: threading.Event | None) -> Floats:
+    def values(self, cancelled: Cancellation | None) -> Floats:
         """Simulate, and return the outcomes: NaN where the unit holds fewer simulations than a full one."""
         shape = len(self.outcomes), *self.unit
         values = np.empty(shape) if self.unit == self.counts else np.full(shape, np.nan)
         for where, task in self.parts():
-            _fill(values[:, *where], self.outcomes, simulate_task(self.setup, task, stop))
+            _fill(values[:, *where], self.outcomes, simulate_task(self.setup, task, cancelled))
         return values
 
 
@@ -269,14 +269,14 @@ class PointsWork(Work):
             yield (some,), Task(some, self.motions[self.which[start]], float(self.factors[start]))
 
 
-def compute(work: Work, stop: threading.Event | None = None) -> bytes:
-    """Simulate a unit, wherever its inputs have been sent, and return its bytes; of no use where `stop` is set.
+def compute(work: Work, cancelled: Cancellation | None = None) -> bytes:
+    """Simulate a unit, wherever its inputs have been sent, and return its bytes; of no use where it is `cancelled`.
 
     A StudyError is raised if the program is another one here, whose bits may differ.
     """
     if work.program != program():
         raise StudyError(f"the worker on {socket.gethostname()} has {program()}, the study needs {work.program}")
-    return encoded(work.values(stop))
+    return encoded(work.values(cancelled))
 
 
 def _fill(values: Floats, names: tuple[str, ...], outcomes: NDArray[np.void]) -> None:

@@ -20,8 +20,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from rocking.analysis.calibration.space import Space
 from rocking.arrays import Flags, Floats
-from rocking.engine import cores
 from rocking.kernels import population as kernel
+from rocking.threads import cores
 
 #: Prior of the logarithm of a dispersion from test to test: its standard deviation.
 _DISPERSION_LOG_DEVIATION: Final = 0.6
