@@ -690,3 +690,67 @@ def test_a_stream_names_no_other_file(tmp_path, monkeypatch):
     scene = b"mtllib /etc/passwd\nusemtl red\n" + trimesh.exchange.obj.export_obj(box()).encode()
     assert Solid.from_mesh(named(scene, "a.obj")).volume == pytest.approx(box().volume)
     assert len(asked) == 1
+
+
+def _box(sizes, at, *, inverted=False):
+    mesh = trimesh.creation.box(sizes)
+    mesh.apply_translation(at)
+    if inverted:
+        mesh.invert()
+    return mesh
+
+
+@pytest.mark.parametrize("inverted", [False, True])
+@pytest.mark.parametrize("density", [None, 1000.0, {"wall": 2000.0, "core": 7000.0}])
+def test_a_body_within_a_cavity_is_one(inverted, density):
+    whole = trimesh.Scene()
+    parts = {"wall": _box((2, 2, 4), (0, 0, 2)), "core": _box((0.5, 0.5, 1), (0, 0, 1.5))}
+    parts["void"] = _box((1.6, 1.6, 3), (0, 0, 2), inverted=True)
+    for name, mesh in parts.items():
+        if inverted:
+            mesh.invert()
+        whole.add_geometry(mesh, node_name=name, geom_name=name)
+    found = Solid.from_mesh(whole, density=density)
+    assert found.volume == pytest.approx(16.0 - 7.68 + 0.25, rel=1e-12)
+    assert {region.name for region in found.regions} == {"wall", "core"}
+    if isinstance(density, dict):
+        assert found.mass == pytest.approx(2000.0 * 8.32 + 7000.0 * 0.25, rel=1e-12)
+
+
+@pytest.mark.parametrize("at", [(-0.5, 0, 2), (0.5, 0, 2), (0, -0.5, 2), (0, 0.5, 2)])
+def test_a_cavity_in_the_surface_is_one_wherever_its_corners_lie(at):
+    found = Solid.from_mesh(trimesh.util.concatenate([_box((2, 2, 4), (0, 0, 2)), _box((1, 1, 2), at, inverted=True)]))
+    assert found.volume == pytest.approx(14.0, rel=1e-12)
+    assert found.repairs == ("1 cavity of 2 m^3 taken as hollow",)
+
+
+def test_a_small_part_of_a_large_body_has_an_inside():
+    whole = trimesh.Scene()
+    for name, mesh in (
+        ("temple", _box((8, 8, 20), (0, 0, 10))),
+        ("clamp", _box((0.02, 0.02, 0.015), (0, 0, 20.0075))),
+    ):
+        whole.add_geometry(mesh, node_name=name, geom_name=name)
+    found = Solid.from_mesh(whole, density={"temple": 2000.0, "clamp": 7000.0})
+    assert found.volume == pytest.approx(1280.000006, rel=1e-12)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-12, 1e-10, 1e-9])
+def test_corners_that_are_near_each_other_are_one_wherever_they_lie(noise):
+    mesh = trimesh.creation.cylinder(radius=0.3, height=2.0, sections=200)
+    corners, faces = mesh.vertices[mesh.faces].reshape(-1, 3), np.arange(3 * len(mesh.faces)).reshape(-1, 3)
+    corners = corners + np.random.default_rng(0).uniform(-noise, noise, corners.shape)
+    found = Solid.from_mesh(trimesh.Trimesh(corners, faces, process=False))
+    assert found.repairs == ()
+    assert found.volume == pytest.approx(mesh.volume, rel=1e-7)
+
+
+@pytest.mark.parametrize("up", [[2e-6, 0, -1], [1.5e-6, -1e-6, -1], [1e-9, 0, -1], [1, 0, -1e-9], [1e-200, 0, -1]])
+def test_an_axis_that_points_nearly_down_is_turned_up_exactly(up):
+    turned = upright(up)
+    np.testing.assert_allclose(turned @ turned.T, np.eye(3), rtol=0.0, atol=1e-15)
+    np.testing.assert_allclose(turned @ (np.array(up) / np.linalg.norm(up)), [0.0, 0.0, 1.0], rtol=0.0, atol=1e-15)
+
+
+def test_an_azimuth_that_is_nearly_a_whole_turn_is_north():
+    assert Solid.from_mesh("statue").rose([0.0, -1e-15, 360.0, 90.0]).data.azimuth.values.tolist() == [0.0, 90.0]

@@ -17,7 +17,7 @@ from rocking.solid import support as polygons
 from rocking.solid.moments import moments, signed_volumes, together
 from rocking.solid.overlap import overlaps
 from rocking.solid.reading import length_of, parts_of, upright
-from rocking.solid.repair import Surface, agreeing, closed, is_closed, joined, winding
+from rocking.solid.repair import Surface, agreeing, closed, is_closed, joined, surrounds
 
 if TYPE_CHECKING:
     from rocking.solid.reading import Mesh, Part
@@ -69,12 +69,12 @@ def properties(
     every = np.vstack([part.vertices[np.unique(part.faces)] for part in parts])
     ground = float(every[:, 2].min())
     every[:, 2] -= ground
-    height, size = float(every[:, 2].max()), float(np.ptp(every, axis=0).max())
+    height = float(every[:, 2].max())
     names, surfaces = _surfaces(parts, density)
     densities = _densities(density, names, [part.name for part in parts])
     inside = [moments(surface.vertices, surface.faces) for surface in surfaces]
-    for name, each in zip(names, inside, strict=True):
-        if not each.amount > _FLAT * size**3:
+    for name, surface, each in zip(names, surfaces, inside, strict=True):
+        if not each.amount > _FLAT * float(np.ptp(surface.vertices, axis=0).max()) ** 3:
             what = "" if name == found.name else f"{name} "
             raise InvalidBlock(
                 f"{what}encloses no volume: it is a surface without an inside; give it a thickness", path=found.name
@@ -166,15 +166,17 @@ def _cavities(surfaces: Sequence[Surface], may: Sequence[bool]) -> dict[int, int
     volumes = [volume if is_closed(each.faces) else 0.0 for volume, each in zip(volumes, surfaces, strict=True)]
     found = {}
     for k, surface in enumerate(surfaces):
-        place = surface.vertices[surface.faces[0, 0]]
         around = [
             n
             for n, volume in enumerate(volumes)
             if may[k] and volume * volumes[k] < 0.0 and abs(volume) > abs(volumes[k])
-            and abs(winding(*surfaces[n][:2], place)) > 0.5
+            and surrounds(*surfaces[n][:2], *surface[:2])
         ]  # fmt: skip
         if around:
             found[k] = min(around, key=lambda n: abs(volumes[n]))
+    for k in sorted(found, key=lambda n: -abs(volumes[n])):
+        if found[k] in found:  # what is in a cavity is a body again
+            del found[k]
     return found
 
 

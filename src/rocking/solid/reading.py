@@ -181,9 +181,10 @@ def upright(up: object) -> Floats:
         if not 0.0 < length < np.inf:
             raise InvalidBlock("{} must be x, y or z, or a vector of three numbers that points up", "up", value=up)
         u = u / length
-    if u[2] < -1.0 + 1e-12:
+    if u[2] < 0.0 and not u[0] * u[0] + u[1] * u[1] > 0.0:
         return np.diag([1.0, -1.0, -1.0])
     x, y, _ = u
-    # Rodrigues' formula for the axis u x z: 1 + V + V^2/(1 + u_z).
+    # Rodrigues' formula for the axis u x z: 1 + V + V^2/(1 + u_z), whose divisor loses its digits near -z.
     v = np.array([[0.0, 0.0, -x], [0.0, 0.0, -y], [x, y, 0.0]])
-    return np.asarray(np.eye(3) + v + v @ v / (1.0 + u[2]))
+    share = 1.0 / (1.0 + u[2]) if u[2] > 0.0 else (1.0 - u[2]) / (x * x + y * y)
+    return np.asarray(np.eye(3) + v + v @ v * share)

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 #: Corners within this part of the mesh's size are one.
 _SAME: Final = 1e-8
 
+#: Triangles of a surface that are looked at to see where it lies.
+_LOOKED_AT: Final = 12
+
 
 class Surface(NamedTuple):
     """Corners, m, shape (n, 3), triangles, shape (m, 3), and what was repaired."""
@@ -36,13 +39,17 @@ def is_closed(faces: Integers) -> bool:
 
 def joined(vertices: Floats, faces: Integers) -> Surface:
     """Join corners at one place; leave out triangles that are none then, or are there already."""
+    from scipy.spatial import cKDTree
+
     low = vertices.min(axis=0)
     size = float(np.max(vertices.max(axis=0) - low))
     if not size > 0.0:
         raise InvalidBlock("all corners of the mesh are at one place")
-    places = np.rint((vertices - low) / (size * _SAME)).astype(np.int64)
-    _, first, index = np.unique(places, axis=0, return_index=True, return_inverse=True)
-    three = index.reshape(-1)[faces]
+    places, at, index = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
+    near = components(len(places), cKDTree(places).query_pairs(size * _SAME, output_type="ndarray"))
+    _, first, of_place = np.unique(near, return_index=True, return_inverse=True)
+    first = at[first]
+    three = of_place.reshape(-1)[index.reshape(-1)][faces]
     whole = (three[:, 0] != three[:, 1]) & (three[:, 1] != three[:, 2]) & (three[:, 2] != three[:, 0])
     kept = three[whole]
     # Each begins with its least corner, so that those of one orientation are equal.
@@ -174,9 +181,8 @@ def _outward(vertices: Floats, faces: Integers) -> tuple[Integers, tuple[str, ..
     cavities, apart = [], 0
     outer = np.flatnonzero(sign * volume > 0.0)
     for k in np.flatnonzero(sign * volume < 0.0):
-        place = vertices[faces[np.argmax(label == k), 0]]
         around = outer[np.abs(volume[outer]) > abs(volume[k])]
-        if any(abs(winding(vertices, faces[label == n], place)) > 0.5 for n in around):
+        if any(surrounds(vertices, faces[label == n], vertices, faces[label == k]) for n in around):
             cavities.append(abs(float(volume[k])))
         else:
             sign[k] *= -1.0
@@ -187,6 +193,17 @@ def _outward(vertices: Floats, faces: Integers) -> tuple[Integers, tuple[str, ..
     if apart:
         repairs.append(f"{counted(apart, 'separate surface')} turned inside out")
     return np.where(sign[label][:, None] < 0.0, faces[:, ::-1], faces), tuple(repairs)
+
+
+def surrounds(vertices: Floats, faces: Integers, other: Floats, others: Integers) -> bool:
+    """Whether a surface goes round another one, as that of its corners and triangles says which is least doubtful.
+
+    What both have in common has a half of the one inside, or nearly so.
+    """
+    some = others[np.linspace(0, len(others) - 1, _LOOKED_AT).astype(np.int64)]
+    places = np.vstack([other[some[:, 0]], other[some].mean(axis=1)])
+    around = [abs(winding(vertices, faces, place)) for place in np.unique(places, axis=0)]
+    return max(around, key=lambda times: abs(times - 0.5)) > 0.5
 
 
 def winding(vertices: Floats, faces: Integers, place: Floats) -> float:

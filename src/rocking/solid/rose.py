@@ -119,7 +119,7 @@ def checked_azimuths(azimuths: ArrayLike | None) -> Floats:
     given = np.atleast_1d(checks.numbers(azimuths, "azimuths", InvalidOption))
     if given.ndim != 1 or not given.size or not np.all(np.isfinite(given)):
         raise InvalidOption("{} must be one finite number or more, degrees clockwise from north", "azimuths")
-    return np.unique([decimal(value) for value in np.mod(given, 360.0).tolist()])
+    return np.unique([decimal(value) % 360.0 for value in np.mod(given, 360.0).tolist()])
 
 
 def rose_of(
