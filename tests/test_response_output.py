@@ -396,3 +396,15 @@ def test_a_g_is_the_standard_one_whatever_gravity_the_block_has():
     for axes, peak in zip(response.plot().axes[1:3], (0.1, 0.05), strict=True):
         highest = [np.max(np.abs(line.get_ydata())) for line in axes.lines]
         assert min(abs(each - peak) for each in highest) < 1e-3 * peak
+
+
+def test_the_last_row_is_the_end_whatever_the_multiples_of_the_step_round_to():
+    motion = rocking.records.load("el-centro-meloland-270").scaled(0.7)
+    block, judged = Block(width=0.6, height=2.0), 0
+    for duration in (35.3, 30.15, 1.1, 2.03):
+        frame = simulate(block, motion, duration=duration).to_dataframe()
+        assert frame.index[-1] <= duration and np.isfinite(frame.to_numpy()).all()
+        judged += len(frame)
+    assert judged > 1000
+    for steps in range(1, 6000, 7):
+        assert history.even_times(round(0.005 * steps, 3), 0.005)[-1] <= round(0.005 * steps, 3)

@@ -324,7 +324,10 @@ class Block:
         alpha = math.atan2(b, h)
         radius = math.hypot(b, h) * (1.0 + 3.0 * gamma) / (1.0 + 2.0 * gamma)
         kept = 1.0 - 1.5 * math.sin(alpha) ** 2 + 3.0 * gamma * math.cos(2.0 * alpha)
-        sides = even_sides(g, radius, alpha, restitution, kept / (1.0 + 3.0 * gamma), _perhaps_swapped(b, h))
+        plus, minus = even_sides(g, radius, alpha, restitution, kept / (1.0 + 3.0 * gamma), _perhaps_swapped(b, h))
+        # The beam moves twice as far as the centres of the columns do.
+        arm = math.hypot(b, h) * (1.0 + 2.0 * gamma) / (1.0 + gamma)
+        sides = replace(plus, arm=arm), replace(minus, arm=arm)
         return block_of_sides(
             cls.__new__(cls), sides, g, f"frame of columns {2 * b:.5g} m x {2 * h:.5g} m, mass ratio {gamma:.5g}"
         )
@@ -468,9 +471,12 @@ class Block:
         stretch: Floats,
     ) -> tuple[Floats, Floats]:
         leaning = np.maximum(side, 0)
-        alpha, radius = (np.array([getattr(s, name) for s in self.sides])[leaning] for name in ("alpha", "radius"))
+        alpha, arm = (
+            np.array(each)[leaning]
+            for each in zip(*((s.alpha, s.radius if s.arm is None else s.arm) for s in self.sides), strict=True)
+        )
         sign = np.where(side < 0, 0.0, 1.0 - 2.0 * leaning)
-        return contact_forces(motion, ground_over_g, sign, alpha, radius / self.gravity)
+        return contact_forces(motion, ground_over_g, sign, alpha, arm / self.gravity)
 
     def alone(self) -> Bodies:
         """Return `Blocks` of which this is the only one."""

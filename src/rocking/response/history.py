@@ -126,7 +126,7 @@ class History:
 
 def even_times(end: float, dt: float) -> Floats:
     """Multiples of a step from 0 to the end, s."""
-    return dt * np.arange(math.floor(end / dt * (1.0 + 1e-12)) + 1, dtype=np.float64)
+    return np.minimum(dt * np.arange(math.floor(end / dt * (1.0 + 1e-12)) + 1, dtype=np.float64), end)
 
 
 def steps_to_events(nodes: Records, *, overturns: bool) -> Integers:
