@@ -863,3 +863,15 @@ def test_a_posterior_whose_interval_ends_at_a_bound_is_told(share, told):
     notes = [str(one) for one in bounds_reached(space, centres)]
     assert len(notes) == told
     assert all("8 % of the posterior" in note and "sets the upper end of the interval" in note for note in notes)
+
+
+def test_a_column_that_is_there_twice_is_refused(tmp_path):
+    for text in (
+        "motion,overturned,overturned\nel-centro-meloland-270,0,1\n",
+        "time_s,rotation_rad,rotation_deg\n0,0.1,1\n0.1,0.1,1\n",
+        "time_s,time_s,rotation_deg\n0,0.1,1\n0.1,0.1,1\n",
+    ):
+        path = tmp_path / "table.csv"
+        path.write_text(text)
+        with pytest.raises(rocking.UnreadableRecord, match="must be there once"):
+            read_calibration(path, channel=None, dt=None, units=None)

@@ -569,3 +569,22 @@ def test_outcomes_go_without_what_is_said_of_motions_to_predict(run, outcomes_ta
     code, _, err = run("calibrate", outcomes_table, "--scale", "3")
     assert code == 2
     assert "--scale is for the motions of --predict or --pulse" in err
+
+
+def test_standing_is_about_overturning_in_whatever_order_the_limits_come(run):
+    common = [
+        "fragility",
+        RECORD,
+        "ridgecrest-clc-090",
+        *SIZES,
+        "--levels",
+        "0.1g:1g:19",
+        "--standing",
+        "1000",
+        "--json",
+    ]
+    for limits in ("overturning,half=0.5", "half=0.5,overturning"):
+        code, out, _ = run(*common, "--limits", limits)
+        assert code == 0 and json.loads(out)["survival"]["limit_state"] == "overturning"
+    code, _, err = run(*common, "--limits", "half=0.5,most=0.8")
+    assert code == 2 and "--standing is about overturning, or about one limit, not half and most" in err

@@ -694,3 +694,72 @@ def test_outcomes_without_a_label_are_on_their_own(missing):
 def test_labels_that_are_none_are_refused(labels):
     with pytest.raises(InvalidOption, match="clusters must"):
         fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 0, 1], clusters=labels)
+
+
+@pytest.mark.parametrize("level", [4.0, 5.0, 6.0])
+def test_motions_that_are_scaled_to_one_level_are_at_one_intensity(level):
+    """Their measured intensities differ in the last digit."""
+    block = rocking.Block.from_parameters(p=3.0, alpha=0.25, restitution=0.9)
+    motions = [rocking.records.load(name).scaled_to(level) for name in rocking.records.names()]
+    assert len({motion.pga for motion in motions}) > 1
+    with pytest.raises(rocking.Unfitted, match="all outcomes are at one intensity"):
+        fragility(block, motions)
+
+
+def test_stripes_that_rounding_spreads_are_stripes():
+    levels = np.repeat([1.0, 2.0, 3.0, 4.0, 5.0, 6.0], 10)
+    fell = np.concatenate([np.arange(10) < count for count in (1, 2, 4, 6, 8, 9)])
+    rng = np.random.default_rng(0)
+    spread = levels * (1.0 + 2.0**-52 * rng.integers(-1, 2, levels.size))
+    one, other = (fit_fragility(each, fell).curves[0] for each in (levels, spread))
+    assert (other.goodness.freedom, one.goodness.freedom) == (4, 4)
+    assert other.goodness.p_value == pytest.approx(one.goodness.p_value, rel=1e-9)
+    assert other.median == pytest.approx(one.median, rel=1e-9)
+
+
+def test_a_draw_of_the_data_themselves_is_half_below_them():
+    """With three motions a fifth of the draws are; their fits differ from the fit in the last digits."""
+    motions = np.repeat([0, 1, 2], 5)
+    levels = np.tile([1.0, 2.0, 3.0, 4.0, 5.0], 3)
+    fell = levels >= np.repeat([3.0, 2.0, 4.0], 5)
+    curve = fit_fragility(levels, fell, clusters=motions, band=Band("bootstrap", samples=2000)).curves[0]
+    values = curve._uncertainty.fits
+    estimate = curve.fitted
+    near = np.abs(values.slope - estimate.slope[0]) < 1e-9 * estimate.slope[0]
+    assert 0.1 < near.mean() < 0.35
+    assert curve.dispersion_interval[0] < 1e-6 < curve.dispersion < curve.dispersion_interval[1]
+
+
+@pytest.mark.parametrize("overlap", [1e-3, 1e-4, 1e-5])
+def test_steep_curves_have_the_ends_of_their_profile_likelihood(overlap):
+    z = np.array([0.0, 0.2, 0.5, 0.5 + overlap, 0.5 + 2.0 * overlap, 0.5 + 3.0 * overlap, 0.8, 1.0])
+    fell = np.array([0, 0, 0, 1, 0, 1, 1, 1])
+    curve = fit_fragility(np.exp(z), fell).curves[0]
+
+    def lost(dispersion):
+        def minus(at):
+            score = (z - at) / dispersion
+            return -float(np.sum(np.where(fell, stats.norm.logcdf(score), stats.norm.logsf(score))))
+
+        return min(minimize(lambda x: minus(x[0]), [start], method="Nelder-Mead").fun for start in (0.4, 0.5, 0.6))
+
+    most = min(lost(each) for each in np.geomspace(0.1 * overlap, 1.0, 60))
+    end = curve.dispersion_interval[1]
+    assert end == pytest.approx(0.4676, abs=2e-3)
+    assert lost(end) - most == pytest.approx(0.5 * stats.chi2.ppf(0.9, 1), rel=5e-3)
+
+
+def test_labels_of_pandas_that_are_missing_are_on_their_own_and_masked_outcomes_are_refused():
+    pandas = pytest.importorskip("pandas")
+    levels, fell = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0], [0, 1, 0, 1, 1, 1]
+    for labels in (
+        pandas.Series(["a", "b", None, "c", "a", None], dtype="string"),
+        pandas.Series([1, 2, None, 3, 1, None], dtype="Int64"),
+        [1, 2, None, 3, 1, float("nan")],
+    ):
+        assert fit_fragility(levels, fell, clusters=labels).curves[0].clusters == 5
+    masked = np.ma.masked_array(fell, mask=[0, 0, 0, 0, 0, 1])
+    with pytest.raises(InvalidOption, match="some are masked"):
+        fit_fragility(levels, masked)
+    with pytest.raises(InvalidOption, match="some are masked"):
+        rocking.calibrate([rocking.pulses.one_sine(each, 1.0) for each in levels], masked)

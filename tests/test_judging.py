@@ -485,3 +485,20 @@ def test_the_command_takes_the_ensemble_of_each_specimen(run, tmp_path):
     assert code == 2 and "leave --width out" in err
     code, _, err = run("validate", tmp_path / "tests.csv")
     assert code == 2 and "a block is needed" in err
+
+
+def test_an_error_of_peaks_is_that_of_the_blocks_in_whatever_order_specimens_come():
+    rng = np.random.default_rng(0)
+    blocks = Blocks(3.0, np.exp(np.log(0.15) + 0.1 * rng.normal(size=50)), 0.9)
+    pulses = [rocking.pulses.one_sine(each, 1.0) for each in (1.6, 1.8, 2.5, 4.0, 4.5)]
+    peaks = [ShakeTest(each, peak_rotation=0.01 + 0.02 * k, specimen="a") for each in pulses[:2] for k in range(3)]
+    fell = [ShakeTest(each, overturned=k > 1, specimen="b") for k, each in enumerate(pulses)]
+    calibration = rocking.calibrate(pulses, [0, 0, 1, 1, 1], candidates=128, two_sided=False, p=3.0, restitution=0.9)
+    left_out = calibration.cross_validate(folds=2)
+    for tests in (peaks + fell, fell + peaks):
+        found = rocking.validate(tests, {"a": blocks, "b": left_out}, peak_error=0.01)
+        assert found.repeated_peaks.same_block == pytest.approx(0.01)
+    with pytest.raises(InvalidOption, match="have their own lapse"):
+        rocking.validate(fell, left_out, lapse=0.3)
+    with pytest.raises(InvalidOption, match="weights have 'A', for which blocks have nothing"):
+        rocking.validate(peaks, {"a": blocks}, weights={"A": np.ones(50)})

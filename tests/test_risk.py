@@ -634,3 +634,26 @@ def test_per_cent_in_a_heading_are_not_passed_over(tmp_path):
     path.write_text("PGA (g),annual rate (%)\n0.1,1\n0.4,0.01\n")
     with pytest.raises(InvalidOption, match=r"annual_rate and one of .*, not PGA \(g\), annual rate \(%\)"):
         HazardCurve.read(path)
+
+
+def test_the_figure_of_a_survival_has_a_range_however_wide_the_curve():
+    for fell in ([500, 500, 500, 501], [499, 500, 500, 501]):
+        figure = rocking.fit_fragility([1, 2, 3, 4], fell, trials=1000).survival(100).plot()
+        assert figure.axes
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("#,,imt='SA(x)',investigation_time=50.0\nlon,lat,poe-0.1,poe-0.2\n0,0,0.5,0.1\n", "could not convert"),
+        ("#,,imt='SA',investigation_time=50.0\nlon,lat,poe-0.1,poe-0.2\n0,0,0.5,0.1\n", "could not convert"),
+        ("#,,imt='PGA',investigation_time=50.0\nlon,lat,poe-0..,poe-0.2\n0,0,0.5,0.1\n", "could not convert"),
+        ("#,,imt='PGA',investigation_time=0\nlon,lat,poe-0.1,poe-0.2\n0,0,0.5,0.1\n", "must be above 0"),
+        ("pga_m_s2,annual_rate\n1,9,0\n2,5,0\n", "this row has 3 cells, and the heading 2"),
+    ],
+)
+def test_a_hazard_curve_that_is_damaged_is_refused(tmp_path, text, said):
+    path = tmp_path / "curve.csv"
+    path.write_text(text)
+    with pytest.raises(InvalidOption, match=said):
+        HazardCurve.read(path)

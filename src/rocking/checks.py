@@ -155,6 +155,14 @@ def numbers(values: ArrayLike, name: str, error: Error) -> Floats:
     return np.asarray(given, dtype=np.float64)
 
 
+def answers_or_numbers(values: ArrayLike, name: str, error: Error) -> Floats:
+    """Return real numbers, or truth values as 1 and 0, as `numbers` does."""
+    if np.ma.is_masked(values):
+        raise error("{} must be given throughout, but some are masked", name, value=values)
+    given = np.asarray(values)
+    return given.astype(np.float64) if given.dtype.kind == "b" else numbers(values, name, error)
+
+
 def positive_numbers(values: ArrayLike, name: str, error: Error) -> Floats:
     """Return one or more positive finite numbers as a flat array, or raise `error`."""
     axis = np.atleast_1d(numbers(values, name, error))

@@ -263,6 +263,10 @@ def _from_table(lines: list[str], period: float | None) -> tuple[Floats, Floats,
     kind, factor = HEADINGS[found[0]]
     intensity, rate = np.empty(len(rows)), np.empty(len(rows))
     for k, (line, row) in enumerate(rows):
+        if len(row) != len(heading):
+            raise InvalidOption(
+                f"this row has {len(row)} cells, and the heading {len(heading)}: make them as many", line=line
+            )
         try:
             intensity[k], rate[k] = (float(row[heading.index(name)]) for name in (found[0], "annual_rate"))
         except (ValueError, IndexError):
@@ -285,14 +289,17 @@ def _from_openquake(lines: list[str], site: int) -> tuple[Floats, Floats, Measur
     if not 0 <= site < len(rows) - 1:
         raise InvalidOption(f"there is no site {site}; it holds {len(rows) - 1}, counted from 0")
     columns = [k for k, level in enumerate(levels) if level]
-    intensity = np.array([float(level[1]) for level in levels if level])
     try:
+        intensity = np.array([float(level[1]) for level in levels if level])
         exceeded = np.array([float(rows[1 + site][k]) for k in columns])
         years = float(said["investigation_time"])
-    except (ValueError, IndexError) as error:
+        at = float(rest.rstrip(")")) if kind == "SA" else None
+    except (ValueError, IndexError, KeyError) as error:
         raise InvalidOption(f"site {site}: {error}; it is not a whole hazard curve") from None
+    if not 0.0 < years < math.inf:
+        raise InvalidOption(f"the investigation_time is {years:g} years; it must be above 0")
     measure_name, factor = _OPENQUAKE[kind]
-    measure = Measure("sa", float(rest.rstrip(")"))) if kind == "SA" else Measure(measure_name)
+    measure = Measure(measure_name) if at is None else Measure("sa", at)
     # Probabilities that are printed as 0 or 1 say nothing of the rate.
     useful = (exceeded > 0.0) & (exceeded < 1.0)
     rate = -np.log1p(-exceeded[useful]) / years

@@ -100,6 +100,9 @@ def read_calibration(
     `time_s`, and `rotation_rad` or `rotation_deg`.
     """
     table = read_table(path)
+    both = ["rotation_rad", "rotation_deg"]
+    if doubled := table.doubled(table.columns) or both * ({*both} <= {*table.columns}):
+        raise table.error(f"each column must be there once, and one rotation, but there is more: {', '.join(doubled)}")
     if {"motion", "overturned"} <= set(table.columns):
         about = {"channel": channel, "dt": dt, "units": units}
         if "specimen" not in table.columns:
@@ -121,6 +124,8 @@ def read_ensemble(path: Path) -> Ensemble:
         [named(f"{name}_{side}", unit) for side in ("plus", "minus")]
         for name, unit in (("p", "rad/s"), ("alpha", "rad"), ("restitution", "1"))
     ]
+    if doubled := table.doubled(table.columns):
+        raise table.error(f"each column must be there once, but {' and '.join(doubled)} several times")
     missing = [name for name in (*columns[0], *columns[1], *columns[2], "weight", "model") if name not in table.columns]
     if missing:
         raise table.error(f"no ensemble of a calibration, whose ensemble.csv has {' and '.join(missing)}")

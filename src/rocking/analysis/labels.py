@@ -34,7 +34,12 @@ def groups_of(labels: object, name: str, count: int) -> Integers:
 
 
 def _is_missing(label: object) -> bool:
-    return label is None or label == "" or (isinstance(label, float) and math.isnan(label))
+    # The missing value of pandas is equal to nothing, and no truth value either.
+    return label is None or type(label).__name__ == "NAType" or label == "" or _is_nan(label)
+
+
+def _is_nan(label: object) -> bool:
+    return isinstance(label, float) and math.isnan(label)
 
 
 def labels_of(data: xr.Dataset, of: str = "motion", *, with_history: bool = True) -> list[str]:

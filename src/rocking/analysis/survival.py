@@ -219,7 +219,9 @@ class Survival(DrawnResult):
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         from rocking.plot.risk import survival_figure
 
-        ends = [self.curve.intensity_of(chance) for chance in _SHOWN]
+        ends = [end for end in map(self.curve.intensity_of, _SHOWN) if 0.0 < end < math.inf]
+        if len(ends) < len(_SHOWN):  # the curve is so wide that these are not numbers any more
+            ends = [self.curve.intensity.min(), self.curve.intensity.max()]
         if self.hazard is not None:
             ends += self.hazard.intensity[[0, -1]].tolist()
         at = np.geomspace(min(ends), max(ends), _POINTS)

@@ -142,7 +142,7 @@ def fragility(
             found["risk"], figures["risk"] = risk.to_dict(years), risk.plot
             text.append(risk.summary(years))
         if standing is not None:
-            survived = fitted.survival(standing, curve, limit_state=fitted.curves[-1].limit_state)
+            survived = fitted.survival(standing, curve, limit_state=_limit_of_standing(fitted))
             found["survival"], figures["survival"] = survived.to_dict(), survived.plot
             text.append(survived.summary())
         if folder is not None:
@@ -155,6 +155,18 @@ def fragility(
                 together.to_csv(folder / "outcomes.csv", "outcomes")
             write_results(folder, figures=figures, result=found)
         print_result(found, "\n\n".join(text), as_json=output.as_json)
+
+
+def _limit_of_standing(fitted: Fragility) -> str:
+    """Name the limit that a block has not passed in a time: overturning, or the only one."""
+    names = [curve.limit_state for curve in fitted.curves]
+    if len(names) > 1 and "overturning" not in names:
+        raise InvalidOption(
+            f"{{}} is about overturning, or about one limit, not {' and '.join(names)}: name one of them in {{}}",
+            "standing",
+            "limits",
+        )
+    return "overturning" if "overturning" in names else names[0]
 
 
 @contextlib.contextmanager

@@ -179,6 +179,8 @@ def _estimates(space: Space, populations: Floats) -> dict[str, Estimate]:
 
 def checked_outcomes(overturned: ArrayLike, count: int) -> Flags:
     """Outcomes as an array that nobody can change: yes or no, one for each motion, and not all the same."""
+    if np.ma.is_masked(overturned):
+        raise InvalidOption("{} must be given for each motion, but some are masked", "overturned", value=overturned)
     values = np.asarray(overturned)
     if values.shape != (count,):
         raise InvalidOption(

@@ -29,7 +29,10 @@ from rocking.arrays import Floats, Integers
 #: Directions in which a region is measured: between them 4e-5 of an interval's width is lost.
 _RAYS: Final = 360
 _DOUBLINGS: Final = 100
-_NEWTON: Final = 12
+_NEWTON: Final = 80
+
+#: Relative difference of two quantities that are the same but for rounding.
+_SAME: Final = 1e-9
 
 #: Clusters that tell how far they differ, at least; and the most that one may weigh in its own leaving out.
 _FEWEST: Final = 3
@@ -137,7 +140,10 @@ class Resamples:
 
         values = quantity(self.fits)
         count = len(values)
-        below = (np.sum(values < estimate, axis=0) + 0.5 * np.sum(values == estimate, axis=0)) / count
+        # Data that are drawn again as they are, are fitted to other last digits.
+        with np.errstate(invalid="ignore"):
+            same = (values == estimate) | (np.abs(values - estimate) <= _SAME * np.maximum(1.0, np.abs(estimate)))
+        below = (np.sum((values < estimate) & ~same, axis=0) + 0.5 * np.sum(same, axis=0)) / count
         bias = ndtri(np.clip(below, 0.5 / count, 1.0 - 0.5 / count))
         pulls = self.influence @ gradient
         tiny = np.finfo(float).tiny
@@ -188,7 +194,10 @@ def _around(data: Outcomes, best: Probit, drop: float) -> Floats:
         with np.errstate(over="ignore", invalid="ignore"):
             fall = -np.sum(scores(rays, here)[0] * directions, axis=1)
         beyond = (above < 0.0) & (fall > 0.0)
-        reach[beyond] += above[beyond] / fall[beyond]
+        step = above[beyond] / fall[beyond]
+        reach[beyond] += step
+        if np.all(np.abs(step) <= _SAME * reach[beyond]):
+            break
     return np.asarray(top + reach[:, None] * directions)
 
 

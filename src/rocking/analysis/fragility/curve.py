@@ -23,6 +23,9 @@ BandKind = Literal["likelihood", "bootstrap"]
 #: Samples of a bootstrap that lie beyond the ends of an interval, in the mean, at least.
 _BEYOND_ENDS: Final = 2.0
 
+#: Share of the trials by which two sums of the same weights may differ.
+_SAME: Final = 1e-12
+
 #: Logarithm of how far beyond the data a median is still believed.
 _BEYOND: Final = math.log(1000.0)
 
@@ -360,6 +363,9 @@ def fitted_curve(
     where several are at one intensity.
     """
     intensity, exceeded, trials = data
+    intensity = lognormal.levelled(intensity)
+    # Both are sums of the same weights, perhaps in another order.
+    exceeded = np.where(np.abs(trials - exceeded) <= _SAME * trials, trials, exceeded)
     z = np.log(intensity)
     outcomes = Outcomes(z, exceeded, trials)
     fault = lognormal.unidentified(outcomes, measure.shown)

@@ -320,8 +320,7 @@ def _limit_states(given: Mapping[str, Any], name: str) -> Mapping[str, Any]:
 
 def _whole(values: ArrayLike, name: str, size: int, least: float, most: ArrayLike) -> Floats:
     """Whole numbers, one for each intensity, between two bounds."""
-    given = np.asarray(values)
-    given = given.astype(np.float64) if given.dtype.kind == "b" else checks.numbers(given, name, InvalidOption)
+    given = checks.answers_or_numbers(values, name, InvalidOption)
     try:
         numbers = np.broadcast_to(given, size)
     except ValueError:

@@ -23,6 +23,9 @@ _CONVERGED: Final = 1e-11
 #: Outcomes that overlap by less than this part of the intensities' range count as separated.
 _NARROW: Final = 1e-6
 
+#: Logarithms of intensities that differ by no more are one level.
+_SAME_LEVEL: Final = 1e-9
+
 #: Slope that stands for a step.
 STEEP: Final = 1e9
 
@@ -118,6 +121,16 @@ class Goodness:
     statistic: float
     freedom: int
     p_value: float
+
+
+def levelled(intensity: Floats) -> Floats:
+    """Return intensities of which those that differ by rounding alone, as those of scaled motions, are one."""
+    order = np.argsort(intensity, kind="stable")
+    ordered = intensity[order]
+    grows = np.diff(np.log(ordered), prepend=-np.inf) > _SAME_LEVEL
+    found = np.empty_like(ordered)
+    found[order] = ordered[grows][np.cumsum(grows) - 1]
+    return found
 
 
 def unidentified(data: Outcomes, shown: Callable[[float], str]) -> str | None:

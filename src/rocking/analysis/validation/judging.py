@@ -354,7 +354,7 @@ def _repeated_peaks(
         own = np.flatnonzero(np.isin(one.tests, chosen))
         standing = np.where(np.isfinite(one.peaks[:, own]), one.peaks[:, own], math.nan)
         same += [float(one.weights @ each) for each in scores.scatter(standing, seen.repetitions[one.tests[own]])]
-        deviation = one.deviation
+        deviation = max(deviation, one.deviation if one.has_blocks else 0.0)
     alone = math.hypot(math.sqrt(same[0] / same[1]), deviation) if same[1] > 0.0 else math.nan
     expected = math.sqrt(float((squares / free).mean()))
     sizes = len(np.unique(sets)), len(chosen)

@@ -198,6 +198,13 @@ def predicted(
             )
         if weights is not None and not isinstance(weights, Mapping):
             raise InvalidOption("{} of several specimens must be a mapping like {}", "weights", "blocks")
+        unknown = [name for name in weights or {} if name not in sources]
+        if unknown:
+            raise InvalidOption(
+                f"{{}} have {unknown[0]!r}, for which {{}} have nothing: name a specimen of these",
+                "weights",
+                "blocks",
+            )
         chosen = {name: (sources[name], (weights or {}).get(name)) for name in tests.names}
         where = {name: np.flatnonzero(tests.specimens == k) for k, name in enumerate(tests.names)}
     else:
@@ -209,6 +216,8 @@ def predicted(
     found, words, models = [], {}, {}
     for name, (source, own) in chosen.items():
         if isinstance(source, Validation):
+            if lapse is not None and len(chosen) == 1:
+                raise InvalidOption("predictions of tests that were left out have their own {}: leave it out", "lapse")
             found.append(_left_out(source, own, tests, where[name]))
             words[name], models[name] = "predictions of tests that were left out", ""
             continue
