@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from rocking import (
     simulate,
     simulate_many,
 )
+from rocking.threads import Cancellation
 
 ULP = 2.0**-52
 
@@ -286,9 +288,12 @@ def test_an_interrupt_reaches_the_tasks_in_hand(monkeypatch):
     )
     begun, told = threading.Event(), []
 
-    def held(setup, task, stop):
+    def held(setup, task, cancelled):
         begun.set()
-        told.append(stop.wait(20.0))
+        late = time.monotonic() + 20.0
+        while not cancelled.asked and time.monotonic() < late:
+            time.sleep(0.001)
+        told.append(cancelled.asked)
 
     def tasks():
         yield task
@@ -304,14 +309,14 @@ def test_an_interrupt_reaches_the_tasks_in_hand(monkeypatch):
 
 def test_a_task_that_is_told_to_stop_follows_no_body_any_further(monkeypatch, records):
     setup, task = engine.Setup(random_blocks(3, 1), "linear", Certified()), engine.Task(slice(None), records[2])
-    marched, stop = [], threading.Event()
+    marched, cancelled = [], Cancellation()
     march = engine._march_together
     monkeypatch.setattr(engine, "_march_together", lambda *given: marched.append(march(*given)))
-    engine.simulate_task(setup, task, stop)
+    engine.simulate_task(setup, task, cancelled)
     assert len(marched) >= 1
-    stop.set()
+    cancelled.asked = True
     marched.clear()
-    engine.simulate_task(setup, task, stop)
+    engine.simulate_task(setup, task, cancelled)
     assert not marched
 
 

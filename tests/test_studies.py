@@ -758,3 +758,65 @@ def test_a_folder_that_is_no_path_is_told(folder):
         rocking.study(folder, BLOCKS, MOTIONS)
     with pytest.raises(rocking.errors.StudyError, match="the file of a study must be text or a path"):
         read_study(folder)
+
+
+def test_bodies_of_another_kind_with_the_same_numbers_are_another_study(tmp_path):
+    motion = rocking.pulses.one_sine(4.0, 1.0)
+    block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    pendulum = rocking.dynamics.InvertedPendulum(p=2.0, gap=0.2, restitution=0.9)
+    rocking.study(tmp_path / "one", block, motion, model="linear", unit_blocks=512).run()
+    rocking.study(tmp_path / "other", pendulum, motion, model="linear", unit_blocks=512).run()
+    for folder, bodies in (("one", pendulum), ("other", block)):
+        with pytest.raises(rocking.StudyError, match="of other inputs \\(the blocks changed\\)"):
+            rocking.study(tmp_path / folder, bodies, motion, model="linear", unit_blocks=512)
+    again = rocking.study(tmp_path / "other", pendulum, motion, model="linear", unit_blocks=512)
+    assert float(again.results().peak_rotation.max()) == pytest.approx(0.2)
+
+
+def test_a_study_that_another_process_creates_meanwhile_is_opened(tmp_path, monkeypatch):
+    module = importlib.import_module("rocking.studies.study")
+    pilot, motion = module.fitting_unit, rocking.pulses.one_sine(4.0, 1.0)
+    blocks = rocking.Blocks(p=np.linspace(1.0, 6.0, 1300), alpha=0.2, restitution=0.9)
+
+    def slow(product):
+        monkeypatch.setattr(module, "fitting_unit", pilot)
+        rocking.study(tmp_path, blocks, motion, unit_blocks=512).run()
+        return (1, 1, 1, 1024)
+
+    monkeypatch.setattr(module, "fitting_unit", slow)
+    study = rocking.study(tmp_path, blocks, motion)
+    assert study.results().sizes["block"] == 1300
+    assert not study.verify()
+
+
+def test_a_symmetric_block_counts_once_beside_others(tmp_path):
+    """Both polarities are one outcome of it, whatever the blocks beside it."""
+    motions = [rocking.records.load(name) for name in ("el-centro-meloland-270", "ridgecrest-clc-090")]
+    even = rocking.Block.from_parameters(p=3.0, alpha=0.18, restitution=0.9)
+    odd = rocking.Block.from_parameters(p=(2.0, 2.2), alpha=(0.15, 0.17), restitution=0.9)
+    levels = np.array([0.15, 0.25, 0.35, 0.5, 0.8]) * 9.80665
+
+    def made(name, blocks):
+        study = rocking.study(
+            tmp_path / name, blocks, motions, levels=levels, measure="pga", polarity="both", unit_blocks=512
+        )
+        study.run()
+        return study.spectrum().data, study.block_fragilities().data
+
+    (alone, curve), (beside, curves) = made("alone", [even]), made("beside", [odd, even])
+    assert np.array_equal(alone.fractile_over_alpha[..., 0], beside.fractile_over_alpha[..., 1])
+    assert np.array_equal(alone.overturned_share[..., 0], beside.overturned_share[..., 1])
+    for name in ("median", "dispersion", "median_lower", "exceeded"):
+        assert np.array_equal(curve[name][0, 0], curves[name][0, 1], equal_nan=True)
+    assert int(curves.exceeded[0, 0]) > int(curves.exceeded[0, 1])
+
+
+def test_sums_of_weights_in_another_order_make_no_outcome(tmp_path):
+    blocks = rocking.Blocks(2.0, np.linspace(0.199, 0.201, 37), 0.9)
+    pulses = [rocking.pulses.one_sine(1.0, frequency) for frequency in np.linspace(0.45, 0.55, 5)]
+    study = rocking.study(tmp_path, blocks, pulses, levels=[1.0, 1.5, 4.0, 5.0], measure="pga", unit_blocks=512)
+    study.run()
+    rng = np.random.default_rng(0)
+    for _ in range(10):
+        with pytest.raises(rocking.Unfitted, match="separated"):
+            study.fragility(weights=rng.uniform(0.1, 1.0, 37))

@@ -80,11 +80,15 @@ def numbered(given: Sequence[str]) -> list[str]:
     ['one #1', 'two', 'one #2']
     """
     shared = {name for name, count in Counter(given).items() if count > 1}
-    seen: Counter[str] = Counter()
+    taken, seen = {*given}, Counter[str]()
     names = []
     for name in given:
-        seen[name] += 1
-        names.append(f"{name} #{seen[name]}" if name in shared else name)
+        own = name
+        while name in shared and own in taken:
+            seen[name] += 1
+            own = f"{name} #{seen[name]}"
+        taken.add(own)
+        names.append(own)
     return names
 
 

@@ -21,7 +21,7 @@ from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
 from rocking.progress import Progress
 from rocking.result import table_of_some, variable
-from rocking.studies.spectrum import BlocksResult, peak_ratios, require_limits
+from rocking.studies.spectrum import BlocksResult, peak_ratios, polarities_that_count, require_limits
 from rocking.studies.store import Store
 from rocking.tables import counted
 
@@ -58,7 +58,7 @@ def pooled_fragility(
     trials = np.zeros((motions, scales, len(units)))
     for blocks, ratios in peak_ratios(store):
         belongs = np.where(which[blocks][:, None] == np.arange(len(units)), shares[blocks][:, None], 0.0)
-        trials += ratios.shape[2] * belongs.sum(axis=0)
+        trials += np.full(ratios.shape[:2] + ratios.shape[3:], float(ratios.shape[2])) @ belongs
         for name, limit in limits.items():
             counts[name] += passed(ratios, limit, name).sum(axis=2) @ belongs
     x = _intensities(product, measure)[:, :, None] / units
@@ -112,9 +112,10 @@ def block_fragilities(
     }
     with Progress("fitting", count * len(limits), show=progress) as bar:
         for blocks, ratios in peak_ratios(store):
-            polarities = ratios.shape[2]
+            counted = polarities_that_count(store.product.bodies.select(blocks), ratios.shape[2])
             for (i, (name, limit)), j in itertools.product(enumerate(limits.items()), range(blocks.start, blocks.stop)):
-                exceeded = passed(ratios[..., j - blocks.start], limit, name).sum(axis=2).ravel()
+                polarities = int(counted[j - blocks.start])
+                exceeded = passed(ratios[:, :, :polarities, j - blocks.start], limit, name).sum(axis=2).ravel()
                 kept["exceeded"][i, j] = exceeded.sum()
                 try:
                     fitted = fit_fragility(intensities / units[j], {name: exceeded}, trials=polarities, **options)

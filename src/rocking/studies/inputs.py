@@ -79,7 +79,7 @@ def hashes(product: Product) -> dict[str, Any]:
     """Hash of every part of the inputs by its name; those of the motions in a list."""
     scales = product.scales
     return {
-        "blocks": _hash(_body_arrays(product.bodies).values()),
+        "blocks": _hash(_told_apart(product.bodies)),
         "motions": [_hash(_motion_arrays(motion).values()) for motion in product.motions],
         "scales": _hash([scales.values, _text(json.dumps([*_measured(scales).values()]))]),
         "rules": _hash([_text(json.dumps(_rules(product)))]),
@@ -155,6 +155,13 @@ def _hash(arrays: Iterable[NDArray[Any]]) -> str:
 
 def _body_arrays(bodies: Bodies) -> dict[str, NDArray[Any]]:
     return {name: values for name, (values, _) in bodies.parameters().items()} | {"gravity": np.array(bodies.gravity)}
+
+
+def _told_apart(bodies: Bodies) -> list[NDArray[Any]]:
+    """Return the arrays of bodies; of others than blocks their kind and names, too, without which two may be alike."""
+    arrays = _body_arrays(bodies)
+    names = [] if bodies.kind == "blocks" else [_text(json.dumps([bodies.kind, *arrays]))]
+    return [*names, *arrays.values()]
 
 
 def _bodies(arrays: Mapping[str, Floats]) -> Bodies:

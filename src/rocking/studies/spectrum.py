@@ -13,7 +13,8 @@ import numpy as np
 from rocking import checks
 from rocking.analysis.fragility.curve import checked_limit
 from rocking.analysis.spectrum import fractiles_of
-from rocking.arrays import Floats, evenly
+from rocking.arrays import Floats, Integers, evenly
+from rocking.body import Bodies
 from rocking.engine import require_finished
 from rocking.ensemble import body_coordinates
 from rocking.errors import InvalidOption, StudyError
@@ -53,6 +54,14 @@ def require_limits(kept: Sequence[str], limits: Mapping[str, float]) -> None:
         require(kept, ["overturned"], "a fragility")
 
 
+def polarities_that_count(bodies: Bodies, polarities: int) -> Integers:
+    """Return how many polarities have outcomes of their own, for each body: a symmetric one does the same in both."""
+    if bodies.is_symmetric or polarities == 1:
+        return np.ones(len(bodies), int)
+    alone = (bodies.select(slice(k, k + 1)) for k in range(len(bodies)))
+    return np.array([1 if each.is_symmetric else polarities for each in alone])
+
+
 def peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
     """Peak rotation over the slenderness, infinite where a block overturned, for a range of blocks after the other.
 
@@ -63,8 +72,8 @@ def peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
     blocks : slice
         Which blocks.
     ratios : ndarray, shape (motions, scales, polarities, blocks of the range)
-        Over the smaller one of two slendernesses; of symmetric blocks under motions in both polarities only the first,
-        since the second is no other outcome.
+        Over the smaller one of two slendernesses; where all blocks of the study are symmetric, only the first of two
+        polarities, since the second is no other outcome. Where some are, `polarities_that_count` says which.
 
     Raises
     ------
@@ -136,9 +145,13 @@ def study_spectrum(store: Store, fractiles: Sequence[float] = FRACTILES, progres
     overturned = np.empty((product.scales.count, count))
     with Progress("reading", count, show=progress) as bar:
         for blocks, ratios in peak_ratios(store):
-            pooled = ratios.swapaxes(1, 2).reshape(-1, product.scales.count, ratios.shape[3])
-            values[:, :, blocks] = fractiles_of(pooled, shares)
-            overturned[:, blocks] = np.isinf(pooled).mean(axis=0)
+            counted = polarities_that_count(product.bodies.select(blocks), ratios.shape[2])
+            for polarities in np.unique(counted):
+                some = np.flatnonzero(counted == polarities)
+                own = ratios[:, :, :polarities, some]
+                pooled = own.swapaxes(1, 2).reshape(-1, product.scales.count, some.size)
+                values[:, :, blocks.start + some] = fractiles_of(pooled, shares)
+                overturned[:, blocks.start + some] = np.isinf(pooled).mean(axis=0)
             bar.advance(blocks.stop - blocks.start)
     words = "peak rotation over the slenderness, infinite where that share overturns"
     return StudySpectrum(

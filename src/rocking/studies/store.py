@@ -139,7 +139,7 @@ class Store(UnitArray):
     @classmethod
     def create(cls, place: Place, product: Product, unit: tuple[int, ...], outcomes: tuple[str, ...]) -> Store:
         """Write an empty store where nothing else is; `study.json` last, so that half a store is none."""
-        _require_free(place)
+        require_free(place)
         archive = inputs.to_bytes(product)
         place.put("inputs.npz", archive)
         made = cls(place, product, UnitGrid(product.shape, unit, outcomes))
@@ -249,7 +249,7 @@ def _described(place: Place) -> dict[str, Any]:
     return about
 
 
-def _require_free(place: Place) -> None:
+def require_free(place: Place) -> None:
     """Check that there is nothing in a place that is no study's."""
     others = {name.partition("/")[0] for name in place.names("")} - _ITS_OWN
     if others:

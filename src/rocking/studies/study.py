@@ -36,7 +36,7 @@ from rocking.studies.results import (
 from rocking.studies.run import RunReport, Stop, run
 from rocking.studies.spectrum import FRACTILES, StudySpectrum, study_spectrum
 from rocking.studies.state import Log, Status, simulations_done, status_of, verified
-from rocking.studies.store import Store, exists
+from rocking.studies.store import Store, exists, require_free
 from rocking.studies.units import fitting_unit, width_of
 from rocking.tables import counted
 from rocking.treatment import Treatment
@@ -568,7 +568,8 @@ def study_of(
     place of what was; `refine` may be given later; `outcomes` are from `chosen_outcomes`.
     """
     tolerances = None if refine is None else tolerances_of(product, refine, outcomes)
-    if exists(place):
+    found = None if exists(place) else _created(place, product, unit_blocks, outcomes)
+    if found is None:
         found = Store.open(place)
         found.check_inputs(product, outcomes)
         width, count = found.grid.unit[3], len(product.bodies)
@@ -576,9 +577,6 @@ def study_of(
             raise InvalidOption(
                 f"the study is there already, in units of {width} blocks: leave {{}} out", "unit_blocks"
             )
-    else:
-        unit = fitting_unit(product) if unit_blocks is None else (1, 1, 1, width_of(unit_blocks))
-        found = Store.create(place, product, unit, outcomes)
     if any(records) or (records and found.records()):
         found.name_records(records)
     if plan is not None and (plan != ReportPlan() or kept_report(found) is not None):
@@ -586,3 +584,11 @@ def study_of(
     if tolerances is not None:
         keep_plan(found, tolerances)
     return Study(found)
+
+
+def _created(place: Place, product: Product, unit_blocks: int | None, outcomes: tuple[str, ...]) -> Store | None:
+    """Create the store of a study; None where somebody else has done so meanwhile."""
+    require_free(place)
+    unit = fitting_unit(product) if unit_blocks is None else (1, 1, 1, width_of(unit_blocks))
+    with place.locked():
+        return None if exists(place) else Store.create(place, product, unit, outcomes)

@@ -111,7 +111,7 @@ def _study(tables: Tables) -> StudyFile:
         product = Product(blocks, tuple(motions), scales, polarity, model, chattering, rules.get("duration"))
         kept = chosen_outcomes(rules.get("outcomes"))
     report, refine = _report(tables, kept), given.get("refine")
-    longest = max(motion.duration for motion in motions)
+    longest = max(motion.end for motion in motions)
     if report not in (None, ReportPlan()) and product.duration is not None and product.duration < longest:
         raise tables.wrong(
             "simulation",
