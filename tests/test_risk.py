@@ -10,6 +10,7 @@ import mpmath
 import numpy as np
 import pytest
 import scipy.integrate
+import scipy.stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -657,3 +658,51 @@ def test_a_hazard_curve_that_is_damaged_is_refused(tmp_path, text, said):
     path.write_text(text)
     with pytest.raises(InvalidOption, match=said):
         HazardCurve.read(path)
+
+
+def _rate_within(fitted, hazard):
+    """Rate from motions between the ends of a hazard curve: the sum of P over fine steps of the rate."""
+    steps = np.geomspace(*hazard.intensity[[0, -1]], 20001)
+    middle = np.sqrt(steps[1:] * steps[:-1])
+    chance = scipy.stats.norm.cdf(fitted[0] + fitted[1] * np.log(middle))
+    return float(np.sum(chance * -np.diff(hazard.rate_of(steps))))
+
+
+@pytest.mark.parametrize(
+    ("levels", "fell", "trials", "hazard", "years"),
+    [
+        ([3, 4, 5, 6], [0, 2, 4, 5], 6, ([0.5, 2, 5], [1e-2, 1.5e-3, 1e-4]), 70000.0),
+        ([3, 4, 5, 6], [0, 2, 4, 5], 6, ([0.5, 2, 5], [1e-2, 1.5e-3, 1e-4]), 20000.0),
+        ([1, 2, 3, 4], [0, 1, 2, 4], 4, ([0.5, 1, 2, 3], [3e-2, 1e-2, 2e-3, 6e-4]), 5000.0),
+        ([1, 2, 3, 4], [500, 500, 500, 501], 1000, ([0.5, 1, 5], [1e-1, 1e-2, 1e-4]), 100.0),
+    ],
+)
+def test_the_largest_probability_of_standing_has_the_least_rate_within_the_curve(levels, fell, trials, hazard, years):
+    curve = HazardCurve(*hazard)
+    fitted = rocking.fit_fragility(levels, fell, trials=trials)
+    found = fitted.survival(years, curve)
+    boundary = fitted.curves[0]._uncertainty.boundary
+    rates = [_rate_within(each, curve) for each in zip(boundary.intercept, boundary.slope, strict=True)]
+    assert len(rates) > 100
+    assert found.most_probable == pytest.approx(math.exp(-min(rates) * years), rel=1e-3)
+    assert found.contradicts == (found.most_probable < 0.05)
+
+
+def test_a_period_that_is_not_the_curve_s_is_refused(tmp_path):
+    plain, other = tmp_path / "plain.csv", tmp_path / "other.csv"
+    plain.write_text("pga_g,annual_rate\n0.1,0.01\n0.5,0.001\n")
+    other.write_text("#,,imt='SA(0.5)',investigation_time=50.0\nlon,lat,poe-0.1,poe-0.2\n0,0,0.5,0.1\n")
+    with pytest.raises(InvalidOption, match="period belongs to a spectral acceleration"):
+        HazardCurve.read(plain, period=1.0)
+    with pytest.raises(InvalidOption, match=r"period is 1 s, and this curve is of SA\(0.5\)"):
+        HazardCurve.read(other, period=1.0)
+    assert HazardCurve.read(other, period=0.5).measure == HazardCurve.read(other).measure
+
+
+def test_a_measure_that_is_not_that_of_observed_outcomes_is_refused(tmp_path):
+    table = tmp_path / "observed.csv"
+    table.write_text("pga_g,overturned\n0.1,0\n0.2,1\n0.3,0\n0.4,1\n")
+    for measure in (Measure("pgv"), Measure("sa", 1.0)):
+        with pytest.raises(InvalidOption, match=f"measure is {measure.name}, but the outcomes are given by pga"):
+            read_observed(table, measure)
+    assert read_observed(table, Measure("pga"))["measure"] == Measure("pga")

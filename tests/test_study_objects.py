@@ -196,3 +196,55 @@ def test_a_store_that_is_not_there_is_one_sentence(run, bucket, monkeypatch):
     assert "nonsense://x/y: this is no URL of an object store" in err
     monkeypatch.setitem(sys.modules, "obstore", None)
     assert "install rocking[objects]" in run("study", "run", "s3://nobody/has/this")[2]
+
+
+def test_a_renewal_whose_answer_is_lost_is_none_of_another_run(url, monkeypatch):
+    monkeypatch.setattr(places, "_RENEWAL", 0.05)
+    place = places.place_of(url)
+    put, lost = place._put_lock, []
+
+    def losing(condition):
+        tag = put(condition)
+        if condition != "create" and not lost:
+            lost.append(tag)
+            raise OSError("the connection broke")
+        return tag
+
+    monkeypatch.setattr(place, "_put_lock", losing)
+    late = time.monotonic() + 60.0
+    with place.locked():
+        before = len(place._renewals)
+        while len(place._renewals) < before + 5 and time.monotonic() < late:
+            time.sleep(0.01)
+        place.put("something", b"written")
+    assert lost and place.get("lock") is None and place.get("something") == b"written"
+
+
+def test_who_has_lost_the_lock_leaves_that_of_the_next_one(url, monkeypatch):
+    monkeypatch.setattr(places, "_RENEWAL", 600.0)
+    one, other = places.place_of(url), places.place_of(url)
+    with one.locked():
+        monkeypatch.setattr(places, "_LEASE", -1.0)
+        entered = other.locked()
+        entered.__enter__()
+    assert b"holder" in other.get("lock")
+    entered.__exit__(None, None, None)
+    assert other.get("lock") is None
+
+
+def test_who_may_only_read_is_told_the_holder(url, monkeypatch):
+    place, reader = places.place_of(url), places.place_of(url)
+    put = obstore.put
+
+    def refused(store, name, *rest, **named):
+        if name == "clock":
+            raise PermissionError("may only read")
+        return put(store, name, *rest, **named)
+
+    with place.locked():
+        monkeypatch.setattr(obstore, "put", refused)
+        assert reader.holder() == places.this_process()
+        monkeypatch.setattr(obstore, "get", lambda *given: (_ for _ in ()).throw(OSError("no connection")))
+        with pytest.raises(rocking.StudyError, match="cannot be read: no connection"):
+            reader.holder()
+        monkeypatch.undo()

@@ -156,7 +156,7 @@ class HazardCurve(Result):
             raise InvalidOption(f"it cannot be read: {reason}", path=str(file)) from error
         try:
             if lines and "investigation_time" in lines[0]:
-                return cls(*_from_openquake(lines, site), file.stem)
+                return cls(*_from_openquake(lines, site, period), file.stem)
             if site:
                 raise InvalidOption("a table of two columns is of one site; leave {} out", "site")
             return cls(*_from_table(lines, period), file.stem)
@@ -273,12 +273,14 @@ def _from_table(lines: list[str], period: float | None) -> tuple[Floats, Floats,
             raise InvalidOption(f"{','.join(row)} is not an intensity and a rate", line=line) from None
     if kind == "sa" and period is None:
         raise InvalidOption("{} must be given, in s, for a spectral acceleration", "period")
+    if kind != "sa" and period is not None:
+        raise InvalidOption(f"{{}} belongs to a spectral acceleration, and this curve is of {kind}", "period")
     measure = Measure("sa", period) if kind == "sa" else Measure(kind)
     with np.errstate(over="ignore"):  # what becomes infinite is refused as such
         return factor * intensity, rate, measure
 
 
-def _from_openquake(lines: list[str], site: int) -> tuple[Floats, Floats, Measure]:
+def _from_openquake(lines: list[str], site: int, period: float | None) -> tuple[Floats, Floats, Measure]:
     """Intensities (SI), annual rates and measure of a site in a file of OpenQuake's."""
     said = dict(re.findall(r"(\w+)='?([^,'\"]+)'?", lines[0]))
     kind, _, rest = said.get("imt", "").partition("(")
@@ -298,6 +300,8 @@ def _from_openquake(lines: list[str], site: int) -> tuple[Floats, Floats, Measur
         raise InvalidOption(f"site {site}: {error}; it is not a whole hazard curve") from None
     if not 0.0 < years < math.inf:
         raise InvalidOption(f"the investigation_time is {years:g} years; it must be above 0")
+    if period is not None and period != at:
+        raise InvalidOption(f"{{}} is {period:g} s, and this curve is of {said['imt']}: leave it out", "period")
     measure_name, factor = _OPENQUAKE[kind]
     measure = Measure(measure_name) if at is None else Measure("sa", at)
     # Probabilities that are printed as 0 or 1 say nothing of the rate.

@@ -347,6 +347,12 @@ def _against_intensity(table: _Table, heading: str, measure: Measure) -> dict[st
     kind, factor = HEADINGS[heading]
     if kind == "sa" and measure.period is None:
         raise InvalidOption("{} must be given, in s, for a spectral acceleration", "period", path=str(table.path))
+    if measure.name not in ("pga", kind):  # the one that is taken if none is named
+        raise InvalidOption(
+            f"{{}} is {measure.name}, but the outcomes are given by {kind}: leave it out",
+            "measure",
+            path=str(table.path),
+        )
     return {"intensity": factor * table.numbers(heading), "measure": measure if kind == "sa" else Measure(kind)}
 
 

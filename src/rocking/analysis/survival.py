@@ -11,7 +11,7 @@ import numpy as np
 from rocking import checks
 from rocking.analysis.fragility.curve import FragilityCurve, in_units, interval_of
 from rocking.analysis.fragility.lognormal import Probit
-from rocking.analysis.hazard import HazardCurve, hazard_line
+from rocking.analysis.hazard import HazardCurve, hazard_line, log_parts
 from rocking.analysis.risk import Rate, beyond_notes, gradient_of
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
@@ -123,9 +123,14 @@ class Survival(DrawnResult):
         """
         if self.rate is None or self.hazard is None:
             return math.nan
-        if not self.several_blocks:
-            return math.exp(-self.rate.interval[0] * (1.0 - self.rate.below - self.rate.above) * self.years)
         hazard, fitted = self.hazard, self.curve.fitted
+        if not self.several_blocks:
+
+            def within(fits: Probit) -> Floats:
+                return _log_rate_within(fits, hazard)
+
+            low, _ = interval_of(self.curve, within, within(fitted)[0], gradient_of(within, fitted))
+            return math.exp(-math.exp(float(low[0])) * self.years)
 
         def logarithm(fits: Probit) -> Floats:
             return _log_standing(fits, hazard, self.years)
@@ -241,6 +246,20 @@ class Survival(DrawnResult):
     def _headline(self) -> str:
         time, never = counted(self.years, "year"), in_units(self.unlikely, self.measure)
         return f"{self.curve.limit_state}: not in {time}; most likely never {never} or more"
+
+
+def _log_rate_within(fits: Probit, hazard: HazardCurve) -> Floats:
+    """Logarithms of the rates that motions between the ends of the hazard curve add, shape (fits, 1).
+
+    That is the integral of P(x) |d rate(x)|, by parts.
+    """
+    from scipy.special import ndtr
+
+    a, b = (values[:, None] for values in fits)
+    first, last = ndtr(a + b * np.log(hazard.intensity[[0, -1]])).T
+    between = np.exp(log_parts(fits, hazard)[:, 1:-1]).sum(axis=1)
+    rate = first * hazard.rate[0] - last * hazard.rate[-1] + between
+    return np.asarray(np.log(np.maximum(rate, np.finfo(float).tiny)))[:, None]
 
 
 def _log_standing(fits: Probit, hazard: HazardCurve, years: float) -> Floats:

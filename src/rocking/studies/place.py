@@ -244,6 +244,8 @@ class ObjectStore:
         except ImportError:
             raise InvalidOption("an object store needs obstore: install rocking[objects]") from None
         self._url, self._library, self._taken_over = url, obstore, False
+        #: What tells the locks that this object has put from those of others.
+        self._renewals: set[str] = set()
         try:
             self._store = from_url(url)
         except Exception as error:  # its own kinds, and those of the system
@@ -297,11 +299,15 @@ class ObjectStore:
             renewal.join()
             if not self._taken_over:
                 with contextlib.suppress(*self._failures):  # it runs out by itself
-                    self._library.delete(self._store, _LOCK)
+                    if self._own_tag():
+                        self._library.delete(self._store, _LOCK)
 
     def holder(self) -> str:
         """Read the lock, where somebody holds it that is not dead."""
-        lock = self._found_lock()
+        try:
+            lock = self._found_lock()
+        except self._failures as error:
+            raise self._failed("read", _LOCK, error) from error
         return "" if lock is None or lock.why_dead else lock.holder
 
     @property
@@ -338,7 +344,8 @@ class ObjectStore:
     def _put_lock(self, condition: Any) -> str:
         # Tags may be hashes of the content, so that it must be new every time.
         about = {"holder": this_process(), "process": os.getpid(), "host": socket.gethostname()}
-        text = json.dumps(about | {"renewal": uuid.uuid4().hex})
+        self._renewals.add(renewal := uuid.uuid4().hex)
+        text = json.dumps(about | {"renewal": renewal})
         return str(self._library.put(self._store, _LOCK, text.encode(), mode=condition)["e_tag"])
 
     def _renew(self, tag: str, over: threading.Event) -> None:
@@ -347,10 +354,23 @@ class ObjectStore:
             try:
                 tag = self._put_lock({"e_tag": tag})
             except self._library.exceptions.PreconditionError:
-                self._taken_over = True
-                return
+                with contextlib.suppress(*self._failures):
+                    tag = self._own_tag()  # of a renewal that was carried out, but whose answer was lost
+                    self._taken_over = not tag
+                if self._taken_over:
+                    return
             except self._failures:  # the connection may come back before the lock runs out
                 continue
+
+    def _own_tag(self) -> str:
+        """Tag of the lock, if it is one that this object has put; else empty."""
+        try:
+            found = self._library.get(self._store, _LOCK)
+            about = json.loads(bytes(found.bytes()))
+        except (FileNotFoundError, ValueError):
+            return ""
+        own = isinstance(about, dict) and about.get("renewal") in self._renewals
+        return str(found.meta["e_tag"]) if own else ""
 
     def _found_lock(self) -> _FoundLock | None:
         try:
@@ -358,8 +378,10 @@ class ObjectStore:
             text = bytes(found.bytes())
         except FileNotFoundError:
             return None
-        self._library.put(self._store, _CLOCK, uuid.uuid4().bytes)
-        now = self._library.head(self._store, _CLOCK)["last_modified"]
+        now = found.meta["last_modified"]
+        with contextlib.suppress(*self._failures):  # who may only read has no clock, and takes the holder to live
+            self._library.put(self._store, _CLOCK, uuid.uuid4().bytes)
+            now = self._library.head(self._store, _CLOCK)["last_modified"]
         try:
             about = dict(json.loads(text))
         except (ValueError, TypeError):

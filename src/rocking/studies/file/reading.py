@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -152,8 +153,10 @@ def _note_levels(name: str, given: object) -> None:
     """Note levels without a unit that look like accelerations in g."""
     if name in ("pga", "sa"):
         for each in given if isinstance(given, list) else [given]:
-            if isinstance(each, (int, float)):
-                for sentence in level_notes(f"{each!r}", float(each), name):
+            # Of START:STOP:COUNT the stop is the strongest.
+            text = each.split(":")[:2][-1] if isinstance(each, str) else f"{each!r}"
+            with contextlib.suppress(ValueError):  # a number with a unit
+                for sentence in level_notes(text.strip(), float(text), name):
                     note(sentence)
 
 
