@@ -241,3 +241,13 @@ def test_a_sequence_begins_after_the_last_impact_at_the_other_stop():
     (sequence,) = response.chattering
     others = response.impacts["time"][response.impacts["side"] != response.impacts["side"][-1]]
     assert len(others) > 5 and sequence["start"] > others.max()
+
+
+def test_ensembles_of_other_bodies_name_their_own_coordinate():
+    ball, block = dynamics.BouncingBall(0.6), rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    motion = rocking.pulses.sine(15.0, 3.0, cycles=4)
+    found = rocking.simulate_many(ball, motion, model="linear")
+    assert found.peak_rotation.attrs == {"units": "m", "long_name": "largest position in size"}
+    own = dynamics.simulate_many(ball, motion).peak_position
+    assert float(found.peak_rotation.max()) == float(own.max()) > 0.0
+    assert rocking.simulate_many(block, motion).peak_rotation.attrs["units"] == "rad"

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.block import Blocks
+from rocking.block.single import ROTATION
 from rocking.body import Bodies, Body
 from rocking.constants import VERSION, Model
 from rocking.engine import OUTCOME, Setup, Task, parts_of, simulate_tasks
@@ -246,6 +247,10 @@ def dataset_of(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
     gone = {"scale": product.scales.measure is None, "polarity": product.polarity != "both"}
     kept = {**VARIABLES, **TIMES}
     described = {name: {"units": units, "long_name": meaning} for name, (units, meaning) in kept.items()}
+    coordinate = product.bodies[0].coordinate if len(product.bodies) else ROTATION
+    if coordinate.unit != ROTATION.unit:
+        described["peak_rotation"] = {"units": coordinate.unit, "long_name": f"largest {coordinate.name} in size"}
+        described["overturned"]["long_name"] = f"whether the {coordinate.name} passed a limit: these bodies have none"
     for name, (_, what) in {**OF_BLOCKS, **BETWEEN_STOPS}.items():
         described[name] = {"units": "rad", "long_name": f"change of the peak per relative change of {what}"}
     variables = {name: (dimensions, values, described.get(name, {})) for name, values in outcomes.items()}

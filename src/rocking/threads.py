@@ -10,7 +10,6 @@ import math
 import os
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from typing import Any, Final, TypeVar
 
@@ -23,11 +22,11 @@ AHEAD: Final = 2
 _NO_MORE: Final = object()
 
 
-@dataclass
 class Cancellation:
     """What work that takes long looks at on its way: whether nobody waits for it any more."""
 
-    asked: bool = False
+    def __init__(self) -> None:
+        self.asked = False
 
 
 def cores() -> int:

@@ -116,7 +116,7 @@ def chattering_episodes(response: Response) -> ChatteringEpisodes:
     Raises
     ------
     InvalidOption
-        If it is given anything but a response.
+        If it is given anything but the `Response` of a block without restraints.
 
     Examples
     --------
