@@ -169,7 +169,7 @@ def _together(folder: Path, parts: list[int]) -> Found:
 
 def overview(promises: list[Promise], rows: Mapping[str, Mapping[str, Any]]) -> str:
     """Table of promises."""
-    cells = {}
+    cells: dict[str, tuple[object, ...]] = {}
     for promise in promises:
         if row := rows.get(promise.name):
             numbers = (row["cases"], row["judged"], row["failures"], f"{row['worst']:.2g}", f"{row['seconds']:.0f}")
