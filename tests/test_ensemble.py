@@ -243,11 +243,11 @@ from rocking import engine
 signal.signal(signal.SIGINT, signal.default_int_handler)  # what runs in the background may have none
 simulate_task, begun = engine.simulate_task, []
 
-def noted(setup, task, stop):
-    begun.append(stop.is_set())
+def noted(setup, task, cancelled):
+    begun.append(cancelled.asked)
     if len(begun) == 4:
         print("begun", flush=True)
-    return simulate_task(setup, task, stop)
+    return simulate_task(setup, task, cancelled)
 
 engine.simulate_task = noted
 blocks = rocking.Blocks(p=np.linspace(1, 6, 20_000), alpha=0.2, restitution=0.9)

@@ -19,7 +19,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion import pulses, records
 from rocking.motion.motion import Description, Motion
-from rocking.motion.named import numbered
 from rocking.motion.scaling import Measure
 
 values = st.floats(-10.0, 10.0).map(lambda x: round(x, 3))
@@ -604,8 +603,3 @@ def test_a_drawing_shows_jumps_where_they_are():
     assert drawn == pytest.approx([-4.0, -4.0, 4.0, 4.0, 0.0, 0.0], abs=1e-12)
     even = Motion.from_samples([0.0, 1.0, -2.0, 1.0], 0.5)
     assert even.drawing_times(0.0, 2.0).tolist() == [0.0, 0.5, 1.0, 1.5, np.nextafter(1.5, 2.0), 2.0]
-
-
-def test_numbers_of_names_leave_names_that_are_there():
-    assert numbered(["a", "a", "a #1"]) == ["a #2", "a #3", "a #1"]
-    assert numbered(["a #2", "a", "b", "a"]) == ["a #2", "a #1", "b", "a #3"]

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from rocking import engine
+from rocking import threads
 from rocking.explorer import apart, background, launch
 from rocking.kernels import compiled
 from rocking.plot import canvas
@@ -40,7 +40,7 @@ WORDS = re.compile(rf"\bimport ({'|'.join(MODULES)})\b|\b({'|'.join(MODULES_WITH
 def test_every_place_that_depends_on_the_system_is_on_the_page() -> None:
     assert len(TEXTS) > 200
     places = {name for name, text in TEXTS.items() if WORDS.search(text)}
-    assert {"explorer/apart.py", "studies/place.py", "kernels/compiled.py", "engine.py"} <= places
+    assert {"explorer/apart.py", "studies/place.py", "kernels/compiled.py", "threads.py"} <= places
     shown = {name for name in places if f"`{name}`" in PAGE or f"`{name.removesuffix('.py')}." in PAGE}
     assert places - shown == set()
 
@@ -77,11 +77,11 @@ def test_texts_have_one_encoding_and_one_end_of_line_everywhere() -> None:
 def test_cores_are_all_where_no_affinity_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "cpu_count", lambda: 7)
     monkeypatch.setattr(os, "sched_getaffinity", lambda process: {0, 3}, raising=False)
-    assert engine.cores() == 2
+    assert threads.cores() == 2
     monkeypatch.delattr(os, "sched_getaffinity")
-    assert engine.cores() == 7
+    assert threads.cores() == 7
     monkeypatch.setattr(os, "cpu_count", lambda: None)
-    assert engine.cores() == 1
+    assert threads.cores() == 1
 
 
 @pytest.mark.parametrize(("system", "asked"), [("linux", 1), ("darwin", 0), ("win32", 0)])

@@ -13,7 +13,7 @@ from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import UnreadableRecord
 from rocking.motion import records
 from rocking.motion.formats import read
-from rocking.motion.named import named_motion
+from rocking.motion.named import named_motion, numbered
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = ROOT / "src" / "rocking" / "motion" / "data"
@@ -126,3 +126,8 @@ def test_a_record_by_name_is_multiplied_by_its_scale(scale, tmp_path):
         found = named_motion(name, scale=scale)
         assert np.array_equal(found.coefficients, scale * base.coefficients)
         assert found.name == base.name
+
+
+def test_numbers_of_names_leave_names_that_are_there():
+    assert numbered(["a", "a", "a #1"]) == ["a #2", "a #3", "a #1"]
+    assert numbered(["a #2", "a", "b", "a"]) == ["a #2", "a #1", "b", "a #3"]
