@@ -250,7 +250,7 @@ def dataset_of(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
     coordinate = product.bodies[0].coordinate if len(product.bodies) else ROTATION
     if coordinate.unit != ROTATION.unit:
         described["peak_rotation"] = {"units": coordinate.unit, "long_name": f"largest {coordinate.name} in size"}
-        described["overturned"]["long_name"] = f"whether the {coordinate.name} passed a limit: these bodies have none"
+        described["overturned"]["long_name"] = f"whether the {coordinate.name} passed its limit, where it has one"
     for name, (_, what) in {**OF_BLOCKS, **BETWEEN_STOPS}.items():
         described[name] = {"units": "rad", "long_name": f"change of the peak per relative change of {what}"}
     variables = {name: (dimensions, values, described.get(name, {})) for name, values in outcomes.items()}

@@ -1,7 +1,8 @@
 """Work on many items in threads, of which an interrupt leaves no thread and no lock behind.
 
-Who waits here takes none of Python's own locks, as `concurrent.futures` does: an exception between two lines of that,
-as that of Ctrl-C, leaves a lock that nobody opens any more, and then the end of the threads never comes.
+Who waits here takes none of the locks of `concurrent.futures`: an exception between two lines of that, as that of
+Ctrl-C, leaves a lock that nobody opens any more, and then the end of the threads never comes. To start a thread takes
+such a lock for a moment; the command line keeps an interrupt back for so long.
 """
 
 from __future__ import annotations

@@ -588,7 +588,7 @@ def study_of(
 
 def _created(place: Place, product: Product, unit_blocks: int | None, outcomes: tuple[str, ...]) -> Store | None:
     """Create the store of a study; None where somebody else has done so meanwhile."""
-    require_free(place)
+    require_free(place)  # before the pilot, and before a lock is put beside the files of others
     unit = fitting_unit(product) if unit_blocks is None else (1, 1, 1, width_of(unit_blocks))
     with place.locked():
         return None if exists(place) else Store.create(place, product, unit, outcomes)
