@@ -216,6 +216,19 @@ def test_an_interrupt_while_the_command_line_is_imported_is_no_traceback():
     assert done.stdout.strip() == rocking.__version__
 
 
+def test_the_end_of_python_need_not_look_through_all_objects():
+    """That takes up to a second, after a command as after an interrupt."""
+    probe = (
+        "import atexit, gc, sys\n"
+        "atexit.register(lambda: print(gc.get_freeze_count() > 10 * len(gc.get_objects())))\n"
+        "sys.argv = ['rocking', '--version']\n"
+        "from rocking.__main__ import main\n"
+        "main()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == [rocking.__version__, "True"]
+
+
 def test_an_interrupt_that_python_drops_comes_again():
     class Dropping:
         def __del__(self):

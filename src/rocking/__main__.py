@@ -1,12 +1,24 @@
 """The program `rocking`: an interrupt while the command line is being imported ends it as one later does."""
 
+import gc
 import sys
 
 
 def main() -> None:
     """Run the command line, as `rocking.cli.main` does."""
     try:
+        _run()
+    finally:
+        # As Python ends it looks for cycles among all objects, again and again: up to a second, for memory that is
+        # given back anyway.
+        gc.freeze()
+
+
+def _run() -> None:
+    try:
         from rocking.cli import main as run
+
+        run()
     except (KeyboardInterrupt, RuntimeError) as error:
         # Python 3.11 makes an error of its own of what interrupts it while it makes a class.
         if not isinstance(error, KeyboardInterrupt) and not isinstance(error.__cause__, KeyboardInterrupt):
@@ -15,7 +27,6 @@ def main() -> None:
 
         print(INTERRUPTED, file=sys.stderr)
         sys.exit(130)
-    run()
 
 
 if __name__ == "__main__":

@@ -170,7 +170,7 @@ def _judge_end(found: Found, what: str, one: Ended, folder: Path, whole: dict[st
     limit = _LIMIT_WITH_A_PART if of_a_part else LIMIT
     found.worst = max(found.worst, one.after / limit)
     if one.after > limit:
-        found.fail(f"{what}: {one.after:.2f} s of processor time after the interrupt")
+        found.fail(f"{what}: {one.after:.2f} s of processor time after the interrupt, status {one.status}")
     for fault in faults(folder, whole, of_a_part=of_a_part):
         found.fail(f"{what}: {fault}")
     lines = [line for line in one.errors.splitlines() if not line.startswith(b"rocking: note:")]

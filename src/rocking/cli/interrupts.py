@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import _thread
-import gc
 import signal
 import sys
 import threading
@@ -60,7 +59,6 @@ class Interrupts:
             self._import = None
             if self.asked and error is not None:
                 error.__context__ = None  # what was half made is given up here, where nothing of it is printed
-                gc.collect()
             sys.unraisablehook = self._before
             signal.signal(signal.SIGINT, signal.default_int_handler)
 
