@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from mpmath import mp
 from scipy import linalg
 from scipy.integrate import solve_ivp
 
@@ -162,6 +163,54 @@ def test_stiff_and_soft_oscillators_have_the_known_limits():
     assert pulse.spectral_acceleration(period, 0.0) * (period / (2 * math.pi)) ** 2 == pytest.approx(
         pulse.pgd, rel=1e-4
     )
+
+
+def displacements(row, width, period, damping):
+    """Displacements (m) under a polynomial from rest and after it, to 40 digits: extrema, and that at its end."""
+    w, z = 2 * mp.pi / mp.mpf(period), mp.mpf(damping)
+    row = [mp.mpf(each) for each in row]
+    forced = [mp.mpf(0)] * (len(row) + 2)
+    for k in reversed(range(len(row))):
+        forced[k] = -(row[k] + (k + 1) * 2 * z * w * forced[k + 1] + (k + 1) * (k + 2) * forced[k + 2]) / w**2
+    root = w * mp.sqrt(1 - z**2)
+
+    def free(u, v, t):
+        fall = mp.exp(-z * w * t)
+        by_sine = (v + z * w * u) / root
+        u_t = fall * (u * mp.cos(root * t) + by_sine * mp.sin(root * t))
+        return u_t, fall * (by_sine * root * mp.cos(root * t) - u * root * mp.sin(root * t)) - z * w * u_t
+
+    def under(t):
+        u, v = free(-forced[0], -forced[1], t)
+        slope = sum(k * each * t ** (k - 1) for k, each in enumerate(forced) if k)
+        return u + sum(each * t**k for k, each in enumerate(forced)), v + slope
+
+    end = under(mp.mpf(width))
+    found = [end[0]]
+    for course, length in ((under, mp.mpf(width)), (lambda t: free(*end, t), mp.pi / root)):
+        times = [length * k / 400 for k in range(1, 401)]
+        speeds = [course(t)[1] for t in times]
+        for k in range(399):
+            if speeds[k] * speeds[k + 1] <= 0:
+                at = mp.findroot(lambda t: course(t)[1], (times[k], times[k + 1]), solver="anderson", verify=False)  # noqa: B023
+                found.append(course(at)[0])
+    return found
+
+
+def test_no_extremum_within_a_step_is_missed():
+    """Neither where the velocity vanishes at an end of a step, nor where it changes its sign twice in one."""
+    rng = np.random.default_rng(11)
+    cases = [([-2.0, 12.0, -12.0], 1.0, 100.0, 0.05), ([-2.0, 12.0, -12.0], 1.0, 1000.0, 0.0)]
+    for _ in range(12):
+        row = rng.normal(size=rng.integers(3, 7)) * 4.0 ** rng.integers(0, 3)
+        cases.append((list(row), rng.uniform(0.1, 2.0), 10 ** rng.uniform(0.5, 3.0), rng.choice([0.0, 0.05, 0.7])))
+    with mp.workdps(40):
+        for row, width, period, damping in cases:
+            peak = max(abs(u) for u in displacements(row, width, period, damping))
+            expected = float((2 * mp.pi / mp.mpf(period)) ** 2 * peak)
+            assert Motion([0.0, width], [row]).spectral_acceleration(period, damping) == pytest.approx(
+                expected, rel=1e-12
+            )
 
 
 def test_spectral_acceleration_takes_many_periods():

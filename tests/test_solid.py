@@ -724,6 +724,25 @@ def test_a_cavity_in_the_surface_is_one_wherever_its_corners_lie(at):
     assert found.repairs == ("1 cavity of 2 m^3 taken as hollow",)
 
 
+@pytest.mark.parametrize("at", [(1.25, 1.25, 4.25), (1.25, 1.25, 2.0), (1.25, 0.0, 2.0)])
+def test_a_piece_that_is_turned_inside_out_and_touches_the_rest_is_none_of_its_cavities(at):
+    """It touches at a corner, along an edge, and with a face that has no corner in common with the other's."""
+    size = (0.5, 0.5, 0.5) if at[2] > 4.0 else (0.5, 0.5, 4.0) if at[1] > 1.0 else (0.5, 1.0, 1.0)
+    piece = _box(size, at, inverted=True)
+    found = Solid.from_mesh(trimesh.util.concatenate([_box((2, 2, 4), (0, 0, 2)), piece]))
+    assert found.volume == pytest.approx(16.0 + np.prod(size), rel=1e-12)
+    assert found.repairs == ("1 separate surface turned inside out",)
+    upright = Solid.from_mesh(trimesh.util.concatenate([_box((2, 2, 4), (0, 0, 2)), _box(size, at)]))
+    assert found.volume == pytest.approx(upright.volume, rel=1e-12)
+
+
+@pytest.mark.parametrize("at", [(0.75, 0.75, 3.75), (0.75, 0.75, 2.0)])
+def test_a_cavity_that_touches_the_surface_at_corners_or_edges_is_one(at):
+    size = (0.5, 0.5, 0.5) if at[2] > 3.0 else (0.5, 0.5, 4.0)
+    found = Solid.from_mesh(trimesh.util.concatenate([_box((2, 2, 4), (0, 0, 2)), _box(size, at, inverted=True)]))
+    assert found.volume == pytest.approx(16.0 - np.prod(size), rel=1e-12)
+
+
 def test_a_small_part_of_a_large_body_has_an_inside():
     whole = trimesh.Scene()
     for name, mesh in (

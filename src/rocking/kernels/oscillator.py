@@ -10,6 +10,10 @@ from rocking.kernels.ground import move
 TERMS = 18
 _RADIANS_PER_STEP = 0.25
 
+#: Parts of a step at most, and by how much a peak may be missed: some units in its last place.
+_FINEST = 2**30
+_ROUNDED_UP = 1.0 + 2.0**-50
+
 
 @kernel
 def peak_displacements(
@@ -49,46 +53,53 @@ def _peak(
         for j in range(len(force)):
             force[j] = coefficients[k, j]
         for _ in range(steps):
-            peak = max(peak, _advance(series, force, width / steps, frequency, damping))
+            peak = _advance(series, force, width / steps, frequency, damping, peak)
             _move(force, width / steps)
     force[:] = 0.0
     half_period = math.pi / math.sqrt(1.0 - damping * damping)
     for _ in range(math.ceil(half_period / _RADIANS_PER_STEP)):
-        peak = max(peak, _advance(series, force, _RADIANS_PER_STEP / frequency, frequency, damping))
+        peak = _advance(series, force, _RADIANS_PER_STEP / frequency, frequency, damping, peak)
     return peak
 
 
 @shared
-def _advance(series: Floats, force: Floats, h: float, frequency: float, damping: float) -> float:
-    """Expand the solution about the start of a step, move ``series[:2]`` to its end and return its peak."""
+def _advance(series: Floats, force: Floats, h: float, frequency: float, damping: float, peak: float) -> float:
+    """Expand the solution about the start of a step, and move ``series[:2]`` to its end.
+
+    Returns the largest displacement of the step, or ``peak`` where that is larger.
+    """
     for k in range(len(series) - 2):
         acceleration = force[k] if k < len(force) else 0.0
         restoring = 2.0 * damping * frequency * (k + 1) * series[k + 1] + frequency * frequency * series[k]
         series[k + 2] = -(acceleration + restoring) / ((k + 1) * (k + 2))
-    start_velocity = series[1]
-    end_velocity = _slope(series, h)
-    end = _value(series, h)
-    peak = abs(end)
-    if start_velocity * end_velocity < 0.0:
-        peak = max(peak, abs(_value(series, _extremum(series, h))))
-    series[0], series[1] = end, end_velocity
+    peak = _larger(series, h, peak)
+    series[0], series[1] = _value(series, h), _slope(series, h)
     return peak
 
 
 @shared
-def _extremum(series: Floats, h: float) -> float:
-    """Root of the velocity between 0 and h, at which it has opposite signs, by bisection.
+def _larger(series: Floats, h: float, peak: float) -> float:
+    """Largest size of a series from 0 to h, or ``peak`` where that is larger, but for rounding.
 
-    The displacement is stationary there, so half the digits of the time give all the digits of the peak.
+    Between two points a distance d apart it is larger than at both by d^2/8 of its second derivative at most. Where
+    that could be the largest, the step is halved.
     """
-    low, high = 0.0, h
-    for _ in range(30):
-        middle = 0.5 * (low + high)
-        if (_slope(series, middle) > 0.0) == (series[1] > 0.0):
-            low = middle
-        else:
-            high = middle
-    return 0.5 * (low + high)
+    bend = 0.0
+    for k in range(len(series) - 1, 1, -1):
+        bend = bend * h + k * (k - 1) * abs(series[k])
+    at, width = 0, _FINEST
+    left = abs(series[0])
+    while at < _FINEST:
+        right = abs(_value(series, h * ((at + width) / _FINEST)))
+        peak = max(peak, right)
+        d = h * (width / _FINEST)
+        if width > 1 and max(left, right) + 0.125 * bend * d * d > peak * _ROUNDED_UP and bend < math.inf:
+            width //= 2
+            continue
+        at, left = at + width, right
+        while at % (2 * width) == 0 and at < _FINEST:
+            width *= 2
+    return peak
 
 
 @inlined

@@ -358,7 +358,7 @@ def saltation(
     entered += block.damping[following.side] * (e * speed)
     faster = -(dv - left * shift) * relative_slope(block, hit, speed, e)
     faster += speed if on_side(quantity, hit) == Quantity.RESTITUTION else 0.0
-    return -e * speed * shift, e * faster + entered * shift
+    return -following.v * shift, e * faster + entered * shift
 
 
 @inlined

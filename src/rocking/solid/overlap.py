@@ -81,7 +81,7 @@ def overlaps(names: Sequence[str], surfaces: Sequence[Surface]) -> tuple[str, ..
 def _pieces(name: str, surface: Surface) -> list[_Piece]:
     """Part a surface into closed ones whose normals point outwards, each with its cavities."""
     vertices, faces, _ = surface
-    label = shells_of(vertices, faces)
+    label = shells_of(faces)
     volumes = np.bincount(label, weights=signed_volumes(vertices, faces))
     outer = np.flatnonzero(volumes > 0.0)
     if len(outer) == 1:

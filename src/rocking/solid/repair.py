@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 #: Corners within this part of the mesh's size are one.
 _SAME: Final = 1e-8
 
+#: Sine of the solid angle of a tetrahedron that is flat but for rounding.
+_IN_PLANE: Final = 1e-12
+
 #: Triangles of a surface that are looked at to see where it lies.
 _LOOKED_AT: Final = 12
 
@@ -157,9 +160,20 @@ def _filled(vertices: Floats, faces: Integers) -> tuple[Floats, Integers, tuple[
     return everything, np.vstack([faces, patches]), (said,)
 
 
-def shells_of(vertices: Floats, faces: Integers) -> Integers:
-    """Label the triangles of each connected surface, from 0 up."""
-    label = components(len(vertices), _edges(faces))[faces[:, 0]]
+def shells_of(faces: Integers) -> Integers:
+    """Label the triangles of each closed surface, from 0 up: pieces that touch at corners or edges are apart."""
+    edges = _edges(faces)
+    _, key, counts = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
+    key = key.reshape(-1)
+    order = np.argsort(key, kind="stable")
+    patch = components(len(faces), order[counts[key[order]] == 2].reshape(-1, 2) // 3)
+    # Patches that are not closed are parts of one surface where they share an edge.
+    of_edge = np.repeat(patch, 3)
+    each, place = np.unique(of_edge * len(counts) + key, return_inverse=True)
+    net = np.bincount(place.reshape(-1), weights=np.where(edges[:, 0] < edges[:, 1], 1.0, -1.0))
+    links = np.isin(of_edge, each[net != 0.0] // len(counts))
+    count = int(patch.max()) + 1
+    label = components(count + len(counts), np.column_stack([of_edge, count + key])[links])[patch]
     return np.asarray(np.unique(label, return_inverse=True)[1].reshape(-1), dtype=np.int64)
 
 
@@ -170,7 +184,7 @@ def _areas(vertices: Floats, faces: Integers) -> Floats:
 
 def _outward(vertices: Floats, faces: Integers) -> tuple[Integers, tuple[str, ...]]:
     """Turn normals outwards; a surface inside another, whose normals point into it, is a cavity."""
-    label = shells_of(vertices, faces)
+    label = shells_of(faces)
     volume = np.bincount(label, weights=signed_volumes(vertices, faces))
     largest = int(np.argmax(np.abs(volume)))
     repairs: list[str] = []
@@ -212,4 +226,7 @@ def winding(vertices: Floats, faces: Integers, place: Floats) -> float:
     la, lb, lc = (np.linalg.norm(each, axis=1) for each in (a, b, c))
     above = np.einsum("ij,ij->i", a, np.cross(b, c))
     below = la * lb * lc + np.sum(a * b, axis=1) * lc + np.sum(b * c, axis=1) * la + np.sum(c * a, axis=1) * lb
-    return float(np.sum(np.arctan2(above, below)) / (2.0 * np.pi))
+    halves = np.arctan2(above, below)
+    # In a triangle itself the sign of its solid angle is that of rounding; halfway from one side to the other it is 0.
+    halves[(below < 0.0) & (np.abs(above) <= _IN_PLANE * la * lb * lc)] = 0.0
+    return float(np.sum(halves) / (2.0 * np.pi))
