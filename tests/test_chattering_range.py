@@ -125,6 +125,27 @@ def test_a_place_where_the_correction_of_an_arc_vanishes_is_no_landing():
     assert not chattering.is_complete(1.1151407720386019, 1.0146326207140592, 0.6062211928500365)
 
 
+def test_within_rounding_of_the_critical_amplitude_there_is_one_verdict():
+    """A sequence and a time come from marches of their own, of which rounding decides here."""
+    rng, judged, undecided = np.random.default_rng(0), 0, 0
+    cases = [(1.0 - 10 ** rng.uniform(-2.5, -0.01), 10 ** rng.uniform(-3, 3)) for _ in range(60)]
+    for eta, omega in [*cases, (0.038270937673807404, 767.3827503406839)]:
+        critical = float(chattering.critical_amplitude(omega, eta))
+        for steps in (-1, 0, 1, 2):
+            a = critical + steps * 2.0**-52
+            if a <= 1.0:
+                continue
+            found, time = chattering.sequence(a, omega, eta), float(chattering.chattering_time(a, omega, eta))
+            assert found.complete == np.isfinite(time)
+            if found.complete:
+                assert found.lower <= found.time <= found.upper
+                assert found.time == pytest.approx(time, rel=1e-6)
+                undecided += found.upper - found.lower > 1e-11 * found.time
+            judged += 1
+    assert judged > 200
+    assert undecided > 0
+
+
 def test_no_amplitude_above_the_critical_one_is_complete():
     rng = np.random.default_rng(5)
     eta = rng.uniform(0.5, 0.97, 100_000)

@@ -7,6 +7,7 @@ from oracles.sine_chattering import settle
 from oracles.slow_sine import _Arc
 
 from rocking import chattering
+from rocking.chattering import expansions
 from rocking.errors import InvalidOption
 
 
@@ -114,3 +115,30 @@ def test_series_knows_its_ends():
         chattering.series_diagnosis(1.01, 2.0, 1.0)
     with pytest.raises(InvalidOption, match="not resolved"):
         chattering.series_coefficients(1e-6, 0.9, order=40)
+
+
+@pytest.fixture
+def unresolved(monkeypatch):
+    """No coefficient is resolved: so it is at eta = 0.99999, after half a minute."""
+    monkeypatch.setattr(expansions, "phase_coefficients", lambda _, __, order: np.full(order, np.inf))
+
+
+def test_where_double_precision_does_not_resolve_the_series_the_rest_is_told(unresolved):
+    report = chattering.chattering_report(1.03, 2.0, 0.9)
+    assert report.values["chattering_time"]["exact"] > 0.0
+    assert np.isnan(report.values["series"]["error"])
+    assert "not known: double precision does not resolve enough terms" in report.summary()
+    with pytest.raises(InvalidOption, match="order must be a whole number from 1 to 34"):
+        chattering.chattering_report(1.03, 2.0, 0.9, order=38)
+
+
+def test_advice_names_no_lower_order_where_there_is_none(unresolved):
+    with pytest.raises(InvalidOption, match="precision: take a higher omega"):
+        chattering.series_diagnosis(1.03, 2.0, 0.9, order=1)
+    with pytest.raises(InvalidOption, match="lower the order, or take a higher omega"):
+        chattering.series_coefficients(2.0, 0.9, order=16)
+
+
+def test_a_small_radius_is_told_with_its_digits():
+    told = chattering.chattering_report(1.01, 1.0, 0.99).summary()
+    assert "worthless: it converges for a - 1 up to 0.00" in told

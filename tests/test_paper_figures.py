@@ -624,6 +624,8 @@ def test_without_rest_figures_4_and_9_say_so():
         (1, {"alpha": 2.0}, "alpha must be between 0 and pi/2"),
         (9, {"a": 3.0}, "overturns"),
         (9, {"a": "high"}, "a .*must be a number"),
+        *((number, {"a": 1.0 + 2.0**-52}, "take a larger one") for number in (2, 9, 10, 11)),
+        (3, {"eta": 1e-150}, "take a larger eta"),
     ],
 )
 def test_parameters_beyond_a_figures_range_are_refused(number, parameters, sentence):

@@ -555,6 +555,16 @@ def test_counts_groups_and_motions_are_taken(tmp_path: Path) -> None:
         read_observed(path, Measure("pgv_ratio"))
 
 
+def test_multiples_of_one_pulse_belong_together_however_they_are_written(tmp_path: Path) -> None:
+    """A factor in the text of a motion tells no more than one in the column scale."""
+    pulses = [(0.3, 1), (0.4, 1), (0.5, 1), (0.3, 2), (0.45, 2), (0.6, 3)]
+    texts = [f"one-sine:amplitude={size}g,frequency={frequency}Hz" for size, frequency in pulses]
+    rows = [f'"{text}",{k % 2},1' for k, text in enumerate(texts)]
+    (tmp_path / "tests.csv").write_text("\n".join(["motion,overturned,scale", *rows, f'"{texts[5]}",0,0']))
+    clusters = read_observed(tmp_path / "tests.csv", Measure("pga"))["clusters"]
+    assert [clusters.index(each) for each in clusters] == [0, 0, 0, 3, 3, 5, 5]
+
+
 def test_counted_outcomes_under_motions_are_those_at_their_intensities(tmp_path: Path) -> None:
     path, rows = tmp_path / "seen.csv", [(0.1, 0, 10), (0.2, 3, 10), (0.3, 1, 2), (0.4, 0, 1), (0.5, 9, 10)]
     path.write_text("pga_g,overturned,trials\n" + "".join(f"{x},{fell},{of}\n" for x, fell, of in rows))
@@ -569,7 +579,7 @@ def test_counted_outcomes_under_motions_are_those_at_their_intensities(tmp_path:
 
 def test_rows_belong_together_by_motion_and_by_group_and_not_without_a_label(tmp_path: Path) -> None:
     path = tmp_path / "seen.csv"
-    names = [f"one-sine:amplitude={x}g,frequency=1Hz" for x in (0.1, 0.2, 0.3)]
+    names = [f"one-sine:amplitude=0.3g,frequency={x}Hz" for x in (1, 2, 3)]
     # Motion and group of each row: the second motion and the third have group b in common, the first has none of both.
     given = [(0, ""), (1, "a"), (2, ""), (1, "b"), (0, ""), (1, ""), (2, "c"), (0, "d"), (2, "b")]
     path.write_text("motion,overturned,group\n" + "".join(f'"{names[k]}",1,{group}\n' for k, group in given))

@@ -13,6 +13,7 @@ import numpy as np
 
 from rocking import checks
 from rocking.analysis.hazard import HEADINGS, heading_of
+from rocking.analysis.levels import families_of
 from rocking.analysis.validation.tested import ShakeTest
 from rocking.arrays import Floats
 from rocking.block import Blocks
@@ -333,7 +334,7 @@ def read_observed(
     observed: dict[str, Any] = {
         "exceeded": table.numbers("overturned") if counts else [*table.answers("overturned")],
         "trials": table.numbers("trials") if counts else 1,
-        "clusters": _clusters(table) if {"motion", "group"} & {*columns} else None,
+        "clusters": _clusters(table, {}) if "group" in columns else None,
     }
     if found:
         observed |= _against_intensity(table, found[0], measure)
@@ -360,16 +361,23 @@ def _under_motions(table: _Table, measure: Measure, **files: Any) -> dict[str, A
     if measure.in_block_units:
         raise InvalidOption(f"{measure.name} counts in a block's own unit, which outcomes do not tell: take pga")
     motions = _motions_of(table, **files)
-    return {"intensity": [measure.value(motion) for motion in motions], "measure": measure}
+    of_name = {row["motion"]: motion for (_, row), motion in zip(table.rows, motions, strict=True) if motion.pga > 0.0}
+    families = dict(zip(of_name, families_of([*of_name.values()]), strict=True)) if of_name else {}
+    intensity = [measure.value(motion) for motion in motions]
+    return {"intensity": intensity, "measure": measure, "clusters": _clusters(table, families)}
 
 
-def _clusters(table: _Table) -> list[int]:
-    """One number for all rows that belong together, because they share a motion or a group, perhaps through others."""
+def _clusters(table: _Table, families: Mapping[str, int]) -> list[int]:
+    """One number for all rows that belong together, because they share a motion or a group, perhaps through others.
+
+    Motions are one where they are multiples of one another, as their ``families`` say by name.
+    """
     clusters = [*range(len(table.rows))]
-    first: dict[tuple[str, str], int] = {}
+    first: dict[tuple[str, str | int], int] = {}
     for k, (_, row) in enumerate(table.rows):
         for column in ("motion", "group"):
             if label := row.get(column):
-                one, other = clusters[first.setdefault((column, label), k)], clusters[k]
+                same = families.get(label, label) if column == "motion" else label
+                one, other = clusters[first.setdefault((column, same), k)], clusters[k]
                 clusters = [one if cluster == other else cluster for cluster in clusters]
     return clusters

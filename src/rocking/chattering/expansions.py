@@ -31,7 +31,7 @@ HIGHEST_ORDER: Final = 40
 _BEYOND_RANGE: Final = np.errstate(over="ignore", invalid="ignore")
 
 #: Coefficients beyond the order asked for that the diagnosis looks at, and how many it needs at least.
-_LOOK_AHEAD: Final = 6
+LOOK_AHEAD: Final = 6
 _FEWEST: Final = 16
 
 CYCLE: Final = np.dtype(
@@ -310,9 +310,9 @@ def series_diagnosis(a: ArrayLike, omega: ArrayLike, eta: ArrayLike, *, order: i
     >>> round(float(diagnosis.radius), 3), bool(diagnosis.error < 5e-4)
     (0.038, True)
     """
-    order = checks.whole(order, "order", InvalidOption, 1, HIGHEST_ORDER - _LOOK_AHEAD)
+    order = checks.whole(order, "order", InvalidOption, 1, HIGHEST_ORDER - LOOK_AHEAD)
     amplitude = checked_amplitude(a)
-    longer = _coefficients(checked_frequency(omega), checked_loss(eta), max(order + _LOOK_AHEAD, _FEWEST))
+    longer = _coefficients(checked_frequency(omega), checked_loss(eta), max(order + LOOK_AHEAD, _FEWEST), _FEWEST)
     eps = _excess(amplitude, longer)
     radius = np.broadcast_to(_radius(longer), eps.shape)
     time = _summed(longer[..., :order], eps)
@@ -340,8 +340,8 @@ def _summed(coefficients: Floats, eps: Floats) -> Floats:
     return np.where(eps == 0.0, 0.0, np.sqrt(eps) * total)
 
 
-def _coefficients(omega: Floats, eta: Floats, order: int) -> Floats:
-    """Coefficients of the broadcast parameters, formed once for each pair of different values."""
+def _coefficients(omega: Floats, eta: Floats, order: int, fewest: int = 1) -> Floats:
+    """Coefficients of the broadcast parameters, ``fewest`` at least, formed once for each pair of different values."""
     shape, parameters = broadcast(omega, eta)
     pairs, where = np.unique(np.stack(parameters), axis=1, return_inverse=True)
     coefficients = np.full((pairs.shape[1], order), math.inf)
@@ -349,8 +349,9 @@ def _coefficients(omega: Floats, eta: Floats, order: int) -> Floats:
         w, restitution = pairs[:, i].tolist()
         coefficients[i] = phase_coefficients(1.0 / (w * w), restitution, order) / w
         if not np.isfinite(coefficients[i]).all():
+            lower = "lower the order, or " if order > fewest else ""
             raise InvalidOption(
                 f"the expansion at omega = {w:g}, eta = {restitution:g} is not resolved to order {order} "
-                "in double precision: lower the order, or take a higher omega, or eta further from 1"
+                f"in double precision: {lower}take a higher omega, or eta further from 1"
             )
     return coefficients[where.ravel()].reshape((*shape, order))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
@@ -13,7 +14,14 @@ from numpy.typing import NDArray
 from rocking import checks
 from rocking.chattering.amplitude import critical_amplitude
 from rocking.chattering.duration import chattering_time, first_arc, sequence
-from rocking.chattering.expansions import asymptotic_table, first_impact_speed, first_interval, series_diagnosis
+from rocking.chattering.expansions import (
+    HIGHEST_ORDER,
+    LOOK_AHEAD,
+    asymptotic_table,
+    first_impact_speed,
+    first_interval,
+    series_diagnosis,
+)
 from rocking.errors import InvalidOption, OutsideFit
 from rocking.result import DrawnResult, Result, TableResult
 from rocking.tables import counted, text_table
@@ -81,7 +89,7 @@ class ChatteringReport(DrawnResult, TableResult):
             ("  by Eq. 65", f"{self._time(times['asymptotic'])}{'' if result['complete'] else _TAKES_FOR_COMPLETE}"),
             (
                 f"  by a series, {result['series']['order']} terms",
-                f"{self._time(times['series'])}{_trust(result['series'])}",
+                _trust(self._time(times["series"]), result["series"]),
             ),
             ("first interval", self._pair(result["first_interval"], "eq32", time=True)),
             ("speed at first impact", self._pair(result["first_impact_speed"], "eq34", time=False)),
@@ -211,6 +219,7 @@ def chattering_report(
     exact = sequence(a, omega, eta)
     impacts = [(row["interval"], row["speed_before"]) for row in exact.impacts[:1]]
     interval, speed = impacts[0] if impacts else first_arc(a, omega)
+    series = _series(a, omega, eta, order)
     values: dict[str, Any] = {
         "a": a,
         "omega": omega,
@@ -221,9 +230,9 @@ def chattering_report(
             "exact": float(chattering_time(a, omega, eta)),
             "asymptotic": float(chattering_time(a, omega, eta, method="asymptotic")),
             "semianalytical": float(chattering_time(a, omega, eta, method="semianalytical", resolved=resolved)),
-            "series": float(chattering_time(a, omega, eta, method="series", order=order)),
+            "series": series["time"],
         },
-        "series": _series(a, omega, eta, order),
+        "series": {name: series[name] for name in ("order", "error", "radius")},
         "resolved": resolved,
         "bracket": {"lower": exact.lower, "upper": exact.upper, "impacts": int(exact.impacts.size)},
         "critical_amplitude": float(critical_amplitude(omega, eta)),
@@ -314,14 +323,25 @@ def _amplitude(omega: float, eta: float, method: str) -> float | None:
 
 
 def _series(a: float, omega: float, eta: float, order: int) -> dict[str, float]:
-    """Return what is known of the expansion's error; without loss at impacts there is no expansion."""
+    """Time by the expansion, and what is known of its error; NaN for what double precision does not resolve.
+
+    Without loss at impacts there is no expansion.
+    """
+    order = checks.whole(order, "order", InvalidOption, 1, HIGHEST_ORDER - LOOK_AHEAD)
     if eta == 1.0:
-        return {"order": order, "error": math.inf, "radius": 0.0}
-    diagnosis = series_diagnosis(a, omega, eta, order=order)
-    return {"order": order, "error": float(diagnosis.error), "radius": float(diagnosis.radius)}
+        return {"order": order, "time": math.inf if a > 1.0 else 0.0, "error": math.inf, "radius": 0.0}
+    found = {"order": order, "time": math.nan, "error": math.nan, "radius": math.nan}
+    with suppress(InvalidOption):
+        found["time"] = float(chattering_time(a, omega, eta, method="series", order=order))
+        diagnosis = series_diagnosis(a, omega, eta, order=order)
+        found |= {"error": float(diagnosis.error), "radius": float(diagnosis.radius)}
+    return found
 
 
-def _trust(series: dict[str, float]) -> str:
+def _trust(time: str, series: dict[str, float]) -> str:
     if math.isfinite(series["error"]):
-        return f", the terms left out add about {series['error']:.1e}"
-    return f", worthless: it converges up to a = {1.0 + series['radius']:.5g} only"
+        return f"{time}, the terms left out add about {series['error']:.1e}"
+    if math.isnan(series["error"]):
+        known = "not known" if time == "none" else f"{time}, whose error is not known"
+        return f"{known}: double precision does not resolve enough terms"
+    return f"{time}, worthless: it converges for a - 1 up to {series['radius']:.3g} only"

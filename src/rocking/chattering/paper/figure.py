@@ -104,6 +104,10 @@ class BlockUnderSine:
         response = simulate(self.block(), motion, model="linear", chattering=treatment, duration=motion.duration)
         if response.overturned:
             raise InvalidOption(f"the block overturns under a sine of {{}} = {self.a:g}: take a smaller one", "a")
+        if not len(response.impacts):
+            raise InvalidOption(
+                f"the block does not rock visibly under a sine of {{}} = {self.a!r}: take a larger one", "a"
+            )
         return response
 
     def words(self, *names: str) -> str:

@@ -318,6 +318,8 @@ def figure_3(*, a: float | None = None, omega: float | None = None, eta: float |
     for case in cases:
         _require_complete(case, 3)
     ratios = [interval_ratios(case.a, case.omega, case.eta, _RATIOS) for case in cases]
+    if not all(np.isfinite(each).any() for each in ratios):
+        raise InvalidOption("intervals are too short for a ratio of two: take a larger {}", "eta")
     conditions = [case.words(*_NAMES) for case in cases]
     columns = {f"ratio_{'ab'[k]}": values for k, values in enumerate(ratios)}
     return PaperFigure(
