@@ -198,7 +198,12 @@ def test_an_interrupt_while_the_command_line_is_imported_is_no_traceback():
         ("RuntimeError('another one')", 1),
     ):
         probe = (
-            "import sys\n"
+            "import atexit, sys\n"
+            "atexit.register(print, 'tidied up')\n"
+            "class HalfMade:\n"
+            "    def __del__(self):\n"
+            "        print('taken apart')\n"
+            "kept = HalfMade()\n"
             "class Interrupted:\n"
             "    def find_spec(self, name, path=None, target=None):\n"
             "        if name == 'cyclopts':\n"
@@ -210,6 +215,9 @@ def test_an_interrupt_while_the_command_line_is_imported_is_no_traceback():
         done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=False)
         assert done.returncode == code
         assert (done.stderr == f"{INTERRUPTED}\n") == (code == 130)
+        # Python's own end takes modules apart, and may crash in one that is half imported.
+        assert done.stdout.splitlines()[0] == "tidied up"
+        assert code != 130 or "taken apart" not in done.stdout
     project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text("utf-8"))
     assert project["project"]["scripts"]["rocking"] == "rocking.__main__:main"
     done = subprocess.run([sys.executable, "-m", "rocking", "--version"], capture_output=True, text=True, check=True)
