@@ -198,12 +198,9 @@ def test_an_interrupt_while_the_command_line_is_imported_is_no_traceback():
         ("RuntimeError('another one')", 1),
     ):
         probe = (
-            "import atexit, sys\n"
+            "import atexit, sys, threading\n"
             "atexit.register(print, 'tidied up')\n"
-            "class HalfMade:\n"
-            "    def __del__(self):\n"
-            "        print('taken apart')\n"
-            "kept = HalfMade()\n"
+            f"threading.Timer({3.0 if code == 130 else 0.0}, print, ['waited for']).start()\n"
             "class Interrupted:\n"
             "    def find_spec(self, name, path=None, target=None):\n"
             "        if name == 'cyclopts':\n"
@@ -215,9 +212,8 @@ def test_an_interrupt_while_the_command_line_is_imported_is_no_traceback():
         done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=False)
         assert done.returncode == code
         assert (done.stderr == f"{INTERRUPTED}\n") == (code == 130)
-        # Python's own end takes modules apart, and may crash in one that is half imported.
-        assert done.stdout.splitlines()[0] == "tidied up"
-        assert code != 130 or "taken apart" not in done.stdout
+        # Python's own end, which waits for threads, may crash in a library that is half imported.
+        assert done.stdout.split("\n") == [*["waited for"] * (code != 130), "tidied up", ""]
     project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text("utf-8"))
     assert project["project"]["scripts"]["rocking"] == "rocking.__main__:main"
     done = subprocess.run([sys.executable, "-m", "rocking", "--version"], capture_output=True, text=True, check=True)
