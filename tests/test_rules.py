@@ -193,6 +193,18 @@ def test_a_block_that_stands_here_and_falls_under_less_is_counted_by_itself(run)
     assert f"stands here, falls at x {factor:.2f}" in out
 
 
+def test_what_was_not_finished_says_nothing_of_a_rule(record, monkeypatch):
+    found = rules.check(TOMBSTONE, {"whole": record, "cut": record}, rules=["west"])
+    with monkeypatch.context() as patched:
+        patched.setattr("rocking.simulation.slices", lambda ground: 1)
+        patched.setattr("rocking.simulation.SLICE", 5)
+        cut = rocking.simulate(TOMBSTONE, rocking.pulses.sine(4.0, 2.0, cycles=20))
+    assert cut.unfinished
+    text = replace(found, responses=(found.responses[0], cut), ratios=({"west": 0.5},) * 2).summary()
+    assert "West: right 1, unsafe 0, over-conservative 0 of 1" in text
+    assert "not counted: 1 of 2, whose simulation was not finished" in text
+
+
 @pytest.mark.parametrize(
     "frequency", [0.8, *(pytest.param(each, marks=pytest.mark.thorough) for each in (0.9, 1.1, 1.2))]
 )

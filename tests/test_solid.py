@@ -587,6 +587,10 @@ REFUSED = {
     "up": (lambda: Solid.from_mesh(box(), up="north"), "up must be one of x, y, z"),
     "up of zero": (lambda: Solid.from_mesh(box(), up=[0.0, 0.0, 0.0]), "up must be x, y or z, or a vector"),
     "tolerance": (lambda: Solid.from_mesh(box(), tolerance=0.0), "tolerance must be a positive number, in m"),
+    "both": (
+        lambda: Solid.from_mesh(box(), tolerance=0.01, support=[[0, 0], [0.1, 0], [0, 0.1]]),
+        "tolerance is how a support is looked for: leave it out where support is given",
+    ),
     "turn": (lambda: Solid.from_mesh(box(), turn=math.nan), "turn must be a finite number"),
     "no file": (lambda: Solid.from_mesh("nobody.obj"), "nobody.obj: there is no such file"),
     "no statue": (lambda: Solid.from_mesh("statu"), "the mesh that ships is statue"),

@@ -446,6 +446,14 @@ def test_verify_sees_a_log_that_ends_before_the_last_run(tmp_path):
     assert study.verify() == ["runs.jsonl is damaged: 1 line of it cannot be read whole"]
 
 
+def test_a_line_of_the_log_that_a_crash_has_cut_takes_no_other_with_it(tmp_path):
+    study, log = made(tmp_path), tmp_path / "runs.jsonl"
+    log.write_bytes(b'{"event": "st')
+    study.run()
+    assert [entry["event"] for entry in study.status.runs] == ["start", "end"]
+    assert log.read_bytes().startswith(b'{"event": "st\n{')
+
+
 def test_a_study_that_may_not_be_written_to_can_be_opened(tmp_path, monkeypatch):
     made(tmp_path).run()
     (tmp_path / "zarr.json").write_bytes(b"")

@@ -58,6 +58,15 @@ def test_a_file_is_the_product_that_it_describes(file):
     assert product.scales.values.tolist() == [0.5, 1.0]
 
 
+def test_a_peak_velocity_has_units_as_on_the_command_line(file):
+    text = file.read_text(encoding="utf-8")
+    (old,) = (line for line in text.splitlines() if line.startswith("factor ="))
+    file.write_text(text.replace(old, 'pgv = ["40cm/s", 0.6]'), encoding="utf-8")
+    scales = read_study(file).product.scales
+    assert scales.values == pytest.approx([0.4, 0.6], rel=1e-15)
+    assert scales.measure.name == "pgv"
+
+
 def test_the_template_describes_a_study(tmp_path):
     path = tmp_path / "new.toml"
     path.write_text(TEMPLATE)

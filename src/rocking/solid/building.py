@@ -59,6 +59,8 @@ def properties(
 
     The arguments are those of `Solid.from_mesh`; a mesh of more than `most` triangles is refused.
     """
+    if support is not None and tolerance is not None:
+        raise InvalidBlock("{} is how a support is looked for: leave it out where {} is given", "tolerance", "support")
     found = parts_of(mesh, most)
     with np.errstate(over="ignore"):
         extent = max(float(np.ptp(part.vertices, axis=0).max()) for part in found.parts) * length_of(unit)

@@ -147,7 +147,7 @@ class Solid(Result):
             Corners of the support, m, in the mesh's own horizontal coordinates after `up`, `unit` and `turn`. By
             default the convex polygon around all corners of the mesh within `tolerance` of the lowest one.
         tolerance : float, optional
-            That distance, m; by default a thousandth of the height.
+            That distance, m; by default a thousandth of the height. Without `support` only.
         up : {"x", "y", "z", "-x", "-y", "-z"} or array_like, optional
             Axis of the mesh that points up, or a vector; the mesh is turned there by the shortest way, so that with "y"
             x stays in the east, and north is -z. By default z; of glTF files y.

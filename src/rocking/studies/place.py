@@ -113,12 +113,12 @@ class Folder:
             return
 
     def append(self, name: str, line: str) -> None:
-        """Append the line to the file."""
-        with (
-            _refused("written", self.path / name),
-            (self.path / name).open("a", encoding="utf-8", newline="\n") as file,
-        ):
-            file.write(line + "\n")
+        """Append the line to the file, in a line of its own where a crash has cut the last one."""
+        with _refused("written", self.path / name), (self.path / name).open("ab+") as file:
+            end = file.seek(0, os.SEEK_END)
+            file.seek(max(0, end - 1))
+            is_cut = file.read(1) not in (b"", b"\n")
+            file.write(b"\n" * is_cut + line.encode() + b"\n")
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[str]:

@@ -119,7 +119,7 @@ class Check(BlockUnderRecords):
             said = [
                 (ratios[rule] >= 1.0, response.overturned)
                 for ratios, response, is_left_out in zip(self.ratios, self.responses, less, strict=True)
-                if not is_left_out
+                if not (is_left_out or response.unfinished)
             ]
             unsafe = sum(not yes and real for yes, real in said)
             wary = sum(yes and not real for yes, real in said)
@@ -130,6 +130,8 @@ class Check(BlockUnderRecords):
                 f"not counted: {sum(less)} of {len(less)}, where the block stands under the motion as it is, but falls "
                 "under the same motion scaled down"
             )
+        if unfinished := sum(response.unfinished for response in self.responses):
+            lines.append(f"not counted: {unfinished} of {len(less)}, whose simulation was not finished")
         return lines
 
 

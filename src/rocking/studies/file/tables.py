@@ -90,6 +90,7 @@ _QUANTITIES: Final[Mapping[str, quantities.Quantity]] = {
     **dict.fromkeys(("width", "height", "pivots", "height_of_mass", "gyration"), quantities.length),
     "pga": quantities.acceleration,
     "sa": quantities.acceleration,
+    "pgv": quantities.velocity,
 }
 
 
