@@ -316,6 +316,28 @@ def test_an_interrupt_waits_until_locks_are_given_back_but_not_for_ever():
     assert time.monotonic() < late
 
 
+def test_an_interrupt_is_not_lost_where_numpy_asks_for_an_attribute():
+    """Of a class it takes whatever comes for a no; those of `enum` in Python 3.11 are asked in Python."""
+    asked = []
+
+    class Kind(type):
+        def __getattr__(cls, name):
+            asked.append(name)
+            if len(asked) == 1:
+                signal.raise_signal(signal.SIGINT)
+            raise AttributeError(name)
+
+    class Asked(int, metaclass=Kind):
+        pass
+
+    late = time.monotonic() + 60.0
+    with pytest.raises(KeyboardInterrupt), Interrupts():
+        assert (np.zeros(3) == Asked(0)).all()
+        while time.monotonic() < late:
+            time.sleep(0.001)
+    assert asked and time.monotonic() < late
+
+
 def test_an_interrupt_that_gets_through_an_import_comes_once(tmp_path, monkeypatch):
     (tmp_path / "plain.py").write_text("import signal\nsignal.raise_signal(signal.SIGINT)\n")
     monkeypatch.syspath_prepend(tmp_path)

@@ -16,7 +16,7 @@ import tempfile
 import time
 from functools import cache
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, cast
 
 from promises.commands import ENDING_WITH_A_PART, LONG, arguments, called, faults, files
 from promises.promise import Found, Promise
@@ -103,7 +103,8 @@ def _forked(words: list[str], folder: Path, moment: float | None) -> int:
         sys.stdout, sys.stderr = (os.fdopen(number, "w", closefd=False) for number in (1, 2))
         os.chdir(folder)
         signal.signal(signal.SIGINT, signal.default_int_handler)
-        signal.signal(signal.SIGPROF, lambda *_: os.kill(os.getpid(), signal.SIGINT))
+        # Whoever listens is called as by Ctrl-C: with the place that is interrupted, and not one of ours.
+        signal.signal(signal.SIGPROF, lambda _, frame: cast(Any, signal.getsignal(signal.SIGINT))(signal.SIGINT, frame))
         if moment is not None:
             signal.setitimer(signal.ITIMER_PROF, max(moment, 1e-3))
         main(words)

@@ -20,6 +20,11 @@ _AGAIN: Final = 0.02
 _LOCKING: Final = ("threading", "concurrent.futures._base", "concurrent.futures.thread")
 _WAITS: Final = 10
 
+#: How an object is asked for an attribute that it may not have: NumPy takes whatever happens there for a no. Of so many
+#: innermost calls none may be one of these.
+_ASKED: Final = "__getattr__"
+_INNERMOST: Final = 3
+
 
 class Interrupts:
     """What became of Ctrl-C within a block of code.
@@ -27,7 +32,7 @@ class Interrupts:
     Python drops an exception that is raised in a finaliser or in a callback, a library that is imported may catch it,
     and one that calls Python may raise another in its place. The first two are raised again; for the third, `asked`
     says where the error comes from. What Python drops of that kind is not printed. While locks are taken and given
-    back an interrupt waits.
+    back, or an object is asked for an attribute, an interrupt waits.
 
     Attributes
     ----------
@@ -67,7 +72,7 @@ class Interrupts:
         if asks and not _is_whole(self._import):
             self._import = None  # the interrupt got through
             return
-        if self._waited < _WAITS and frame is not None and frame.f_globals.get("__name__") in _LOCKING:
+        if self._waited < _WAITS and _is_delicate(frame):
             self._waited += 1
             self._later(_thread.interrupt_main)
             return
@@ -105,6 +110,14 @@ def _is_whole(imported: FrameType | None) -> bool:
         return False
     module = sys.modules.get(imported.f_globals.get("__name__", ""))
     return module is not None and vars(module) is imported.f_globals
+
+
+def _is_delicate(frame: FrameType | None) -> bool:
+    """Whether an exception would leave a lock behind here, or be lost."""
+    if frame is None:
+        return False
+    asked = any(each.f_code.co_name == _ASKED for each in _frames(frame)[:_INNERMOST])
+    return asked or frame.f_globals.get("__name__") in _LOCKING
 
 
 def _frames(frame: FrameType | None) -> list[FrameType]:
