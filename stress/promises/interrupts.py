@@ -16,6 +16,7 @@ import tempfile
 import time
 from functools import cache
 from pathlib import Path
+from types import FrameType
 from typing import Any, Final, NamedTuple, cast
 
 from promises.commands import ENDING_WITH_A_PART, LONG, arguments, called, faults, files
@@ -36,8 +37,12 @@ _PATIENCE: Final = 300.0
 
 _TICKS: Final = os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 100
 
-#: Status of a fork that was interrupted before or after the command.
+#: Status of a fork that was interrupted before or after the command, and of one that went on to its end all the same.
 _OUTSIDE: Final = 99
+_LOST: Final = 98
+
+#: Interrupts that were raised in a fork.
+_raised: list[int] = []
 
 
 class Ended(NamedTuple):
@@ -88,6 +93,15 @@ def _started(words: list[str], folder: Path) -> int:
     return process.pid
 
 
+def _interrupted(number: int, frame: FrameType | None) -> None:
+    """Call who listens as Ctrl-C does: with the place that is interrupted, and not one of ours."""
+    try:
+        cast(Any, signal.getsignal(signal.SIGINT))(signal.SIGINT, frame)
+    except KeyboardInterrupt:
+        _raised.append(number)
+        raise
+
+
 def _forked(words: list[str], folder: Path, moment: float | None) -> int:
     """Start a fork, which interrupts itself; its number."""
     sys.stdout.flush()
@@ -103,12 +117,11 @@ def _forked(words: list[str], folder: Path, moment: float | None) -> int:
         sys.stdout, sys.stderr = (os.fdopen(number, "w", closefd=False) for number in (1, 2))
         os.chdir(folder)
         signal.signal(signal.SIGINT, signal.default_int_handler)
-        # Whoever listens is called as by Ctrl-C: with the place that is interrupted, and not one of ours.
-        signal.signal(signal.SIGPROF, lambda _, frame: cast(Any, signal.getsignal(signal.SIGINT))(signal.SIGINT, frame))
+        signal.signal(signal.SIGPROF, _interrupted)
         if moment is not None:
             signal.setitimer(signal.ITIMER_PROF, max(moment, 1e-3))
         main(words)
-        code = 0
+        code = _LOST if _raised and words[0] not in ENDING_WITH_A_PART else 0
     except SystemExit as stop:
         code = int(stop.code or 0)
     except KeyboardInterrupt:
