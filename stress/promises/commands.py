@@ -19,7 +19,7 @@ _BLOCK: Final = ("--width", "0.24", "--height", "1.1")
 _RECORD: Final = "el-centro-meloland-270"
 _SINE: Final = "sine:amplitude=0.3g,frequency=2Hz"
 _ALONG: Final = ("--pulse", "sine:frequency=2Hz", "--along", "amplitude:0.1g:0.4g:9")
-_GRID: Final = ("--positions=-0.15:0.15:17", "--velocities=-0.5:0.5:17")
+_GRID: Final = ("--positions=-0.15:0.15:65", "--velocities=-0.5:0.5:65")
 
 _STUDY: Final = """\
 [blocks]

@@ -174,6 +174,8 @@ def judge(part: int) -> Found:
                 one = ended(name, folder, moment, forked=forked)
                 what = f"{name}{' forked' * forked}, after {moment:.3f} s of {seconds:.3f} s"
                 _judge_end(found, what, one, folder / "out", whole)
+    if name in ENDING_WITH_A_PART and not found.notes["a part"]:
+        found.fail(f"{name}: no interrupt met what it computes, so that nothing is known of how it ends with a part")
     return found
 
 
