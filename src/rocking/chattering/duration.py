@@ -178,7 +178,8 @@ class ChatteringSequence:
         Whether the impacts accumulate before half a period is over.
     time, lower, upper : float
         Time of rest and the bracket on it that the certificate proves from the last impact's time and speed; NaN where
-        chattering is incomplete.
+        chattering is incomplete. Within rounding of the critical amplitude the bracket may be as wide as from the last
+        impact to half a period.
     """
 
     impacts: NDArray[np.void]
@@ -243,7 +244,7 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
             raise InvalidOption(
                 f"the sequence takes more than {_LARGEST_CAPACITY} impacts: lower {{}} = {eta!r}", "eta", value=eta
             )
-    if impacts["time"].max(initial=0.0) > half_period * (1.0 - _CRITICAL):
+    if status == Verdict.UNRESOLVED or impacts["time"].max(initial=0.0) > half_period * (1.0 - _CRITICAL):
         # Where rounding decides, the verdict is that of `chattering_time`, which says no more than half a period.
         settled = float(chattering_time(amplitude, frequency, restitution))
         if status != Verdict.FOUND and math.isfinite(settled):
