@@ -669,6 +669,15 @@ def test_rows_of_uneven_length_take_twenty_times_the_file_at_most(row: bytes, fi
     assert peak < 20 * len(content)
 
 
+def test_a_sample_takes_a_hundred_bytes_while_it_is_read(file: Callable[[bytes], Path]) -> None:
+    path = file(b"1.5\n-2.0\n" * 200_000)
+    tracemalloc.start()
+    assert read(path, units="g", dt=0.005).pga == pytest.approx(2.0 * GRAVITY)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 110 * 400_000
+
+
 @pytest.mark.parametrize(
     ("heading", "factor"),
     [

@@ -229,6 +229,23 @@ def test_a_table_of_displacements_or_velocities_is_refused_without_advice_to_ren
         read(path)
 
 
+@pytest.mark.parametrize(
+    "name", ["time (s)", "Time", "t/ms", "Time in s", "# Zeit, s", "time\n(s)", "t [s]", "Period (s)", "PSA (g)"]
+)
+def test_a_column_of_times_alone_is_not_read_as_accelerations(tmp_path, name):
+    path = tmp_path / "times.csv"
+    path.write_text(f"{name}\n0.000\n0.005\n0.010\n")
+    with pytest.raises(UnreadableRecord, match=r"names no column of accelerations|is that of a spectrum"):
+        read(path, dt=0.005, units="g")
+
+
+@pytest.mark.parametrize("name", ["T", "S", "NS", "Time history", "time series (g)", "Time: 12:03", "dt = 0.01 s", "1"])
+def test_a_title_above_a_column_of_accelerations_may_speak_of_time(tmp_path, name):
+    path = tmp_path / "column.csv"
+    path.write_text(f"# {name}\n0.000\n0.005\n0.010\n")
+    assert read(path, dt=0.005, units="g").pga == pytest.approx(0.01 * G)
+
+
 def test_a_missing_row_among_even_times_is_noted(tmp_path):
     def written(name, left_out):
         path = tmp_path / name

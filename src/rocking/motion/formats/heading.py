@@ -112,7 +112,7 @@ class _Names:
     def columns(self) -> Iterator[Column]:
         """Columns as their names tell; where none is named as times, the first of several holds them."""
         count = len(self.names)
-        kinds: list[Kind] = [self._kind(place) if count > 1 else "channel" for place in range(count)]
+        kinds = [self._kind(place) for place in range(count)] if count > 1 else [self._kind_of_only()]
         first_time = kinds.index("time") if "time" in kinds else 0
         for place, kind in enumerate(kinds):
             if kind == "count" and place > first_time:
@@ -147,6 +147,18 @@ class _Names:
         if counts and not any(map(find_time_unit, texts)):
             return "count"
         return "time" if words & _TIMES or self._is_unit_of_time(place) else "channel"
+
+    def _kind_of_only(self) -> Kind:
+        """Return the kind of a single column, above which a title may stand: times only if it says nothing else.
+
+        "T" by itself is the transverse component.
+        """
+        name = self._label(0)
+        units = (find_unit, find_time_unit)
+        words = {word.lower() for word in _WORD.findall(name) if not any(find(word) for find in units)} - {"in"}
+        unclear = words == {"t"} and not any(find_time_unit(text) for line in self._lines(0) for text in _texts(line))
+        sure = words and words <= _TIMES | _SPECTRA and not unclear and not re.search(r"\d", name)
+        return self._kind(0) if sure else "channel"
 
     def _label(self, place: int) -> str:
         """Return a column's name, which may stand above a line of units."""
