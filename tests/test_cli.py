@@ -14,6 +14,7 @@ import time
 import tomllib
 from pathlib import Path
 
+import matplotlib.path as outline
 import numpy as np
 import pytest
 
@@ -316,26 +317,58 @@ def test_an_interrupt_waits_until_locks_are_given_back_but_not_for_ever():
     assert time.monotonic() < late
 
 
-def test_an_interrupt_is_not_lost_where_numpy_asks_for_an_attribute():
-    """Of a class it takes whatever comes for a no; those of `enum` in Python 3.11 are asked in Python."""
-    asked = []
+def compared(interrupt):
+    """Of a class NumPy takes whatever comes for a no; those of `enum` in Python 3.11 are asked in Python."""
 
     class Kind(type):
         def __getattr__(cls, name):
-            asked.append(name)
-            if len(asked) == 1:
-                signal.raise_signal(signal.SIGINT)
+            interrupt()
             raise AttributeError(name)
 
-    class Asked(int, metaclass=Kind):
-        pass
+    return np.zeros(3) == Kind("Number", (int,), {})(0)
+
+
+def converted(interrupt):
+    class Empty:
+        def __len__(self):
+            interrupt()
+            return 0
+
+        def __getitem__(self, index):
+            raise IndexError
+
+    return np.array(Empty())
+
+
+def looked_for(interrupt):
+    class Identity:
+        is_affine = True
+
+        def frozen(self):
+            return self
+
+        def __array__(self, dtype=None, copy=None):
+            interrupt()
+            return np.eye(3)
+
+    return outline.Path([[0.0, 0.0], [1.0, 1.0]]).contains_point((0.0, 0.0), Identity())
+
+
+@pytest.mark.parametrize("ask", [compared, converted, looked_for])
+def test_an_interrupt_is_not_lost_where_a_library_asks_what_an_object_is(ask):
+    reached = []
+
+    def interrupt():
+        reached.append(len(reached))
+        if len(reached) == 1:
+            signal.raise_signal(signal.SIGINT)
 
     late = time.monotonic() + 60.0
     with pytest.raises(KeyboardInterrupt), Interrupts():
-        assert (np.zeros(3) == Asked(0)).all()
+        ask(interrupt)
         while time.monotonic() < late:
             time.sleep(0.001)
-    assert asked and time.monotonic() < late
+    assert reached and time.monotonic() < late
 
 
 def test_an_interrupt_that_gets_through_an_import_comes_once(tmp_path, monkeypatch):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import _thread
+import itertools
 import signal
 import sys
 import threading
@@ -20,10 +21,10 @@ _AGAIN: Final = 0.02
 _LOCKING: Final = ("threading", "concurrent.futures._base", "concurrent.futures.thread")
 _WAITS: Final = 10
 
-#: How an object is asked for an attribute that it may not have: NumPy takes whatever happens there for a no. Of so many
-#: innermost calls none may be one of these.
-_ASKED: Final = "__getattr__"
-_INNERMOST: Final = 3
+#: What libraries in C ask of an object that may not have it: NumPy and pybind11 take whatever happens there for a no.
+_ASKED: Final = frozenset(
+    {"__array__", "__eq__", "__float__", "__getattr__", "__getitem__", "__index__", "__iter__", "__len__"}
+)
 
 
 class Interrupts:
@@ -32,7 +33,7 @@ class Interrupts:
     Python drops an exception that is raised in a finaliser or in a callback, a library that is imported may catch it,
     and one that calls Python may raise another in its place. The first two are raised again; for the third, `asked`
     says where the error comes from. What Python drops of that kind is not printed. While locks are taken and given
-    back, or an object is asked for an attribute, an interrupt waits.
+    back, or an object is asked what it is, an interrupt waits.
 
     Attributes
     ----------
@@ -116,8 +117,9 @@ def _is_delicate(frame: FrameType | None) -> bool:
     """Whether an exception would leave a lock behind here, or be lost."""
     if frame is None:
         return False
-    asked = any(each.f_code.co_name == _ASKED for each in _frames(frame)[:_INNERMOST])
-    return asked or frame.f_globals.get("__name__") in _LOCKING
+    # Of a module that is imported, whoever asked for it learns of the exception.
+    inner = itertools.takewhile(lambda each: not _imports(each), _frames(frame))
+    return frame.f_globals.get("__name__") in _LOCKING or any(each.f_code.co_name in _ASKED for each in inner)
 
 
 def _frames(frame: FrameType | None) -> list[FrameType]:
@@ -131,9 +133,9 @@ def _frames(frame: FrameType | None) -> list[FrameType]:
 
 def _is_imported(frame: FrameType) -> bool:
     """Whether a frame is that of a module which is being imported."""
-    caller = frame.f_back
-    return (
-        frame.f_code.co_name == "<module>"
-        and caller is not None
-        and caller.f_code.co_filename.startswith("<frozen importlib")
-    )
+    return frame.f_code.co_name == "<module>" and frame.f_back is not None and _imports(frame.f_back)
+
+
+def _imports(frame: FrameType) -> bool:
+    """Whether a frame is of the code by which Python imports."""
+    return frame.f_code.co_filename.startswith("<frozen importlib")
