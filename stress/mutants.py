@@ -4,11 +4,11 @@
     python stress/mutants.py chattering --number 5
 
 Each mutant (`mutations.py` says what is drawn) is put into a copy of the tree, and judged there by the files of tests
-that `make quick` would run for a change of its file, up to the first failure. Kernels are run uncompiled. What a mutant
-showed is kept under a hash of its text, and holds as long as the tests that showed it are what they were; a run that
-was stopped goes on where it was. Every survivor is printed; those of `equivalent_mutants.json` change nothing that can
-be seen, for the reason said there, and do not count. The table of docs/reliability.md has the last judgement of each
-part.
+that `make quick` would run for a change of its file, up to the first failure; if they see nothing, by more that are
+farther away. The nearest tests of kernels run them uncompiled. What a mutant showed is kept under a hash of its text,
+and holds as long as the tests that showed it are what they were; a run that was stopped goes on where it was. Every
+survivor is printed; those of `equivalent_mutants.json` change nothing that can be seen, for the reason said there, and
+do not count. The table of docs/reliability.md has the last judgement of each part.
 """
 
 from __future__ import annotations
@@ -73,6 +73,9 @@ EQUIVALENT = Path(__file__).with_name("equivalent_mutants.json")
 _OPTIONS = ["-x", "-q", "-n0", "-p", "no:cacheprovider", "--benchmark-disable"]
 _FAST = ["-m", "not thorough and not slow and not browser"]
 
+#: Processor time at most in which the kernels that tests call are compiled anew, s.
+_COMPILING = 400.0
+
 #: Time over processor time after which a process hangs: on a busy machine it is only waiting.
 _SLOWER = 100.0
 
@@ -106,17 +109,17 @@ class Tree:
         """Hash of a file of tests."""
         return hashlib.sha256((ROOT / name).read_bytes()).hexdigest()[:16]
 
-    def near(self, path: Path) -> list[str]:
-        """Names of the files of tests of a file, the nearest first."""
+    def near(self, path: Path, most: int) -> list[str]:
+        """Names of so many files of tests of a file at most, the nearest first."""
         near = ordered([self.tests.of(path)])
-        return [path.relative_to(ROOT).as_posix() for path in near[:MOST]]
+        return [path.relative_to(ROOT).as_posix() for path in near[:most]]
 
-    def chosen(self, paths: set[Path], seconds: float, uncompiled: bool) -> dict[Path, dict[str, float]]:
+    def chosen(self, paths: set[Path], seconds: float, most: int, uncompiled: bool) -> dict[Path, dict[str, float]]:
         """Files of tests for a mutant of each file and their times: the nearest that the time allows, at least one.
 
         Times are measured one file of tests after another, until half of the time is filled.
         """
-        near, times = {path: self.near(path) for path in paths}, dict[str, float]()
+        near, times = {path: self.near(path, most) for path in paths}, dict[str, float]()
         while True:
             chosen: dict[Path, dict[str, float]] = {path: {} for path in near}
             missing = set()
@@ -149,18 +152,20 @@ class Tree:
             print("left out, for they fail or take too long without a mutant:", *failing)
         return {name: math.inf if each["by"] else each["seconds"] for name, each in found.items()}
 
-    def judged(self, drawn: list[Mutant], uncompiled: bool) -> list[dict[str, Any]]:
+    def judged(self, drawn: list[Mutant], kernels: bool) -> list[dict[str, Any]]:
         """Find what the tests show of each mutant: the nearest, and of what these spare more, and what judges all."""
         places = {mutant: self.folder / "mutants" / f"{mutant.key}.json" for mutant in drawn}
         left = drawn
-        for seconds, of_all in ((self.seconds, {}), (3.0 * self.seconds, {OF_ALL: _OF_ALL_SECONDS})):
-            near = self.chosen({mutant.path for mutant in left}, seconds, uncompiled)
+        stages = [(self.seconds, MOST, {}, kernels), (3.0 * self.seconds, 3 * MOST, {OF_ALL: _OF_ALL_SECONDS}, False)]
+        for seconds, most, of_all, uncompiled in stages:
+            near = self.chosen({mutant.path for mutant in left}, seconds, most, uncompiled)
             chosen = {path: some | of_all for path, some in near.items()}
             tasks: list[Task] = []
             for mutant in left:
                 names, place = [*chosen[mutant.path]], places[mutant]
                 if not (place.exists() and self._holds(json.loads(place.read_text()), names)):
                     limit = 3.0 * sum(chosen[mutant.path].values()) + 20.0
+                    limit += _COMPILING * (kernels and not uncompiled)
                     tasks.append((place, mutant, names, limit, uncompiled))
             done(tasks, self.copies)
             left = [mutant for mutant in left if not json.loads(places[mutant].read_text())["by"]]
@@ -363,7 +368,7 @@ def main() -> int:
     try:
         for part in given.parts or PARTS:
             some = drawn(part, given.number, given.seed)
-            shown = Shown.of(some, tree.judged(some, uncompiled=part == "kernels"), given.seed)
+            shown = Shown.of(some, tree.judged(some, kernels=part == "kernels"), given.seed)
             rows = with_earlier(TABLE, {part: dataclasses.asdict(shown)})
             TABLE.write_text(table({name: Shown(**row) for name, row in rows.items()}), "utf-8")
             enough = enough and shown.share >= WANTED

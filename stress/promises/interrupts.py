@@ -30,7 +30,7 @@ FORKS: Final = 95
 
 #: Processor time after an interrupt at most, s; of a command that draws and writes what it has.
 LIMIT: Final = 1.0
-_LIMIT_WITH_A_PART: Final = 3.0
+_LIMIT_WITH_A_PART: Final = 5.0
 
 #: Longest a command may take in all, s: long enough for a busy machine.
 _PATIENCE: Final = 300.0
