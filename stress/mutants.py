@@ -29,7 +29,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
@@ -76,6 +76,9 @@ _FAST = ["-m", "not thorough and not slow and not browser"]
 #: Processor time at most in which the kernels that tests call are compiled anew, s.
 _COMPILING = 400.0
 
+#: No file of tests is so many imports farther than the nearest.
+_ANYWHERE = 99
+
 #: Time over processor time after which a process hangs: on a busy machine it is only waiting.
 _SLOWER = 100.0
 
@@ -109,17 +112,20 @@ class Tree:
         """Hash of a file of tests."""
         return hashlib.sha256((ROOT / name).read_bytes()).hexdigest()[:16]
 
-    def near(self, path: Path, most: int) -> list[str]:
-        """Names of so many files of tests of a file at most, the nearest first."""
-        near = ordered([self.tests.of(path)])
-        return [path.relative_to(ROOT).as_posix() for path in near[:most]]
+    def near(self, path: Path, without: Collection[str] = ()) -> list[str]:
+        """Names of the files of tests of a file, the nearest first; of many more where some are left out."""
+        near = ordered([self.tests.of(path, _ANYWHERE) if without else self.tests.of(path)])
+        names = [path.relative_to(ROOT).as_posix() for path in near]
+        return [name for name in names if name not in without][: MOST * (3 if without else 1)]
 
-    def chosen(self, paths: set[Path], seconds: float, most: int, uncompiled: bool) -> dict[Path, dict[str, float]]:
+    def chosen(
+        self, without: Mapping[Path, Collection[str]], seconds: float, uncompiled: bool
+    ) -> dict[Path, dict[str, float]]:
         """Files of tests for a mutant of each file and their times: the nearest that the time allows, at least one.
 
-        Times are measured one file of tests after another, until half of the time is filled.
+        Some may be left out. Times are measured one file of tests after another, until half of the time is filled.
         """
-        near, times = {path: self.near(path, most) for path in paths}, dict[str, float]()
+        near, times = {path: self.near(path, names) for path, names in without.items()}, dict[str, float]()
         while True:
             chosen: dict[Path, dict[str, float]] = {path: {} for path in near}
             missing = set()
@@ -152,24 +158,25 @@ class Tree:
             print("left out, for they fail or take too long without a mutant:", *failing)
         return {name: math.inf if each["by"] else each["seconds"] for name, each in found.items()}
 
-    def judged(self, drawn: list[Mutant], kernels: bool) -> list[dict[str, Any]]:
-        """Find what the tests show of each mutant: the nearest, and of what these spare more, and what judges all."""
-        places = {mutant: self.folder / "mutants" / f"{mutant.key}.json" for mutant in drawn}
-        left = drawn
-        stages = [(self.seconds, MOST, {}, kernels), (3.0 * self.seconds, 3 * MOST, {OF_ALL: _OF_ALL_SECONDS}, False)]
-        for seconds, most, of_all, uncompiled in stages:
-            near = self.chosen({mutant.path for mutant in left}, seconds, most, uncompiled)
+    def judged(self, drawn: list[Mutant], kernels: bool) -> list[str]:
+        """Name of the test that sees each mutant, or nothing: a near one, else another, or one that judges all."""
+        by, chosen = dict.fromkeys(drawn, ""), {mutant.path: dict[str, float]() for mutant in drawn}
+        for times, of_all, uncompiled in ((1, {}, kernels), (3, {OF_ALL: _OF_ALL_SECONDS}, False)):
+            left = [mutant for mutant in drawn if not by[mutant]]
+            places = {mutant: self.folder / "mutants" / f"{mutant.key}-{times}.json" for mutant in left}
+            without = {mutant.path: chosen[mutant.path] for mutant in left}
+            near = self.chosen(without, times * self.seconds, uncompiled)
             chosen = {path: some | of_all for path, some in near.items()}
             tasks: list[Task] = []
-            for mutant in left:
-                names, place = [*chosen[mutant.path]], places[mutant]
+            for mutant, place in places.items():
+                names = [*chosen[mutant.path]]
                 if not (place.exists() and self._holds(json.loads(place.read_text()), names)):
                     limit = 3.0 * sum(chosen[mutant.path].values()) + 20.0
                     limit += _COMPILING * (kernels and not uncompiled)
                     tasks.append((place, mutant, names, limit, uncompiled))
             done(tasks, self.copies)
-            left = [mutant for mutant in left if not json.loads(places[mutant].read_text())["by"]]
-        return [json.loads(place.read_text()) for place in places.values()]
+            by |= {mutant: json.loads(place.read_text())["by"] for mutant, place in places.items()}
+        return [*by.values()]
 
     def _holds(self, found: dict[str, Any], names: list[str]) -> bool:
         """Whether a mutant that was judged is what it was: killed by a file that is the same, or spared by all."""
@@ -308,10 +315,10 @@ class Shown:
         return self.killed / max(self.counted, 1)
 
     @classmethod
-    def of(cls, drawn: list[Mutant], found: list[dict[str, Any]], seed: int) -> Shown:
+    def of(cls, drawn: list[Mutant], by: list[str], seed: int) -> Shown:
         """Count, and name the survivors."""
         reason = equivalent()
-        spared = [mutant for mutant, each in zip(drawn, found, strict=True) if not each["by"]]
+        spared = [mutant for mutant, name in zip(drawn, by, strict=True) if not name]
         places = [f"{mutant.path.relative_to(ROOT / 'src/rocking')}:{mutant.line}" for mutant in spared]
         named = [
             [place, reason(mutant), mutant.before, mutant.after] for place, mutant in zip(places, spared, strict=True)

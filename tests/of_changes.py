@@ -118,7 +118,7 @@ class FilesOfTests:
                 found[each].add(module)
         return found
 
-    def of_module(self, module: str) -> dict[Path, tuple[int, int]]:
+    def of_module(self, module: str, farther: int = FARTHER) -> dict[Path, tuple[int, int]]:
         """Files of tests of a module, each with how far it is and how much else it imports."""
         distances, reached = {module: 0}, [module]
         for each in reached:
@@ -132,7 +132,7 @@ class FilesOfTests:
             test, shared = self.modules[path], len(own & words(path.stem))
             if shared or test in distances:
                 found[path] = distances.get(test, BY_NAME) - shared, len(self.imported[test])
-        farthest = min((far for far, _ in found.values()), default=0) + FARTHER
+        farthest = min((far for far, _ in found.values()), default=0) + farther
         return {path: rank for path, rank in found.items() if rank[0] <= farthest}
 
     def of_other(self, path: Path) -> dict[Path, tuple[int, int]]:
@@ -144,12 +144,12 @@ class FilesOfTests:
                 return {each: (-len(words(path.stem) & words(each.stem)), 0) for each in found}
         return {}
 
-    def of(self, path: Path) -> dict[Path, tuple[int, int]]:
-        """Files of tests that judge a file, each with its rank."""
+    def of(self, path: Path, farther: int = FARTHER) -> dict[Path, tuple[int, int]]:
+        """Files of tests that judge a file, so much farther than the nearest at most, each with its rank."""
         path = path.with_suffix(".py") if path.suffix == ".pyi" else path
         if path in self.files:
             return {path: (-9, 0)}
-        return self.of_module(self.modules[path]) if path in self.modules else self.of_other(path)
+        return self.of_module(self.modules[path], farther) if path in self.modules else self.of_other(path)
 
 
 def changed(commit: str = "HEAD", root: Path = ROOT) -> list[Path]:

@@ -71,7 +71,7 @@ def test_what_changes_nothing_is_in_a_line_that_is_there():
 
 def test_survivors_are_named_and_those_that_change_nothing_do_not_count(monkeypatch):
     drawn = mutants.drawn("block and solid", 4, 1)
-    found = [{"by": "tests/test_block.py::test_something"}, {"by": ""}, {"by": ""}, {"by": "signal 24"}]
+    found = ["tests/test_block.py::test_something", "", "", "signal 24"]
     monkeypatch.setattr(mutants, "equivalent", lambda: lambda each: "it is only faster" if each is drawn[1] else "")
     shown = mutants.Shown.of(drawn, found, 1)
     head, *rest = shown.report("block and solid")
@@ -96,14 +96,14 @@ def test_times_are_measured_of_the_nearest_tests_until_half_of_the_time_is_fille
     tree, asked = object.__new__(mutants.Tree), []
     near = {"a.py": ["slow", "quick"], "b.py": ["fails", "quick", "slow", "other", "last"], "c.py": ["fails"]}
     times = {"slow": 30.0, "quick": 4.0, "fails": math.inf, "other": 9.0}
-    monkeypatch.setattr(tree, "near", lambda path: near[path.name])
+    monkeypatch.setattr(tree, "near", lambda path, without: near[path.name])
 
     def measured(names, uncompiled):
         asked.append(sorted(names))
         return {name: times[name] for name in names}
 
     monkeypatch.setattr(tree, "measured", measured)
-    chosen = tree.chosen({Path(name) for name in near}, 20.0, uncompiled=False)
+    chosen = tree.chosen({Path(name): () for name in near}, 20.0, uncompiled=False)
     assert {path.name: [*names] for path, names in chosen.items()} == {
         "a.py": ["slow"],
         "b.py": ["quick", "other"],
@@ -142,14 +142,15 @@ def test_a_part_without_enough_branches_fails_the_run(monkeypatch, tmp_path, cap
     assert branches.main() == 1
 
 
-def test_what_the_nearest_tests_spare_is_judged_by_more_of_them_and_by_laws_of_all(monkeypatch, tmp_path):
+def test_what_the_nearest_tests_spare_is_judged_by_others_and_by_laws_of_all(monkeypatch, tmp_path):
     tree = object.__new__(mutants.Tree)
     tree.folder, tree.seconds, tree.copies = tmp_path, 20.0, []
     (tmp_path / "mutants").mkdir()
     drawn, asked = mutants.drawn("response", 3, 1), []
-    files = {20.0: {"near": 9.0}, 60.0: {"near": 9.0, "far": 40.0}}
-    monkeypatch.setattr(tree, "chosen", lambda paths, seconds, uncompiled: dict.fromkeys(paths, files[seconds]))
-    monkeypatch.setattr(tree, "hash", lambda name: name)
+
+    def chosen(without, seconds, uncompiled):
+        assert seconds == (60.0 if any(without.values()) else 20.0)
+        return {path: {"far": 40.0} if names else {"near": 9.0} for path, names in without.items()}
 
     def done(tasks, copies):
         asked.append([(drawn.index(mutant), names) for _, mutant, names, *_ in tasks])
@@ -157,13 +158,25 @@ def test_what_the_nearest_tests_spare_is_judged_by_more_of_them_and_by_laws_of_a
             by = {0: "near::first", 1: "far::second" if "far" in names else ""}.get(drawn.index(mutant), "")
             place.write_text(json.dumps({"by": by, "files": {name: name for name in names}}))
 
+    monkeypatch.setattr(tree, "chosen", chosen)
+    monkeypatch.setattr(tree, "hash", lambda name: name)
     monkeypatch.setattr(mutants, "done", done)
     monkeypatch.setattr(mutants, "ROOT", tmp_path)
     monkeypatch.setattr(mutants, "OF_ALL", "all")
     for name in ("near", "far", "all"):
         (tmp_path / name).touch()
     for _ in range(2):
-        assert [each["by"] for each in tree.judged(drawn, uncompiled=False)] == ["near::first", "far::second", ""]
-    more = ["near", "far", "all"]
-    assert asked[:2] == [[(0, ["near"]), (1, ["near"]), (2, ["near"])], [(1, more), (2, more)]]
+        assert tree.judged(drawn, kernels=False) == ["near::first", "far::second", ""]
+    others = ["far", "all"]
+    assert asked[:2] == [[(0, ["near"]), (1, ["near"]), (2, ["near"])], [(1, others), (2, others)]]
     assert asked[2:] == [[], []]
+
+
+def test_the_nearest_tests_are_followed_by_those_that_are_not_among_them():
+    tree = object.__new__(mutants.Tree)
+    tree.tests = mutants.FilesOfTests(mutants.ROOT)
+    path = mutants.ROOT / "src/rocking/kernels/restrained.py"
+    near = tree.near(path)
+    others = tree.near(path, near)
+    assert len(near) == mutants.MOST and len(others) == 3 * mutants.MOST and not {*near} & {*others}
+    assert "tests/test_restrained_response.py" in others

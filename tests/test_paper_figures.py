@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 import rocking
 from rocking.chattering import chattering_time, critical_amplitude, interval_ratios
 from rocking.chattering.paper import FIGURES, Statement, paper_figure, theory
-from rocking.chattering.paper.figure import BlockUnderSine
+from rocking.chattering.paper.figure import ETA, OMEGA, A, BlockUnderSine
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -42,6 +42,20 @@ def stated(figure, beginning):
 def test_the_critical_amplitude_at_a_restitution_of_0_92_is_about_1_038():
     assert round(float(critical_amplitude(2.0, 0.92)), 3) == 1.038
     assert round(float(critical_amplitude(2.0, 0.92, method="eq77")), 3) == 1.038
+
+
+def test_eq_32_as_printed_and_eq_65_are_told_beside_what_is_right(figures):
+    """Eq. 32: sqrt(2 eps) / omega (4 + eps (1 - 32 (omega^2 - 1) / (5 omega^2))), with eps = a - 1."""
+    printed, corrected = (
+        next(each for each in figures[2].statements if each.formula == f"Eq. 32 {how}")
+        for how in ("as printed", "with its slip corrected")
+    )
+    eps = A - 1.0
+    second = 1.0 - 6.4 * (OMEGA**2 - 1.0) / OMEGA**2
+    assert printed.paper == pytest.approx(math.sqrt(2.0 * eps) / OMEGA * (4.0 + second * eps), rel=1e-14)
+    assert abs(corrected.paper - corrected.here) < 0.1 * abs(printed.paper - printed.here)
+    asymptotic = stated(figures[9], "time from uplift to rest")
+    assert asymptotic.paper == float(chattering_time(A, OMEGA, ETA, method="asymptotic")) != asymptotic.here
 
 
 def test_the_critical_amplitude_differs_by_half_a_per_cent_over_the_frequencies():
