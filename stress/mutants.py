@@ -161,10 +161,12 @@ class Tree:
     def judged(self, drawn: list[Mutant], kernels: bool) -> list[str]:
         """Name of the test that sees each mutant, or nothing: a near one, else another, or one that judges all."""
         by, chosen = dict.fromkeys(drawn, ""), {mutant.path: dict[str, float]() for mutant in drawn}
+        # Other tests of kernels alone would see little that these do not.
+        of_kernels = [path.relative_to(ROOT).as_posix() for path in ROOT.glob("tests/test_kernels_*") if kernels]
         for times, of_all, uncompiled in ((1, {}, kernels), (3, {OF_ALL: _OF_ALL_SECONDS}, False)):
             left = [mutant for mutant in drawn if not by[mutant]]
             places = {mutant: self.folder / "mutants" / f"{mutant.key}-{times}.json" for mutant in left}
-            without = {mutant.path: chosen[mutant.path] for mutant in left}
+            without = {mutant.path: [*some, *of_kernels] if (some := chosen[mutant.path]) else () for mutant in left}
             near = self.chosen(without, times * self.seconds, uncompiled)
             chosen = {path: some | of_all for path, some in near.items()}
             tasks: list[Task] = []

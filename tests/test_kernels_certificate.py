@@ -7,22 +7,35 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from kernel_records import GRAVITY, block_of, ground_of, long_uncompiled, rules_for, state_of
+from kernel_records import (
+    GRAVITY,
+    block_of,
+    ground_of,
+    in_units_of_g,
+    long_uncompiled,
+    rocking_block,
+    rules_for,
+    state_of,
+)
 from oracles import multiprecision
 from oracles.problem import Problem
 
-from rocking.kernels.arc import restoring
+from rocking.kernels.arc import restoring, weight_series
 from rocking.kernels.certificate import (
     Bounds,
+    Horizon,
     MotionBounds,
     Proof,
     arc_bounds,
+    bounds_on_motion,
     geometric_bracket,
     prove_rest,
+    restoring_parabola,
     side_bounds,
     widened,
+    with_drag,
 )
-from rocking.kernels.ground import Window, bounds_over
+from rocking.kernels.ground import Window, bounds_over, local_series, vertical_of
 from rocking.kernels.state import new_scratch
 
 #: Limits that no motion passes.
@@ -261,3 +274,74 @@ def test_the_restoring_acceleration_is_that_of_the_equation_of_motion(problem: P
     expected = problem.restoring(0.0, 1 - 2 * side)
     size = problem.p[side] ** 2 * (problem.alpha[side] + abs(here))
     assert restoring(ground_of(problem), block_of(problem), side, 0, 0.0) == pytest.approx(expected, abs=1e-15 * size)
+
+
+@quick
+@given(
+    models,
+    between(0.05, 0.5),
+    st.lists(between(-0.5, 0.5), min_size=8, max_size=8),
+    st.integers(2, 4),
+    st.tuples(between(-4.0, -1.0), between(-7.0, -1.0)),
+    st.sampled_from([0.0, 1e-3]),
+    st.integers(0, 1),
+)
+def test_the_restoring_acceleration_stays_within_its_parabola_s_error(
+    model: str,
+    alpha: float,
+    coefficients: list[float],
+    columns: int,
+    powers: tuple[float, float],
+    error: float,
+    side: int,
+) -> None:
+    """At any time of the window and any rotation up to the height, whatever the motion does within its error.
+
+    It is no larger than what the changes of a straight motion and of the equation's slope make of it.
+    """
+    window, height = 10.0 ** powers[0], 10.0 ** powers[1]
+    rows = np.array(coefficients).reshape(2, 4)[:, :columns] / window ** np.arange(columns)
+    ground = in_units_of_g([0.0, 2.0 * window], rows[:1], error, rows[1:])
+    block, rules, scratch = (
+        rocking_block((2.0, 3.0), (alpha, 0.9 * alpha), nonlinear=model == "nonlinear"),
+        rules_for(nonlinear=model == "nonlinear"),
+        new_scratch(),
+    )
+    motion = MotionBounds(
+        *(
+            widened(bounds_over(component, 0, 0.0, window, ANYTHING, new_scratch()["ground"]), error)
+            for component in (ground, vertical_of(ground))
+        )
+    )
+    local_series(ground, 0, 0.0, 1.0, scratch["ground"])
+    weight_series(ground, 0, 0.0, scratch["weight"])
+    horizon = Horizon(motion, error, columns, window, height, 0.0)
+    found = restoring_parabola(block, rules, side, scratch, horizon)
+    sign, p, tilt = 1 - 2 * side, (2.0, 3.0)[side], (alpha, 0.9 * alpha)[side]
+    if columns == 2 and not error:
+        changes = window * np.abs(rows[:, 1]).sum() + 0.5 * height * (1.0 + np.abs(rows).sum(axis=0) @ [1.0, window])
+        assert found.error <= 2.0 * p * p * (height * changes + 1e-15)
+    for t in np.linspace(0.0, window, 5):
+        horizontal, vertical = (np.polynomial.polynomial.polyval(t, row) for row in rows)
+        for u in np.linspace(0.0, height, 4):
+            parabola = found.g + found.rate * t + found.curvature * t * t - found.stiffness * u
+            for wrong, heavy in ((0.0, 0.0), (error, error), (-error, error), (error, -error), (-error, -error)):
+                a, weight = sign * (horizontal + wrong), 1.0 + vertical + heavy
+                if model == "linear":
+                    true = p * p * (weight * (tilt - u) + a)
+                else:
+                    true = p * p * (weight * math.sin(tilt - u) + a * math.cos(tilt - u))
+                assert abs(true - parabola) <= found.error * (1.0 + 1e-12) + 1e-14 * p * p
+
+
+def test_resistance_takes_from_and_adds_to_the_restoring_acceleration() -> None:
+    assert with_drag(Bounds(1.0, 2.0, 3.0, 0.5, 0.25, 0.125), 0.1) == (1.0, 1.9, 3.1, 0.7, 0.25, 0.325)
+
+
+@pytest.mark.parametrize("weight", [-0.5, 0.0, 0.5])
+@pytest.mark.parametrize("share", [0.9, 1.1])
+def test_a_motion_passes_the_threshold_where_the_greatest_weight_lets_it(weight: float, share: float) -> None:
+    strong = share * 0.15 * (1.0 + weight)
+    ground = in_units_of_g([0.0, 9.0], [[strong, 0.0]], 0.0, [[weight, 0.0]])
+    found = bounds_on_motion(ground, rocking_block(), state_of(0, 0.0, 1e-3), 0.1, new_scratch())
+    assert math.isnan(found.horizontal.high) == (share > 1.0)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from oracles import multiprecision, one_piece
 from oracles.problem import Problem
 
-from rocking.kernels.remaining import Restoring, deviation, refined_bracket, remaining_time
+from rocking.kernels.remaining import Restoring, deviation, ratio, refined_bracket, remaining_time
 from rocking.kernels.rest import LARGEST_BETA, LARGEST_GAMMA, proven_arc
 
 GRAVITY = 9.80665
@@ -286,3 +286,15 @@ def test_the_estimate_without_stiffness_under_a_constant_motion_is_the_geometric
     expected = 2.0 * v / (1.0 - e[0] * e[1]) * (1.0 / g[0] + e[0] / g[1])
     sides = [Restoring(g[k], 0.0, 0.0, 0.0, e[k], 0.0) for k in range(2)]
     assert remaining_time(v, *sides) == pytest.approx(expected, rel=1e-14)
+
+
+def test_the_ratio_of_remaining_times_allows_for_every_term_and_shift():
+    """Each by what it is, but a small margin."""
+    none = (0.0, 0.0, 0.0)
+    assert ratio((0.5, 0.0, 0.0, 0.0), none, none) == 0.5
+    for k, term in ((1, 0.2), (2, 0.1), (3, -0.05)):
+        series = tuple(0.5 if j == 0 else term if j == k else 0.0 for j in range(4))
+        assert abs(term) < ratio(series, none, none) - 0.5 < 1.5 * abs(term)
+    for shift, following in (((0.1, 0.0, 0.0), none), ((0.0, 0.1, 0.0), none), (none, (0.0, 0.1, 0.0))):
+        assert ratio((0.5, 0.0, 0.0, 0.0), shift, following) == pytest.approx(0.6)
+    assert math.isnan(ratio((0.5, 0.6, 0.0, 0.0), none, none))
