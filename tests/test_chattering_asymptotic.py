@@ -115,3 +115,18 @@ def test_asymptotic_functions_know_their_ends():
         chattering.asymptotic_table(1.01, 2.0, 1.0)
     with pytest.raises(InvalidOption, match="lift off"):
         chattering.asymptotic_table(0.9, 2.0, 0.9)
+
+
+def test_the_tables_and_the_figure_of_a_report_are_those_of_its_sequence():
+    report = chattering.chattering_report(1.03, 2.0, 0.92)
+    impacts, cycles = (report.to_dataframe(table) for table in report.TABLES)
+    assert impacts["interval"].tolist() == report.impacts["interval"].tolist() and len(impacts) > 5
+    assert cycles["speed_after"].tolist() == report.cycles["speed_after"].tolist() and len(cycles) > 5
+    with pytest.raises(InvalidOption, match="must be below 1 for the iterative procedure"):
+        chattering.chattering_report(1.03, 2.0, 1.0).to_dataframe("cycles")
+    titles = [
+        {figure_of.get_suptitle(), *(each.get_title() for each in figure_of.axes)}
+        for figure_of in (report.plot(), report.plot(title="mine"))
+    ]
+    rest = report.values["chattering_time"]["exact"]
+    assert f"a = 1.03, ω = 2, η = 0.92: at rest at p t = {rest:.6g}" in titles[0] and "mine" in titles[1]
