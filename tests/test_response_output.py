@@ -261,6 +261,7 @@ def test_every_variable_of_the_dataset_has_a_unit_in_the_file_too(shaken, tmp_pa
     shaken.to_netcdf(tmp_path / "r.nc", dt=0.02)
     with xr.open_dataset(tmp_path / "r.nc") as dataset:
         units = {name: variable.attrs.get("units") for name, variable in dataset.variables.items()}
+        assert dataset.attrs["motion"] == shaken.motion.name
         assert None not in units.values()
         assert units["impact_speed_after"] == "rad/s"
         assert units["sequence_lower"] == units["event_time"] == "s"
@@ -275,6 +276,34 @@ def test_rotations_are_drawn_in_the_unit_that_is_asked_for(shaken, units, factor
     line = max(axes.lines, key=lambda line: len(line.get_xdata()))
     assert np.max(np.abs(line.get_ydata())) == pytest.approx(shaken.peak_rotation * factor, rel=1e-4)
     assert units in axes.get_ylabel() or (units == "deg" and "°" in axes.get_ylabel())
+
+
+def test_a_part_of_a_response_is_told_from_the_whole_below_its_axis(shaken):
+    start, end = 1.0, 3.0
+    assert shaken.plot(window=(start, end)).axes[-1].get_xlabel() == (
+        f"time (s); shown: 1.0–3.0 s of {shaken.duration:.1f} s"
+    )
+    assert shaken.plot(window=(0.0, shaken.duration)).axes[-1].get_xlabel() == "time (s)"
+
+
+def test_the_phase_plane_has_the_states_of_the_response_and_its_name(shaken):
+    axes = shaken.plot_phase_plane().axes[0]
+    rotation, velocity = max((line.get_data() for line in axes.lines), key=lambda data: len(data[0]))
+    side = shaken.block.sides[0]
+    assert np.nanmax(np.abs(rotation)) == pytest.approx(shaken.peak_rotation / side.alpha, rel=1e-3)
+    rates = np.abs(shaken.states(np.linspace(0.0, shaken.duration, 20_000))[:, 1])
+    assert np.nanmax(np.abs(velocity)) == pytest.approx(rates.max() / (side.p * side.alpha), rel=1e-2)
+    titles = [
+        f"{figure.get_suptitle()}{figure.axes[0].get_title()}"
+        for figure in (shaken.plot_phase_plane(), shaken.plot_phase_plane(title="mine"))
+    ]
+    assert shaken.motion.name in titles[0] and titles[1] == "mine"
+    struck = shaken.events[shaken.events["kind"] == "uplift"]["time"][0]
+    labels = [
+        shaken.plot_phase_plane(window=(start, struck + 1.0)).axes[0].get_legend_handles_labels()[1]
+        for start in (struck, struck + 0.01)
+    ]
+    assert [any("uplift" in label for label in each) for each in labels] == [True, False]
 
 
 def test_a_response_draws_its_rotation_into_axes_of_the_caller(shaken):
