@@ -348,7 +348,7 @@ def table(shown: dict[str, Shown]) -> str:
     lines = markdown(heads, rows, "not judged yet")
     spared = [survivor for each in shown.values() for survivor in each.spared if not survivor[1]]
     if spared:
-        lines += ["", "Not seen by any test:"]
+        lines += ["", "Not seen by the tests that were run:"]
     elif len(shown) == len(PARTS):
         lines += ["", "Tests have seen each that changes something."]
     for place, _, before, after in spared:

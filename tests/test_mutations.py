@@ -82,7 +82,7 @@ def test_survivors_are_named_and_those_that_change_nothing_do_not_count(monkeypa
     *_, title, _, survivor, end = rows = mutants.table({"block and solid": shown}).split("\n")
     assert f"| block and solid | 4 | 1 | 2 | 67 | {shown.date} |" in rows
     assert sum("not judged yet" in row for row in rows) == len(mutants.PARTS) - 1
-    assert (title, end) == ("Not seen by any test:", "")
+    assert (title, end) == ("Not seen by the tests that were run:", "")
     assert survivor.startswith(f"- {drawn[2].path.relative_to(mutants.ROOT / 'src/rocking')}:{drawn[2].line}: `")
     complete = mutants.Shown(3, 0, 3, [])
     assert mutants.table(dict.fromkeys(mutants.PARTS, complete)).endswith(
