@@ -322,3 +322,20 @@ def test_reading_a_response_leaves_the_law_of_its_tendon_alone():
     assert np.isfinite(response.sensitivity.peak["motion"][0])
     rocking.gradient(response, "rotation", 0.5 * response.duration)
     assert trail_of(response).block.tobytes() == before
+
+
+@pytest.mark.parametrize("model", ["linear", "nonlinear"])
+@pytest.mark.parametrize("law", [0.8, rocking.FallingRestitution(0.95, 0.3, 0.5)], ids=["constant", "falling"])
+def test_a_resized_body_has_the_same_rotations_under_a_motion_as_much_slower(model, law):
+    """Every parameter has its power of p: the equation in p t is the same."""
+    column, rng = Block(width=0.5, height=3.0, mass=4000.0), np.random.default_rng(3)
+    rough = 1.5 * np.convolve(rng.normal(size=200), np.ones(4), mode="same")
+    restraints = Tendon(3e6, prestress=1e3, strength=2e4), Damper(2e3)
+    tied, factor, judged = RestrainedBlock(column, *restraints, restitution=law).alone(), 0.6, 0
+    for level in (0.25, 0.5, 1.0):
+        here = rocking.simulate_many(tied, rocking.Motion.from_samples(level * rough, 0.02), model=model)
+        slower = rocking.Motion.from_samples(level * rough, 0.02 / factor)
+        there = rocking.simulate_many(tied.resized(np.array([factor])), slower, model=model)
+        assert there.peak_rotation.item() == pytest.approx(here.peak_rotation.item(), rel=1e-9)
+        judged += not here.overturned.item()
+    assert judged >= 2

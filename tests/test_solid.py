@@ -21,7 +21,7 @@ from rocking import Block, InvalidBlock, InvalidOption, Solid
 from rocking.solid.moments import moments
 from rocking.solid.overlap import overlaps
 from rocking.solid.reading import _NothingElse, upright
-from rocking.solid.repair import agreeing, closed, is_closed, joined
+from rocking.solid.repair import agreeing, closed, is_closed, joined, shells_of
 
 SCRIPT = runpy.run_path(str(Path(__file__).resolve().parents[1] / "scripts" / "ship_statue.py"))
 SIZES = (0.6, 0.4, 1.8)
@@ -777,3 +777,11 @@ def test_an_axis_that_points_nearly_down_is_turned_up_exactly(up):
 
 def test_an_azimuth_that_is_nearly_a_whole_turn_is_north():
     assert Solid.from_mesh("statue").rose([0.0, -1e-15, 360.0, 90.0]).data.azimuth.values.tolist() == [0.0, 90.0]
+
+
+def test_open_pieces_that_share_an_edge_are_one_surface_and_closed_ones_are_not():
+    """Three pages of a book; two tetrahedra back to back along an edge."""
+    assert shells_of(np.array([[0, 1, 2], [0, 1, 3], [0, 1, 4]])).tolist() == [0, 0, 0]
+    tetrahedron = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+    other = np.array([[0, 5, 1], [0, 1, 6], [1, 5, 6], [0, 6, 5]])
+    assert shells_of(np.vstack([tetrahedron, other])).tolist() == [0, 0, 0, 0, 1, 1, 1, 1]
