@@ -233,3 +233,12 @@ def test_a_notebook_shows_the_block_to_scale_on_the_ground_in_the_colour_of_the_
     )
     drawn = np.column_stack([points[:, 0] - points[0, 0], floor[0, 1] - points[:, 1]])
     np.testing.assert_allclose(drawn, 120.0 / np.max(corners) * np.array(corners), atol=0.11)
+
+
+@pytest.mark.parametrize("distances", [(0.3, 0.5), (0.5, 0.3)])
+def test_parameters_of_two_sides_tell_the_body_that_has_them(distances):
+    sides = Block.from_pivots(distances, 1.2, 0.8).sides
+    found = Block.from_parameters(p=[side.p for side in sides], alpha=[side.alpha for side in sides])
+    said = "body from its parameters, centre of mass 1.2 m high, radius of gyration 0.8 m"
+    assert found.description.startswith(said)
+    assert [side.radius for side in found.sides] == pytest.approx([math.hypot(b, 1.2) for b in distances], rel=1e-9)
