@@ -339,3 +339,14 @@ def test_a_resized_body_has_the_same_rotations_under_a_motion_as_much_slower(mod
         assert there.peak_rotation.item() == pytest.approx(here.peak_rotation.item(), rel=1e-9)
         judged += not here.overturned.item()
     assert judged >= 2
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_restrained_body_draws_a_restitution_at_each_impact_whatever_the_seed(seed):
+    column = Block(width=0.5, height=3.0, mass=4000.0)
+    tied = RestrainedBlock(
+        column, Tendon(3e6, prestress=1e3), restitution=rocking.RandomRestitution(0.6, 0.9, seed=seed)
+    )
+    impacts = rocking.simulate(tied, None, initial_rotation=0.05).impacts
+    ratios = np.abs(impacts["speed_after"] / impacts["speed_before"])
+    assert len(ratios) > 5 and 0.6 <= ratios.min() < 0.7 < 0.8 < ratios.max() <= 0.9
