@@ -280,3 +280,12 @@ def test_scales_in_the_wrong_order_are_refused_where_a_stronger_motion_lets_the_
     assert not rocking.simulate(block, pulse * 14.0).overturned
     with pytest.raises(rocking.InvalidOption, match="low = 14 must be below high = 8"):
         rocking.critical_scale(block, pulse, 14.0, 8.0)
+
+
+def test_a_gradient_counts_the_pieces_that_its_value_depends_on():
+    """Those up to the peak, and none after it."""
+    motion = Motion.from_samples([0.0, 1.5, 3.0, 3.0, -2.0, 0.0, 0.1, 0.0], 0.2)
+    found = rocking.gradient(rocking.simulate(BLOCK, motion), "rotation", 0.7)
+    moved = int(np.count_nonzero(found.coefficients.any(axis=1)))
+    assert 0 < moved < len(found.coefficients) == 7
+    assert f"depends on {moved} of 7 pieces of the motion" in repr(found)
