@@ -66,7 +66,7 @@ NOT_JUDGED = ("compiled.py", "compiler.py", "interpreted.py", "kept.py", "librar
 WANTED = 0.85
 
 #: Tests of laws that every module keeps, which import none of them; and more than the processor time that they take, s.
-OF_ALL = "tests/test_public_interface.py"
+OF_ALL = ("tests/test_public_interface.py", "tests/test_portability.py")
 _OF_ALL_SECONDS = 30.0
 
 EQUIVALENT = Path(__file__).with_name("equivalent_mutants.json")
@@ -163,7 +163,7 @@ class Tree:
         by, chosen = dict.fromkeys(drawn, ""), {mutant.path: dict[str, float]() for mutant in drawn}
         # Other tests of kernels alone would see little that these do not.
         of_kernels = [path.relative_to(ROOT).as_posix() for path in ROOT.glob("tests/test_kernels_*") if kernels]
-        for times, of_all, uncompiled in ((1, {}, kernels), (3, {OF_ALL: _OF_ALL_SECONDS}, False)):
+        for times, of_all, uncompiled in ((1, {}, kernels), (3, dict.fromkeys(OF_ALL, _OF_ALL_SECONDS), False)):
             left = [mutant for mutant in drawn if not by[mutant]]
             places = {mutant: self.folder / "mutants" / f"{mutant.key}-{times}.json" for mutant in left}
             without = {mutant.path: [*some, *of_kernels] if (some := chosen[mutant.path]) else () for mutant in left}

@@ -121,3 +121,24 @@ def test_the_closure_of_series_is_that_of_numbers():
     one = [PowerSeries(np.array([[value]]), 0) for value in (V, P, D)]
     number = float(remaining_series(tuple(one), 0.25, 0.9).coefficients[0, 0])
     assert number == pytest.approx(remaining_phase(State(V, P, D), 0.25, 0.9), rel=1e-14)
+
+
+def test_a_lane_that_is_moved_takes_everything_with_it():
+    random = np.random.default_rng(6)
+    pool = np.zeros(lanes.GROUPS + 1, lanes.GROUP).view(np.recarray)
+    # What is between the two arcs of a pair is written anew in each.
+    names = [name for name in lanes.GROUP.names if name != "filled" and not name.startswith("between")]
+    for name in names:
+        pool[name][:] = random.integers(1, 99, pool[name].shape)
+    before = pool.copy()
+    source, target = 2 * lanes.WIDTH + 3, 1
+    lanes.move_lane(pool, source, target)
+    for name in names:
+        moved, was = pool[name][0, ..., target], before[name][2, ..., 3]
+        assert np.array_equal(moved, was), name
+        pool[name][0, ..., target] = before[name][0, ..., target]
+        if name == "status":
+            assert pool.status[2, 3] == lanes.LaneState.EMPTY
+            pool.status[2, 3] = before.status[2, 3]
+        assert np.array_equal(pool[name], before[name]), name
+    assert len(names) == 13

@@ -132,3 +132,24 @@ def test_wrong_input_gets_one_sentence(change, words):
     with pytest.raises(InvalidOption, match=words) as caught:
         dynamics.lyapunov_exponents(ball, table, **({"state": [0.1, 0.0]} | change))
     assert "\n" not in str(caught.value)
+
+
+def test_they_are_those_of_a_map_whose_rests_are_decided_as_asked():
+    block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    motion = pulses.sine(2.0, 1.2, cycles=1)
+    free = dynamics.lyapunov_exponents(block, motion, [0.02, 0.1], 30, chattering="velocity=1e-9")
+    stopped = dynamics.lyapunov_exponents(block, motion, [0.02, 0.1], 30, chattering="velocity=10")
+    assert math.isfinite(free.largest) and free.resting == 0.0
+    assert stopped.largest == -math.inf and stopped.resting > 0.0
+
+
+def test_they_are_those_of_the_model_that_is_asked_for():
+    """On stable orbits both have the same mean; in each stretch they are those of their own states."""
+    block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    motion = pulses.sine(2.0, 1.2, cycles=1)
+    usual, nonlinear, linear = (
+        dynamics.lyapunov_exponents(block, motion, [0.02, 0.1], 30, **options).stretches
+        for options in ({}, {"model": "nonlinear"}, {"model": "linear"})
+    )
+    assert np.array_equal(usual, nonlinear)
+    assert np.max(np.abs(linear - nonlinear)) > 1e-3

@@ -416,6 +416,9 @@ def test_results_are_written_and_drawn(branch, tmp_path):
         assert found.plot(figsize=(3.4, 2.7)).get_size_inches().tolist() == [3.4, 2.7]
         assert repr(found).startswith(f"<{type(found).__name__}: ")
         assert found.summary()
+    # A figure goes through the state at the start of every period, and as finely in a long orbit as in a short one.
+    times = orbit.to_dataframe("histories")["time_s"].to_numpy()
+    assert np.max(np.diff(times)) == pytest.approx(orbit.duration / orbit.period / 400.0, rel=1e-12)
     drawn = {line.get_label(): line for line in branch.plot().axes[0].lines}
     assert drawn.keys() == {"stable", "unstable", "fold", "flip"}
     assert len({drawn[kind].get_marker() for kind in ("fold", "flip")}) == 2

@@ -121,6 +121,9 @@ def test_entries_of_an_address_are_those_of_motions_and_not_too_many():
         entries_of("motion=none&width=1")
     with pytest.raises(InvalidOption, match="has 160 entries"):
         entries_of("motion=none;" * 161)
+    assert entries_of("motion=" + "n" * 39_993) == [{"motion": "n" * 39_993}]
+    with pytest.raises(InvalidOption, match="40000 letters at most"):
+        entries_of("motion=" + "n" * 39_994)
 
 
 def test_a_file_that_finds_no_room_is_refused_until_one_is_taken_out(monkeypatch):

@@ -556,6 +556,15 @@ def test_a_comparison_holds_both_cases(explorer):
     assert larger["block"]["sides"][0]["p"] == 2.0
 
 
+def test_a_comparison_goes_on_until_the_later_of_both_ends(explorer):
+    later = {**SINE, "motion": "sine:amplitude=2.02,frequency=0.1,cycles=2.5"}
+    for one, other in ((SINE, later), (later, SINE)):
+        header = explorer.compare(one, other, align="uplift", whole=True).header
+        first, second = (explorer.show(texts).response for texts in (one, other))
+        assert header["shift"] == first.events["time"][0] - second.events["time"][0] != 0.0
+        assert header["duration"] == max(first.duration, second.duration + header["shift"])
+
+
 def test_schemes_are_judged_over_the_duration_of_the_case(explorer):
     """The first rest that a threshold of 0.05 gets wrong is at 230.75 s."""
     for more, right in (({}, False), ({"duration": "230.5"}, True)):
@@ -750,6 +759,20 @@ def test_the_case_at_a_point_of_a_map_is_what_the_map_shows(x, y):
             assert found["rest"][row, column] == pytest.approx(rest, rel=1e-5)
             judged += 1
     assert judged >= 3 or (x, y) == ("p", "alpha")  # there all that is lifted off rocks on or falls
+
+
+def test_a_map_has_the_gravity_of_its_case():
+    case = read_case({**SINE, "model": "nonlinear", "gravity": "3.7"}, UploadStore())
+    grid = maps.grid_of(case, {"x": "alpha", "y": "a", "points": "8"})
+    found = filled(grid)
+    for row, column in ((1, 2), (2, 6), (5, 5)):
+        response = read_case(
+            maps.texts_at(grid, float(grid.x.values[column]), float(grid.y.values[row])), UploadStore()
+        ).simulate()
+        assert response.block.gravity == 3.7
+        peak = math.inf if response.overturned else response.peak_over_slenderness
+        assert found["peak"][row, column] == pytest.approx(peak, rel=1e-5, abs=1e-12)
+    assert np.any(np.isfinite(found["peak"]) & (found["peak"] > 0.0))
 
 
 @pytest.mark.parametrize("block", ECCENTRIC)

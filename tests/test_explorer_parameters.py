@@ -46,6 +46,10 @@ def test_every_slider_starts_within_its_ends():
     assert judged >= 14
 
 
+def test_a_direction_goes_once_round():
+    assert (PARAMETERS["azimuth"].low, PARAMETERS["azimuth"].high) == (0.0, 360.0)
+
+
 def test_every_text_of_a_case_is_an_option_of_the_command_line(run):
     for command, options, floor in (
         ("simulate", PARAMETERS.keys() - NO_OPTIONS - OF_MESHES, 20),

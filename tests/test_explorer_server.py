@@ -329,7 +329,8 @@ def test_a_list_of_records_is_assessed_part_by_part_and_a_file_taken_out(page):
     shares = [unpacked(part)[0]["share"] for part in found]
     assert len(shares) == 3 and shares[-1] == 1.0 and shares == sorted(shares)
     assert page.get("/api/assessment", params=STATUE).status_code == 422
-    assert page.request("DELETE", f"/api/records/{key}").status_code == 200
+    forgotten = page.request("DELETE", f"/api/records/{key}")
+    assert forgotten.status_code == 200 and forgotten.headers["cache-control"] == "no-store"
     assert page.get(f"/api/records/{key}").status_code == 422
     assert page.request("DELETE", f"/api/records/{key}").status_code == 422
 

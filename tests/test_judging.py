@@ -43,6 +43,11 @@ def test_perfect_predictions_score_zero_and_have_skill_one():
     assert found.reliability_chance == 1.0 and found.crps is None and not found.ranks
 
 
+def test_what_was_thought_nearly_impossible_has_the_least_chance():
+    found = rocking.validate(of_outcomes([1] * 12), left_out([0.02] * 12), simulations=400)
+    assert found.reliability_chance == pytest.approx(1.0 / 401.0)
+
+
 def test_the_base_rate_has_no_skill():
     outcomes = [1, 0, 1, 1, 0, 0, 0, 0]
     found = rocking.validate(of_outcomes(outcomes), left_out([3 / 8] * 8))

@@ -162,7 +162,7 @@ def test_what_the_nearest_tests_spare_is_judged_by_others_and_by_laws_of_all(mon
     monkeypatch.setattr(tree, "hash", lambda name: name)
     monkeypatch.setattr(mutants, "done", done)
     monkeypatch.setattr(mutants, "ROOT", tmp_path)
-    monkeypatch.setattr(mutants, "OF_ALL", "all")
+    monkeypatch.setattr(mutants, "OF_ALL", ("all",))
     for name in ("near", "far", "all"):
         (tmp_path / name).touch()
     for _ in range(2):

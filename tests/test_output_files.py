@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 import rocking
-from rocking.analysis.survey import survey
+from rocking.analysis.survey import folder_names, survey
 from rocking.cli.output import write_results
 from rocking.result import DatasetResult
 from rocking.studies.results import FORMATS
@@ -172,3 +172,8 @@ def test_figures_of_a_command_have_the_size_and_resolution_of_a_page(tmp_path: P
     assert imread(tmp_path / "one.png").shape[:2] == (320, 480)  # 160 dots per inch
     assert b"/MediaBox [ 0 0 216 144 ]" in (tmp_path / "one.pdf").read_bytes()
     assert json.loads((tmp_path / "result.json").read_text("utf-8")) == {"answer": 1.5}
+
+
+def test_records_of_one_name_have_a_folder_each() -> None:
+    assert folder_names(["a/one.csv", "b/one.csv", "c/one.csv", "two.csv"]) == ["one", "one-2", "one-3", "two"]
+    assert folder_names(["-", "sine:amplitude=1"]) == ["standard-input", "sine-amplitude=1"]

@@ -69,6 +69,22 @@ def test_a_default_is_the_same_everywhere() -> None:
         assert len({repr(default) for default in found.values()}) <= 1 + several, (name, found)
 
 
+def test_who_is_asked_for_silence_is_silent() -> None:
+    """Every function with an argument `progress` passes it to its bar, and commands show theirs where there is one."""
+    judged = 0
+    for path in sorted((Path(rocking.__file__).parent).rglob("*.py")):
+        for function in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if not isinstance(function, ast.FunctionDef) or "progress" not in {
+                each.arg for each in [*function.args.args, *function.args.kwonlyargs]
+            }:
+                continue
+            for call in (node for node in ast.walk(function) if isinstance(node, ast.Call)):
+                if isinstance(call.func, ast.Name) and call.func.id == "Progress":
+                    judged += 1
+                    assert "show" in {each.arg for each in call.keywords}, f"{path}, line {call.lineno}"
+    assert judged >= 15
+
+
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_a_function_takes_few_parameters_in_plain_words(name: str) -> None:
     names = list(parameters_of(FUNCTIONS[name]))

@@ -361,6 +361,13 @@ def test_what_cannot_be_is_refused_in_one_sentence(make, says):
     assert "\n" not in str(refused.value)
 
 
+@pytest.mark.parametrize("given", [(0.95, 0.9), (0.9, 1.1), ((0.9, 0.5), (0.95, 0.4))])
+def test_an_error_keeps_the_bound_that_is_wrong(given):
+    with pytest.raises(InvalidBlock) as refused:
+        RandomRestitution(*given, 1)
+    assert refused.value.value == given[["least", "largest"].index(refused.value.argument)]
+
+
 def test_what_needs_the_same_factor_each_time_refuses_a_law():
     shaking = rocking.pulses.sine(6.0, 0.8, cycles=1)
     random = RestrainedBlock(COLUMN, restitution=RandomRestitution(0.9, 0.95, 1))

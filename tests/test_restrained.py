@@ -266,6 +266,8 @@ def test_a_tendon_that_has_yielded_leaves_the_block_free():
         (lambda: RestrainedBlock(Block(width=0.4, height=2.0, mass=1.0), 3.0), "is no restraint"),
         (lambda: RestrainedBlock(0.4), "a Block is needed"),
         (lambda: RestrainedBlock(Block(width=0.4, height=2.0, mass=9.0), Thrust(900.0, 2.0)), "does not stand"),
+        # Its moment about the pivot is that of the weight: the quotient is zero to the last bit.
+        (lambda: RestrainedBlock(Block(width=0.25, height=1.0, mass=1.0), Thrust(0.25 * 9.80665, 0.5)), " 0 m/s"),
         (lambda: RestrainedBlock(Block(width=0.4, height=2.0), lean=0.3), "falls: from -0.1974 to 0.1974 rad"),
         (lambda: RestrainedBlock(Block(width=0.4, height=2.0), restitution=1.2), "restitution must be in"),
         (

@@ -416,6 +416,15 @@ def test_random_triangles_that_are_turned_anyhow_close_again():
 # The support
 
 
+def test_a_body_far_from_the_origin_of_its_coordinates_has_the_support_that_it_has_there():
+    # Eastings and northings of a map: the body is small over them.
+    for at in ((0.0, 0.0), (4.0e5, 5.2e6)):
+        found = Solid.from_mesh(box(at=at))
+        assert len(found.support) == 4, at
+        assert np.ptp(found.support, axis=0) == pytest.approx(SIZES[:2], rel=1e-7)
+        assert found.block(0.0).sides[0].alpha == pytest.approx(math.atan2(SIZES[1], SIZES[2]), rel=1e-7)
+
+
 def test_only_corners_near_the_lowest_one_carry():
     # A base whose edge is bevelled by 5 mm over 50 mm.
     profile = ((0.0, 0.25), (0.005, 0.3), (1.5, 0.3))

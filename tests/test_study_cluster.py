@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -120,8 +121,20 @@ def test_the_caller_s_own_dask_goes_on_as_it_was():
         scheduler_executor(pool.scheduler_address) as executor,
     ):
         assert executor.submit(sum, (1, 2)).result() == 3
+        # A unit that is computed again is computed, and not remembered.
+        assert executor.submit(time.perf_counter).result() != executor.submit(time.perf_counter).result()
         with pytest.raises(ValueError):  # there is none
             distributed.default_client()
+
+
+def test_workers_of_this_machine_have_one_thread_each_and_remember_nothing(monkeypatch):
+    in_this_process = partial(distributed.LocalCluster, processes=False, protocol="tcp")
+    monkeypatch.setattr(distributed, "LocalCluster", in_this_process)
+    monkeypatch.setattr(clusters, "dask_setup", lambda worker: None)
+    with clusters.local_executor(1) as executor:
+        wait_until(lambda: executor._client.nthreads())
+        assert [*executor._client.nthreads().values()] == [1]
+        assert executor.submit(time.perf_counter).result() != executor.submit(time.perf_counter).result()
 
 
 # What is lost with processes is thorough: each takes seconds to start.

@@ -8,7 +8,7 @@ import pytest
 
 from rocking.errors import StudyError
 from rocking.studies.place import Folder
-from rocking.studies.store import Store, exists, keep
+from rocking.studies.store import Store, exists, keep, require_free
 
 
 @pytest.mark.skipif(os.name == "nt", reason="folders cannot be flushed there")
@@ -78,3 +78,14 @@ def test_where_there_is_no_study_none_is_opened(tmp_path: Path) -> None:
     assert not exists(place)
     with pytest.raises(StudyError, match="there is no study here: create it first"):
         Store.open(place)
+
+
+@pytest.mark.parametrize(
+    ("names", "listed"), [(("b", "a"), "but a, b: name"), (("d", "c", "b", "a"), "but a, b, c and more: name")]
+)
+def test_a_folder_of_other_files_is_no_place_for_a_study(tmp_path: Path, names: tuple[str, ...], listed: str) -> None:
+    require_free(Folder(tmp_path))
+    for name in names:
+        (tmp_path / name).touch()
+    with pytest.raises(StudyError, match=listed):
+        require_free(Folder(tmp_path))
