@@ -4,6 +4,7 @@ import csv
 import json
 import re
 from importlib import import_module
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import pytest
 import rocking
 from rocking import fragility, incremental_dynamic_analysis, overturning_map, quantities, rocking_spectrum
 from rocking.analysis import Band
+from rocking.analysis.calibration.diagnostics import Scores
 from rocking.cli import fits
 from rocking.tables import to_json
 
@@ -364,6 +366,34 @@ def test_calibrate_prints_the_diagnostics_and_writes_what_it_says(run, outcomes_
     written = {path.name for path in (tmp_path / "out").iterdir()}
     assert written == {"calibration.png", "calibration.pdf", "result.json", "ensemble.csv"}
     assert len((tmp_path / "out" / "ensemble.csv").read_text().splitlines()) > 10
+
+
+@pytest.mark.parametrize("folds", [0, 2])
+def test_every_specimen_is_said_with_its_own_numbers(run, outcomes_table, tmp_path, monkeypatch, folds):
+    def calibrated(motions, overturned, **how):
+        fallen = int(np.sum(overturned))
+        scores = Scores.of(np.full(2, 0.5), np.array([0, 1]))
+        return SimpleNamespace(
+            summary=lambda: f"{fallen} of {len(motions)} fell",
+            to_dict=lambda: {"fallen": fallen},
+            predict=lambda motions: [],
+            cross_validate=lambda **_: SimpleNamespace(scores=scores),
+        )
+
+    monkeypatch.setattr(fits, "calibrated", calibrated)
+    header, *rows = outcomes_table.read_text().splitlines()
+    fell = [sum(row.split(",")[2] == "1" for row in rows[k::2]) for k in range(2)]
+    names = [f"{row},{'AB'[k % 2]}" for k, row in enumerate(rows)]
+    outcomes_table.write_text("\n".join([f"{header},specimen", *names]))
+    arguments = ("calibrate", outcomes_table, *CALIBRATED, "--folds", str(folds))
+    code, out, err = run(*arguments, "--json")
+    assert (code, err) == (0, "")
+    found = json.loads(out)["specimens"]
+    assert {name: each["fallen"] for name, each in found.items()} == dict(zip("AB", fell, strict=True))
+    assert all(("cross_validated" in each) == bool(folds) for each in found.values())
+    text = run(*arguments)[1]
+    assert all(f"specimen {name}\n{count} of 10 fell" in text for name, count in zip("AB", fell, strict=True))
+    assert text.count("left-out motions: ") == text.count("(2 folds)") == folds
 
 
 @pytest.mark.slow

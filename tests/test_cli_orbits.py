@@ -1,11 +1,13 @@
 """`rocking orbits`: the same numbers as the functions, files for every orbit, and one line for every mistake."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from rocking import Block, Damper, RestrainedBlock, Tendon, Thrust, dynamics, pulses
+from rocking import Block, Damper, InvalidOption, RestrainedBlock, Tendon, Thrust, dynamics, pulses
+from rocking.cli import dynamics as commands
 
 SINE = "sine:amplitude=12,frequency=5Hz"
 
@@ -39,6 +41,35 @@ def test_what_begins_at_a_flip_is_followed(run):
     (flip,) = result["branch"]["bifurcations"]
     assert (result["branch"]["period"], switched["period"]) == (1, 2)
     assert switched["bifurcations"][0]["value"] == pytest.approx(flip["value"], abs=1e-8)
+
+
+def test_each_branch_begins_at_the_nearest_bifurcation_of_the_one_before(monkeypatch):
+    made = []
+
+    def branch(name, *values):
+        made.append(name)
+        kinds = [SimpleNamespace(kind=kind, value=value) for kind, value in values]
+        return SimpleNamespace(name=name, period=1, bifurcations=kinds)
+
+    def switched(before, k):
+        return branch((before.name, k), ("fold", 4.0), ("flip", 2.0))
+
+    monkeypatch.setattr(commands, "continue_orbit", lambda *_, **__: branch("first", ("flip", 1.0), ("flip", 3.0)))
+    monkeypatch.setattr(commands, "switch_branch", switched)
+    shaking = commands._Repeating("sine:amplitude=2,frequency=1")
+    follow = commands._follower(dynamics.BouncingBall(0.5), shaking, "amplitude:1:3", "2.5,4")
+    assert [each.name for each in follow(None)] == made == ["first", ("first", 1), (("first", 1), 1)]
+
+
+def test_the_first_stable_orbit_is_followed_unless_one_is_named():
+    unstable, stable, other = (SimpleNamespace(is_stable=k > 0) for k in range(3))
+    found = [unstable, stable, other]
+    assert commands._chosen(found, None) is stable
+    assert [commands._chosen(found, number) for number in (1, 2, 3)] == found
+    assert commands._chosen([unstable], None) is unstable
+    for number in (0, 4):
+        with pytest.raises(InvalidOption, match="from 1 to 3"):
+            commands._chosen(found, number)
 
 
 @pytest.mark.slow

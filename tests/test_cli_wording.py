@@ -366,6 +366,10 @@ ECCENTRIC = ["--p", "2.9858,3.0053", "--alpha", "0.27417,0.155"]
             lambda: Block.from_pivots((0.2, 0.15), 0.6, 0.4),
         ),
         (
+            ["--pivots", "0.2", "--height-of-mass", "0.6", "--gyration", "0.4", "--restitution", "0.7,0.8"],
+            lambda: Block.from_pivots((0.2, 0.2), 0.6, 0.4, restitution=(0.7, 0.8)),
+        ),
+        (
             ["--width", "0.3", "--height", "1.1", "--offset", "-0.03"],
             lambda: Block(width=0.3, height=1.1, offset=-0.03),
         ),
