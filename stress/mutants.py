@@ -288,10 +288,18 @@ def drawn(part: str, number: int, seed: int) -> list[Mutant]:
 
 
 def equivalent() -> Callable[[Mutant], str]:
-    """Look up why a mutant changes nothing that can be seen; empty if nothing is known."""
+    """Look up why a mutant changes nothing that can be seen; empty if nothing is known.
+
+    What it changes is said as ``Mutant.change`` says it, or by the whole new line where there are several of these.
+    """
     names = ("file", "line", "change")
     known = {tuple(each[name] for name in names): each["reason"] for each in json.loads(EQUIVALENT.read_text("utf-8"))}
-    return lambda each: known.get((each.path.relative_to(ROOT / "src").as_posix(), each.code, each.change), "")
+
+    def reason(each: Mutant) -> str:
+        place = each.path.relative_to(ROOT / "src").as_posix(), each.code
+        return known.get((*place, each.change)) or known.get((*place, each.becomes), "")
+
+    return reason
 
 
 @dataclass(frozen=True)

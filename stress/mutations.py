@@ -60,6 +60,11 @@ class Mutant:
         return f"{self.before} -> {self.after}"
 
     @property
+    def becomes(self) -> str:
+        """The line after the change."""
+        return self.text.splitlines()[self.line - 1].strip()
+
+    @property
     def key(self) -> str:
         """Hash of the text."""
         return hashlib.sha256(f"{self.path.name}\0{self.text}".encode()).hexdigest()[:20]

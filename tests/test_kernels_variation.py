@@ -146,9 +146,8 @@ def test_changes_of_the_rotation_are_zero_at_rest_none_outside_and_the_sum_of_bo
         assert np.array_equal(np.isnan(values), [[False, True, False], [False, True, True]])
         assert values[1, 0] == 0.0
     assert response.sensitivity.rotation(0.0)["initial_rotation"] == pytest.approx(-0.05, rel=1e-15)
-    with pytest.raises(rocking.InvalidOption, match=r"of must be among motion, .*, not 'gravity'") as refused:
+    with pytest.raises(rocking.InvalidOption, match=r"of must be among motion, .*, not 'gravity'"):
         response.sensitivity.rotation(times, of=["gravity"])
-    assert refused.value.value == "gravity"
 
 
 def test_changes_of_the_rotation_just_before_a_proven_rest_are_those_of_its_bounces() -> None:

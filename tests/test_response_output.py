@@ -166,6 +166,20 @@ def test_digits_are_those_that_are_left_by_whatever_drives_the_block(name):
     assert min(peak, *impacts[:3]) > 1e-3 and len(events) == len(response.events)
 
 
+def test_a_sensitivity_that_there_is_not_is_kept_by_its_error(shaken):
+    with pytest.raises(InvalidOption, match=r"of must be among motion, .*, not 'mass'") as refused:
+        shaken.sensitivity.rotation(0.0, of=["mass"])
+    assert (refused.value.argument, refused.value.value) == ("of", "mass")
+
+
+def test_a_summary_says_whether_the_motion_goes_on(shaken, record):
+    end = record.duration
+    stopped = simulate(shaken.block, record, duration=6.0)
+    assert stopped.stopped and f"; the motion goes on to {end:.6g} s" in stopped.summary()
+    released = simulate(shaken.block, None, initial_rotation=0.15, duration=0.2)
+    assert released.stopped and "the motion goes on" not in released.summary() + shaken.summary()
+
+
 def test_each_sensitivity_is_one_pass_when_asked_for_and_a_share_of_nothing_is_none(shaken, monkeypatch):
     passes, vary = [], sensitivity.vary
     monkeypatch.setattr(sensitivity, "vary", lambda *given: (passes.append(given[3]), vary(*given)))
