@@ -69,6 +69,21 @@ def test_a_default_is_the_same_everywhere() -> None:
         assert len({repr(default) for default in found.values()}) <= 1 + several, (name, found)
 
 
+def test_an_error_that_says_what_was_given_keeps_it() -> None:
+    """A sentence that names an argument, and what it is "not", has this as its value."""
+    judged = 0
+    for path in sorted((Path(rocking.__file__).parent).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if not (isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call) and node.exc.args):
+                continue
+            sentence, *arguments = node.exc.args
+            if arguments and re.search(r", not \{(?!\{)", ast.unparse(sentence)):
+                judged += 1
+                # A literal dictionary of keywords may hold it, too.
+                assert {each.arg for each in node.exc.keywords} & {"value", None}, f"{path}, line {node.lineno}"
+    assert judged >= 80
+
+
 def test_who_is_asked_for_silence_is_silent() -> None:
     """Every function with an argument `progress` passes it to its bar, and commands show theirs where there is one."""
     judged = 0

@@ -65,7 +65,7 @@ def number(text: str, name: str) -> float:
     """Return a number without a unit."""
     value, unit = _parts(text)
     if value is None or unit:
-        raise InvalidOption(f"{{}} takes a number, not {text.strip()!r}", name)
+        raise InvalidOption(f"{{}} takes a number, not {text.strip()!r}", name, value=text)
     return value
 
 
@@ -103,7 +103,7 @@ def length(text: str, name: str) -> float:
     """Return a positive length, m, from "0.2m", "20cm" or "0.2" (m)."""
     value = _in_units("length", text, name, "a length as 0.2, 0.2m or 20cm")
     if not value > 0.0:
-        raise InvalidOption(f"{{}} must be a positive length, in m, not {text.strip()}", name)
+        raise InvalidOption(f"{{}} must be a positive length, in m, not {text.strip()}", name, value=text)
     return value
 
 
@@ -121,7 +121,7 @@ def tilt(text: str, name: str) -> float:
         raise InvalidOption(
             f"{{}} {text.strip()} is taken for rad, and pi/2 is the limit; did you mean {text.strip()}deg?", name
         )
-    raise InvalidOption(f"{{}} must be below 90deg in size, not {text.strip()}", name)
+    raise InvalidOption(f"{{}} must be below 90deg in size, not {text.strip()}", name, value=text)
 
 
 def of_state(unit: str) -> tuple[Quantity, Quantity]:
@@ -133,7 +133,9 @@ def sides(text: str, name: str, quantity: Quantity = number) -> float | list[flo
     """Return one number, or a list of two: side + and side -."""
     found = [quantity(part, name) for part in text.split(",")]
     if len(found) > 2:
-        raise InvalidOption(f"{{}} takes a number, or two with a comma between (side +, side -), not {text!r}", name)
+        raise InvalidOption(
+            f"{{}} takes a number, or two with a comma between (side +, side -), not {text!r}", name, value=text
+        )
     return found[0] if len(found) == 1 else found
 
 
@@ -145,6 +147,7 @@ def bounds(text: str, name: str, quantity: Quantity = number) -> float | tuple[f
             "{} takes a number, if it is known, or two with a comma between, the lowest and the highest thinkable, not "
             f"{text!r}",
             name,
+            value=text,
         )
     return found[0] if len(found) == 1 else tuple(found)
 
@@ -155,17 +158,19 @@ def values(text: str, name: str, quantity: Quantity = number) -> Floats:
     if len(parts) == 1:
         return np.array([quantity(part, name) for part in text.split(",")])
     if len(parts) not in (3, 4) or not parts[2].strip().isdecimal() or (len(parts) == 4 and parts[3] != "log"):
-        raise InvalidOption(f"{{}} takes numbers, 1,2,5, or a range, START:STOP:COUNT[:log], not {text!r}", name)
+        raise InvalidOption(
+            f"{{}} takes numbers, 1,2,5, or a range, START:STOP:COUNT[:log], not {text!r}", name, value=text
+        )
     start, stop, count = quantity(parts[0], name), quantity(parts[1], name), int(parts[2])
     if not 2 <= count <= _MOST:
         sentence = f"{{}} takes a range START:STOP:COUNT with a COUNT from 2 to {_MOST}, not {text!r}"
         raise InvalidOption(sentence, name)
     if not math.isfinite(stop - start):
-        raise InvalidOption(f"{{}}: a range needs finite ends, not {text!r}", name)
+        raise InvalidOption(f"{{}}: a range needs finite ends, not {text!r}", name, value=text)
     if len(parts) == 3:
         return _decimals(np.linspace(start, stop, count))
     if not (0.0 < start < math.inf and 0.0 < stop < math.inf):
-        raise InvalidOption(f"{{}}: a range with :log needs positive ends, not {text!r}", name)
+        raise InvalidOption(f"{{}}: a range with :log needs positive ends, not {text!r}", name, value=text)
     return _decimals(np.geomspace(start, stop, count))
 
 
@@ -193,7 +198,9 @@ def scaling(given: Mapping[str, str | float | None], quantity: Quantity = accele
     if name == "sa":
         level, at, period = str(value).partition("@")
         if not at:
-            raise InvalidOption(f"{{}} takes an acceleration at a period, as 0.4g@1.0, not {value!r}", name)
+            raise InvalidOption(
+                f"{{}} takes an acceleration at a period, as 0.4g@1.0, not {value!r}", name, value=value
+            )
         both = quantity(level, name), duration(period, name)
         read_level, read_period = (checks.finite(each, name, InvalidOption) for each in both)
         return read_level, Measure("sa", read_period)
@@ -213,7 +220,7 @@ def _in_units(kind: str, text: str, name: str, wanted: str) -> float:
     value, spelling = _parts(text)
     unit = UNITS[kind].get(plain_spelling(spelling))
     if value is None or unit is None:
-        raise InvalidOption(f"{{}} takes {wanted}, not {text.strip()!r}", name)
+        raise InvalidOption(f"{{}} takes {wanted}, not {text.strip()!r}", name, value=text)
     return value * unit.multiplier / unit.divisor
 
 
@@ -238,7 +245,7 @@ def densities(text: str, name: str) -> float | dict[str, float]:
         part, equals, value = each.rpartition("=")
         if not equals:
             raise InvalidOption(
-                f"{{}} takes a number, or PART=NUMBER with commas between, not {literal(repr(text))}", name
+                f"{{}} takes a number, or PART=NUMBER with commas between, not {literal(repr(text))}", name, value=text
             )
         found[part.strip()] = number(value, name)
     return found

@@ -372,7 +372,9 @@ def treatment(chattering: str | Treatment) -> Treatment:
     name, given, value = chattering.partition("=") if isinstance(chattering, str) else ("", "", "")
     if name not in _BY_NAME:
         kinds = "" if isinstance(chattering, str) else " or a treatment"
-        raise InvalidOption(f"{{}} must be one of {', '.join(_BY_NAME)}{kinds}, not {chattering!r}", "chattering")
+        raise InvalidOption(
+            f"{{}} must be one of {', '.join(_BY_NAME)}{kinds}, not {chattering!r}", "chattering", value=chattering
+        )
     if not given:
         return _BY_NAME[name]()
     try:

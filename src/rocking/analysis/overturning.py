@@ -365,7 +365,9 @@ def _unit_pulse(pulse: str | Callable[[float, float], Motion], frequency: float,
         return _called(pulse, 1.0, frequency)
     family = pulse_family(pulse)
     if family.name not in PULSES:
-        raise InvalidOption(f"{{}} must be one of {', '.join(PULSES)}, or a function, not {pulse!r}", "pulse")
+        raise InvalidOption(
+            f"{{}} must be one of {', '.join(PULSES)}, or a function, not {pulse!r}", "pulse", value=pulse
+        )
     unit = family.motion({"amplitude": 1.0, "frequency": frequency} | parameters)
     return unit.scaled_to(1.0) if family.is_of_velocity else unit
 

@@ -64,6 +64,8 @@ def checked_pair(value: Any, name: str) -> tuple[float, float]:
         return value, value
     values = checks.numbers(value, name, InvalidBlock)
     if values.shape not in ((), (2,)):
-        raise InvalidBlock(f"{{}} must be a number or a pair (side +, side -), not {values.size} values", name)
+        raise InvalidBlock(
+            f"{{}} must be a number or a pair (side +, side -), not {values.size} values", name, value=value
+        )
     plus, minus = np.broadcast_to(values, 2).tolist()
     return plus, minus

@@ -150,12 +150,13 @@ def chattering_map(
 
     checks.mapping(parameters, "parameters", InvalidOption, '{"a": [1.0, 1.1], "omega": [1.0, 2.0]}')
     if len(parameters) != 2:
-        raise InvalidOption(f"{{}} must be two, not {len(parameters)}", "parameters")
+        raise InvalidOption(f"{{}} must be two, not {len(parameters)}", "parameters", value=parameters)
     count = None if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
     if not callable(family):
         raise InvalidOption(
             f"{{}} must be a function of two numbers, as rocking.chattering.families.sine(block), not {family!r}",
             "family",
+            value=family,
         )
     (first, x), (second, y) = ((name, _axis(values, name)) for name, values in parameters.items())
     swapped = _is_swapped(family, str(first), str(second))

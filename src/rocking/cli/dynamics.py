@@ -236,7 +236,7 @@ def _follower(
     low, high = (quantity(end, "along") for end in ends)
     value, unit = float(shaking.given[name]), shaking.family.unit(name) or "1"
     if not low < high:
-        raise InvalidOption(f"{{}} takes a range from a lower value to a higher one, not {rest}", "along")
+        raise InvalidOption(f"{{}} takes a range from a lower value to a higher one, not {rest}", "along", value=along)
     if not low <= value <= high:
         raise InvalidOption(f"{{}} must hold the pulse's own {name}, {value:g}, at which orbits are found", "along")
     places = [] if switch is None else [quantity(each, "switch") for each in switch.split(",")]

@@ -165,6 +165,7 @@ def _limit_of_standing(fitted: Fragility) -> str:
             f"{{}} is about overturning, or about one limit, not {' and '.join(names)}: name one of them in {{}}",
             "standing",
             "limits",
+            value=names,
         )
     return "overturning" if "overturning" in names else names[0]
 
@@ -245,7 +246,7 @@ def _limits(text: str) -> dict[str, float]:
         name, given, value = part.strip().partition("=")
         if not given and name != "overturning":
             raise InvalidOption(
-                f"{{}} takes overturning or NAME=ROTATION over slenderness, not {part.strip()!r}", "limits"
+                f"{{}} takes overturning or NAME=ROTATION over slenderness, not {part.strip()!r}", "limits", value=text
             )
         if name in limits or (given and name in ("", "overturning")):
             why = f"has {name} twice" if name in limits else f"gives a rotation the name {name!r}"
@@ -253,7 +254,7 @@ def _limits(text: str) -> dict[str, float]:
         try:
             limits[name] = number(value, "limits") if given else math.inf
         except InvalidOption:
-            raise InvalidOption(f"{{}} {name} takes a number, not {value.strip()!r}", "limits") from None
+            raise InvalidOption(f"{{}} {name} takes a number, not {value.strip()!r}", "limits", value=text) from None
     return limits
 
 

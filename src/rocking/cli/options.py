@@ -323,7 +323,9 @@ def _parameters(text: str, option: str, made: Callable[..., object]) -> dict[str
         name, equals, value = (each.strip() for each in part.partition("="))
         name = name.replace("-", "_")
         if not equals or name not in known:
-            raise InvalidOption(f"{{}} takes NAME=VALUE with {', '.join(known)}, not {part.strip()!r}", option)
+            raise InvalidOption(
+                f"{{}} takes NAME=VALUE with {', '.join(known)}, not {part.strip()!r}", option, value=text
+            )
         if name in given:
             raise InvalidOption(f"{{}} gives {name} twice, in {text!r}", option)
         is_truth = isinstance(known[name].default, bool)
@@ -336,7 +338,7 @@ def _parameters(text: str, option: str, made: Callable[..., object]) -> dict[str
 
 def _truth(text: str, name: str, option: str) -> bool:
     if text not in ("yes", "no"):
-        raise InvalidOption(f"{{}} takes {name}=yes or {name}=no, not {text!r}", option)
+        raise InvalidOption(f"{{}} takes {name}=yes or {name}=no, not {text!r}", option, value=text)
     return text == "yes"
 
 
@@ -452,7 +454,9 @@ def noted_acceleration(text: str, name: str) -> float:
     """Return an acceleration, m/s^2, with a note where a number without a unit looks like one in g."""
     value = acceleration(text, name)
     if not value > 0.0:
-        raise InvalidOption(f"{{}} must be above 0, not {text.strip()}; {{}} -1 reverses a motion", name, "scale")
+        raise InvalidOption(
+            f"{{}} must be above 0, not {text.strip()}; {{}} -1 reverses a motion", name, "scale", value=text
+        )
     for sentence in level_notes(text, value, name):
         note(sentence)
     return value

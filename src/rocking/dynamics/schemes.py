@@ -221,14 +221,16 @@ def scheme_of(scheme: Scheme | str) -> Scheme:
         return scheme
     name, _, value = scheme.partition("=") if isinstance(scheme, str) else ("", "", "")
     if name not in FAMILIES:
-        raise InvalidOption(f"a scheme must be one of {', '.join(FAMILIES)}, not {scheme!r}", "schemes")
+        raise InvalidOption(f"a scheme must be one of {', '.join(FAMILIES)}, not {scheme!r}", "schemes", value=scheme)
     kinds = {kind.name: kind for kind in (MoreauJean, SchatzmanPaoli)}
     if name not in kinds:
         return treatment(scheme)
     try:
         return kinds[name](float(value))
     except ValueError:
-        raise InvalidOption(f"{name} takes its step in s, as {name}=1e-3, not {value!r}", "schemes") from None
+        raise InvalidOption(
+            f"{name} takes its step in s, as {name}=1e-3, not {value!r}", "schemes", value=scheme
+        ) from None
 
 
 def _compile(proof: Response) -> None:

@@ -269,7 +269,9 @@ def integrate(
         raise InvalidBlock("time stepping knows no tendon that yields: leave its {} out", "strength")
     longest = _LONGEST_STEP / math.sqrt(float(np.max(np.abs(record["stiffness"]))) or math.inf)
     if not isinstance(scheme, TimeStepping):
-        raise InvalidOption(f"{{}} must be one of time stepping, as MoreauJean(1e-3), not {scheme!r}", "scheme")
+        raise InvalidOption(
+            f"{{}} must be one of time stepping, as MoreauJean(1e-3), not {scheme!r}", "scheme", value=scheme
+        )
     h = scheme.step
     if h > longest > 0.0:
         raise InvalidOption(f"{{}} of {h:g} s is too long for this body: at most {longest:.3g} s", "step", value=h)

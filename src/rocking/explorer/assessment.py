@@ -98,7 +98,9 @@ def assessment_of(case: Case, texts: Texts, uploads: UploadStore) -> Assessment:
     measure = _measure(given)
     count = number(given.get("levels", "16"), "levels")
     if not (_LEAST <= count <= _MOST and count == int(count)):
-        raise InvalidOption(f"{{}} are from {_LEAST} to {_MOST} in number, not {count:g}", "levels")
+        raise InvalidOption(
+            f"{{}} are from {_LEAST} to {_MOST} in number, not {count:g}", "levels", value=given["levels"]
+        )
     known = {end: float(ASSESSMENT[end].read(given[end])) for end in ("level_from", "level_to") if end in given}
     found = (math.nan, math.nan)
     if len(known) < 2:
@@ -114,7 +116,7 @@ def _measure(given: Texts) -> Measure:
     if given.get("measure", "pga") == "pga":
         return Measure("pga")
     if given["measure"] != "sa":
-        raise InvalidOption(f"{{}} is pga or sa, not {given['measure'][:20]!r}", "measure")
+        raise InvalidOption(f"{{}} is pga or sa, not {given['measure'][:20]!r}", "measure", value=given["measure"])
     return Measure("sa", ASSESSMENT["measure_period"].read(given.get("measure_period", "1")))
 
 

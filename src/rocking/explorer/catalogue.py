@@ -80,7 +80,9 @@ def entries_of(text: str) -> list[dict[str, str]]:
     wrong = {name for entry in found for name in entry.keys() - {*names_of("motion"), "key"}}
     if wrong:
         raise InvalidOption(
-            f"an entry of the list of {{}} has {', '.join(names_of('motion'))}, not {min(wrong)[:20]!r}", "records"
+            f"an entry of the list of {{}} has {', '.join(names_of('motion'))}, not {min(wrong)[:20]!r}",
+            "records",
+            value=text,
         )
     return found
 

@@ -382,7 +382,11 @@ def arguments_of(text: str) -> dict[str, Any]:
     _, arguments = pulse_values(text)
     for name in ("cycles", "gamma"):
         if arguments.get(name, 0.0) > MOST_SHOWN:
-            raise InvalidMotion(f"{{}} of a pulse may be {MOST_SHOWN:g} here at most, not {arguments[name]:g}", name)
+            raise InvalidMotion(
+                f"{{}} of a pulse may be {MOST_SHOWN:g} here at most, not {arguments[name]:g}",
+                name,
+                value=arguments[name],
+            )
     return arguments
 
 

@@ -288,7 +288,9 @@ def _axis(which: str, case: Case, texts: Texts, points: int) -> Axis:
         for end, default in zip(("from", "to"), kind.close, strict=True)
     )
     if not 0.0 < low < high < math.inf:
-        raise InvalidOption(f"the axis of {{}} needs a positive start below its end, not {low:g} to {high:g}", name)
+        raise InvalidOption(
+            f"the axis of {{}} needs a positive start below its end, not {low:g} to {high:g}", name, value=(low, high)
+        )
     return Axis(name, np.linspace(low, high, points))
 
 

@@ -98,7 +98,9 @@ def sweep_of(case: Case, texts: Texts) -> Sweep:
         for end, default in zip(("sweep_from", "sweep_to"), ends, strict=True)
     )
     if not 0.0 < low < high < math.inf:
-        raise InvalidOption(f"a sweep needs a positive start below its end, not {low:g} to {high:g}", "sweep_from")
+        raise InvalidOption(
+            f"a sweep needs a positive start below its end, not {low:g} to {high:g}", "sweep_from", value=low
+        )
     sweep = Sweep(case, sine, Axis(name, np.linspace(low, high, int(points))))
     require_possible(sweep.sine_at(high).amplitude)
     return sweep

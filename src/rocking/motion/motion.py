@@ -570,7 +570,9 @@ class Motion:
         """
         if not isinstance(other, Motion):
             raise InvalidMotion(
-                f"{{}} must be a Motion, the other horizontal component, not {type(other).__name__}", "other"
+                f"{{}} must be a Motion, the other horizontal component, not {type(other).__name__}",
+                "other",
+                value=other,
             )
         first, second = recorded_azimuths(self, other, recorded)
         check_start(self, other)
@@ -913,6 +915,7 @@ def _check_vertical(given: object) -> None:
         raise InvalidMotion(
             f"{{}} must be a Motion, as from rocking.read or Motion.from_samples, not {type(given).__name__}",
             "vertical",
+            value=given,
         )
     if given.vertical is not None:
         raise InvalidMotion("{} must be a motion without a vertical component of its own", "vertical")

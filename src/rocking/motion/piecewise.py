@@ -293,6 +293,7 @@ def checked_pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Flo
             f"{ends.shape} and {rows.shape}",
             "breakpoints",
             "coefficients",
+            value=breakpoints,
         )
     widths = np.diff(ends)
     if ends[0] != 0.0 or not np.all(widths > 0.0):

@@ -75,7 +75,9 @@ class Measure:
         checks.one_of(self.name, "measure", InvalidOption, get_args(MeasureName))
         damping = checks.number(self.damping, "damping", InvalidOption)
         if not 0.0 <= damping < 1.0:
-            raise InvalidOption(f"{{}} must be a fraction of critical from 0 to below 1, not {damping:g}", "damping")
+            raise InvalidOption(
+                f"{{}} must be a fraction of critical from 0 to below 1, not {damping:g}", "damping", value=damping
+            )
         object.__setattr__(self, "damping", damping)
         if self.name == "sa":
             if self.period is None:

@@ -70,6 +70,7 @@ def parts_of(mesh: Mesh, most: int | None = None) -> Parts:
                     "{} must be the path of a file, a binary stream that has a name, or a mesh or scene of trimesh, "
                     f"not {checks.shown(mesh)}",
                     "mesh",
+                    value=mesh,
                 )
             name, up = file.name, "y" if file.suffix.lower() in _Y_UP else "z"
         graph, geometry = scene.graph, scene.geometry

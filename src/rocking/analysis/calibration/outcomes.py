@@ -184,7 +184,9 @@ def checked_outcomes(overturned: ArrayLike, count: int) -> Flags:
     values = np.asarray(overturned)
     if values.shape != (count,):
         raise InvalidOption(
-            f"{{}} must hold one outcome for each of the {count} motions, not {values.shape}", "overturned"
+            f"{{}} must hold one outcome for each of the {count} motions, not {values.shape}",
+            "overturned",
+            value=overturned,
         )
     if not np.all(np.isin(values, (0, 1))):
         raise InvalidOption("{} must hold True or False (or 1 or 0) for each motion", "overturned")

@@ -279,7 +279,9 @@ class PaperFigure(TableResult):
         chosen = next(iter(self.drawings)) if drawing is None else drawing
         if chosen not in self.drawings:
             raise InvalidOption(
-                f"{{}} of Fig. {self.number} must be {' or '.join(self.drawings)}, not {drawing!r}", "drawing"
+                f"{{}} of Fig. {self.number} must be {' or '.join(self.drawings)}, not {drawing!r}",
+                "drawing",
+                value=drawing,
             )
         return self.drawings[chosen]()
 

@@ -367,6 +367,7 @@ def _require_complete(case: BlockUnderSine, number: int) -> None:
             f"Fig. {number} shows complete chattering: {{}} must be below the critical amplitude "
             f"{case.critical:.9g} at {in_words({'omega': case.omega, 'eta': case.eta})}, not {case.a:.9g}",
             "a",
+            value=case.a,
         )
 
 

@@ -114,14 +114,14 @@ class Source:
         places = (self.data.find(bytes([control])) for control in _CONTROL)
         return min((place for place in places if place >= 0), default=None)
 
-    def error(self, message: str, at: int | None = None, *arguments: str) -> UnreadableRecord:
+    def error(self, message: str, at: int | None = None, *arguments: str, value: object = None) -> UnreadableRecord:
         """Return the error that says `message` about this file, at the line that holds the offset `at`.
 
         Each "{}" in the message stands for one of the `arguments` of `rocking.read`; the first is what is missing
-        or wrong.
+        or wrong, and was given as `value`.
         """
         line = None if at is None else self.line_number(at)
-        return UnreadableRecord(message, *arguments, path=self.path, line=line)
+        return UnreadableRecord(message, *arguments, path=self.path, line=line, value=value)
 
 
 def open_source(path: str | os.PathLike[str] | BinaryIO) -> Source:
@@ -238,7 +238,11 @@ class Request:
             raise source.error(f"the sampling step is {stated:g} s, but it must be positive; correct it", at)
         if self.dt is not None and not self.several and not math.isclose(self.dt, stated, rel_tol=_SAME_STEP):
             raise source.error(
-                f"the sampling step is {stated:g} s, not {{}} {self.dt:g} s; leave {{}} out", at, "dt", "dt"
+                f"the sampling step is {stated:g} s, not {{}} {self.dt:g} s; leave {{}} out",
+                at,
+                "dt",
+                "dt",
+                value=self.dt,
             )
         return stated
 
@@ -254,7 +258,11 @@ class Request:
             raise source.error(f"{fault}; give {{}} as one of {', '.join(CHOICES)}", at, "units")
         if self.unit is not None and not self.several and unit != self.unit:
             raise source.error(
-                f"the units are {unit.name}, not {{}} {self.unit.name!r}; leave {{}} out", at, "units", "units"
+                f"the units are {unit.name}, not {{}} {self.unit.name!r}; leave {{}} out",
+                at,
+                "units",
+                "units",
+                value=self.unit.name,
             )
         return unit
 
