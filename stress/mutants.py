@@ -21,7 +21,6 @@ import json
 import math
 import multiprocessing
 import os
-import random
 import resource
 import shutil
 import signal
@@ -29,6 +28,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from multiprocessing.connection import wait
@@ -279,12 +279,15 @@ def _tried(copy: Path, place: Path, mutant: Mutant | None, names: list[str], lim
 
 
 def drawn(part: str, number: int, seed: int) -> list[Mutant]:
-    """Mutants of a part, the same for everybody."""
-    every = []
+    """Mutants of a part, the same for everybody, and those of a line as long as the line is what it was."""
+    placed, seen = {}, Counter[str]()
     for folder in PARTS[part]:
         for path in sorted((ROOT / "src/rocking" / folder).rglob("*.py")):
-            every += [] if path.name in NOT_JUDGED else mutants(path)
-    return random.Random(f"{part} {seed}").sample(every, min(number, len(every)))
+            for each in [] if path.name in NOT_JUDGED else mutants(path):
+                place = "\0".join([str(seed), path.relative_to(ROOT).as_posix(), each.code, each.change, each.becomes])
+                seen[place] += 1  # equal lines have equal mutants
+                placed[hashlib.sha256(f"{place}\0{seen[place]}".encode()).hexdigest()] = each
+    return [placed[key] for key in sorted(placed)[:number]]
 
 
 def equivalent() -> Callable[[Mutant], str]:

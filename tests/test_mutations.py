@@ -62,6 +62,24 @@ def test_a_draw_is_the_same_again():
         assert [each.key for each in mutants.drawn(part, 30, 2)] != [each.key for each in drawn]
 
 
+def test_a_draw_changes_with_the_lines_that_change_alone(tmp_path, monkeypatch):
+    folder = tmp_path / "src/rocking/part"
+    folder.mkdir(parents=True)
+    monkeypatch.setattr(mutants, "ROOT", tmp_path)
+    monkeypatch.setattr(mutants, "PARTS", {"part": ["part"]})
+    lines = [f"x{k} = {k} + y{k}" for k in range(40)] + ["same = 1 + 2"] * 3
+    (folder / "one.py").write_text("\n".join(lines))
+    before = mutants.drawn("part", 60, 1)
+    assert len({each.key for each in before}) == 60
+    # Half of the lines become others, behind one that is new.
+    lines[20:40] = [f"x{k} = {k} - z{k}" for k in range(20, 40)]
+    (folder / "one.py").write_text("\n".join(["# new", *lines]))
+    mutations.mutants.cache_clear()
+    after = {(each.code, each.change) for each in mutants.drawn("part", 60, 1)}
+    kept = {(each.code, each.change) for each in before if each.code in lines}
+    assert len(kept) >= 20 and len(kept & after) >= 0.8 * len(kept)
+
+
 def test_what_changes_nothing_is_in_a_line_that_is_there():
     for each in json.loads(mutants.EQUIVALENT.read_text("utf-8")):
         found = mutations.mutants(mutants.ROOT / "src" / each["file"])
