@@ -21,7 +21,7 @@ from oracles import record_files as written
 from rocking.errors import InvalidMotion, RockingError, UnreadableRecord
 from rocking.motion import formats, records
 from rocking.motion.formats import Channel, channels, identify, read, source, through_obspy, values
-from rocking.motion.formats.channel import even_step
+from rocking.motion.formats.channel import even_step, gap_at
 from rocking.motion.formats.source import open_source
 
 GRAVITY = 9.80665
@@ -1163,3 +1163,14 @@ def test_a_motion_knows_where_it_comes_from(file: Callable[[str], Path]) -> None
     shipped = records.load("ridgecrest-clc-up").delayed(1.0).description.origin
     assert shipped is not None
     assert (shipped.channel, shipped.station) == ("up", records.info("ridgecrest-clc-up").station)
+
+
+@pytest.mark.parametrize("mark", [-99.0, -999.0, 9999.0, 99.9999, -99999.99, 999.25, -12345.0, -32768.0, 8388607.0])
+def test_a_number_for_a_missing_value_is_found_among_far_smaller_ones(mark: float) -> None:
+    assert gap_at(np.array([0.1, 0.2, mark, mark, 0.2])) == 2
+    assert gap_at(np.array([0.1, 0.9 * abs(mark), mark, 0.2])) is None  # a value among values
+
+
+@pytest.mark.parametrize("value", [9.0, 9.9999, 99.99999, 98.0, 999999999.0, 32766.0])
+def test_a_large_number_that_stands_for_nothing_is_a_value(value: float) -> None:
+    assert gap_at(np.array([0.1, value, 0.2])) is None

@@ -253,3 +253,14 @@ def test_the_oscillator_kernel_works_uncompiled():
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
     assert float(done.stdout) == pytest.approx(pulses.one_sine(1.0, 1.0).spectral_acceleration(0.7), rel=1e-14)
+
+
+def test_the_longest_period_is_a_million_durations():
+    samples = np.zeros(1001)
+    samples[400:600] = np.sin(np.linspace(0.0, 2.0 * np.pi, 200)) * 3.0
+    motion = Motion.from_samples(samples, 0.01)
+    # The mass of a soft oscillator stays where it is: it moves by the displacement of the ground, or farther after it.
+    w = 2.0 * np.pi / 0.9e7
+    assert motion.spectral_acceleration(0.9e7, 0.0) >= w * w * motion.pgd * (1.0 - 1e-6) > 0.0
+    with pytest.raises(InvalidMotion, match="a million times the duration, 10 s, says nothing"):
+        motion.spectral_acceleration(1.1e7)

@@ -259,3 +259,10 @@ def test_a_vertical_component_on_multiples_of_the_step_stays_even_and_can_be_fil
     assert both.vertical.acceleration(0.01) == pytest.approx(lift.acceleration(0.5223), abs=1e-12)
     both = push.with_vertical(pulse).processed(trim=(0.51, 1.53))
     assert both.vertical.acceleration(0.345) == pytest.approx(pulse.acceleration(0.855), abs=1e-12)
+
+
+def test_a_part_of_less_than_two_samples_is_refused_with_what_was_given():
+    motion = Motion.from_samples(np.sin(np.arange(100)), 0.01)
+    with pytest.raises(InvalidMotion, match=r"trim must keep at least two samples, 0.01 s apart") as refused:
+        motion.processed(trim=(0.301, 0.304))
+    assert (refused.value.argument, refused.value.value) == ("trim", (0.301, 0.304))
