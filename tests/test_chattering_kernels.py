@@ -142,3 +142,17 @@ def test_a_lane_that_is_moved_takes_everything_with_it():
             pool.status[2, 3] = before.status[2, 3]
         assert np.array_equal(pool[name], before[name]), name
     assert len(names) == 13
+
+
+@pytest.mark.parametrize("omega, eta", [(0.7, 0.6), (3.0, 0.8), (5.0, 0.95)])
+def test_eq_76_and_eq_77_are_the_polynomials_that_the_paper_prints(omega, eta):
+    """Terms of Eq. 76: coefficient, power of eta, power of omega."""
+    terms = [
+        (1.079, 0, 0), (-0.1885, 1, 0), (0.1405, 0, 1), (0.6442, 2, 0), (-0.1903, 1, 1), (-0.02818, 0, 2),
+        (-0.7372, 3, 0), (0.06413, 2, 1), (0.03236, 1, 2), (0.00176, 0, 3), (0.2146, 4, 0), (-0.0187, 3, 1),
+        (-0.003045, 2, 2), (-0.00185, 1, 3),
+    ]  # fmt: skip
+    expected = sum(factor * eta**i * omega**j for factor, i, j in terms)
+    assert chattering.critical_amplitude(omega, eta, method="eq76") == pytest.approx(expected, rel=1e-13)
+    cubic = np.polynomial.polynomial.polyval(eta, [1.271, -0.45, 0.5763, -0.3941])
+    assert chattering.critical_amplitude(omega, eta, method="eq77") == pytest.approx(cubic, rel=1e-13)

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from kernel_records import ULP, in_units_of_g, long_uncompiled
 from oracles.exact import exact, polynomial
 
+from rocking.kernels.adjoint import add_moments
 from rocking.kernels.arc import significant_degree
 from rocking.kernels.ground import (
     STRETCH,
@@ -250,3 +251,16 @@ def test_stretches_without_anything_are_passed_over() -> None:
     assert next_beyond(ground, 8 * STRETCH, (-0.2, 0.2), (0.0, 0.0)) == count
     assert next_beyond(ground, 3, (-0.6, 0.2), (0.0, 0.0)) == count
     assert next_beyond(ground, 3, (-0.6, 0.05), (0.0, 0.0)) == 3
+
+
+@pytest.mark.parametrize(("offset", "count"), [(0.0, 1), (0.0, 2), (0.7, 2), (0.7, 4), (-0.3, 6)])
+def test_moments_of_a_series_are_its_integrals_with_powers_of_the_time_in_a_piece(offset: float, count: int) -> None:
+    """By Gauss-Legendre quadrature, which is exact for polynomials of this degree."""
+    series, t = np.array([0.7, -1.3, 0.4, 2.1, -0.9]), 0.6
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    at = 0.5 * t * (nodes + 1.0)
+    m = np.polynomial.polynomial.polyval(at, series)
+    expected = [1.0 - 0.5 * t * np.sum(weights * m * (offset + at) ** j) for j in range(count)]
+    out = np.ones(count)
+    add_moments(np.empty(count), np.append(series, 99.0), len(series) + 1, offset, t, -1.0, out)
+    assert out == pytest.approx(expected, rel=1e-14, abs=1e-15)
