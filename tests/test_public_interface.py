@@ -69,14 +69,25 @@ def test_a_default_is_the_same_everywhere() -> None:
         assert len({repr(default) for default in found.values()}) <= 1 + several, (name, found)
 
 
+@functools.cache
+def modules() -> dict[Path, ast.Module]:
+    every = sorted(Path(rocking.__file__).parent.rglob("*.py"))
+    return {path: ast.parse(path.read_text("utf-8")) for path in every}
+
+
 def test_an_error_that_says_what_was_given_keeps_it() -> None:
     """A sentence that names an argument, and what it is "not", has this as its value."""
     judged = 0
-    for path in sorted((Path(rocking.__file__).parent).rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+    for path, tree in modules().items():
+        said: dict[str, ast.expr] = {}  # sentences that have a name, in the order of the text
+        for node in sorted(ast.walk(tree), key=lambda each: getattr(each, "lineno", 0)):
+            if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
+                said[node.targets[0].id] = node.value
             if not (isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call) and node.exc.args):
                 continue
             sentence, *arguments = node.exc.args
+            if isinstance(sentence, ast.Name):
+                sentence = said.get(sentence.id, sentence)
             if arguments and re.search(r", not \{(?!\{)", ast.unparse(sentence)):
                 judged += 1
                 # A literal dictionary of keywords may hold it, too.
@@ -87,8 +98,8 @@ def test_an_error_that_says_what_was_given_keeps_it() -> None:
 def test_who_is_asked_for_silence_is_silent() -> None:
     """Every function with an argument `progress` passes it to its bar, and commands show theirs where there is one."""
     judged = 0
-    for path in sorted((Path(rocking.__file__).parent).rglob("*.py")):
-        for function in ast.walk(ast.parse(path.read_text("utf-8"))):
+    for path, tree in modules().items():
+        for function in ast.walk(tree):
             if not isinstance(function, ast.FunctionDef) or "progress" not in {
                 each.arg for each in [*function.args.args, *function.args.kwonlyargs]
             }:
@@ -147,12 +158,10 @@ def test_all_that_is_taken_or_returned_has_a_public_name() -> None:
 @functools.cache
 def made_dataclasses() -> list[tuple[ast.ClassDef, str]]:
     """Every dataclass of the package, with its decorator."""
-    texts = (path.read_text("utf-8") for path in sorted(Path(rocking.__file__).parent.rglob("*.py")))
     return [
         (node, ast.unparse(made))
-        for text in texts
-        if "dataclass" in text
-        for node in ast.walk(ast.parse(text))
+        for tree in modules().values()
+        for node in ast.walk(tree)
         for made in (node.decorator_list if isinstance(node, ast.ClassDef) else [])
         if ast.unparse(made).startswith("dataclass")
     ]

@@ -164,7 +164,7 @@ def values(text: str, name: str, quantity: Quantity = number) -> Floats:
     start, stop, count = quantity(parts[0], name), quantity(parts[1], name), int(parts[2])
     if not 2 <= count <= _MOST:
         sentence = f"{{}} takes a range START:STOP:COUNT with a COUNT from 2 to {_MOST}, not {text!r}"
-        raise InvalidOption(sentence, name)
+        raise InvalidOption(sentence, name, value=text)
     if not math.isfinite(stop - start):
         raise InvalidOption(f"{{}}: a range needs finite ends, not {text!r}", name, value=text)
     if len(parts) == 3:

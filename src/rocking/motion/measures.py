@@ -68,7 +68,7 @@ def significant_duration(motion: Piecewise, start: float, end: float) -> float:
     start, end = (checks.finite(value, "ends of a significant duration", InvalidMotion) for value in (start, end))
     if not 0.0 <= start < end <= 1.0:
         sentence = f"a significant duration needs 0 <= {{}} < {{}} <= 1, not {start:g} and {end:g}"
-        raise InvalidMotion(sentence, "start", "end")
+        raise InvalidMotion(sentence, "start", "end", value=(start, end))
     first, last = significant_span(motion, start, end)
     return last - first
 

@@ -354,5 +354,5 @@ def _floats(values: ArrayLike, what: str, dimensions: int, hint: str = "") -> Fl
     array = np.array(checks.numbers(values, f"{what} of a motion", InvalidMotion), order="C")
     if array.ndim != dimensions:
         sentence = f"the {{}} of a motion must have {dimensions} dimension(s), not {array.ndim}{hint}"
-        raise InvalidMotion(sentence, what)
+        raise InvalidMotion(sentence, what, value=values)
     return array
