@@ -271,7 +271,16 @@ def test_a_duration_among_the_remarks_is_no_unit_of_the_times(tmp_path):
     assert (channels(path)[0].dt, channels(path)[0].units) == (0.01, "g")
 
 
-@pytest.mark.parametrize("names", ["NS,EW,UD", "N-S E-W U-D", "ch1;ch2;ch3"])
+@pytest.mark.parametrize("names", ["time (s),ns,up", "t,NS,EW", "t,ns,ud", "Time,ud,ns"])
+def test_ns_beside_times_is_north_south_and_no_nanoseconds(tmp_path, names):
+    path = tmp_path / "table.csv"
+    path.write_text(names + "\n" + wide(TIMES, SAMPLES, OTHER))
+    found = channels(path, units="gal")
+    assert [channel.name for channel in found] == names.split(",")[1:]
+    assert {channel.dt for channel in found} == {0.01}
+
+
+@pytest.mark.parametrize("names", ["NS,EW,UD", "ns,ew,ud", "N-S E-W U-D", "ch1;ch2;ch3"])
 def test_components_alone_are_read_with_a_step(tmp_path, names):
     path = tmp_path / "table.csv"
     sign = "," if "," in names else ";" if ";" in names else " "

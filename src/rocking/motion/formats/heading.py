@@ -168,19 +168,26 @@ class _Names:
         return name
 
     def _is_unit_of_time(self, place: int) -> bool:
-        """Whether a name is a unit of time and nothing else; "min", "h" and "d" only in brackets, no NS beside EW."""
+        """Whether a name is a unit of time and nothing else; "min", "h" and "d" only in brackets."""
         name = self.names[place]
-        if name == "NS" and "EW" in self.names:
+        if self._is_north_south(place):
             return False
         unit = find_time_unit(_bare(name))
         return unit is not None and (unit.multiplier == 1.0 or name != _bare(name))
+
+    def _is_north_south(self, place: int) -> bool:
+        """Whether a name is "ns" of north and south: beside "ew", or a column that is named as times."""
+        others = [name.lower() for k, name in enumerate(self.names) if k != place]
+        return self.names[place].lower() == "ns" and any(
+            name == "ew" or not _TIMES.isdisjoint(_WORD.findall(name)) for name in others
+        )
 
     def _lines(self, place: int) -> list[str]:
         """Return what is written above a column, the nearest line first."""
         return [line[place] for line in (self.names, self.above) if line]
 
     def _time_unit(self, place: int) -> tuple[Unit | None, str]:
-        for line in self._lines(place):
+        for line in () if self._is_north_south(place) else self._lines(place):
             unit = next((unit for text in _texts(line) if (unit := find_time_unit(text))), None)
             if unit is not None:
                 return unit, ""
