@@ -57,6 +57,8 @@ def test_processor_times_tables_and_figure_are_written(run, tmp_path, monkeypatc
         (["--ball", 0.9], "give one record or more"),
         (["ridgecrest-clc-090", "el-centro-meloland-270", "--ball", 0.9], "on one motion at a time, not on 2"),
         ([*BALL, "--repetitions", -1], "--repetitions must be"),
+        ([*BALL, "--pga", "0.4g"], "--pga is of a record or a pulse: name one, or leave it out"),
+        ([*BALL, "--vertical", "nosuch"], "--vertical is of a record or a pulse: name one, or leave it out"),
     ],
 )
 def test_a_mistake_is_one_line(run, arguments, sentence):

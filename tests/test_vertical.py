@@ -26,6 +26,7 @@ from rocking.kernels import state
 from rocking.kernels.certificate import arc_bounds, bounds_on_motion, prove_rest, side_bounds
 from rocking.motion.description import Origin
 from rocking.motion.exceedance import exceedances, lifting_factors
+from rocking.motion.named import named_motion
 from rocking.plausibility import vertical_notes
 from rocking.problem import ground_of, rules_of
 from rocking.tables import plain
@@ -357,6 +358,43 @@ def test_stretches_beyond_the_threshold_are_those_of_the_weighted_threshold(seed
     near = np.min(np.abs(times[:, None] - found.ravel()), axis=1) < 1e-9
     assert len(found) > 3
     assert np.array_equal(inside[~near], beyond[~near])
+
+
+@pytest.fixture
+def two_files(tmp_path: Path) -> dict[str, Path]:
+    """Records of 0.3 and 0.1 m/s^2 that say their units or step, or do not."""
+    files = {name: tmp_path / name for name in ("says.csv", "silent.csv", "plain.txt")}
+    wave = np.sin(np.arange(60.0))
+    rows = [(0.02 * k, 100 * 0.3 * a, 100 * 0.1 * b) for k, (a, b) in enumerate(zip(wave, wave**2, strict=True))]
+    written = [f"{t:.2f},{a:.6f},{b:.6f}" for t, a, b in rows]
+    files["says.csv"].write_text("\n".join(["time (s),ns (cm/s2),up (cm/s2)", *written]))
+    files["silent.csv"].write_text("\n".join(["time (s),ns,up", *(f"{t},{a / 981},{b / 981}" for t, a, b in rows)]))
+    files["plain.txt"].write_text("\n".join(f"{b / 100:.6f}" for _, _, b in rows))
+    return files
+
+
+def test_what_is_said_of_files_is_for_the_one_of_two_that_does_not_say_its_own(two_files: dict[str, Path]) -> None:
+    says, plain = str(two_files["says.csv"]), str(two_files["plain.txt"])
+    found = named_motion(says, vertical=plain, channel="ns", dt=0.02, units="m/s2")
+    alone = rocking.read(says, channel="ns")
+    assert found.pga == alone.pga == pytest.approx(0.3, rel=1e-2)
+    assert found.vertical is not None
+    assert found.vertical.pga == pytest.approx(0.1, rel=1e-2)
+    shipped = named_motion("el-centro-meloland-270", vertical=plain, dt=0.02, units="m/s2")
+    assert shipped.vertical is not None
+    assert shipped.vertical.pga == found.vertical.pga
+
+
+def test_a_file_of_several_that_says_its_units_keeps_them_for_both_channels(two_files: dict[str, Path]) -> None:
+    for name in ("says.csv", "silent.csv"):
+        found = named_motion(str(two_files[name]), channel="ns", vertical="up", units="g", several=True)
+        assert found.vertical is not None
+        assert (found.pga, found.vertical.pga) == pytest.approx((0.3, 0.1), rel=1e-2)
+    # Of one file alone a heading is overruled, and for both channels alike.
+    alone = named_motion(str(two_files["says.csv"]), channel="ns", vertical="up", units="g")
+    assert alone.vertical is not None
+    assert alone.pga / alone.vertical.pga == pytest.approx(3.0, rel=2e-2)
+    assert alone.pga == pytest.approx(30.0 * G, rel=1e-2)
 
 
 @pytest.mark.parametrize("model", MODELS)

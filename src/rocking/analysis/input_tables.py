@@ -215,11 +215,11 @@ def _motions_of(table: _Table, *, channel: Any, dt: Any, units: Any) -> tuple[Mo
 def _motion_of(table: Path, name: str, vertical: str, *, several: bool, **about: Any) -> Motion:
     """Read a motion with its vertical component, where one is named; a pulse is written as commands take it."""
     record = _beside(table, name)
-    if record == name and name.partition(":")[0] in FAMILIES:
-        motion = named_pulse(name)
-    else:
-        motion = named_motion(record, **about, several=several)
-    return motion.with_vertical(named_vertical(_beside(table, vertical), record, **about)) if vertical else motion
+    upwards = _beside(table, vertical) if vertical else None
+    if record != name or name.partition(":")[0] not in FAMILIES:
+        return named_motion(record, vertical=upwards, **about, several=several)
+    pulse = named_pulse(name)
+    return pulse if upwards is None else pulse.with_vertical(named_vertical(upwards, record, **about))
 
 
 def _beside(table: Path, name: str) -> str:

@@ -67,8 +67,15 @@ class FileOptions:
 
     def read(self, name: str, *, several: bool = False) -> Motion:
         """Return the motion of a record, alone or one of several."""
-        motion = named_motion(name, channel=self.channel, dt=self.dt, units=self.units, several=several)
-        return self.finished(name, motion)
+        return self.finished(name, named_motion(name, **self.said(), several=several))
+
+    def said(self) -> dict[str, Any]:
+        """Return what `named_motion` takes besides a name."""
+        return {"channel": self.channel, "dt": self.dt, "units": self.units}
+
+    def of_pulse(self, text: str) -> Motion:
+        """Return the motion of a pulse."""
+        return self.finished(text, named_pulse(text))
 
     def finished(self, name: str, motion: Motion) -> Motion:
         """Return a motion as the simulations take it, with notes on what looks like a mistake."""
@@ -92,14 +99,20 @@ class VerticalOptions(FileOptions):
         hint("Vertical motion, scaled alike: a channel of the same file, or another file or shipped record."),
     ] = None
 
+    def said(self) -> dict[str, Any]:
+        """Return what `named_motion` takes besides a name, the vertical motion included."""
+        return super().said() | {"vertical": self.vertical}
+
+    def of_pulse(self, text: str) -> Motion:
+        """Return the motion of a pulse, with its vertical component, if one is asked for."""
+        pulse = named_pulse(text)
+        if self.vertical is not None:
+            pulse = pulse.with_vertical(named_vertical(self.vertical, text, **super().said()))
+        return self.finished(text, pulse)
+
     def finished(self, name: str, motion: Motion) -> Motion:
-        """Return a motion with its vertical component, if one is asked for, with notes on that as well."""
+        """Return a motion as the simulations take it, with notes on its vertical component as well."""
         noted = super().finished(name, motion)
-        if self.vertical is None:
-            return noted
-        noted = noted.with_vertical(
-            named_vertical(self.vertical, name, channel=self.channel, dt=self.dt, units=self.units)
-        )
         for sentence in vertical_notes(noted):
             note(f"{name}: {sentence}")
         return noted
@@ -123,7 +136,7 @@ class ScaledOptions(VerticalOptions):
         return super().read(name, several=several)
 
     def finished(self, name: str, motion: Motion) -> Motion:
-        """Return a motion with its vertical component, if one is asked for, scaled; with notes on that as well."""
+        """Return a motion scaled, with notes on that as well."""
         noted = super().finished(name, motion)
         if self._target is None:
             return noted
@@ -155,7 +168,7 @@ class PulseOptions(FileOptions):
 
     def pulses(self) -> dict[str, Motion]:
         """Return the pulses by their texts."""
-        return {text: self.finished(text, named_pulse(text)) for text in self.pulse}
+        return {text: self.of_pulse(text) for text in self.pulse}
 
 
 class ReadRecords(NamedTuple):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Annotated
 
 from rocking.cli.options import BLOCK, MODEL, WHOLE, BodyOptions, ModelOptions, measured, written
@@ -82,6 +82,9 @@ def schemes(
 def _one_motion(names: Sequence[str], motion: MotionOptions, *, free: bool) -> Motion | None:
     """Return the one motion, or None where none is given and the body moves without."""
     if free and not names and not motion.pulse:
+        for option in fields(motion):
+            if getattr(motion, option.name) != option.default:
+                raise InvalidOption("{} is of a record or a pulse: name one, or leave it out", option.name)
         return None
     motions = motion.read_all(names).motions
     if len(motions) != 1:

@@ -120,6 +120,7 @@ STANDARD_INPUT = "-"
 def named_motion(
     name: str,
     *,
+    vertical: str | None = None,
     channel: str | None = None,
     dt: float | None = None,
     units: str | None = None,
@@ -128,9 +129,11 @@ def named_motion(
 ) -> Motion:
     """Motion, times a factor, of a record file ("-" is standard input), or of a shipped record where there is no file.
 
-    Channel, step and units are as for `rocking.read`. Where they are for several files, those that say their step and
-    units keep them, and those that hold one channel are taken whatever its name.
+    With `vertical` it has a vertical component, as `named_vertical`. Channel, step and units are as for `rocking.read`.
+    Where they are for several files, those that say their step and units keep them, and those that hold one channel are
+    taken whatever its name; a motion and a vertical one of its own are two.
     """
+    several = several or (vertical is not None and _stands_alone(vertical))
     if is_shipped(name):
         if not several:
             refuse_what_is_known(name, channel=channel, dt=dt, units=units)
@@ -138,25 +141,39 @@ def named_motion(
     else:
         file = sys.stdin.buffer if name == STANDARD_INPUT else name
         motion = formats.read_as(file, Request.checked(dt, units, channel, several=several))
+    if vertical is not None:
+        up = named_vertical(vertical, name, channel=channel, dt=dt, units=units, several=several)
+        motion = motion.with_vertical(up)
     return motion if scale == 1.0 else motion.scaled(scale)
 
 
 def named_vertical(
-    name: str, record: str, *, channel: str | None = None, dt: float | None = None, units: str | None = None
+    name: str,
+    record: str,
+    *,
+    channel: str | None = None,
+    dt: float | None = None,
+    units: str | None = None,
+    several: bool = False,
 ) -> Motion:
     """Vertical motion by name: a file or a shipped record of its own, or else a channel of the horizontal one's file.
 
-    That file is `record`, and `channel` the horizontal motion in it; `dt` and `units` hold for both. With a file of its
-    own there are two motions, so they are for the one that does not say its own.
+    That file is `record`, and `channel` the horizontal motion in it; `dt` and `units` are for both, as for
+    `named_motion`.
     """
-    if os.path.isfile(name) or name in records.names():  # noqa: PTH113 - see `is_there`
+    if _stands_alone(name):
         return named_motion(name, dt=dt, units=units, several=True)
     if record == STANDARD_INPUT or not is_there(record):
         raise UnreadableRecord(
             f"there is no file or shipped record {name!r} for the vertical motion, and {record} has no channels; check "
             "the name"
         )
-    return formats.read_vertical(record, name, Request.checked(dt, units, channel))
+    return formats.read_vertical(record, name, Request.checked(dt, units, channel, several=several))
+
+
+def _stands_alone(vertical: str) -> bool:
+    """Whether a vertical motion is a file or a shipped record of its own, and no channel of the horizontal one's."""
+    return os.path.isfile(vertical) or vertical in records.names()  # noqa: PTH113 - see `is_there`
 
 
 def refuse_what_is_known(name: str, **said: object) -> None:

@@ -15,7 +15,7 @@ from rocking.errors import InvalidMotion, UnreadableRecord
 from rocking.motion import records
 from rocking.motion.formats.source import Request
 from rocking.motion.motion import Motion
-from rocking.motion.named import expanded, is_there, named_motion, named_vertical
+from rocking.motion.named import expanded, is_there, named_motion
 from rocking.named_pulses import pulse_family
 from rocking.plausibility import motion_notes
 from rocking.progress import note
@@ -59,10 +59,8 @@ def _record(tables: Tables, path: str, *, several: bool) -> Motion:
     given = tables.table("motions")
     about = {"dt": given.get("dt"), "units": given.get("units")}
     channel = None if "channel" not in given else str(given["channel"])
-    motion = named_motion(path, channel=channel, several=several, **about)
-    if "vertical" in given:
-        vertical = named_vertical(_beside(tables, given["vertical"]), path, channel=channel, **about)
-        motion = motion.with_vertical(vertical)
+    vertical = _beside(tables, given["vertical"]) if "vertical" in given else None
+    motion = named_motion(path, vertical=vertical, channel=channel, several=several, **about)
     for sentence in motion_notes(motion):
         note(f"{path}: {sentence}")
     return motion
