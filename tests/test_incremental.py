@@ -42,6 +42,13 @@ def test_a_pulse_overturns_in_two_bands_that_a_map_finds_as_well():
     assert float(dataset.overturning_level[0, 0]) == start
 
 
+def both_verdicts_are_near(body, motion, level, measure):
+    """Whether both come within the tolerance of a level; under a record bands have thinner ones beside them."""
+    shifts = sorted(np.linspace(-5e-7, 5e-7, 11), key=abs, reverse=True)
+    scaled = (motion.scaled_to(level * (1.0 + shift), measure) for shift in shifts)
+    return len({rocking.simulate(body, one).overturned for one in scaled}) == 2
+
+
 def test_the_ends_of_every_band_are_where_the_verdict_changes(analysis, record):
     blocks, dataset = analysis
     assert dataset.sizes["band"] > 4
@@ -51,12 +58,7 @@ def test_the_ends_of_every_band_are_where_the_verdict_changes(analysis, record):
             for start, end in bands(dataset, m, k):
                 for level in (start, end):
                     if not math.isnan(level):
-                        # Both verdicts within the tolerance; under a record bands have thinner ones beside them.
-                        shifts = sorted(np.linspace(-5e-7, 5e-7, 11), key=abs, reverse=True)
-                        scaled = (motion.scaled_to(level * (1.0 + shift), "pgv") for shift in shifts)
-                        verdicts = (rocking.simulate(block, one).overturned for one in scaled)
-                        first = next(verdicts)
-                        assert any(other != first for other in verdicts)
+                        assert both_verdicts_are_near(block, motion, level, "pgv")
                         judged += 1
     assert judged > 4
 
@@ -220,3 +222,37 @@ def test_levels_of_a_spectral_acceleration_say_its_period_and_damping():
     assert about["measure"] == "spectral acceleration at 1 s, damping 0.02"
     assert "spectral acceleration at 1 s, damping 0.02 (g) that overturns" in found.summary()
     assert "damping" not in incremental_dynamic_analysis(BLOCK, PULSE, levels=[3.0, 9.0]).to_dict()
+
+
+def test_the_ends_of_bands_are_those_of_simulations_where_restitution_is_drawn():
+    """How many impacts are followed decides what is drawn next, so a treatment of its own would move the ends."""
+    first, second = rocking.pulses.sine(4.0, 1.5, cycles=3), rocking.pulses.sine(4.5, 1.2, cycles=4)
+    values = np.zeros(1400)
+    for start, pulse in ((0, first), (800, second)):
+        t = 0.01 * np.arange(int(pulse.duration / 0.01))
+        values[start : start + t.size] = pulse.acceleration(t)
+    motion = rocking.Motion.from_samples(values, 0.01)
+    ends = []
+    for seed in range(4):
+        restitution = rocking.RandomRestitution(0.5, 0.95, seed=seed)
+        body = rocking.RestrainedBlock(rocking.Block(width=0.3, height=1.2), restitution=restitution)
+        found = incremental_dynamic_analysis(body, motion, levels=np.geomspace(2.5, 14.0, 30))
+        ends += [(body, level) for band in found.bands() for level in band if not math.isnan(level)]
+    assert len(ends) >= 6
+    assert all(both_verdicts_are_near(body, motion, level, "pga") for body, level in ends)
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_blocks_with_equal_and_with_different_sides_are_analysed_together(order):
+    each = rocking.Block(width=0.3, height=1.2), rocking.Block(width=0.3, height=1.5, offset=0.02)
+    blocks, levels = [each[k] for k in order], [1.0, 4.0, 16.0, 64.0]
+    both = incremental_dynamic_analysis(blocks, PULSE, measure="pga_ratio", levels=levels)
+    judged = 0
+    for k, block in enumerate(blocks):
+        alone = incremental_dynamic_analysis(block, PULSE, measure="pga_ratio", levels=levels)
+        np.testing.assert_array_equal(both.bands(block=k), alone.bands())
+        assert alone.bands()
+        slenderness = both.data.alpha_plus.values[k], both.data.alpha_minus.values[k]
+        assert slenderness == tuple(side.alpha for side in block.sides)
+        judged += 1
+    assert judged == 2

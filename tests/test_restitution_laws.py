@@ -20,6 +20,7 @@ from rocking import (
 from rocking.analysis.restitution import _factors, _speeds
 
 COLUMN = Block(width=0.4, height=2.0)
+FRAME = Block.from_frame(half_width=0.2, half_height=1.0, mass_ratio=2.0)
 
 
 def releases(law, seed=1, timing=1e-3, impacts=12, model="nonlinear"):
@@ -45,6 +46,18 @@ def test_the_law_that_made_the_times_is_preferred(law, names):
     assert 0.6 < found.laws[0].misfit < 1.4
     assert sum(fit.weight for fit in found.laws) == pytest.approx(1.0)
     assert [fit.criterion for fit in found.laws] == sorted(fit.criterion for fit in found.laws)
+
+
+def test_laws_of_angular_momentum_are_those_of_the_body_and_not_of_a_rectangle():
+    sizes = {"distances": (0.2, 0.2), "height": 1.0, "radius_of_gyration": 0.9}
+    for contact in (1.0, 0.7):
+        kept = impact_restitution(**sizes, contact=contact)
+        block = Block.from_pivots((0.2, 0.2), 1.0, 0.9, restitution=kept)
+        runs = [rocking.simulate(block, None, initial_rotation=start) for start in (0.06, 0.1, 0.14)]
+        found = compare_restitution([run.impacts["time"][:12] for run in runs], block, timing=1e-5)
+        fits = {fit.name: fit for fit in found.laws}
+        assert fits["narrow contact"].estimates["contact"] == pytest.approx(contact, rel=1e-4)
+        assert (fits["angular momentum (Housner)"].misfit < 1e-3) == (contact == 1.0)
 
 
 @pytest.mark.parametrize("alpha", [1.0, 1.2])
@@ -114,6 +127,7 @@ def test_a_comparison_shows_itself():
         ((None, COLUMN), InvalidOption, "tests must be a list, not None"),
         (([[1.0, 1.5, 1.9]], 0.4), InvalidBlock, "a Block is needed"),
         (([[1.0, 1.5, 1.9]], Block(width=0.4, height=2.0, offset=0.02)), InvalidOption, "must have equal sides"),
+        (([[1.0, 1.5, 1.9]], FRAME), InvalidOption, "block must be one rigid body: laws of angular momentum"),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_sentence(arguments, error, says):

@@ -120,6 +120,13 @@ def results(bars, spectrum, study):
     }
 
 
+@pytest.fixture(scope="module")
+def of_several():
+    """Results that have other dimensions where they are of several blocks."""
+    blocks = rocking.Blocks(p=[2.0, 3.0], alpha=[0.1, 0.2], restitution=0.9)
+    return {"RockingSpectrum of several": rocking.rocking_spectrum(blocks, [PULSE], p=[1.0, 2.0])}
+
+
 def test_every_public_result_with_a_dataset_is_among_those_that_are_judged(results):
     public = {value for value in public_names().values() if inspect.isclass(value) and issubclass(value, DatasetResult)}
     assert {each.__name__ for each in public} - {"DatasetResult"} == results.keys()
@@ -211,7 +218,8 @@ HEADERS = {
     ("StudySpectrum", "fractiles"): "fractile,pga_m_s2,block,p_rad_s,alpha_rad,restitution,"
     "fractile_over_alpha,overturned_share",
     ("BlockFragilities", "curves"): "limit_state,block,p_rad_s,alpha_rad,restitution,"
-    "median_m_s2,median_lower_m_s2,median_upper_m_s2,dispersion,dispersion_lower,dispersion_upper,exceeded,fault",
+    "median_m_s2,median_lower_m_s2,median_upper_m_s2,dispersion,dispersion_lower,dispersion_upper,exceeded,outcomes,"
+    "fault",
     ("ChatteringMap", "outcomes"): "a,omega,outcome,complete,uplift_s,rest_s,lower_s,upper_s,rests,overturned",
 }
 
@@ -328,14 +336,35 @@ def test_why_a_file_cannot_be_written_is_said_without_the_library_s_internals(tm
     assert not path.exists()
 
 
-def test_a_part_has_no_numbers_of_the_whole(results, spectrum):
+#: Dimensions that not all variables have, though none is of all values together: what holds along with each label.
+NOT_POOLED = {
+    "RockingSpectrum": {"fractile"},
+    "RockingSpectrum of several": {"fractile"},
+    "StudySpectrum": {"fractile"},
+    "OverturningMap": {"amplitude", "frequency"},
+    "Rose": {"azimuth", "corner"},
+    "BifurcationDiagram": {"direction", "value", "iterate"},
+}
+
+
+def test_a_dimension_that_some_numbers_lack_is_said_to_be_pooled_or_is_known_not_to_be(results, of_several):
+    for name, found in (results | of_several).items():
+        lacked = {d for d in found.data.dims if not all(d in each.dims for each in found.data.data_vars.values())}
+        assert lacked - {*found.POOLED} == NOT_POOLED.get(name, set()), name
+
+
+def test_a_part_has_no_numbers_of_the_whole(results, of_several):
+    results = results | of_several
     for name, dimension in (
         ("RockingSpectrum", "motion"), ("IncrementalDynamicAnalysis", "motion"), ("MeasureComparison", "motion"),
+        ("RockingSpectrum of several", "block"), ("MeasureComparison", "block"),
+        ("IncrementalDynamicAnalysis", "level"),
         ("ResponseRose", "pair"), ("ResponseRose", "azimuth"), ("Basins", "attractor"), ("Basins", "rotation"),
+        ("Basins", "angular_velocity"),
     ):  # fmt: skip
         assert dimension in results[name].sizes, name
         with pytest.raises(rocking.InvalidOption, match=f"of all its values of {dimension} together; compute a part"):
-            results[name].select(**{dimension: results[name][dimension].values[0]})
+            results[name].select(**{dimension: results[name].data[dimension].values[0]})
 
 
 def test_a_part_of_an_overturning_map_has_the_boundaries_within_it():

@@ -248,6 +248,8 @@ def test_a_table_is_read_with_its_units(tmp_path: Path) -> None:
     assert "0.1 to 0.5" in repr(hazard)
     path.write_text("sa_g,annual_rate\n0.1,0.02\n0.5,0.001\n")
     assert HazardCurve.read(path, period=1.0).measure == Measure("sa", 1.0)
+    with pytest.raises(InvalidOption, match="period must be a positive number"):
+        HazardCurve.read(path, period="1.0")  # type: ignore[arg-type]
 
 
 def test_openquake_probabilities_become_rates(tmp_path: Path) -> None:

@@ -200,6 +200,18 @@ def test_both_polarities_of_asymmetric_blocks_are_two_trials(tmp_path):
         assert (found.median, found.dispersion) == pytest.approx((reference.median, reference.dispersion), rel=1e-9)
 
 
+@pytest.mark.parametrize("order", [[0, 1], [1, 0]])
+def test_outcomes_are_counted_for_each_block_by_its_own_polarities(tmp_path, order):
+    blocks = rocking.Blocks(p=2.0, alpha=[[0.2, 0.2], [0.2, 0.15]], restitution=0.9).select(np.array(order))
+    study = rocking.study(tmp_path, blocks, MOTIONS, levels=LEVELS, measure="pga", polarity="both", unit_blocks=512)
+    study.run(progress=False)
+    found, once = study.block_fragilities(), len(MOTIONS) * len(LEVELS)
+    assert found.outcomes.values.tolist() == [[once * (1 + k) for k in order]]
+    assert f"fragility of 2 blocks, {once} to {2 * once} outcomes each" in found.summary()
+    for k, count in enumerate(found.exceeded.values[0]):
+        assert f"{count:.0f} of {once * (1 + order[k])}" in found.summary()
+
+
 def test_a_block_that_no_curve_fits_says_why(tmp_path):
     blocks = rocking.Blocks(p=[2.0, 2.0], alpha=[0.2, 1.2], restitution=[0.9, 0.9])
     study = rocking.study(tmp_path, blocks, MOTIONS, levels=LEVELS, measure="pga", unit_blocks=512)

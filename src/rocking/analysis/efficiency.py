@@ -162,7 +162,7 @@ class MeasureComparison(DatasetResult):
             "intensities": ("intensity",),
         }
     )
-    POOLED = ("motion",)
+    POOLED = ("motion", "block")
 
     def _order(self) -> Integers:
         """Positions of the measures, the most efficient first."""

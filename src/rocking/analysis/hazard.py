@@ -149,6 +149,8 @@ class HazardCurve(Result):
         """
         file = checks.path(path, "path of a hazard curve", InvalidOption)
         checks.whole(site, "site", InvalidOption, 0)
+        if period is not None:
+            period = checks.positive(period, "period", InvalidOption, "s")
         try:
             lines = file.read_text(encoding="utf-8-sig").splitlines()
         except (OSError, UnicodeDecodeError) as error:

@@ -15,7 +15,7 @@ from rocking.block import Blocks
 from rocking.body import Bodies, Body, title_of
 from rocking.constants import Model
 from rocking.engine import require_finished
-from rocking.ensemble import simulate_many
+from rocking.ensemble import body_coordinates, simulate_many
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
@@ -141,11 +141,13 @@ def simulate_levels(
     parts = []
     for group in groups:
         scaled = {"levels": levels * units[group[0]], "measure": measure.alone}
-        parts.append(simulate_many(blocks.select(group), motions, model=model, **scaled, **options))
-        parts[-1] = parts[-1].assign_coords(scale=("scale", levels, {"measure": measure.name, "units": measure.units}))
+        part = simulate_many(blocks.select(group), motions, model=model, **scaled, **options)
+        part = part.drop_vars(body_coordinates(blocks.select(group)))  # their names hang on the whole: added at last
+        parts.append(part.assign_coords(scale=("scale", levels, {"measure": measure.name, "units": measure.units})))
     whole = xr.concat(parts, "block", data_vars="all", coords="minimal", compat="override", join="override")
     require_finished(whole.unfinished.values)
-    return whole.isel(block=np.argsort(np.concatenate(groups))).rename(scale="level")
+    ordered = whole.isel(block=np.argsort(np.concatenate(groups))).rename(scale="level")
+    return ordered.assign_coords(body_coordinates(blocks))
 
 
 @dataclass(frozen=True, eq=False)

@@ -188,7 +188,7 @@ class RockingSpectrum(DatasetResult):
             "peaks": ("peak_rotation", "peak_over_alpha", "overturned"),
         }
     )
-    POOLED = ("motion",)
+    POOLED = ("motion", "block")
 
     def summary(self) -> str:
         header = ["p (rad/s)", "R (m)", *(f"{100 * share:g} %" for share in self.data.fractile.values), "overturned"]

@@ -113,8 +113,10 @@ def fragility(
     if output.out is not None:
         nrml.check_names([taxonomy], "taxonomy")
         nrml.check_names(states, "a limit state")
+    not_passed = ""
     if standing is not None:
         checks.positive(standing, "standing", InvalidOption)
+        not_passed = _limit_of_standing([*states])
     checks.whole(bootstrap, "bootstrap", InvalidOption, 0)
     band = Band("bootstrap" if bootstrap != 0 else "likelihood", confidence, samples=bootstrap or 1, seed=seed)
     with output.folder() as folder:
@@ -142,7 +144,7 @@ def fragility(
             found["risk"], figures["risk"] = risk.to_dict(years), risk.plot
             text.append(risk.summary(years))
         if standing is not None:
-            survived = fitted.survival(standing, curve, limit_state=_limit_of_standing(fitted))
+            survived = fitted.survival(standing, curve, limit_state=not_passed)
             found["survival"], figures["survival"] = survived.to_dict(), survived.plot
             text.append(survived.summary())
         if folder is not None:
@@ -157,9 +159,8 @@ def fragility(
         print_result(found, "\n\n".join(text), as_json=output.as_json)
 
 
-def _limit_of_standing(fitted: Fragility) -> str:
+def _limit_of_standing(names: list[str]) -> str:
     """Name the limit that a block has not passed in a time: overturning, or the only one."""
-    names = [curve.limit_state for curve in fitted.curves]
     if len(names) > 1 and "overturning" not in names:
         raise InvalidOption(
             f"{{}} is about overturning, or about one limit, not {' and '.join(names)}: name one of them in {{}}",

@@ -56,7 +56,7 @@ class Basins(DatasetResult):
             "orbits": ("orbit_coordinate", "orbit_velocity"),
         }
     )
-    POOLED = ("velocity", "position", "rotation", "attractor", "phase")
+    POOLED = ("velocity", "position", "angular_velocity", "rotation", "attractor", "phase")
 
     @property
     def entropy(self) -> tuple[float, float]:

@@ -38,6 +38,7 @@ _KEPT: Final[Mapping[str, str]] = {
     "dispersion_lower": "lower end of its confidence interval",
     "dispersion_upper": "upper end of its confidence interval",
     "exceeded": "outcomes that exceed the limit",
+    "outcomes": "outcomes that the curve is fitted to",
 }
 
 
@@ -99,7 +100,7 @@ def block_fragilities(
 ) -> BlockFragilities:
     """Fit a curve to the outcomes of each block."""
     require_limits(store.grid.outcomes, limits)
-    motions, scales, polarities, count = store.grid.shape
+    _, scales, _, count = store.grid.shape
     shape = len(limits), count
     kept = {name: np.full(shape, np.nan) for name in _KEPT}
     faults = np.full(shape, "", dtype=object)
@@ -116,7 +117,7 @@ def block_fragilities(
             for (i, (name, limit)), j in itertools.product(enumerate(limits.items()), range(blocks.start, blocks.stop)):
                 polarities = int(counted[j - blocks.start])
                 exceeded = passed(ratios[:, :, :polarities, j - blocks.start], limit, name).sum(axis=2).ravel()
-                kept["exceeded"][i, j] = exceeded.sum()
+                kept["exceeded"][i, j], kept["outcomes"][i, j] = exceeded.sum(), exceeded.size * polarities
                 try:
                     fitted = fit_fragility(intensities / units[j], {name: exceeded}, trials=polarities, **options)
                 except InvalidOption as error:  # no lognormal fits outcomes that are all alike, or separated
@@ -137,7 +138,6 @@ def block_fragilities(
             | {"fault": variable(dims, faults.astype(str), "why there is no curve")},
             {"limit_state": list(limits), **body_coordinates(store.product.bodies)},
             {
-                "outcomes": motions * scales * polarities,
                 "confidence": confidence,
                 "model": store.product.model,
                 "measure": measure.name,
@@ -155,8 +155,9 @@ class BlockFragilities(BlocksResult):
     ----------
     data : xarray.Dataset
         Over (limit_state, block): median with its confidence interval (median_lower, median_upper; SI units of the
-        measure), dispersion likewise, exceeded (how many outcomes exceed the limit), and fault: why there is no curve,
-        empty where there is one. Parameters of the blocks are coordinates.
+        measure), dispersion likewise, exceeded (how many outcomes exceed the limit), outcomes (of how many: a block
+        with two equal sides has those of one polarity), and fault: why there is no curve, empty where there is one.
+        Parameters of the blocks are coordinates.
     """
 
     TABLES = MappingProxyType({"curves": (*_KEPT, "fault")})
@@ -168,6 +169,12 @@ class BlockFragilities(BlocksResult):
             self.data.measure,
             **{name: self.data.attrs[name] for name in ("period", "damping") if name in self.data.attrs},
         )
+
+    @property
+    def _heading(self) -> str:
+        least, most = int(self.data.outcomes.min()), int(self.data.outcomes.max())
+        each = counted(most, "outcome") if least == most else f"{least} to {counted(most, 'outcome')}"
+        return f"fragility of {counted(self.data.sizes['block'], 'block')}, {each} each"
 
     def summary(self) -> str:
         data, scale = self.data, self.measure.scale
@@ -182,17 +189,14 @@ class BlockFragilities(BlocksResult):
                     str(data.limit_state.values[i]),
                     j,
                     *(float(values[j]) for values in parameters.values()),
-                    f"{one['exceeded']:.0f} of {data.outcomes}",
+                    f"{one['exceeded']:.0f} of {one['outcomes']:.0f}",
                     scale * float(one["median"]),
                     "-" if data.fault.values[i, j] else between,
                     float(one["dispersion"]),
                 ]
             )
         without = int(np.count_nonzero(data.fault.values != ""))
-        text = (
-            f"fragility of {counted(data.sizes['block'], 'block')}, {counted(int(data.outcomes), 'outcome')} each; "
-            f"intensity: {self.measure.label}"
-        )
+        text = f"{self._heading}; intensity: {self.measure.label}"
         text += f"; {counted(without, 'curve')} cannot be fitted (fault says why)" if without else ""
         return f"{text}\n\n{table_of_some(header, rows)}"
 
@@ -223,9 +227,7 @@ class BlockFragilities(BlocksResult):
             panels=dict(zip(names, medians, strict=True)),
             value_label=f"median {self.measure.label}",
             missing_label="no curve fits",
-            title=title
-            or f"fragility of {counted(self.data.sizes['block'], 'block')}, "
-            f"{counted(int(self.data.outcomes), 'outcome')} each",
+            title=title or self._heading,
             ax=ax,
             figsize=figsize,
         )
