@@ -11,7 +11,7 @@ import pytest
 from kernel_records import one_sided
 
 import rocking
-from rocking import InvalidBlock, InvalidOption, Motion, checks, dynamics, simulate, simulate_many
+from rocking import InvalidBlock, InvalidMotion, InvalidOption, Motion, checks, dynamics, simulate, simulate_many
 from rocking.body import KINDS, Bodies, Body, Coordinate
 from rocking.constants import STANDARD_GRAVITY
 from rocking.engine import Setup, Task, simulate_each, simulate_tasks
@@ -113,6 +113,28 @@ def test_balls_and_blocks_are_bodies():
     for other in (0.4, "block", rocking.Block, [block]):
         with pytest.raises(InvalidBlock, match="a Block or another body is needed"):
             simulate(other, None)
+
+
+@pytest.mark.parametrize(
+    "simulated",
+    [
+        lambda body, motion: simulate(body, motion, model="linear", duration=1.0),
+        lambda body, motion: simulate_many(body.alone(), motion, model="linear", duration=1.0),
+        lambda body, motion: [
+            *simulate_tasks(Setup(body.alone(), "linear", Certified(), 1.0), [Task(slice(1), motion)])
+        ],
+        lambda body, motion: dynamics.simulate(body, motion, duration=1.0),
+        lambda body, motion: dynamics.simulate_many(body, motion, duration=1.0),
+        lambda body, motion: dynamics.integrate(body, motion, dynamics.MoreauJean(1e-3), 1.0),
+    ],
+    ids=["simulate", "simulate_many", "engine", "dynamics", "dynamics, many", "time stepping"],
+)
+def test_a_body_on_a_line_takes_no_vertical_component(simulated):
+    motion = rocking.pulses.one_sine(2.0, 1.0)
+    for body in (dynamics.ImpactOscillator(1.0, 0.8, stop=0.05), dynamics.BouncingBall(0.5)):
+        simulated(body, motion)
+        with pytest.raises(InvalidMotion, match=f"this {body.description} moves along one line"):
+            simulated(body, motion.with_vertical(rocking.pulses.one_sine(5.0, 1.0)))
 
 
 @pytest.mark.parametrize("e", [0.3, 0.9])

@@ -354,6 +354,26 @@ def test_what_cannot_be_meant_is_refused_in_one_sentence(make, words):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(("sign", "stops"), [(1.0, (-0.01, 0.05)), (-1.0, (0.05, -0.01))])
+def test_a_spring_that_presses_against_one_of_two_stops_brings_the_body_to_rest_there(sign, stops):
+    two = dynamics.ImpactOscillator(1.0, 0.8, stop=stops[0], second_stop=stops[1])
+    one = dynamics.ImpactOscillator(1.0, 0.8, stop=-0.01)  # as long as the other stop is not reached
+    found = dynamics.simulate(two, None, initial_position=sign * 0.02)
+    expected = dynamics.simulate(one, None, initial_position=0.02)
+    assert found.events["time"][-1] == pytest.approx(expected.events["time"][-1], rel=1e-9)
+    times = np.linspace(0.0, found.duration, 50)
+    assert sign * found.position(times) == pytest.approx(expected.position(times), abs=1e-12)
+    free = dynamics.ImpactOscillator(1.0, 0.8, stop=0.01, second_stop=0.05)
+    shaking = pulses.sine(0.5, 2.0, cycles=1)
+    many = dynamics.simulate_many([two, free], shaking)
+    assert many.stopped.values[0].tolist() == [False, True]
+    lively = dynamics.ImpactOscillator(1.0, 1.0, stop=stops[0], second_stop=stops[1])
+    with pytest.raises(InvalidOption, match="restitution 1"):
+        dynamics.simulate(lively, shaking)
+    with pytest.raises(InvalidOption, match="nothing presses"):
+        dynamics.simulate(free, None)
+
+
 def test_a_body_under_a_motion_without_acceleration_rests():
     (orbit,) = dynamics.periodic_orbits(dynamics.BouncingBall(0.5), pulses.sine(0.0, 5.0, cycles=1), starts=64)
     assert orbit.rests and orbit.impacts == 0.0

@@ -172,6 +172,26 @@ def test_impacts_as_close_as_the_even_times_have_points_between_them_too():
     assert (between[close] >= 10).all()
 
 
+@pytest.mark.parametrize("model", ["nonlinear", "linear"])
+def test_a_phase_plane_counts_in_radians_where_a_side_has_no_balance(model):
+    body = RestrainedBlock(rocking.Block(width=0.6, height=2.0, mass=1e3), Tendon(6e4, offset=0.2))
+    response = simulate(body, rocking.pulses.one_sine(4.5, 1.0), model=model)
+    balance = response.balance[0]
+    assert math.isfinite(balance) and response.balance[1] == math.inf
+    course = course_of(response, 0.0, response.duration)
+    smooth = np.delete(np.arange(len(course.time)), np.union1d(course.before, course.before + 1))
+    times = course.time[smooth]
+    np.testing.assert_array_equal(course.rotation[smooth], response.rotation(times))
+    sides = [side.p for side in body.sides]
+    assert course.rotation.min() < -0.04
+    np.testing.assert_allclose(course.velocity[smooth] * sides[0], response.angular_velocity(times), rtol=1e-12)
+    x, y = boundary_of(response)
+    crossing = np.flatnonzero(np.abs(x - balance) < 1e-12)
+    assert crossing.size == 2 and np.max(np.abs(y[crossing])) < 1e-7
+    axes = response.plot_phase_plane().axes[0]
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("rotation / rad", "velocity / (p × rad)")
+
+
 @pytest.mark.parametrize(
     ("body", "words"),
     [

@@ -179,6 +179,19 @@ def test_tolerance_sets_the_width_of_the_bracket(block):
         assert np.all((rows["lower"] <= rows["end"]) & (rows["end"] <= rows["upper"]))
 
 
+@pytest.mark.parametrize("model", ["linear", "nonlinear"])
+def test_a_tolerance_below_all_rounding_proves_the_rest_that_a_wider_one_proves(model):
+    block = Block(width=0.4, height=2.0)
+    (known,) = simulate(block, None, model=model, initial_rotation=0.05).chattering
+    for tolerance in (1e-30, 1e-80, 1e-300):
+        found = simulate(block, None, model=model, initial_rotation=0.05, chattering=Certified(tolerance))
+        (row,) = found.chattering
+        assert found.stalled == 0
+        assert row["start"] == known["start"]
+        assert row["lower"] <= row["end"] <= row["upper"] <= row["lower"] + 1e-11
+        assert max(row["lower"], known["lower"]) <= min(row["upper"], known["upper"])
+
+
 def test_export_round_trips(shaken, tmp_path):
     shaken.to_netcdf(tmp_path / "r.nc", dt=0.02)
     with xr.open_dataset(tmp_path / "r.nc") as dataset:

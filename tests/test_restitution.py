@@ -336,7 +336,11 @@ def test_maps_of_a_restitution_that_falls_have_the_derivatives_of_finite_differe
     ("make", "says"),
     [
         (lambda: FallingRestitution(1.2, 0.1, 0.8), "largest must be in"),
-        (lambda: FallingRestitution(0.9, -0.1, 0.8), "slope must be at least 0"),
+        (lambda: FallingRestitution(0.9, -0.1, 0.8), "slope must be finite and at least 0, in s/rad, not -0.1"),
+        (
+            lambda: FallingRestitution(0.9, (0.1, math.inf), 0.8),
+            "slope must be finite and at least 0, in s/rad, not inf",
+        ),
         (lambda: FallingRestitution(0.9, 0.1, 0.95), "least must be above 0 and at most largest, 0.9"),
         (lambda: FallingRestitution(0.9, 0.1, 0.0), "least must be above 0"),
         (lambda: FallingRestitution("high", 0.1, 0.8), "largest must be a number"),

@@ -289,6 +289,18 @@ def test_what_cannot_be_is_refused_in_one_sentence(make, says):
     assert "\n" not in str(refused.value)
 
 
+@pytest.mark.parametrize("restitution", [0.4, rocking.RandomRestitution(0.3, 0.4, seed=1)])
+def test_a_wall_too_stocky_for_angular_momentum_rocks_one_way_with_a_restitution_that_is_given(restitution):
+    with pytest.raises(InvalidBlock, match=r"too stocky to rock that way; .*give restitution a value in \(0, 1\]"):
+        Block.one_sided(width=3.0, height=2.0)
+    wall = Block.one_sided(width=3.0, height=2.0, restitution=restitution)
+    assert wall.is_one_sided and wall.sides[0].restitution == 0.4
+    assert wall.sides[0].alpha == pytest.approx(math.atan(1.5), rel=1e-15)
+    for wrong, says in ((1.2, "restitution must be in"), ((0.4, 0.5), "is one number, not a pair")):
+        with pytest.raises(InvalidBlock, match=says):
+            Block.one_sided(width=3.0, height=2.0, restitution=wrong)
+
+
 @pytest.mark.parametrize("factor", [0.5, 2.0])
 @pytest.mark.parametrize(
     "restraint",

@@ -12,6 +12,7 @@ from rocking.response.history import plastic_elongations
 
 MASS, G = 4e3, 9.80665
 COLUMN = Block.from_pivots((0.25, 0.3), 1.5, 0.9, mass=MASS, restitution=0.85)
+SYMMETRIC = Block(width=0.4, height=2.0, mass=2e3)
 PUSH = rocking.pulses.sine(3.0, 1.1, cycles=2).with_vertical(rocking.pulses.sine(2.0, 3.0, cycles=3))
 
 
@@ -96,6 +97,24 @@ def test_tendons_are_stretched_as_the_rotations_of_both_sides_stretch_them(stren
     assert (found["plastic_elongation"][0] > 1e-3) == (strength < math.inf)
     # On the other side of its toe the second one is stretched less by the larger rotation.
     assert response.to_dict()["tendons"][1]["force_N"] == found["force"][1]
+
+
+@pytest.mark.parametrize(
+    ("samples", "step", "start"),
+    [((-12.0, 30.0), 0.3, (0.0, 0.0)), ((-4.0, 20.0), 0.1, (0.0, 0.0)), ((-12.0, 30.0), 0.3, (4e-3, -0.02))],
+    ids=["high", "low", "inwards first"],
+)
+@pytest.mark.parametrize("model", ["linear", "nonlinear"])
+def test_a_tendon_is_stretched_where_the_block_rises_and_turns_within_one_step(model, samples, step, start):
+    tied = RestrainedBlock(SYMMETRIC, Tendon(2e5), one_sided=True, restitution=0.1)
+    motion, (rotation, velocity) = rocking.Motion.from_samples(samples, step), start
+    response = rocking.simulate(tied, motion, model=model, initial_rotation=rotation, initial_velocity=velocity)
+    peak = response.peak_rotation
+    assert peak > 1.1 * rotation
+    opening = 0.2 * (peak if model == "linear" else 2.0 * math.sin(0.5 * peak))
+    (row,) = response.tendons
+    assert row["elongation"] == pytest.approx(opening, rel=1e-12)
+    assert row["force"] == pytest.approx(2e5 * opening, rel=1e-12)
 
 
 def test_a_tendon_yields_in_the_linear_model_where_its_response_says_so():
@@ -242,6 +261,28 @@ def test_a_linear_response_tips_at_the_balance_of_its_own_model(restraint, held,
     assert f"{balance:.5g} rad" in response.summary() and response.to_dict()["balance_rad"] == [*response.balance]
 
 
+@pytest.mark.parametrize("amplitude", [2.4, 3.2, 8.0])
+def test_the_linear_balance_of_a_tendon_that_yields_is_that_of_its_strength_under_any_motion(amplitude):
+    """Beyond yielding m g R (u - alpha) is what its strength holds, whatever it has become during the response."""
+    body = RestrainedBlock(SYMMETRIC, Tendon(2e5, prestress=4e3, strength=6e3))
+    response = rocking.simulate(body, rocking.pulses.one_sine(amplitude, 1.0), model="linear")
+    balance = SYMMETRIC.alpha + 6e3 * 0.2 / (2e3 * G * SYMMETRIC.radius)
+    assert response.balance == pytest.approx((balance, balance), rel=1e-12)
+    assert response.overturned == (amplitude > 3.0)
+    if response.overturned:
+        assert abs(response.rotation(response.tipping_time)) == pytest.approx(balance, rel=1e-9)
+    else:
+        assert response.peak_over_slenderness == pytest.approx(response.peak_rotation / balance, rel=1e-12)
+
+
+def test_the_linear_balance_comes_before_a_tendon_yields_where_that_takes_a_larger_rotation():
+    weight = 2e3 * G * SYMMETRIC.radius
+    body = RestrainedBlock(SYMMETRIC, Tendon(1e4, strength=6e3))
+    response = rocking.simulate(body, rocking.pulses.one_sine(8.0, 1.0), model="linear")
+    balance = weight * SYMMETRIC.alpha / (weight - 1e4 * 0.2**2)
+    assert response.overturned and response.balance == pytest.approx((balance, balance), rel=1e-12)
+
+
 def test_what_is_not_known_of_a_wall_is_said():
     wall = Block.one_sided(Thrust(8e2, height=4.0), width=0.5, height=5.0, mass=6e3).alone()[0]
     response = rocking.simulate(wall, rocking.pulses.one_sine(1.5, 0.8))
@@ -261,6 +302,22 @@ def test_a_block_that_is_held_at_any_rotation_has_no_balance_to_count_by():
     figure = response.plot()
     assert figure.axes[0].get_ylabel() == "rotation (rad)"
     assert "rotation (rad)" in response._repr_html_()
+
+
+def test_a_peak_has_no_ratio_to_a_balance_that_is_not_there():
+    body = RestrainedBlock(SYMMETRIC, Spring(2e5))
+    motion = rocking.pulses.one_sine(4.0, 1.0)
+    for each in (motion, motion.scaled(0.1)):
+        response = rocking.simulate(body, each)
+        assert math.isnan(response.peak_over_slenderness)
+        assert response.to_dict()["peak_over_balance"] is None
+    found = rocking.survey(body, [motion])
+    header, row = found.summary().splitlines()[-2:]
+    assert row[: header.index("peak/balance") + len("peak/balance")].split()[-1] == "-"
+    assert math.isnan(found.rows()[0]["peak_over_balance"])
+    # A wall that rocks one way has one balance, and counts by it at rest, too.
+    wall = RestrainedBlock(SYMMETRIC, one_sided=True)
+    assert rocking.simulate(wall, motion.scaled(0.1)).peak_over_slenderness == 0.0
 
 
 @pytest.mark.parametrize("vertical", [False, True])

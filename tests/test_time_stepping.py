@@ -224,6 +224,31 @@ def test_a_block_that_overturns_ends_at_the_same_time(kind, model):
     assert found.times[-1] == pytest.approx(exact.overturn_time, abs=5e-3)
 
 
+def restrained(*restraints):
+    return rocking.RestrainedBlock(rocking.Block(width=0.4, height=2.0, mass=2e3), *restraints)
+
+
+STIFF = {
+    "spring": restrained(rocking.Spring(1e8)),
+    "tendon": restrained(rocking.Tendon(1e9)),
+    "damper": restrained(rocking.Damper(1e8)),
+}
+
+
+@pytest.mark.parametrize("scheme", [SchatzmanPaoli, MoreauJean, lambda h: MoreauJean(h, 0.0)])
+@pytest.mark.parametrize("model", ["linear", "nonlinear"])
+@pytest.mark.parametrize("kind", STIFF)
+def test_steps_too_long_for_a_restraint_are_refused_and_others_do_not_make_it_overturn(kind, model, scheme):
+    given = {"body": STIFF[kind], "motion": None, "duration": 0.5, "initial_position": 0.01, "model": model}
+    with pytest.raises(rocking.InvalidOption, match=r"too long for this body: at most") as refused:
+        integrate(scheme=scheme(0.02), **given)
+    longest = float(str(refused.value).split()[-2])
+    found = integrate(scheme=scheme(0.99 * longest), **given)
+    assert not found.overturned
+    assert found.peak < 0.01 * math.e  # so much an explicit scheme may add to an oscillation
+    assert not rocking.simulate(STIFF[kind], None, model=model, initial_rotation=0.01, duration=0.5).overturned
+
+
 @pytest.mark.parametrize(
     ("given", "sentence"),
     [

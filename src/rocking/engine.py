@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.arrays import Flags, Floats, Integers
+from rocking.block.single import ROTATION
 from rocking.body import Bodies
 from rocking.compiling import SIMULATIONS, announce
 from rocking.constants import Model
-from rocking.errors import Unfinished
+from rocking.errors import InvalidMotion, Unfinished
 from rocking.kernels import lanes, state
 from rocking.kernels.ground import Ground, greatest_weight
 from rocking.kernels.lane_steps import WIDTH
@@ -188,9 +189,24 @@ def _in_flight(
             yield pending.pop(future), future.result()
 
 
+def check_components(bodies: Bodies, motion: Motion | None) -> None:
+    """Check that a motion has no vertical component where bodies move along a line and not over the ground.
+
+    Raises
+    ------
+    InvalidMotion
+        If it has one there.
+    """
+    if motion is not None and motion.vertical is not None and bodies[0].coordinate.unit != ROTATION.unit:
+        raise InvalidMotion(
+            f"this {bodies[0].description} moves along one line; give a motion without a vertical component"
+        )
+
+
 def simulate_task(setup: Setup, task: Task, cancelled: Cancellation | None = None) -> NDArray[np.void]:
     """Outcomes of one task; where it is ``cancelled`` on the way, of no use."""
     bodies = setup.bodies.select(task.bodies)
+    check_components(bodies, task.motion)
     limits = setup.treatment.limits(bodies, task.motion, setup.model, task.factor)
     rules = rules_of(bodies, setup.model, setup.treatment, setup.duration, record=False)
     ground = ground_of(task.motion, bodies.gravity, task.factor)

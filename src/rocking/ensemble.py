@@ -16,7 +16,7 @@ from rocking.block import Blocks
 from rocking.block.single import ROTATION
 from rocking.body import Bodies, Body
 from rocking.constants import VERSION, Model
-from rocking.engine import OUTCOME, Setup, Task, parts_of, simulate_tasks
+from rocking.engine import OUTCOME, Setup, Task, check_components, parts_of, simulate_tasks
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.named import Motions, names_of, several_motions
@@ -164,8 +164,8 @@ class Product:
 
     Raises
     ------
-    InvalidOption
-        If a rule is out of its range.
+    InvalidOption, InvalidMotion
+        If a rule is out of its range, or a motion of bodies on a line has a vertical component.
     """
 
     bodies: Bodies
@@ -179,6 +179,8 @@ class Product:
     def __post_init__(self) -> None:
         checks.one_of(self.polarity, "polarity", InvalidOption, list(_SIGNS))
         rules_of(self.bodies, self.model, self.treatment, self.duration, record=False)  # checked before any work
+        for motion in self.motions:
+            check_components(self.bodies, motion)
 
     @property
     def signs(self) -> tuple[int, ...]:
@@ -353,8 +355,8 @@ def simulate_many(
 
     Raises
     ------
-    InvalidOption
-        If an argument is out of its range.
+    InvalidOption, InvalidMotion
+        If an argument is out of its range, or a motion of bodies on a line has a vertical component.
 
     Notes
     -----

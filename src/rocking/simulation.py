@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rocking.body import Bodies, Body
 from rocking.compiling import SIMULATIONS, announce
 from rocking.constants import Model
-from rocking.engine import SLICE, slices
+from rocking.engine import SLICE, check_components, slices
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.march import follow
@@ -71,7 +71,7 @@ def simulate(
     Raises
     ------
     InvalidBlock, InvalidMotion
-        If the block is no body, or the motion no `Motion`.
+        If the block is no body, or the motion no `Motion` or one with a vertical component for a body on a line.
     InvalidOption
         If an argument is out of its range, or the block would never come to rest and no duration is given.
 
@@ -108,6 +108,7 @@ def response_to(
     """Response as of `simulate`, to a caller that has another name for the initial coordinate."""
     announce(SIMULATIONS)
     how, alone, motion = treatment(chattering), one_body(block).alone(), one_motion(motion)
+    check_components(alone, motion)
     rules = rules_of(alone, model, how, duration, record=True)
     records = alone.kernel_records(model, how.limits(alone, motion, model))
     trail = Trail(ground_of(motion, block.gravity), records[0], rules, NO_NODES)

@@ -238,9 +238,9 @@ class FallingRestitution(Restitution):
     def __post_init__(self) -> None:
         """Check the numbers."""
         slopes = checked_pair(self.slope, "slope")
-        if not all(0.0 <= slope < math.inf for slope in slopes):
+        if wrong := [slope for slope in slopes if not 0.0 <= slope < math.inf]:
             raise InvalidBlock(
-                f"{{}} must be at least 0, in s/rad, not {min(slopes):g}: a faster impact loses more",
+                f"{{}} must be finite and at least 0, in s/rad, not {wrong[0]:g}: a faster impact loses more",
                 "slope",
                 value=self.slope,
             )

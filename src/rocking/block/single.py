@@ -377,7 +377,10 @@ class Block:
         from rocking.block.restrained import RestrainedBlock
 
         numbers: Any = [each for each in restraints if isinstance(each, (int, float))]
-        return RestrainedBlock(cls(*numbers, **sizes), *restraints, one_sided=True, lean=lean, restitution=restitution)
+        # What is given takes the place of the block's own restitution, so that angular momentum need not leave it one.
+        own = None if restitution is None else 1.0
+        block = cls(*numbers, restitution=own, **sizes)
+        return RestrainedBlock(block, *restraints, one_sided=True, lean=lean, restitution=restitution)
 
     def __str__(self) -> str:
         """Return description and parameters in one line."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
@@ -16,7 +17,7 @@ from rocking.body import Body
 from rocking.constants import MODELS, Model
 from rocking.dynamics.linear_bodies import LinearBodies, LinearBody
 from rocking.ensemble import dataset_of, outcomes_of, product_of, setup_of
-from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
+from rocking.errors import InvalidBlock, InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.named import Motions, one_motion
 from rocking.peak_changes import BETWEEN_STOPS
@@ -135,7 +136,7 @@ def simulate(
     >>> f"{response.events['time'][0]:.12f}"
     '1.800000000000'
     """
-    body, motion = _one_body(body), _along_one_line(one_motion(motion))
+    body, motion = _one_body(body), one_motion(motion)
     _check_rests(body, duration)
     at = position_at_start(body, initial_position)
     found = response_to(body, motion, "linear", chattering, _duration(body, motion, duration), (at, initial_velocity))
@@ -202,7 +203,7 @@ def simulate_many(
         gathered = LinearBodies([_one_body(each) for each in given])
     for each in gathered.members:
         _check_rests(each, duration)
-    pressed = np.array([min(each.thresholds) > 0.0 for each in gathered.members])
+    pressed = np.array([_is_pressed(each) for each in gathered.members])
     if duration is None and pressed.any() and not pressed.all():
         # Those that nothing presses against a stop end with the motion; the others go on until they rest.
         import xarray as xr
@@ -216,8 +217,6 @@ def simulate_many(
         whole = xr.concat(parts, "body", data_vars="all", coords="minimal", compat="override", join="override")
         return whole.isel(body=np.argsort(np.concatenate(kinds)))
     product = product_of(gathered, motions, None, "factor", "+", "linear", chattering, duration)
-    for motion in product.motions:
-        _along_one_line(motion)
     if initial_position is not None:
         initial_position = checks.finite(initial_position, "initial_position", InvalidOption)
     setup = replace(
@@ -285,22 +284,20 @@ def _one_body(body: object) -> LinearBody:
     return body
 
 
-def _along_one_line(motion: Motion | None) -> Motion | None:
-    if motion is not None and motion.vertical is not None:
-        raise InvalidMotion(
-            "a body of rocking.dynamics moves along one line; give a motion without a vertical component"
-        )
-    return motion
-
-
 def _start_of(body: LinearBody) -> float:
     """Return position zero, or the stop that zero is behind."""
     return min(max(0.0, body.law.low), body.law.high)
 
 
+def _is_pressed(body: LinearBody) -> bool:
+    """Whether something presses the body against one of its stops where nothing moves."""
+    low, high = body.thresholds
+    return low > 0.0 or 0.0 < high < math.inf
+
+
 def _check_rests(body: LinearBody, duration: float | None) -> None:
     """Ask for a duration where a body that is pressed against its stop bounces for ever."""
-    if duration is None and min(body.thresholds) > 0.0 and never_rests(body.alone()):
+    if duration is None and _is_pressed(body) and never_rests(body.alone()):
         raise InvalidOption(
             f"a body with {{}} 1, as this {body.description}, never comes to rest; give {{}} to say when to stop",
             *("restitution", "duration"),
@@ -309,7 +306,7 @@ def _check_rests(body: LinearBody, duration: float | None) -> None:
 
 def _duration(body: LinearBody, motion: Motion | None, duration: float | None) -> float | None:
     """Return the given duration, or that of the motion for a body that nothing presses against its stop."""
-    if duration is not None or min(body.thresholds) > 0.0:
+    if duration is not None or _is_pressed(body):
         return duration
     if motion is None:
         raise InvalidOption("nothing presses this body against a stop, so that it need not rest; give {}", "duration")

@@ -14,6 +14,7 @@ from rocking.arrays import Floats
 from rocking.body import Body
 from rocking.constants import Model
 from rocking.dynamics.simulation import model_of, position_at_start
+from rocking.engine import check_components
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.kernels import state, stepping
 from rocking.motion.motion import Motion
@@ -29,8 +30,11 @@ _STEPS_AT_REST: Final = 16
 #: Largest number of steps: the rows are half a gigabyte.
 _MOST_STEPS: Final = 20_000_000
 
-#: Longest step over the time in which the body's own motion grows by e, or turns by a radian.
+#: Longest step over the time in which the body's own motion grows or is damped by e, or turns by a radian.
 _LONGEST_STEP: Final = 0.5
+
+#: Logarithm of the largest factor by which a scheme may enlarge an oscillation of the body until the end.
+_MOST_GROWTH: Final = 1.0
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,11 @@ class TimeStepping(ABC):
     def label(self) -> str:
         """Short name with the parameters and their units, for tables and figures."""
 
+    @property
+    def _growth(self) -> float:
+        """Logarithm of the factor by which a step enlarges an oscillation, over half the square of its phase."""
+        return 0.0
+
     @abstractmethod
     def _follow(self, problem: tuple[Any, state.Record, state.Record, state.Record], out: Floats) -> int:
         """Write steps into rows, and return how many."""
@@ -83,7 +92,8 @@ class MoreauJean(TimeStepping):
     step : float
         Length h of a step, s.
     theta : float
-        0 is explicit, 1 implicit; 0.5 is of second order where there are no impacts.
+        0 is explicit, 1 implicit; 0.5 is of second order where there are no impacts. Below 0.5 oscillations grow, so
+        that a body which swings about its stop, as by a spring, needs short steps.
 
     Raises
     ------
@@ -113,6 +123,10 @@ class MoreauJean(TimeStepping):
         """Name, step, and theta if it is not one half."""
         theta = "" if self.theta == 0.5 else f", theta {self.theta:g}"
         return f"Moreau-Jean {self.step:g} s{theta}"
+
+    @property
+    def _growth(self) -> float:
+        return max(0.0, 1.0 - 2.0 * self.theta)
 
     def _follow(self, problem: tuple[Any, state.Record, state.Record, state.Record], out: Floats) -> int:
         return int(stepping.moreau_jean(*problem, self.theta, self.AHEAD, self.step, out))
@@ -233,7 +247,7 @@ def integrate(
     ------
     InvalidBlock, InvalidMotion
         If the body is none, its restitution varies from impact to impact, or a tendon of it yields; or if the motion is
-        no `Motion`.
+        no `Motion`, or one with a vertical component for a body on a line.
     InvalidOption
         If an argument is out of its range, or the step too long for the body, or too short for the duration.
 
@@ -258,6 +272,7 @@ def integrate(
     """
     one, motion = one_body(body), one_motion(motion)
     alone, how = one.alone(), Certified()
+    check_components(alone, motion)
     stop = checks.positive(duration, "duration", InvalidOption, "s")
     equation = model_of(one, model)
     rules = rules_of(alone, equation, how, stop, record=True)
@@ -267,13 +282,12 @@ def integrate(
         raise InvalidBlock("time stepping knows no {} that varies from impact to impact: give a number", "restitution")
     if record["yielding"]:
         raise InvalidBlock("time stepping knows no tendon that yields: leave its {} out", "strength")
-    longest = _LONGEST_STEP / math.sqrt(float(np.max(np.abs(record["stiffness"]))) or math.inf)
     if not isinstance(scheme, TimeStepping):
         raise InvalidOption(
             f"{{}} must be one of time stepping, as MoreauJean(1e-3), not {scheme!r}", "scheme", value=scheme
         )
-    h = scheme.step
-    if h > longest > 0.0:
+    h, longest = scheme.step, _longest_step(scheme, record, stop, nonlinear=equation == "nonlinear")
+    if h > longest:
         raise InvalidOption(f"{{}} of {h:g} s is too long for this body: at most {longest:.3g} s", "step", value=h)
     count = math.ceil(stop / h * (1.0 - 2.0**-50))
     if count > _MOST_STEPS:
@@ -303,6 +317,21 @@ def integrate(
         peak=float(u.max()) + one.stops[0],
         penetration=max(0.0, -float(u.min()), float(u.max() - record["fallen"]) if record["facing"] else 0.0),
     )
+
+
+def _longest_step(scheme: TimeStepping, record: state.Record, stop: float, *, nonlinear: bool) -> float:
+    """Longest step, s, by which a scheme follows a body that nothing shakes until ``stop``; infinite without a bound.
+
+    The derivative of its acceleration by the coordinate is between two bounds on each side, at any rotation.
+    """
+    weight, push = 1.0 + record["added_weight"], np.abs(record["added_push"])
+    low = high = record["stiffness"] * weight - record["spring"]
+    if nonlinear:  # the weight counts with a cosine that is not negative, the push with a sine of any sign
+        low = record["stiffness"] * (np.minimum(weight, 0.0) - push) - record["spring"]
+        high = record["stiffness"] * (np.maximum(weight, 0.0) + push) - record["spring"] + 0.5 * record["prestress"]
+    rate = max(math.sqrt(float(np.max(np.abs([low, high])))), float(np.max(record["damping"])))
+    growth = scheme._growth * max(0.0, -float(np.min(low)))  # of an oscillation, per time and step
+    return min(_LONGEST_STEP / rate if rate else math.inf, 2.0 * _MOST_GROWTH / (growth * stop) if growth else math.inf)
 
 
 def _contacts(times: Floats, pushes: Any) -> tuple[Floats, Floats]:

@@ -60,7 +60,8 @@ def record_proof(ground: Ground, block: Record, rules: Record, state: Record, pr
     if state.run == 0:
         state.run = 1
         state.run_start = time_of(ground, state)
-    excess = (proof.upper - proof.lower) / rules.tolerance
+    # No bracket is narrower than the last place of its times, however slow the block is.
+    excess = (proof.upper - proof.lower) / max(rules.tolerance, ULP * time_of(ground, state))
     if block.varying:
         # The width is proportional to the square of the speed, or to the speed where the factor is drawn.
         state.proof_speed = state.v * min(_SLOWEST, 1.0 / excess if is_drawn(block) else math.sqrt(1.0 / excess))

@@ -75,19 +75,30 @@ class Answers:
         Of a free block it is the slenderness in both models.
         """
         if isinstance(self.body, RestrainedBlock) and not self._trail.rules["nonlinear"]:
-            plus, minus = linear_balance(self._trail.block).tolist()
+            plus, minus = linear_balance(self.body).tolist()
             return plus, minus
         return self.body.balance
 
     @cached_property
     def peak_over_slenderness(self) -> float:
-        """Peak rotation over the slenderness of the side where it is reached; infinite where the block overturns."""
+        """Peak rotation over the slenderness of the side where it is reached; infinite where the block overturns.
+
+        Of a restrained block over its balance; NaN where there is none.
+        """
         if self.overturned:
             return math.inf
+        balance = self._balance_at_peak
+        return self.peak_rotation / balance if math.isfinite(balance) else math.nan
+
+    @cached_property
+    def _balance_at_peak(self) -> float:
+        """Rotation of the unstable balance on the side of the peak, rad; infinite without one.
+
+        Of a block that does not move it is the nearer one.
+        """
         if self.peak_rotation == 0.0:
-            return 0.0
-        leaning = float(self.rotation(self.peak_time))
-        return self.peak_rotation / self.balance[0 if leaning > 0.0 else 1]
+            return min(self.balance)
+        return self.balance[0 if float(self.rotation(self.peak_time)) > 0.0 else 1]
 
     @cached_property
     def tendons(self) -> NDArray[np.void]:

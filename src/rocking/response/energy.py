@@ -55,7 +55,17 @@ class Energy:
     @cached_property
     def balance(self) -> Floats:
         """Rotation of the unstable balance on each side in this model, rad; infinite where there is none."""
-        return np.array(self.body.balance) if self.nonlinear else linear_balance(self.record)
+        return np.array(self.body.balance) if self.nonlinear else linear_balance(self.body)
+
+    @cached_property
+    def counts_by_balance(self) -> bool:
+        """Whether rotations can be counted in balances: each side to which the body leans has one."""
+        return bool(np.all(np.isfinite(self.balance[: len(self.body.sides)])))
+
+    @property
+    def counted_in(self) -> Floats:
+        """What rotations to each side are counted in, rad: the balance; one radian where they cannot be so counted."""
+        return np.where(np.isfinite(self.balance), self.balance, 1.0) if self.counts_by_balance else np.ones(2)
 
     @cached_property
     def highest(self) -> Floats:
@@ -123,15 +133,26 @@ class Energy:
         return self.kinetic(impacts["speed_before"], left) - self.kinetic(impacts["speed_after"], entered)
 
 
-def linear_balance(made: Record) -> Floats:
-    """Rotation of the unstable balance on each side in the linear model, rad; infinite where there is none."""
-    found = np.full(2, math.inf)
-    for k in range(2):
-        weight = 1.0 + made["added_weight"][k]
-        falls = made["stiffness"][k] * weight - made["spring"][k]
-        stands = made["gain"][k] * (made["threshold"][k] * weight + made["added_push"][k]) + made["prestress"][k]
-        if falls > 0.0:
-            found[k] = stands / falls
+def linear_balance(body: Block | RestrainedBlock) -> Floats:
+    """Rotation of the unstable balance on each side in the linear model, rad; infinite where there is none.
+
+    A tendon that yields does so for the first time: it pulls as one that is elastic or with its strength, whichever is
+    less, so that the balance is the nearer one of both.
+    """
+    (made,) = body.alone().kernel_records("linear", np.zeros((1, 2)))
+    elastic = _balance_on_a_line(made, made["added_weight"], made["added_push"], made["prestress"])
+    if not made["yielding"]:
+        return elastic
+    pull = made["base_prestress"] + made["tendon"] * (made["yields"] - made["slack"])
+    return np.minimum(elastic, _balance_on_a_line(made, made["base_weight"], made["base_push"], pull))
+
+
+def _balance_on_a_line(made: Record, added_weight: Floats, added_push: Floats, prestress: Floats) -> Floats:
+    """Rotation at which what brings a block back has become nothing, where it is a straight line in the rotation."""
+    found, weight = np.full(2, math.inf), 1.0 + added_weight
+    falls = made["stiffness"] * weight - made["spring"]
+    stands = made["gain"] * (made["threshold"] * weight + added_push) + prestress
+    np.divide(stands, falls, out=found, where=falls > 0.0)
     return found
 
 

@@ -21,7 +21,9 @@ from rocking.kernels.trace import Trail, own, trace
 #: Times at which each step of the last arc is looked at for its last passage of the balance point.
 _LOOKS: Final = 33
 
-#: Halvings of the time at which a body turns: the coordinate is stationary there.
+#: Parts of a step, each of which is looked at for where a body turns back; and halvings of the time at which it does:
+#: the coordinate is stationary there.
+_PARTS: Final = 8
 _TURNINGS: Final = 30
 
 
@@ -106,20 +108,24 @@ class History:
         return bisected(float(times[within[-1]]), float(times[min(within[-1] + 1, len(times) - 1)]), is_beyond)[1]
 
     def largest(self) -> tuple[float, float]:
-        """Largest rotation of a block on each side, rad: at nodes, and where it turns within a step."""
+        """Largest rotation of a block on each side, rad: at the ends of parts of steps, and where it turns within one.
+
+        A part may begin without speed, as an uplift does, and a step may begin inwards and turn outwards.
+        """
         nodes = self.trail.nodes
         moving = np.flatnonzero(nodes["side"] >= 0)
-        side, found = nodes["side"][moving], nodes["u"][moving].copy()
-        sign = 1.0 - 2.0 * side
-        low = nodes["time"][moving].copy()
-        high = np.append(nodes["time"][1:], self.end)[moving]
-        rising = (nodes["v"][moving] > 0.0) & (sign * self.states_in(high, moving)[:, 1] <= 0.0)
-        at = np.flatnonzero(rising)
-        for _ in range(_TURNINGS if len(at) else 0):
-            middle = 0.5 * (low[at] + high[at])
-            out = sign[at] * self.states_in(middle, moving[at])[:, 1] > 0.0
-            low[at], high[at] = np.where(out, middle, low[at]), np.where(out, high[at], middle)
-        found[at] = np.abs(self.states_in(low[at], moving[at])[:, 0])
+        side = nodes["side"][moving]
+        ends = np.append(nodes["time"][1:], self.end)[moving]
+        times = np.linspace(nodes["time"][moving], ends, _PARTS + 1, axis=1)
+        states = self.states_in(times.ravel(), np.repeat(moving, _PARTS + 1)).reshape(*times.shape, 3)
+        found, rate = np.abs(states[..., 0]).max(axis=1), (1.0 - 2.0 * side)[:, None] * states[..., 1]
+        step, part = np.nonzero((rate[:, :-1] >= 0.0) & (rate[:, 1:] <= 0.0))
+        low, high, rows, sign = times[step, part], times[step, part + 1], moving[step], 1.0 - 2.0 * side[step]
+        for _ in range(_TURNINGS if len(step) else 0):
+            middle = 0.5 * (low + high)
+            out = sign * self.states_in(middle, rows)[:, 1] > 0.0
+            low, high = np.where(out, middle, low), np.where(out, high, middle)
+        np.maximum.at(found, step, np.abs(self.states_in(low, rows)[:, 0]))
         plus, minus = (float(np.max(found[side == k], initial=0.0)) for k in range(2))
         return plus, minus
 

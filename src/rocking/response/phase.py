@@ -30,7 +30,8 @@ class Course(NamedTuple):
     time : ndarray
         s.
     rotation, velocity : ndarray
-        Rotation over the balance of its side (of a free block the slenderness), velocity over p times that.
+        Rotation over the balance of its side (of a free block the slenderness), velocity over p times that; where a
+        side has no balance, rotation in rad and velocity over p.
     kinetic, potential : ndarray
         Energies as of `Response.kinetic_energy`.
     before : ndarray of int
@@ -83,11 +84,11 @@ def course_of(response: Answers, start: float, end: float) -> Course:
     back, out = (2.0 * left - 1.0) * impacts["speed_before"], (1.0 - 2.0 * entered) * impacts["speed_after"]
     rotation, velocity = joined(theta, 0.0 * at, 0.0 * at), joined(rate, back, out)
     own = np.maximum(side, 0)
-    balance = energy.balance[own]
+    unit = energy.counted_in[own]
     return Course(
         joined(times, at, at),
-        rotation / balance,
-        velocity / (energy.p[own] * balance),
+        rotation / unit,
+        velocity / (energy.p[own] * unit),
         energy.kinetic(velocity, side),
         energy.potential(rotation, side),
         where + 2 * np.arange(len(where)),
@@ -105,9 +106,10 @@ def boundary_of(response: Answers) -> tuple[Floats, Floats]:
     for side, sign in enumerate((1.0, -1.0)):
         u, speed = energy.boundary(side)
         falling = np.where(u < 1.0, speed, -speed)  # two branches cross at the balance
+        unit = energy.balance[side] / energy.counted_in[side]
         for direction in (1.0, -1.0) if len(u) else ():
-            x += [sign * u, gap]
-            y += [direction * falling, gap]
+            x += [sign * unit * u, gap]
+            y += [direction * unit * falling, gap]
     return np.concatenate(x), np.concatenate(y)
 
 
@@ -142,7 +144,7 @@ def phase_plane(
         jumps=np.column_stack([course.velocity[course.before], course.velocity[course.before + 1]]),
         boundary=boundary_of(response),
         **{f"{kind}s": bool(len(times)) for kind, times in marked(response, start, end).items()},
-        limit=response.body.coordinate.limit,
+        limit=response.body.coordinate.limit if energy_in(response).counts_by_balance else "rad",
         title=title or titled(response),
         ax=ax,
         figsize=figsize,

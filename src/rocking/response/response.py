@@ -342,7 +342,7 @@ class Response(Answers, DrawnResult):
         """Figure of the velocity against the rotation, with impacts as jumps and the energy of the balance.
 
         Rotations are over the slenderness of their side (of a restrained block over its balance), velocities over p
-        times that.
+        times that; where a side has no balance, rotations are in rad.
 
         Parameters
         ----------

@@ -75,7 +75,7 @@ def line(response: Answers) -> str:
     """Return what happened, in one line."""
     motion, limit = response.motion, response.body.coordinate.limit
     peak = ""
-    if limit and not response.overturned and math.isfinite(_balance_of(response)):
+    if limit and not response.overturned and math.isfinite(response._balance_at_peak):
         peak = f", peak {response.peak_over_slenderness:.4g} of the {limit}"
     return (
         f"{response.body.description} under {'no motion' if motion is None else motion.label}: "
@@ -294,7 +294,7 @@ def _peak_rows(response: Answers) -> list[Row]:
         note += ", where the block has fallen"
     elif response._reaches_second_stop:
         note += ", at the stop"
-    elif limit and math.isfinite(_balance_of(response)):
+    elif limit and math.isfinite(response._balance_at_peak):
         note += f", {ratio_text(response)} of the {limit}"
     return [Row(f"peak {name}", f"{response.peak_rotation:.{_peak_digits(response)}g}", unit, note)]
 
@@ -317,12 +317,6 @@ def _tendon_rows(response: Answers) -> list[Row]:
         text = f"longer by {1e3 * row['elongation']:.4g} mm at most{stays}"
         rows.append(Row("tendon", text, note=f", force {1e-3 * row['force']:.4g} kN at most"))
     return rows
-
-
-def _balance_of(response: Answers) -> float:
-    """Unstable balance on the side of the peak, rad."""
-    leaning = float(response.rotation(response.peak_time))
-    return response.balance[0 if leaning > 0.0 else 1] if response.peak_rotation > 0.0 else 1.0
 
 
 def _contact_rows(response: Answers, friction: float | None, sliding: float) -> list[Row]:
