@@ -106,6 +106,14 @@ def test_every_body_is_shown_in_a_table(run, body, pulse):
     assert "largest multiplier" in out
 
 
+@pytest.mark.parametrize(("restitution", "said"), [(0.0, "1"), (0.5, "infinite")])
+def test_the_table_has_the_impacts_of_the_orbits(restitution, said):
+    ball, table = dynamics.BouncingBall(restitution), pulses.sine(12.0, 5.0, cycles=1)
+    (orbit,) = dynamics.periodic_orbits(ball, table, starts=[[0.0, 0.0]])
+    assert orbit.rests and float(said.replace("infinite", "inf")) == orbit.impacts
+    assert commands._text([orbit]).splitlines()[-1].split()[:3] == ["1", "1", said]
+
+
 BLOCK = ("--width", 0.8, "--height", 2.0, "--model", "linear", "--pulse", "sine:amplitude=0.05,frequency=5Hz")
 
 MISTAKES = [

@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 from rocking import Block, InvalidMotion, InvalidOption, dynamics, pulses
 from rocking.dynamics import basin_grid
 from rocking.dynamics.attractors import Known
+from rocking.dynamics.bifurcation import period_of, settled_states
 
 BLOCK = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
 SHAKING = pulses.sine(3.5, 1.2, cycles=1)
@@ -230,6 +231,29 @@ def test_an_interrupted_erosion_goes_on_in_its_folder(tmp_path, monkeypatch):
     calls[:] = [0]
     with pytest.raises(KeyboardInterrupt):  # nothing was reached
         dynamics.safe_basin_erosion(BLOCK, SHAKING, [0.5, 1.0], x, v, 40)
+
+
+def test_a_state_at_any_point_of_a_long_orbit_has_settled_on_it():
+    """A few points of a long orbit have a neighbourhood; a cell may end at another one, before or after it is known."""
+    strobe = dynamics.stroboscopic_map(dynamics.BouncingBall(0.5, gravity=10.0), pulses.sine(16.92, 5.0, cycles=1))
+    states = np.stack(np.meshgrid(np.linspace(0.05, 0.15, 5), np.linspace(0.3, 0.7, 5)), axis=-1).reshape(-1, 2)
+    kept = settled_states(strobe, states, 400, 64)
+    periods = [period_of(each) for each in kept]
+    assert sorted(set(periods)) == [4, 23]
+    known = Known(strobe, np.array([0.1, 0.4]))
+    owners = known.settle(kept[:, -1])
+    assert [each.period for each in known.attractors] in ([4, 23], [23, 4])
+    assert [known.attractors[owner].period for owner in owners] == periods
+    on = kept[periods.index(23)][:23]
+    assert np.count_nonzero(known.owners(on) == -1) > Known.MOST_TRIES
+    assert set(known.settle(on).tolist()) == {owners[periods.index(23)]} and len(known.attractors) == 2
+
+
+@pytest.mark.parametrize("width", [1e-2, 1e-6, 1e-9, 0.0])
+def test_a_small_part_of_a_grid_has_the_same_attractor(width):
+    x, v = np.linspace(0.02, 0.02 + width, 3), np.linspace(0.1, 0.1 + 2.0 * width, 3)
+    found = dynamics.basins(BLOCK, SHAKING, *((x, v) if width else (x[:1], v[:1])))
+    assert found.attractor.values.tolist() == ["period 1, 2 impacts"]
 
 
 def test_what_rests_is_an_attractor_and_a_chaotic_state_has_not_settled():

@@ -135,6 +135,51 @@ def test_a_block_that_overturns_leaves_a_gap_and_starts_again():
     assert found.changes() == [(9.0, 1.0, -1, 1)]
 
 
+def test_a_velocity_that_is_zero_but_for_rounding_has_no_period_of_its_own():
+    """In resonance the velocity of an oscillator that misses its stop is zero where the support's acceleration is."""
+    oscillator = dynamics.ImpactOscillator(1.0, 0.8, damping_ratio=0.2, stop=0.5)
+    found = dynamics.bifurcation_diagram(
+        lambda frequency: (oscillator, pulses.sine(1.0, frequency, cycles=1)),
+        [0.8, 0.9, 1.0, 1.1, 1.2], [0.0, 0.1], transient=800,
+    )  # fmt: skip
+    assert np.abs(found.velocity.values[0, 2]).max() < 1e-14
+    assert found.period.values[0, :, 0].tolist() == [1] * 5
+
+
+def test_a_small_orbit_has_its_period():
+    states = 1e-5 * np.array([[1.0, 2.0], [1.0, 2.0 + 1e-5]] * 8)
+    assert bifurcation.period_of(states, (1.0, 1.0)) == bifurcation.period_of(states) == 2
+
+
+@pytest.mark.parametrize("chattering", ["certified", "velocity=0.001"])
+@pytest.mark.parametrize("restitution", [0.5, 0.0])
+def test_impacts_are_those_of_the_orbit_infinite_where_chattering_is_complete(restitution, chattering):
+    ball, levels = dynamics.BouncingBall(restitution, gravity=10.0), [5.0, 12.0]
+
+    def case(level):
+        return ball, pulses.sine(level, 5.0, cycles=1)
+
+    found = dynamics.bifurcation_diagram(case, levels, [0.0, 0.0], chattering=chattering)
+    orbits = [dynamics.periodic_orbits(*case(level), starts=[[0.0, 0.0]], chattering=chattering)[0] for level in levels]
+    impacts = found.impacts.values[0, :, 0].tolist()
+    assert impacts == [each.impacts for each in orbits] and impacts[0] == 0.0 < impacts[1]
+    assert math.isinf(impacts[1]) == (restitution > 0.0 and chattering == "certified")
+
+
+@pytest.mark.parametrize("transient", [0, 1])
+def test_what_takes_too_many_steps_is_not_said_to_overturn(transient):
+    lively, start = dynamics.BouncingBall(1.0, gravity=10.0), [0.0, 1e-5]
+    found = dynamics.bifurcation_diagram(
+        lambda level: (lively, pulses.sine(level, 0.5, cycles=1)), [0.1], start, transient=transient, kept=2
+    )
+    _, fate, _ = dynamics.stroboscopic_map(lively, pulses.sine(0.1, 0.5, cycles=1)).followed(start)
+    assert fate == dynamics.Fate.UNFINISHED and np.isnan(found.coordinate.values).all()
+    assert found.period.values.tolist() == [[[-2]]]
+    assert found.summary().endswith("up: not followed throughout") and "overturned" not in found.summary()
+    (figure_legend,) = found.plot().legends
+    assert "not followed" in [text.get_text() for text in figure_legend.get_texts()]
+
+
 def test_a_stop_that_moves_takes_the_body_with_it():
     found = dynamics.bifurcation_diagram(
         lambda stop: (dynamics.ImpactOscillator(1.0, 0.7, stop=stop), pulses.sine(1.0, 0.7, cycles=1)),

@@ -1,6 +1,7 @@
 """Every way in which a branch of orbits may end, or cross another, where formulas or other computations say."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,9 @@ from oracles import closed_orbits
 from scipy.optimize import brentq
 
 from rocking import Block, VelocityThreshold, dynamics, pulses, simulate
+from rocking.dynamics.courses import Course
+from rocking.dynamics.locating import _reason
+from rocking.dynamics.orbit_equations import Kind, _kind_of
 
 G = 10.0
 TABLE = 5.0  # Hz
@@ -229,6 +233,31 @@ def test_a_branch_is_lost_where_the_family_has_no_body():
     # Both orbits go there from where 0.4 is the level of the fold.
     (fold,) = branch.bifurcations
     assert closed_orbits.Ball(fold.value, 1).fold == pytest.approx(0.4, abs=1e-10)
+
+
+def test_a_ball_that_never_moves_does_not_graze_where_the_family_has_no_body():
+    def family(e):
+        return dynamics.BouncingBall(e, gravity=G), pulses.sine(5.0, TABLE, cycles=1)
+
+    (rests,) = dynamics.periodic_orbits(*family(0.5), starts=[[0.0, 0.0]])
+    branch = dynamics.continue_orbit(rests, family, 0.5, (0.3, 1.5))
+    assert branch.ends == ("limit of the parameter", "lost") and branch.bifurcations == ()
+    assert 1.0 - 1e-6 < branch.values.max() <= 1.0
+
+
+def test_a_branch_beyond_which_nothing_can_be_followed_is_lost_and_does_not_overturn():
+    lively = dynamics.stroboscopic_map(dynamics.BouncingBall(1.0, gravity=G), pulses.sine(0.1, 0.5, cycles=1))
+    block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    falls = dynamics.stroboscopic_map(block, pulses.sine(20.0, 0.5, cycles=1))
+    judged = 0
+    for reason, strobe, state in (("lost", lively, [0.0, 1e-5]), ("overturning", falls, [0.1, 0.2])):
+        kind = _kind_of(strobe, np.array(state), 1)
+        before = Kind(rests=False, for_ever=False, impacts=1, overturns=False, unknown=False)
+        equations = SimpleNamespace(kind=before, sizes=np.ones(3), kind_at=lambda z, kind=kind: kind)
+        here = SimpleNamespace(equations=equations, course=Course(1.0, 1.0, 1.0, np.empty(0)), tangent=np.ones(3))
+        assert _reason(here, np.zeros(3)) == reason
+        judged += 1
+    assert judged == 2
 
 
 @pytest.mark.slow

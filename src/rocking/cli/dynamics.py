@@ -285,7 +285,7 @@ def _text(found: list[PeriodicOrbit]) -> str:
     coordinate = found[0].body.coordinate
     rows = [
         [
-            k, each.period, "infinite" if each.rests and each.impacts else int(each.impacts),
+            k, each.period, "infinite" if math.isinf(each.impacts) else int(each.impacts),
             "yes" if each.is_stable else "no", "yes" if each.symmetric else "no",
             f"{each.state[0]:.9g}", f"{each.state[1]:.9g}", cell(float(abs(each.multipliers[0]))),
         ]

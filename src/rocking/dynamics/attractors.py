@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from rocking.arrays import Flags, Floats, Integers, evenly
 from rocking.dynamics.maps import StroboscopicMap
 from rocking.dynamics.orbits import multipliers_at, sizes_of
+from rocking.dynamics.repeated import parts_of
 from rocking.errors import InvalidOption
-from rocking.kernels.periodic import TRAP
-from rocking.kernels.state import Records
+from rocking.kernels.periodic import TRAP, settle
+from rocking.kernels.state import Records, new_scratch
 from rocking.tables import counted
 
 #: Longest period of an attractor, in periods of the motion, and how near a state must come back to be on one, over the
@@ -235,7 +236,7 @@ class Known:
         Which attractor each belongs to.
     """
 
-    #: States from which attractors are sought among those that have settled on none, in one go.
+    #: States from which attractors are sought in one go, those that lead to a known one not counted.
     MOST_TRIES: Final = 12
 
     def __init__(self, strobe: StroboscopicMap, size: Floats, states: Sequence[Floats] = ()) -> None:
@@ -247,43 +248,56 @@ class Known:
 
     def owners(self, states: Floats) -> Integers:
         """Attractor of each of some states, -1 where it is in no trap."""
-        return self._owner_of(self.strobe._states(states)[1], slice(None))
+        return self._owner_of(self.strobe._states(states)[1])
 
     def settle(self, states: Floats) -> Integers:
         """Attractor of each of some states, -1 where it is in no trap; new attractors are sought on the way."""
         _, made = self.strobe._states(states)
-        found = self._owner_of(made, slice(None))
-        for _ in range(self.MOST_TRIES):
-            unsettled = np.flatnonzero(found == -1)
-            if unsettled.size == 0:
-                break
-            first = unsettled[0]
-            known = len(self.traps)
-            self._add(attractor_from(self.strobe, states[first], self.size))
-            found[unsettled] = self._owner_of(made[unsettled], slice(known, None))
-            if found[first] == -1:
-                found[first] = -2
+        found = self._owner_of(made)
+        tries = self.MOST_TRIES
+        while tries and (unsettled := np.flatnonzero(found == -1)).size:
+            first, known = unsettled[0], len(self.attractors)
+            owner = self._add(attractor_from(self.strobe, states[first], self.size))
+            if owner == known:  # a new one
+                found[unsettled] = self._passing(made[unsettled], self.attractors[owner].period)
+            if owner < 0 or owner == known:  # what is known already is no try
+                tries -= 1
+            found[first] = owner if owner >= 0 else -2
         found[found == -2] = -1
         return found
 
-    def _owner_of(self, made: Records, rows: slice) -> Integers:
+    def _passing(self, made: Records, periods: int) -> Integers:
+        """Attractor in whose traps each of some states comes within so many periods, -1 where it comes in none.
+
+        Of a long orbit some points have a trap, and what has settled on it may be at another point.
+        """
+        setting, passing = self.strobe._setting(), made.copy()
+        found, taken = np.empty(len(made), dtype=np.int64), np.empty(len(made), dtype=np.int64)
+        for part in parts_of(len(made)):
+            settle(setting, new_scratch(), passing[part], periods, self.traps, found[part], taken[part])
+        return np.append(self.owner, -1)[found]
+
+    def _owner_of(self, made: Records) -> Integers:
         found = np.full(len(made), -1)
-        for trap, owner in zip(self.traps[rows], self.owner[rows], strict=True):
+        for trap, owner in zip(self.traps, self.owner, strict=True):
             du, dv = made["u"] - trap[1], made["v"] - trap[2]
             inside: Flags = trap[3] * du * du + 2.0 * trap[4] * du * dv + trap[5] * dv * dv <= 1.0
             found[(made["side"] == trap[0]) & inside & (found == -1)] = owner
         return found
 
-    def _add(self, attractor: Attractor | None) -> None:
+    def _add(self, attractor: Attractor | None) -> int:
+        """Make an attractor known; returns its number, that of the same one where it is known, or -1 without traps."""
         if attractor is None:
-            return
-        for known in self.attractors:
+            return -1
+        for number, known in enumerate(self.attractors):
             if known.period == attractor.period:
                 near = np.abs((known.states - attractor.states[0]) / self.size).max(axis=1)
                 if near.min() < RETURN:
-                    return
+                    return number
         traps = traps_of(self.strobe, attractor, self.size)
-        if len(traps):
-            self.owner = np.append(self.owner, np.full(len(traps), len(self.attractors)))
-            self.traps = np.concatenate([self.traps, traps])
-            self.attractors.append(attractor)
+        if not len(traps):
+            return -1
+        self.owner = np.append(self.owner, np.full(len(traps), len(self.attractors)))
+        self.traps = np.concatenate([self.traps, traps])
+        self.attractors.append(attractor)
+        return len(self.attractors) - 1

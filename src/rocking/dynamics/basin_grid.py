@@ -14,7 +14,7 @@ from rocking.constants import VERSION
 from rocking.dynamics.attractors import Known
 from rocking.dynamics.kept import Kept, key_of
 from rocking.dynamics.maps import StroboscopicMap
-from rocking.dynamics.repeated import described, parts_of
+from rocking.dynamics.repeated import described, parts_of, scale_of
 from rocking.kernels import state
 from rocking.kernels.periodic import Fate, settle
 from rocking.progress import Progress
@@ -43,7 +43,9 @@ class Grid:
 
     def __init__(self, strobe: StroboscopicMap, x: Floats, v: Floats, periods: int, threads: int) -> None:
         self.strobe, self.x, self.v, self.periods, self.threads = strobe, x, v, periods, threads
-        self.size = np.array([_extent(x), _extent(v)])
+        # What becomes of a small grid's states is as large as that of others: to compare them more closely than by
+        # rounding would find no attractor.
+        self.size = np.maximum([_extent(x), _extent(v)], scale_of(strobe))
         self.outcome = np.full(len(x) * len(v), NOT_REACHED, dtype=np.int16)
         self.taken = np.zeros(len(x) * len(v), dtype=np.int32)
         self.known = Known(strobe, self.size)

@@ -12,14 +12,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.arrays import Floats
+from rocking.arrays import Floats, Integers
 from rocking.body import Body
 from rocking.constants import VERSION, Model
 from rocking.dynamics.attractors import RETURN
 from rocking.dynamics.kept import Kept, key_of
 from rocking.dynamics.linear_bodies import LinearBody
-from rocking.dynamics.maps import StroboscopicMap, stroboscopic_map
-from rocking.dynamics.repeated import described
+from rocking.dynamics.maps import Fate, StroboscopicMap, stroboscopic_map
+from rocking.dynamics.orbits import impacts_of
+from rocking.dynamics.repeated import Scale, described, scale_of
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.progress import Progress
@@ -39,6 +40,14 @@ Direction = Literal["up", "down", "both", "afresh"]
 #: An orbit is still settling if the distance between its states shrinks to less than this share while they are kept.
 _STILL: Final = 0.99
 
+#: Least size that the kept states of an orbit are compared by, over the natural scale: `RETURN` of it is some thousand
+#: times rounding.
+_LEAST_SIZE: Final = 1e-6
+
+#: What stands for a period where the body overturned, and where it took too many steps to be followed.
+OVERTURNED: Final = -1
+NOT_FOLLOWED: Final = -2
+
 #: Values of the parameter that are done between two looks at the progress bar.
 _PORTION: Final = 10
 
@@ -53,8 +62,10 @@ class BifurcationDiagram(DatasetResult):
     ----------
     data : xarray.Dataset
         Over (direction, value, start, iterate): coordinate and velocity at the starts of periods after the transient,
-        NaN where the body has overturned. Over (direction, value, start): period, in periods of the motion, 0 where the
-        orbit does not come back among the kept states, -1 where the body overturned; impacts in one such period, or -1.
+        NaN where the body has overturned or could not be followed. Over (direction, value, start): period, in periods
+        of the motion, 0 where the orbit does not come back among the kept states, -1 where the body overturned, -2
+        where it took too many steps to be followed; impacts in one such period, infinity with complete chattering, or
+        -1 where there is no period.
     """
 
     TABLES = MappingProxyType({"states": ("coordinate", "velocity"), "orbits": ("period", "impacts")})
@@ -72,7 +83,7 @@ class BifurcationDiagram(DatasetResult):
         Returns
         -------
         list of (float, float, int, int)
-            In the order in which the values were gone through; a period is 0 where there is none, -1 of overturning.
+            In the order in which the values were gone through; a period that is none is 0, -1 or -2, as in ``data``.
 
         Raises
         ------
@@ -115,7 +126,7 @@ class BifurcationDiagram(DatasetResult):
                 parts.append(
                     f"{which}: changes of the period\n{table_of_some(['from', 'to', 'before', 'after'], rows)}"
                     if rows
-                    else f"{which}: period {_in_words(int(data.period.sel(direction=way).values[0, start]))} throughout"
+                    else f"{which}: {_throughout(int(data.period.sel(direction=way).values[0, start]))} throughout"
                 )
         return "\n\n".join(parts)
 
@@ -141,13 +152,15 @@ class BifurcationDiagram(DatasetResult):
         from rocking.plot.bifurcation import bifurcation_figure
 
         data = self.data
+        over = (data.period.values == OVERTURNED).all(axis=(0, 2))
         return bifurcation_figure(
             value=data.value.values,
             states={
                 way: data.coordinate.sel(direction=way).values.reshape(data.sizes["value"], -1)
                 for way in data.direction.values.tolist()
             },
-            overturned=(data.period.values == -1).all(axis=(0, 2)),
+            overturned=over,
+            not_followed=(data.period.values < 0).all(axis=(0, 2)) & ~over,
             x_label=as_written(data.parameter.replace("_", " ")),
             y_label=f"{data.coordinate.attrs['long_name']} ({data.coordinate.units})",
             title=title or as_written(data.cases),
@@ -181,8 +194,8 @@ def bifurcation_diagram(
     starts : array_like, shape (2,) or (k, 2)
         Coordinate and velocity, of one initial state or of several.
     direction : {"up", "down", "both", "afresh"}
-        Up or down: at each value an orbit starts where it was at the value before, and after overturning again at its
-        initial state. Afresh: at each value from the initial states.
+        Up or down: at each value an orbit starts where it was at the value before, and where that is not known, as
+        after overturning, again at its initial state. Afresh: at each value from the initial states.
     transient : int
         Periods at each value before states are kept.
     kept : int
@@ -265,7 +278,7 @@ class _Work:
         self.transient, self.kept = counts
         shape = len(self.ways), levels.size, len(first)
         self.states = np.full((*shape, self.kept, 2), np.nan)
-        self.period, self.impacts = np.full(shape, -1), np.full(shape, -1)
+        self.period, self.impacts = np.full(shape, OVERTURNED), np.full(shape, -1.0)
         self.done = 0
         self.file: Kept | None = None
         self.ends = [self.mapped(0), self.mapped(levels.size - 1)]
@@ -332,13 +345,14 @@ class _Work:
             strobe = self.mapped(k)
             at = self.first if self.afresh else self.before(w, k)
             at = _in_front(strobe, np.where(np.isnan(at), self.first, at))
-            self.states[w, k] = settled_states(strobe, at, self.transient, self.kept)
-            now = self.states[w, k, :, -1]
+            self.states[w, k], fates = settled(strobe, at, self.transient, self.kept)
+            now, scale = self.states[w, k, :, -1], scale_of(strobe)
+            self.period[w, k, fates == Fate.UNFINISHED] = NOT_FOLLOWED
             for s in np.flatnonzero(~np.isnan(now[:, 0])):
-                period = period_of(self.states[w, k, s])
+                period = period_of(self.states[w, k, s], scale)
                 self.period[w, k, s] = period
                 if period:
-                    self.impacts[w, k, s] = strobe.followed(now[s], period)[2]
+                    self.impacts[w, k, s] = impacts_of(strobe, now[s], period)
         return len(values)
 
     def dataset(self, parameter: str) -> xr.Dataset:
@@ -355,8 +369,12 @@ class _Work:
             {
                 "coordinate": variable(over, self.states[..., 0], coordinate.name, coordinate.unit),
                 "velocity": variable(over, self.states[..., 1], coordinate.rate, f"{coordinate.unit}/s"),
-                "period": variable(orbits, self.period, "periods of the motion, 0: none found, -1: overturned"),
-                "impacts": variable(orbits, self.impacts, "impacts in one period of the orbit, -1: not known"),
+                "period": variable(
+                    orbits, self.period, "periods of the motion, 0: none found, -1: overturned, -2: not followed"
+                ),
+                "impacts": variable(
+                    orbits, self.impacts, "impacts in one period of the orbit, infinite: chattering, -1: not known"
+                ),
                 "start_coordinate": variable("start", self.first[:, 0], "initial state", coordinate.unit),
                 "start_velocity": variable("start", self.first[:, 1], "initial state", f"{coordinate.unit}/s"),
             },
@@ -381,19 +399,37 @@ def _in_front(strobe: StroboscopicMap, states: Floats) -> Floats:
     return np.stack([inside, np.where(held, 0.0, states[:, 1])], axis=-1)
 
 
-def settled_states(strobe: StroboscopicMap, at: Floats, transient: int, kept: int) -> Floats:
-    """States at the starts of some periods after others, shape (n, kept, 2); NaN from where a body overturns."""
-    states = np.full((len(at), kept, 2), np.nan)
-    now = strobe(at, transient) if transient else at
+def settled(strobe: StroboscopicMap, at: Floats, transient: int, kept: int) -> tuple[Floats, Integers]:
+    """States at the starts of some periods after others, shape (n, kept, 2), and what became of each: a `Fate`.
+
+    NaN from where a body overturns, or cannot be followed.
+    """
+    states, now, fates = np.full((len(at), kept, 2), np.nan), at, np.full(len(at), Fate.MOVES.value)
+    if transient:
+        now, fates, _ = strobe.followed(at, transient)
     moves = ~np.isnan(now[:, 0])
     if moves.any():
         states[moves] = strobe.orbit(now[moves], kept)[:, 1:]
-    return states
+    lost = moves & np.isnan(states[:, -1, 0])
+    if lost.any():
+        fates[lost] = strobe.followed(now[lost], kept)[1]
+    return states, fates
 
 
-def period_of(states: Floats) -> int:
-    """Period of an orbit from its kept states; 0 where none comes back for half of them, or it is still settling."""
+def settled_states(strobe: StroboscopicMap, at: Floats, transient: int, kept: int) -> Floats:
+    """States of `settled`."""
+    return settled(strobe, at, transient, kept)[0]
+
+
+def period_of(states: Floats, scale: Scale | None = None) -> int:
+    """Period of an orbit from its kept states; 0 where none comes back for half of them, or it is still settling.
+
+    States are compared by their own size, for an orbit may be small, but by no less than a share of ``scale``, which is
+    natural to them: what is zero but for rounding would have that rounding as its size.
+    """
     size = np.abs(states).max(axis=0) + np.finfo(float).tiny
+    if scale is not None:
+        size = np.maximum(size, _LEAST_SIZE * np.array(scale))
 
     def apart(period: int) -> Floats:
         distance: Floats = (np.abs(states[period:] - states[:-period]) / size).max(axis=1)
@@ -416,5 +452,9 @@ def _common(texts: Sequence[str]) -> str:
     return ", ".join(part for part in first if part in last)
 
 
+def _throughout(period: int) -> str:
+    return f"period {_in_words(period)}" if period >= 0 else _in_words(period)
+
+
 def _in_words(period: int) -> str:
-    return {0: "none found", -1: "overturned"}.get(period, str(period))
+    return {0: "none found", OVERTURNED: "overturned", NOT_FOLLOWED: "not followed"}.get(period, str(period))

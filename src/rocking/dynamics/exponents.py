@@ -37,7 +37,8 @@ class LyapunovExponents(Result):
     ----------
     largest, smallest : float
         Weighted mean of the logarithm, per period, of the stretch along the direction that grows fastest and of that
-        across it: minus infinity where the body comes to rest in some of the periods, NaN where it overturns.
+        across it: minus infinity where the body comes to rest in some of the periods, NaN where it overturns. Where
+        impacts lose nothing, a period at rest counts as zero: what is near it never rests.
     standard_error : float
         Of both, from the means of 20 consecutive parts of the orbit.
     period : float
@@ -47,7 +48,7 @@ class LyapunovExponents(Result):
     impacts : float
         Impacts per period.
     resting : float
-        Share of the periods in which the body comes to rest, of those that are known; NaN where none is.
+        Share of the periods in which the body comes to rest or is at rest, of those that are known; NaN where none is.
     fate : Fate
         What the state is in the end.
     stretches : ndarray, shape (periods, 2)
@@ -166,6 +167,9 @@ def lyapunov_exponents(
     count = checks.whole(periods, "periods", InvalidOption, least=_BATCHES)
     before = checks.whole(transient, "transient", InvalidOption, least=0)
     logs, impacts, fate = strobe._stretches(given, before, count)
+    rests = np.isneginf(logs[:, 0])
+    if strobe._loses_nothing:  # what is near a rest never comes to one, and goes neither nearer nor away
+        logs[rests] = 0.0
     weights = _weights(count)
     known = ~np.isnan(logs).any(axis=1)
     mean = np.full(2, np.nan)
@@ -178,7 +182,7 @@ def lyapunov_exponents(
         period=strobe.period,
         periods=count,
         impacts=impacts / count,
-        resting=float(np.mean(np.isneginf(logs[known, 0]))) if known.any() else float("nan"),
+        resting=float(np.mean(rests[known])) if known.any() else float("nan"),
         fate=fate,
         stretches=logs,
     )

@@ -154,11 +154,14 @@ def _reason(here: Location, beyond: Floats) -> str:
     kind, sizes = equations.kind, equations.sizes
     if not kind.rests and (course.slowest < _GRAZES * sizes[1] or course.gap < _GRAZES * sizes[0]):
         return GRAZING
+    on_other_courses = False
     for step in _BEYOND:
         try:
             found = equations.kind_at(beyond + step * here.tangent)
         except RockingError:
             continue
+        if found.unknown:
+            return LOST
         if found.overturns:
             return OVERTURNING
         if found.for_ever != kind.for_ever:
@@ -167,8 +170,9 @@ def _reason(here: Location, beyond: Floats) -> str:
             return REST if found.rests else CHATTERING
         if found != kind:
             return GRAZING
-    # A body that rests as before, but not in the same way, has touched or missed something since it lifted.
-    return GRAZING if kind.rests else LOST
+        on_other_courses = kind.rests and not kind.for_ever
+    # A body that lifts and rests as before, but not in the same way, has touched or missed something in between.
+    return GRAZING if on_other_courses else LOST
 
 
 def _towards_root(

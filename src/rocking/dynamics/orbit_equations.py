@@ -58,12 +58,16 @@ _KEPT: Final = 64
 
 
 class Kind(NamedTuple):
-    """What does not change along a branch: whether a body rests (for ever) or overturns, and its impacts."""
+    """What does not change along a branch: whether a body rests (for ever), its impacts, and whether it overturns.
+
+    And whether it took too many steps to be followed, so that nothing is known.
+    """
 
     rests: bool
     for_ever: bool
     impacts: int
     overturns: bool
+    unknown: bool
 
 
 class Tests(NamedTuple):
@@ -289,10 +293,11 @@ def tangent_of(jacobian: Floats, like: Floats) -> Floats:
 
 
 def _kind_of(strobe: StroboscopicMap, state: Floats, period: int) -> Kind:
-    after, fate, impacts = strobe.followed(state, period)
+    _, fate, impacts = strobe.followed(state, period)
     _, change = strobe.derivative(state, period)
     rests, for_ever = not np.any(change), bool(fate == Fate.RESTS_FOR_EVER and not impacts)
-    return Kind(rests, for_ever, 0 if rests else int(impacts), bool(np.isnan(after).any()))
+    overturns, unknown = bool(fate == Fate.OVERTURNED), bool(fate == Fate.UNFINISHED)
+    return Kind(rests, for_ever, 0 if rests else int(impacts), overturns, unknown)
 
 
 def _shifted(motion: Motion, shift: int) -> Motion:

@@ -192,14 +192,20 @@ class PeriodicOrbit(DrawnResult, TableResult):
 def orbit_at(strobe: StroboscopicMap, state: Floats, period: int) -> PeriodicOrbit:
     """Periodic orbit of a state that comes back after so many periods."""
     _, change = strobe.derivative(state, period)
-    _, _, impacts = strobe.followed(state, period)
-    rests = not np.any(change)
-    complete = rests and bool(impacts) and strobe.treatment.bracket > 0.0 and float(np.max(strobe.bodies.restitution))
     return PeriodicOrbit(
-        strobe.body, strobe.motion, strobe.model, strobe.treatment, state, period,
-        math.inf if complete else float(impacts), multipliers_at(strobe, change), is_symmetric(strobe, state, period),
-        rests,
+        strobe.body, strobe.motion, strobe.model, strobe.treatment, state, period, impacts_of(strobe, state, period),
+        multipliers_at(strobe, change), is_symmetric(strobe, state, period), not np.any(change),
     )  # fmt: skip
+
+
+def impacts_of(strobe: StroboscopicMap, state: Floats, period: int) -> float:
+    """Impacts in so many periods from a state that comes back: infinity with complete chattering.
+
+    That is a rest after impacts which is proven, and not made by an impact that leaves no speed.
+    """
+    impacts = float(strobe.followed(state, period)[2])
+    chatters = impacts > 0.0 and strobe.treatment.bracket > 0.0 and np.max(strobe.bodies.restitution) > 0.0
+    return math.inf if chatters and not np.any(strobe.derivative(state, period)[1]) else impacts
 
 
 def multipliers_of(change: Floats) -> NDArray[np.complex128]:
@@ -213,11 +219,11 @@ def multipliers_at(strobe: StroboscopicMap, change: Floats) -> NDArray[np.comple
 
     What is near the rest of such a body bounces for ever, so that they are one there, not zero.
     """
-    record = strobe._records[0]
-    if np.prod(record["restitution"]) < 1.0:
+    if not strobe._loses_nothing:
         return multipliers_of(change)
     if not np.any(change):
         return np.ones(2, dtype=np.complex128)
+    record = strobe._records[0]
     keeps_areas = not (record["varying"] or np.any(record["damping"]))
     # By the rounding of many impacts the product of both would differ from 1, as if the orbit attracted.
     return multipliers_of(change / np.sqrt(np.abs(np.linalg.det(change)))) if keeps_areas else multipliers_of(change)

@@ -142,6 +142,11 @@ class Repeated:
         record = self._records[0]
         return bool(record["facing"] or record["entered"][0] == 1)
 
+    @property
+    def _loses_nothing(self) -> bool:
+        """Whether no speed is lost from one impact to the next but one, so that nothing near a rest comes to rest."""
+        return bool(np.prod(self._records[0]["restitution"]) >= 1.0)
+
     def _pairs_of_impacts(self, impacts: ArrayLike) -> Floats:
         given = checks.numbers(impacts, "impacts", InvalidOption)
         if given.ndim == 0 or given.shape[-1] != 2:

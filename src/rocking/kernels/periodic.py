@@ -271,8 +271,14 @@ def differentiate(trail: Trail, scratch: Record, work: Record, table: Records, s
 
 
 @shared
-def differentiate_period(trail: Trail, scratch: Record, work: Record, table: Records, state: Record, M: Floats) -> int:
-    """Take one state through a period and write its derivative, as `differentiate`; returns the number of impacts."""
+def differentiate_period(
+    trail: Trail, scratch: Record, work: Record, table: Records, state: Record, M: Floats
+) -> tuple[int, float]:
+    """Take one state through a period and write its derivative, as `differentiate`.
+
+    Returns the number of impacts, and the logarithm of the determinant's size where the derivative is not zero. That is
+    a sum over steps: from the derivative itself it could not be had, whose columns become parallel to rounding.
+    """
     ground, block, rules, _ = trail
     one = 1.0
     if state.side < 0:
@@ -284,21 +290,21 @@ def differentiate_period(trail: Trail, scratch: Record, work: Record, table: Rec
     state.until = pieces_of(ground)
     state.budget = turns_from(state)
     ending = Ending.FULL.value
-    impacts = 0
+    impacts, area = 0, 0.0
     while ending == Ending.FULL:
         state.nodes = state.impacts = state.events = state.sequences = 0
         ending = march(ground, block, rules, table, scratch, state)
         impacts += state.impacts
         for n in range(state.nodes - 1):
-            carry_on(trail, scratch, work, table[n].node, table[n + 1].node, M)
+            area += carry_on(trail, scratch, work, table[n].node, table[n + 1].node, M)
         if state.nodes > 0:
-            carry_on(trail, scratch, work, table[state.nodes - 1].node, state, M)
+            area += carry_on(trail, scratch, work, table[state.nodes - 1].node, state, M)
     state.ending = put_back(ground, block, state, ending)
     if state.ending == Fate.RESTS or state.ending == Fate.RESTS_FOR_EVER:
         M[0, 0] = M[0, 1] = M[1, 0] = M[1, 1] = 0.0
     elif state.ending != Fate.MOVES:
         M[0, 0] = M[0, 1] = M[1, 0] = M[1, 1] = np.nan
-    return impacts
+    return impacts, area
 
 
 @kernel
@@ -316,16 +322,16 @@ def stretch(
     M = frame[:2]
     impacts = 0
     for n in range(logs.shape[0]):
-        impacts += differentiate_period(trail, scratch, work, table, state, M)
+        more, area = differentiate_period(trail, scratch, work, table, state, M)
+        impacts += more
         if state.ending != Fate.MOVES and state.ending != Fate.RESTS:
             break
         c, s = frame[2, 0], frame[2, 1]
         x, y = M[0, 0] * c + M[0, 1] * s, M[1, 0] * c + M[1, 1] * s
         length = math.sqrt(x * x + y * y)
         if length > 0.0:
-            across = abs(M[0, 0] * M[1, 1] - M[0, 1] * M[1, 0]) / length
             logs[n, 0] = math.log(length)
-            logs[n, 1] = math.log(across) if across > 0.0 else -np.inf
+            logs[n, 1] = area - logs[n, 0]
             frame[2, 0], frame[2, 1] = x / length, y / length
         else:
             logs[n, 0] = logs[n, 1] = -np.inf
@@ -333,14 +339,16 @@ def stretch(
 
 
 @shared
-def carry_on(trail: Trail, scratch: Record, work: Record, node: Record, following: Record, M: Floats) -> None:
-    """Multiply a derivative by that along the step from a node to what follows it, an impact at its end included."""
+def carry_on(trail: Trail, scratch: Record, work: Record, node: Record, following: Record, M: Floats) -> float:
+    """Multiply a derivative by that along the step from a node to what follows it, an impact at its end included.
+
+    Returns the logarithm of the size of that step's determinant.
+    """
     ground, block, rules, _ = trail
     if node.side < 0:  # what coming to rest has made of it
-        return
+        return 0.0
     if following.side < 0:
-        come_to_rest(ground, block, node, following, M)
-        return
+        return come_to_rest(ground, block, node, following, M)
     h = following.offset - node.offset
     if following.piece > node.piece:
         h = length_of(ground, node.piece) - node.offset
@@ -356,16 +364,19 @@ def carry_on(trail: Trail, scratch: Record, work: Record, node: Record, followin
         work.change[0], work.change[1] = M[0, column], M[1, column]
         variation_coefficients(work, block.damping[node.side], order)
         M[0, column], M[1, column], _ = evaluate(work.change, order, h)
+    area = -block.damping[node.side] * h
     if following.u == 0.0 and h > 0.0:
         _, v, _ = evaluate(scratch.rotation, order, h)
-        apply_saltation(ground, block, node.side, following, v, M)
+        area += apply_saltation(ground, block, node.side, following, v, M)
+    return area
 
 
 @inlined
-def come_to_rest(ground: Ground, block: Record, node: Record, following: Record, M: Floats) -> None:
+def come_to_rest(ground: Ground, block: Record, node: Record, following: Record, M: Floats) -> float:
     """Multiply a derivative by that from a node to a rest: zero, but where the ground ends the rest at once.
 
     The impact has then left no speed, or what it left was taken away. When the body leaves depends on when it came.
+    Returns the logarithm of the size of the determinant.
     """
     side = node.side
     after = restoring(ground, block, side, following.piece, following.offset)
@@ -376,11 +387,17 @@ def come_to_rest(ground: Ground, block: Record, node: Record, following: Record,
     elif node.v > 0.0:
         for column in range(2):
             M[0, column], M[1, column] = 0.0, -after / node.v * M[0, column]
+    else:
+        return 0.0
+    return -np.inf
 
 
 @inlined
-def apply_saltation(ground: Ground, block: Record, left: int, following: Record, v: float, M: Floats) -> None:
-    """Multiply a derivative by that through an impact, before which the velocity was v."""
+def apply_saltation(ground: Ground, block: Record, left: int, following: Record, v: float, M: Floats) -> float:
+    """Multiply a derivative by that through an impact, before which the velocity was v.
+
+    Returns the logarithm of the size of its determinant.
+    """
     across = block.facing and following.side != left  # at the other stop: seen from there, all signs change
     hit, sign = (following.side, -1.0) if across else (left, 1.0)
     speed = -sign * v
@@ -394,6 +411,8 @@ def apply_saltation(ground: Ground, block: Record, left: int, following: Record,
     for column in range(2):
         du, dv = sign * M[0, column], sign * M[1, column]
         M[0, column], M[1, column] = -e * du, coupling * du - rate * dv
+    shrunk = abs(e * rate)
+    return math.log(shrunk) if shrunk > 0.0 else -np.inf
 
 
 # ---- From one impact to the next ----

@@ -28,6 +28,7 @@ def bifurcation_figure(
     value: Floats,
     states: Mapping[str, Floats],
     overturned: Flags,
+    not_followed: Flags | None = None,
     x_label: str,
     y_label: str,
     title: str = "",
@@ -36,7 +37,7 @@ def bifurcation_figure(
 ) -> Figure:
     """Draw states, shape (len(value), n), of each direction against a parameter; NaN where there is none.
 
-    Where nothing is left because the body overturned, ticks at the lower edge say so.
+    Where nothing is left, marks at the lower edge say whether the body overturned or could not be followed.
     """
     from matplotlib.lines import Line2D
 
@@ -49,11 +50,13 @@ def bifurcation_figure(
             axes.scatter(x, kept.ravel(), s=area, marker="o", color=colour, linewidths=0.0, rasterized=True)
             size = area**0.5 + 1.0
             handles.append(Line2D([], [], linestyle="", marker="o", color=colour, markersize=size, label=_WORDS[way]))
-        if overturned.any():
-            places = value[overturned]
-            look: dict[str, Any] = {"linestyle": "", "marker": "|", "color": GROUND}
+        for gone, marker, label in ((overturned, "|", "overturned"), (not_followed, "x", "not followed")):
+            if gone is None or not gone.any():
+                continue
+            places = value[gone]
+            look: dict[str, Any] = {"linestyle": "", "marker": marker, "color": GROUND}
             axes.plot(places, np.full(places.size, 0.015), transform=axes.get_xaxis_transform(), **look)
-            handles.append(Line2D([], [], label="overturned", **look))
+            handles.append(Line2D([], [], label=label, **look))
         axes.set_xlim(value[0], value[-1] if value.size > 1 else None)
         add_labels(axes, x_label, y_label)
         add_legend(figure, ax, handles)
