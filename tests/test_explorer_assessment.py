@@ -97,6 +97,28 @@ def test_the_margin_is_the_critical_scale():
     assert last(assessed(LEANING, records=PLAIN, **LEVELS)).header["margin"] is None
 
 
+@pytest.mark.parametrize(
+    ("width", "height", "name"), [("0.24", "1.1", "ridgecrest-clc-090"), ("0.3", "2.0", "ridgecrest-tow2-360")]
+)
+def test_the_margin_is_the_lowest_band_of_an_incremental_dynamic_analysis(width, height, name):
+    margin = last(assessed({"width": width, "height": height, "motion": name}, **FEW)).header["margin"]
+    block, motion = rocking.Block(width=float(width), height=float(height)), rocking.records.load(name)
+    found = rocking.incremental_dynamic_analysis(block, motion, progress=False)
+    bands = found.bands()
+    assert len(bands) > 2 and margin["pga"] == pytest.approx(bands[0][0], rel=1e-6)
+    assert margin["step"] == pytest.approx(5.0)
+    levels = found.data.level.values
+    assert levels[1] / levels[0] == pytest.approx(1.0 + margin["step"] / 100.0)
+
+
+def test_a_block_that_no_level_overturns_has_no_margin_up_to_the_highest_level_looked_at():
+    case = {"width": "2", "height": "8", "motion": "half-sine:amplitude=1g,frequency=3000"}
+    margin = last(assessed(case, **FEW)).header["margin"]
+    block, motion = rocking.Block(width=2.0, height=8.0), rocking.pulses.half_sine(9.80665, 3000.0)
+    assert margin["factor"] is None and margin["pga"] > 400.0 * block.uplift_thresholds()[0]
+    assert not rocking.simulate(block, motion.scaled_to(margin["pga"])).overturned
+
+
 @pytest.mark.parametrize(("motion", "scale"), [("el-centro-meloland-270", "2000"), ("ridgecrest-clc-090", "1e12")])
 def test_the_margin_of_a_motion_however_strong_is_next_to_what_does_not_overturn(motion, scale):
     case = {**STATUE, "motion": motion, "scale": scale}

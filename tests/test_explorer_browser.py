@@ -2,6 +2,8 @@
 
 import hashlib
 import http.server
+import io
+import itertools
 import json
 import math
 import random
@@ -21,6 +23,7 @@ import pytest
 import trimesh
 from explorer_browser import BROWSER, Watched, launched, only_chromium, remembering, tool
 from explorer_texts import in_english
+from PIL import Image
 
 import rocking
 from rocking import quantities
@@ -30,6 +33,7 @@ from rocking.explorer.core import Explorer
 from rocking.explorer.inputs import read_case
 from rocking.explorer.launch import served
 from rocking.explorer.studies import StudyView
+from rocking.plot.canvas import cell_edges
 
 pytestmark = pytest.mark.browser
 
@@ -623,6 +627,19 @@ def test_a_pulse_is_chosen_and_changed(opened):
         rocking.Block(width=0.24, height=1.1), rocking.pulses.ricker(0.35 * 9.80665, 1.0, kind="antisymmetric")
     )
     assert page.text("#figures div:first-child dd").startswith("overturns") == response.overturned
+
+
+def test_a_pulse_of_an_address_is_read_as_the_package_reads_it(opened):
+    loose = urlencode({"motion": "sine: amplitude=0.3g, frequency = 2Hz, cycles=5 ,"})
+    page = opened(f"width=0.24&height=1.1&{loose}&view=map&points=8")
+    complete(page)
+    shown = {name: page.page.input_value(f"#pulse-{name}") for name in ("amplitude", "frequency", "cycles")}
+    assert shown == {"amplitude": "0.3", "frequency": "2", "cycles": "5"}
+    assert page.page.input_value("#map-x") == "omega" and page.page.input_value("#map-y") == "a"
+    assert "--cycles 5" in page.text("#command") or "rocking map" not in page.text("#command")
+    page.rested(lambda: page.page.click("#map-open"))
+    motion = query_of(page)["motion"]
+    assert motion.startswith("sine:amplitude=") and motion.endswith(",cycles=5.0")
 
 
 def test_a_field_shows_what_is_computed_where_the_case_leaves_it_out(opened):
@@ -1363,10 +1380,14 @@ def test_a_map_of_a_record_opens_on_the_final_fate_and_hatches_what_falls_later(
 
 
 def test_a_map_of_a_record_offers_a_sine_whose_critical_amplitude_is_known(opened):
-    page = opened(f"view=map&{STATUE}&points=8")
-    page.page.click("#map-sine")
-    page.says("map-legend", "exact critical amplitude")
-    assert query_of(page)["motion"].startswith("sine:")
+    for more, gravity in (("", 9.80665), ("&gravity=1.62", 1.62)):
+        page = opened(f"view=map&{STATUE}&points=8{more}")
+        page.page.click("#map-sine")
+        page.says("map-legend", "exact critical amplitude")
+        found = query_of(page)
+        amplitude = quantities.acceleration(found["motion"].removeprefix("sine:amplitude=").split(",")[0], "amplitude")
+        assert amplitude == pytest.approx(1.03 * gravity * 0.24 / 1.1, rel=1e-3)
+        assert found.get("gravity", "") == more.removeprefix("&gravity=")
 
 
 def test_a_study_opens_as_a_map(browser, opened, tmp_path_factory):
@@ -1430,6 +1451,39 @@ def test_a_study_opens_as_a_map(browser, opened, tmp_path_factory):
         rocking.records.load("el-centro-meloland-270").scaled(float(texts["scale"])),
     )
     assert ("overturns" in page.text("#verdict")) == response.overturned
+    running.server.should_exit = True
+
+
+def test_uneven_cells_of_a_study_lie_where_their_values_do(opened, tmp_path_factory):
+    """Each cell goes to the middle between its value and the next, as it does in the figures of the package."""
+    folder = tmp_path_factory.mktemp("study") / "uneven"
+    blocks = rocking.Blocks.grid(p=[1.0, 2.0, 4.0, 8.0, 16.0], alpha=[0.2], restitution=[0.9])
+    levels = np.array([0.8, 0.2, 0.4]) * 9.80665
+    made = rocking.study(folder, blocks, rocking.pulses.one_sine(1.0, 1.0), levels=levels, measure="pga")
+    made.run(progress=False)
+    falls = made.results().overturned.transpose("scale", "motion", "block").values[[1, 2, 0], 0]
+    running = served(Explorer(), {"view": "map"}, StudyView(folder))
+    running.run_in_background()
+    page = opened("view=map&x=p&y=scale&quantity=overturned", server=running)
+    complete(page)
+    box = page.page.locator("#map").bounding_box()
+    picture = np.asarray(Image.open(io.BytesIO(page.page.locator("#map").screenshot())).convert("RGB"), dtype=int)
+    pixels = "const {frame} = Bokeh.index.find_one(" + f"{MODELS}.find((each) => each.type === 'Figure'))"
+    inks = np.array([[0xC9, 0xDC, 0xF0], [0xD4, 0x66, 0x0F]])
+    right, up = cell_edges(blocks.p[:, 0]), cell_edges(np.sort(levels) / 9.80665)
+    judged = 0
+    for row, column, part in itertools.product(range(3), range(5), (0.1, 0.9)):
+        x, y = right[column] + part * np.diff(right)[column], up[row] + part * np.diff(up)[row]
+        across, down = page.js(
+            f"(() => {{ {pixels}; return [frame.x_scale.compute({x}), frame.y_scale.compute({y})]; }})()"
+        )
+        ink = picture[round(down), round(across)]
+        assert np.argmin(np.abs(inks - ink).sum(axis=1)) == falls[row, column], (x, y)
+        page.page.mouse.move(box["x"] + across, box["y"] + down)
+        page.says("map-at", f"{blocks.p[column, 0]:g} rad/s")
+        assert f"{np.sort(levels)[row] / 9.80665:.3g} g" in page.text("#map-at")
+        judged += 1
+    assert judged == 30 and 3 <= falls.sum() <= 12
     running.server.should_exit = True
 
 
@@ -1599,6 +1653,20 @@ def test_a_thresholds_wrong_answer_is_seen(opened):
     assert len(errors) >= 9 and all(re.fullmatch(r"−?[\d.]+ ([mµnp]?s)", each) for each in errors)
 
 
+def test_a_threshold_is_compared_with_the_certificate(opened):
+    page = opened(f"view=compare&{STATUE}&chattering=velocity%3D0.05")
+    page.until("document.body.dataset.compared")
+    page.page.select_option("#other-treatment", "certified")
+    page.says("compare-verdict", "The other (Proof)")
+    assert query_of(page)["other.chattering"] == "certified"
+    assert page.page.locator("#compare-plots").is_visible()
+    first, second = plotted(page, "first", "compare-plots"), plotted(page, "second", "compare-plots")
+    assert max(second["y"]) > 2.0 * max(first["y"])
+    # The case's own texts leave out what is the default.
+    page.rested(lambda: page.page.select_option("#treatment", "certified"))
+    assert "chattering" not in query_of(page)
+
+
 @pytest.mark.parametrize("what", ["block", "motion"])
 def test_two_blocks_or_two_motions_are_compared(opened, what):
     page = opened(f"view=compare&{STATUE}")
@@ -1615,6 +1683,21 @@ def test_two_blocks_or_two_motions_are_compared(opened, what):
         else {0: "does not come to rest", 1: "once", 2: "twice"}.get(rests, f"{rests} times")
     )
     page.says("compare-verdict", words)
+
+
+@pytest.mark.parametrize(
+    ("query", "size"),
+    [
+        ("length_in=cm&width=0.24&height=1.1", {"width": "0.36", "height": "1.65"}),
+        ("length_in=in&width=10in&height=40in", {"width": "15in", "height": "60in"}),
+        ("p=2&alpha=12deg", {"p": "1.6", "alpha": "12deg"}),
+    ],
+)
+def test_the_other_block_is_half_as_large_again_whatever_lengths_are_shown_in(opened, query, size):
+    page = opened(f"view=compare&compare=block&motion=one-sine:amplitude%3D4,frequency%3D1&{query}")
+    page.until("[...new URLSearchParams(location.search).keys()].some((name) => name.startsWith('other.'))")
+    found = query_of(page)
+    assert {name: found[f"other.{name}"] for name in size} == size
 
 
 def test_a_comparison_with_a_pinned_case_shows_that_or_nothing(opened):
@@ -1808,6 +1891,10 @@ def test_an_assessment_is_the_packages_fragility_and_stops_when_the_reader_goes(
     assert f"at {curve.median / 9.80665:.3g} g (with 90 % confidence" in page.text("#assessment-verdict")
     assert page.page.locator("#assessment-records tbody tr").count() == 3
     assert "slides before it rocks" in page.text("#assessment-figures")
+    first = rocking.incremental_dynamic_analysis(block, rocking.records.load("ridgecrest-clc-090"), progress=False)
+    level = f"{float(first.data.overturning_level.values[0, 0]) / 9.80665:.3g} g"
+    assert f"overturns first at {level}, looked for in steps of 5 %; stronger" in page.text("#assessment-figures")
+    assert "as it is;" not in page.text("#assessment-figures")
     assert "may overturn under 3 of 3" in page.text("#assessment-rules")
     assert "rocking.fragility(block" in page.text("#python") and "rocking fragility el-centro" in page.text("#command")
     assert query_of(page)["records"] == records
@@ -1818,6 +1905,13 @@ def test_an_assessment_is_the_packages_fragility_and_stops_when_the_reader_goes(
     page.page.click("[data-view=response]")
     page.page.wait_for_timeout(500)
     assert page.js("document.body.dataset.assessed") == done and not page.page.is_visible("#problem")
+
+
+def test_an_assessment_says_that_a_case_overturns_as_it_is_apart_from_its_margin(opened):
+    query = {"view": "assessment", "records": "motion=el-centro-meloland-270", "levels": "2", "level_from": "0.2g"}
+    page = opened(f"{STATUE.replace('0.4g', '2g')}&{urlencode({**query, 'level_to': '0.9g'})}")
+    page.until("document.body.dataset.assessment === 'complete'", "the assessment is complete")
+    page.says("assessment-figures", "it overturns as it is; overturns first at 0.514 g")
 
 
 def test_units_are_chosen_once_and_in_the_address(opened):

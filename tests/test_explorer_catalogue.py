@@ -89,6 +89,24 @@ def test_another_length_or_step_is_another_station_and_headings_are_believed():
     assert store.kept() == (key,)
 
 
+@pytest.mark.parametrize("said", ["names", "headings", "both"])
+def test_a_sensor_in_a_borehole_and_one_at_the_surface_have_a_vertical_component_each(said):
+    """KiK-net numbers the directions of both from 1 to 6, and names the files as here."""
+    store, record = UploadStore(), (FORMATS / "knet.ns").read_bytes()
+    kinds = ["EW1", "EW2", "NS1", "NS2", "UD1", "UD2"]
+    for seed, kind in enumerate(kinds):
+        number = {"NS1": b"1", "EW1": b"2", "UD1": b"3", "NS2": b"4", "EW2": b"5", "UD2": b"6"}[kind]
+        data = samples(seed).encode() if said == "names" else record.replace(b"N-S", number)
+        store.add_file(f"file {seed}" if said == "headings" else f"TST0019901021800.{kind}", data)
+    keys = dict(zip(kinds, store.kept(), strict=True))
+    groups = groups_of(store)
+    assert [[row["key"] for row in group["rows"]] for group in groups] == [
+        [keys[f"{direction}{sensor}"] for direction in ("EW", "NS", "UD")] for sensor in (1, 2)
+    ]
+    for group, sensor in zip(groups, (1, 2), strict=True):
+        assert [row["vertical"] for row in group["rows"]] == [f"file:{keys[f'UD{sensor}']}"] * 2 + [""]
+
+
 def test_nothing_is_said_of_a_file_before_its_units_and_step_are_answered():
     store = UploadStore()
     key = store.add_file("a.txt", samples(1).encode())

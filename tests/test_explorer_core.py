@@ -122,6 +122,27 @@ def test_a_record_has_a_vertical_component(vertical, tmp_path, monkeypatch):
         assert f"--vertical {'up.csv' if 'file' in vertical else vertical}" in command
 
 
+def test_an_answer_about_the_vertical_file_leaves_alone_what_the_horizontal_one_says(tmp_path, monkeypatch, run):
+    monkeypatch.chdir(tmp_path)
+    up = np.random.default_rng(1).normal(size=200)
+    (tmp_path / "up.txt").write_text("\n".join(map(repr, up.tolist())), "utf-8")
+    (tmp_path / "knet.ns").write_bytes((Path(__file__).parent / "data" / "formats" / "knet.ns").read_bytes())
+    uploads = UploadStore()
+    along, upwards = (uploads.add_file(name, (tmp_path / name).read_bytes()) for name in ("knet.ns", "up.txt"))
+    answer = {"dt": "0.02", "units": "m/s2", "scale": "4"}
+    case = read_case(
+        {"width": "0.24", "height": "1.1", "motion": f"file:{along}", "vertical": f"file:{upwards}", **answer}, uploads
+    )
+    expected = rocking.read("knet.ns").with_vertical(rocking.Motion.from_samples(up, 0.02)).scaled(4.0)
+    assert np.array_equal(case.motion.coefficients, expected.coefficients)
+    assert np.array_equal(case.motion.vertical.coefficients, expected.vertical.coefficients)
+    assert case.motion_call.startswith("rocking.read('knet.ns').with_vertical(rocking.read('up.txt', dt=0.02, units=")
+    program, *arguments = shlex.split(case_as_command(case))
+    code, out, _ = run(*arguments, "--json", "--quiet")
+    assert (program, code) == ("rocking", 0)
+    assert json.loads(out)["peak_rotation_rad"] == case.simulate().peak_rotation
+
+
 def test_a_spreadsheet_takes_no_name_of_a_case_for_a_formula():
     texts = {"width": "0.24", "height": "1.1", "motion": "one-sine:amplitude=4,frequency=1"}
     table = Explorer().compared_as_csv(texts, {"scale": "2"}, ("=1+1", "-x")).decode()
@@ -554,6 +575,20 @@ def test_a_comparison_holds_both_cases(explorer):
     assert first["peak_rotation"] > 2.0 * second["peak_rotation"]
     larger = explorer.compare(STATUE, {"p": "2", "alpha": "0.2"}).header["cases"][1]
     assert larger["block"]["sides"][0]["p"] == 2.0
+
+
+def test_another_motion_begins_as_its_own_texts_say(explorer):
+    size = {"width": "0.24", "height": "1.1"}
+    released = {"motion": "none", "initial_rotation": "3deg", "initial_velocity": "0.1"}
+    shaken = {"motion": "el-centro-meloland-270", "pga": "0.25g"}
+    for one, other in ((released, shaken), (shaken, released), (released, {**shaken, "initial_rotation": "1deg"})):
+        second = explorer.compare(size | one, other).header["cases"][1]
+        alone = explorer.show(size | other).response
+        assert (second["peak_rotation"], second["overturned"]) == (alone.peak_rotation, alone.overturned)
+    # Another block is released as the first one is, and another start alone is that of the same motion.
+    for other in ({"width": "0.3", "height": "1.1"}, {"initial_rotation": "2deg"}):
+        second = explorer.compare(size | released, other).header["cases"][1]
+        assert second["peak_rotation"] == explorer.show(size | released | other).response.peak_rotation
 
 
 def test_a_comparison_goes_on_until_the_later_of_both_ends(explorer):
@@ -1104,6 +1139,16 @@ def test_points_of_a_study_have_its_gravity_and_keep_each_motion_once(tmp_path):
     assert judged == 6 and len(uploads._motions) == 1
 
 
+def test_levels_of_a_study_are_an_axis_in_increasing_order(tmp_path):
+    blocks, levels = rocking.Blocks.grid(p=[2.0, 3.0], alpha=[0.2], restitution=[0.9]), [3.0, 1.0, 2.0]
+    made = rocking.study(tmp_path / "any", blocks, rocking.pulses.one_sine(2.2, 2.0), levels=levels)
+    made.run(progress=False)
+    found = StudyView(tmp_path / "any").slice({"x": "p", "y": "scale", "quantity": "peak_rotation"})
+    assert found.header["y"]["values"] == [1.0, 2.0, 3.0]
+    peaks = made.results().peak_rotation.transpose("scale", "motion", "block").values[[1, 2, 0], 0]
+    assert np.array_equal(found.arrays["values"].reshape(3, 2), peaks) and len(np.unique(peaks)) > 3
+
+
 @pytest.mark.parametrize("at", ["99", "0", "inf", "nan", "-1"])
 @pytest.mark.parametrize("axis", ["motion", "p", "scale"])
 def test_a_point_beside_a_study_is_refused(study, axis, at):
@@ -1218,6 +1263,49 @@ def test_a_map_of_overturning_is_a_command(run):
     assert code == 0
     assert np.array_equal(np.array(json.loads(out)["mode"]), found["mode"])
     assert len(np.unique(found["mode"])) > 2
+
+
+@pytest.mark.parametrize("duration", [None, 1.2])
+def test_a_ricker_pulse_is_mapped_over_its_frequency_with_the_length_that_goes_with_it(run, duration):
+    """The script and the cases at two corners have the map's own peaks; a whole pulse's text has no length."""
+    motion = rocking.pulses.ricker(3.0, 1.0, duration=duration)
+    texts = texts_of(rocking.simulate(rocking.Block(width=0.24, height=1.1), motion), UploadStore())
+    assert texts["motion"] == "ricker:amplitude=3.0,frequency=1.0," + ("duration=1.2," if duration else "") + (
+        "kind=symmetric"
+    )
+    grid, found = _mapped(texts, {"x": "omega", "x_from": "1", "x_to": "5", "y": "a", "y_from": "1.2", "y_to": "6"})
+    judged = 0
+    for row, column in ((1, 0), (1, 7), (3, 7)):
+        texts_here = maps.texts_at(grid, grid.x.values[column], grid.y.values[row])
+        response = read_case(texts_here, UploadStore()).simulate()
+        peak = np.inf if response.overturned else response.peak_over_slenderness
+        assert found["peak"][row, column] == pytest.approx(peak, rel=1e-5)
+        judged += 0.0 < peak < np.inf
+    assert judged >= 2
+    command = map_as_command(grid)
+    assert (command is None) == (duration is not None)
+    if command is not None:
+        code, out, _ = run(*shlex.split(command)[1:], "--tolerance", "0.1", "--json", "--quiet")
+        assert code == 0 and np.array_equal(np.array(json.loads(out)["mode"]), found["mode"])
+    names = {}
+    exec(map_as_python(grid, "peak"), names)
+    assert np.array_equal(names["found"].astype(np.float32), found["peak"])
+    exec(map_as_python(grid, "outcome"), names)
+    assert np.array_equal(names["found"].outcome.values, found["outcome"])
+
+
+def test_a_pulse_is_read_as_tolerantly_as_the_package_does(explorer, run):
+    strict = {**SINE, "motion": "sine:amplitude=0.3g,frequency=1,cycles=2.5,phase=90deg"}
+    loose = {**SINE, "motion": "sine: amplitude = 0.3g, frequency=1Hz, cycles=2.5 , phase=90 deg,"}
+    axes = {"x": "omega", "x_from": "1", "x_to": "5", "y": "a"}
+    (one, found), (other, same) = (_mapped(texts, axes) for texts in (strict, loose))
+    assert all(np.array_equal(found[name], same[name], equal_nan=True) for name in found)
+    assert maps.texts_at(one, 2.0, 1.5) == maps.texts_at(other, 2.0, 1.5)
+    assert map_as_command(one) == map_as_command(other) and map_as_python(one, "peak") == map_as_python(other, "peak")
+    code, out, _ = run(*shlex.split(map_as_command(other))[1:], "--tolerance", "0.1", "--json", "--quiet")
+    assert code == 0 and np.array_equal(np.array(json.loads(out)["mode"]), same["mode"])
+    peaks = {explorer.show(texts).response.peak_rotation for texts in (strict, loose)}
+    assert len(peaks) == 1
 
 
 #: Cases and axes of maps: over records and pulses, of one side and two, with each kind of axis.

@@ -24,8 +24,9 @@ from rocking.explorer.parameters import ASSESSMENT
 from rocking.explorer.payload import Payload
 from rocking.explorer.phrases import phrase
 from rocking.explorer.uploads import UploadStore
+from rocking.motion.exceedance import lifting_factors
 from rocking.motion.motion import Motion
-from rocking.motion.scaling import Measure
+from rocking.motion.scaling import FACTOR, Measure
 from rocking.quantities import number
 from rocking.response.contact import friction_coefficient
 from rocking.simulation import simulate
@@ -37,8 +38,11 @@ _POINTS: Final = 121
 #: The highest level stands for this share of the sudden velocity that overturns the block at one blow.
 _STRONG: Final = 2.0
 
-#: The margin is looked for up to this factor on the case's motion, in halves and doubles, and then closed in on.
-_FACTORS: Final = 2.0**8
+#: Levels of the margin are this times the one before, from the lowest that lifts the block, as many at most, and so
+#: many are simulated at once; the first that overturns is then closed in on.
+_STEP: Final = 1.05
+_MOST_FACTORS: Final = 128
+_AT_ONCE: Final = 16
 _HALVINGS: Final = 24
 
 #: Rules of thumb that are shown, what each says, and where it comes from.
@@ -228,24 +232,37 @@ def _rated(case: Case, motion: Motion) -> dict[str, Any]:
 
 
 def _margin(case: Case) -> dict[str, Any] | None:
-    """Return a factor on the case's motion from which on it overturns the block, next to one that does not."""
+    """Return the factor on the case's motion at which it first overturns the block, and the peak acceleration of that.
+
+    Levels that overturn may be several bands with gaps between: the lowest is looked for in steps from the level that
+    lifts the block. What is thinner than a step is not seen. Where no level overturns, the factor is None and the peak
+    acceleration that of the highest level looked at.
+    """
     motion = case.motion
     if motion is None or motion.pga == 0.0:
         return None
 
-    def falls(factor: float) -> bool:
-        return simulate(case.block, motion * factor, model=case.model, chattering=case.treatment).overturned
+    def fall(factors: Floats) -> Flags:
+        table = simulate_levels(
+            Blocks.of(case.block), [motion], FACTOR, factors, model=case.model, chattering=case.treatment,
+            progress=False,
+        )  # fmt: skip
+        return np.asarray(table.overturned.values.ravel())
 
-    high = 1.0
-    if falls(high):
-        while falls(high / 2.0):  # down to where the motion does not lift the block, at last
-            high /= 2.0
-    else:
-        while not falls(high := 2.0 * high):
-            if high >= _FACTORS:
-                return {"factor": None, "pga": None}
-    factor = bisected(high / 2.0, high, falls, halvings=_HALVINGS)[1]
-    return {"factor": factor, "pga": factor * motion.pga}
+    lifting = lifting_factors(motion, [case.block.uplift_thresholds(case.model)], case.block.gravity)[0]
+    found: dict[str, Any] = {"factor": None, "pga": motion.pga, "step": 100.0 * (_STEP - 1.0)}  # in %
+    if math.isinf(lifting):
+        return found
+    factors = lifting * _STEP ** np.arange(-1.0, _MOST_FACTORS)  # the lowest does not lift the block
+    for start in range(1, len(factors), _AT_ONCE):
+        fallen = np.flatnonzero(fall(factors[start : start + _AT_ONCE]))
+        if fallen.size:
+            low, high = factors[start + fallen[0] - 1 : start + fallen[0] + 1]
+            factor = bisected(
+                float(low), float(high), lambda each: bool(fall(np.array([each]))[0]), halvings=_HALVINGS
+            )[1]
+            return found | {"factor": factor, "pga": factor * motion.pga}
+    return found | {"pga": float(factors[-1]) * motion.pga}
 
 
 def _motion(entry: Texts, uploads: UploadStore) -> Motion:

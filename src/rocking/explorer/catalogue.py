@@ -31,6 +31,11 @@ _COMPONENT: Final = re.compile(
     rf"(?i)(?:^|[-_. ]|(?<=[a-z])(?=\d\d\d))(?:(?P<up>{_UP})|(?P<level>{_LEVEL}))(?: ?deg)?$"
 )
 
+#: The number of the sensor in the name of a component, and what its heading says: KiK-net has one in a borehole, 1, and
+#: one at the surface, 2, each with three components.
+_SENSOR: Final = re.compile(r"(?i)(?:ns|ew|ud)([12])$")
+_DEEP: Final = " borehole"
+
 
 @dataclass
 class Component:
@@ -44,6 +49,7 @@ class Component:
     event: str = ""
     station: str = ""
     stem: str = ""
+    sensor: str = ""
     samples: int = 0
     step: float | None = None
     key: str = ""
@@ -141,13 +147,14 @@ def _of_file(uploads: UploadStore, key: str, answer: Texts) -> list[Component]:
     for each in told["channels"]:
         texts = {"motion": f"file:{key}"} | ({"channel": str(each["number"])} if several else {})
         texts |= {one: given[one] for one in needed if one in given}
-        stem, label, is_up = _parted(name, each["name"], each["azimuth"], several)
+        stem, label, is_up, sensor = _parted(name, each["name"], each["azimuth"], several)
         component = Component(texts, f"{name}, {each['name']}" if several else name, label, is_up, each["measures"])
         found.append(
             replace(
                 component,
                 **{fact: each[fact] for fact in ("event", "station", "samples", "step", "choices")},
                 stem=key if several else stem,
+                sensor=sensor,
                 key=key,
                 file=name,
                 missing=told["missing"],
@@ -156,22 +163,24 @@ def _of_file(uploads: UploadStore, key: str, answer: Texts) -> list[Component]:
     return found
 
 
-def _parted(name: str, channel: str, azimuth: float | None, several: bool) -> tuple[str, str, bool]:
-    """Return a file's name without its component, what the component is called, and whether it is the vertical one."""
+def _parted(name: str, channel: str, azimuth: float | None, several: bool) -> tuple[str, str, bool, str]:
+    """Return a file's name without its component, what that is called, whether it is vertical, and of which sensor."""
     path = PurePath(name)
     whole = path.stem
     found = None
     for text in (path.suffix.removeprefix("."), whole):
         found = found or (_COMPONENT.search(text) if not several else None)
     stem = whole[: found.start()] if found is not None and found.string == whole else whole
-    said = _COMPONENT.search(channel.strip())
+    said = _COMPONENT.search(channel.strip().removesuffix(_DEEP))
     up = azimuth is None and any(each is not None and each["up"] for each in (said, found))
     label = channel if found is None or azimuth is not None else found[0].strip("-_. ")
-    return stem.lower(), label, up
+    number = _SENSOR.search(found[0]) if found is not None else None
+    sensor = "1" if channel.endswith(_DEEP) else "" if number is None else number[1]
+    return stem.lower(), label, up, sensor
 
 
 def _by_station(components: Iterable[Component]) -> list[list[Component]]:
-    """Put together what belongs to one station: horizontal components, two at most, and a vertical one after them."""
+    """Put together what belongs to one sensor: horizontal components, two at most, and a vertical one after them."""
     groups: list[list[Component]] = []
     for each in components:
         home = next((group for group in groups if _belongs(each, group)), None)
@@ -195,7 +204,12 @@ def _belongs(one: Component, group: list[Component]) -> bool:
         return False
     if not one.key or one.key == first.key:
         return one.stem == first.stem
-    if one.missing != first.missing or one.step != first.step or any(each.key == one.key for each in group):
+    if (
+        one.sensor != first.sensor
+        or one.missing != first.missing
+        or one.step != first.step
+        or any(each.key == one.key for each in group)
+    ):
         return False
     if abs(one.samples - first.samples) > _AS_LONG * max(one.samples, first.samples):
         return False

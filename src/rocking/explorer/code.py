@@ -15,7 +15,6 @@ from rocking.explorer.maps import Axis, MapGrid, sign_of
 from rocking.explorer.parameters import QUANTITIES
 from rocking.explorer.periodic import KEPT, PASSED
 from rocking.explorer.sweeps import Sweep, call_at
-from rocking.named_pulses import pulse_values
 
 #: Quantities of a map of overturning.
 _OVERTURNING: Final = ("peak", "mode")
@@ -202,14 +201,16 @@ def map_as_command(grid: MapGrid) -> str | None:
     texts = grid.case.texts
     if not _is_overturning_map(grid) or "gravity" in texts:
         return None
-    name, written, given = _pulse(grid)
+    name, given = texts["motion"].partition(":")[0], arguments_of(texts["motion"])
+    if "duration" in given:  # the command has no cut pulses
+        return None
     # The amplitudes of the command are positive, which is another motion only where the sides differ.
     if given["amplitude"] * sign_of(texts) < 0.0 and not grid.case.block.is_symmetric:
         return None
     options: dict[str, str] = {
         "amplitudes": _range(grid.y),
         "frequencies": _range(grid.x),
-        **{each: value for each, value in written.items() if each not in ("amplitude", "frequency")},
+        **{each: str(value) for each, value in given.items() if each not in ("amplitude", "frequency")},
         **block_options(grid.case),
     }
     return command_line(["rocking", "map", name], options)
@@ -283,13 +284,6 @@ def _is_overturning_map(grid: MapGrid) -> bool:
     return name in PULSES and (grid.x.name, grid.y.name) == ("omega", "a")
 
 
-def _pulse(grid: MapGrid) -> tuple[str, dict[str, str], dict[str, Any]]:
-    """Name of the pulse, its parameters as they were written, and as numbers."""
-    text = grid.case.texts["motion"]
-    name, _, written = text.partition(":")
-    return name, dict(part.split("=", 1) for part in written.split(",")), pulse_values(text)[1]
-
-
 def _values(axis: Axis) -> str:
     return f"np.linspace({float(axis.values[0])!r}, {float(axis.values[-1])!r}, {len(axis.values)})"
 
@@ -347,11 +341,11 @@ def _motion(grid: MapGrid) -> str:
     if "omega" in names and is_pulse(text):
         p = min(side.p for side in grid.case.block.sides)
         given = arguments_of(text)
+        frequency = f"omega * {p!r} / (2.0 * math.pi)"
         written = {name: repr(value) for name, value in given.items()}
-        written |= {
-            "amplitude": repr(sign_of(grid.case.texts) * given["amplitude"]),
-            "frequency": f"omega * {p!r} / (2.0 * math.pi)",
-        }
+        written |= {"amplitude": repr(sign_of(grid.case.texts) * given["amplitude"]), "frequency": frequency}
+        if "duration" in given:
+            written["duration"] = f"{given['duration'] * given['frequency']!r} / ({frequency})"
         made = pulse_call(text, written)
     if "a" in names:
         return f"{made}.scaled_to(a * min(block.uplift_thresholds({grid.case.model!r})))"

@@ -142,7 +142,8 @@ class Explorer:
     ) -> Payload:
         """Return two cases in one window of the first one's time, with chosen moments over each other (`ALIGNED`).
 
-        The second is another case as a ``whole``, or the first with some texts changed; blocks and motions go together.
+        The second is another case as a ``whole``, or the first with some texts changed: those of its block, or of its
+        motion and its start, go together.
         """
         first, second = self._compared(texts, changed, whole=whole)
         shift = shift_of(first.response, second.response, align)
@@ -236,9 +237,12 @@ class Explorer:
 
 
 def _changed(texts: Texts, changed: Texts) -> dict[str, str]:
-    """Texts of a case with others in their place; those of a whole block or motion go together."""
-    groups = [group for group in (names_of("block"), names_of("motion")) if changed.keys() & {*group}]
-    gone = {name for group in groups for name in group}
+    """Texts of a case with others in their place; those of a whole block go together, and of a motion with its start.
+
+    The form of a motion leaves out what begins at rest, so that another motion without a start has none.
+    """
+    together = [(names_of("block"), names_of("block")), (names_of("motion"), names_of("motion", "start"))]
+    gone = {name for given, names in together if changed.keys() & {*given} for name in names}
     return {name: value for name, value in texts.items() if name not in gone} | dict(changed)
 
 

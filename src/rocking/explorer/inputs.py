@@ -308,7 +308,7 @@ _shipped = functools.cache(records.load)
 
 
 def _with_vertical(found: Found, horizontal: str, values: Values, uploads: UploadStore) -> Found:
-    """Add the vertical component, which is read with the same step and units as the motion."""
+    """Add the vertical component."""
     name, (kind, _, key) = values["vertical"], horizontal.partition(":")
     if found.motion is None or is_pulse(horizontal) or kind == "given":
         raise InvalidOption("{} goes with a record: choose one, or leave the component out", "vertical")
@@ -347,12 +347,19 @@ def _unscaled(name: str, values: Values, uploads: UploadStore) -> Found:
 
 
 def _from_file(key: str, values: Values, channel: str | None, uploads: UploadStore) -> Found:
-    """Read a channel of a file with the step and the units that the texts give."""
-    given: dict[str, Any] = {"channel": channel, "dt": values.get("dt"), "units": values.get("units")}
-    file = uploads.file(key).name
-    arguments = _written({name: value for name, value in given.items() if value is not None})
+    """Read a channel of a file with the step and the units that the texts give.
+
+    Where the vertical component is a record of its own, these are for the file that does not say them, as the command
+    line has it.
+    """
+    given: dict[str, Any] = {name: values[name] for name in ("dt", "units") if name in values}
+    vertical = values.get("vertical", "")
+    if vertical.startswith("file:") or vertical in records.names():
+        given = {name: value for name, value in given.items() if name in uploads.contents(key)["missing"]}
+    file, read = uploads.file(key).name, {"channel": channel, "dt": None, "units": None} | given
+    arguments = _written({name: value for name, value in read.items() if value is not None})
     call = f"rocking.read({file!r}{', ' if arguments else ''}{arguments})"
-    return Found(uploads.read(key, **given), call, (as_path(file),))
+    return Found(uploads.read(key, **read), call, (as_path(file),))
 
 
 def as_path(name: str) -> str:
@@ -378,8 +385,16 @@ def is_pulse(text: str) -> bool:
 
 
 def arguments_of(text: str) -> dict[str, Any]:
-    """Read the parameters of a pulse, in SI units; one that is longer than the page shows is refused."""
-    _, arguments = pulse_values(text)
+    """Read the parameters of a pulse, in SI units; one that is longer than the page shows is refused.
+
+    A duration is given only where it cuts the pulse: the one that a pulse has by itself goes with its frequency.
+
+    Examples
+    --------
+    >>> arguments_of("sine:amplitude=2, frequency=1Hz, cycles=5,")
+    {'amplitude': 2.0, 'frequency': 1.0, 'cycles': 5.0}
+    """
+    family, arguments = pulse_values(text)
     for name in ("cycles", "gamma"):
         if arguments.get(name, 0.0) > MOST_SHOWN:
             raise InvalidMotion(
@@ -387,7 +402,16 @@ def arguments_of(text: str) -> dict[str, Any]:
                 name,
                 value=arguments[name],
             )
+    if "duration" in arguments and "duration" in family.optional:
+        whole = {name: value for name, value in arguments.items() if name != "duration"}
+        return whole if family.motion(whole).duration == arguments["duration"] else arguments
     return arguments
+
+
+def pulse_text(text: str, arguments: Mapping[str, Any]) -> str:
+    """Write a pulse of the family of a text with these parameters, in SI units."""
+    written = ",".join(f"{name}={value}" for name, value in arguments.items())
+    return f"{pulse_values(text)[0].name}:{written}"
 
 
 def pulse_of(text: str) -> Motion:
@@ -416,12 +440,12 @@ def pulse_as_text(motion: Motion) -> str | None:
     if name not in PULSES or motion.vertical is not None:
         return None
     parameters = [*FAMILIES[name].needed, *FAMILIES[name].optional]
-    text = f"{name}:" + ",".join(f"{each}={value}" for each, value in given.items() if each in parameters)
+    text = pulse_text(name, {each: value for each, value in given.items() if each in parameters})
     made = pulse_of(text)
     same = np.array_equal(made.breakpoints, motion.breakpoints) and np.array_equal(
         made.coefficients, motion.coefficients
     )
-    return text if same else None
+    return pulse_text(text, arguments_of(text)) if same else None
 
 
 def texts_of_motion(motion: Motion, uploads: UploadStore, factor: float = 1.0) -> dict[str, str]:

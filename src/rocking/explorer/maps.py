@@ -26,6 +26,7 @@ from rocking.explorer.inputs import (
     arguments_of,
     is_pulse,
     pulse_of,
+    pulse_text,
     require_possible,
     require_rest,
 )
@@ -375,11 +376,11 @@ def _both(pair: list[float]) -> str:
 
 
 def change_pulse(texts: dict[str, str], **numbers: float) -> None:
-    """Change some parameters of the pulse in the texts of a case."""
-    family, _, given = texts["motion"].partition(":")
-    parts = dict(part.split("=", 1) for part in given.split(","))
-    parts |= {name: repr(value) for name, value in numbers.items()}
-    texts["motion"] = f"{family}:" + ",".join(f"{name}={value}" for name, value in parts.items())
+    """Change some parameters of the pulse in the texts of a case; one that is cut has as many cycles as before."""
+    given = arguments_of(texts["motion"])
+    if "duration" in given and "frequency" in numbers:
+        given["duration"] *= given["frequency"] / numbers["frequency"]
+    texts["motion"] = pulse_text(texts["motion"], given | numbers)
 
 
 def _change_amplitude(texts: dict[str, str], grid: MapGrid, peak: float) -> None:

@@ -12,6 +12,7 @@ from rocking.arrays import Floats
 from rocking.dynamics.bifurcation import period_of, settled_states
 from rocking.dynamics.maps import Fate, StroboscopicMap, stroboscopic_map
 from rocking.dynamics.orbits import multipliers_at
+from rocking.dynamics.repeated import scale_of
 from rocking.explorer.inputs import Case, arguments_of, is_pulse, pulse_of
 from rocking.explorer.payload import Payload
 from rocking.explorer.phrases import phrase
@@ -128,7 +129,7 @@ def settled(rock: StroboscopicMap, start: ArrayLike, periods: int, kept: int = K
         _, fate, _ = rock.followed(orbit[after - 1])
         earlier = max(0, after - LONGEST)
         return Settled(np.empty((0, 2)), 0, False, Fate(int(fate)), after, (orbit[earlier], after - earlier))
-    period = period_of(last[-KEPT:])
+    period = period_of(last[-KEPT:], scale_of(rock))
     _, fate, _ = rock.followed(last[-1])
     rests = period > 0 and not np.any(rock.derivative(last[-1], period)[1])
     drawn = period or LONGEST

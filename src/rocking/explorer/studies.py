@@ -80,7 +80,7 @@ class StudyView:
     def axes(self) -> dict[str, Floats]:
         """Values of what the study varies."""
         found = {name: np.unique(values) for name, values in self._columns.items()}
-        found["scale"] = self._scales
+        found["scale"] = np.unique(self._scales)
         found["motion"] = np.arange(1.0, len(self.study.product.motions) + 1.0)
         return {name: values for name, values in found.items() if values.size > 1}
 
@@ -124,7 +124,8 @@ class StudyView:
             name: np.searchsorted(axes[name], self._columns[name][blocks]) for name in (x, y) if name in self._columns
         }
         for scale, motion in itertools.product(scales, motions):
-            at |= {"scale": np.full(blocks.size, scale), "motion": np.full(blocks.size, motion)}
+            level = np.searchsorted(np.unique(self._scales), self._scales[scale])  # a study has them in any order
+            at |= {"scale": np.full(blocks.size, level), "motion": np.full(blocks.size, motion)}
             chosen = {"motion": motion, "scale": scale, "polarity": self._index(texts, "polarity_index")}
             found = results.isel({name: k for name, k in chosen.items() if name in results.dims})
             values[at[y], at[x]] = np.asarray(found.values, dtype=float)[blocks]

@@ -206,19 +206,25 @@ export class View {
     ]));
   }
 
-  /** Uplift, friction and margin of the case. @param {{factor: number | null, pga: number | null} | null | undefined} margin */
+  /** What is known of the factor on the case's motion, and apart from that of the case as it is.
+   * @param {{factor: number | null, pga: number, step: number} | null | undefined} margin */
+  margin(margin) {
+    if (!margin) return phrase(this.last?.header.share === 1 ? "assessment.not_shaken" : "assessment.at_last");
+    const found = phrase(margin.factor ? "assessment.margin_first" : "assessment.no_margin", {level: acceleration(margin.pga), step: short(margin.step)});
+    return this.page.shown?.header.overturned ? phrase("assessment.margin_as_is", {found}) : found;
+  }
+
+  /** Uplift, friction and margin of the case. @param {{factor: number | null, pga: number, step: number} | null | undefined} margin */
   base(margin) {
     const {thresholds, friction_to_rock: needed, friction} = this.about;
     const largest = this.rows.reduce((most, {friction_needed: each}) => Math.max(most, each ?? Infinity), 0);
     const holds = friction === null ? "" : friction < needed ? phrase("assessment.slides_first", {friction: short(friction)}) : phrase("assessment.rocks_first", {friction: short(friction)});
-    const {header} = this.page.shown ?? {};
     const rows = [
       [phrase("assessment.uplift"), thresholds[0] === thresholds[1] ? acceleration(thresholds[0]) : phrase("assessment.both", {first: acceleration(thresholds[0]), second: acceleration(thresholds[1])}), phrase("assessment.uplift_about")],
       [phrase("assessment.to_rock"), short(needed), holds || phrase("assessment.below")],
       [phrase("assessment.over_list"), !this.rows.length ? phrase("assessment.waits") : Number.isFinite(largest) ? fixed(largest, 3) : "∞", phrase("assessment.over_list_about")],
       [phrase("assessment.margin"), margin === undefined || (margin === null && !this.last?.header.share) ? phrase("assessment.waits") : margin?.factor ? phrase("assessment.factor", {factor: short(margin.factor)}) : NONE,
-        margin?.factor ? (header?.overturned ? phrase("assessment.margin_as_is", {level: acceleration(margin.pga)}) : phrase("assessment.margin_from", {level: acceleration(margin.pga)}))
-          : margin ? phrase("assessment.no_margin") : this.last?.header.share === 1 ? phrase("assessment.not_shaken") : phrase("assessment.at_last")],
+        this.margin(margin)],
     ];
     one("assessment-figures").replaceChildren(...rows.map(([name, value, more]) => make("div", {}, [make("dt", {}, [name]), make("dd", {}, [value, make("small", {}, [more])])])));
   }

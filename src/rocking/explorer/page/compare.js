@@ -164,10 +164,10 @@ class PinnedForm {
 /** The same shape, half as large again; of a mesh the same body, a quarter turned. @param {Texts} texts @returns {Texts} */
 function larger(texts) {
   if (texts.mesh) return {...Object.fromEntries(namesOf("block").filter((name) => texts[name]).map((name) => [name, texts[name]])), azimuth: String((Number(texts.azimuth) + 90) % 360)};
-  const factors = /** @type {Record<string, number>} */ ({m: 1.5, "rad/s": 0.8});
+  const factors = /** @type {Record<string, number>} */ ({length: 1.5, position: 1.5, rate: 0.8});
   const resized = (/** @type {string} */ text, factor = 1) =>
     (factor === 1 ? text : text.split(",").map((each) => String(Number((factor * parseFloat(each)).toPrecision(12))) + each.replace(/^[\s\d.eE+-]+/, "")).join(","));
-  return Object.fromEntries(namesOf("block").filter((name) => texts[name]).map((name) => [name, resized(texts[name], factors[parameter(name).unit])]));
+  return Object.fromEntries(namesOf("block").filter((name) => texts[name]).map((name) => [name, resized(texts[name], factors[parameter(name).kind])]));
 }
 
 /** What the other response is called, where it was moved in time. @param {number} by s */

@@ -4,7 +4,7 @@ import {json} from "./api.js";
 import {check, choice, choose, offer} from "./controls.js";
 import {remaking} from "./focus.js";
 import {MeshFields} from "./mesh.js";
-import {namesOf, parameter, specification} from "./parameters.js";
+import {namesOf, parameter, pulseOf, specification} from "./parameters.js";
 import {explained, make, one} from "./words.js";
 import {measured, shown, typed, whole} from "./numbers.js";
 import {phrase} from "./texts.js";
@@ -300,7 +300,7 @@ export class MotionForm {
   /** @param {Texts} texts */
   show(texts) {
     const motion = texts.motion ?? specification.default.motion;
-    const family = motion.split(":")[0];
+    const {family, parts} = pulseOf(motion);
     const kind = Object.hasOwn(specification.pulses, family) ? "pulse" : ["none", "file", "given"].includes(family) ? family : "record";
     this.kind.select.value = kind;
     if (kind === "record") this.record.select.value = motion;
@@ -308,7 +308,6 @@ export class MotionForm {
     if (kind === "pulse") {
       this.pulse.select.value = family;
       if (this.family !== family) this.showPulse(family);
-      const parts = Object.fromEntries(motion.slice(family.length + 1).split(",").map((part) => part.split("=")));
       // What a pulse does not name is what the package takes for it: the field's default, and the first choice.
       for (const each of this.controls ?? []) each.show(parts[each.spec.name] ?? each.spec.default);
       for (const each of this.choices ?? []) each.select.value = parts[each.name] ?? each.select.options[0].value;
@@ -510,8 +509,7 @@ export class TreatmentForm {
 
   tell() {
     const name = this.kind.select.value;
-    const text = this.limits[name] ? `${name}=${this.limits[name].text}` : name;
-    this.changed(/** @type {Texts} */ (name === "certified" ? {} : {chattering: text}), ["chattering"]);
+    this.changed({chattering: this.limits[name] ? `${name}=${this.limits[name].text}` : name}, ["chattering"]);
   }
 }
 
@@ -523,7 +521,8 @@ export class ModelForm {
     const [button, words] = explained(phrase("form.model_about"), phrase("form.model_what"));
     this.model.element.querySelector("label")?.append(" ", button);
     element.replaceChildren(this.model.element, words);
-    this.treatment = new TreatmentForm(element, changed);
+    // The texts of a case leave out what is the default; in a comparison the default is another treatment like any.
+    this.treatment = new TreatmentForm(element, ({chattering}, names) => changed(/** @type {Texts} */ (chattering === "certified" ? {} : {chattering}), names));
   }
 
   /** @param {Texts} texts */

@@ -1,7 +1,7 @@
 // A map as it is drawn: its plot, its colours, and the legend that says what they mean.
 
 import {withLegend} from "./exports.js";
-import {AFTER_REST, AROUND, MARK, MODES, OUTCOMES, OVERTURNS, RAMP, STRIPES, UNKNOWN, VERDICTS, picture, rgba} from "./outcomes.js";
+import {AFTER_REST, AROUND, MARK, MODES, OUTCOMES, OVERTURNS, RAMP, STRIPES, UNKNOWN, VERDICTS, cellEdges, picture, rgba} from "./outcomes.js";
 import {plain} from "./ticks.js";
 import {bokeh, coarse, colour, figure, showPlot, themed} from "./theme.js";
 import {make, one} from "./words.js";
@@ -123,14 +123,14 @@ export class MapPicture {
     return [frame.x_scale.compute(x), frame.y_scale.compute(y)];
   }
 
-  /** Ends of the map, half a step beyond the outermost points. */
+  /** Ends of the map, those of its outermost cells. */
   box() {
-    const {x, y} = this.about;
-    return [x.values, y.values].flatMap((values) => {
-      const half = 0.5 * ((values[values.length - 1] - values[0]) / Math.max(1, values.length - 1));
-      return [values[0] - half, values[values.length - 1] + half];
-    });
+    const {x, y} = this.edges();
+    return [x[0], x[x.length - 1], y[0], y[y.length - 1]];
   }
+
+  /** Ends of the cells of both axes. */
+  edges() { return {x: cellEdges(this.about.x.values), y: cellEdges(this.about.y.values)}; }
 
   /** Colour all points. @param {Float32Array[]} all values of each quantity @param {string} quantity the one that is shown
    * @param {{complete: boolean, label: string}} given whether they are all computed, and what the quantity is called */
@@ -142,8 +142,8 @@ export class MapPicture {
     const [rows, columns] = this.about.shape;
     const {inks, kinds, hatched} = this.coloured(quantity, values, label);
     // One pixel a point until all are computed: lines take time that computing has a use for.
-    const width = complete ? one("map").clientWidth - 80 : columns;
-    const {colours, shape} = picture(inks, [rows, columns], width, kinds, hatched);
+    const {clientWidth: width, clientHeight: height} = one("map");
+    const {colours, shape} = picture(inks, this.edges(), complete ? [width - 80, height - 80] : [columns, rows], kinds, hatched);
     const {ndarray} = bokeh().require("core/util/ndarray");
     const [x0, x1, y0, y1] = this.box();
     Object.assign(this.image.data, {image: [ndarray(colours, {shape, dtype: "uint32"})], x: [x0], y: [y0], dw: [x1 - x0], dh: [y1 - y0]});

@@ -116,7 +116,7 @@ export class MapReading {
     pen.stroke();
   }
 
-  /** Row and column at a place. @param {number} x @param {number} y */
+  /** Row and column of the cell at a place, whose value is the nearest. @param {number} x @param {number} y */
   place(x, y) {
     const nearest = (/** @type {number[]} */ values, /** @type {number} */ wanted) => values.reduce((best, each, k) => (Math.abs(each - wanted) < Math.abs(values[best] - wanted) ? k : best), 0);
     return [nearest(this.view.about.y.values, y), nearest(this.view.about.x.values, x)];

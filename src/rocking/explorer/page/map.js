@@ -7,7 +7,7 @@ import {goOnAt} from "./focus.js";
 import {MapPicture, labelled, quantityLabel} from "./map-picture.js";
 import {MapReading} from "./map-reading.js";
 import {MapZoom} from "./map-zoom.js";
-import {namesOf, specification} from "./parameters.js";
+import {namesOf, pulseOf, specification} from "./parameters.js";
 import {make, one} from "./words.js";
 import {joined, short, typed} from "./numbers.js";
 import {inWords, phrase} from "./texts.js";
@@ -141,10 +141,9 @@ export class View {
       if (!varied.includes(map.y) || map.y === map.x) this.turn("y", varied.find((/** @type {string} */ each) => each !== map.x));
       return {names: varied, right: varied};
     }
-    const motion = texts.motion ?? "";
-    const family = motion.split(":")[0];
+    const {family, parts} = pulseOf(texts.motion ?? "");
     const pulse = Object.hasOwn(specification.pulses, family);
-    const frequency = pulse && motion.includes("frequency=");
+    const frequency = pulse && "frequency" in parts;
     const names = specification.axes.map((/** @type {any} */ each) => each.name).filter((/** @type {string} */ name) => name !== "omega" || frequency);
     const right = names.filter((/** @type {string} */ name) => name !== "a" && name !== "pga");
     if (!names.includes(map.y)) this.turn("y", pulse ? "a" : "pga");
@@ -185,7 +184,7 @@ export class View {
   /** The quantity with which a map begins: under a pulse how the first rocking ends; a record goes on, and what counts is the end.
    * @param {string[]} quantities @returns {string} */
   first(quantities) {
-    const family = (this.page.state.texts.motion ?? "").split(":")[0];
+    const {family} = pulseOf(this.page.state.texts.motion ?? "");
     return this.study || Object.hasOwn(specification.pulses, family) ? quantities[0] : "mode";
   }
 
@@ -352,7 +351,7 @@ export class View {
     const [threshold] = shown?.header.block.thresholds_g ?? [0.2];
     const p = shown?.header.block.sides[0].p ?? 3.6;
     const {texts} = this.page.state;
-    const block = Object.fromEntries([...namesOf("block"), "model"].filter((name) => texts[name]).map((name) => [name, texts[name]]));
+    const block = Object.fromEntries([...namesOf("block"), "model", "gravity"].filter((name) => texts[name]).map((name) => [name, texts[name]]));
     const motion = `sine:amplitude=${(1.03 * threshold).toPrecision(6)}g,frequency=${(p / Math.PI).toPrecision(6)},cycles=2.5`;
     this.page.state.map = {};
     this.restore();

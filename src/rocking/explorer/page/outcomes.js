@@ -58,14 +58,32 @@ export const stripe = (ink) => rgba(STRIPES[luminance(ink) > 0.3 ? 0 : 1]);
 /** Whether a point lies on a stripe of a hatch. @param {number} k @param {number} columns */
 const striped = (k, columns) => (Math.floor(k / columns) + (k % columns)) % 4 === 0;
 
+/** Ends of the cells about values, midway between neighbours: what lies in a cell is nearest to its value.
+ * @param {number[]} values @returns {number[]} */
+export function cellEdges(values) {
+  const last = values.length - 1, middles = values.slice(1).map((each, k) => 0.5 * (each + values[k]));
+  return [2 * values[0] - middles[0], ...middles, 2 * values[last] - middles[last - 1]];
+}
+
+/** The same ends in pixels of a picture: cells as wide as each other have the same number of these, others share what there are on the
+ * screen. @param {number[]} edges @param {number} size pixels of one of even cells @param {number} room pixels at most where they are uneven */
+function inPixels(edges, size, room) {
+  const count = edges.length - 1, whole = edges[count] - edges[0];
+  const even = edges.every((each, k) => Math.abs(count * (each - edges[0]) - k * whole) < 1e-3 * whole);
+  const pixels = even ? count * size : Math.max(count, Math.floor(room));
+  return edges.map((each) => Math.round((pixels * (each - edges[0])) / whole));
+}
+
 /** A map's picture, in which every point has some pixels: with stripes, and with lines between outcomes of low contrast.
- * @param {Uint32Array} inks colour of every point, row by row @param {[number, number]} shape rows and columns @param {number} width pixels of the screen
- * @param {Set<number>} kinds colours that stand for an outcome @param {boolean[] | null} hatched
+ * @param {Uint32Array} inks colour of every point, row by row @param {{x: number[], y: number[]}} edges ends of the cells @param {[number, number]} screen
+ * its pixels to the right and upwards @param {Set<number>} kinds colours that stand for an outcome @param {boolean[] | null} hatched
  * @returns {{colours: Uint32Array, shape: [number, number]}} */
-export function picture(inks, [rows, columns], width, kinds, hatched) {
-  const wanted = Math.round(width / columns), most = Math.floor(Math.sqrt(MOST / (rows * columns)));
+export function picture(inks, {x, y}, screen, kinds, hatched) {
+  const columns = x.length - 1, rows = y.length - 1;
+  const wanted = Math.round(screen[0] / columns), most = Math.floor(Math.sqrt(MOST / (rows * columns)));
   const size = Math.min(Math.max(wanted, 1), Math.max(most, 1), 8);
-  const out = new Uint32Array(rows * columns * size * size), across = columns * size;
+  const right = inPixels(x, size, Math.min(screen[0], MOST / (rows * size))), up = inPixels(y, size, Math.min(screen[1], MOST / (columns * size)));
+  const across = right[columns], out = new Uint32Array(across * up[rows]);
   /** @type {Map<number, number>} */
   const known = new Map();
   /** @param {number} first @param {number} second */
@@ -79,12 +97,12 @@ export function picture(inks, [rows, columns], width, kinds, hatched) {
   for (let row = 0; row < rows; row += 1) for (let column = 0; column < columns; column += 1) {
     const k = row * columns + column, ink = inks[k];
     const shown = hatched?.[k] && striped(k, columns) ? stripe(ink) : ink;
-    const corner = row * size * across + column * size;
-    for (let r = 0; r < size; r += 1) out.fill(shown, corner + r * across, corner + r * across + size);
-    if (size < 2) continue;
-    const right = column + 1 < columns ? line(ink, inks[k + 1]) : 0, above = row + 1 < rows ? line(ink, inks[k + columns]) : 0;
-    if (right) for (let r = 0; r < size; r += 1) out[corner + r * across + size - 1] = right;
-    if (above) out.fill(above, corner + (size - 1) * across, corner + (size - 1) * across + size);
+    const [left, end, bottom, top] = [right[column], right[column + 1], up[row], up[row + 1]];
+    for (let r = bottom; r < top; r += 1) out.fill(shown, r * across + left, r * across + end);
+    if (end - left < 2 || top - bottom < 2) continue;
+    const beside = column + 1 < columns ? line(ink, inks[k + 1]) : 0, above = row + 1 < rows ? line(ink, inks[k + columns]) : 0;
+    if (beside) for (let r = bottom; r < top; r += 1) out[r * across + end - 1] = beside;
+    if (above) out.fill(above, (top - 1) * across + left, (top - 1) * across + end);
   }
-  return {colours: out, shape: [rows * size, columns * size]};
+  return {colours: out, shape: [up[rows], across]};
 }

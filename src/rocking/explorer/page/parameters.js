@@ -11,7 +11,7 @@ import {known, phrase} from "./texts.js";
 /** @typedef {{view: string, texts: Texts, other: Texts, compare: string, align: string, window: [number, number] | null, at: number | null, lecture: boolean, example: {name: string, step: number} | null, map: Texts, sweep: Texts, assessment: Texts, good: Good}} State */
 /** What was answered last of each part of the state: it alone enters the address.
  * @typedef {{texts: Texts, other: Texts, compare: string, align: string, map: Texts, sweep: Texts, assessment: Texts}} Good */
-/** @typedef {{name: string, label: string, group: string, unit: string, suffix: string, default: string, units: Record<string, number>, low: number, high: number, logarithmic: boolean, step: number, values: string, explanation: string}} Parameter */
+/** @typedef {{name: string, label: string, group: string, kind: string, unit: string, suffix: string, default: string, units: Record<string, number>, low: number, high: number, logarithmic: boolean, step: number, values: string, explanation: string}} Parameter */
 
 /** @type {any} */
 export const specification = await json("/api/start", {}).catch(stop);
@@ -44,6 +44,13 @@ export const parameter = (name) => specification.parameters.find((/** @type {Par
 /** Names of the texts of a case, of some groups or of all. @param {string[]} groups @returns {string[]} */
 export const namesOf = (...groups) =>
   specification.parameters.filter((/** @type {Parameter} */ each) => !groups.length || groups.includes(each.group)).map((/** @type {Parameter} */ each) => each.name);
+
+/** Family of a pulse, and texts of its parameters by name, read as the package does: with blanks and a comma at the end.
+ * @param {string} text */
+export function pulseOf(text) {
+  const [family, rest = ""] = text.split(":");
+  return {family, parts: /** @type {Texts} */ (Object.fromEntries(rest.split(",").map((part) => part.split("=").map((each) => each.trim()))))};
+}
 
 const VIEWS = ["response", "block", "map", "periodic", "compare", "records", "assessment"];
 const COMPARED = ["treatment", "block", "motion", "case"];
