@@ -656,6 +656,7 @@ def test_a_long_line_costs_little_more_than_its_size(content: bytes, file: Calla
     assert peak < 8 * len(content)
 
 
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize("row", [b"\n87.304875", b"\n0.090,8.9026197e-02"])
 def test_rows_of_uneven_length_take_twenty_times_the_file_at_most(row: bytes, file: Callable[[bytes], Path]) -> None:
     rows = b"".join(row + b"5" * (k % 2) for k in range(100_000))

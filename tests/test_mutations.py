@@ -8,6 +8,7 @@ from pathlib import Path
 import branches
 import mutants
 import mutations
+import pytest
 
 CODE = '''"""A module."""
 
@@ -191,6 +192,7 @@ def test_what_the_nearest_tests_spare_is_judged_by_others_and_by_laws_of_all(mon
     assert asked[2:] == [[], []]
 
 
+@pytest.mark.thorough
 def test_the_nearest_tests_are_followed_by_those_that_are_not_among_them():
     tree = object.__new__(mutants.Tree)
     tree.tests = mutants.FilesOfTests(mutants.ROOT)

@@ -680,6 +680,7 @@ def _rate_within(fitted, hazard):
     return float(np.sum(chance * -np.diff(hazard.rate_of(steps))))
 
 
+@pytest.mark.cases(fast=2)
 @pytest.mark.parametrize(
     ("levels", "fell", "trials", "hazard", "years"),
     [

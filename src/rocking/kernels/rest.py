@@ -23,9 +23,8 @@ _SLOWER = 0.6
 _SOONER = 0.97
 _SLOWEST = 0.95
 
-#: What is left until the rest is this many times the rounding of the time at least when a proof is tried: impacts that
-#: keep 0.99 of the speed are then still 160 times that apart.
-_RESOLVED = 2.0**14
+#: Impacts are about this many times the rounding of the time apart, at least, when a proof is tried again.
+_RESOLVED = 8.0
 
 
 class Rest(NamedTuple):
@@ -74,8 +73,9 @@ def record_proof(ground: Ground, block: Record, rules: Record, state: Record, pr
         # one to its square. The former needs a rest within the present piece.
         ratio = _SOONER * excess**-0.2 if wait == 0.0 else 1.0 - wait / proof.time
         ratio = max(ratio, math.sqrt(1.0 / excess))
-    # What is left until the rest is proportional to the speed, and the arcs must not be lost in the rounding of times.
-    least = _RESOLVED * ULP * time_of(ground, state) / proof.time if proof.time > 0.0 else 1.0
+    # The next arc is about this long; arcs go with the speed, and must not be lost in the rounding of times.
+    arc = (1.0 - max(block.restitution[0], block.restitution[1])) * proof.time
+    least = _RESOLVED * ULP * time_of(ground, state) / arc if arc > 0.0 else 0.0
     state.proof_speed = state.v * min(_SLOWEST, max(ratio, least))
 
 
