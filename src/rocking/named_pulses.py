@@ -146,9 +146,14 @@ def named_pulse(text: str) -> Motion:
 
 def pulse_values(text: str) -> tuple[PulseFamily, dict[str, Any]]:
     """Family and values (SI units) of the parameters that a text of `named_pulse` gives."""
+    family, written = pulse_texts(text)
+    return family, {parameter: _value(family, parameter, texts) for parameter, texts in written.items()}
+
+
+def pulse_texts(text: str) -> tuple[PulseFamily, dict[str, list[str]]]:
+    """Family and parameters of a text of `named_pulse` as they are written: of most one value, without blanks."""
     name, _, rest = checks.text(text, "pulse", InvalidOption).partition(":")
-    family = pulse_family(name)
-    return family, {parameter: _value(family, parameter, texts) for parameter, texts in _parts(rest).items()}
+    return pulse_family(name), _parts(rest)
 
 
 def _parts(text: str) -> dict[str, list[str]]:

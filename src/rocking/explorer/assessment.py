@@ -135,6 +135,8 @@ def described(assessment: Assessment) -> dict[str, Any]:
         notes.append(phrase("assessment.symmetric"))
     if any(entry.get("vertical") for entry in assessment.entries):
         notes.append(phrase("assessment.vertical"))
+    if case.motion is not None:
+        notes.append(phrase("assessment.first", step=100.0 * (_STEP - 1.0)))
     if case.initial_rotation or case.initial_velocity or case.duration is not None:
         notes.append(phrase("assessment.begins"))
     return {
@@ -250,7 +252,7 @@ def _margin(case: Case) -> dict[str, Any] | None:
         return np.asarray(table.overturned.values.ravel())
 
     lifting = lifting_factors(motion, [case.block.uplift_thresholds(case.model)], case.block.gravity)[0]
-    found: dict[str, Any] = {"factor": None, "pga": motion.pga, "step": 100.0 * (_STEP - 1.0)}  # in %
+    found: dict[str, Any] = {"factor": None, "pga": motion.pga}
     if math.isinf(lifting):
         return found
     factors = lifting * _STEP ** np.arange(-1.0, _MOST_FACTORS)  # the lowest does not lift the block

@@ -33,6 +33,7 @@ from rocking.explorer.inputs import (
 from rocking.explorer.parameters import QUANTITIES, SCALINGS, names_of
 from rocking.explorer.phrases import phrase
 from rocking.motion.motion import Motion
+from rocking.named_pulses import pulse_texts
 from rocking.quantities import number
 from rocking.treatment import FITTED_FREQUENCIES, FITTED_RESTITUTIONS, Certified
 
@@ -376,11 +377,16 @@ def _both(pair: list[float]) -> str:
 
 
 def change_pulse(texts: dict[str, str], **numbers: float) -> None:
-    """Change some parameters of the pulse in the texts of a case; one that is cut has as many cycles as before."""
+    """Change some parameters of the pulse in the texts of a case; one that is cut has as many cycles as before.
+
+    The others stay as they are written, so that what hangs on them alone is found not to have changed.
+    """
     given = arguments_of(texts["motion"])
     if "duration" in given and "frequency" in numbers:
-        given["duration"] *= given["frequency"] / numbers["frequency"]
-    texts["motion"] = pulse_text(texts["motion"], given | numbers)
+        numbers["duration"] = given["duration"] * given["frequency"] / numbers["frequency"]
+    _, written = pulse_texts(texts["motion"])
+    kept: dict[str, Any] = {name: ",".join(values) for name, values in written.items() if name in given}
+    texts["motion"] = pulse_text(texts["motion"], kept | numbers)
 
 
 def _change_amplitude(texts: dict[str, str], grid: MapGrid, peak: float) -> None:

@@ -207,14 +207,14 @@ export class View {
   }
 
   /** What is known of the factor on the case's motion, and apart from that of the case as it is.
-   * @param {{factor: number | null, pga: number, step: number} | null | undefined} margin */
+   * @param {{factor: number | null, pga: number} | null | undefined} margin */
   margin(margin) {
     if (!margin) return phrase(this.last?.header.share === 1 ? "assessment.not_shaken" : "assessment.at_last");
-    const found = phrase(margin.factor ? "assessment.margin_first" : "assessment.no_margin", {level: acceleration(margin.pga), step: short(margin.step)});
+    const found = phrase(margin.factor ? "assessment.margin_first" : "assessment.no_margin", {level: acceleration(margin.pga)});
     return this.page.shown?.header.overturned ? phrase("assessment.margin_as_is", {found}) : found;
   }
 
-  /** Uplift, friction and margin of the case. @param {{factor: number | null, pga: number, step: number} | null | undefined} margin */
+  /** Uplift, friction and margin of the case. @param {{factor: number | null, pga: number} | null | undefined} margin */
   base(margin) {
     const {thresholds, friction_to_rock: needed, friction} = this.about;
     const largest = this.rows.reduce((most, {friction_needed: each}) => Math.max(most, each ?? Infinity), 0);
