@@ -352,7 +352,7 @@ class _Work:
                 period = period_of(self.states[w, k, s], scale)
                 self.period[w, k, s] = period
                 if period:
-                    self.impacts[w, k, s] = impacts_of(strobe, now[s], period)
+                    self.impacts[w, k, s] = impacts_of(strobe, now[s], period, strobe.derivative(now[s], period)[1])
         return len(values)
 
     def dataset(self, parameter: str) -> xr.Dataset:

@@ -193,19 +193,19 @@ def orbit_at(strobe: StroboscopicMap, state: Floats, period: int) -> PeriodicOrb
     """Periodic orbit of a state that comes back after so many periods."""
     _, change = strobe.derivative(state, period)
     return PeriodicOrbit(
-        strobe.body, strobe.motion, strobe.model, strobe.treatment, state, period, impacts_of(strobe, state, period),
+        strobe.body, strobe.motion, strobe.model, strobe.treatment, state, period, impacts_of(strobe, state, period, change),
         multipliers_at(strobe, change), is_symmetric(strobe, state, period), not np.any(change),
     )  # fmt: skip
 
 
-def impacts_of(strobe: StroboscopicMap, state: Floats, period: int) -> float:
-    """Impacts in so many periods from a state that comes back: infinity with complete chattering.
+def impacts_of(strobe: StroboscopicMap, state: Floats, period: int, change: Floats) -> float:
+    """Impacts in so many periods from a state of this derivative: infinity with complete chattering.
 
     That is a rest after impacts which is proven, and not made by an impact that leaves no speed.
     """
     impacts = float(strobe.followed(state, period)[2])
     chatters = impacts > 0.0 and strobe.treatment.bracket > 0.0 and np.max(strobe.bodies.restitution) > 0.0
-    return math.inf if chatters and not np.any(strobe.derivative(state, period)[1]) else impacts
+    return math.inf if chatters and not np.any(change) else impacts
 
 
 def multipliers_of(change: Floats) -> NDArray[np.complex128]:

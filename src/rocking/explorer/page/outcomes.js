@@ -66,11 +66,11 @@ export function cellEdges(values) {
 }
 
 /** The same ends in pixels of a picture: cells as wide as each other have the same number of these, others share what there are on the
- * screen. @param {number[]} edges @param {number} size pixels of one of even cells @param {number} room pixels at most where they are uneven */
-function inPixels(edges, size, room) {
+ * screen. @param {number[]} edges @param {number} size pixels of one of even cells @param {number} most pixels at most where they are uneven */
+function inPixels(edges, size, most) {
   const count = edges.length - 1, whole = edges[count] - edges[0];
   const even = edges.every((each, k) => Math.abs(count * (each - edges[0]) - k * whole) < 1e-3 * whole);
-  const pixels = even ? count * size : Math.max(count, Math.floor(room));
+  const pixels = even ? count * size : Math.max(count, Math.floor(most));
   return edges.map((each) => Math.round((pixels * (each - edges[0])) / whole));
 }
 
