@@ -193,8 +193,9 @@ def orbit_at(strobe: StroboscopicMap, state: Floats, period: int) -> PeriodicOrb
     """Periodic orbit of a state that comes back after so many periods."""
     _, change = strobe.derivative(state, period)
     return PeriodicOrbit(
-        strobe.body, strobe.motion, strobe.model, strobe.treatment, state, period, impacts_of(strobe, state, period, change),
-        multipliers_at(strobe, change), is_symmetric(strobe, state, period), not np.any(change),
+        strobe.body, strobe.motion, strobe.model, strobe.treatment, state, period,
+        impacts_of(strobe, state, period, change), multipliers_at(strobe, change), is_symmetric(strobe, state, period),
+        not np.any(change),
     )  # fmt: skip
 
 
