@@ -521,6 +521,21 @@ def test_keys_move_and_zoom_the_plots(opened):
     page.until("!new URLSearchParams(location.search).has('from')")
 
 
+@pytest.mark.parametrize(
+    ("more", "plots", "asks"),
+    [("", "#histories", "**/api/window?*"), ("&view=compare", "#compare-plots", "**/api/compare?*")],
+)
+def test_keys_go_on_from_the_window_that_is_asked_for(opened, more, plots, asks):
+    page = opened(f"{STATUE}&from=231&to=235{more}")
+    with held(page, asks) as waiting:
+        page.page.locator(plots).focus()
+        page.page.keyboard.press("+")
+        asked(page, waiting)
+        page.page.keyboard.press("ArrowRight")
+        page.page.keyboard.press("-")
+    page.until("new URLSearchParams(location.search).get('from') === '231.5'")
+
+
 def test_dragging_across_a_plot_zooms_in(opened):
     page = opened(f"{STATUE}&from=230&to=240")
     box = page.page.locator("#histories").bounding_box()

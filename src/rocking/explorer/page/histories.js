@@ -45,7 +45,7 @@ export class Scale {
 }
 
 export class Histories {
-  /** @param {HTMLElement} element @param {{window: (ends: [number, number] | null) => void, cursor?: (time: number | null) => void, pick?: (time: number) => void}} tell */
+  /** @param {HTMLElement} element @param {{window: (ends: [number, number] | null) => void, asked: () => [number, number] | null, cursor?: (time: number | null) => void, pick?: (time: number) => void}} tell */
   constructor(element, tell) {
     this.element = element;
     this.tell = tell;
@@ -314,7 +314,7 @@ export class Histories {
 
   /** @param {string} how */
   zoom(how) {
-    const [from, to] = this.window;
+    const [from, to] = this.tell.asked() ?? this.window; // what is asked for may not be drawn yet
     const width = to - from, middle = 0.5 * (from + to);
     if (how === "all") this.go([0, this.whole]);
     else if (how === "active") this.go(null);

@@ -43,7 +43,7 @@ const forms = {
   model: new ModelForm(one("model-form"), changed),
 };
 const histories = new Histories(one("histories"), {
-  window: showWindow, cursor: (time) => { if (time === null) cursor.show(); else cursor.hover(time); }, pick: (time) => cursor.set(time),
+  window: showWindow, asked: () => state.window, cursor: (time) => { if (time === null) cursor.show(); else cursor.hover(time); }, pick: (time) => cursor.set(time),
 });
 const phase = new PhasePanel(page, (time) => cursor.set(time));
 const cursor = new Cursor(page, {mark: (time) => { histories.mark(time); phase.mark(time); }, seek: (time) => { if (state.view === "block") views.block?.seek(time); }});
