@@ -11,7 +11,7 @@ import rocking
 from rocking.errors import InvalidOption, UnreadableRecord
 from rocking.explorer import uploads
 from rocking.explorer.catalogue import entries_of, listing, title_of
-from rocking.explorer.inputs import read_motion
+from rocking.explorer.motions import read_motion
 from rocking.explorer.uploads import UploadStore
 
 FORMATS = Path(__file__).parent / "data" / "formats"

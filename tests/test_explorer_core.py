@@ -20,12 +20,14 @@ from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingEr
 from rocking.explorer import maps, readings
 from rocking.explorer.code import case_as_command, case_as_python, map_as_command, map_as_python
 from rocking.explorer.core import Explorer
-from rocking.explorer.inputs import NAMES, arguments_of, pulse_as_text, pulse_of, read_case, texts_of, texts_of_motion
+from rocking.explorer.inputs import read_case, texts_of
+from rocking.explorer.motions import arguments_of, pulse_as_text, pulse_of, texts_of_motion
 from rocking.explorer.parameters import DEFAULT
 from rocking.explorer.parameters import PULSES as OFFERED
 from rocking.explorer.payload import pack
 from rocking.explorer.studies import StudyView
 from rocking.explorer.sweeps import sweep_of
+from rocking.explorer.texts import NAMES
 from rocking.explorer.uploads import LARGEST, MOST, UploadStore, bare_name
 from rocking.explorer.windows import extremes
 from rocking.motion.exceedance import exceedances

@@ -6,7 +6,6 @@ import pytest
 
 from rocking import quantities
 from rocking.errors import InvalidOption
-from rocking.explorer.inputs import FAMILIES
 from rocking.explorer.parameters import (
     DEFAULT,
     MAP,
@@ -19,7 +18,7 @@ from rocking.explorer.parameters import (
     specification,
 )
 from rocking.explorer.phrases import english
-from rocking.named_pulses import named_pulse
+from rocking.named_pulses import FAMILIES, named_pulse
 from rocking.treatment import treatment
 
 #: What the command line takes as an argument, and what it does not do.

@@ -11,18 +11,8 @@ from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.analysis.overturning import overturning_map
 from rocking.analysis.spectrum import Abscissa, rocking_spectrum
 from rocking.block import Blocks
-from rocking.cli.options import (
-    BLOCK,
-    MEASURE,
-    MODEL,
-    EnsembleOptions,
-    HeldOptions,
-    MeasureOptions,
-    ModelOptions,
-    SlendernessOptions,
-    TreatmentOptions,
-    ensemble_of,
-)
+from rocking.cli.body_options import EnsembleOptions, HeldOptions, SlendernessOptions, ensemble_of
+from rocking.cli.options import BLOCK, MEASURE, MODEL, MeasureOptions, ModelOptions, TreatmentOptions
 from rocking.cli.output import OUTPUT, OutputOptions, deliver
 from rocking.cli.records import RECORDS, MotionOptions, Names, ReadRecords, UnscaledOptions
 from rocking.errors import InvalidOption

@@ -69,7 +69,7 @@ def _study(folder: Path) -> StudyView:
 
 def _opening(explorer: Explorer, motion: str) -> dict[str, str]:
     """Texts of the motion that the page opens with."""
-    from rocking.explorer.inputs import is_pulse, pulse_of
+    from rocking.explorer.motions import is_pulse, pulse_of
 
     if is_pulse(motion):
         pulse_of(motion)

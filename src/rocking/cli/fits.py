@@ -25,7 +25,8 @@ from rocking.analysis.fragility.result import Fragility
 from rocking.analysis.hazard import HazardCurve
 from rocking.analysis.input_tables import History, Outcomes, read_calibration, read_observed
 from rocking.analysis.risk import check_measure
-from rocking.cli.options import BLOCK, MEASURE, MODEL, WHOLE, EnsembleOptions, MeasureOptions, TreatmentOptions
+from rocking.cli.body_options import EnsembleOptions
+from rocking.cli.options import BLOCK, MEASURE, MODEL, WHOLE, MeasureOptions, TreatmentOptions
 from rocking.cli.output import OUTPUT, OutputOptions, left_out, print_result, subfolder, write_results
 from rocking.cli.records import RECORDS, MotionOptions, Names, ReadRecords, ScaledPulseOptions
 from rocking.constants import Model

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Annotated
 
-from rocking.cli.options import BLOCK, MODEL, WHOLE, BodyOptions, ModelOptions, measured, written
+from rocking.cli.body_options import BodyOptions
+from rocking.cli.options import BLOCK, MODEL, WHOLE, ModelOptions, measured, written
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results, write_tables
 from rocking.cli.records import RECORDS, MotionOptions, Names
 from rocking.dynamics import compare_schemes, scheme_of

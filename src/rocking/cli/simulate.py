@@ -12,7 +12,8 @@ from cyclopts import Parameter
 from rocking import quantities
 from rocking.analysis.rules.check import check as apply_rules
 from rocking.analysis.survey import folder_names, survey
-from rocking.cli.options import BLOCK, MODEL, BlockOptions, HeldOptions, ModelOptions, TreatmentOptions, measured
+from rocking.cli.body_options import BlockOptions, HeldOptions
+from rocking.cli.options import BLOCK, MODEL, ModelOptions, TreatmentOptions, measured
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, subfolder, write_results
 from rocking.cli.records import RECORDS, MotionOptions, Names
 from rocking.errors import InvalidOption

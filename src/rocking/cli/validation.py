@@ -10,7 +10,8 @@ from rocking.analysis.input_tables import read_tests
 from rocking.analysis.validation.judging import Scope
 from rocking.analysis.validation.judging import validate as judged
 from rocking.analysis.validation.tested import ShakeTest
-from rocking.cli.options import BLOCK, MODEL, WHOLE, EnsembleOptions, ModelOptions, ensemble_of
+from rocking.cli.body_options import EnsembleOptions, ensemble_of
+from rocking.cli.options import BLOCK, MODEL, WHOLE, ModelOptions
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results, write_tables
 from rocking.cli.records import RECORDS, FileOptions
 from rocking.errors import InvalidOption

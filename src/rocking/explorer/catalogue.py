@@ -11,9 +11,9 @@ from typing import Any, Final
 from urllib.parse import parse_qsl
 
 from rocking.errors import InvalidOption, RockingError
-from rocking.explorer.inputs import Texts
 from rocking.explorer.parameters import PARAMETERS, field_label, names_of
 from rocking.explorer.phrases import phrase
+from rocking.explorer.texts import Texts
 from rocking.explorer.uploads import UploadStore, measures
 from rocking.motion import records
 

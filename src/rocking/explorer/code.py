@@ -10,11 +10,13 @@ from typing import Any, Final
 
 from rocking.analysis.overturning import PULSES
 from rocking.constants import STANDARD_GRAVITY
-from rocking.explorer.inputs import BLOCK_NAMES, NAMES, Case, arguments_of, as_option, is_pulse, pulse_call
+from rocking.explorer.inputs import Case
 from rocking.explorer.maps import Axis, MapGrid, sign_of
+from rocking.explorer.motions import arguments_of, is_pulse, pulse_call
 from rocking.explorer.parameters import QUANTITIES
 from rocking.explorer.periodic import KEPT, PASSED
 from rocking.explorer.sweeps import Sweep, call_at
+from rocking.explorer.texts import BLOCK_NAMES, NAMES, as_option
 
 #: Quantities of a map of overturning.
 _OVERTURNING: Final = ("peak", "mode")

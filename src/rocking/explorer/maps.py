@@ -19,19 +19,11 @@ from rocking.chattering.maps import Outcome, last_exceedance, outcomes_of
 from rocking.constants import STANDARD_GRAVITY
 from rocking.engine import Setup, Task, simulate_tasks
 from rocking.errors import InvalidOption
-from rocking.explorer.inputs import (
-    BLOCK_NAMES,
-    Case,
-    Texts,
-    arguments_of,
-    is_pulse,
-    pulse_of,
-    pulse_text,
-    require_possible,
-    require_rest,
-)
+from rocking.explorer.inputs import Case, require_possible, require_rest
+from rocking.explorer.motions import arguments_of, is_pulse, pulse_of, pulse_text
 from rocking.explorer.parameters import QUANTITIES, SCALINGS, names_of
 from rocking.explorer.phrases import phrase
+from rocking.explorer.texts import BLOCK_NAMES, Texts
 from rocking.motion.motion import Motion
 from rocking.named_pulses import pulse_texts
 from rocking.quantities import number

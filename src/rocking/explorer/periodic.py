@@ -13,7 +13,8 @@ from rocking.dynamics.bifurcation import period_of, settled_states
 from rocking.dynamics.maps import Fate, StroboscopicMap, stroboscopic_map
 from rocking.dynamics.orbits import multipliers_at
 from rocking.dynamics.repeated import scale_of
-from rocking.explorer.inputs import Case, arguments_of, is_pulse, pulse_of
+from rocking.explorer.inputs import Case
+from rocking.explorer.motions import arguments_of, is_pulse, pulse_of
 from rocking.explorer.payload import Payload
 from rocking.explorer.phrases import phrase
 from rocking.motion import pulses

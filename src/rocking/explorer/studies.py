@@ -16,9 +16,10 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption, StudyError
-from rocking.explorer.inputs import as_path, texts_of_motion
+from rocking.explorer.motions import texts_of_motion
 from rocking.explorer.payload import Payload
 from rocking.explorer.phrases import phrase
+from rocking.explorer.texts import as_path
 from rocking.explorer.uploads import UploadStore
 from rocking.motion.scaling import FACTOR
 from rocking.quantities import number

@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike
 
 from rocking.dynamics.maps import Fate
 from rocking.errors import InvalidOption
-from rocking.explorer.inputs import Case, Texts, arguments_of, pulse_call, require_possible
+from rocking.explorer.inputs import Case, require_possible
 from rocking.explorer.maps import AXES, Axis, change_pulse
+from rocking.explorer.motions import arguments_of, pulse_call
 from rocking.explorer.parameters import SCALINGS
 from rocking.explorer.payload import Payload
 from rocking.explorer.periodic import (
@@ -31,6 +32,7 @@ from rocking.explorer.periodic import (
     values_of,
 )
 from rocking.explorer.phrases import phrase
+from rocking.explorer.texts import Texts
 from rocking.quantities import number
 
 #: Values of a sweep, the steps between those of each level, and how many come at once.

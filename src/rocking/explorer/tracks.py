@@ -7,8 +7,9 @@ from collections.abc import Callable
 from typing import Final
 
 from rocking.errors import RockingError
-from rocking.explorer.inputs import Texts, read_case
+from rocking.explorer.inputs import read_case
 from rocking.explorer.parameters import PARAMETERS, Parameter, names_of
+from rocking.explorer.texts import Texts
 from rocking.explorer.uploads import UploadStore
 
 #: Steps of a slider from its low to its high end, as the page has them.
