@@ -600,6 +600,17 @@ def test_the_detail_of_a_response_is_a_panel_whose_time_is_shaded_wide_enough_to
     assert max(np.max(np.abs(values)) for values in magnified) > 0.5 * detail.get_ylim()[1]
 
 
+@pytest.mark.parametrize("a", [1.00001, pytest.param(1.0 + 1e-13, marks=pytest.mark.thorough)])
+def test_the_detail_of_a_very_short_chattering_shows_its_arcs(a):
+    figure = paper_figure(10, a=a)
+    low, high = figure.draw().axes[2].get_xlim()
+    history = figure.tables["history"]
+    time, rotation = history["time_over_period"], history["rotation_over_alpha_certified"]
+    inside = np.abs(rotation[(low < time) & (time < high)])
+    turnings = np.sum((inside[1:-1] > inside[:-2]) & (inside[1:-1] >= inside[2:]))
+    assert turnings >= 5 and inside.max() > 1e-3 * np.max(np.abs(rotation))
+
+
 def test_an_initiation_that_the_certified_response_has_not_names_the_scheme_that_has_it(figures):
     texts = {number: [text.get_text() for text in figures[number].draw().axes[1].texts] for number in (10, 11)}
     assert texts[10] == ["1st initiation", "2nd initiation"]

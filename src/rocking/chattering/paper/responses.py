@@ -33,8 +33,9 @@ from rocking.treatment import AsymptoticTime, Certified, Treatment, VelocityThre
 #: Amplitude of Fig. 11.
 _INCOMPLETE: Final = 1.05
 
-#: Arcs of less than this share of the period are not drawn point by point.
+#: Arcs of less than this share of the period, or of a detail where that is very short, are not drawn point by point.
 _SHORTEST: Final = 1e-4
+_SHORTEST_IN_DETAIL: Final = 1e-2
 
 #: What the details show: from and to, counted from uplift, over the chattering time (half a period where incomplete).
 _DETAILS: Final = {9: (0.64, 1.09), 10: (0.955, 1.015), 11: (0.38, 1.2)}
@@ -201,7 +202,8 @@ def _responses(case: BlockUnderSine, names: tuple[str, ...]) -> dict[str, Respon
 def _history(
     number: int, title: str, case: BlockUnderSine, responses: dict[str, Response], statements: tuple[Statement, ...]
 ) -> PaperFigure:
-    end, shortest = CYCLES * case.period, _SHORTEST * case.period
+    end, shown = CYCLES * case.period, _shown_closely(case, _DETAILS[number])
+    shortest = case.period * min(_SHORTEST, _SHORTEST_IN_DETAIL * (shown[1] - shown[0]))
     dense = [dense_times(response.impacts["time"], end, shortest=shortest) for response in responses.values()]
     seconds = np.unique(np.concatenate(dense))
     time = seconds / case.period
@@ -223,7 +225,7 @@ def _history(
                 time=time,
                 rotations={_SCHEMES[name].label: rotation for name, rotation in scaled.items()},
                 acceleration=acceleration,
-                detail=_detail(case, _DETAILS[number], time, list(scaled.values())),
+                detail=_detail(case, shown, time, list(scaled.values())),
                 marks=_initiations(case, responses),
                 title=f"{case.symbols(*_SINE)}; {case.symbols(*_BLOCK)}",
             )
@@ -231,11 +233,21 @@ def _history(
     )
 
 
-def _detail(case: BlockUnderSine, shares: tuple[float, float], time: Floats, rotations: list[Floats]) -> Detail:
+def _chattering(case: BlockUnderSine) -> tuple[float, float]:
+    """Start and length of the first chattering, over the period; of half a period where it is incomplete."""
+    return _uplift(case), 0.5 if math.isnan(case.rest) else case.rest
+
+
+def _shown_closely(case: BlockUnderSine, shares: tuple[float, float]) -> tuple[float, float]:
+    """Start and end of a detail, which are at these shares of the first chattering, over the period."""
+    uplift, length = _chattering(case)
+    return uplift + shares[0] * length, uplift + shares[1] * length
+
+
+def _detail(case: BlockUnderSine, shown: tuple[float, float], time: Floats, rotations: list[Floats]) -> Detail:
     """Return what a detail shows: all rotations within its limits of time, up to the end of chattering."""
-    uplift, length = _uplift(case), 0.5 if math.isnan(case.rest) else case.rest
-    start, end = (uplift + share * length for share in shares)
-    inside = (time >= start) & (time <= min(end, uplift + length))
+    start, end = shown
+    inside = (time >= start) & (time <= min(end, sum(_chattering(case))))
     reach = 1.2 * max(float(np.max(np.abs(rotation[inside]))) for rotation in rotations)
     return Detail((start, end), (-reach, reach))
 
