@@ -16,8 +16,8 @@ motion = rocking.records.load("ridgecrest-clc-090")
 response = rocking.simulate(piece, motion)
 
 # %%
-# The summary says it all in words. The block neither slides nor leaves the ground if the friction is
-# as large as it says.
+# The summary says it all in words. The block does not slide if the friction is as large as it says,
+# and does not leave the ground, as the least normal force is above zero.
 
 print(response.summary())
 

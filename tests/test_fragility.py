@@ -13,7 +13,7 @@ from scipy.optimize import minimize
 import rocking
 from rocking import InvalidOption, fit_fragility, fragility
 from rocking.analysis import Band
-from rocking.analysis.levels import families_of
+from rocking.analysis.levels import clusters_of, families_of
 from rocking.block import Blocks
 
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
@@ -671,6 +671,31 @@ def test_multiples_of_a_motion_are_one_cluster_however_they_are_given():
     twice = fragility(BLOCK, [*PULSES, *PULSES], levels=levels).curves[0]
     assert twice.clusters == len(PULSES)
     assert twice.median == pytest.approx(curve.median, rel=1e-6)
+
+
+def test_motions_of_one_label_count_together_as_their_outcomes_do():
+    levels, labels = np.geomspace(2.0, 6.0, 4), [k // 3 for k in range(len(PULSES))]
+    found = fragility(BLOCK, PULSES, levels=levels, clusters=labels)
+    each = found.outcomes
+    of_name = dict(zip(each.motion.unique(), labels, strict=True))
+    given = fit_fragility(each.pga_m_s2, each.overturned, clusters=each.motion.map(of_name)).curves[0]
+    curve, alone = found.curves[0], fragility(BLOCK, PULSES, levels=levels).curves[0]
+    assert (curve.clusters, alone.clusters) == (5, len(PULSES))
+    assert "13 motions in 5 clusters, 4 stripes" in found.description
+    assert curve.median == alone.median
+    assert curve.median_interval == pytest.approx(given.median_interval, rel=1e-9)
+    assert curve.median_interval != pytest.approx(alone.median_interval, rel=1e-3)
+    two = fragility(BLOCK, PULSES, levels=levels, clusters=[0] * 6 + [1] * 7)
+    assert "2 clusters cannot tell how far clusters differ" in " ".join(two.notes)
+
+
+def test_motions_are_of_one_cluster_by_label_or_as_multiples_perhaps_through_others():
+    one, other, third, fourth = PULSES[:4]
+    given = [one, other, third, one.scaled(2.0), fourth, fourth]
+    assert clusters_of(given, ["a", "b", "b", "b", None, ""]).tolist() == [0, 0, 0, 0, 1, 1]
+    assert clusters_of(given).tolist() == families_of(given).tolist() == [0, 1, 2, 0, 3, 3]
+    with pytest.raises(rocking.InvalidOption, match=r"clusters must hold 13 labels, .* one for each motion"):
+        fragility(BLOCK, PULSES, levels=[2.0, 4.0], clusters=["a", "b"])
 
 
 def test_motions_of_one_shape_and_another_length_or_vertical_component_are_not_one():

@@ -194,6 +194,23 @@ def test_what_is_made_of_two_outcomes_is_what_is_made_of_all(few_blocks, tmp_pat
     assert two.critical_scales().identical(all_.critical_scales())
 
 
+def test_motions_of_a_study_that_belong_together_count_as_those_of_a_fragility_do(tmp_path):
+    motions = [rocking.pulses.one_sine(1.0, frequency) for frequency in np.linspace(0.3, 1.5, 12)]
+    blocks, levels = rocking.Blocks.grid(p=[1.8, 2.0], alpha=[0.2], restitution=[0.9]), np.geomspace(2.0, 6.0, 6)
+    labels = [k // 3 for k in range(len(motions))]
+    study = rocking.study(tmp_path, blocks, motions, levels=levels, unit_blocks=512)
+    study.run(threads=1)
+
+    def expected(chosen):
+        curve = rocking.fragility(chosen, motions, levels=levels, clusters=labels).curves[0]
+        assert curve.clusters == 4 and 0.0 < curve.median_interval[0] < curve.median_interval[1] < np.inf
+        return pytest.approx(curve.median_interval, rel=1e-6)
+
+    assert study.fragility(clusters=labels).curves[0].median_interval == expected(blocks)
+    each = study.block_fragilities(clusters=labels).data.isel(block=1, limit_state=0)
+    assert (float(each.median_lower), float(each.median_upper)) == expected(blocks.select(slice(1, 2)))
+
+
 def test_overturning_alone_is_enough_for_its_own_fragility_and_for_no_more(few_blocks, tmp_path):
     study = made(tmp_path, FEW, outcomes=["overturned"])
     study.run(threads=1)

@@ -23,13 +23,11 @@ def numbered(labels: Sequence[object]) -> Integers:
     return np.array([places.setdefault(label, len(places)) for label in labels], dtype=np.int64)
 
 
-def groups_of(labels: object, name: str, count: int) -> Integers:
+def groups_of(labels: object, name: str, count: int, each: str = "outcome") -> Integers:
     """Numbers of given labels, one for each of so many; what has None, NaN or no text for a label is on its own."""
     given = checks.several(labels, name, InvalidOption)
     if len(given) != count or not all(isinstance(label, Hashable) for label in given):
-        raise InvalidOption(
-            f"{{}} must hold {count} labels, numbers or texts, one for each outcome", name, value=labels
-        )
+        raise InvalidOption(f"{{}} must hold {count} labels, numbers or texts, one for each {each}", name, value=labels)
     return numbered([(k,) if _is_missing(label) else label for k, label in enumerate(given)])
 
 

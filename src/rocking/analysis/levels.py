@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import bisection, checks
+from rocking.analysis.labels import groups_of, numbered
 from rocking.arrays import Flags, Floats, Integers
 from rocking.block import Blocks
 from rocking.body import Bodies, Body, title_of
@@ -81,6 +82,26 @@ def _pair(sides: Floats) -> str:
 def values_of(motions: Sequence[Motion], measure: Measure) -> Floats:
     """Return what each motion alone measures, in SI units."""
     return np.array([measure.positive(motion, motion.name) for motion in motions])
+
+
+def clusters_of(motions: Sequence[Motion], labels: object = None) -> Integers:
+    """Whole numbers, the same for motions of one label and for multiples of one another, perhaps through others."""
+    families = families_of(motions)
+    if labels is None:
+        return families
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    count = len(motions)
+    given = groups_of(labels, "clusters", count, "motion")
+    links = coo_array((np.ones(count), (families, count + given)), shape=(2 * count, 2 * count))
+    return numbered(connected_components(links, directed=False)[1][families].tolist())
+
+
+def motions_in_words(clusters: Integers, labels: object) -> str:
+    """How many motions there are, and in how many clusters if they were given labels."""
+    text = counted(len(clusters), "motion")
+    return text if labels is None else f"{text} in {counted(len(np.unique(clusters)), 'cluster')}"
 
 
 def families_of(motions: Sequence[Motion]) -> Integers:

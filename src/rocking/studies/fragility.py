@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from rocking.analysis.fragility.curve import Band, FragilityCurve, fitted_curve, passed
 from rocking.analysis.fragility.fit import OVERTURNING, fit_fragility, of_polarities, weights_of
 from rocking.analysis.fragility.result import Fragility
-from rocking.analysis.levels import families_of, only_block, pooled, units_of, values_of
+from rocking.analysis.levels import clusters_of, motions_in_words, only_block, pooled, units_of, values_of
 from rocking.arrays import Floats
 from rocking.ensemble import Product, body_coordinates, verticals_of
 from rocking.errors import InvalidOption
@@ -48,6 +48,7 @@ def pooled_fragility(
     limits: Mapping[str, float] = OVERTURNING,
     confidence: float = 0.9,
     weights: ArrayLike | None = None,
+    clusters: ArrayLike | None = None,
 ) -> Fragility:
     """Fit one curve to the outcomes of all blocks, each of which may have a weight."""
     require_limits(store.grid.outcomes, limits)
@@ -64,19 +65,20 @@ def pooled_fragility(
             counts[name] += passed(ratios, limit, name).sum(axis=2) @ belongs
     x = _intensities(product, measure)[:, :, None] / units
     found = trials.ravel() > 0
-    clusters = np.broadcast_to(families_of(product.motions)[:, None, None], x.shape).ravel()[found]
+    together = clusters_of(product.motions, clusters)
+    groups = np.broadcast_to(together[:, None, None], x.shape).ravel()[found]
     curves = [
         fitted_curve(
             name,
             (x.ravel()[found], count.ravel()[found], trials.ravel()[found]),
-            clusters,
+            groups,
             band,
             measure,
             limits[name],
         )
         for name, count in counts.items()
     ]
-    text = f"{pooled(product.bodies, weights)}, {counted(motions, 'motion')}, {counted(scales, 'scale')}"
+    text = f"{pooled(product.bodies, weights)}, {motions_in_words(together, clusters)}, {counted(scales, 'scale')}"
     return Fragility(
         curves=tuple(curves),
         measure=measure,
@@ -88,6 +90,7 @@ def pooled_fragility(
         one_way=product.polarity != "both" and not product.bodies.is_symmetric,
         with_vertical=bool(verticals_of(product.motions)),
         several_blocks=bool(np.count_nonzero(shares) > 1),
+        source="motion" if clusters is None else "cluster",
     )
 
 
@@ -96,6 +99,7 @@ def block_fragilities(
     measure: Measure,
     limits: Mapping[str, float] = OVERTURNING,
     confidence: float = 0.9,
+    clusters: ArrayLike | None = None,
     progress: bool | None = None,
 ) -> BlockFragilities:
     """Fit a curve to the outcomes of each block."""
@@ -107,7 +111,7 @@ def block_fragilities(
     intensities = _intensities(store.product, measure).ravel()
     units = units_of(store.product.bodies, measure, store.product.model)
     options: dict[str, Any] = {
-        "clusters": np.repeat(families_of(store.product.motions), scales),
+        "clusters": np.repeat(clusters_of(store.product.motions, clusters), scales),
         "measure": measure,
         "band": Band(confidence=confidence),
     }

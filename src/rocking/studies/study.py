@@ -286,6 +286,7 @@ class Study(WrittenToFiles):
         limits: Mapping[str, float] = OVERTURNING,
         confidence: float = 0.9,
         weights: ArrayLike | None = None,
+        clusters: ArrayLike | None = None,
     ) -> Fragility:
         """Fit the probability that a limit is exceeded to the outcomes of all blocks, as `rocking.fragility` does.
 
@@ -299,6 +300,8 @@ class Study(WrittenToFiles):
             As for `rocking.fragility`.
         weights : array_like, optional
             As for `rocking.fragility`.
+        clusters : array_like of labels, optional
+            As for `rocking.fragility`, one for each motion of the study.
 
         Returns
         -------
@@ -323,7 +326,7 @@ class Study(WrittenToFiles):
         >>> f"{study.fragility().curves[0].median:.3f} m/s^2"
         '1.662 m/s^2'
         """
-        return pooled_fragility(self._store, Measure.of(measure), limits, confidence, weights)
+        return pooled_fragility(self._store, Measure.of(measure), limits, confidence, weights, clusters)
 
     def block_fragilities(
         self,
@@ -331,6 +334,7 @@ class Study(WrittenToFiles):
         measure: IntensityName | Measure = "pga",
         limits: Mapping[str, float] = OVERTURNING,
         confidence: float = 0.9,
+        clusters: ArrayLike | None = None,
         progress: bool | None = None,
     ) -> BlockFragilities:
         """Fit a fragility curve to the outcomes of each block.
@@ -344,6 +348,8 @@ class Study(WrittenToFiles):
             As for `rocking.fragility`.
         confidence : float
             As for `rocking.fragility`.
+        clusters : array_like of labels, optional
+            As for `rocking.fragility`, one for each motion of the study.
         progress : bool, optional
             Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
 
@@ -371,7 +377,7 @@ class Study(WrittenToFiles):
         >>> study.block_fragilities().data.exceeded.values.tolist()
         [[2.0, 1.0, 2.0, 1.0]]
         """
-        return block_fragilities(self._store, Measure.of(measure), limits, confidence, progress)
+        return block_fragilities(self._store, Measure.of(measure), limits, confidence, clusters, progress)
 
     def spectrum(self, fractiles: Sequence[float] = FRACTILES, *, progress: bool | None = None) -> StudySpectrum:
         """Fractiles over the motions of the peak rotation over slenderness, for each scale and block.

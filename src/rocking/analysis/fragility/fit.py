@@ -14,8 +14,9 @@ from rocking.analysis.fragility.curve import Band, fitted_curve, passed
 from rocking.analysis.fragility.result import Fragility
 from rocking.analysis.labels import groups_of
 from rocking.analysis.levels import (
-    families_of,
+    clusters_of,
     mean_one,
+    motions_in_words,
     only_block,
     pooled,
     simulate_levels,
@@ -58,6 +59,7 @@ def fragility(
     chattering: str | Treatment = "certified",
     polarity: Polarity = "+",
     weights: ArrayLike | None = None,
+    clusters: ArrayLike | None = None,
     band: Band = _LIKELIHOOD,
     threads: int | None = None,
     progress: bool | None = None,
@@ -90,9 +92,12 @@ def fragility(
     weights : array_like, optional
         How much the outcomes of each block count, one number for each; by default all alike. A block of weight 0 is
         simulated, and is none of the data.
+    clusters : array_like of labels, shape (m,), optional
+        Which motions belong together, as components of one station or records of one earthquake: intervals then tell
+        how far clusters differ. By default each motion is one, with all its outcomes. Motions that are multiples of one
+        another, as one record scaled to several levels beforehand, are one cluster in any case.
     band : Band
-        How intervals and bands are made; the clusters are the motions, each with all its outcomes. Motions that are
-        multiples of one another, as one record scaled to several levels beforehand, are one cluster.
+        How intervals and bands are made.
     threads : int, optional
         As for `simulate_many`.
     progress : bool, optional
@@ -128,7 +133,7 @@ def fragility(
     _check_band(band)
     states = _limit_states(limits, "limits")
     shaken = several_motions(motions)
-    values = values_of(shaken, how)
+    values, together = values_of(shaken, how), clusters_of(shaken, clusters)
     options: dict[str, Any] = {
         "chattering": chattering,
         "polarity": "+" if mirrored else polarity,
@@ -150,22 +155,22 @@ def fragility(
     table = table.transpose("level", "motion", "block", "polarity")
     ratio = table.peak_rotation.values / slenderness[:, None]
     ratio[table.overturned.values] = np.inf
-    clusters = np.broadcast_to(families_of(shaken)[None, :, None, None], ratio.shape)
+    groups = np.broadcast_to(together[None, :, None, None], ratio.shape)
     x, trials = (np.broadcast_to(each, ratio.shape).ravel() for each in (intensity, shares[:, None]))
     outcomes = _outcomes(table, how, x, ratio, states)
     if weights is not None:
         outcomes["weight"] = trials
     # What a block without weight does is told, but is none of the data.
     counts = trials > 0.0
-    x, trials, clusters = x[counts], trials[counts], clusters.ravel()[counts]
+    x, trials, groups = x[counts], trials[counts], groups.ravel()[counts]
     data = {name: (x, trials * passed(ratio, limit, name).ravel()[counts], trials) for name, limit in states.items()}
     try:
-        curves = [fitted_curve(name, data[name], clusters, band, how, states[name]) for name in states]
+        curves = [fitted_curve(name, data[name], groups, band, how, states[name]) for name in states]
     except Unfitted as refused:
         refused.outcomes = outcomes
         raise
     kind = "cloud" if levels is None else counted(len(intensity), "stripe")
-    text = f"{pooled(blocks, weights)}, {counted(len(shaken), 'motion')}, {kind}, {model} model"
+    text = f"{pooled(blocks, weights)}, {motions_in_words(together, clusters)}, {kind}, {model} model"
     return Fragility(
         curves=tuple(curves),
         measure=how,
@@ -176,6 +181,7 @@ def fragility(
         one_way=polarity != "both" and not many.is_symmetric,
         with_vertical="vertical" in table.coords,
         several_blocks=bool(np.count_nonzero(shares) > 1),
+        source="motion" if clusters is None else "cluster",
     )
 
 
