@@ -128,7 +128,7 @@ class Answers:
 
     @cached_property
     def tipping_time(self) -> float:
-        """Last time, s, at which the block passes its balance point, |theta| = alpha; NaN if it ends within it.
+        """Last time, s, at which the block passes its `balance`, of a free block alpha; NaN if it ends within it.
 
         From then on a block that overturns only falls; one that is beyond it where the simulation was `stopped` may yet
         be caught by the motion.

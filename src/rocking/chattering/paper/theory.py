@@ -163,13 +163,13 @@ def _duration_statements(case: BlockUnderSine) -> tuple[Statement, ...]:
     return (
         Statement("critical amplitude a_cr", 1.038 if papers else None, critical),
         Statement(
-            "vertical asymptote at a = 1: tau_ch goes like a - 1 to the power",
+            "vertical tangent at a = 1: tau_ch goes like a - 1 to the power",
             "below 1",
             _exponent(_over_half_period(starts, case, "exact")),
             digits=4,
         ),
         Statement(
-            "vertical asymptote at a_cr: T/2 - tau_ch goes like a_cr - a to the power",
+            "vertical tangent at a_cr: T/2 - tau_ch goes like a_cr - a to the power",
             "below 1",
             _exponent(1.0 - _over_half_period(ends, case, "exact")),
             digits=4,
