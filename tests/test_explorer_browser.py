@@ -536,6 +536,71 @@ def test_keys_go_on_from_the_window_that_is_asked_for(opened, more, plots, asks)
     page.until("new URLSearchParams(location.search).get('from') === '231.5'")
 
 
+WINDOW = (
+    "[new URLSearchParams(location.search).get('from'), new URLSearchParams(location.search).get('to')].map(Number)"
+)
+
+
+def windows(page, act):
+    """Do something, and wait until the plots show another window; return its ends."""
+    before = page.js("document.getElementById('histories').dataset.origin + document.body.dataset.drawn")
+    act()
+    page.until(f"document.getElementById('histories').dataset.origin + document.body.dataset.drawn !== {before!r}")
+    page.page.wait_for_timeout(250)
+    return page.js(WINDOW)
+
+
+def test_plots_are_zoomed_within_a_response_that_became_shorter(opened):
+    page = opened("width=0.4&height=1.1&motion=sine:amplitude%3D0.38g,frequency%3D2,cycles%3D60&from=0&to=30")
+    page.rested(lambda: entered(page, "width", "0.2"))
+    page.page.locator("#histories").focus()
+    low, high = windows(page, lambda: page.page.keyboard.press("+"))
+    assert 0.0 < low < high < 3.0
+    assert high - low == pytest.approx(2.0 * low, rel=1e-9)  # the middle half
+
+
+def test_a_key_after_the_one_for_where_it_moves_waits_for_that(opened):
+    page = opened(f"{STATUE}&from=240&to=250")
+    page.page.locator("#histories").focus()
+    page.rested(lambda: page.page.keyboard.press("0"))
+    slowly = windows(page, lambda: page.page.keyboard.press("+"))
+    page = opened(f"{STATUE}&from=240&to=250")
+    page.page.locator("#histories").focus()
+    with held(page, "**/api/case?*") as waiting:
+        page.page.keyboard.press("0")
+        asked(page, waiting)
+        page.page.keyboard.press("+")
+    page.until(f"JSON.stringify({WINDOW}) === {json.dumps(json.dumps(slowly, separators=(',', ':')))}")
+
+
+def test_deeper_goes_on_from_the_window_that_is_asked_for(opened):
+    page = opened(STATUE)
+    with held(page, "**/api/window?*") as waiting:
+        page.page.click("#deeper")
+        asked(page, waiting)
+        page.until("location.search.includes('from=')")
+        low, high = page.js(WINDOW)
+        page.page.click("#deeper")
+        page.until(f"{WINDOW}[0] !== {low!r}")
+        lower, upper = page.js(WINDOW)
+    assert upper - lower == pytest.approx(0.1 * (high - low), rel=1e-6)
+
+
+def test_the_phase_plane_is_that_of_the_window_to_which_somebody_went_back(opened):
+    page = opened(f"{STATUE}&from=231&to=239")
+    page.page.locator("#phase-plots").scroll_into_view_if_needed()
+    page.until("document.body.dataset.phases")
+    plots = page.page.locator("#histories")
+    with held(page, "**/api/phase?*") as waiting:
+        windows(page, lambda: plots.press("ArrowRight"))
+        asked(page, waiting)
+        assert windows(page, lambda: plots.press("ArrowLeft")) == [231.0, 239.0]
+        asks = []
+        page.page.on("request", lambda request: asks.append(request.url) if "/api/phase?" in request.url else None)
+    page.until("Number(document.body.dataset.phases) >= 3")
+    assert "from=231&to=239" in asks[-1]
+
+
 def test_dragging_across_a_plot_zooms_in(opened):
     page = opened(f"{STATUE}&from=230&to=240")
     box = page.page.locator("#histories").bounding_box()
@@ -550,6 +615,39 @@ def test_dragging_across_a_plot_zooms_in(opened):
     page.says("cursor", "the block")
 
 
+def test_going_back_to_what_cannot_be_computed_marks_what_is_drawn_as_old(opened):
+    page = opened(STATUE, allowed=["Failed to load", "net::"])
+    page.rested(lambda: entered(page, "width", "0.3"))
+    page.until("location.search.includes('width=0.3')")
+    page.page.route("**/api/case?*", lambda route: route.abort())
+    page.page.go_back()
+    page.until("!document.getElementById('problem').hidden")
+    assert "old" in page.page.get_attribute("#main", "class").split() and page.page.locator("#old").is_visible()
+
+
+def test_going_back_over_a_change_of_units_changes_them_back(opened):
+    page = opened(STATUE)
+    with page.page.expect_event("load"):
+        page.page.select_option("#acceleration_in", "m/s2")
+    page.until(READY)
+    page.until("location.search.includes('acceleration_in')")
+    page.page.go_back()
+    page.until(f"!location.search.includes('acceleration_in') && {READY}")
+    page.page.wait_for_timeout(400)
+    assert "acceleration_in" not in page.page.url
+    assert page.page.locator("#pga").input_value().strip() in ("0.4", "0.40")
+
+
+def test_a_view_that_was_chosen_while_a_field_was_wrong_has_files_of_its_own(opened):
+    page = opened(f"view=map&{SINE}&points=24", allowed=["422"])
+    complete(page)
+    entered(page, "p", "-1")
+    page.until("!document.getElementById('problem').hidden")
+    page.page.click('[data-view="response"]')
+    page.until("document.getElementById('python').textContent.includes('rocking.simulate(')")
+    assert "chattering_map" not in page.text("#python")
+
+
 def test_a_reading_is_of_the_case_and_of_the_time_that_are_shown(opened):
     page = opened(STATUE, allowed=["422"])
     problem = "!document.getElementById('problem').hidden"
@@ -561,6 +659,7 @@ def test_a_reading_is_of_the_case_and_of_the_time_that_are_shown(opened):
     page.says("cursor", "At 2.0")
     page.rested(lambda: page.page.select_option("#record", "ridgecrest-clc-090"))
     assert page.page.input_value("#at") == "" and page.text("#cursor").startswith("Click on the plots")
+    assert page.page.get_attribute("#at-slider", "aria-valuetext") is None
     # What the pointer asked for comes when it has left the plots.
     box = page.page.locator("#histories").bounding_box()
     with held(page, "**/api/at?*") as waiting:
@@ -1502,6 +1601,50 @@ def test_uneven_cells_of_a_study_lie_where_their_values_do(opened, tmp_path_fact
     running.server.should_exit = True
 
 
+def test_a_map_is_zoomed_from_the_ends_that_are_asked_for(opened):
+    page = opened(f"view=map&{SINE}&points=24&x=omega&x_from=1&x_to=5&y=a&y_from=1&y_to=1.1")
+    complete(page)
+    page.page.focus("#map")
+    with held(page, "**/api/map?*") as waiting:
+        page.page.keyboard.press("+")
+        asked(page, waiting)
+        page.page.keyboard.press("+")
+        page.page.wait_for_timeout(100)
+        low, high = (float(page.page.input_value(f"#map-x-{end}")) for end in ("from", "to"))
+        assert high - low == pytest.approx(1.0, rel=0.01)
+        page.page.keyboard.press("-")
+        low, high = (float(page.page.input_value(f"#map-x-{end}")) for end in ("from", "to"))
+        assert high - low == pytest.approx(2.0, rel=0.01)
+    complete(page)
+
+
+def test_a_point_of_a_map_is_of_the_axes_that_are_drawn(opened):
+    page = opened(f"view=map&{SINE}&points=24&x=omega&x_from=1&x_to=5&y=a&y_from=1&y_to=1.1", allowed=["422"])
+    complete(page)
+    asks = []
+    page.page.on("request", lambda request: asks.append(request.url) if "/api/map/" in request.url else None)
+    with held(page, "**/api/map?*") as waiting:
+        page.page.select_option("#map-y", "restitution")
+        asked(page, waiting)
+        page.page.focus("#map")
+        page.page.keyboard.press("Enter")
+        page.until("!location.search.includes('view=map')")
+    (ask,) = [parse_qs(urlsplit(each).query) for each in asks if "/point?" in each]
+    assert ask["y"] == ["a"] and 1.0 <= float(ask["at_y"][0]) <= 1.1
+    assert page.page.locator("#problem").is_hidden()
+    # What the pointer asks for while a map gives way to another is of neither.
+    page = opened(f"view=map&{SINE}&points=24&x=omega&x_from=1&x_to=5&y=a&y_from=1&y_to=1.1")
+    complete(page)
+    box = page.page.locator("#map").bounding_box()
+    page.page.focus("#map")
+    for k in range(4):
+        page.page.keyboard.press("+")
+        page.page.mouse.move(box["x"] + 200 + 30 * k, box["y"] + 120)
+        complete(page)
+        page.page.wait_for_timeout(200)
+        assert page.page.locator("#problem").is_hidden()
+
+
 # Periodic motion
 
 CASCADE = "width=0.24&height=1.1&restitution=0.5&motion=sine:amplitude%3D0.8g,frequency%3D2,cycles%3D5"
@@ -1650,7 +1793,32 @@ def test_a_record_is_answered_with_the_nearest_sine(opened):
     assert page.page.locator("#save").is_visible()
 
 
+def test_a_point_of_a_diagram_is_of_the_sweep_that_is_drawn(opened):
+    page = periodic(opened, f"{CASCADE}&sweep_from=2&sweep_to=5&sweep_points=20")
+    with held(page, "**/api/orbit?*") as waiting:
+        page.page.select_option("#sweep", "omega")
+        asked(page, waiting)
+        page.page.focus("#diagram")
+        with page.page.expect_request("**/api/sweep/point?*") as opening:
+            page.page.keyboard.press("Enter")
+    ask = parse_qs(urlsplit(opening.value.url).query)
+    assert "sweep" not in ask or ask["sweep"] == ["a"]
+    assert 2.0 <= float(ask["at"][0]) <= 5.0
+
+
 # Comparing
+
+
+def test_a_comparison_is_there_after_going_back(opened):
+    page = opened(STATUE)
+    page.page.click('[data-view="compare"]')
+    page.until("document.body.dataset.compared")
+    page.until("location.search.includes('view=compare')")
+    page.page.go_back()
+    page.until("!location.search.includes('view=compare')")
+    page.page.click('[data-view="compare"]')
+    page.page.locator("#compare-plots").wait_for(state="visible", timeout=20_000)
+    page.until("location.search.includes('other.chattering')")
 
 
 def test_a_thresholds_wrong_answer_is_seen(opened):
@@ -1802,6 +1970,32 @@ def emptied(explorer):
     """Forget the files of other tests."""
     for key in explorer.uploads.kept():
         explorer.uploads.remove(key)
+
+
+def test_vertical_components_that_are_asked_for_before_the_list_is_there_leave_the_ticks(opened, explorer):
+    emptied(explorer)
+    page = opened(f"{STATUE}&view=response&records={RECORDS}")
+    with held(page, "**/api/list*") as waiting:
+        page.page.click('[data-view="records"]')
+        asked(page, waiting)
+        page.page.check("#records-vertical")
+    page.until(LISTED)
+    page.until("new URLSearchParams(location.search).get('records')?.includes('vertical=')")
+    assert query_of(page)["records"].count("motion=") == 3
+
+
+def test_an_assessment_that_was_left_while_its_list_came_begins_anew(opened, explorer):
+    emptied(explorer)
+    page = opened(f"{STATUE}&levels=3")
+    with page.page.expect_response("**/api/list*"), held(page, "**/api/list*") as waiting:
+        page.page.click('[data-view="assessment"]')
+        asked(page, waiting)
+        page.page.click('[data-view="response"]')
+        page.page.locator("#view-response").wait_for(state="visible")
+    page.page.wait_for_timeout(200)
+    page.page.click('[data-view="assessment"]')
+    page.until("document.body.dataset.assessment === 'complete'", "the assessment is complete", timeout=120.0)
+    assert page.text("#assessment-verdict")
 
 
 def test_what_is_ticked_is_what_the_address_says_and_what_is_assessed(opened, explorer):

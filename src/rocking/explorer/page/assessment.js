@@ -77,6 +77,7 @@ export class View {
     try {
       if (!assessment.records) {
         await this.page.list.load();
+        signal.throwIfAborted();
         assessment.records = this.page.list.entries();
         this.key = JSON.stringify([texts, assessment]);
       }

@@ -1,15 +1,17 @@
 // Chattering sequences: their rests with brackets, intervals between impacts, and their ratios against eta^2.
 
 import {Latest, json} from "./api.js";
+import {within} from "./histories.js";
 import {bokeh, colour, figure, showPlot, themed} from "./theme.js";
 import {fill, make, one} from "./words.js";
 import {NONE, fixed, short, span} from "./numbers.js";
 import {phrase} from "./texts.js";
 
 export class ChatteringPanel {
-  /** @param {(ends: [number, number]) => void} go @param {(error: unknown) => void} problem is told what went wrong */
-  constructor(go, problem) {
-    this.go = go;
+  /** @param {{window: (ends: [number, number]) => void, asked: () => [number, number] | null}} tell
+   * @param {(error: unknown) => void} problem is told what went wrong */
+  constructor(tell, problem) {
+    this.tell = tell;
     /** Texts of the case that is drawn. @type {Record<string, string> | null} */
     this.texts = null;
     this.summary = new Latest(async () => {
@@ -77,17 +79,18 @@ export class ChatteringPanel {
   /** @param {any} sequence */
   showSequence(sequence) {
     const margin = 0.06 * (sequence.end - sequence.uplift);
-    this.go([Math.max(0, sequence.uplift - margin), sequence.end + margin]);
+    this.tell.window([Math.max(0, sequence.uplift - margin), sequence.end + margin]);
   }
 
   /** Ten times closer to the accumulation point. */
   zoomToRest() {
     const sequence = this.sequences[this.chosen];
     if (!sequence || !this.shown) return;
-    const {from, to} = this.shown.header.window;
+    const {window, duration} = this.shown.header;
+    const [from, to] = within(this.tell.asked(), duration) ?? [window.from, window.to];
     const inside = from <= sequence.end && sequence.end <= to;
     const width = Math.max(1e-10, inside ? 0.1 * (to - from) : sequence.end - sequence.uplift);
-    this.go([sequence.end - 0.92 * width, sequence.end + 0.08 * width]);
+    this.tell.window([sequence.end - 0.92 * width, sequence.end + 0.08 * width]);
   }
 
   /** @param {{from: number, to: number, impacts: number, unresolved: number | null}} window */

@@ -25,13 +25,16 @@ export class View {
     this.with.addEventListener("change", () => { page.state.compare = this.with.value; page.state.other = {}; this.form(); this.update(); });
     this.align = /** @type {HTMLSelectElement} */ (one("compare-align"));
     this.align.addEventListener("change", () => { page.state.align = this.align.value; page.state.window = null; this.update(); });
-    this.histories = new Histories(one("compare-plots"), {window: (chosen) => { page.state.window = chosen; this.update(); }, asked: () => page.state.window});
+    this.histories = new Histories(one("compare-plots"), {window: (chosen) => { page.state.window = chosen; this.update(); }, asked: () => page.state.window, load: () => this.load});
     this.known = "";
     this.load = new Latest(() => this.run(), (error) => page.problem(error, "view-compare"));
     this.restore();
   }
 
-  enter() { this.update(); }
+  enter() {
+    this.restore(); // what is other may have been left behind in the browser's history
+    this.update();
+  }
 
   /** Show what the state says. */
   restore() {

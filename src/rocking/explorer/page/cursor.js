@@ -66,6 +66,8 @@ export class Cursor {
     const digits = decimals(this.width());
     if (!this.typing) this.field.value = at === null ? "" : at.toFixed(digits);
     if (!known) {
+      this.slider.value = String(STEPS / 2);
+      this.slider.removeAttribute("aria-valuetext");
       one("cursor").textContent = phrase(at !== null && shown ? "reading.late" : coarse() ? "reading.tap" : "reading.hint");
       return;
     }

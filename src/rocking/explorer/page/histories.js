@@ -44,8 +44,12 @@ export class Scale {
   }
 }
 
+/** A window within a response, or null where none is asked for that has a part in it.
+ * @param {[number, number] | null} asked @param {number} duration @returns {[number, number] | null} */
+export const within = (asked, duration) => (asked && asked[0] < duration ? [asked[0], Math.min(asked[1], duration)] : null);
+
 export class Histories {
-  /** @param {HTMLElement} element @param {{window: (ends: [number, number] | null) => void, asked: () => [number, number] | null, cursor?: (time: number | null) => void, pick?: (time: number) => void}} tell */
+  /** @param {HTMLElement} element @param {{window: (ends: [number, number] | null) => void, asked: () => [number, number] | null, load: () => import("./api.js").Latest, cursor?: (time: number | null) => void, pick?: (time: number) => void}} tell */
   constructor(element, tell) {
     this.element = element;
     this.tell = tell;
@@ -195,7 +199,9 @@ export class Histories {
     if (dataset.origin !== origin || dataset.unit !== unit) Object.assign(dataset, {origin, unit});
     this.drawing = true;
     for (const plot of [this.rotation, this.ground]) plot.hold_render = true;
-    this.x.setv({start: this.scale.plotted(from), end: this.scale.plotted(to)});
+    // Where another window is asked for already, the axis stays there: a wheel turns on from it.
+    const [left, right] = this.tell.load().next ? this.wanted() : this.window;
+    this.x.setv({start: this.scale.plotted(left), end: this.scale.plotted(right)});
     this.ground.below[0].axis_label = this.scale.label;
     let low = 0, high = 0;
     for (const [k, drawn] of this.drawn.entries()) {
@@ -312,9 +318,14 @@ export class Histories {
     this.tell.window(ends);
   }
 
+  /** The window that is asked for, which may not be drawn yet; the one that is drawn where nothing is asked of it.
+   * @returns {[number, number]} */
+  wanted() { return within(this.tell.asked(), this.whole) ?? this.window; }
+
   /** @param {string} how */
-  zoom(how) {
-    const [from, to] = this.tell.asked() ?? this.window; // what is asked for may not be drawn yet
+  async zoom(how) {
+    if (!this.tell.asked()) await this.tell.load().idle; // where it moves is known when that is drawn
+    const [from, to] = this.wanted();
     const width = to - from, middle = 0.5 * (from + to);
     if (how === "all") this.go([0, this.whole]);
     else if (how === "active") this.go(null);
@@ -332,7 +343,7 @@ export class Histories {
     const how = {"+": "in", "=": "in", "-": "out", "−": "out", ArrowLeft: "left", ArrowRight: "right", "0": "active"}[event.key];
     if (!how) return;
     event.preventDefault();
-    this.zoom(how);
+    void this.zoom(how);
   }
 
   /** Show where the cursor is, if it is anywhere. @param {number | null} time */

@@ -43,17 +43,19 @@ const forms = {
   model: new ModelForm(one("model-form"), changed),
 };
 const histories = new Histories(one("histories"), {
-  window: showWindow, asked: () => state.window, cursor: (time) => { if (time === null) cursor.show(); else cursor.hover(time); }, pick: (time) => cursor.set(time),
+  window: showWindow, asked: () => state.window, load: () => load, cursor: (time) => { if (time === null) cursor.show(); else cursor.hover(time); }, pick: (time) => cursor.set(time),
 });
 const phase = new PhasePanel(page, (time) => cursor.set(time));
 const cursor = new Cursor(page, {mark: (time) => { histories.mark(time); phase.mark(time); }, seek: (time) => { if (state.view === "block") views.block?.seek(time); }});
-const chattering = new ChatteringPanel(showWindow, problem);
+const chattering = new ChatteringPanel({window: showWindow, asked: () => state.window}, problem);
 const lecture = new Lecture(page, histories);
 const examples = new Examples(state, revisit, problem);
 new Sheet();
 const ghosts = new Ghosts(histories);
 new Snapshots({now: () => (page.shown ? {name: caseName(page.shown.header), texts: {...state.good.texts}} : null), open: restate, changed: () => views.compare?.repinned()});
 
+/** Whether a case is drawn, be it the one that the state says or another one. */
+let drawn = false;
 /** What is wrong at each place of the page, by its id. @type {Record<string, string | null>} */
 const problems = {};
 
@@ -76,8 +78,8 @@ function problem(error, place = "settings") {
     around?.setAttribute("data-problem", problems[place] ?? "");
     if (place === "settings") around?.scrollIntoView({block: "nearest"});
   }
-  one(place === "settings" ? "main" : place).classList.toggle("old", Boolean(error && page.shown));
-  one("old").hidden = !(problems.settings && page.shown);
+  one(place === "settings" ? "main" : place).classList.toggle("old", Boolean(error && drawn));
+  one("old").hidden = !(problems.settings && drawn);
   const sentence = problems.settings ?? Object.values(problems).findLast(Boolean);
   one("problem").hidden = !sentence;
   if (sentence) one("problem").textContent = sentence;
@@ -105,6 +107,7 @@ async function compute() {
     const found = await payload("/api/case", {...asked, ...ends(state)});
     if (state.good !== good) return; // somebody went back meanwhile
     page.shown = found;
+    drawn = true;
     texts = asked;
     if (state.texts === asked) forms.block.known = found.header.block.sides;
     // It was chosen for a longer response; where two are compared, the other may be longer.
@@ -264,6 +267,7 @@ async function go(name) {
     draw();
   }
   stale = true;
+  rested = null; // files and code are those of the view
   void load.ask();
 }
 
@@ -345,7 +349,7 @@ async function watchCompilation() {
 }
 
 for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => { begin(); void go(/** @type {any} */ (button).dataset.view); });
-for (const button of document.querySelectorAll("[data-zoom]")) button.addEventListener("click", () => histories.zoom(/** @type {any} */ (button).dataset.zoom));
+for (const button of document.querySelectorAll("[data-zoom]")) button.addEventListener("click", () => void histories.zoom(/** @type {any} */ (button).dataset.zoom));
 for (const button of document.querySelectorAll("button.what[aria-controls]")) {
   button.addEventListener("click", () => {
     const words = one(/** @type {string} */ (button.getAttribute("aria-controls")));

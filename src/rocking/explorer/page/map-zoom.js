@@ -17,6 +17,12 @@ export class MapZoom {
     one("map").addEventListener("keydown", (event) => this.key(event));
   }
 
+  /** The rectangle that is shown, or asked for and not drawn yet; its ends to the right and upwards. @returns {number[]} */
+  box() {
+    const {study, picture, usual, page: {state}} = this.view;
+    return study ? this.shown ?? picture.box() : ENDS.map((end) => this.view.scale(end) * Number(state.map[end] || usual[end]));
+  }
+
   /** Show a rectangle. @param {number[]} box its ends to the right and upwards */
   into(box) {
     const {about, study, picture, page: {state}} = this.view;
@@ -84,7 +90,7 @@ export class MapZoom {
     }
     if (event.key !== "+" && event.key !== "=") return;
     event.preventDefault();
-    const [x0, x1, y0, y1] = this.shown ?? this.view.picture.box(), [x, y] = this.view.reading.mark;
+    const [x0, x1, y0, y1] = this.box(), [x, y] = this.view.reading.mark;
     this.into([x - 0.25 * (x1 - x0), x + 0.25 * (x1 - x0), y - 0.25 * (y1 - y0), y + 0.25 * (y1 - y0)]);
   }
 }

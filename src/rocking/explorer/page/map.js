@@ -41,7 +41,11 @@ export class View {
     one("map-sine").addEventListener("click", () => this.sine());
   }
 
-  enter() { this.update(); }
+  enter() {
+    if (this.known !== this.page.state.map) this.zoom.forget(); // they were those of another map
+    this.known = this.page.state.map;
+    this.update();
+  }
 
   /** Show what the state says: the ends before each step in were those of another one. */
   restore() { this.zoom.forget(); }
@@ -83,8 +87,12 @@ export class View {
     if (name === "x" || name === "y") this.turn(name, this.select(name).value); else map[name] = this.select(name).value;
     if (name === "quantity" && this.about && !this.study) {
       this.fill();
-      this.page.remember({map});
-      if (JSON.stringify(this.asked()) === this.drawn) { this.recolour(); this.offer(); return; }
+      if (JSON.stringify(this.asked()) === this.drawn) {
+        this.page.remember({map});
+        this.recolour();
+        this.offer();
+        return;
+      }
     }
     this.update();
   }
@@ -191,8 +199,8 @@ export class View {
   /** @param {AbortSignal} signal */
   async stream(signal) {
     this.fill();
-    const {map} = this.page.state;
-    if (this.complete && this.drawn === JSON.stringify(this.asked())) {
+    const {map} = this.page.state, asked = this.asked();
+    if (this.complete && this.drawn === JSON.stringify(asked)) {
       this.page.remember({map});
       this.recolour();
       this.offer();
@@ -200,29 +208,34 @@ export class View {
     }
     const started = performance.now();
     const body = document.body.dataset;
-    this.drawn = JSON.stringify(this.asked());
+    this.drawn = JSON.stringify(asked);
     body.map = "running";
     let done = 0;
     this.complete = false;
     window.clearTimeout(this.waiting); // that of a map that was given up may be long
     this.waiting = 0;
-    for await (const frame of frames("/api/map", this.asked(), signal)) {
-      if (!this.about || done === 0) {
-        this.about = inUnits(JSON.parse(new TextDecoder().decode(frame)));
-        const count = this.about.shape[0] * this.about.shape[1];
-        this.values = this.about.quantities.map(() => new Float32Array(count).fill(NaN));
-        this.covered = new Uint8Array(count).fill(255);
-        this.page.remember({map});
-        this.drawAxes();
-        this.offer();
-        done = 1;
-        continue;
+    try {
+      for await (const frame of frames("/api/map", asked, signal)) {
+        if (!this.about || done === 0) {
+          this.about = {...inUnits(JSON.parse(new TextDecoder().decode(frame))), asked};
+          const count = this.about.shape[0] * this.about.shape[1];
+          this.values = this.about.quantities.map(() => new Float32Array(count).fill(NaN));
+          this.covered = new Uint8Array(count).fill(255);
+          this.page.remember({map});
+          this.drawAxes();
+          this.offer();
+          done = 1;
+          continue;
+        }
+        done += this.take(frame);
+        const [rows, columns] = this.about.shape;
+        /** @type {HTMLProgressElement} */ (one("map-progress")).value = done / (rows * columns);
+        this.recolourSoon(started);
+        if (!body.first || body.firstOf !== String(started)) { body.first = String(performance.now() - started); body.firstOf = String(started); }
       }
-      done += this.take(frame);
-      const [rows, columns] = this.about.shape;
-      /** @type {HTMLProgressElement} */ (one("map-progress")).value = done / (rows * columns);
-      this.recolourSoon(started);
-      if (!body.first || body.firstOf !== String(started)) { body.first = String(performance.now() - started); body.firstOf = String(started); }
+    } catch (error) {
+      this.drawn = "";
+      throw error;
     }
     this.complete = true;
     this.recolour();
@@ -293,6 +306,7 @@ export class View {
   }
 
   drawAxes() {
+    this.reading.leave(); // what is pointed at is a point of the map before
     this.picture.axes(this.about);
     const notes = (this.about.notes ?? []).map(inWords).join(" ");
     Object.assign(one("map-notes"), {textContent: notes, hidden: !notes});
@@ -310,9 +324,10 @@ export class View {
 
   async slice() {
     this.fill();
-    const {header, arrays} = await payload("/api/study", this.page.state.map);
+    const asked = {...this.page.state.map};
+    const {header, arrays} = await payload("/api/study", asked);
     this.page.remember({map: this.page.state.map});
-    this.about = inUnits({...header, quantities: [header.quantity], curves: {}});
+    this.about = {...inUnits({...header, quantities: [header.quantity], curves: {}}), asked};
     this.values = [Float32Array.from(arrays.values)];
     this.drawAxes();
     this.complete = true;
@@ -322,11 +337,11 @@ export class View {
     document.body.dataset.map = "complete";
   }
 
-  /** What is asked of the server about a point. @param {string} what @param {number[]} at to the right and upwards @returns {[string, Record<string, string>]} */
+  /** What is asked of the server about a point of the map that is drawn. @param {string} what @param {number[]} at to the right and upwards @returns {[string, Record<string, string>]} */
   request(what, [x, y]) {
     const own = (/** @type {any} */ axis, /** @type {number} */ value) => String(axis.own.values[axis.values.indexOf(value)]);
     const at = {at_x: own(this.about.x, x), at_y: own(this.about.y, y)};
-    return this.study ? [`/api/study/${what}`, {...this.page.state.map, ...at}] : [`/api/map/${what}`, {...this.asked(), ...at}];
+    return [this.study ? `/api/study/${what}` : `/api/map/${what}`, {...this.about.asked, ...at}];
   }
 
   /** Open the case at the mark. */

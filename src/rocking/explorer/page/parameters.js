@@ -60,6 +60,7 @@ const ALIGNED = ["start", "uplift", "arias"];
 /** @returns {State} */
 export function readAddress() {
   const given = new URLSearchParams(location.search);
+  readUnits(specification.shown_in, given);
   /** @param {string[]} names @param {string} [prefix] @returns {Texts} */
   const those = (names, prefix = "") =>
     Object.fromEntries(names.map((name) => [name, given.get(prefix + name) ?? ""]).filter(([, text]) => text));

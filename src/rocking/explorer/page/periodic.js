@@ -118,7 +118,7 @@ export class View {
           begun = true;
           this.complete = false;
           this.found = {up: new Map(), down: new Map()};
-          this.about = JSON.parse(new TextDecoder().decode(frame));
+          this.about = {...JSON.parse(new TextDecoder().decode(frame)), asked: {...texts, ...chosen}};
           this.page.remember({sweep: chosen});
           this.fill();
           this.drawAxes();
@@ -336,10 +336,10 @@ export class View {
     if (!this.about || !this.mark) return;
     const [index, k] = this.mark;
     const point = this.points(index)[k];
-    const {texts, sweep} = this.page.state;
+    const {texts} = this.page.state;
     const from = point ? {u: String(point.u), v: String(point.v)} : {};
     try {
-      const found = await json("/api/sweep/point", {...texts, ...sweep, at: String(this.about.values[index]), ...from});
+      const found = await json("/api/sweep/point", {...this.about.asked, at: String(this.about.values[index]), ...from});
       if (this.page.state.texts === texts && this.page.state.view === "periodic") this.page.restate(found);
     } catch (error) {
       this.page.problem(error, "view-periodic");

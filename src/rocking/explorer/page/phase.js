@@ -60,6 +60,7 @@ export class PhasePanel {
     this.drawn = wanted;
     if (!this.plane) this.build();
     this.draw();
+    if (this.visible && this.page.shown && this.wanted() !== this.drawn) void this.latest.ask(); // it changed back meanwhile
     counted("phases");
   }
 

@@ -29,7 +29,7 @@ export class View {
     one("records-search").addEventListener("input", () => this.render());
     one("records-vertical").addEventListener("change", () => {
       this.list.rising = /** @type {HTMLInputElement} */ (one("records-vertical")).checked;
-      this.remember();
+      if (this.list.usage) this.remember(); else void this.reload();
     });
     one("records-choose").addEventListener("click", () => one("choose-file").click());
     one("records-assess").addEventListener("click", () => page.go("assessment"));
