@@ -631,8 +631,9 @@ def test_going_back_over_a_change_of_units_changes_them_back(opened):
         page.page.select_option("#acceleration_in", "m/s2")
     page.until(READY)
     page.until("location.search.includes('acceleration_in')")
-    page.page.go_back()
-    page.until(f"!location.search.includes('acceleration_in') && {READY}")
+    with page.page.expect_event("load"):
+        page.page.go_back()
+    page.until(READY)
     page.page.wait_for_timeout(400)
     assert "acceleration_in" not in page.page.url
     assert page.page.locator("#pga").input_value().strip() in ("0.4", "0.40")
