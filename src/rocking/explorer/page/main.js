@@ -211,7 +211,6 @@ function revisit() {
   cursor.show();
   if (String(unitsChosen()) !== units) { location.reload(); return; } // every field has its unit from the start
   showForms(state.texts);
-  views[state.view]?.restore?.();
   void examples.show();
   if (state.lecture && !lecture.on) void lecture.enter();
   else if (lecture.on && !state.lecture) lecture.leave(state.view);

@@ -47,9 +47,6 @@ export class View {
     this.update();
   }
 
-  /** Show what the state says: the ends before each step in were those of another one. */
-  restore() { this.zoom.forget(); }
-
   leave() {
     this.running?.abort();
     this.reading.leave();
@@ -369,7 +366,7 @@ export class View {
     const block = Object.fromEntries([...namesOf("block"), "model", "gravity"].filter((name) => texts[name]).map((name) => [name, texts[name]]));
     const motion = `sine:amplitude=${(1.03 * threshold).toPrecision(6)}g,frequency=${(p / Math.PI).toPrecision(6)},cycles=2.5`;
     this.page.state.map = {};
-    this.restore();
+    this.zoom.forget();
     this.page.restate({...block, motion});
   }
 }
