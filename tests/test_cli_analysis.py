@@ -122,7 +122,7 @@ STRIPES = ["--measure", "pgv", "--levels", "0.4:1.2:9", "--polarity", "both"]
 
 def test_fragility_json_is_the_fit(run):
     code, out, err = run(
-        "fragility", RECORD, OTHER, "ridgecrest-clc-090", *SIZES, *STRIPES, "--bootstrap", "50", "--json"
+        "fragility", RECORD, OTHER, "ridgecrest-clc-090", *SIZES, *STRIPES, "--bootstrap", "50", "--json", "--quiet"
     )
     assert (code, err) == (0, "")
     result = json.loads(out)
@@ -255,12 +255,14 @@ def test_more_folds_than_groups_are_refused_before_the_calibration(run, outcomes
     assert "--folds must be a whole number" in err and ("specimen B" in err) == specimens
 
 
+@pytest.mark.thorough
 def test_a_spectrum_of_many_curves_is_written_with_its_figure(run, tmp_path):
     code, _, err = run("spectrum", RECORD, "--alpha", "0.1:0.4:6", "--p", "2,3", "--out", tmp_path)
     assert (code, err) == (0, "")
     assert {"spectrum.png", "spectrum.pdf", "result.json"} <= {path.name for path in tmp_path.iterdir()}
 
 
+@pytest.mark.thorough
 def test_a_fragility_that_nrml_does_not_hold_is_written_without(run, tmp_path):
     """A measure in units of blocks that are many, and so have no common unit."""
     ensemble = tmp_path / "ensemble.csv"
@@ -289,7 +291,7 @@ COMMANDS = {
 }
 
 
-@pytest.mark.cases(fast=3)
+@pytest.mark.cases(fast=1)
 @pytest.mark.usefixtures("coarse")
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_figure_that_is_refused_takes_nothing_else_away(run, tmp_path, monkeypatch, request, command):
@@ -341,6 +343,7 @@ def outcomes_table(outcomes_text, tmp_path):
     return table
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("coarse")
 def test_calibrate_json_is_the_calibration(run, outcomes_table):
     code, out, err = run("calibrate", outcomes_table, *CALIBRATED, "--folds", "2", "--predict", RECORD, OTHER, "--json")
@@ -461,6 +464,7 @@ def test_calibrate_refuses_a_mistake_in_one_line(run, outcomes_table, change, wo
     assert words in err and len(err.splitlines()) == 1
 
 
+@pytest.mark.thorough
 def test_the_outcomes_of_a_fragility_name_their_block_and_the_unit_of_their_intensity(run, tmp_path):
     records = [name for name in rocking.records.names() if not name.endswith("up")]
     sizes = ["--width", "0.3", "--height", "1.5"]
@@ -472,6 +476,7 @@ def test_the_outcomes_of_a_fragility_name_their_block_and_the_unit_of_their_inte
     assert "intensity" not in header
 
 
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize(("width", "height"), [("0.6", "2.1"), ("1.1", "2.0")])
 def test_the_table_of_many_records_says_no_more_than_is_known(run, tmp_path, width, height):
     """What is ambiguous alone is so in a table, and a peak has no more digits there."""
@@ -579,6 +584,24 @@ def test_what_a_fragility_would_pass_over_is_refused(run, arguments, said):
     assert said in err
 
 
+def test_records_of_a_fragility_belong_together_by_station_or_by_labels(run):
+    names = [name for name in rocking.records.names() if not name.endswith("up")]
+    motions = [rocking.records.load(name) for name in names]
+    stations = [name.rpartition("-")[0] for name in names]
+    stripes = ["fragility", *names, *SIZES, "--measure", "pgv", "--levels", "0.4:1.2:9"]
+    options = {"measure": "pgv", "levels": [0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2]}
+    code, alone, err = run(*stripes)
+    assert code == 0 and "--clusters may be station, which joins them" in err and "6 motions, 9 stripes" in alone
+    for given in ("station", ",".join(stations)):
+        code, out, err = run(*stripes, "--clusters", given, "--json")
+        assert (code, err) == (0, "")
+        fitted = fragility(rocking.Block(width=0.24, height=1.1), motions, clusters=stations, **options)
+        assert fitted.curves[0].clusters == 3
+        assert json.loads(out)["curves"][0]["median_interval"] == list(fitted.curves[0].median_interval)
+    code, _, err = run(*stripes, "--clusters", "a,b")
+    assert code == 2 and "--clusters must hold 6 labels" in err
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -601,6 +624,7 @@ def test_outcomes_go_without_what_is_said_of_motions_to_predict(run, outcomes_ta
     assert "--scale is for the motions of --predict or --pulse" in err
 
 
+@pytest.mark.thorough
 def test_standing_is_about_overturning_in_whatever_order_the_limits_come(run, monkeypatch):
     common = [
         "fragility",

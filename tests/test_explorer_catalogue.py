@@ -10,7 +10,7 @@ from explorer_texts import in_english
 import rocking
 from rocking.errors import InvalidOption, UnreadableRecord
 from rocking.explorer import uploads
-from rocking.explorer.catalogue import entries_of, listing, title_of
+from rocking.explorer.catalogue import clusters_of, entries_of, listing, title_of
 from rocking.explorer.motions import read_motion
 from rocking.explorer.uploads import UploadStore
 
@@ -87,6 +87,20 @@ def test_another_length_or_step_is_another_station_and_headings_are_believed():
     assert title_of(group["rows"][1]["texts"], store) == "two.v2, 90 Deg"
     assert read_motion(group["rows"][1]["texts"], store).motion.pga == group["rows"][1]["measures"]["pga"]
     assert store.kept() == (key,)
+
+
+def test_entries_of_one_station_have_one_number():
+    store = UploadStore()
+    keys = [store.add_file(name, samples(seed).encode()) for seed, name in enumerate(("a-ns.txt", "b.txt", "a-ew.txt"))]
+    east = (FORMATS / "knet.ns").read_bytes()
+    keys += [store.add_file(name, east.replace(b"N-S", name[:3].encode())) for name in ("N-S", "E-W")]
+    two = store.add_file("two.v2", (FORMATS / "two.v2").read_bytes())
+    entries = [{"motion": f"file:{key}", "dt": "0.01", "units": "m/s2"} for key in keys[:3]]
+    entries += [{"motion": f"file:{key}"} for key in keys[3:]]
+    entries += [{"motion": f"file:{two}", "channel": channel} for channel in ("1", "2")]
+    shipped = ("el-centro-meloland-360", "ridgecrest-clc-090", "el-centro-meloland-270", "el-centro-meloland-360")
+    entries += [{"motion": name} for name in shipped]
+    assert clusters_of(entries, store) == [0, 1, 0, 2, 2, 3, 3, 4, 5, 4, 4]
 
 
 @pytest.mark.parametrize("said", ["names", "headings", "both"])

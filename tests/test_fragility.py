@@ -15,6 +15,7 @@ from rocking import InvalidOption, fit_fragility, fragility
 from rocking.analysis import Band
 from rocking.analysis.levels import clusters_of, families_of
 from rocking.block import Blocks
+from rocking.progress import notes_for
 
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
 PULSES = [rocking.pulses.one_sine(1.0, frequency) for frequency in np.linspace(0.3, 1.5, 13)]
@@ -698,6 +699,22 @@ def test_motions_are_of_one_cluster_by_label_or_as_multiples_perhaps_through_oth
         fragility(BLOCK, PULSES, levels=[2.0, 4.0], clusters=["a", "b"])
 
 
+def test_components_of_one_station_are_one_cluster_where_that_is_asked_for_and_noted_where_not(capsys):
+    named = [rocking.records.load(name) for name in ("el-centro-meloland-270", "ridgecrest-clc-090")]
+    beside = rocking.records.load("el-centro-meloland-360").scaled(2.0)
+    with notes_for("everybody"):
+        assert clusters_of([*named, named[0].scaled(0.5), PULSES[0], PULSES[1]]).tolist() == [0, 1, 0, 2, 3]
+        assert capsys.readouterr().err == ""
+        assert clusters_of([*named, beside]).tolist() == [0, 1, 2]
+        assert (
+            "components of one station count as independent of each other: clusters may be" in capsys.readouterr().err
+        )
+        assert clusters_of([*named, beside, PULSES[0], PULSES[1]], "station").tolist() == [0, 1, 0, 2, 3]
+        assert capsys.readouterr().err == ""
+    with pytest.raises(InvalidOption, match="clusters station is for records that name theirs"):
+        clusters_of(PULSES, "station")
+
+
 def test_motions_of_one_shape_and_another_length_or_vertical_component_are_not_one():
     pulse = rocking.pulses.one_sine(1.0, 1.0)
     up, down = (pulse.with_vertical(rocking.pulses.one_sine(a, 3.0)) for a in (0.5, -0.5))
@@ -755,6 +772,7 @@ def test_a_draw_of_the_data_themselves_is_half_below_them():
     assert curve.dispersion_interval[0] < 1e-6 < curve.dispersion < curve.dispersion_interval[1]
 
 
+@pytest.mark.thorough
 @pytest.mark.cases(fast=1)
 @pytest.mark.parametrize("overlap", [1e-3, 1e-4, 1e-5])
 def test_steep_curves_have_the_ends_of_their_profile_likelihood(overlap):

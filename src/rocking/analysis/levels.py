@@ -17,11 +17,12 @@ from rocking.body import Bodies, Body, title_of
 from rocking.constants import Model
 from rocking.engine import require_finished
 from rocking.ensemble import body_coordinates, simulate_many
-from rocking.errors import InvalidOption
+from rocking.errors import InvalidOption, Message
+from rocking.motion.description import Origin
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
 from rocking.problem import bodies_of
-from rocking.progress import Progress
+from rocking.progress import Progress, note
 from rocking.tables import counted
 
 if TYPE_CHECKING:
@@ -33,6 +34,9 @@ REVERSED_TOO: Final = "the sides differ, so motions that are reversed (scaled by
 
 #: Two motions are one at two scales where they differ by no more than this share of their largest values.
 _ROUNDING: Final = 1e-9
+
+#: What stands for labels of motions that are their stations.
+BY_STATION: Final = "station"
 
 #: From so many changes on, no further ones are looked for in an interval of the grid.
 _MOST: Final = 64
@@ -85,10 +89,21 @@ def values_of(motions: Sequence[Motion], measure: Measure) -> Floats:
 
 
 def clusters_of(motions: Sequence[Motion], labels: object = None) -> Integers:
-    """Whole numbers, the same for motions of one label and for multiples of one another, perhaps through others."""
-    families = families_of(motions)
+    """Whole numbers, the same for motions of one label and for multiples of one another, perhaps through others.
+
+    "station" stands for labels that are the earthquake and the station that records name.
+    """
+    families, stations = families_of(motions), stations_of(motions)
     if labels is None:
+        of_records = {family: station for family, station in zip(families, stations, strict=True) if station}
+        if len(of_records) > len(set(of_records.values())):
+            sentence = f"components of one station count as independent of each other: {{}} may be {BY_STATION}"
+            note(Message(f"{sentence}, which joins them", ("clusters",)))
         return families
+    if isinstance(labels, str) and labels == BY_STATION:
+        labels = stations
+        if not any(stations):
+            raise InvalidOption(f"{{}} {BY_STATION} is for records that name theirs: give each a label", "clusters")
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -96,6 +111,12 @@ def clusters_of(motions: Sequence[Motion], labels: object = None) -> Integers:
     given = groups_of(labels, "clusters", count, "motion")
     links = coo_array((np.ones(count), (families, count + given)), shape=(2 * count, 2 * count))
     return numbered(connected_components(links, directed=False)[1][families].tolist())
+
+
+def stations_of(motions: Sequence[Motion]) -> list[str]:
+    """Earthquake and station of each motion; nothing where its file names no station."""
+    origins = [motion.description.origin or Origin() for motion in motions]
+    return [f"{each.event}, {each.station}" if each.station else "" for each in origins]
 
 
 def motions_in_words(clusters: Integers, labels: object) -> str:

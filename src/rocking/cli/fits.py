@@ -24,6 +24,7 @@ from rocking.analysis.fragility.fit import fragility as run
 from rocking.analysis.fragility.result import Fragility
 from rocking.analysis.hazard import HazardCurve
 from rocking.analysis.input_tables import History, Outcomes, read_calibration, read_observed
+from rocking.analysis.levels import BY_STATION
 from rocking.analysis.risk import check_measure
 from rocking.cli.body_options import EnsembleOptions
 from rocking.cli.options import BLOCK, MEASURE, MODEL, WHOLE, MeasureOptions, TreatmentOptions
@@ -54,6 +55,7 @@ def fragility(
     outcomes: Path | None = None,
     limits: str = "overturning",
     polarity: Annotated[Polarity, Parameter(allow_leading_hyphen=True)] = "+",
+    clusters: str | None = None,
     confidence: float = 0.9,
     bootstrap: Annotated[int, WHOLE] = 0,
     seed: Annotated[int, WHOLE] = 0,
@@ -86,6 +88,9 @@ def fragility(
         Limit states, with commas between: overturning, or NAME=ROTATION over slenderness, as half=0.5.
     polarity
         Motions as they are (+), reversed (-), or both; a symmetric block does the same in both, which count once.
+    clusters
+        Which records belong together, for the intervals: station joins components of one station in one earthquake, as
+        files name them; or a label for each record, with commas between. By default each is on its own.
     confidence
         Probability of the intervals and bands.
     bootstrap
@@ -106,7 +111,9 @@ def fragility(
         probable that is; survival.png and .pdf to --out.
     """
     if outcomes is not None:
-        _refuse_beside_outcomes(names, block, motion, measure, model, limits=limits, polarity=polarity)
+        _refuse_beside_outcomes(
+            names, block, motion, measure, model, limits=limits, polarity=polarity, clusters=clusters
+        )
     bodies = {} if outcomes is not None else block.blocks(model)
     checks.positive(years, "years", InvalidOption)
     curve = _hazard(hazard, site, years, measure.period)
@@ -136,6 +143,7 @@ def fragility(
                     **model.chosen() | bodies,
                     limits=states,
                     polarity=polarity,
+                    clusters=clusters if clusters in (None, BY_STATION) else clusters.split(","),
                     band=band,
                 )
         found, text = fitted.to_dict() | ({} if read is None else read.to_dict()), [fitted.summary()]
@@ -222,6 +230,7 @@ def _refuse_beside_outcomes(
     *,
     limits: str,
     polarity: Polarity,
+    clusters: str | None,
 ) -> None:
     """Refuse options that do not go with observed outcomes."""
     motions = ("pulse", "scale", "pga", "pgv", "sa", "vertical", "keep_going")
@@ -231,6 +240,7 @@ def _refuse_beside_outcomes(
         "ensemble": block.ensemble,
         "limits": limits if limits != "overturning" else None,
         "polarity": polarity if polarity != "+" else None,
+        "clusters": clusters,
         "model": model.equation,
         "chattering": model.chattering if model.chattering != "certified" else None,
         **{name: getattr(motion, name) for name in motions},

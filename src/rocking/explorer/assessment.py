@@ -17,7 +17,7 @@ from rocking.bisection import bisected
 from rocking.block import Blocks
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption, Unfitted
-from rocking.explorer.catalogue import entries_of, title_of
+from rocking.explorer.catalogue import clusters_of, entries_of, title_of
 from rocking.explorer.code import block_options, command_line
 from rocking.explorer.inputs import Case, require_rest
 from rocking.explorer.motions import Found, read_motion
@@ -70,14 +70,24 @@ print(found.summary())
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
-    """A case, the entries of its list of records, and to which levels of which measure each is scaled."""
+    """A case, the entries of its list of records, and to which levels of which measure each is scaled.
+
+    Entries of one station have the same number among ``clusters``.
+    """
 
     case: Case
     entries: list[dict[str, str]]
+    clusters: list[int]
     uploads: UploadStore
     measure: Measure
     levels: Floats
     friction: float | None
+
+    @property
+    def stations(self) -> int | None:
+        """How many stations there are, where several entries are of one."""
+        count = len(set(self.clusters))
+        return count if count < len(self.entries) else None
 
     def record(self, k: int) -> Found:
         """Read one record; the list is not held in memory as a whole."""
@@ -115,7 +125,9 @@ def assessment_of(case: Case, texts: Texts, uploads: UploadStore) -> Assessment:
     if not 0.0 < low < high < math.inf:
         raise InvalidOption("{} must be positive, and below the last of the levels", "level_from")
     friction = friction_coefficient(number(given["friction"], "friction")) if "friction" in given else None
-    return Assessment(case, entries, uploads, measure, np.linspace(low, high, int(count)), friction)
+    return Assessment(
+        case, entries, clusters_of(entries, uploads), uploads, measure, np.linspace(low, high, int(count)), friction
+    )
 
 
 def _measure(given: Texts) -> Measure:
@@ -135,6 +147,8 @@ def described(assessment: Assessment) -> dict[str, Any]:
         notes.append(phrase("assessment.polarities"))
     else:
         notes.append(phrase("assessment.symmetric"))
+    if assessment.stations is not None:
+        notes.append(phrase("assessment.stations", count=assessment.stations))
     if any(entry.get("vertical") for entry in assessment.entries):
         notes.append(phrase("assessment.vertical"))
     if case.motion is not None:
@@ -189,7 +203,8 @@ def _part(header: dict[str, Any], assessment: Assessment, fallen: list[Flags]) -
     """Return what is sent with a part: the curve through all outcomes so far, as `rocking.fragility` fits it."""
     outcomes = np.stack(fallen, axis=1)  # level, motion, polarity, in the order of `rocking.fragility`
     levels = np.broadcast_to(assessment.levels[:, None, None], outcomes.shape).ravel()
-    clusters = np.broadcast_to(np.arange(len(fallen))[None, :, None], outcomes.shape).ravel()
+    own = np.array(assessment.clusters[: len(fallen)])
+    clusters = np.broadcast_to(own[None, :, None], outcomes.shape).ravel()
     arrays = {"seen": outcomes.mean(axis=(1, 2))}
     try:
         fitted = fit_fragility(levels, outcomes.ravel(), clusters=clusters, measure=assessment.measure)
@@ -206,7 +221,7 @@ def _part(header: dict[str, Any], assessment: Assessment, fallen: list[Flags]) -
         "confidence": curve.confidence,
         "bounded": curve.bounded,
         "exceeded": int(curve.exceeded.sum()),
-        "notes": list(replace(fitted, source="motion").notes),
+        "notes": list(replace(fitted, source="motion" if assessment.stations is None else "cluster").notes),
     }
     header = {**header, "fit": fit, "why": None, "outcomes": outcomes.size}
     return Payload(header, {**arrays, "at": at, "probability": curve.probability(at), "lower": lower, "upper": upper})
@@ -299,7 +314,11 @@ def _rounded(level: float, towards: Any) -> float:
 def as_python(assessment: Assessment) -> str:
     """Write a script that computes the same curve; it runs as it stands."""
     case, measure = assessment.case, assessment.measure
-    given = {"model": None if case.model == "nonlinear" else case.model, "chattering": case.texts.get("chattering")}
+    given = {
+        "model": None if case.model == "nonlinear" else case.model,
+        "chattering": case.texts.get("chattering"),
+        "clusters": None if assessment.stations is None else assessment.clusters,
+    }
     found = [assessment.record(k) for k in range(len(assessment.entries))]
     return _PYTHON.format(
         block=case.block_call,
@@ -328,5 +347,6 @@ def as_command(assessment: Assessment) -> str | None:
         **({} if measure.period is None else {"period": repr(measure.period)}),
         "levels": f"{levels[0]!s}:{levels[-1]!s}:{len(levels)}",
         "polarity": "both",
+        **({} if assessment.stations is None else {"clusters": ",".join(map(str, assessment.clusters))}),
     }
     return command_line(["rocking", "fragility", *(each[0] for each in words)], options)

@@ -10,6 +10,7 @@ from pathlib import PurePath
 from typing import Any, Final
 from urllib.parse import parse_qsl
 
+from rocking.analysis.labels import numbered
 from rocking.errors import InvalidOption, RockingError
 from rocking.explorer.parameters import PARAMETERS, field_label, names_of
 from rocking.explorer.phrases import phrase
@@ -112,6 +113,19 @@ def listing(uploads: UploadStore, answers: Iterable[Texts] = ()) -> dict[str, An
         wrong = [problems[each.key] for each in group if each.key in problems]
         groups.append(_described(group, " ".join(wrong) or _reason(group)))
     return {"groups": groups, "usage": uploads.usage()}
+
+
+def clusters_of(entries: list[dict[str, str]], uploads: UploadStore) -> list[int]:
+    """Return a number for each entry of a list, the same for components of one station, as the list groups them."""
+    files = {entry["motion"].partition(":")[2]: entry for entry in entries if entry["motion"].startswith("file:")}
+    components = [each for key, entry in files.items() for each in _of_file(uploads, key, entry)]
+    homes: dict[tuple[str, str | None], object] = {}
+    for group in [*_by_station(_shipped()), *_by_station(components)]:
+        for each in group:
+            names = (each.event, each.station) if each.station else (group[0].key, group[0].texts.get("channel"))
+            homes[each.texts["motion"], each.texts.get("channel")] = names
+    places = [(entry["motion"], entry.get("channel")) for entry in entries]
+    return [*map(int, numbered([homes.get(place, place) for place in places]))]
 
 
 def title_of(texts: Texts, uploads: UploadStore) -> str:

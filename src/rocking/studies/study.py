@@ -300,7 +300,7 @@ class Study(WrittenToFiles):
             As for `rocking.fragility`.
         weights : array_like, optional
             As for `rocking.fragility`.
-        clusters : array_like of labels, optional
+        clusters : "station" or array_like of labels, optional
             As for `rocking.fragility`, one for each motion of the study.
 
         Returns
@@ -348,7 +348,7 @@ class Study(WrittenToFiles):
             As for `rocking.fragility`.
         confidence : float
             As for `rocking.fragility`.
-        clusters : array_like of labels, optional
+        clusters : "station" or array_like of labels, optional
             As for `rocking.fragility`, one for each motion of the study.
         progress : bool, optional
             Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.

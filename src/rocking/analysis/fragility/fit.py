@@ -92,10 +92,11 @@ def fragility(
     weights : array_like, optional
         How much the outcomes of each block count, one number for each; by default all alike. A block of weight 0 is
         simulated, and is none of the data.
-    clusters : array_like of labels, shape (m,), optional
-        Which motions belong together, as components of one station or records of one earthquake: intervals then tell
-        how far clusters differ. By default each motion is one, with all its outcomes. Motions that are multiples of one
-        another, as one record scaled to several levels beforehand, are one cluster in any case.
+    clusters : "station" or array_like of labels, shape (m,), optional
+        Which motions belong together: intervals then tell how far clusters differ. "station" joins components of one
+        station in one earthquake, as their files name them. By default each motion is one cluster, with all its
+        outcomes. Motions that are multiples of one another, as one record scaled to several levels beforehand, are one
+        cluster in any case.
     band : Band
         How intervals and bands are made.
     threads : int, optional
@@ -132,6 +133,9 @@ def fragility(
     mirrored = checks.one_of(polarity, "polarity", InvalidOption, get_args(Polarity)) == "both" and many.is_symmetric
     _check_band(band)
     states = _limit_states(limits, "limits")
+    stripes = None if levels is None else checks.increasing_numbers(levels, "levels", InvalidOption)
+    if stripes is not None and stripes.size < 2:
+        raise InvalidOption("a fragility needs {} that differ: give two or more", "levels", value=levels)
     shaken = several_motions(motions)
     values, together = values_of(shaken, how), clusters_of(shaken, clusters)
     options: dict[str, Any] = {
@@ -140,14 +144,11 @@ def fragility(
         "threads": threads,
         "progress": progress,
     }
-    if levels is None:
+    if stripes is None:
         table = simulate_many(many, shaken, model=model, **options).expand_dims("level")
         require_finished(table.unfinished.values)
         intensity = (values[:, None] / units_of(many, how, model)[None, :])[None, :, :, None]
     else:
-        stripes = checks.increasing_numbers(levels, "levels", InvalidOption)
-        if stripes.size < 2:
-            raise InvalidOption("a fragility needs {} that differ: give two or more", "levels", value=levels)
         table = simulate_levels(many, shaken, how, stripes, model=model, **options)
         intensity = stripes[:, None, None, None]
     if "polarity" not in table.dims:
