@@ -10,6 +10,7 @@ PAGE_TOOLS := axe-core@4.14.1 typescript@7.0.2 eslint@10.15.0 @eslint/js@10.0.1 
 # Work stealing gives each worker a run of neighbouring tests, so that few of a module's fixtures are made twice.
 PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal --benchmark-disable
 FAST := "not thorough and not slow and not browser"
+QUICKLY := -m $(FAST) --hypothesis-profile=few
 # Something of every library that the package needs, for other versions than those that are pinned; `make lowest EVERY_PART=tests` runs all.
 EVERY_PART := $(addprefix tests/test_,reference.py result.py plot.py cli.py response.py chattering_maps.py processing.py explorer_server.py first_response.py)
 # What the oldest numba compiles; all else uses the compiled kernels of the wheel.
@@ -36,12 +37,12 @@ wheel: .venv/.all ## build a wheel for this platform, with kernels compiled befo
 
 quick: .venv/.all ## run the tests of what has changed since the last commit, or since BASE=..., within half a minute
 	@files=$$($(BIN)/python tests/of_changes.py $(BASE)) && { test -z "$$files" || \
-	    $(PYTEST) --dist load --maxschedchunk 4 --within 14 -m $(FAST) $$files; }
+	    $(PYTEST) --dist load --maxschedchunk 4 --within 14 $(QUICKLY) $$files; }
 
-test: .venv/.all ## run the tests (four minutes on two slow cores)
-	$(PYTEST) -m $(FAST)
+test: .venv/.all ## run the tests (three minutes on two cores)
+	$(PYTEST) $(QUICKLY)
 
-test-all: .venv/.all ## run them with more cases each (twice as long)
+test-all: .venv/.all ## run them with more cases each, and longer ones (three times as long)
 	$(PYTEST) -m "not slow and not browser"
 
 browser: .venv/.all .page-tools/.installed ## drive the explorer's page in Chromium, which must be installed
@@ -64,13 +65,13 @@ mutants: .venv/.all ## ask of the tests whether they see small mistakes, 30 in e
 
 lowest: .bounds-lowest ## run a test of every part with the oldest versions that pyproject.toml allows
 	@# Workers beside each other would compile the same.
-	ROCKING_SHIPPED=0 $(PYTEST:$(BIN)/%=.venv-lowest/bin/%) -n 0 -m $(FAST) $(COMPILED)
+	ROCKING_SHIPPED=0 $(PYTEST:$(BIN)/%=.venv-lowest/bin/%) -n 0 $(QUICKLY) $(COMPILED)
 
 latest: .bounds-latest ## the same with the versions of the day
 
 .bounds-lowest .bounds-latest: .bounds-%: wheel .venv-%/.installed
 	.venv-$*/bin/python -m pip install --disable-pip-version-check -qq --no-deps --force-reinstall dist/rocking-*.whl
-	ROCKING_LIBRARY_REQUIRED=1 $(PYTEST:$(BIN)/%=.venv-$*/bin/%) -m $(FAST) $(EVERY_PART)
+	ROCKING_LIBRARY_REQUIRED=1 $(PYTEST:$(BIN)/%=.venv-$*/bin/%) $(QUICKLY) $(EVERY_PART)
 
 .lowest.txt: pyproject.toml scripts/lowest_versions.py
 	$(PYTHON) scripts/lowest_versions.py > $@

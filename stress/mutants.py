@@ -71,7 +71,7 @@ _OF_ALL_SECONDS = 30.0
 
 EQUIVALENT = Path(__file__).with_name("equivalent_mutants.json")
 _OPTIONS = ["-x", "-q", "-n0", "-p", "no:cacheprovider", "--benchmark-disable"]
-_FAST = ["-m", "not thorough and not slow and not browser"]
+_FAST = ["-m", "not thorough and not slow and not browser", "--hypothesis-profile=few"]
 
 #: Processor time at most in which the kernels that tests call are compiled anew, s.
 _COMPILING = 400.0

@@ -26,6 +26,7 @@ hypothesis.settings.register_profile(
     deadline=None,
     suppress_health_check=[hypothesis.HealthCheck.too_slow],
 )
+hypothesis.settings.register_profile("few", hypothesis.settings.get_profile("fixed"), max_examples=20)
 hypothesis.settings.load_profile("fixed")
 
 # Figures are not looked at here, whatever display there is.
@@ -50,6 +51,13 @@ def pytest_collection() -> Generator[None, object, object]:
         return (yield)
     finally:
         gc.enable()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_unconfigure() -> None:
+    """Look for garbage once in the end: pytest looks ten times, through all that there is."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -92,6 +100,7 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Keep Matplotlib's settings and list of fonts to the tests, and let Ctrl-C be heard."""
+    gc.set_threshold(20_000, 25, 10)  # looking for garbage as often as by default takes one part in thirty of the time
     # A user's own settings change what is drawn and said.
     cached = config.pluginmanager.hasplugin("cacheprovider")
     os.environ["MPLCONFIGDIR"] = str(config.cache.mkdir("matplotlib")) if cached else tempfile.mkdtemp()

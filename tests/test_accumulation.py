@@ -106,6 +106,7 @@ def test_the_scorer_tells_right_from_wrong(score):
     assert score.scored(never, right | {"rests": [], "impacts": [1.0]}).verdict == "wrong"
 
 
+@pytest.mark.thorough
 def test_the_page_shows_what_the_answers_are_worth(score):
     programs, cases = score.read([])
     assert len(programs) == len(ANSWERS) >= 2

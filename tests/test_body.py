@@ -105,7 +105,7 @@ def test_what_digits_leave_open_is_bounded_or_refused():
     slenderness = st.floats(0.05, 0.6)
 
     @given(st.tuples(st.floats(1.0, 8.0), slenderness, slenderness, st.floats(-0.15, 0.15), st.integers(3, 6)))
-    @settings(deadline=None)
+    @settings(deadline=None, max_examples=40)
     def judge(drawn):
         nonlocal judged
         judged += _restitution_is_near_or_refused(*drawn)

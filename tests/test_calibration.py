@@ -139,6 +139,7 @@ def test_fitted_probabilities_are_those_of_the_ensemble(found, told):
     assert np.abs(found.predict(told[0]) - found.probabilities).max() < 3.0 / math.sqrt(1000)
 
 
+@pytest.mark.thorough
 def test_the_same_seed_gives_the_same_calibration(coarse, plain, shaken):
     second, other = (
         rocking.calibrate(shaken[0][:12], shaken[1][:12], seed=seed, candidates=128, two_sided=False, model="linear")
@@ -163,6 +164,7 @@ def test_cross_validation_says_how_good_predictions_are(coarsely, shaken, unseen
     assert abs(validation.scores.accuracy - honest.accuracy) < 0.06
 
 
+@pytest.mark.thorough
 def test_a_group_is_left_out_as_a_whole(coarse):
     # Each motion comes twice, with opposite outcomes: whoever saw the twin would predict the wrong outcome.
     motions = bursts(6, seed=4)
@@ -428,6 +430,7 @@ def test_the_posterior_is_that_of_brute_force(threshold_evidence):
     np.testing.assert_allclose(drawn.std(axis=0), deviation, rtol=0.3)
 
 
+@pytest.mark.thorough
 def test_where_candidates_are_does_not_change_the_posterior(threshold_evidence):
     """A guide in the wrong place adds candidates there; the posterior stays what it was."""
     evidence, thresholds = threshold_evidence
@@ -445,6 +448,7 @@ def test_where_candidates_are_does_not_change_the_posterior(threshold_evidence):
     assert np.abs(weights @ more.points / weights.sum() - expected).max() < 0.02
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("candidates", "goes_on", "populations"),
     [
@@ -777,6 +781,7 @@ def test_a_mistaken_history_is_refused(change, word):
         rocking.calibrate_history(**arguments)
 
 
+@pytest.mark.thorough
 def test_fragility_and_spectrum_take_the_weights_and_the_model_of_the_calibration(found, unseen):
     motions = unseen[0][:4]
     levels = np.array([1.0, 2.0, 3.0, 4.5, 6.0, 8.0])

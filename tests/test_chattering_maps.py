@@ -224,6 +224,7 @@ def test_a_map_is_the_same_in_one_thread_and_in_several():
         chattering_map(families.sine(BLOCK), parameters, threads=0)
 
 
+@pytest.mark.thorough
 def test_a_map_is_drawn_with_the_outcomes_that_it_has():
     dataset = chattering_map(families.sine(BLOCK, model="linear"), {"a": [0.9, 1.03, 1.05], "omega": [1.0, 2.0]})
     figure = dataset.plot(labels={"a": "amplitude"}, title="A map")

@@ -99,7 +99,7 @@ def files(folder: Path) -> dict[str, Path]:
     return paths | {"missing": folder / "nothing.AT2", "folder": folder}
 
 
-@pytest.mark.cases(fast=6)
+@pytest.mark.cases(fast=3)
 @pytest.mark.parametrize("name", ["empty", "binary", "npts", "token", "nan", "missing", "folder"])
 @pytest.mark.parametrize("command", ["simulate", "records"])
 def test_an_unusable_record_is_one_line_and_exit_2(run, tmp_path, name, command):
@@ -192,6 +192,7 @@ def test_a_full_disk_behind_the_output_is_one_sentence(run, monkeypatch, is_smal
         assert run("pulses") == (2, "", said)
 
 
+@pytest.mark.thorough
 def test_an_interrupt_while_the_command_line_is_imported_is_no_traceback():
     for raised, code in (
         ("KeyboardInterrupt", 130),
@@ -380,6 +381,7 @@ def test_an_interrupt_that_gets_through_an_import_comes_once(tmp_path, monkeypat
         time.sleep(0.2)  # what has caught it goes on undisturbed
 
 
+@pytest.mark.thorough
 def test_what_an_interrupt_leaves_half_made_is_given_up_before_the_end(monkeypatch, capsys):
     class HalfMade:
         def __del__(self):

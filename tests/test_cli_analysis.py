@@ -52,6 +52,7 @@ def test_spectrum_prints_fractiles_and_writes_what_it_says(run, tmp_path):
     assert all(path.name in out for path in tmp_path.iterdir())
 
 
+@pytest.mark.thorough
 def test_map_json_is_the_map(run):
     arguments = ["--alpha", "0.2", "--restitution", "0.9", "--amplitudes", "0.5:8:16", "--frequencies", "2,5", "--json"]
     code, out, err = run("map", "sine", "--cycles", "1", *arguments, "--model", "linear")
@@ -135,6 +136,7 @@ def test_fragility_json_is_the_fit(run):
     assert result["measure"] == {"name": "pgv", "units": "m/s"}
 
 
+@pytest.mark.thorough
 def test_fragility_prints_a_table_and_writes_what_it_says(run, tmp_path):
     arguments = ["--limits", "half=0.5,overturning", "--taxonomy", "statue", "--out", tmp_path]
     code, out, _ = run("fragility", RECORD, OTHER, "ridgecrest-clc-090", *SIZES, *STRIPES, *arguments)
@@ -310,6 +312,7 @@ def test_a_figure_that_is_refused_takes_nothing_else_away(run, tmp_path, monkeyp
     assert "result.json" in out
 
 
+@pytest.mark.thorough
 def test_the_help_of_every_command_names_its_options(run):
     for command, option in (
         ("spectrum", "--alpha"),
@@ -361,6 +364,7 @@ def test_calibrate_json_is_the_calibration(run, outcomes_table):
     assert list(result["predicted"].values()) == pytest.approx(predicted.tolist(), rel=1e-12)
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("coarse", "undrawn")
 def test_calibrate_prints_the_diagnostics_and_writes_what_it_says(run, outcomes_table, tmp_path):
     code, out, _ = run("calibrate", outcomes_table, *CALIBRATED, "--out", tmp_path / "out")

@@ -70,6 +70,7 @@ def test_without_loss_at_impacts_nothing_rests(run):
     assert json.loads(run("chatter", 1.03, 2, 1, "--json")[1])["series"]["error"] is None
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "sequence",
     [
@@ -117,6 +118,7 @@ def test_critical_prints_how_far_the_fits_are_off(run):
     assert "off by -6.92e-04" in out
 
 
+@pytest.mark.thorough
 def test_paper_writes_one_figure_and_says_what_the_paper_says(run, tmp_path):
     code, out, err = run("paper", "--figure", 7, "--out", tmp_path / "new")
     assert (code, err) == (0, "")

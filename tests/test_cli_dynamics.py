@@ -25,6 +25,7 @@ def test_basin_json_is_the_basins(run, tmp_path):
         assert result["complete"] is True and result["basin_entropy"] == found.entropy[0]
 
 
+@pytest.mark.thorough
 def test_basin_prints_shares_and_writes_what_it_says(run, tmp_path):
     grid = ["--positions", "-0.2:0.2:4", "--velocities", "-0.4:0.4:4"]
     code, out, _ = run("basin", *SINE, *BLOCK, *grid, "--out", tmp_path)
@@ -56,6 +57,7 @@ def test_bifurcation_json_is_the_diagram(run, tmp_path, pulse, along, parameter)
     assert result["period"] == found.period.values.tolist() and result["impacts"] == found.impacts.values.tolist()
 
 
+@pytest.mark.thorough
 def test_bifurcation_writes_what_it_says(run, tmp_path):
     arguments = ["--pulse", "sine:frequency=1.2", "--along", "amplitude:1:3:4", "--kept", "4", "--out", tmp_path]
     code, out, _ = run("bifurcation", *arguments, *BLOCK)
@@ -64,6 +66,7 @@ def test_bifurcation_writes_what_it_says(run, tmp_path):
     assert {path.name for path in tmp_path.iterdir()} == names
 
 
+@pytest.mark.thorough
 @pytest.mark.cases(fast=1)
 @pytest.mark.parametrize(
     ("options", "body"),

@@ -33,6 +33,7 @@ def test_the_result_is_the_body_and_its_rose(run, statue):
             )
 
 
+@pytest.mark.thorough
 def test_it_prints_and_writes_what_it_says(run, tmp_path, statue):
     code, out, _ = run("mesh", "statue", "--azimuth", "0:165:12", "--out", tmp_path)
     assert code == 0
@@ -61,6 +62,7 @@ def test_every_option_reaches_the_body(run, tmp_path):
     assert sorted(found) == [[-0.1, -0.1], [-0.1, 0.1], [0.1, -0.1], [0.1, 0.1]]
 
 
+@pytest.mark.cases(fast=5)
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [

@@ -86,6 +86,7 @@ def test_branches_that_begin_at_flips_are_followed_one_after_the_other_and_writt
     assert len(rows) == len(third["values"]) + 1
 
 
+@pytest.mark.cases(fast=2)
 @pytest.mark.parametrize(
     "pulse",
     ["sine:amplitude=0.05,frequency=5Hz", pytest.param("sine:amplitude=3,frequency=1.3Hz", marks=pytest.mark.thorough)],
@@ -159,6 +160,7 @@ SIZES = ("--width", 0.5, "--height", 3.0, "--mass", 4000)
 COLUMN = Block(width=0.5, height=3.0, mass=4e3)
 
 
+@pytest.mark.thorough
 def test_a_diagram_takes_restraints(run, tmp_path):
     options = (*SIZES, "--tendon", "stiffness=3e5,prestress=1e3", "--damper", 2e3, "--pulse", "sine:frequency=1.5Hz")
     few = ("--along", "amplitude:2,2.5", "--transient", 20, "--kept", 4, "--direction", "up")

@@ -51,6 +51,7 @@ def test_full_sizes_are_twice_the_half_sizes(run):
     assert "--width and --height" in err
 
 
+@pytest.mark.cases(fast=6)
 @pytest.mark.parametrize("command", ["simulate", "spectrum", "fragility"])
 @pytest.mark.parametrize(
     ("option", "value", "target"),
@@ -172,6 +173,7 @@ def test_the_table_is_what_simulate_finds(run, folder):
     assert rows[RECORD]["verdict"].startswith("overturns at") == rows[RECORD]["overturned"]
 
 
+@pytest.mark.thorough
 def test_the_table_is_written_and_each_record_only_on_request(run, folder, tmp_path, monkeypatch):
     # Figures take much of the time, and other tests look at them.
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda *_, **__: None)
@@ -250,6 +252,7 @@ def test_each_record_counts_once(folder):
         expanded([str(folder / "*.xyz")])
 
 
+@pytest.mark.thorough
 def test_a_record_is_read_from_standard_input(run, folder, monkeypatch):
     content = (folder / "r1.AT2").read_bytes()
     expected = json.loads(run("simulate", folder / "r1.AT2", *BLOCK, "--json")[1])
@@ -635,6 +638,7 @@ def test_a_calibration_draws_what_it_found(run, tmp_path):
     assert {path.name for path in out.iterdir()} == {"calibration.png", "calibration.pdf", "result.json"}
 
 
+@pytest.mark.thorough
 def test_a_coefficient_of_friction_is_put_to_the_test(run):
     out = run("simulate", "ridgecrest-clc-090", "--width", 0.24, "--height", 1.1, "--friction", 0.24)[1]
     assert re.search(r"friction 0.24 +is not enough: the block slides, first at 23\d\.\d{4} s", out)

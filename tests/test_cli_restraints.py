@@ -43,6 +43,7 @@ def test_simulate_takes_restraints(run, options, body):
     assert found["peak_rotation_rad"] == response.peak_rotation > 0.0
 
 
+@pytest.mark.thorough
 def test_ida_and_fragility_take_restraints(run):
     body = RestrainedBlock(BLOCK, Thrust(5e2, 3.0), one_sided=True)
     pulse, given = rocking.pulses.one_sine(1.0, 0.8), ["--pulse", "one-sine:amplitude=1,frequency=0.8Hz"]

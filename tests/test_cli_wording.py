@@ -174,6 +174,7 @@ def history(tmp_path):
     return write
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("coarse")
 def test_a_calibration_takes_semicolons_and_gives_units(run, history):
     known = ["--alpha", 0.2, "--restitution", 0.9]
@@ -459,6 +460,7 @@ def test_a_fragility_names_the_options_and_counts_the_years(run, tmp_path):
     assert 'give another curve; --polarity "both" counts both' in out
 
 
+@pytest.mark.thorough
 def test_only_what_this_run_has_written_is_listed(run, undrawn, tmp_path):
     first = ("simulate", "--pulse", PULSE, *SIZES, "--out", tmp_path)
     assert "energy.png" in run(*first, "--energy")[1]

@@ -179,6 +179,7 @@ def test_the_order_of_work_and_threads_do_not_count():
     assert np.count_nonzero(one.outcome.values < 0) == 0
 
 
+@pytest.mark.thorough
 def test_an_interrupt_keeps_what_was_computed_and_a_folder_goes_on(tmp_path, monkeypatch):
     monkeypatch.setattr(basin_grid, "_COARSEST", 100)  # A small grid, too, then has three passes.
     x, v = np.linspace(-0.2, 0.2, 44), np.linspace(-0.4, 0.4, 44)
@@ -233,6 +234,7 @@ def test_an_interrupted_erosion_goes_on_in_its_folder(tmp_path, monkeypatch):
         dynamics.safe_basin_erosion(BLOCK, SHAKING, [0.5, 1.0], x, v, 40)
 
 
+@pytest.mark.thorough
 def test_a_state_at_any_point_of_a_long_orbit_has_settled_on_it():
     """A few points of a long orbit have a neighbourhood; a cell may end at another one, before or after it is known."""
     strobe = dynamics.stroboscopic_map(dynamics.BouncingBall(0.5, gravity=10.0), pulses.sine(16.92, 5.0, cycles=1))
@@ -297,6 +299,7 @@ def test_a_neighbourhood_holds_what_enters_it():
     assert judged > 500
 
 
+@pytest.mark.thorough
 def test_measures_of_a_straight_boundary_of_random_outcomes_and_of_a_cantor_set():
     half = np.zeros((100, 100), dtype=int)
     half[:, 52:] = 1  # two of five columns of one box in twenty

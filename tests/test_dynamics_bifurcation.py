@@ -188,6 +188,7 @@ def test_a_stop_that_moves_takes_the_body_with_it():
     assert np.all(found.coordinate.values[0, :, 0].min(axis=-1) >= np.array([0.3, 0.2, 0.0]))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("direction", ["both", pytest.param("afresh", marks=pytest.mark.thorough)])
 def test_an_interrupted_diagram_goes_on_in_its_folder(tmp_path, monkeypatch, direction):
     values, starts = np.linspace(1.0, 1.7, 25), [[0.1, 0.5], [0.0, 0.0]]

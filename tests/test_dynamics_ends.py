@@ -30,6 +30,7 @@ def branch_of(family, value, limits, *, starts=64, **options):
     return dynamics.continue_orbit(start, family, value, limits, step=0.2)
 
 
+@pytest.mark.thorough
 def test_branches_that_cross_are_followed_through_and_the_crossing_is_said():
     """Where the level is a parabola whose vertex is the fold, both orbits of the ball are smooth in the parameter."""
     branch = branch_of(lambda q: table(EXACT.fold + q * q), 0.3, (-0.35, 0.35))
@@ -123,6 +124,7 @@ def test_a_branch_that_comes_back_is_followed_round_once():
     assert np.abs(branch.values).max() == pytest.approx(0.3, abs=0.01) and np.any(branch.is_stable)
 
 
+@pytest.mark.thorough
 def test_where_an_impact_vanishes_is_extrapolated_from_orbits_that_have_it():
     """An orbit without impacts passes near: x = a sin(w t)/(p^2 + w^2), which touches the walls at gap (p^2 + w^2)."""
     pendulum = dynamics.InvertedPendulum(3.0, 0.1, 0.6)
@@ -140,6 +142,7 @@ def test_where_an_impact_vanishes_is_extrapolated_from_orbits_that_have_it():
     assert end.bracket[0] - 1e-8 < exact < end.bracket[1] + 1e-8
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("limits", [(16.0, 16.1), pytest.param((16.0, 16.2), marks=pytest.mark.thorough)])
 def test_an_orbit_whose_slowest_impact_is_always_slow_does_not_end_before_that_vanishes(limits):
     """Of seven impacts in a period the last leave little; two ranges, whose steps differ, lead to one end."""

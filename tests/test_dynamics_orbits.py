@@ -188,6 +188,7 @@ def ball_between_fold_and_flip(restitution, n):
     return exact, level, once, dynamics.continue_orbit(start, family, level, limits, name="level")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("restitution", "n"),
     [
@@ -435,6 +436,7 @@ def test_an_orbit_near_which_nothing_grows_or_shrinks_is_neutral():
     assert orbit.multipliers[0] == pytest.approx(np.exp(2j * math.pi / 1.3).conjugate(), abs=1e-9)
 
 
+@pytest.mark.thorough
 def test_a_rest_that_attracts_nothing_is_neutral():
     """A ball that loses nothing bounces for ever, however near the table it begins."""
     motion = pulses.sine(0.4, 0.7, cycles=1)
@@ -521,6 +523,7 @@ def test_a_branch_is_refused_in_one_sentence(branch, changes, words):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.thorough
 def test_long_orbits_in_chaos_come_back_or_are_left_out():
     ball, table = dynamics.BouncingBall(0.8, gravity=10.0), pulses.sine(40.0, 5.0, cycles=1)
     strobe = dynamics.stroboscopic_map(ball, table)
@@ -529,6 +532,7 @@ def test_long_orbits_in_chaos_come_back_or_are_left_out():
     assert len(orbits) > 5 and max(away) < 1e-5
 
 
+@pytest.mark.thorough
 def test_a_family_that_loses_its_mirror_image_is_followed_as_orbits():
     block, times = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9), np.linspace(0.0, 1.0 / 1.2, 401)
 

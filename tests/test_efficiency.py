@@ -85,6 +85,7 @@ def test_what_cannot_be_compared_is_told_in_one_sentence():
         compare_measures(SLENDER, [pulse, pulse], periods=[0.0], progress=False)
 
 
+@pytest.mark.thorough
 def test_the_command_prints_and_writes_the_comparison(run, tmp_path, monkeypatch):
     monkeypatch.setattr(Figure, "savefig", lambda figure, file, **options: file.write(b"not drawn"))
     pulses = ["--pulse", "half-sine:amplitude=1,frequency=1Hz", "--pulse", "half-sine:amplitude=1,frequency=2Hz"]
@@ -151,6 +152,7 @@ def test_dispersions_of_several_blocks_are_written_out_sums(monkeypatch):
     assert "left out: 1 pair of block and motion" in found.summary()
 
 
+@pytest.mark.thorough
 def test_copies_of_a_block_scatter_as_the_block_does():
     """Blocks share the motions: five copies are no larger sample."""
     motions = [rocking.pulses.one_sine(1.0, f) for f in (0.5, 0.8, 1.1)]
@@ -160,6 +162,7 @@ def test_copies_of_a_block_scatter_as_the_block_does():
         assert many[name].values == pytest.approx(alone[name].values, rel=1e-12)
 
 
+@pytest.mark.thorough
 def test_a_block_of_no_weight_changes_nothing_and_need_not_overturn(monkeypatch):
     motions = [rocking.pulses.one_sine(1.0, f) for f in (0.5, 0.8, 1.1)]
     a, b = (rocking.Block.from_parameters(p=p, alpha=0.2, restitution=0.9) for p in (1.5, 3.0))
@@ -189,6 +192,7 @@ def test_spectral_accelerations_of_other_damping_than_5_percent_have_another_nam
         assert found.to_dict()["damping"] == damping
 
 
+@pytest.mark.thorough
 def test_the_figure_has_the_order_of_the_table():
     motions = [rocking.pulses.one_sine(1.0, f) for f in (0.4, 0.7, 1.0, 1.4)]
     found = compare_measures(rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9), motions)
@@ -198,6 +202,7 @@ def test_the_figure_has_the_order_of_the_table():
     assert all(row.startswith(name) for row, name in zip(rows, drawn, strict=True))
 
 
+@pytest.mark.thorough
 def test_multiples_of_a_motion_count_once(rectangles):
     pulses = [rocking.pulses.rectangular(*one) for one in ((1.0, LENGTHS[0]), *((2.5, length) for length in LENGTHS))]
     found = compare_measures(SLENDER, pulses, periods=[0.7], model="linear", tolerance=1e-9, progress=False)

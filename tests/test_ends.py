@@ -51,12 +51,14 @@ def within(budget: int | None, expression: str) -> str:
 BUDGETS = pytest.mark.parametrize("budget", [pytest.param(None, marks=pytest.mark.slow), 10_000])
 
 
+@pytest.mark.thorough
 @BUDGETS
 @pytest.mark.parametrize("model", ["linear", "nonlinear"])
 def test_an_ensemble_of_blocks_that_hardly_lose_energy_ends(model: str, budget: int | None) -> None:
     ended(within(budget, MANY.format(LIVELY.format(2), model)))
 
 
+@pytest.mark.thorough
 @BUDGETS
 @pytest.mark.parametrize("model", ["linear", "nonlinear"])
 def test_free_rocking_of_a_block_that_hardly_loses_energy_ends(model: str, budget: int | None) -> None:

@@ -246,6 +246,7 @@ def test_a_record_plus_a_pulse_is_not_a_record(model: str, order: str) -> None:
     assert_allclose(result.peak_time.item(), expected.overturn_time, rtol=1e-12)
 
 
+@pytest.mark.cases(fast=3)
 @MODELS
 @pytest.mark.parametrize("degree", [1, 2, 3])
 def test_jumps_between_even_pieces_are_followed(model: str, degree: int) -> None:

@@ -104,6 +104,7 @@ def test_the_margin_is_the_critical_scale():
     assert last(assessed(LEANING, records=PLAIN, **LEVELS)).header["margin"] is None
 
 
+@pytest.mark.thorough
 @pytest.mark.cases(fast=1)
 @pytest.mark.parametrize(
     ("width", "height", "name"), [("0.24", "1.1", "ridgecrest-clc-090"), ("0.3", "2.0", "ridgecrest-tow2-360")]
@@ -128,6 +129,7 @@ def test_a_block_that_no_level_overturns_has_no_margin_up_to_the_highest_level_l
     assert not rocking.simulate(block, motion.scaled_to(margin["pga"])).overturned
 
 
+@pytest.mark.thorough
 @pytest.mark.cases(fast=1)
 @pytest.mark.parametrize(("motion", "scale"), [("el-centro-meloland-270", "2000"), ("ridgecrest-clc-090", "1e12")])
 def test_the_margin_of_a_motion_however_strong_is_next_to_what_does_not_overturn(motion, scale):
@@ -163,6 +165,7 @@ def test_motions_of_the_program_are_variables_of_the_script():
     assert len({name for name, _, _ in names}) == 2
 
 
+@pytest.mark.thorough
 def test_levels_go_from_where_a_record_lifts_the_block_to_where_most_overturn_it():
     for measure in ("pga", "sa"):
         found = assessed(STATUE, records=PLAIN, measure=measure, levels="4")

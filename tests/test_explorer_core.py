@@ -333,6 +333,7 @@ def test_the_case_as_a_command_runs_and_has_the_same_peak(texts, run):
     assert peak == case.simulate().peak_rotation
 
 
+@pytest.mark.thorough
 def test_a_file_is_named_in_code_as_it_was_called(tmp_path, monkeypatch, run):
     record = rocking.records.load("el-centro-meloland-270")
     text = "\n".join(f"{value:.10g}" for value in record.samples[1])
@@ -735,6 +736,7 @@ def filled(grid):
     return dict(zip(maps.QUANTITIES, values.reshape(len(values), *grid.shape), strict=True))
 
 
+@pytest.mark.thorough
 def test_a_map_of_a_sine_is_the_packages_chattering_map():
     case = read_case(SINE, UploadStore())
     grid = maps.grid_of(
@@ -919,6 +921,7 @@ _SIDES = {"p": "2,2.4", "alpha": "0.2,0.25", "restitution": "0.9,0.85"}
 _BLOCK = {"p": "2", "alpha": "0.2", "restitution": "0.9"}
 
 
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize(
     ("texts", "axes"),
     [
@@ -996,6 +999,7 @@ def test_a_map_of_a_motion_that_shakes_nothing_is_refused(motion):
         maps.grid_of(case, {"x": "p", "y": "pga"})
 
 
+@pytest.mark.cases(fast=2)
 @pytest.mark.parametrize(
     ("cycles", "phase", "valid"),
     [("2.5", "-20deg", True), ("2.5", "120deg", True), ("2.5", "80deg", False), ("0.6", "30deg", False),
@@ -1217,6 +1221,7 @@ def test_a_study_that_varies_too_little_is_refused_with_a_sentence(tmp_path):
         StudyView(tmp_path / "few")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("align", ["start", "uplift", "arias"])
 def test_two_records_are_laid_over_each_other_at_a_moment_of_both(explorer, align):
     other = {"motion": "el-centro-meloland-270", "pga": "0.4g"}
@@ -1267,6 +1272,7 @@ def test_a_map_of_overturning_is_a_command(run):
     assert len(np.unique(found["mode"])) > 2
 
 
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize("duration", [None, 1.2])
 def test_a_ricker_pulse_is_mapped_over_its_frequency_with_the_length_that_goes_with_it(run, duration):
     """The script and the cases at two corners have the map's own peaks; a whole pulse's text has no length."""

@@ -286,6 +286,7 @@ def test_a_mesh_that_does_not_stand_as_its_format_has_it_may_be_turned(here):
     assert explorer.case({**texts, "up": "-z", "azimuth": "0"}).header["block"]["body"]["name"] == "lying.stl"
 
 
+@pytest.mark.thorough
 def test_a_file_is_read_apart_to_the_same_bits_and_within_limits(monkeypatch):
     data = SHIPPED["statue"].read_bytes()
     made, sections = apart.made_apart("statue.obj", data, {"unit": "ft"})
@@ -378,6 +379,7 @@ def test_the_server_takes_a_mesh_and_shows_it(page, here):
 
 
 # The texts of seed 3 have the statue turned, which takes most of the time.
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", [4, pytest.param(3, marks=pytest.mark.thorough)])
 def test_no_text_of_a_mesh_fails_otherwise_than_by_a_sentence(seed):
     random = np.random.default_rng(seed)

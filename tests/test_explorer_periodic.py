@@ -220,6 +220,7 @@ def test_a_sweep_is_what_its_script_computes(texts, asked, tmp_path):
     assert overturned >= 3 or "model" in texts or "scale" in texts
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("texts", "asked", "most"),
     [
@@ -262,7 +263,7 @@ def test_a_sweep_depends_on_its_direction(points):
     assert not any(b > 0 and not a for a, b in zip(up, down, strict=True))
 
 
-@pytest.mark.cases(fast=2)
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize("name", ["a", "omega"])
 @pytest.mark.parametrize("texts", [{}, {"pga": "0.8g"}, {"scale": "-0.9"}])
 def test_the_case_at_a_point_of_a_sweep_settles_on_that_point(name, texts):

@@ -204,7 +204,7 @@ def test_a_comparison_takes_what_is_other_under_a_prefix(page):
 
 @pytest.mark.parametrize(
     "form",
-    ["svg", "csv", *(pytest.param(x, marks=pytest.mark.thorough) for x in ("png", "events.csv", "impacts.csv", "nc"))],
+    ["csv", *(pytest.param(x, marks=pytest.mark.thorough) for x in ("svg", "png", "events.csv", "impacts.csv", "nc"))],
 )
 def test_every_export_is_a_download(page, form):
     answer = page.get("/api/export", params={**SINE, "form": form})
@@ -312,6 +312,7 @@ def test_what_no_field_of_the_page_is_called_is_not_said(page):
         assert "“Record”" not in answer.json()["problem"]
 
 
+@pytest.mark.thorough
 def test_a_list_of_records_is_assessed_part_by_part_and_a_file_taken_out(page):
     key = page.post("/api/records", params={"name": "b_ns.txt"}, content=b"0\n1\n-1\n0\n" * 99).json()["key"]
     rows = [row for group in page.get("/api/list").json()["groups"] for row in group["rows"]]
@@ -471,6 +472,7 @@ def malformed(rng):
     return ("\n".join(rng.choice(["nan", "inf", "1e999", "-", "0x1", "1" * 400, "1.0"]) for _ in range(50))).encode()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "count", [60, pytest.param(200, marks=pytest.mark.thorough), pytest.param(1000, marks=pytest.mark.slow)]
 )
@@ -588,6 +590,7 @@ def test_malformed_files_links_and_headers_are_refused_in_words(page, explorer, 
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["private"]
 
 
+@pytest.mark.thorough
 def test_twenty_clients_at_once_are_all_answered(page):
     def ask(k):
         answer = page.get("/api/case", params={**STATUE, "pga": f"{0.3 + 0.01 * k:.2f}g"})
@@ -627,6 +630,7 @@ def test_the_server_answers_over_a_socket_and_compiles_ahead(running, browser):
     assert start["compilation"]["done"]
 
 
+@pytest.mark.thorough
 @pytest.mark.cases(fast=1, thorough=2)
 @pytest.mark.parametrize(
     ("path", "axes"),
@@ -841,6 +845,7 @@ def test_a_map_that_is_not_read_gives_its_turn_to_the_next(running, browser, mon
 # The command
 
 
+@pytest.mark.thorough
 def test_the_command_prints_one_line_and_listens_here_alone():
     command = [sys.executable, "-c", "from rocking.cli import main; main()"]
     process = subprocess.Popen(
@@ -900,6 +905,7 @@ def test_a_missing_package_is_named(run, monkeypatch):
     assert "pip install 'rocking[explorer]'" in err
 
 
+@pytest.mark.thorough
 def test_the_library_is_found_without_importing_it():
     assert (server.library_folder() / "bokeh.min.js").is_file()
     code = "import sys; from rocking.explorer import server; server.library_folder(); print('bokeh' in sys.modules)"

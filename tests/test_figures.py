@@ -317,7 +317,7 @@ def shown_boxes(figure):
             yield "an axis", box
 
 
-@pytest.mark.cases(fast=4, thorough=26)
+@pytest.mark.cases(fast=2, thorough=26)
 @pytest.mark.parametrize(
     ("width", "dpi"),
     [
@@ -404,6 +404,7 @@ def test_where_blocks_overturn_the_lines_of_a_spectrum_end_in_crosses():
     assert not spectrum_figure(x=x, curves=[standing], fractiles=[0.5], motions=["a"], x_label="p").legends
 
 
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize("count", [1, 3, *(pytest.param(n, marks=pytest.mark.thorough) for n in (2, 15, 200))])
 def test_impacts_are_counted_by_whole_numbers(count):
     figure = intervals_figure(intervals=0.8 ** np.arange(1.0, count + 1.0), eta=0.9)
@@ -415,6 +416,7 @@ def test_impacts_are_counted_by_whole_numbers(count):
         assert all(tick == round(tick) for tick in panel.get_xticks() if low <= tick <= high)
 
 
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize(("ends", "numbers"), [((1.0, 6.0), "1 1.5 2 3 4 5 6"), ((0.3, 60.0), "0.5 1 2 5 10 20 50")])
 def test_sizes_are_numbered_over_less_than_a_decade_and_over_more(ends, numbers):
     x = np.geomspace(*ends, 5)
@@ -500,6 +502,7 @@ def test_long_names_of_few_strips_are_written_in_lines():
     assert "\n" not in ida_figure(motions=many, level_label="PGA").axes[1].get_xticklabels()[0].get_text()
 
 
+@pytest.mark.thorough
 def test_the_thinnest_band_of_an_ida_has_ends_that_are_seen():
     motion = scaled(1)[0]._replace(bands=np.array([[3.0, 3.0000001]]))
     strips = ida_figure(motions=[motion], level_label="PGA").axes[1]

@@ -164,6 +164,7 @@ def test_everything_that_computes_needs_no_compiler() -> None:
     assert set(json.loads(answer(EVERYTHING))) == expected
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("n", [4, pytest.param(20, marks=pytest.mark.thorough)])
 def test_libraries_of_all_levels_give_the_same_bits(n: int, monkeypatch, capsys) -> None:
     found = library.opened()

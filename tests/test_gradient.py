@@ -204,6 +204,7 @@ def test_what_cannot_be_differentiated_is_refused_in_a_sentence() -> None:
         rocking.gradient(BLOCK)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("model", [pytest.param("linear", marks=pytest.mark.thorough), "nonlinear"])
 def test_a_critical_scale_changes_as_differences_of_critical_scales_say(model: str) -> None:
     rng = np.random.default_rng(1)

@@ -153,6 +153,7 @@ def test_given_levels_that_begin_or_end_in_a_band_leave_it_open():
     assert np.isnan(safe.overturning_level.values).all()
 
 
+@pytest.mark.thorough
 def test_the_larger_of_two_similar_blocks_is_safer_under_records():
     names = ("el-centro-meloland-270", "el-centro-meloland-360", "ridgecrest-tow2-090")
     motions = [rocking.records.load(name) for name in names]
@@ -224,6 +225,7 @@ def test_levels_of_a_spectral_acceleration_say_its_period_and_damping():
     assert "damping" not in incremental_dynamic_analysis(BLOCK, PULSE, levels=[3.0, 9.0]).to_dict()
 
 
+@pytest.mark.thorough
 def test_the_ends_of_bands_are_those_of_simulations_where_restitution_is_drawn():
     """How many impacts are followed decides what is drawn next, so a treatment of its own would move the ends."""
     first, second = rocking.pulses.sine(4.0, 1.5, cycles=3), rocking.pulses.sine(4.5, 1.2, cycles=4)
@@ -242,6 +244,7 @@ def test_the_ends_of_bands_are_those_of_simulations_where_restitution_is_drawn()
     assert all(both_verdicts_are_near(body, motion, level, "pga") for body, level in ends)
 
 
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
 def test_blocks_with_equal_and_with_different_sides_are_analysed_together(order):
     each = rocking.Block(width=0.3, height=1.2), rocking.Block(width=0.3, height=1.5, offset=0.02)

@@ -157,6 +157,7 @@ def test_a_block_that_overturns_has_no_largest_rotation_in_any_table(tmp_path):
     assert f"{fallen.peak_rotation:.4f}" == f"{math.pi / 2:.4f}"
 
 
+@pytest.mark.thorough
 def test_numbers_are_written_as_people_write_them(run, tmp_path, monkeypatch):
     monkeypatch.setattr(Figure, "savefig", lambda figure, file, **options: file.write(b"not drawn"))
     assert quantities.values("0.1:1:10", "--levels").tolist() == [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]

@@ -175,6 +175,7 @@ def chances_are_even(chances):
     return stats.kstest(chances, "uniform").pvalue > 0.01
 
 
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize("scope", ["test", "specimen"])
 @pytest.mark.parametrize("sets", [12, pytest.param(200, marks=pytest.mark.slow)])
 def test_of_right_predictions_chances_are_even_and_bands_hold(monkeypatch, scope, sets):
@@ -492,6 +493,7 @@ def test_the_command_takes_the_ensemble_of_each_specimen(run, tmp_path):
     assert code == 2 and "a block is needed" in err
 
 
+@pytest.mark.thorough
 def test_an_error_of_peaks_is_that_of_the_blocks_in_whatever_order_specimens_come():
     rng = np.random.default_rng(0)
     blocks = Blocks(3.0, np.exp(np.log(0.15) + 0.1 * rng.normal(size=50)), 0.9)

@@ -167,6 +167,7 @@ def test_processes_that_compile_at_once_for_different_types_keep_both(kept: Path
 
 
 @pytest.mark.skipif(compiled.UNCOMPILED, reason="nothing is compiled")
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize(
     "damage", [lambda data: data[:-100], lambda data: data[:5000] + b"no" + data[5002:], lambda data: b""]
 )

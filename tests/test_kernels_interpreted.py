@@ -153,6 +153,7 @@ def test_an_interrupt_while_kernels_are_read_leaves_nothing_half_done(
     assert len(made) > when
 
 
+@pytest.mark.thorough
 def test_threads_that_simulate_first_at_once_compile_nothing(unread: None, monkeypatch: pytest.MonkeyPatch) -> None:
     def slowly(*arguments: Any) -> Any:
         time.sleep(1e-4)  # another thread goes on

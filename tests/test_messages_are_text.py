@@ -181,6 +181,7 @@ def outcome(run, command, folder, out):
     return {"code": code, "printed": shown, "files": files, "named": named, "notes": bool(err)}, err
 
 
+@pytest.mark.thorough
 @pytest.mark.cases(fast=5)
 @pytest.mark.parametrize(("command", "argument"), COMMANDS.items(), ids=COMMANDS)
 def test_what_a_command_does_does_not_hang_on_its_words(run, folder, tmp_path_factory, command, argument):

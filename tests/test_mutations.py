@@ -54,6 +54,7 @@ def test_each_mutant_is_one_mistake_in_what_is_run(tmp_path):
     assert len({each.key for each in found}) == len(found) >= 16
 
 
+@pytest.mark.thorough
 def test_a_draw_is_the_same_again():
     assert all((mutants.ROOT / "src/rocking" / each).is_dir() for part in mutants.PARTS.values() for each in part)
     for part in ("response", "chattering"):
@@ -81,6 +82,7 @@ def test_a_draw_changes_with_the_lines_that_change_alone(tmp_path, monkeypatch):
     assert len(kept) >= 20 and len(kept & after) >= 0.8 * len(kept)
 
 
+@pytest.mark.thorough
 def test_what_changes_nothing_is_in_a_line_that_is_there():
     for each in json.loads(mutants.EQUIVALENT.read_text("utf-8")):
         found = mutations.mutants(mutants.ROOT / "src" / each["file"])
@@ -89,6 +91,7 @@ def test_what_changes_nothing_is_in_a_line_that_is_there():
         assert each["reason"], each
 
 
+@pytest.mark.thorough
 def test_survivors_are_named_and_those_that_change_nothing_do_not_count(monkeypatch):
     drawn = mutants.drawn("block and solid", 4, 1)
     found = ["tests/test_block.py::test_something", "", "", "signal 24"]

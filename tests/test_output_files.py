@@ -67,7 +67,7 @@ WRITERS = {
 }
 
 
-@pytest.mark.cases(fast=3)
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize("name", WRITERS)
 def test_a_full_disk_leaves_no_part_of_a_file_and_keeps_the_old_one(response, analysis, tmp_path, name):
     path = tmp_path / name
@@ -83,7 +83,7 @@ def test_a_full_disk_leaves_no_part_of_a_file_and_keeps_the_old_one(response, an
 
 
 @pytest.mark.parametrize(
-    "suffix", [".csv", ".nc", *(pytest.param(x, marks=pytest.mark.thorough) for x in (".json", ".parquet"))]
+    "suffix", [".csv", *(pytest.param(x, marks=pytest.mark.thorough) for x in (".nc", ".json", ".parquet"))]
 )
 def test_an_export_of_a_study_is_whole_or_not_there(tmp_path, suffix):
     if suffix == ".parquet":
@@ -106,6 +106,7 @@ def test_a_table_of_many_records_is_whole_or_not_there(response, tmp_path):
     assert not [*tmp_path.iterdir()]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("too_large", "tables"), [pytest.param("response.csv", 0, marks=pytest.mark.thorough), ("response.png", 3)]
 )
@@ -166,6 +167,7 @@ def test_a_link_is_kept_and_a_file_keeps_its_rights_and_a_device_is_written_to(t
         pass
 
 
+@pytest.mark.thorough
 def test_figures_of_a_command_have_the_size_and_resolution_of_a_page(tmp_path: Path) -> None:
     figure = Figure(figsize=(3.0, 2.0))
     write_results(tmp_path, figures={"one": lambda: figure}, result={"answer": 1.5})

@@ -236,6 +236,7 @@ def test_each_figure_is_written_with_its_data(unarranged, figures, number, tmp_p
                 assert read == column.tolist()
 
 
+@pytest.mark.thorough
 def test_two_runs_write_the_same_files(unarranged, tmp_path, monkeypatch):
     contents = []
     for folder, seconds in (("first", "0"), ("second", "86400")):
@@ -352,6 +353,7 @@ def test_figure_6_draws_eq_76_above_or_below_the_surface_as_it_is(figures):
     assert shown == 17 * 11
 
 
+@pytest.mark.thorough
 def test_the_labels_of_figure_6_lie_within_their_panel_and_apart(figures):
     drawing = figures[6].draw()
     canvas = FigureCanvasAgg(drawing)
@@ -611,14 +613,16 @@ def test_the_detail_of_a_very_short_chattering_shows_its_arcs(a):
     assert turnings >= 5 and inside.max() > 1e-3 * np.max(np.abs(rotation))
 
 
+@pytest.mark.thorough
 def test_an_initiation_that_the_certified_response_has_not_names_the_scheme_that_has_it(figures):
     texts = {number: [text.get_text() for text in figures[number].draw().axes[1].texts] for number in (10, 11)}
     assert texts[10] == ["1st initiation", "2nd initiation"]
     assert texts[11] == ["1st initiation", r"2nd initiation, by $VelTol/(p\alpha) = 5\cdot 10^{-2}$ alone"]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("eta", [0.01, *(pytest.param(eta, marks=pytest.mark.thorough) for eta in (0.5, 0.99))])
-@pytest.mark.parametrize("number", [2, pytest.param(3, marks=pytest.mark.thorough), 9])
+@pytest.mark.parametrize("number", [2, *(pytest.param(number, marks=pytest.mark.thorough) for number in (3, 9))])
 def test_sequences_of_few_and_of_many_impacts_are_drawn(eta, number):
     a = 1.0 + 0.5 * (critical_amplitude(2.0, eta) - 1.0)
     with pytest.warns(rocking.errors.OutsideFit) if number == 9 and eta != 0.5 else contextlib.nullcontext():

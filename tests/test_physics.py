@@ -276,6 +276,7 @@ def test_sensitivities_are_derivatives_by_the_scale_of_the_motion() -> None:
     assert judged >= 100
 
 
+@pytest.mark.thorough
 def test_sensitivities_of_rests_take_in_the_impacts_that_a_proof_has_summed() -> None:
     judged = 0
 

@@ -61,6 +61,7 @@ def test_the_rotation_and_the_motion_are_drawn_as_given(units, plus, minus):
     np.testing.assert_array_equal(labelled(motion, "_ground acceleration").get_ydata(), -0.3 * np.sin(time))
 
 
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize("units", ["slenderness", "rad"])
 def test_an_axis_in_degrees_stands_on_the_right(units):
     figure = figure_of(units=units, rotation=np.linspace(-0.1, 0.15, 1001))
@@ -168,6 +169,7 @@ def test_the_zoom_shows_every_interval_against_the_time_to_rest():
     assert len(figure_of().axes) == 2
 
 
+@pytest.mark.thorough
 def test_the_zoom_says_how_far_the_rest_is_known_before_the_bracket_of_the_computation():
     response = simulate(Block(width=0.24, height=1.1), records.load("ridgecrest-clc-090"))
     zoom = response.plot(longest_sequence=True).axes[2]
@@ -178,6 +180,7 @@ def test_the_zoom_says_how_far_the_rest_is_known_before_the_bracket_of_the_compu
     assert second.startswith("bracket of the computation ")
 
 
+@pytest.mark.thorough
 def test_a_narrow_figure_has_the_sequence_below_and_a_wide_one_beside():
     sequence = DrawnSequence(bouncing_times(9.8, 0.5, 0.8, 60), 9.8 - 1e-9, 9.8 + 1e-9)
     boxes = []
@@ -198,7 +201,7 @@ def test_impacts_closer_than_the_spacing_of_times_are_left_out_of_the_zoom():
     assert zoom.lines[0].get_xdata().size < 60
 
 
-@pytest.mark.cases(fast=2, thorough=7)
+@pytest.mark.cases(fast=1, thorough=7)
 @pytest.mark.parametrize("extension", ["png", "pdf", "svg"])
 @pytest.mark.parametrize(
     "changes",
@@ -217,6 +220,7 @@ def test_every_response_is_drawn_to_every_format_without_a_warning(changes, exte
     assert buffer.tell() > 5000
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("extension", [pytest.param("pdf", marks=pytest.mark.thorough), "svg"])
 def test_the_fullest_response_is_drawn_in_vectors_without_a_warning(unarranged, extension):
     sequence = DrawnSequence(bouncing_times(9.8, 0.5, 0.8, 60), 9.8 - 1e-9, 9.8 + 1e-9)
@@ -234,6 +238,7 @@ def test_without_a_bracketed_sequence_the_panels_fill_the_figure(sequence):
     assert len(figure_of(chattering=sequence).axes) == 2
 
 
+@pytest.mark.thorough
 def test_no_text_covers_another_text():
     sequence = DrawnSequence(bouncing_times(9.8, 0.5, 0.8, 60), 9.8 - 1e-9, 9.8 + 1e-9)
     figure = figure_of(chattering=sequence, overturn_time=9.9)

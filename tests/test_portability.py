@@ -55,6 +55,7 @@ def test_no_module_that_a_system_lacks_is_needed_to_import_the_package() -> None
     assert [(name, module) for name, module in imported if module in MODULES] == []
 
 
+@pytest.mark.thorough
 def test_texts_have_one_encoding_and_one_end_of_line_everywhere() -> None:
     judged = 0
     for name, text in TEXTS.items():

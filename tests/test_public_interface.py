@@ -4,6 +4,7 @@ import ast
 import functools
 import inspect
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -69,16 +70,18 @@ def test_a_default_is_the_same_everywhere() -> None:
         assert len({repr(default) for default in found.values()}) <= 1 + several, (name, found)
 
 
-@functools.cache
-def modules() -> dict[Path, ast.Module]:
-    every = sorted(Path(rocking.__file__).parent.rglob("*.py"))
-    return {path: ast.parse(path.read_text("utf-8")) for path in every}
+def modules(words: str) -> Iterator[tuple[Path, ast.Module]]:
+    """Modules of the package that have these words in them."""
+    for path in sorted(Path(rocking.__file__).parent.rglob("*.py")):
+        text = path.read_text("utf-8")
+        if words in text:
+            yield path, ast.parse(text)
 
 
 def test_an_error_that_says_what_was_given_keeps_it() -> None:
     """A sentence that names an argument, and what it is "not", has this as its value."""
     judged = 0
-    for path, tree in modules().items():
+    for path, tree in modules(", not {"):
         said: dict[str, ast.expr] = {}  # sentences that have a name, in the order of the text
         for node in sorted(ast.walk(tree), key=lambda each: getattr(each, "lineno", 0)):
             if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
@@ -98,7 +101,7 @@ def test_an_error_that_says_what_was_given_keeps_it() -> None:
 def test_who_is_asked_for_silence_is_silent() -> None:
     """Every function with an argument `progress` passes it to its bar, and commands show theirs where there is one."""
     judged = 0
-    for path, tree in modules().items():
+    for path, tree in modules("Progress("):
         for function in ast.walk(tree):
             if not isinstance(function, ast.FunctionDef) or "progress" not in {
                 each.arg for each in [*function.args.args, *function.args.kwonlyargs]
@@ -151,6 +154,7 @@ def test_public_docstrings_are_complete(monkeypatch: pytest.MonkeyPatch) -> None
     assert faults() == []
 
 
+@pytest.mark.thorough
 def test_all_that_is_taken_or_returned_has_a_public_name() -> None:
     assert unreachable() == []
 
@@ -160,13 +164,14 @@ def made_dataclasses() -> list[tuple[ast.ClassDef, str]]:
     """Every dataclass of the package, with its decorator."""
     return [
         (node, ast.unparse(made))
-        for tree in modules().values()
+        for _, tree in modules("@dataclass")
         for node in ast.walk(tree)
         for made in (node.decorator_list if isinstance(node, ast.ClassDef) else [])
         if ast.unparse(made).startswith("dataclass")
     ]
 
 
+@pytest.mark.thorough
 def test_what_holds_data_cannot_be_changed() -> None:
     """All dataclasses are frozen but those that are built up within one call."""
     made = made_dataclasses()
@@ -174,6 +179,7 @@ def test_what_holds_data_cannot_be_changed() -> None:
     assert {node.name for node, how in made if "frozen=True" not in how} == CHANGING
 
 
+@pytest.mark.thorough
 def test_what_holds_arrays_is_equal_to_itself_alone_and_a_result_says_what_it_is() -> None:
     """Arrays cannot be compared by one truth value, nor hashed; a result's own text would be hidden by its fields."""
     arrays = re.compile(r"\b(Floats|Integers|Flags|NDArray|ndarray|Dataset|DataArray|DataFrame)\b")

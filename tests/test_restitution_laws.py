@@ -60,6 +60,7 @@ def test_laws_of_angular_momentum_are_those_of_the_body_and_not_of_a_rectangle()
         assert (fits["angular momentum (Housner)"].misfit < 1e-3) == (contact == 1.0)
 
 
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize("alpha", [1.0, 1.2])
 def test_of_a_stocky_block_a_narrow_contact_explains_what_housner_cannot(alpha):
     """By Housner such a block would not rock on; e = (A - k s^2)/(A + k s^2) of 0.6 tells the contact k."""
@@ -104,6 +105,7 @@ def test_errors_of_times_are_those_of_the_factors():
     assert abs(truth.covariance[1, 0]) > 0.1 * truth.covariance[0, 0]
 
 
+@pytest.mark.thorough
 def test_a_comparison_shows_itself():
     found = compare_restitution(releases(0.9), COLUMN)
     text = found.summary()

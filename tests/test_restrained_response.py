@@ -320,6 +320,7 @@ def test_a_peak_has_no_ratio_to_a_balance_that_is_not_there():
     assert rocking.simulate(wall, motion.scaled(0.1)).peak_over_slenderness == 0.0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("vertical", [False, True])
 def test_a_figure_of_a_wall_counts_by_its_balance(vertical):
     wall = RestrainedBlock(Block(width=0.5, height=5.0, mass=6e3), Thrust(8e2, height=4.0), one_sided=True)

@@ -367,6 +367,7 @@ def test_a_part_has_no_numbers_of_the_whole(results, of_several):
             results[name].select(**{dimension: results[name].data[dimension].values[0]})
 
 
+@pytest.mark.thorough
 def test_a_part_of_an_overturning_map_has_the_boundaries_within_it():
     whole = rocking.overturning_map(BLOCK, "one-sine", amplitudes=np.arange(1.0, 9.0), frequencies=[2.0, 3.0, 4.0])
     part = whole.select(frequency=[2.0, 4.0], amplitude=[3.0, 5.0, 7.0])

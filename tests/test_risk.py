@@ -452,6 +452,7 @@ def test_survival_is_what_the_rate_and_the_curve_say() -> None:
         fitted.survival(0.0)
 
 
+@pytest.mark.thorough
 def test_a_survival_of_one_block_of_several_is_likelier_than_of_their_mean() -> None:
     """Of a weak and a strong block the strong one stands: what each does alone says how probably."""
     blocks = [
@@ -680,7 +681,7 @@ def _rate_within(fitted, hazard):
     return float(np.sum(chance * -np.diff(hazard.rate_of(steps))))
 
 
-@pytest.mark.cases(fast=2)
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize(
     ("levels", "fell", "trials", "hazard", "years"),
     [

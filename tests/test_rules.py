@@ -173,6 +173,7 @@ def test_a_check_sets_the_rules_beside_the_exact_answer(record):
         assert f"West: {words} of 2" in text
 
 
+@pytest.mark.thorough
 def test_a_block_that_stands_here_and_falls_under_less_is_counted_by_itself(run):
     """A rocking block may stand a motion that is stronger than one that overturns it."""
     statue, name = rocking.Block(width=0.24, height=1.1), "ridgecrest-tow2-090"

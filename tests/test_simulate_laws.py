@@ -199,6 +199,7 @@ def test_ordinary_states_are_not_ambiguous(model: str, p: float, alpha: float, r
     assert not simulate(block, None, model=model, initial_rotation=rotation, initial_velocity=speed).ambiguous
 
 
+@pytest.mark.cases(fast=1)
 @MODELS
 def test_ordinary_records_are_not_ambiguous(model: str) -> None:
     """Of a hundred blocks under noise hardly any; those without an event never."""

@@ -65,6 +65,7 @@ def test_what_is_open_between_legs_is_open_in_the_outline():
     assert np.allclose(found.across(180.0)[:, 2:4], -found.across(0.0)[:, 3:1:-1])
 
 
+@pytest.mark.thorough
 def test_a_mesh_of_very_many_corners_and_pieces_has_a_small_outline():
     ball = trimesh.creation.icosphere(4)
     ball.vertices[:, 2] = np.maximum(ball.vertices[:, 2], -0.9)

@@ -85,6 +85,7 @@ def test_any_selection_of_the_results_is_that_of_the_whole(complete, reference):
         xr.testing.assert_identical(lazy.isel(part).load(), reference.isel(part))
 
 
+@pytest.mark.thorough
 def test_units_may_hold_several_motions_scales_and_polarities(reference, tmp_path, monkeypatch):
     owner = importlib.import_module("rocking.studies.study")
     monkeypatch.setattr(owner, "fitting_unit", lambda product: (2, 1, 2, 1024))
@@ -237,6 +238,7 @@ class Interrupted(Exception):
     """Stands for a second signal."""
 
 
+@pytest.mark.thorough
 def test_the_second_signal_stops_in_the_middle_of_a_unit(complete, tmp_path, monkeypatch):
     study, begun = made(tmp_path), []
 
@@ -342,7 +344,7 @@ def small_complete(tmp_path_factory):
     return folder
 
 
-@pytest.mark.cases(fast=16)
+@pytest.mark.cases(fast=6)
 @pytest.mark.parametrize("code", [errno.ENOSPC, errno.EIO])
 @pytest.mark.parametrize("call", ["fsync", "open", "write", "rename"])
 @pytest.mark.parametrize("n", [1, 2, 3, 5, 6, 9])
@@ -624,6 +626,7 @@ COLUMNS = [
 ]
 
 
+@pytest.mark.thorough
 def test_a_study_is_exported(tmp_path, reference):
     pandas = pytest.importorskip("pandas")
     study, reference = made(tmp_path / "study", blocks=BLOCKS.select(slice(0, 50))), reference.isel(block=slice(0, 50))
@@ -685,6 +688,7 @@ def test_names_of_units_are_their_keys():
         assert key_of(name) not in grid
 
 
+@pytest.mark.thorough
 def test_however_many_units_there_are_a_study_opens_alike_and_lists_its_folder_once(tmp_path, monkeypatch):
     """What it asks of its place is counted; `stress/cost.py` measures how long it takes."""
     asked = []

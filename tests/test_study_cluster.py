@@ -127,6 +127,7 @@ def test_the_caller_s_own_dask_goes_on_as_it_was():
             distributed.default_client()
 
 
+@pytest.mark.thorough
 def test_workers_of_this_machine_have_one_thread_each_and_remember_nothing(monkeypatch):
     in_this_process = partial(distributed.LocalCluster, processes=False, protocol="tcp")
     monkeypatch.setattr(distributed, "LocalCluster", in_this_process)
@@ -306,6 +307,7 @@ def answers(port):
     return False
 
 
+@pytest.mark.thorough
 def test_the_script_of_the_page_submits_what_it_says(tmp_path, monkeypatch):
     pytest.importorskip("dask_jobqueue")
     script = re.search(r"```python\n(.*?)```", PAGE, re.DOTALL)[1]

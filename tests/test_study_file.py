@@ -221,6 +221,7 @@ def test_a_mistake_is_a_sentence_with_its_line(file, old, new, line, sentence):
         assert f"{file}, line {line}: " in str(caught.value)
 
 
+@pytest.mark.thorough
 def test_unreadable_records_are_left_out_only_where_the_file_says_so(file, tmp_path):
     (tmp_path / "broken.AT2").write_text("nothing of use\n")
     records = 'records = ["el-centro-meloland-270", "broken.AT2"]'
@@ -610,6 +611,7 @@ def test_only_what_was_repaired_counts_as_repaired(run, file, tmp_path):
     assert run("study", "verify", made, "--recompute", "-1")[0] == 2
 
 
+@pytest.mark.thorough
 def test_scales_of_changes_and_tables_of_reports_say_what_they_are(run, file, tmp_path, undrawn):
     text = (
         TEXT.replace("1:6:5", "1:6:2")

@@ -80,6 +80,7 @@ def test_a_study_in_an_object_store_holds_the_same_bytes(complete, url, tmp_path
     assert again._store.place.get("lock") is None
 
 
+@pytest.mark.thorough
 def test_any_zarr_reader_opens_it_there(complete, url):
     zarr = pytest.importorskip("zarr")
     made(url).run()
@@ -106,6 +107,7 @@ def test_the_commands_take_a_url(url, run, tmp_path):
     assert "name one as well" in run("study", "report", url)[2]
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(os.name == "nt", reason="signals are sent the POSIX way")
 def test_a_killed_run_loses_nothing_and_its_lock_is_taken_over(complete, url):
     study = made(url)
@@ -141,6 +143,7 @@ def put_lock(study, holder):
     obstore.put(study._store.place._store, "lock", text)
 
 
+@pytest.mark.thorough
 def test_a_lock_of_a_host_that_is_not_heard_of_is_taken_over(complete, url, monkeypatch):
     study = made(url)
     put_lock(study, "process 17 on elsewhere")
@@ -152,6 +155,7 @@ def test_a_lock_of_a_host_that_is_not_heard_of_is_taken_over(complete, url, monk
     assert same(study, complete)
 
 
+@pytest.mark.thorough
 def test_a_lock_is_renewed_and_a_run_that_lost_it_stops(url, monkeypatch):
     monkeypatch.setattr(places, "_RENEWAL", 0.05)
     study = made(url)

@@ -130,6 +130,7 @@ def test_whoever_refines_it_and_when_the_store_is_the_same_to_the_byte(complete,
     assert rocking.study(folder).run().units == 0
 
 
+@pytest.mark.thorough
 def test_a_refinement_that_stops_at_any_unit_goes_on_to_the_same_bytes(complete, tmp_path, monkeypatch):
     class Stopped(BaseException):
         pass
@@ -204,6 +205,7 @@ def test_before_each_round_the_last_one_alone_is_read(tmp_path, monkeypatch):
     assert rounds - 1 <= count <= 2 * rounds  # those of all before would be twice the sum of their numbers
 
 
+@pytest.mark.thorough
 def test_damage_to_a_round_is_named_and_corrected(complete, tmp_path):
     folder = tmp_path / "study"
     study = made(folder)
@@ -415,6 +417,7 @@ def test_what_cannot_be_refined_is_refused(tmp_path):
         made(tmp_path / "study", refine=FINE)
 
 
+@pytest.mark.thorough
 def test_a_file_asks_for_refinement_and_the_command_writes_critical_scales(run, tmp_path):
     pandas = pytest.importorskip("pandas")
     file, folder = tmp_path / "study.toml", tmp_path / "study"

@@ -126,6 +126,7 @@ def test_blocks_of_one_curve_count_by_their_weights(study):
 LIFT = rocking.pulses.one_sine(6.0, 3.0)
 
 
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize(
     ("alpha", "lift"),
     [
@@ -200,6 +201,7 @@ def test_both_polarities_of_asymmetric_blocks_are_two_trials(tmp_path):
         assert (found.median, found.dispersion) == pytest.approx((reference.median, reference.dispersion), rel=1e-9)
 
 
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize("order", [[0, 1], [1, 0]])
 def test_outcomes_are_counted_for_each_block_by_its_own_polarities(tmp_path, order):
     blocks = rocking.Blocks(p=2.0, alpha=[[0.2, 0.2], [0.2, 0.15]], restitution=0.9).select(np.array(order))

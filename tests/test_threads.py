@@ -93,6 +93,7 @@ print(reached, raised)
 """
 
 
+@pytest.mark.thorough
 def test_no_interrupt_leaves_a_thread_that_is_waited_for():
     """Where it came between the lines of `concurrent.futures`, the end of the threads was waited for in vain."""
     done = subprocess.run(

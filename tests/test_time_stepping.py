@@ -33,6 +33,7 @@ def shaken(amplitude, frequency=1.0, cycles=3, model="linear"):
     return motion, off_the_ground
 
 
+@pytest.mark.cases(fast=2)
 @pytest.mark.parametrize("model", ["linear", "nonlinear"])
 @pytest.mark.parametrize("theta", [0.5, pytest.param(1.0, marks=pytest.mark.thorough), 0.0])
 def test_moreau_jean_is_what_a_plain_program_computes(model, theta):

@@ -43,6 +43,7 @@ def test_the_amplitudes_of_the_other_program_are_met_within_its_bound(script):
             assert rocking.simulate(block, pulse).overturned is (sign > 0.0)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("number", [pytest.param(0, marks=pytest.mark.thorough), 1])
 def test_the_frequency_limits_of_overturning_with_impact_are_those_of_dop853(script, number):
     rows = (script.TABLES / "validation-limits.txt").read_text("utf-8").splitlines()[2:]

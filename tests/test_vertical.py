@@ -397,6 +397,7 @@ def test_a_file_of_several_that_says_its_units_keeps_them_for_both_channels(two_
     assert alone.pga == pytest.approx(30.0 * G, rel=1e-2)
 
 
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize("model", MODELS)
 def test_levels_begin_where_a_motion_with_its_vertical_component_lifts_a_block(model: str) -> None:
     block = block_for(2.0, 0.2, 0.5)
@@ -648,6 +649,7 @@ def test_the_summary_says_by_what_the_vertical_motion_multiplies_the_thresholds(
     assert response.to_xarray(dt=0.1).attrs["vertical_motion"] == "el-centro-meloland-up"
 
 
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize(
     ("vertical", "said"),
     [
@@ -674,6 +676,7 @@ def test_components_that_last_very_different_times_are_noted() -> None:
     )
 
 
+@pytest.mark.thorough
 def test_tables_of_many_records_name_the_vertical_components(tmp_path: Path) -> None:
     alone = rocking.records.load("el-centro-meloland-360")
     motions = [el_centro(), alone]
