@@ -2091,22 +2091,26 @@ def test_an_entry_of_the_list_without_a_motion_is_left_out(opened):
 
 
 def test_an_assessment_is_the_packages_fragility_and_stops_when_the_reader_goes(opened):
-    records = "motion=el-centro-meloland-270;motion=el-centro-meloland-360;motion=ridgecrest-clc-360"
+    names = ("el-centro-meloland-270", "el-centro-meloland-360", "ridgecrest-clc-360", "ridgecrest-tow2-360")
+    records = ";".join(f"motion={name}" for name in names)
     query = {"view": "assessment", "records": records, "levels": "6", "level_from": "0.2g", "level_to": "0.9g"}
     page = opened(f"{STATUE}&{urlencode({**query, 'friction': '0.2'})}")
     page.until("document.body.dataset.assessment === 'complete'", "the assessment is complete")
-    motions = [rocking.records.load(part.removeprefix("motion=")) for part in records.split(";")]
-    block, levels = rocking.Block(width=0.24, height=1.1), np.linspace(0.2, 0.9, 6) * 9.80665
-    curve = rocking.fragility(block, motions, levels=levels, polarity="both", progress=False).curves[0]
-    assert f"at {curve.median / 9.80665:.3g} g (with 90 % confidence" in page.text("#assessment-verdict")
-    assert page.page.locator("#assessment-records tbody tr").count() == 3
+    block, motions = rocking.Block(width=0.24, height=1.1), [rocking.records.load(name) for name in names]
+    stripes = {"levels": np.linspace(0.2, 0.9, 6) * 9.80665, "polarity": "both", "clusters": "station"}
+    curve = rocking.fragility(block, motions, **stripes, progress=False).curves[0]
+    low = f"{curve.median_interval[0] / 9.80665:.3g} g"
+    said = f"at {curve.median / 9.80665:.3g} g (with 90 % confidence {low} to ∞)"
+    assert said in page.text("#assessment-verdict")
+    assert "The records are of 3 stations" in page.text("#assessment-about")
+    assert page.page.locator("#assessment-records tbody tr").count() == 4
     assert "slides before it rocks" in page.text("#assessment-figures")
     first = rocking.incremental_dynamic_analysis(block, rocking.records.load("ridgecrest-clc-090"), progress=False)
     level = f"{float(first.data.overturning_level.values[0, 0]) / 9.80665:.3g} g"
     assert f"overturns first at {level}" in page.text("#assessment-figures")
     assert "as it is" not in page.text("#assessment-figures").partition("overturns first at")[2]
     assert "the lowest level that overturns, looked for in steps of 5 %" in page.text("#assessment-about")
-    assert "may overturn under 3 of 3" in page.text("#assessment-rules")
+    assert "may overturn under 4 of 4" in page.text("#assessment-rules")
     assert "rocking.fragility(block" in page.text("#python") and "rocking fragility el-centro" in page.text("#command")
     assert query_of(page)["records"] == records
     page.page.fill("#levels", "60")
