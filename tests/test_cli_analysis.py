@@ -596,11 +596,11 @@ def test_records_of_a_fragility_belong_together_by_station_or_by_labels(run):
     options = {"measure": "pgv", "levels": [0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2]}
     code, alone, err = run(*stripes)
     assert code == 0 and "--clusters may be station, which joins them" in err and "6 motions, 9 stripes" in alone
+    fitted = fragility(rocking.Block(width=0.24, height=1.1), motions, clusters=stations, **options)
+    assert fitted.curves[0].clusters == 3
     for given in ("station", ",".join(stations)):
         code, out, err = run(*stripes, "--clusters", given, "--json")
         assert (code, err) == (0, "")
-        fitted = fragility(rocking.Block(width=0.24, height=1.1), motions, clusters=stations, **options)
-        assert fitted.curves[0].clusters == 3
         assert json.loads(out)["curves"][0]["median_interval"] == list(fitted.curves[0].median_interval)
     code, _, err = run(*stripes, "--clusters", "a,b")
     assert code == 2 and "--clusters must hold 6 labels" in err

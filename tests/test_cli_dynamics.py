@@ -11,6 +11,7 @@ BLOCK = ["--p", "2", "--alpha", "0.2", "--restitution", "0.9"]
 SINE = ["--pulse", "sine:amplitude=3.5,frequency=1.2Hz"]
 
 
+@pytest.mark.thorough
 def test_basin_json_is_the_basins(run, tmp_path):
     arguments = ["--positions", "-0.2:0.2:12", "--velocities", "-0.4:0.4:11", "--folder", tmp_path / "kept"]
     for _ in range(2):  # the second time from the folder

@@ -128,6 +128,7 @@ def integrated(block, push, period, state, periods, orbits):
     return None
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "count",
     [2, pytest.param(5, marks=pytest.mark.thorough), *(pytest.param(n, marks=pytest.mark.slow) for n in (40, 100))],

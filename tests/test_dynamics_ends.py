@@ -193,6 +193,7 @@ def test_a_branch_reaches_limits_beyond_which_there_is_no_body():
         assert branch.multipliers[k].sum().real == pytest.approx(ball.trace(level, stable=True), abs=1e-9)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("limits", "step"),
     [
@@ -238,6 +239,7 @@ def test_a_branch_is_lost_where_the_family_has_no_body():
     assert closed_orbits.Ball(fold.value, 1).fold == pytest.approx(0.4, abs=1e-10)
 
 
+@pytest.mark.thorough
 def test_a_ball_that_never_moves_does_not_graze_where_the_family_has_no_body():
     def family(e):
         return dynamics.BouncingBall(e, gravity=G), pulses.sine(5.0, TABLE, cycles=1)

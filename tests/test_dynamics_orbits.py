@@ -402,6 +402,7 @@ def test_points_of_a_branch_are_orbits_and_stability_changes_at_its_bifurcations
         branch.orbit(len(branch))
 
 
+@pytest.mark.thorough
 def test_results_are_written_and_drawn(branch, tmp_path):
     orbit = branch.orbit(3)
     for found in (orbit, branch):
@@ -503,6 +504,7 @@ def test_wrong_input_gets_one_sentence(make, error, words):
     assert words in str(caught.value) and "\n" not in str(caught.value)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("changes", "words"),
     [

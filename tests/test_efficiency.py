@@ -65,6 +65,7 @@ def test_a_measure_that_was_scattered_by_hand_gets_its_scatter_back():
     assert found.summary().splitlines()[3].startswith(("PGV", "SA(1 s)", "p PGV"))
 
 
+@pytest.mark.thorough
 def test_a_measure_in_the_blocks_own_units_serves_blocks_of_all_sizes():
     blocks = [rocking.Block.from_parameters(p=p, alpha=0.1, restitution=0.6) for p in (1.0, 2.0, 4.0)]
     # Each pulse is short for every block, so that its velocity counts.
@@ -102,6 +103,7 @@ def test_the_command_prints_and_writes_the_comparison(run, tmp_path, monkeypatch
     assert header.startswith("measure,unit,median_intensity,dispersion,")
 
 
+@pytest.mark.thorough
 def test_a_block_of_weight_two_counts_as_two_blocks():
     motions = [rocking.pulses.one_sine(1.0, f) for f in (0.5, 1.1)]
     a, b = (rocking.Block.from_parameters(p=p, alpha=0.2, restitution=0.9) for p in (1.5, 3.0))

@@ -37,7 +37,7 @@ def integrated(ground, period, damping, times):
     return found
 
 
-@pytest.mark.cases(fast=2)
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize("damping", [0.0, 0.05, 0.6])
 @pytest.mark.parametrize("name", GROUNDS)
 def test_a_floor_moves_as_an_integration_of_the_oscillator_does(name, damping):

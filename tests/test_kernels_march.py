@@ -263,20 +263,19 @@ def test_a_motion_that_never_passes_a_threshold_leaves_the_block_at_rest() -> No
 
 @long_uncompiled
 @pytest.mark.parametrize("shape", [[1.0, 0.0], [1.0, -1.0], [0.0, 1.0], [1.0, 1.0]])
-@pytest.mark.parametrize("ulps", range(-24, 25, 3))
 @pytest.mark.parametrize("nonlinear", [False, True])
 def test_a_motion_clipped_at_the_threshold_ends_whatever_rounding_makes_of_it(
-    shape: list[float], ulps: int, nonlinear: bool
+    shape: list[float], nonlinear: bool
 ) -> None:
     """Four pieces between samples that are zero or, within some units in the last place, at the threshold."""
     alpha = 0.15
-    top = (math.tan(alpha) if nonlinear else alpha) * (1.0 + ulps * ULP)
-    values = top * np.array([*shape, *shape, shape[0]])
-    found = run(
-        in_units_of_g(0.1 * np.arange(5), np.column_stack([values[:-1], np.diff(values) / 0.1])), nonlinear=nonlinear
-    )
-    assert_sound(found)
-    assert len(found.nodes) < 200
+    for ulps in range(-24, 25, 3):
+        top = (math.tan(alpha) if nonlinear else alpha) * (1.0 + ulps * ULP)
+        values = top * np.array([*shape, *shape, shape[0]])
+        ground = in_units_of_g(0.1 * np.arange(5), np.column_stack([values[:-1], np.diff(values) / 0.1]))
+        found = run(ground, nonlinear=nonlinear)
+        assert_sound(found)
+        assert len(found.nodes) < 200, ulps
 
 
 @pytest.mark.parametrize("nonlinear", [False, True])

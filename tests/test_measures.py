@@ -101,6 +101,7 @@ def exact_linear_response(motion, period, damping, per_step=1):
     return np.array(history)
 
 
+@pytest.mark.thorough
 @pytest.mark.cases(fast=1)
 @pytest.mark.parametrize("period", [0.05, 0.3, 1.0, 4.0])
 def test_spectral_acceleration_of_a_record_is_the_exact_recurrence(period):

@@ -212,6 +212,7 @@ def test_histories_are_the_responses_of_the_schemes(figures, number):
 # Drawings and files
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "number", [number if number == 6 else pytest.param(number, marks=pytest.mark.thorough) for number in FIGURES]
 )

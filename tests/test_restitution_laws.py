@@ -48,6 +48,7 @@ def test_the_law_that_made_the_times_is_preferred(law, names):
     assert [fit.criterion for fit in found.laws] == sorted(fit.criterion for fit in found.laws)
 
 
+@pytest.mark.thorough
 def test_laws_of_angular_momentum_are_those_of_the_body_and_not_of_a_rectangle():
     sizes = {"distances": (0.2, 0.2), "height": 1.0, "radius_of_gyration": 0.9}
     for contact in (1.0, 0.7):

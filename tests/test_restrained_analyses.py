@@ -90,6 +90,7 @@ def test_a_vertical_motion_changes_the_weight_that_lifts_a_tied_block_and_not_it
     assert thresholds[0] < 0.9
 
 
+@pytest.mark.thorough
 def test_measures_are_compared_by_the_levels_of_incremental_analyses():
     motions = PULSES[:3]
     found = rocking.compare_measures(FACADE, motions, periods=[1.0], tolerance=1e-3)

@@ -1,5 +1,6 @@
 """Studies in an object store: the same objects, the same bytes; locks by condition, and what becomes of the dead."""
 
+import importlib
 import json
 import logging
 import os
@@ -31,7 +32,16 @@ def bucket():
     one = server.ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
     one.start()
     address = "http://{}:{}".format(*one.get_host_and_port())
+    responses = importlib.import_module("moto.s3.responses").S3Response
+    put, one_at_a_time = responses.put_object, threading.Lock()
+
+    def put_object(self):
+        # An object store writes where nothing is in one step; moto looks, and then writes.
+        with one_at_a_time:
+            return put(self)
+
     with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(responses, "put_object", put_object)
         patched.setenv("AWS_ACCESS_KEY_ID", "anybody")
         patched.setenv("AWS_SECRET_ACCESS_KEY", "anything")
         patched.setenv("AWS_REGION", "us-east-1")

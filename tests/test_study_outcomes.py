@@ -251,6 +251,7 @@ def test_rests_alone_are_enough_for_nothing_else(tmp_path):
             make()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("verdict", "outcomes"),
     [

@@ -119,6 +119,7 @@ def test_a_verdict_that_goes_back_has_a_bracket_for_each_change(complete):
     assert np.all(np.diff(one.low) > 0.0)
 
 
+@pytest.mark.thorough
 @pytest.mark.cases(fast=1)
 @pytest.mark.parametrize("threads", [1, 2])
 def test_whoever_refines_it_and_when_the_store_is_the_same_to_the_byte(complete, tmp_path, threads):
@@ -305,6 +306,7 @@ def test_under_a_sine_chattering_is_complete_from_the_uplift_to_the_critical_amp
     assert len(set(critical.round(6))) == len(p)
 
 
+@pytest.mark.thorough
 def test_refined_for_both_verdicts_it_finds_what_it_finds_for_each(complete, tmp_path):
     def found_by(refine):
         study = made(tmp_path / f"{len(refine)}{min(refine)}", refine=refine)

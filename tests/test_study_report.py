@@ -181,6 +181,7 @@ def test_what_is_read_in_small_parts_is_the_same(study, curves, monkeypatch):
     assert whole[2].to_dict() == parts[2].to_dict()
 
 
+@pytest.mark.thorough
 def test_both_polarities_of_symmetric_blocks_are_one_outcome(curves, tmp_path):
     both = rocking.study(tmp_path, BLOCKS, MOTIONS, levels=LEVELS, measure="pga", polarity="both", unit_blocks=512)
     both.run()

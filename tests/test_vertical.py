@@ -431,6 +431,7 @@ def test_a_motion_that_lifts_no_block_at_any_level_is_told() -> None:
         rocking.incremental_dynamic_analysis(block_for(2.0, 0.2, 0.5), heavy)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("points", ["8", pytest.param("16", marks=pytest.mark.thorough)])
 def test_a_map_on_the_page_tells_chattering_as_its_points_do_with_a_vertical_component(points: str) -> None:
     uploads = UploadStore()

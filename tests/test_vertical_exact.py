@@ -206,6 +206,7 @@ def drawn(number: int) -> Case:
     return vertical_referee.case(11, number)
 
 
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize(
     "number",
     [0, 12, *(pytest.param(n, marks=[pytest.mark.thorough, pytest.mark.slow][n % 2]) for n in range(24) if n % 12)],
@@ -226,6 +227,7 @@ def test_the_judge_says_the_same_with_more_digits_and_other_steps(number: int) -
         assert abs(mine[0] - theirs[0]) < 1e-22
 
 
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize(
     "number", [2, 5, *(pytest.param(n, marks=pytest.mark.thorough) for n in (0, 4, 9, 10, 12, 15, 18))]
 )
