@@ -39,7 +39,7 @@ quick: .venv/.all ## run the tests of what has changed since the last commit, or
 	@files=$$($(BIN)/python tests/of_changes.py $(BASE)) && { test -z "$$files" || \
 	    $(PYTEST) --dist load --maxschedchunk 4 --within 14 $(QUICKLY) $$files; }
 
-test: .venv/.all ## run the tests (three minutes on two cores)
+test: .venv/.all ## run the tests (three to four minutes on two slow cores)
 	$(PYTEST) $(QUICKLY)
 
 test-all: .venv/.all ## run them with more cases each, and longer ones (three times as long)

@@ -598,7 +598,7 @@ def test_records_of_a_fragility_belong_together_by_station_or_by_labels(run):
     assert code == 0 and "--clusters may be station, which joins them" in err and "6 motions, 9 stripes" in alone
     fitted = fragility(rocking.Block(width=0.24, height=1.1), motions, clusters=stations, **options)
     assert fitted.curves[0].clusters == 3
-    for given in ("station", ",".join(stations)):
+    for given in ("station", ", ".join(stations)):
         code, out, err = run(*stripes, "--clusters", given, "--json")
         assert (code, err) == (0, "")
         assert json.loads(out)["curves"][0]["median_interval"] == list(fitted.curves[0].median_interval)

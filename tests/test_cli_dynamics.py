@@ -68,7 +68,6 @@ def test_bifurcation_writes_what_it_says(run, tmp_path):
 
 
 @pytest.mark.thorough
-@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize(
     ("options", "body"),
     [

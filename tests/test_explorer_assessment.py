@@ -105,7 +105,6 @@ def test_the_margin_is_the_critical_scale():
 
 
 @pytest.mark.thorough
-@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize(
     ("width", "height", "name"), [("0.24", "1.1", "ridgecrest-clc-090"), ("0.3", "2.0", "ridgecrest-tow2-360")]
 )
@@ -130,7 +129,6 @@ def test_a_block_that_no_level_overturns_has_no_margin_up_to_the_highest_level_l
 
 
 @pytest.mark.thorough
-@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize(("motion", "scale"), [("el-centro-meloland-270", "2000"), ("ridgecrest-clc-090", "1e12")])
 def test_the_margin_of_a_motion_however_strong_is_next_to_what_does_not_overturn(motion, scale):
     case = {**STATUE, "motion": motion, "scale": scale}

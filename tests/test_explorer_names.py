@@ -94,7 +94,6 @@ def test_a_channel_named_like_an_option_is_none(run, tmp_path, monkeypatch):
 
 
 @pytest.mark.thorough
-@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize("name", ["$$", "$\\frac{$", "a$b$c{", "\\$x$"])
 def test_a_dollar_in_a_channels_name_begins_no_formula(name):
     text = f"time (s), {name} (g), other (g)\n" + "".join(

@@ -773,7 +773,6 @@ def test_a_draw_of_the_data_themselves_is_half_below_them():
 
 
 @pytest.mark.thorough
-@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize("overlap", [1e-3, 1e-4, 1e-5])
 def test_steep_curves_have_the_ends_of_their_profile_likelihood(overlap):
     z = np.array([0.0, 0.2, 0.5, 0.5 + overlap, 0.5 + 2.0 * overlap, 0.5 + 3.0 * overlap, 0.8, 1.0])

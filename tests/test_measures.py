@@ -102,7 +102,6 @@ def exact_linear_response(motion, period, damping, per_step=1):
 
 
 @pytest.mark.thorough
-@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize("period", [0.05, 0.3, 1.0, 4.0])
 def test_spectral_acceleration_of_a_record_is_the_exact_recurrence(period):
     motion = records.load("el-centro-meloland-270")
@@ -199,11 +198,12 @@ def displacements(row, width, period, damping):
     return found
 
 
-def test_no_extremum_within_a_step_is_missed():
+@pytest.mark.parametrize("count", [6, pytest.param(24, marks=pytest.mark.thorough)])
+def test_no_extremum_within_a_step_is_missed(count):
     """Neither where the velocity vanishes at an end of a step, nor where it changes its sign twice in one."""
     rng = np.random.default_rng(11)
     cases = [([-2.0, 12.0, -12.0], 1.0, 100.0, 0.05), ([-2.0, 12.0, -12.0], 1.0, 1000.0, 0.0)]
-    for _ in range(6):
+    for _ in range(count):
         row = rng.normal(size=rng.integers(3, 7)) * 4.0 ** rng.integers(0, 3)
         cases.append((list(row), rng.uniform(0.1, 2.0), 10 ** rng.uniform(0.5, 3.0), rng.choice([0.0, 0.05, 0.7])))
     with mp.workdps(40):

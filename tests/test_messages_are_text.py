@@ -182,7 +182,6 @@ def outcome(run, command, folder, out):
 
 
 @pytest.mark.thorough
-@pytest.mark.cases(fast=5)
 @pytest.mark.parametrize(("command", "argument"), COMMANDS.items(), ids=COMMANDS)
 def test_what_a_command_does_does_not_hang_on_its_words(run, folder, tmp_path_factory, command, argument):
     plain, said = outcome(run, command, folder, tmp_path_factory.mktemp("plain") / "out")

@@ -81,7 +81,7 @@ def modules(words: str) -> Iterator[tuple[Path, ast.Module]]:
 def test_an_error_that_says_what_was_given_keeps_it() -> None:
     """A sentence that names an argument, and what it is "not", has this as its value."""
     judged = 0
-    for path, tree in modules(", not {"):
+    for path, tree in modules(", not"):
         said: dict[str, ast.expr] = {}  # sentences that have a name, in the order of the text
         for node in sorted(ast.walk(tree), key=lambda each: getattr(each, "lineno", 0)):
             if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):

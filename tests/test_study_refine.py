@@ -120,7 +120,6 @@ def test_a_verdict_that_goes_back_has_a_bracket_for_each_change(complete):
 
 
 @pytest.mark.thorough
-@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize("threads", [1, 2])
 def test_whoever_refines_it_and_when_the_store_is_the_same_to_the_byte(complete, tmp_path, threads):
     folder = tmp_path / "study"

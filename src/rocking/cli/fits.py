@@ -143,7 +143,7 @@ def fragility(
                     **model.chosen() | bodies,
                     limits=states,
                     polarity=polarity,
-                    clusters=clusters if clusters in (None, BY_STATION) else clusters.split(","),
+                    clusters=_clusters(clusters),
                     band=band,
                 )
         found, text = fitted.to_dict() | ({} if read is None else read.to_dict()), [fitted.summary()]
@@ -250,6 +250,10 @@ def _refuse_beside_outcomes(
     if found:
         sentence = "{} are observed, of a block and under motions of their own: leave {} out"
         raise InvalidOption(sentence, "outcomes", found[0])
+
+
+def _clusters(text: str | None) -> str | list[str] | None:
+    return text if text in (None, BY_STATION) else [label.strip() for label in text.split(",")]
 
 
 def _limits(text: str) -> dict[str, float]:
