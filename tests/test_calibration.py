@@ -743,6 +743,16 @@ def test_a_release_to_the_other_side_is_found_too(mirrored):
     assert mirrored.estimates["restitution"].value == pytest.approx(0.88, abs=2e-3)
 
 
+def test_errors_with_white_noise_are_those_of_least_squares(sure):
+    step = 1e-5
+    sides = [rocking.Block.from_parameters(p=2.5, alpha=0.2, restitution=0.88 + sign * step) for sign in (1, -1)]
+    # The same noise is in both, and cancels.
+    slope = (released(block=sides[0]) - released(block=sides[1])) / (2.0 * step)
+    # The autocorrelation of white noise, summed to its first value that is not positive, is 1 and a little.
+    ratio = sure.estimates["restitution"].deviation * np.linalg.norm(slope) / sure.misfit
+    assert 0.99 < ratio < 1.15
+
+
 @pytest.mark.parametrize("known", [pytest.param({}, marks=pytest.mark.slow), KNOWN])
 def test_correlated_noise_widens_the_errors(coarse, sure, known):
     white = np.random.default_rng(0).normal(0.0, 1.0, len(TIMES))

@@ -922,7 +922,8 @@ def test_paths_may_be_text_bytes_or_paths(file: Callable[[str], Path]) -> None:
 
 
 def test_foreign_files_are_said_to_be_text_or_binary(file: Callable[[bytes], Path]) -> None:
-    assert "this is a binary file (byte 0 at 2)" in complaint(file(b"ab\x00cd\n"))
+    for byte in set(range(32)) - set(b"\t\n\f\r"):
+        assert f"this is a binary file (byte {byte} at 2)" in complaint(file(b"ab%ccd\n" % byte))
     assert "this is text in no format known here" in complaint(file(b"Dear reader,\nthere is no record here.\n"))
     assert "no line of it holds numbers alone" in complaint(file("time (s), acceleration (g)\n"))
 
