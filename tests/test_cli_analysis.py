@@ -13,7 +13,8 @@ import rocking
 from rocking import fragility, incremental_dynamic_analysis, overturning_map, quantities, rocking_spectrum
 from rocking.analysis import Band
 from rocking.analysis.calibration.diagnostics import Scores
-from rocking.cli import fits
+from rocking.cli import calibrate as calibrating
+from rocking.cli import fragility as fitting
 from rocking.tables import to_json
 
 RECORD = "el-centro-meloland-270"
@@ -387,7 +388,7 @@ def test_every_specimen_is_said_with_its_own_numbers(run, outcomes_table, tmp_pa
             cross_validate=lambda **_: SimpleNamespace(scores=scores),
         )
 
-    monkeypatch.setattr(fits, "calibrated", calibrated)
+    monkeypatch.setattr(calibrating, "calibrated", calibrated)
     header, *rows = outcomes_table.read_text().splitlines()
     fell = [sum(row.split(",")[2] == "1" for row in rows[k::2]) for k in range(2)]
     names = [f"{row},{'AB'[k % 2]}" for k, row in enumerate(rows)]
@@ -413,14 +414,14 @@ def test_several_specimens_are_calibrated_each_by_itself(run, outcomes_table, tm
     both.write_text("\n".join([header + ",specimen", *mixed]))
     # Those of the two are made once, and then shown again as text.
     with monkeypatch.context() as patched:
-        made, calibrated = {}, fits.calibrated
+        made, calibrated = {}, calibrating.calibrated
 
         def once(motions, overturned, **how):
             if (which := tuple(overturned)) not in made:
                 made[which] = calibrated(motions, overturned, **how)
             return made[which]
 
-        patched.setattr(fits, "calibrated", once)
+        patched.setattr(calibrating, "calibrated", once)
         code, out, err = run("calibrate", both, *CALIBRATED, "--folds", "2", "--out", tmp_path / "out", "--json")
         text = run("calibrate", both, *CALIBRATED)[1]
     assert (code, err) == (0, "")
@@ -644,6 +645,6 @@ def test_standing_is_about_overturning_in_whatever_order_the_limits_come(run, mo
     for limits in ("overturning,half=0.5", "half=0.5,overturning"):
         code, out, _ = run(*common, "--limits", limits)
         assert code == 0 and json.loads(out)["survival"]["limit_state"] == "overturning"
-    monkeypatch.setattr(fits, "run", None)  # it is refused before anything is simulated
+    monkeypatch.setattr(fitting, "run", None)  # it is refused before anything is simulated
     code, _, err = run(*common, "--limits", "half=0.5,most=0.8")
     assert code == 2 and "--standing is about overturning, or about one limit, not half and most" in err

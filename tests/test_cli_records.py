@@ -142,7 +142,7 @@ def test_ranges_have_units_at_their_ends():
 
 @pytest.mark.parametrize(
     ("command", "module", "analysis"),
-    [("ida", "analysis", "incremental_dynamic_analysis"), ("fragility", "fits", "run")],
+    [("ida", "analysis", "incremental_dynamic_analysis"), ("fragility", "fragility", "run")],
 )
 def test_levels_of_an_acceleration_may_be_in_g_and_those_of_a_velocity_may_not(
     run, monkeypatch, command, module, analysis

@@ -1,53 +1,43 @@
-"""`rocking fragility` and `rocking calibrate`: what is fitted to outcomes, simulated or observed."""
+"""`rocking fragility`: curves that are fitted to outcomes, simulated or observed, and what follows for a site."""
 
 from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 from cyclopts import Parameter
 
 from rocking import checks
-from rocking.analysis.calibration.history import HistoryCalibration, calibrate_history
-from rocking.analysis.calibration.outcomes import calibrate as calibrated
-from rocking.analysis.calibration.outcomes import checked_outcomes
-from rocking.analysis.calibration.result import Calibration, group_labels
-from rocking.analysis.calibration.space import HOUSNER
 from rocking.analysis.fragility import nrml
 from rocking.analysis.fragility.curve import Band
 from rocking.analysis.fragility.fit import fit_fragility
 from rocking.analysis.fragility.fit import fragility as run
 from rocking.analysis.fragility.result import Fragility
 from rocking.analysis.hazard import HazardCurve
-from rocking.analysis.input_tables import History, Outcomes, read_calibration, read_observed
+from rocking.analysis.input_tables import read_observed
 from rocking.analysis.levels import BY_STATION
 from rocking.analysis.risk import check_measure
 from rocking.cli.body_options import EnsembleOptions
 from rocking.cli.options import BLOCK, MEASURE, MODEL, WHOLE, MeasureOptions, TreatmentOptions
-from rocking.cli.output import OUTPUT, OutputOptions, left_out, print_result, subfolder, write_results
-from rocking.cli.records import RECORDS, MotionOptions, Names, ReadRecords, ScaledPulseOptions
-from rocking.constants import Model
+from rocking.cli.output import OUTPUT, OutputOptions, left_out, print_result, write_results
+from rocking.cli.records import RECORDS, MotionOptions, Names, ReadRecords
 from rocking.ensemble import Polarity
-from rocking.errors import InvalidOption, RockingError, Unfitted, literal
-from rocking.motion.motion import Motion
+from rocking.errors import InvalidOption, Unfitted
 from rocking.motion.scaling import Measure
 from rocking.plausibility import hazard_notes
 from rocking.progress import note
-from rocking.quantities import bounds, number, tilt
-from rocking.tables import counted, text_table, write_csv
+from rocking.quantities import number
+from rocking.tables import write_csv
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: Time of probabilities, unless it is said.
 _YEARS: Final = 50.0
-
-#: Blocks to try, unless it is said.
-_CANDIDATES: Final = 8192
 
 
 def fragility(
@@ -272,186 +262,3 @@ def _limits(text: str) -> dict[str, float]:
         except InvalidOption:
             raise InvalidOption(f"{{}} {name} takes a number, not {value.strip()!r}", "limits", value=text) from None
     return limits
-
-
-def calibrate(
-    data: Path,
-    *,
-    model: Model = "nonlinear",
-    p: str | None = None,
-    alpha: str | None = None,
-    restitution: str | None = None,
-    two_sided: bool | None = None,
-    candidates: Annotated[int, WHOLE] = _CANDIDATES,
-    folds: Annotated[int, WHOLE] = 0,
-    predict: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = (),
-    motion: str | None = None,
-    initial_rotation: str | None = None,
-    seed: Annotated[int, WHOLE] = 0,
-    file: Annotated[ScaledPulseOptions, RECORDS] = ScaledPulseOptions(),
-    output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
-) -> None:
-    """Find the block behind observed outcomes (overturned or not), or behind a measured rotation history.
-
-    DATA is a CSV table with a header. Outcomes: columns motion (a record file, or a shipped record) and overturned (1
-    or 0), and where wanted scale, channel, group, and specimen: each specimen is then calibrated by itself. A history:
-    columns time_s and rotation_rad (or rotation_deg). The motions of --predict, --motion and --pulse may be scaled.
-    --out holds calibration.png, .pdf, result.json and, of outcomes, ensemble.csv; of several specimens a folder each.
-
-    Parameters
-    ----------
-    data
-        CSV table of outcomes or of a history.
-    model
-        Equation of motion; the linear one is faster, and serves slender specimens.
-    p
-        Lowest and highest thinkable frequency parameter, rad/s, with a comma between; or a known value.
-    alpha
-        Likewise the slenderness, as 5deg,20deg or 0.1,0.3 (rad).
-    restitution
-        Likewise the factor on the angular speed at an impact; of outcomes also housner, to follow from the slenderness
-        (of two sides as those of one rectangle).
-    two_sided
-        Whether the two sides of the block may differ; by default yes for outcomes, no for a history.
-    candidates
-        Outcomes: blocks to try, about; more where its runs disagree.
-    folds
-        Outcomes: parts for cross-validation; 0: none. Tests of one group stay together.
-    predict
-        Outcomes: records to predict, files or names of shipped records; pulses to predict go with --pulse.
-    motion
-        History: record of the base's motion, or give one --pulse; without either, the block was released and rocked
-        freely.
-    initial_rotation
-        History: rotation at time 0, 2deg or 0.03 (rad); by default fitted in a release test, 0 under a motion.
-    seed
-        The same seed gives the same result.
-    """
-    ranges = {
-        "p": None if p is None else bounds(p, "p", number),
-        "alpha": None if alpha is None else bounds(alpha, "alpha", tilt),
-        "restitution": restitution if restitution in (None, HOUSNER) else bounds(restitution, "restitution", number),
-    }
-    start = None if initial_rotation is None else tilt(initial_rotation, "initial_rotation")
-    given: dict[str, Any] = {**ranges, "model": model, "two_sided": two_sided}
-    choices = {name: value for name, value in given.items() if value is not None}
-    with output.folder() as folder:
-        table = read_calibration(data, channel=file.channel, dt=file.dt, units=file.units)
-        if not isinstance(table, History):
-            _refuse("a history", motion=motion, initial_rotation=initial_rotation)
-            if not (predict or file.pulse):
-                _refuse_without("predict", file)
-            others = {name: file.read(name) for name in predict} | file.pulses()
-            how = _How(seed, folds, others, {"candidates": candidates, **choices})
-            results = _of_specimens(table, how, folder) if isinstance(table, dict) else _of_outcomes(table, how)
-        else:
-            _refuse("outcomes", predict=predict or None, folds=folds or None)
-            _refuse("outcomes", candidates=candidates if candidates != _CANDIDATES else None)
-            shaking = _shaking(motion, file)
-            if shaking is None:
-                _refuse_without("motion", file)
-            history = calibrate_history(
-                table.times, table.rotation, shaking, **choices, initial_rotation=start, seed=seed
-            )
-            results = _history_results(history)
-        if folder is not None:
-            results.write(folder)
-        print_result(results.numbers, results.text, as_json=output.as_json)
-
-
-@dataclass(frozen=True)
-class _How:
-    """How to calibrate, and what to predict."""
-
-    seed: int
-    folds: int
-    others: Mapping[str, Motion]
-    choices: Mapping[str, Any]
-
-
-@dataclass(frozen=True)
-class _Results:
-    """A calibration, or of several specimens none that could be drawn; numbers and words."""
-
-    found: Calibration | HistoryCalibration | None
-    numbers: dict[str, Any]
-    text: str
-
-    def write(self, folder: Path) -> None:
-        """Write numbers, and figure and ensemble of a calibration."""
-        if isinstance(self.found, Calibration):
-            self.found.to_csv(folder / "ensemble.csv")
-        write_results(folder, figures={"calibration": self.found.plot} if self.found else {}, result=self.numbers)
-
-
-def _refuse(belong_to: str, **given: object) -> None:
-    for name, value in given.items():
-        if value is not None:
-            raise InvalidOption(f"{{}} is for {belong_to}; the columns of this table are not", name)
-
-
-def _refuse_without(option: str, file: ScaledPulseOptions) -> None:
-    """Refuse what is said of motions where none is given that it could be said of."""
-    for name in ("scale", "pga", "pgv", "sa", "vertical"):
-        if getattr(file, name) is not None:
-            raise InvalidOption("{} is for the motions of {} or {}: give one, or leave it out", name, option, "pulse")
-
-
-def _shaking(record: str | None, file: ScaledPulseOptions) -> Motion | None:
-    """Motion of the base, if it moved."""
-    motions = file.pulses() if record is None else {record: file.read(record)} | file.pulses()
-    if len(motions) > 1:
-        raise InvalidOption("a history has one motion of the base: give {}, or one {}", "motion", "pulse")
-    return next(iter(motions.values()), None)
-
-
-def _of_specimens(tables: Mapping[str, Outcomes], how: _How, folder: Path | None) -> _Results:
-    """Calibrate each specimen by itself, and write each as soon as it is done."""
-    for name, table in tables.items():
-        with _naming(name):
-            _check(table, how)
-    results = {}
-    for name, table in tables.items():
-        with _naming(name):
-            results[name] = _of_outcomes(table, how)
-        if folder is not None:
-            results[name].write(subfolder(folder, name))
-    numbers = {"specimens": {name: one.numbers for name, one in results.items()}}
-    return _Results(None, numbers, "\n\n".join(f"specimen {name}\n{one.text}" for name, one in results.items()))
-
-
-def _check(table: Outcomes, how: _How) -> None:
-    """Refuse outcomes that cannot be calibrated, and more folds than groups, before the work."""
-    checked_outcomes(table.overturned, len(table.overturned))
-    if how.folds:
-        group_labels(table.groups, len(table.overturned), how.folds)
-
-
-@contextlib.contextmanager
-def _naming(specimen: str) -> Iterator[None]:
-    """Add the specimen's name to an error."""
-    try:
-        yield
-    except RockingError as error:
-        error.message = replace(error.message, template=f"specimen {literal(specimen)}: {error.message.template}")
-        raise
-
-
-def _of_outcomes(table: Outcomes, how: _How) -> _Results:
-    _check(table, how)
-    found = calibrated(table.motions, table.overturned, seed=how.seed, **how.choices)
-    predicted = dict(zip(how.others, found.predict([*how.others.values()]), strict=True))
-    numbers = {**found.to_dict(), "predicted": predicted}
-    parts = [found.summary()]
-    if how.folds:
-        scores = found.cross_validate(groups=table.groups, folds=how.folds).scores
-        numbers["cross_validated"] = asdict(scores)
-        parts.append(f"left-out motions: {scores} ({counted(how.folds, 'fold')})")
-    if predicted:
-        rows = [(name, float(chance)) for name, chance in predicted.items()]
-        parts.append("\n" + text_table(["motion", "probability"], rows))
-    return _Results(found, numbers, "\n".join(parts))
-
-
-def _history_results(found: HistoryCalibration) -> _Results:
-    return _Results(found, found.to_dict(), found.summary())
