@@ -607,6 +607,22 @@ def test_records_of_a_fragility_belong_together_by_station_or_by_labels(run):
     assert code == 2 and "--clusters must hold 6 labels" in err
 
 
+@pytest.mark.thorough
+def test_records_of_a_comparison_of_measures_belong_together_by_station(run):
+    names = [name for name in rocking.records.names() if not name.endswith("up")]
+    measures = ["measures", *names, *SIZES, "--periods", "1"]
+    code, _, err = run(*measures)
+    assert code == 0 and "--clusters may be station, which joins them" in err
+    code, out, err = run(*measures, "--clusters", "station", "--json")
+    assert (code, err) == (0, "")
+    motions = [rocking.records.load(name) for name in names]
+    expected = rocking.compare_measures(
+        rocking.Block(width=0.24, height=1.1), motions, periods=[1.0], clusters="station"
+    )
+    assert json.loads(out)["measures"] == json.loads(to_json(expected.to_dict()))["measures"]
+    assert "6 motions in 3 clusters" in expected.summary()
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

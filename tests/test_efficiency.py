@@ -86,6 +86,23 @@ def test_what_cannot_be_compared_is_told_in_one_sentence():
         compare_measures(SLENDER, [pulse, pulse], periods=[0.0], progress=False)
 
 
+def test_motions_of_a_cluster_count_as_one_in_the_intervals():
+    # Three stations, two components each; the last is a multiple of the first, so that two clusters remain.
+    pulses = [rocking.pulses.half_sine(1.0, f) for f in (0.5, 0.6, 1.0, 1.2, 1.4)]
+    pulses.append(pulses[0].scaled(2.0))
+    options = {"periods": [0.7], "model": "linear", "tolerance": 1e-3, "progress": False}
+    alone = compare_measures(SLENDER, pulses, **options)
+    found = compare_measures(SLENDER, pulses, clusters=["a", "a", "b", "b", "c", "c"], **options)
+    assert np.array_equal(found.dispersion, alone.dispersion)
+    for compared, freedom in ((alone, 4), (found, 1)):
+        ends = [math.sqrt(freedom / chi2.ppf(share, freedom)) for share in (0.95, 0.05)]
+        assert compared.dispersion_low.values == pytest.approx(ends[0] * alone.dispersion.values, rel=1e-12)
+        assert compared.dispersion_high.values == pytest.approx(ends[1] * alone.dispersion.values, rel=1e-12)
+    assert "6 motions in 2 clusters" in found.summary() and "6 motions overturn" in alone.summary()
+    with pytest.raises(rocking.InvalidOption, match="fewer than two clusters overturn"):
+        compare_measures(SLENDER, pulses, clusters=[0] * 6)
+
+
 @pytest.mark.thorough
 def test_the_command_prints_and_writes_the_comparison(run, tmp_path, monkeypatch):
     monkeypatch.setattr(Figure, "savefig", lambda figure, file, **options: file.write(b"not drawn"))

@@ -42,7 +42,7 @@ def small_budget(monkeypatch):
         ),
         lambda: rocking.overturning_map(RESTLESS, "one-sine", amplitudes=[1.2, 1.4], frequencies=[3.0]),
         lambda: rocking.incremental_dynamic_analysis(RESTLESS, PULSE, levels=[2.2, 2.4]),
-        lambda: rocking.compare_measures(RESTLESS, [PULSE, PULSE]),
+        lambda: rocking.compare_measures(RESTLESS, [PULSE, rocking.pulses.one_sine(6.0, 2.0)]),
         lambda: rocking.fragility(RESTLESS, PULSE, levels=[2.2, 2.4]),
         lambda: rocking.fragility(RESTLESS, PULSE.scaled(0.4)),
         lambda: rocking.calibrate(

@@ -12,7 +12,16 @@ from numpy.typing import ArrayLike
 
 from rocking import checks
 from rocking.analysis.incremental import incremental_dynamic_analysis
-from rocking.analysis.levels import REVERSED_TOO, families_of, mean_one, pooled, units_of, values_of
+from rocking.analysis.levels import (
+    REVERSED_TOO,
+    clusters_of,
+    families_of,
+    mean_one,
+    motions_in_words,
+    pooled,
+    units_of,
+    values_of,
+)
 from rocking.arrays import Flags, Floats, Integers
 from rocking.body import Bodies, Body
 from rocking.constants import Model
@@ -21,7 +30,7 @@ from rocking.motion.named import Motions, several_motions
 from rocking.motion.scaling import Measure
 from rocking.problem import bodies_of, slenderness_of
 from rocking.result import DatasetResult, variable
-from rocking.tables import as_written, counted, text_table
+from rocking.tables import as_written, text_table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,6 +49,7 @@ def compare_measures(
     damping: float = 0.05,
     model: Model = "nonlinear",
     weights: ArrayLike | None = None,
+    clusters: object = None,
     tolerance: float = 1e-4,
     threads: int | None = None,
     progress: bool | None = None,
@@ -60,6 +70,8 @@ def compare_measures(
         Equation of motion.
     weights : array_like, optional
         How much each of several blocks counts, as those of a calibration; by default all alike.
+    clusters : "station" or array_like of labels, shape (m,), optional
+        Which motions belong together, as for `fragility`: a cluster counts as one motion in the intervals.
     tolerance : float
         Width of the intensities at overturning, relative to them.
     threads : int, optional
@@ -75,8 +87,8 @@ def compare_measures(
     Raises
     ------
     InvalidOption
-        If an argument is out of its range, fewer than two motions are given or overturn a block, or a block never comes
-        to rest.
+        If an argument is out of its range, fewer than two motions, or motions of fewer than two clusters, are given or
+        overturn a block, or a block never comes to rest.
     InvalidMotion
         If a motion is zero throughout.
 
@@ -88,7 +100,8 @@ def compare_measures(
     Over several blocks beta is pooled from the deviations from each block's own mean; a measure that is to serve them
     all must also have a small deviation from one mean. Both have the same degrees of freedom, those of the motions:
     blocks share these, so that more blocks are no larger sample. Of motions that are multiples of one another the first
-    counts, since all of them overturn a block at one intensity.
+    counts, since all of them overturn a block at one intensity. Motions of one cluster may do almost the same: the
+    intervals then have the degrees of freedom of the clusters.
 
     References
     ----------
@@ -112,6 +125,8 @@ def compare_measures(
     if len(shaken) < 2:
         raise InvalidOption("measures are compared by how {} scatter: give two or more, not one", "motions")
     times = checks.positive_numbers(periods, "periods", InvalidOption)
+    together = clusters_of(shaken, clusters)
+    _check_enough(len(np.unique(together)), clusters)
     measures = [
         Measure("pga"),
         Measure("pgv"),
@@ -130,14 +145,13 @@ def compare_measures(
     )
     families = families_of(shaken)
     is_first = np.isin(np.arange(len(shaken)), np.unique(families, return_index=True)[1])
-    if np.any(np.isfinite(level[is_first]).sum(axis=0)[shares > 0.0] < 2):
-        raise InvalidOption(
-            "fewer than two motions that are not multiples of one another overturn a block, however strong; a "
-            "dispersion needs more"
-        )
+    counted_in = np.isfinite(level[is_first])[:, shares > 0.0]
+    sizes = [len(np.unique(together[is_first][overturns])) for overturns in counted_in.T]
+    _check_enough(min(sizes), clusters)
     named_motions = {name: scaled[name] for name in ("motion", "vertical") if name in scaled.coords}
-    found = _dataset(measures, intensity, named_motions, shares, is_first)
+    found = _dataset(measures, intensity, named_motions, shares, is_first, freedom=min(sizes) - 1)
     about = {"blocks": pooled(blocks, weights), "model": model, "damping": damping}
+    about["sample"] = motions_in_words(together, clusters)
     return MeasureComparison(found.assign_attrs(about, sides_differ=scaled.sides_differ))
 
 
@@ -153,7 +167,7 @@ class MeasureComparison(DatasetResult):
         Over (measure, motion, block): intensity, the lowest that overturns, in the measure's unit; NaN where none does.
         Over (measure): median_intensity; dispersion (standard deviation of the logarithm about each block's own mean),
         with dispersion_low and dispersion_high, its 90 % interval; dispersion_of_all, about one mean of all blocks;
-        unit. Its attribute damping is that of the spectral accelerations.
+        unit. Its attribute damping is that of the spectral accelerations, sample how many motions there are.
     """
 
     TABLES = MappingProxyType(
@@ -184,8 +198,7 @@ class MeasureComparison(DatasetResult):
             ]
             for k in order
         ]
-        count = counted(data.sizes["motion"], "motion")
-        head = f"{data.blocks}, {data.model} model: intensities at which {count} overturn"
+        head = f"{data.blocks}, {data.model} model: intensities at which {data.sample} overturn"
         columns = ["measure", "median", "dispersion", "90 % between", *(["of all blocks"] if several else [])]
         text = [head, "", text_table([*columns, "over the best"], rows)]
         missing = int(np.sum(np.isnan(data.intensity.values[0])))
@@ -223,7 +236,7 @@ class MeasureComparison(DatasetResult):
             dispersion=data.dispersion.values[order],
             low=data.dispersion_low.values[order],
             high=data.dispersion_high.values[order],
-            title=title or as_written(f"{data.blocks}, {data.model} model, {counted(data.sizes['motion'], 'motion')}"),
+            title=title or as_written(f"{data.blocks}, {data.model} model, {data.sample}"),
             ax=ax,
             figsize=figsize,
         )
@@ -235,10 +248,13 @@ def _dataset(
     motions: dict[str, xr.DataArray],
     shares: Floats,
     is_first: Flags,
+    *,
+    freedom: int,
 ) -> xr.Dataset:
     """Intensities at overturning and their dispersions.
 
-    `shares` are the weights of the blocks, 1 in the mean; only motions that are the first of their kind count.
+    `shares` are the weights of the blocks, 1 in the mean; only motions that are the first of their kind count. The
+    intervals have so many degrees of `freedom`.
     """
     import xarray as xr
 
@@ -246,12 +262,12 @@ def _dataset(
     weight = np.where(np.isfinite(logarithm[0]), shares, 0.0)
     count = np.isfinite(logarithm[0]).sum(axis=0)
     # Motions are what is drawn: those of several blocks are the same.
-    freedom = np.sum(shares * (count - 1))
-    low, high = _interval_factors(int(count[shares > 0.0].min()) - 1)
+    others = np.sum(shares * (count - 1))
+    low, high = _interval_factors(freedom)
     within = logarithm - np.nansum(logarithm, axis=1, keepdims=True) / np.maximum(count, 1)
-    about_own = np.sqrt(np.nansum(weight * within**2, axis=(1, 2)) / freedom)
+    about_own = np.sqrt(np.nansum(weight * within**2, axis=(1, 2)) / others)
     mean = np.nansum(weight * logarithm, axis=(1, 2)) / weight.sum()
-    of_all = np.nansum(weight * (logarithm - mean[:, None, None]) ** 2, axis=(1, 2)) / freedom
+    of_all = np.nansum(weight * (logarithm - mean[:, None, None]) ** 2, axis=(1, 2)) / others
     spread = "standard deviation of the logarithm of the intensity at overturning"
     return xr.Dataset(
         {
@@ -270,6 +286,15 @@ def _dataset(
             **motions,
         },
     )
+
+
+def _check_enough(count: int, clusters: object) -> None:
+    """Refuse a sample of one: so many clusters, or motions if no clusters were given."""
+    if count < 2:
+        which = "motions that are not multiples of one another" if clusters is None else "{}"
+        raise InvalidOption(
+            f"fewer than two {which} overturn a block, however strong; a dispersion needs more", "clusters"
+        )
 
 
 def _interval_factors(freedom: int) -> tuple[float, float]:

@@ -12,7 +12,7 @@ from rocking.analysis.overturning import overturning_map
 from rocking.analysis.spectrum import Abscissa, rocking_spectrum
 from rocking.block import Blocks
 from rocking.cli.body_options import EnsembleOptions, HeldOptions, SlendernessOptions, ensemble_of
-from rocking.cli.options import BLOCK, MEASURE, MODEL, MeasureOptions, ModelOptions, TreatmentOptions
+from rocking.cli.options import BLOCK, MEASURE, MODEL, MeasureOptions, ModelOptions, TreatmentOptions, labels_of
 from rocking.cli.output import OUTPUT, OutputOptions, deliver
 from rocking.cli.records import RECORDS, MotionOptions, Names, ReadRecords, UnscaledOptions
 from rocking.errors import InvalidOption
@@ -177,6 +177,7 @@ def measures(
     *names: Names,
     periods: str = "0.5,1,2",
     damping: float = 0.05,
+    clusters: str | None = None,
     block: Annotated[EnsembleOptions, BLOCK] = EnsembleOptions(),
     motion: Annotated[UnscaledOptions, RECORDS] = UnscaledOptions(),
     model: Annotated[ModelOptions, MODEL] = ModelOptions(),
@@ -194,6 +195,10 @@ def measures(
         Periods of spectral accelerations, s: 0.5,1,2 or 0.2:4:10:log.
     damping
         Their fraction of critical damping.
+    clusters
+        Which records belong together, and count as one in the intervals: station joins components of one station in
+        one earthquake, as files name them; or a label for each record, with commas between. By default each is on its
+        own.
     """
     bodies = block.blocks(model)
     with output.folder() as folder:
@@ -202,6 +207,7 @@ def measures(
             motions=[*read.motions.values()],
             periods=values(periods, "periods"),
             damping=damping,
+            clusters=labels_of(clusters),
             **bodies,
         )
         _deliver(found, "measures", read, folder=folder, as_json=output.as_json)

@@ -19,10 +19,9 @@ from rocking.analysis.fragility.fit import fragility as run
 from rocking.analysis.fragility.result import Fragility
 from rocking.analysis.hazard import HazardCurve
 from rocking.analysis.input_tables import read_observed
-from rocking.analysis.levels import BY_STATION
 from rocking.analysis.risk import check_measure
 from rocking.cli.body_options import EnsembleOptions
-from rocking.cli.options import BLOCK, MEASURE, MODEL, WHOLE, MeasureOptions, TreatmentOptions
+from rocking.cli.options import BLOCK, MEASURE, MODEL, WHOLE, MeasureOptions, TreatmentOptions, labels_of
 from rocking.cli.output import OUTPUT, OutputOptions, left_out, print_result, write_results
 from rocking.cli.records import RECORDS, MotionOptions, Names, ReadRecords
 from rocking.ensemble import Polarity
@@ -133,7 +132,7 @@ def fragility(
                     **model.chosen() | bodies,
                     limits=states,
                     polarity=polarity,
-                    clusters=_clusters(clusters),
+                    clusters=labels_of(clusters),
                     band=band,
                 )
         found, text = fitted.to_dict() | ({} if read is None else read.to_dict()), [fitted.summary()]
@@ -240,10 +239,6 @@ def _refuse_beside_outcomes(
     if found:
         sentence = "{} are observed, of a block and under motions of their own: leave {} out"
         raise InvalidOption(sentence, "outcomes", found[0])
-
-
-def _clusters(text: str | None) -> str | list[str] | None:
-    return text if text in (None, BY_STATION) else [label.strip() for label in text.split(",")]
 
 
 def _limits(text: str) -> dict[str, float]:

@@ -5,19 +5,17 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import Annotated, Any, Final
 
 from cyclopts import Group, Parameter, Token
 
+from rocking.analysis.levels import BY_STATION
 from rocking.constants import Model
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.plausibility import level_notes
 from rocking.progress import note
 from rocking.quantities import Quantity, acceleration, number, values, velocity
-
-if TYPE_CHECKING:
-    pass
 
 _DIGITS: Final = re.compile(r"[+-]?\d+")
 
@@ -127,6 +125,11 @@ class TreatmentOptions(ModelOptions):
         from rocking.treatment import treatment
 
         return {"model": self.equation or "nonlinear", "chattering": treatment(self.chattering)}
+
+
+def labels_of(clusters: str | None) -> str | list[str] | None:
+    """Return what an option says of motions that belong together."""
+    return clusters if clusters in (None, BY_STATION) else [label.strip() for label in clusters.split(",")]
 
 
 def noted_acceleration(text: str, name: str) -> float:
