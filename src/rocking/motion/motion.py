@@ -661,7 +661,8 @@ class Motion:
         -----
         Of a building that moves in one mode this is the motion of its roof where the mode's shape times its
         participation factor is 1; of a floor below multiply the part beyond the ground's own accordingly, as
-        ``ground + (floor + -ground) * 0.6``. What stands on the floor does not act back on it.
+        ``ground + (floor + -ground) * 0.6``. What stands on the floor does not act back on it. Its `pga`, `pgv` and
+        spectra are the floor's: a fragility against them goes with no hazard curve of the ground.
 
         Examples
         --------
