@@ -60,7 +60,7 @@ def incremental_dynamic_analysis(
     threads: int | None = None,
     progress: bool | None = None,
 ) -> IncrementalDynamicAnalysis:
-    """Scale motions up until every block overturns and beyond, and find all bands of levels that overturn it.
+    """Scale motions up until every block overturns and beyond, and find the bands of levels that overturn it.
 
     A rocking block may stand a motion that is stronger than one that overturns it, so there is no single level of
     overturning: bands of levels that overturn alternate with bands that do not.
@@ -90,7 +90,7 @@ def incremental_dynamic_analysis(
     Returns
     -------
     IncrementalDynamicAnalysis
-        Peaks at every level, and all bands of levels that overturn.
+        Peaks at every level, and the bands of levels that overturn, as far as the levels show them.
 
     Raises
     ------
@@ -103,7 +103,8 @@ def incremental_dynamic_analysis(
     -----
     Ends of bands are found by bisection between neighbouring levels whose verdicts differ; what lies between two levels
     with the same verdict is not seen. Under records the set of levels that overturn is often a fractal: thinner bands
-    beside every band, at any resolution.
+    beside every band, at any resolution. The lowest level that is found then depends on how finely is looked, and is no
+    safety margin by itself.
 
     References
     ----------
@@ -147,7 +148,7 @@ def incremental_dynamic_analysis(
         for m in np.unique(motion):
             here = motion == m
             factor = level[here] * factors[m, block[here]]
-            # The treatment is that of the levels: how often restitution is drawn hangs on it.
+            # The treatment is that of the levels: how often restitution is drawn depends on it.
             setup = Setup(many.select(block[here]), model, Certified())
             for task, outcomes in simulate_each(setup, shaken[m], factor, threads=threads):
                 verdicts[np.flatnonzero(here)[task.bodies]] = outcomes["overturned"]

@@ -48,10 +48,11 @@ def calibrate(
 ) -> None:
     """Find the block behind observed outcomes (overturned or not), or behind a measured rotation history.
 
-    DATA is a CSV table with a header. Outcomes: columns motion (a record file, or a shipped record) and overturned (1
-    or 0), and where wanted scale, channel, group, and specimen: each specimen is then calibrated by itself. A history:
-    columns time_s and rotation_rad (or rotation_deg). The motions of --predict, --motion and --pulse may be scaled.
-    --out holds calibration.png, .pdf, result.json and, of outcomes, ensemble.csv; of several specimens a folder each.
+    DATA is a CSV table with a header. Outcomes: columns motion (a record file, a shipped record, or a pulse) and
+    overturned (1 or 0), and where wanted scale, vertical, channel, dt_s, units, group, and specimen: each specimen is
+    then calibrated by itself. A history: columns time_s and rotation_rad (or rotation_deg). The motions of --predict,
+    --motion and --pulse may be scaled. --out holds calibration.png, .pdf, result.json and, of outcomes, ensemble.csv;
+    of several specimens a folder each.
 
     Parameters
     ----------

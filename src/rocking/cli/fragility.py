@@ -71,8 +71,8 @@ def fragility(
     ----------
     outcomes
         CSV table of what was observed: a column overturned (1 or 0; with a column trials, how many of them), and the
-        intensity (pga_g, pgv_m_s, sa_g with --period) or the motion (a record file, or a shipped record, of which the
-        --measure is taken); and where wanted group: outcomes that belong together.
+        intensity (pga_g, pgv_m_s, sa_g with --period) or the motion (a record file, a shipped record, or a
+        pulse, of which the --measure is taken); and where wanted group: outcomes that belong together.
     limits
         Limit states, with commas between: overturning, or NAME=ROTATION over slenderness, as half=0.5.
     polarity

@@ -371,7 +371,7 @@ def _both(pair: list[float]) -> str:
 def change_pulse(texts: dict[str, str], **numbers: float) -> None:
     """Change some parameters of the pulse in the texts of a case; one that is cut has as many cycles as before.
 
-    The others stay as they are written, so that what hangs on them alone is found not to have changed.
+    The others stay as they are written, so that what depends on them alone is found not to have changed.
     """
     given = arguments_of(texts["motion"])
     if "duration" in given and "frequency" in numbers:

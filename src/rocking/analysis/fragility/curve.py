@@ -251,7 +251,7 @@ class FragilityCurve:
         Parameters
         ----------
         intensity : array_like
-            Intensities in SI units, above 0.
+            Intensities in SI units, 0 or more.
         years : float
             For how long the block has stood.
         confidence : float

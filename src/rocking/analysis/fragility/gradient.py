@@ -62,7 +62,7 @@ class MedianGradient:
     reason : str
         Why derivatives are NaN, one sentence; empty where none is.
     units : str
-        Of the measure: "m/s^2", "m/s", or "1".
+        Of the measure: "m/s^2" or "m/s".
     """
 
     median: float

@@ -94,7 +94,7 @@ class Check(BlockUnderRecords):
             [
                 str(self.block),
                 "demand over capacity: from 1 on a rule says that the block overturns; exact: one over the lowest "
-                "factor on the motion that overturns it",
+                "factor on the motion that was found to overturn it, in steps of 5 %",
                 "",
                 table,
                 *(["", *self._disagreements(rules)] if rules else []),
