@@ -103,6 +103,22 @@ def test_motions_of_a_cluster_count_as_one_in_the_intervals():
         compare_measures(SLENDER, pulses, clusters=[0] * 6)
 
 
+@pytest.mark.parametrize("slendernesses", [(0.12, 0.3), (0.12, 0.12)])
+def test_reversed_motions_count_where_the_sides_of_a_block_differ(slendernesses):
+    block = rocking.Block.from_parameters(p=2.0, alpha=slendernesses, restitution=0.9)
+    up = rocking.pulses.one_sine(0.2, 2.0)
+    pulses = [rocking.pulses.ricker(1.0, f).with_vertical(up) for f in (0.4, 0.6, 0.9)]
+    options = {"periods": [1.0], "tolerance": 1e-3, "progress": False}
+    found = compare_measures(block, [*pulses, *(pulse.scaled(-1.0) for pulse in pulses)], **options)
+    logarithms = np.log(found.intensity.sel(measure="PGA").values[:, 0])
+    counts = logarithms if block.sides[0] != block.sides[1] else logarithms[:3]
+    assert float(found.dispersion.sel(measure="PGA")) == pytest.approx(np.std(counts, ddof=1), rel=1e-12)
+    assert float(found.median_intensity.sel(measure="PGA")) == pytest.approx(np.exp(counts.mean()), rel=1e-12)
+    end = math.sqrt(2.0 / chi2.ppf(0.05, 2))  # three pulses, each as it is and reversed
+    assert float(found.dispersion_high[0] / found.dispersion[0]) == pytest.approx(end, rel=1e-12)
+    assert (np.ptp(logarithms.reshape(2, 3), axis=0).max() > 0.01) == (len(counts) == 6)
+
+
 @pytest.mark.thorough
 def test_the_command_prints_and_writes_the_comparison(run, tmp_path, monkeypatch):
     monkeypatch.setattr(Figure, "savefig", lambda figure, file, **options: file.write(b"not drawn"))

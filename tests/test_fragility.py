@@ -285,6 +285,18 @@ def test_the_bootstrap_draws_whole_clusters():
     assert np.diff(apart.median_interval) < 0.5 * np.diff(kept.median_interval)
 
 
+@pytest.mark.parametrize("count", [1, 2])
+def test_one_or_two_clusters_bound_nothing_by_the_bootstrap_either(count):
+    intensity, exceeded = outcomes(2, 60)
+    clusters = np.arange(60) % count
+    fitted = fit_fragility(intensity, exceeded, clusters=clusters, band=Band("bootstrap", samples=200))
+    curve = fitted.curves[0]
+    assert not curve.bounded and curve.median_interval == (0.0, math.inf)
+    assert "give 3 or more" in " ".join(fitted.notes)
+    rate = fitted.annual_rate(rocking.HazardCurve([1.0, 9.0], [1e-2, 1e-4])).rate("overturning")
+    assert rate.interval[0] < 1e-3 * rate.annual_rate and math.isinf(rate.interval[1])
+
+
 def test_the_bootstrap_draws_counted_outcomes_one_by_one():
     intensity, exceeded, trials = np.array([2.0, 3.0, 4.0, 5.0]), np.array([1, 4, 7, 10]), 10
     band = Band("bootstrap", samples=4000)
@@ -719,8 +731,9 @@ def test_motions_of_one_shape_and_another_length_or_vertical_component_are_not_o
     pulse = rocking.pulses.one_sine(1.0, 1.0)
     up, down = (pulse.with_vertical(rocking.pulses.one_sine(a, 3.0)) for a in (0.5, -0.5))
     longer = rocking.pulses.one_sine(1.0, 1.5)
-    given = [pulse, longer, up, pulse.scaled(-3.0), up.scaled(0.3), down, longer.scaled(1e-6)]
-    assert families_of(given).tolist() == [0, 1, 2, 0, 2, 3, 1]
+    given = [pulse, longer, up, pulse.scaled(-3.0), up.scaled(-0.3), down, longer.scaled(1e-6), up.scaled(0.3)]
+    assert families_of(given).tolist() == [0, 1, 2, 0, 2, 3, 1, 2]
+    assert families_of(given, reversed_too=False).tolist() == [0, 1, 2, 3, 4, 5, 1, 2]
 
 
 @pytest.mark.parametrize("missing", [None, "", math.nan, np.nan])

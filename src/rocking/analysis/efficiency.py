@@ -101,8 +101,8 @@ def compare_measures(
     from each block's own mean; a measure that is to serve them all must also have a small deviation from one mean. Both
     have the same degrees of freedom, those of the motions: blocks share these, so that more blocks are no larger
     sample. Of motions that are multiples of one another the first counts, since all of them overturn a block at one
-    intensity. Motions of one cluster may do almost the same: the intervals then have the degrees of freedom of the
-    clusters.
+    intensity; where the sides of a block differ, reversed ones count as well. Motions of one cluster may do almost the
+    same: the intervals then have the degrees of freedom of the clusters.
 
     References
     ----------
@@ -144,7 +144,7 @@ def compare_measures(
     intensity = np.stack(
         [factors * values_of(shaken, measure)[:, None] / units_of(many, measure, model) for measure in measures]
     )
-    families = families_of(shaken)
+    families = families_of(shaken, reversed_too=many.is_symmetric)
     is_first = np.isin(np.arange(len(shaken)), np.unique(families, return_index=True)[1])
     counted_in = np.isfinite(level[is_first])[:, shares > 0.0]
     sizes = [len(np.unique(together[is_first][overturns])) for overturns in counted_in.T]

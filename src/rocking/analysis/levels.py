@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -125,40 +125,48 @@ def motions_in_words(clusters: Integers, labels: object) -> str:
     return text if labels is None else f"{text} in {counted(len(np.unique(clusters)), 'cluster')}"
 
 
-def families_of(motions: Sequence[Motion]) -> Integers:
-    """Whole numbers, the same for motions that are multiples of one another: together they tell no more than one."""
-    times, values = zip(*map(_as_rows, motions), strict=True)
-    # Neither of these changes with the scale or the sign: only motions that are alike in both are compared in full.
-    alike = np.array([(np.abs(row).mean(), np.sqrt((row * row).mean())) for row in values])
+def families_of(motions: Sequence[Motion], *, reversed_too: bool = True) -> Integers:
+    """Whole numbers, the same for motions that scaling makes of one another: together they tell no more than one.
+
+    ``reversed_too``: by factors of either sign; else by positive ones alone.
+    """
+    shapes = [_shape_of(motion) for motion in motions]
+    # None of these changes with the scale or the sign: only motions that are alike in all are compared in full.
+    alike = np.array([(np.abs(one.values).mean(), np.sqrt((one.values**2).mean())) for one in shapes])
     firsts: list[int] = []
     families = np.empty(len(motions), dtype=np.int64)
-    for k in range(len(motions)):
+    for k, shape in enumerate(shapes):
         near = np.flatnonzero(np.all(np.abs(alike[firsts] - alike[k]) <= _ROUNDING, axis=1))
-        same = (
-            int(j) for j in near if _is_same(times[firsts[j]], times[k]) and _is_multiple(values[firsts[j]], values[k])
-        )
+        same = (int(j) for j in near if _is_multiple(shapes[firsts[j]], shape, reversed_too=reversed_too))
         families[k] = next(same, len(firsts))
         if families[k] == len(firsts):
             firsts.append(k)
     return families
 
 
-def _as_rows(motion: Motion) -> tuple[Floats, Floats]:
+class _Shape(NamedTuple):
     """Breakpoints of a motion and its vertical component, and their coefficients over the largest."""
+
+    times: Floats
+    values: Floats
+    horizontal: int
+
+
+def _shape_of(motion: Motion) -> _Shape:
     parts = [part for part in (motion, motion.vertical) if part is not None]
     values = np.concatenate([part.coefficients.ravel() for part in parts])
-    return np.concatenate([part.breakpoints for part in parts]), values / np.abs(values).max()
+    times = np.concatenate([part.breakpoints for part in parts])
+    return _Shape(times, values / np.abs(values).max(), motion.coefficients.size)
 
 
-def _is_same(times: Floats, others: Floats) -> bool:
-    return times.shape == others.shape and np.allclose(times, others, rtol=_ROUNDING, atol=0.0)
-
-
-def _is_multiple(row: Floats, other: Floats) -> bool:
-    if row.shape != other.shape:
+def _is_multiple(first: _Shape, other: _Shape, *, reversed_too: bool) -> bool:
+    """Whether scaling makes one of the other; a negative factor reverses the horizontal component alone."""
+    sizes = [(one.times.size, one.values.size, one.horizontal) for one in (first, other)]
+    if sizes[0] != sizes[1] or not np.allclose(first.times, other.times, rtol=_ROUNDING, atol=0.0):
         return False
-    factor = (row @ other) / (row @ row)
-    return bool(np.abs(other - factor * row).max() <= _ROUNDING)
+    signs = np.where(np.arange(first.values.size) < first.horizontal, -1.0, 1.0)
+    turned = [first.values, signs * first.values] if reversed_too else [first.values]
+    return any(bool(np.abs(other.values - values).max() <= _ROUNDING) for values in turned)
 
 
 def units_of(blocks: Bodies, measure: Measure, model: Model) -> Floats:

@@ -35,7 +35,7 @@ _NEWTON: Final = 80
 _SAME: Final = 1e-9
 
 #: Clusters that tell how far they differ, at least; and the most that one may weigh in its own leaving out.
-_FEWEST: Final = 3
+FEWEST: Final = 3
 _LEVERAGE: Final = 0.9
 
 #: Level curves at 0 and 1, and steps at intensities below and above all that there are.
@@ -53,8 +53,8 @@ class LikelyRegion:
     A quantity lies, with the given confidence, between its extremes on the region. The region is convex, since the
     likelihood is concave, and ends where curves no longer rise. Where clusters hold several outcomes each, it is
     stretched to the covariance that the clusters show (Chandler and Bate 2007), each left out in turn, and Student's
-    distribution takes the place of the normal one. Fewer than three clusters tell nothing of it: then the region is
-    the whole plane.
+    distribution takes the place of the normal one. Fewer than three clusters tell nothing of it, and can hardly be
+    drawn anew: then the region is the whole plane.
     """
 
     boundary: Probit
@@ -77,7 +77,7 @@ class LikelyRegion:
         best = Probit(fitted.intercept + fitted.slope * centre, fitted.slope * spread)
         if clusters is None:
             around = _around(scaled, best, 0.5 * float(chdtri(1.0, 1.0 - confidence)))
-        elif (count := int(clusters.max()) + 1) < _FEWEST:
+        elif (count := int(clusters.max()) + 1) < FEWEST:
             return cls(_WHOLE_PLANE)
         else:
             around = _around(scaled, best, 0.5 * float(stdtrit(count - 1.0, 0.5 + 0.5 * confidence)) ** 2)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from rocking import checks
 from rocking.analysis.fragility import lognormal
-from rocking.analysis.fragility.confidence import Confidence, Ends, LikelyRegion, Quantity, Resamples
+from rocking.analysis.fragility.confidence import FEWEST, Confidence, Ends, LikelyRegion, Quantity, Resamples
 from rocking.analysis.fragility.lognormal import Outcomes, Probit, normal_scores, probabilities
 from rocking.arrays import Floats, Integers, as_asked
 from rocking.errors import InvalidOption, Unfitted
@@ -382,7 +382,7 @@ def fitted_curve(
     count = round(float(trials.sum())) if clusters is None else int(clusters.max()) + 1
     independent = clusters is None or (count == z.size and bool(np.all(trials <= 1.0)))
     uncertainty: Confidence
-    if band.kind == "bootstrap":
+    if band.kind == "bootstrap" and (independent or count >= FEWEST):
         uncertainty = Resamples.of(outcomes, fitted, clusters, band.samples, band.seed)
     else:
         uncertainty = LikelyRegion.of(outcomes, fitted, None if independent else clusters, band.confidence)
