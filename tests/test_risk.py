@@ -20,7 +20,7 @@ from rocking.analysis import Band
 from rocking.analysis.fragility.lognormal import Probit
 from rocking.analysis.hazard import log_parts, powers
 from rocking.analysis.input_tables import read_observed
-from rocking.analysis.survival import _log_standing
+from rocking.analysis.survival import _log_rate_within, _log_standing
 from rocking.motion.scaling import Measure
 
 G = 9.80665
@@ -483,6 +483,17 @@ def test_a_block_of_which_the_intensity_alone_decides_stands_as_quadrature_says(
     expected = mpmath.ncdf(low) * mpmath.exp(-5.0) + mpmath.ncdf(-high) + mpmath.quad(integrand, corners)
     found = _log_standing(Probit(np.array([a]), np.array([b])), hazard, 100.0)
     assert found[0, 0] == pytest.approx(float(mpmath.log(expected)), abs=1e-5)
+
+
+@pytest.mark.parametrize("a", [-np.inf, -3.0, 0.0, 1.5, np.inf])
+def test_a_curve_that_does_not_rise_is_the_limit_of_flat_ones(a: float) -> None:
+    """Motions within the hazard curve exceed it with one probability, as often as they come."""
+    hazard = rocking.HazardCurve([4.0, 12.0, 40.0], [1e-3, 1e-4, 1e-5])
+    chance, flat = scipy.stats.norm.cdf(a), Probit(np.array([a, np.clip(a, -9.0, 9.0)]), np.array([0.0, 1e-9]))
+    with np.errstate(all="raise"):
+        rates, standing = _log_rate_within(flat, hazard)[:, 0], _log_standing(flat, hazard, 1000.0)[:, 0]
+    assert np.exp(rates) == pytest.approx(chance * (1e-3 - 1e-5), rel=1e-6, abs=1e-21)
+    assert np.exp(standing) == pytest.approx(1.0 - chance + chance * math.exp(-1.0), rel=1e-6)
 
 
 def test_motions_beyond_the_hazard_curve_contradict_nothing() -> None:

@@ -257,7 +257,8 @@ def _log_rate_within(fits: Probit, hazard: HazardCurve) -> Floats:
 
     a, b = (values[:, None] for values in fits)
     first, last = ndtr(a + b * np.log(hazard.intensity[[0, -1]])).T
-    between = np.exp(log_parts(fits, hazard)[:, 1:-1]).sum(axis=1)
+    # Of a curve that does not rise, dP is 0 on every segment.
+    between = np.where(fits.slope > 0.0, np.exp(log_parts(fits, hazard)[:, 1:-1]).sum(axis=1), 0.0)
     rate = first * hazard.rate[0] - last * hazard.rate[-1] + between
     return np.asarray(np.log(np.maximum(rate, np.finfo(float).tiny)))[:, None]
 
@@ -276,6 +277,7 @@ def _log_standing(fits: Probit, hazard: HazardCurve, years: float) -> Floats:
         z = first + (last - first) * _STEPS
         density = -0.5 * z * z - years * np.exp(np.interp((z - a) / b, log_x, log_rate))
         between = np.logaddexp(density[:, 1:], density[:, :-1]) + np.log(np.diff(z) * math.sqrt(0.125 / math.pi))
+        # Under a curve that does not rise, what falls at all falls under the weakest motions.
+        between = np.where(b > 0.0, between, -np.inf)
         parts = np.column_stack([log_ndtr(first) - years * hazard.rate[0], between, log_ndtr(-last)])
-    # Under a curve that does not rise, what falls at all falls under the weakest motions.
-    return np.where(b > 0.0, np.logaddexp.reduce(parts, axis=1)[:, None], log_ndtr(-a))
+        return np.logaddexp.reduce(parts, axis=1)[:, None]
