@@ -17,6 +17,7 @@ from rocking.named_pulses import FAMILIES
 from rocking.treatment import Certified
 
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+PULSE_OF = rocking.pulses.one_sine
 FREQUENCIES = np.array([1.0, 2.0, 3.0, 5.0, 6.5])
 
 # The closed forms know no limit to the rotation. A block falls at pi/2, which the linear model passes during a slow
@@ -281,6 +282,16 @@ def test_the_figure_names_every_mode_that_it_shows():
         ({"pulse": lambda a, f: None}, "is None; return a Motion"),
         ({"pulse": lambda a, f: rocking.pulses.half_sine(a, 1.0), "frequencies": [1.0, 3.0]}, "one shape"),
         ({"pulse": lambda a, f: rocking.pulses.n_lobe([a, a * a], f)}, "one shape"),
+        ({"pulse": "ricker", "duration": 1.5, "frequencies": [1.0, 3.0]}, "one shape"),
+        ({"pulse": lambda a, f: PULSE_OF(a, f).with_vertical(PULSE_OF(1.0, f))}, "one shape"),
+        ({"pulse": lambda a, f: PULSE_OF(a, f).with_vertical(PULSE_OF(a, 1.0)), "frequencies": [3.0]}, "one shape"),
+        (
+            {
+                "pulse": lambda a, f: PULSE_OF(a, f).with_vertical(PULSE_OF(a, f) if f > 1.0 else None),
+                "frequencies": [0.1, 90.0],
+            },
+            "one shape",
+        ),
         ({"amplitudes": []}, "amplitudes"),
         ({"amplitudes": [2.0, 1.0]}, "increase"),
         ({"amplitudes": [1.0, math.nan]}, "finite"),
@@ -295,6 +306,20 @@ def test_what_makes_no_map_is_refused(changes, word):
     arguments = {"pulse": "half-sine", "block": BLOCK, "amplitudes": [0.5, 2.0], "frequencies": [1.0]} | changes
     with pytest.raises(rocking.RockingError, match=word):
         overturning_map(arguments.pop("block"), arguments.pop("pulse"), **arguments)
+
+
+def test_a_pulse_with_a_vertical_component_overturns_where_single_simulations_say():
+    def pulse(amplitude, frequency):
+        return PULSE_OF(amplitude, frequency).with_vertical(rocking.pulses.sine(amplitude, 2.0 * frequency, cycles=3))
+
+    ratios = np.array([1.5, 3.0])
+    found = overturning_map(BLOCK, pulse, amplitudes=np.linspace(0.8, 6.0, 14), frequencies=ratios, tolerance=1e-6)
+    side = BLOCK.sides[0]
+    for ratio, level in zip(ratios, found.overturning_amplitude.values, strict=True):
+        frequency, lifting = ratio * side.p / (2.0 * math.pi), BLOCK.gravity * math.tan(side.alpha)
+        for times, falls in ((1.0 - 1e-5, False), (1.0 + 1e-5, True)):
+            response = rocking.simulate(BLOCK, pulse(times * level * lifting, frequency))
+            assert response.overturned == falls
 
 
 def test_a_map_is_the_same_in_one_thread_and_in_several():

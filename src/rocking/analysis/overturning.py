@@ -96,8 +96,8 @@ def overturning_map(
     pulse : str or callable
         "sine" (give `cycles`), "half-sine", "one-sine", "one-cosine", "ricker" (`kind`) or "mavroeidis-papageorgiou"
         (`phase`, `gamma`); or a function of amplitude (m/s^2) and frequency (Hz) that returns a motion proportional to
-        the amplitude, and of one shape: at twice the frequency it is over in half the time. It is called at the ends
-        of the frequencies, of which one would do.
+        the amplitude, and of one shape: at twice the frequency it is over in half the time, and so is its vertical
+        component. It is called at the ends of the frequencies, of which one would do.
     amplitudes : array_like, shape (m,)
         Increasing amplitudes, over the smallest acceleration that lifts the block: g tan(alpha), in the linear model
         g alpha. The amplitude of a Mavroeidis-Papageorgiou pulse is here its peak acceleration.
@@ -122,8 +122,8 @@ def overturning_map(
     Raises
     ------
     InvalidOption
-        If an argument is out of its range, the shape of a function's motion changes with the frequency or the
-        amplitude, or the block never comes to rest (restitution 1).
+        If an argument is out of its range, the shape of the pulse changes with the frequency (as that of one with a
+        `duration` does) or the amplitude, or the block never comes to rest (restitution 1).
     InvalidMotion
         If a function returns no motion.
 
@@ -161,11 +161,11 @@ def overturning_map(
             "a block with {} 1 never comes to rest; an overturning map needs one below 1", "restitution"
         )
     slowest = min(side.p for side in block.sides)
-    unit = _unit_pulse(pulse, slowest / (2.0 * math.pi), parameters)
-    if callable(pulse):
-        for ratio in {ratios[0], ratios[-1]}:
-            _check_shape(unit, pulse, slowest / (2.0 * math.pi), float(ratio))
-    chattering = Certified(width * unit.duration)
+    made, own = _pulse_function(pulse, parameters), slowest / (2.0 * math.pi)
+    unit = _called(made, 1.0, own)
+    for ratio in {ratios[0], ratios[-1]}:
+        _check_shape(unit, made, own, float(ratio))
+    chattering = Certified(width * unit.end)
     setup = Setup(_resized(block, ratios), model, chattering)
     count = None if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
     problem = _PulseProblem(setup, unit, min(block.uplift_thresholds(model)), count)
@@ -352,24 +352,30 @@ class _PulseProblem:
         for task, outcomes in simulate_each(setup, self.unit, self.threshold * level, threads=self.threads):
             ends[task.bodies] = outcomes
             done(len(outcomes))
-        return modes_of(ends, self.unit.duration), ends["peak_rotation"]
+        return modes_of(ends, self.unit.end), ends["peak_rotation"]
 
 
-def _unit_pulse(pulse: str | Callable[[float, float], Motion], frequency: float, parameters: dict[str, Any]) -> Motion:
-    """Pulse of amplitude 1 m/s^2."""
+def _pulse_function(
+    pulse: str | Callable[[float, float], Motion], parameters: dict[str, Any]
+) -> Callable[[float, float], Motion]:
+    """Return the function of amplitude (of a pulse by name its peak, m/s^2) and frequency (Hz) that makes a pulse."""
     if callable(pulse):
         if parameters:
             raise InvalidOption(
                 f"a {{}} given as a function takes no {', '.join(parameters)}: bind them to it", "pulse"
             )
-        return _called(pulse, 1.0, frequency)
+        return pulse
     family = pulse_family(pulse)
     if family.name not in PULSES:
         raise InvalidOption(
             f"{{}} must be one of {', '.join(PULSES)}, or a function, not {pulse!r}", "pulse", value=pulse
         )
-    unit = family.motion({"amplitude": 1.0, "frequency": frequency} | parameters)
-    return unit.scaled_to(1.0) if family.is_of_velocity else unit
+
+    def named_pulse(amplitude: float, frequency: float) -> Motion:
+        made = family.motion({"amplitude": 1.0, "frequency": frequency} | parameters)
+        return made.scaled_to(amplitude) if family.is_of_velocity else made.scaled(amplitude)
+
+    return named_pulse
 
 
 def _called(pulse: Callable[[float, float], Motion], amplitude: float, frequency: float) -> Motion:
@@ -382,22 +388,31 @@ def _called(pulse: Callable[[float, float], Motion], amplitude: float, frequency
 
 
 def _check_shape(unit: Motion, pulse: Callable[[float, float], Motion], frequency: float, ratio: float) -> None:
-    """Refuse a function whose motion is another one than `unit` when it is as many times as fast, and stronger."""
+    """Refuse a pulse whose motion is another one than `unit` when it is as many times as fast, and stronger."""
     stronger = 1.0 + ratio
     other = _called(pulse, stronger, ratio * frequency)
-    phases = (np.arange(_PHASES) + 0.5) / _PHASES
-    first, second = (
-        (motion.acceleration(phases * motion.duration) / factor, motion.duration * times)
-        for motion, factor, times in ((unit, 1.0, 1.0), (other, stronger, ratio))
-    )
-    apart = np.abs(second[0] - first[0]).mean() > _SAME * np.abs(first[0]).max()
-    if apart or abs(second[1] - first[1]) > _SAME * first[1]:
+    same = (unit.vertical is None) == (other.vertical is None) and _is_as_long(unit, other, ratio)
+    for first, second in ((unit, other), (unit.vertical, other.vertical)):
+        if same and first is not None and second is not None:
+            same = _is_as_long(first, second, ratio) and _is_alike(first, second, stronger)
+    if not same:
         raise InvalidOption(
             "the {} must have one shape: a function of amplitude and frequency whose motion is proportional to the "
             f"amplitude, and over in half the time at twice the frequency; that of {frequency:g} Hz is another one "
             f"than that of {ratio * frequency:g} Hz",
             "pulse",
         )
+
+
+def _is_as_long(first: Motion, second: Motion, ratio: float) -> bool:
+    return abs(ratio * second.duration - first.duration) <= _SAME * first.duration
+
+
+def _is_alike(first: Motion, second: Motion, factor: float) -> bool:
+    """Whether one motion is the other by a factor, each over its own duration."""
+    phases = (np.arange(_PHASES) + 0.5) / _PHASES
+    one, other = first.acceleration(phases * first.duration), second.acceleration(phases * second.duration) / factor
+    return bool(np.abs(other - one).mean() <= _SAME * np.abs(one).max())
 
 
 def _resized(block: Block, ratios: Floats) -> Blocks:

@@ -280,4 +280,4 @@ def _log_standing(fits: Probit, hazard: HazardCurve, years: float) -> Floats:
         # Under a curve that does not rise, what falls at all falls under the weakest motions.
         between = np.where(b > 0.0, between, -np.inf)
         parts = np.column_stack([log_ndtr(first) - years * hazard.rate[0], between, log_ndtr(-last)])
-        return np.logaddexp.reduce(parts, axis=1)[:, None]
+        return np.asarray(np.logaddexp.reduce(parts, axis=1)[:, None])
