@@ -85,6 +85,16 @@ def test_times_without_errors_tell_the_factors(model):
     assert fit.estimates["factor"] == pytest.approx(0.9, rel=1e-8)
 
 
+@pytest.mark.parametrize("model", ["linear", "nonlinear"])
+def test_impacts_close_to_each_other_tell_the_factors_too(model):
+    block = Block.from_parameters(p=6.0, alpha=0.3, restitution=0.7)
+    times = rocking.simulate(block, None, model=model, initial_rotation=0.2, chattering="velocity=1e-5").impacts["time"]
+    times = times[: 2 + int(np.argmax(np.diff(times) < 2e-4))]
+    found = rocking.compare_restitution([times], block, model=model, timing=2e-5)
+    assert found.factors == pytest.approx(0.7, rel=1e-5)
+    assert found.laws[0].name == "constant"
+
+
 def test_speeds_are_those_of_an_integration():
     body = Held((0.2, 0.2), 1.0, math.sqrt((0.04 + 1.0) / 3.0), 1.0, COLUMN.gravity, (0.9, 0.9))
     still = rocking.Motion.from_samples(np.zeros(60), 0.1)

@@ -299,8 +299,10 @@ def _speeds(block: Block, model: Model) -> Callable[[Floats], tuple[Floats, Floa
                 "give another {}",
                 "block",
             )
-        logs = np.log(np.maximum(times, time[0]))
-        return spline(logs), spline(logs, 1) / times
+        logs = np.log(times)
+        inside = np.maximum(logs, math.log(time[0]))
+        # The speed of a very small arc is in proportion to its time.
+        return spline(inside) + (logs - inside), np.where(logs < inside, 1.0, spline(inside, 1)) / times
 
     return found
 
