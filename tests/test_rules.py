@@ -255,6 +255,12 @@ def test_the_tables_of_the_trial_are_those_that_the_script_makes():
             assert float(now) == pytest.approx(float(before), abs=share if "." in before else 3.0)
 
 
+def test_a_motion_beyond_all_levels_that_are_looked_at_has_a_margin():
+    block, shock = rocking.Block(width=0.01, height=0.5), rocking.pulses.half_sine(80.0 * G, 2000.0)
+    (row,) = rules.check(block, shock, rules=["west"]).rows()
+    assert row["overturned"] and row["exact"] == row["lowest_factor"] == 1.0
+
+
 def test_the_command_prints_and_writes_the_check(run, tmp_path):
     arguments = ["check", RECORD, "--width", "0.3", "--height", "0.9", "--rules", "west, ishiyama", "--out", tmp_path]
     code, out, err = run(*arguments)

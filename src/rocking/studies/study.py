@@ -462,11 +462,11 @@ def study(
     blocks: Bodies | Body | Sequence[Body] | None = None,
     motions: Motions | None = None,
     *,
-    model: Model = "nonlinear",
-    chattering: str | Treatment = "certified",
+    model: Model | None = None,
+    chattering: str | Treatment | None = None,
     levels: ArrayLike | None = None,
-    measure: MeasureName | Measure = "factor",
-    polarity: Polarity = "+",
+    measure: MeasureName | Measure | None = None,
+    polarity: Polarity | None = None,
     duration: float | None = None,
     refine: float | Mapping[str, float] | None = None,
     outcomes: Sequence[str] | None = None,
@@ -484,15 +484,15 @@ def study(
         argument (but `refine`).
     motions : Motion, sequence of Motion, or mapping of str to Motion, optional
         As for `simulate_many`.
-    model : {"nonlinear", "linear"}
-        As for `simulate_many`.
-    chattering : str or Treatment
+    model : {"nonlinear", "linear"}, optional
+        As for `simulate_many`, with its default for a new study; likewise the next five.
+    chattering : str or Treatment, optional
         As for `simulate_many`.
     levels : array_like, optional
         As for `simulate_many`.
-    measure : {"factor", "pga", "pgv"} or Measure
+    measure : {"factor", "pga", "pgv"} or Measure, optional
         As for `simulate_many`.
-    polarity : {"+", "-", "both"}
+    polarity : {"+", "-", "both"}, optional
         As for `simulate_many`.
     duration : float, optional
         As for `simulate_many`.
@@ -536,16 +536,26 @@ def study(
     if blocks is None or motions is None:
         if blocks is not None or motions is not None:
             raise InvalidOption("a new study needs {} and {}; one that is there needs neither", "blocks", "motions")
-        _refuse_inputs({"levels": levels, "duration": duration, "outcomes": outcomes, "unit_blocks": unit_blocks})
+        _refuse_inputs(
+            model=model,
+            chattering=chattering,
+            levels=levels,
+            measure=measure,
+            polarity=polarity,
+            duration=duration,
+            outcomes=outcomes,
+            unit_blocks=unit_blocks,
+        )
         store = Store.open(place)
         if refine is not None:
             keep_plan(store, tolerances_of(store.product, refine, store.grid.outcomes))
         return Study(store)
-    product = product_of(blocks, motions, levels, measure, polarity, model, chattering, duration)
+    given = measure or "factor", polarity or "+", model or "nonlinear", chattering or "certified"
+    product = product_of(blocks, motions, levels, *given, duration)
     return study_of(place, product, unit_blocks, refine=refine, outcomes=chosen_outcomes(outcomes))
 
 
-def _refuse_inputs(given: Mapping[str, object]) -> None:
+def _refuse_inputs(**given: object) -> None:
     """Refuse what is said of a study that is opened by its folder alone: it would be ignored."""
     names = [name for name, value in given.items() if value is not None]
     if names:

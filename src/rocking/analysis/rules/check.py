@@ -214,7 +214,7 @@ def _margin(response: Response, block: Block, motion: Motion, model: Model, thre
     )
     margin = motion.pga / float(scaled.overturning_level[0, 0])
     if response.overturned:
-        return float(max(margin, 1.0))
+        return float(np.fmax(margin, 1.0))  # it may be beyond all levels that were looked at
     # The level is the middle of a bracket: where that holds the motion itself, which stands, the change lies above it.
     is_near = 1.0 <= margin <= 1.0 + _TOLERANCE and not response.unfinished
     return float(np.nextafter(1.0, 0.0)) if is_near else margin
