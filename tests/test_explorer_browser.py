@@ -1915,6 +1915,25 @@ def test_a_late_answer_of_a_view_that_was_left_changes_nothing(opened):
         assert len(before[1]) == 6 and page.js("document.body.dataset.sweep") is None
 
 
+@MORE
+def test_a_late_slice_of_a_study_changes_nothing_in_another_view(opened, tmp_path):
+    blocks = rocking.Blocks.grid(p=[2.0, 3.0], alpha=[0.1, 0.2], restitution=[0.9])
+    motion = rocking.records.load("el-centro-meloland-270")
+    rocking.study(tmp_path / "late", blocks, motion, levels=[2.0, 4.0], measure="pga").run(progress=False)
+    running = served(Explorer(), {"view": "map"}, StudyView(tmp_path / "late"))
+    running.run_in_background()
+    page = opened(server=running)
+    complete(page)
+    with held(page, "**/api/study?*") as waiting:
+        page.page.locator("#study-tools label", has_text="scale").locator("select").select_option("1")
+        asked(page, waiting)
+        page.rested(lambda: page.page.click("[data-view=response]"))
+    page.page.wait_for_timeout(500)
+    assert page.text("#python-title") == "This case as Python"
+    assert page.page.locator("#exports button").count() == 6
+    running.server.should_exit = True
+
+
 # Records, assessment, units, paper
 
 

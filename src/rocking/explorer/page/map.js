@@ -134,7 +134,8 @@ export class View {
 
   async run() {
     this.running = new AbortController();
-    await (this.study ? this.slice() : this.stream(this.running.signal));
+    const {signal} = this.running;
+    await (this.study ? this.slice(signal) : this.stream(signal));
   }
 
   /** Axes that the case has, and those that are chosen. */
@@ -319,10 +320,12 @@ export class View {
     this.reading.say();
   }
 
-  async slice() {
+  /** @param {AbortSignal} signal */
+  async slice(signal) {
     this.fill();
     const asked = {...this.page.state.map};
-    const {header, arrays} = await payload("/api/study", asked);
+    const {header, arrays} = await payload("/api/study", asked, {signal});
+    signal.throwIfAborted();
     this.page.remember({map: this.page.state.map});
     this.about = {...inUnits({...header, quantities: [header.quantity], curves: {}}), asked};
     this.values = [Float32Array.from(arrays.values)];
