@@ -49,6 +49,8 @@ VIEWS = ("response", "block", "map", "periodic", "compare")
 #: Further cases of what a faster run holds, too.
 MORE = pytest.mark.thorough
 READY = "document.body?.dataset.ready && document.body.dataset.rested"
+#: What is drawn in grey.
+GREY = "Array.from(document.querySelectorAll('.old :is(.plots, .verdict, .links)'), (each) => each.id)"
 #: Fields that are marked as wrong.
 MARKED = "Array.from(document.querySelectorAll('[aria-invalid=true]'), (each) => each.id)"
 
@@ -1134,6 +1136,26 @@ def test_a_broken_file_is_answered_with_a_sentence(opened):
     page.until("!document.getElementById('problem').hidden")
     assert page.text("#problem").startswith("broken.at2")
     assert page.text("#verdict").startswith("It stays up")
+    # The case that is shown is the one that was asked for; the sentence stays until the next file.
+    assert page.page.locator("#old").is_hidden() and page.js(GREY) == []
+    page.rested(lambda: entered(page, "width", "0.3"))
+    assert page.page.locator("#problem").is_visible()
+    page.rested(lambda: page.js(DROP, ["whole.csv", ROWS]))
+    page.until("document.getElementById('problem').hidden")
+
+
+def test_what_cannot_be_saved_or_printed_is_said_until_it_can_and_greys_nothing(opened):
+    page = opened(STATUE, allowed=["ERR_FAILED"])
+    page.js("window.print = () => { document.body.dataset.printed = '1'; }; 1")
+    for path, button in (("export", "#exports button"), ("summary", "#print")):
+        page.page.route(f"**/api/{path}?*", lambda route: route.abort())
+        page.page.locator(button).first.click()
+        page.until("!document.getElementById('problem').hidden")
+        assert page.text("#problem").startswith("The explorer does not answer")
+        assert page.page.locator("#old").is_hidden() and page.js(GREY) == []
+        page.page.unroute(f"**/api/{path}?*")
+        page.page.locator(button).first.click()
+        page.until("document.getElementById('problem').hidden")
 
 
 # Ways out

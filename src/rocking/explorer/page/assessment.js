@@ -72,7 +72,7 @@ export class View {
     const {texts, assessment} = this.page.state;
     const body = document.body.dataset;
     body.assessment = "running";
-    const problem = (/** @type {unknown} */ error) => this.page.problem(error, "view-assessment");
+    const problem = (/** @type {unknown} */ error) => this.page.problem(error, "exports");
     let begun = false; // what was there before stays until then
     try {
       if (!assessment.records) {

@@ -125,7 +125,7 @@ export class View {
     const drawn = (/** @type {"svg" | "png"} */ form) => this.histories.picture(form, entries);
     offer([
       [`${name}.svg`, phrase("compare.svg"), () => drawn("svg")], [`${name}.png`, phrase("compare.png"), () => drawn("png")], [`${name}.csv`, phrase("compare.csv"), () => file("/api/compare/table", asked)],
-    ], (error) => this.page.problem(error, "view-compare"));
+    ], (error) => this.page.problem(error, "exports"));
   }
 
   /** What is asked of the server besides the case and the window. @returns {Texts} */

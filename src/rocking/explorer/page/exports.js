@@ -11,7 +11,7 @@ const FORMS = /** @type {[string, string, boolean][]} */ ([
 ]);
 
 /** Files of a case, which the server makes; figures show its window. @param {import("./parameters.js").State} state
- * @param {(error: unknown) => void} problem is told what went wrong */
+ * @param {(error: unknown) => void} problem is told what went wrong, or null */
 export function showFiles(state, problem) {
   offer(FORMS.map(([form, label, windowed]) => [
     `rocking-response.${form}`, label, () => file("/api/export", {...state.good.texts, form, ...(windowed ? ends(state) : {})}),
@@ -19,15 +19,18 @@ export function showFiles(state, problem) {
 }
 
 /** @typedef {[string, string, () => Promise<Blob>][]} Files names, labels, and what makes them */
-/** Buttons that save files. @param {Files} files @param {(error: unknown) => void} problem is told what went wrong */
+/** Buttons that save files. @param {Files} files @param {(error: unknown) => void} problem is told what went wrong, or null */
 export function offer(files, problem) {
   one("exports").replaceChildren(...files.map(([name, label, content]) => make("button", {type: "button", on: {click: async () => {
-    try { save(name, await content()); } catch (error) { problem(error); }
+    try {
+      save(name, await content());
+      problem(null);
+    } catch (error) { problem(error); }
   }}}, [label])));
 }
 
 /** Files of a map or a diagram, which the page makes of what it has. @param {string} what @param {string} python @param {string | null} command
- * @param {Files} files @param {(error: unknown) => void} problem is told what went wrong */
+ * @param {Files} files @param {(error: unknown) => void} problem is told what went wrong, or null */
 export function showExports(what, python, command, files, problem) {
   offer(files, problem);
   showCode(what, python, command);

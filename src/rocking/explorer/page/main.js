@@ -58,6 +58,8 @@ new Snapshots({now: () => (page.shown ? {name: caseName(page.shown.header), text
 let drawn = false;
 /** What is wrong at each place of the page, by its id. @type {Record<string, string | null>} */
 const problems = {};
+/** Places where somebody has just done something: what is wrong there is said before what views make of it. */
+const FIRST = ["settings", "files", "exports", "print-head"];
 
 /** Say what is wrong, or that nothing is, and mark the field that is wrong. @param {unknown} error @param {string} [place] id of what holds the field */
 function problem(error, place = "settings") {
@@ -80,7 +82,8 @@ function problem(error, place = "settings") {
   }
   one(place === "settings" ? "main" : place).classList.toggle("old", Boolean(error && drawn));
   one("old").hidden = !(problems.settings && drawn);
-  const sentence = problems.settings ?? Object.values(problems).findLast(Boolean);
+  const wrong = Object.entries(problems).filter(([, each]) => each);
+  const sentence = (wrong.findLast(([each]) => FIRST.includes(each)) ?? wrong.at(-1))?.[1];
   one("problem").hidden = !sentence;
   if (sentence) one("problem").textContent = sentence;
 }
@@ -152,7 +155,7 @@ const afterPause = new Latest(async () => {
   cursor.show();
   await forms.block.mesh.learn(of);
   if (!ofOwn(state.view)) {
-    if (state.view !== "compare") showFiles(state, problem);
+    if (state.view !== "compare") showFiles(state, (error) => problem(error, "exports"));
     const {python, command} = await json("/api/code", of);
     if (texts === of && !ofOwn(state.view)) showCode("case", python, command);
   }
@@ -260,6 +263,7 @@ async function go(name) {
   examples.check();
   for (const [each, view] of Object.entries(views)) if (each !== name) view.leave?.();
   for (const place of Object.keys(problems)) if (one(place).closest("[hidden]")) problem(null, place);
+  problem(null, "exports"); // another view has other files
   views[name]?.enter?.();
   if (page.shown) {
     entitle(page.shown.header);
@@ -366,15 +370,15 @@ acceptFiles(async (file, use) => {
     else forms.motion.take(found, use === "vertical");
     if (state.view === "records") void views.records?.loading.ask();
     say(use === "mesh" ? phrase("file.is_body", {name: found.name}) : phrase("file.is_record", {name: found.name, format: found.format}));
-    problem(null);
+    problem(null, "files");
   } catch (error) {
-    problem(error);
+    problem(error, "files");
   }
 }, async (files) => {
   await go("records");
   await views.records?.add(files);
-}, problem);
-makePrinting(page, problem);
+}, (error) => problem(error, "files"));
+makePrinting(page, (error) => problem(error, "print-head"));
 unitFields(async (name) => {
   await load.idle; // what was changed before belongs into the address that is loaded again
   writeAddress(state);

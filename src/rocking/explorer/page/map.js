@@ -279,7 +279,7 @@ export class View {
     showExports("map", this.study ? python : python[quantity], (this.study ? command : command[quantity]) ?? null, !this.complete ? [] : [
       [`${name}.svg`, phrase("save.svg"), () => this.picture.file("svg")], [`${name}.png`, phrase("save.png"), () => this.picture.file("png")],
       [`${name}.csv`, phrase("save.numbers"), async () => new Blob([this.table()], {type: "text/csv"})],
-    ], (error) => this.page.problem(error, "view-map"));
+    ], (error) => this.page.problem(error, "exports"));
   }
 
   /** Every point of the map with all that is known of it, in the units of the server. */

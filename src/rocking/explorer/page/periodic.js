@@ -359,7 +359,7 @@ export class View {
     showExports("diagram", python, command, !this.complete ? [] : [
       ["rocking-diagram.svg", phrase("save.svg"), () => this.picture("svg")], ["rocking-diagram.png", phrase("save.png"), () => this.picture("png")],
       ["rocking-diagram.csv", phrase("save.numbers"), async () => new Blob([this.table()], {type: "text/csv"})],
-    ], (error) => this.page.problem(error, "view-periodic"));
+    ], (error) => this.page.problem(error, "exports"));
   }
 
   /** @param {"svg" | "png"} form @returns {Promise<Blob>} */

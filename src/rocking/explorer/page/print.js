@@ -8,7 +8,7 @@ import {fill, make, one} from "./words.js";
 import {short} from "./numbers.js";
 import {phrase} from "./texts.js";
 
-/** @param {any} page @param {(error: unknown) => void} problem */
+/** @param {any} page @param {(error: unknown) => void} problem is told what went wrong, or null */
 export function makePrinting(page, problem) {
   /** Texts of the case whose summary is on the page. */
   let held = "";
@@ -26,6 +26,7 @@ export function makePrinting(page, problem) {
       begin();
       await new Promise((drawn) => setTimeout(drawn, 300));
       window.print();
+      problem(null);
     } catch (error) {
       problem(error);
     }
