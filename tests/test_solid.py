@@ -144,6 +144,19 @@ def test_two_densities_move_the_centre_and_the_sides_differ():
     assert_same(Solid.from_mesh(scene(foot=foot, post=post)), Solid.from_mesh(scene(foot=foot, post=post), density=7.0))
 
 
+@pytest.mark.parametrize("at", [(0.0, 0.0), (1.1, 0.7), (-35.3, 12.9)])
+def test_a_symmetric_body_has_equal_sides_wherever_it_stands(at):
+    inertia = np.diag([(0.4**2 + 1.8**2) / 12, (0.6**2 + 1.8**2) / 12, (0.6**2 + 0.4**2) / 12])
+    corners = [(at[0] + x, at[1] + y) for x, y in ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))]
+    cabinet = Solid(corners, (*at, 0.9), inertia)
+    turned = Solid.from_mesh(box(at=at), turn=30.0)
+    for azimuth in (*range(0, 360, 15), turned.weakest_azimuth):
+        for solid in (cabinet, turned):
+            assert solid.block(azimuth).is_symmetric
+    uneven = Solid(corners, (at[0] + 1e-6, at[1], 0.9), inertia)
+    assert not uneven.block(90.0).is_symmetric
+
+
 def test_the_opposite_azimuth_is_the_mirror_image():
     solid = Solid.from_mesh("statue")
     for azimuth in (0.0, 37.0, 90.0, 200.0):

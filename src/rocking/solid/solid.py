@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 #: Letters of the names of a summary.
 _NAMES: Final = 22
 
+#: Relative difference of distances to both sides that are one.
+_EVEN: Final = 1e-12
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Solid(Result):
@@ -353,6 +356,9 @@ def plane_of(solid: Solid, azimuth: float) -> Plane:
     """Return a body in the vertical plane of an azimuth."""
     towards = checks.finite(azimuth, "azimuth", InvalidBlock)
     pivots = polygons.extents(solid.support - solid.centre[:2], [towards, towards + 180.0])
+    middle, apart = pivots.distance.mean(), np.ptp(pivots.distance)
+    if apart <= _EVEN * middle:  # by rounding alone: a body that is symmetric has equal sides wherever it stands
+        pivots = pivots._replace(distance=np.full(2, middle))
     squared, _ = about_axes(solid.inertia_over_mass, np.array([towards]))
     return Plane(towards, pivots, float(solid.centre[2]), math.sqrt(float(squared[0])))
 
