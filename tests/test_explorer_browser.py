@@ -1832,6 +1832,49 @@ def test_a_point_of_a_diagram_is_of_the_sweep_that_is_drawn(opened):
     assert 2.0 <= float(ask["at"][0]) <= 5.0
 
 
+def test_a_diagram_is_of_the_sign_of_the_sine(opened):
+    leaning = "width=0.3&height=1.5&offset=0.03&motion=sine:amplitude%3D0.25g,frequency%3D1.5,cycles%3D2.5,phase%3D0deg"
+    page = periodic(opened, f"{leaning}&sweep_points=8&sweep_from=1&sweep_to=4")
+    assert "phase=" not in page.text("#python")
+    page.js("document.body.dataset.sweep = 'waits'")
+    entered(page, "pulse-amplitude", "-0.25")
+    page.until("document.body.dataset.sweep === 'complete'", "another diagram is complete")
+    assert "phase=3.14159" in page.text("#python") and "phase=3.14159" in page.text("#command")
+
+
+def amplitude_in_code(page):
+    """Amplitude over the threshold of uplift with which the script of a diagram computes the case itself."""
+    return float(re.search(r"stroboscopic_map\(\*case\(([\d.]+)\)", page.text("#python"))[1])
+
+
+def test_the_code_and_the_mark_of_a_diagram_are_of_the_case_that_is_shown(opened):
+    page = periodic(opened, f"{CASCADE},phase%3D0deg&sweep_points=8&sweep_from=1&sweep_to=3")
+    swept = []
+    page.page.on("request", lambda request: swept.append(request.url) if "/api/sweep?" in request.url else None)
+    settles(page, lambda: entered(page, "pulse-amplitude", "0.5"))
+    assert amplitude_in_code(page) == pytest.approx(0.5 * 1.1 / 0.24, rel=1e-12)
+    settles(page, lambda: entered(page, "pulse-cycles", "9"))
+    page.page.focus("#diagram")
+    page.page.keyboard.press("ArrowLeft")
+    found = settles(page, lambda: page.page.keyboard.press("Enter"))
+    assert "cycles=9" in found["motion"]
+    start = tuple(float(found[f"initial_{name}"]) for name in ("rotation", "velocity"))
+    assert f"rock.orbit({start!r}, " in page.text("#python")
+    assert swept == []  # the diagram is the same all the while
+
+
+@MORE
+def test_a_diagram_that_begins_when_another_case_is_shown_has_the_code_of_that(opened):
+    page = periodic(opened, f"{CASCADE},phase%3D0deg&sweep_points=8&sweep_from=1&sweep_to=3")
+    page.js("document.body.dataset.sweep = 'waits'")
+    with held(page, "**/api/sweep?*") as waiting:
+        entered(page, "sweep_to", "4")
+        asked(page, waiting)
+        settles(page, lambda: entered(page, "pulse-amplitude", "0.5"))
+    page.until("document.body.dataset.sweep === 'complete'")
+    assert amplitude_in_code(page) == pytest.approx(0.5 * 1.1 / 0.24, rel=1e-12)
+
+
 # Comparing
 
 

@@ -171,6 +171,7 @@ def orbit(case: Case) -> Payload:
         "sentence": sentence(found, response),
         "about": _about(case, sine, found, rock),
         "at": values_of(case, sine),
+        "phase": sine.phase,
         "period": found.period,
     }
     states = scaled(case, found.states)

@@ -181,6 +181,7 @@ class App:
             ),
             "/api/orbit": lambda query: periodic.orbit(self._case(query)),
             "/api/sweep/point": self._point_of_sweep,
+            "/api/sweep/code": lambda query: sweep_as_code(self._sweep(query)),
             "/api/list": lambda query: listing(explorer.uploads, entries_of(query.given.get("answers", ""))),
             "/api/study": lambda query: self._study().slice(query.others),
             "/api/study/point": lambda query: self._study().texts_at(query.others, explorer.uploads),
@@ -294,11 +295,13 @@ class App:
     def _grid(self, query: Query) -> maps.MapGrid:
         return maps.grid_of(self._case(query), query.others)
 
+    def _sweep(self, query: Query) -> sweeps.Sweep:
+        return sweeps.sweep_of(self._case(query), query.others)
+
     def _point_of_sweep(self, query: Query) -> dict[str, str]:
         """Return the texts of the case at a value of the parameter, released from a state where one is given."""
-        sweep = sweeps.sweep_of(self._case(query), query.others)
         value, _ = query.numbers("at", "at")
-        return sweeps.texts_at(sweep, value, query.numbers("u", "v") if query.given.get("u") else None)
+        return sweeps.texts_at(self._sweep(query), value, query.numbers("u", "v") if query.given.get("u") else None)
 
     def _study(self) -> StudyView:
         if self.study is None:
@@ -318,7 +321,7 @@ class App:
         """Stream a sweep under periodic motion, coarse to fine: what is swept, then parts of it, each a payload."""
 
         def begun(query: Query) -> _Stream:
-            sweep = sweeps.sweep_of(self._case(query), query.others)
+            sweep = self._sweep(query)
             about = {**sweeps.described(sweep), **sweep_as_code(sweep)}
             return _Stream(about, sweeps.parts(sweep), lambda part: pack(sweeps.part_payload(sweep, part)))
 

@@ -15,7 +15,7 @@ import {inWords, phrase} from "./texts.js";
 
 const DIRECTIONS = ["up", "down"];
 const FIELDS = ["sweep", "sweep_from", "sweep_to", "sweep_points"];
-/** What scales a sine, or releases the block, and with it changes nothing in a sweep. */
+/** What scales a sine, or releases the block, and changes nothing in a sweep but the sine's sign. */
 const FREE = ["scale", "pga", "pgv", "sa", "initial_rotation", "initial_velocity"];
 const F = (/** @type {string} */ field) => ({field});
 
@@ -32,6 +32,8 @@ export class View {
     /** @type {Record<string, Map<number, Found>>} */
     this.found = {up: new Map(), down: new Map()};
     this.key = "";
+    /** The case that is shown, and what is swept. @type {{texts: Texts, sweep: Texts}} */
+    this.asked = {texts: {}, sweep: {}};
     this.complete = false;
     this.waiting = 0;
     /** Number of the marked value, and of the point there. @type {[number, number] | null} */
@@ -64,7 +66,8 @@ export class View {
 
   /** What the case settles on; after that, its diagram, unless that is the one that is drawn or under way. */
   async settle() {
-    const {header, arrays} = await payload("/api/orbit", this.page.state.texts);
+    const {texts, sweep} = this.page.state, asked = {texts, sweep: {...sweep}};
+    const {header, arrays} = await payload("/api/orbit", texts);
     if (this.page.state.view !== "periodic") return; // somebody left meanwhile
     this.offer = header.offer;
     one("orbit").hidden = Boolean(this.offer);
@@ -84,10 +87,11 @@ export class View {
     /** @type {Record<string, number>} */
     this.at = header.at;
     this.drawPlane(header, arrays);
-    const key = this.asked();
+    this.asked = asked;
+    const key = keyOf(asked, header.phase);
     if (key === this.key) {
       this.drawCase();
-      if (this.about) this.offerFiles();
+      await this.renew();
     } else {
       this.running?.abort();
       this.key = key;
@@ -96,21 +100,22 @@ export class View {
     counted("settled");
   }
 
-  /** All that a sweep depends on. */
-  asked() {
-    const {texts, sweep} = this.page.state;
-    const motion = texts.motion.replace(sweep.sweep === "omega" ? /frequency=[^,]*/ : /amplitude=[^,]*/, "").replace(/cycles=[^,]*/, "");
-    const free = sweep.sweep === "omega" ? FREE.slice(-2) : FREE;
-    return JSON.stringify([Object.entries({...texts, motion}).filter(([name]) => !free.includes(name)).sort(), sweep]);
+  /** Code, and the case at the mark, are of the case that is shown, though several have the same diagram. */
+  async renew() {
+    const {about, asked} = this, {texts, sweep} = asked;
+    if (about?.key !== this.key) return; // its diagram has not begun
+    const code = await json("/api/sweep/code", {...texts, ...sweep});
+    if (this.asked !== asked || this.page.state.view !== "periodic") return; // another case was settled, or somebody left, meanwhile
+    Object.assign(about, code, {asked});
+    this.offerFiles();
   }
 
   async stream() {
     this.running = new AbortController();
     const {signal} = this.running;
-    const {sweep, texts} = this.page.state, chosen = {...sweep};
+    const {key, asked} = this, {texts, sweep} = asked;
     const body = document.body.dataset;
     body.sweep = "running";
-    const {key} = this;
     let begun = false; // what was there before stays until then
     try {
       for await (const frame of frames("/api/sweep", {...texts, ...sweep}, signal)) {
@@ -118,11 +123,12 @@ export class View {
           begun = true;
           this.complete = false;
           this.found = {up: new Map(), down: new Map()};
-          this.about = {...JSON.parse(new TextDecoder().decode(frame)), asked: {...texts, ...chosen}};
-          this.page.remember({sweep: chosen});
+          this.about = {...JSON.parse(new TextDecoder().decode(frame)), key, asked};
+          this.page.remember({sweep});
           this.fill();
           this.drawAxes();
           this.offerFiles();
+          if (this.asked !== asked) await this.renew();
           continue;
         }
         const {header, arrays} = unpacked(/** @type {ArrayBuffer} */ (frame.buffer));
@@ -336,10 +342,10 @@ export class View {
     if (!this.about || !this.mark) return;
     const [index, k] = this.mark;
     const point = this.points(index)[k];
-    const {texts} = this.page.state;
+    const {texts} = this.page.state, {asked} = this.about;
     const from = point ? {u: String(point.u), v: String(point.v)} : {};
     try {
-      const found = await json("/api/sweep/point", {...this.about.asked, at: String(this.about.values[index]), ...from});
+      const found = await json("/api/sweep/point", {...asked.texts, ...asked.sweep, at: String(this.about.values[index]), ...from});
       if (this.page.state.texts === texts && this.page.state.view === "periodic") this.page.restate(found);
     } catch (error) {
       this.page.problem(error, "view-periodic");
@@ -375,6 +381,14 @@ export class View {
       (overturned ? [[values[index], each, "", ""]] : Array.from({length: states.length / 2}, (_, k) => [values[index], each, states[2 * k], states[2 * k + 1]]))));
     return [[name, "sweep", "rotation_rad", "velocity_rad_per_s"], ...rows].map((row) => `${row.join(",")}\n`).join("");
   }
+}
+
+/** All that a sweep depends on: of what scales the sine that is the sign, which the phase has.
+ * @param {{texts: Texts, sweep: Texts}} asked @param {number} phase */
+function keyOf({texts, sweep}, phase) {
+  const motion = texts.motion.replace(sweep.sweep === "omega" ? /frequency=[^,]*/ : /amplitude=[^,]*/, "").replace(/cycles=[^,]*/, "");
+  const free = sweep.sweep === "omega" ? FREE.slice(-2) : FREE;
+  return JSON.stringify([Object.entries({...texts, motion}).filter(([name]) => !free.includes(name)).sort(), sweep, phase]);
 }
 
 /** Ends of an axis around all of these. @param {Iterable<number>[]} parts @returns {[number, number]} */
