@@ -1967,6 +1967,54 @@ def test_a_comparison_with_a_pinned_case_shows_that_or_nothing(opened):
     page.page.click(".chip .remove")
 
 
+def test_a_comparison_is_saved_as_it_was_asked_for(opened):
+    page = opened(f"{STATUE}&view=compare")
+    page.until("document.body.dataset.compared")
+    with held(page, "**/api/compare?*") as waiting:
+        entered(page, "other-velocity-limit", "0.02")
+        asked(page, waiting)
+        entered(page, "other-velocity-limit", "0.09")
+        waiting[0].continue_()
+        asked(page, waiting, 2)
+        page.says("compare-verdict", "Velocity threshold, 0.02 pα")
+        with page.page.expect_request("**/api/compare/table?*") as asking:
+            page.page.click("text=Both, histories, CSV")
+    ask = parse_qs(urlsplit(asking.value.url).query)
+    assert ask["other.chattering"] == ["velocity=0.02"] and "0.02" in ask["second"][0]
+
+
+def test_the_treatments_are_told_of_the_case_that_is_compared(opened):
+    page = opened(f"{STATUE}&view=compare", allowed=["422"])
+    page.until("document.querySelectorAll('#schemes tbody tr').length > 5")
+    with held(page, "**/api/compare?*") as waiting:
+        entered(page, "width", "0.3")
+        asked(page, waiting)
+        entered(page, "width", "-1")
+        page.until("!document.getElementById('problem').hidden")
+        with page.page.expect_request("**/api/schemes?*") as asking:
+            waiting[0].continue_()
+    assert parse_qs(urlsplit(asking.value.url).query)["width"] == ["0.3"]
+
+
+@MORE
+def test_a_comparison_is_named_by_the_pinned_case_that_it_is_of(opened):
+    page = opened(STATUE)
+    texts = {"width": "0.24", "height": "1.1", "motion": "ridgecrest-clc-090"}
+    pinned = [{"name": f"pinned at {level}", "texts": {**texts, "pga": level}} for level in ("0.3g", "0.2g", "0.1g")]
+    page.js("(pinned) => localStorage.setItem('rocking-snapshots', JSON.stringify(pinned))", pinned)
+    page.page.goto(page.page.url + "&view=compare&compare=case")
+    page.until("document.body.dataset.compared")
+    with held(page, "**/api/compare?*") as waiting:
+        page.page.select_option("#other-case", "1")
+        asked(page, waiting)
+        page.page.select_option("#other-case", "2")
+        waiting[0].continue_()
+        asked(page, waiting, 2)
+        page.says("compare-verdict", "The other (pinned at 0.2g)")
+    page.says("compare-verdict", "The other (pinned at 0.1g)")
+    page.js("localStorage.removeItem('rocking-snapshots')")
+
+
 def test_a_late_answer_of_a_view_that_was_left_changes_nothing(opened):
     page = opened(SINE)
     for view, pattern in (("compare", "**/api/compare?*"), ("periodic", "**/api/orbit?*")):

@@ -77,7 +77,7 @@ export class View {
 
   async run() {
     const {state} = this.page;
-    const {other: chosen, compare: kind, align, good} = state;
+    const {texts, other: chosen, compare: kind, align, good} = state, asked = {...texts, ...this.asked()};
     const none = !Object.keys(chosen).length;
     for (const id of DRAWN) one(id).hidden = none;
     if (none) {
@@ -85,19 +85,19 @@ export class View {
       this.page.remember({other: chosen, compare: kind, align});
       return;
     }
-    const {header, arrays} = await payload("/api/compare", {...state.texts, ...this.asked(), ...ends(state)});
+    const {header, arrays} = await payload("/api/compare", {...asked, ...ends(state)});
     if (state.good !== good || state.view !== "compare") return; // somebody went back, or elsewhere, meanwhile
     if (state.window && state.window[0] >= header.duration) state.window = null; // it was of longer responses
     this.page.remember({other: chosen, compare: kind, align});
-    this.draw(header, arrays, kind);
+    this.draw(header, arrays, kind, chosen);
     if (state.other === chosen) this.block?.show(chosen, header.cases[1].block.sides);
-    this.files(header, kind);
+    this.files(header, kind, asked);
     counted("compared");
-    if (kind === "treatment") await this.schemes();
+    if (kind === "treatment") await this.schemes(texts);
   }
 
-  /** @param {any} [header] @param {any} [arrays] @param {string} [kind] of what is compared */
-  draw(header, arrays, kind = "") {
+  /** @param {any} [header] @param {any} [arrays] @param {string} [kind] of what is compared @param {Texts} [chosen] what is other */
+  draw(header, arrays, kind = "", chosen = {}) {
     if (!header) return;
     const [one_, other] = header.cases;
     const none = new Float64Array(0);
@@ -108,18 +108,18 @@ export class View {
     first.lines.weight = arrays.first_weight;
     if (!["motion", "case"].includes(kind)) second.lines.ground_time = second.lines.ground_g = none;
     this.histories.draw(header, first, second);
-    const name = kind === "treatment" ? treatmentName(other.treatment) : pinnedAs(this.page.state.other)?.name;
+    const name = kind === "treatment" ? treatmentName(other.treatment) : pinnedAs(chosen)?.name;
     const found = {verdict: inWords(other.verdict), difference: difference(one_, other)};
     tell(one("compare-verdict"), (name ? phrase("compare.verdict_named", {name, ...found}) : phrase("compare.verdict", found)).trim());
     legend("compare-legend", [["line", phrase("compare.this")], ["second", shifted(header.shift)], ["rest", phrase("compare.at_rest")], ["impact", phrase("compare.impacts")]]);
   }
 
-  /** What may be saved: both cases, each under its name. @param {any} header @param {string} kind of what is compared */
-  files({cases: [first, other]}, kind) {
-    const {state} = this.page;
+  /** What may be saved: both cases, each under its name. @param {any} header @param {string} kind of what is compared
+   * @param {Texts} texts with which they were asked for */
+  files({cases: [first, other]}, kind, texts) {
     const [one_, second] = [caseName(first), kind === "treatment" ? phrase("compare.treated", {name: caseName(other), treatment: treatmentName(other.treatment)}) : caseName(other)];
     const name = `rocking-compare-${slug(one_)}-and-${slug(second)}`;
-    const asked = {...state.texts, ...this.asked(), first: one_, second};
+    const asked = {...texts, first: one_, second};
     /** @type {[string, string][]} */
     const entries = [[phrase("compare.entry_this", {name: one_}), colour("ink")], [phrase("compare.entry_other", {name: second}), colour("second")]];
     const drawn = (/** @type {"svg" | "png"} */ form) => this.histories.picture(form, entries);
@@ -134,10 +134,11 @@ export class View {
     return {...Object.fromEntries(Object.entries(other).map(([name, value]) => [`other.${name}`, value])), compare, align};
   }
 
-  async schemes() {
-    const key = JSON.stringify(this.page.state.texts);
+  /** @param {Texts} texts of the case that is drawn */
+  async schemes(texts) {
+    const key = JSON.stringify(texts);
     if (this.known === key) return;
-    const rows = await json("/api/schemes", this.page.state.texts);
+    const rows = await json("/api/schemes", texts);
     this.known = key;
     fill(/** @type {HTMLTableElement} */ (one("schemes")), ["", phrase("compare.treatment_head"), phrase("compare.makes")], rows.map((/** @type {any} */ row) => {
       const name = treatmentName(row.text);
