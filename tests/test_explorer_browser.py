@@ -2015,6 +2015,17 @@ def test_a_comparison_is_named_by_the_pinned_case_that_it_is_of(opened):
     page.js("localStorage.removeItem('rocking-snapshots')")
 
 
+def test_the_other_block_stays_when_it_is_described_otherwise_whatever_the_gravity(opened):
+    query = STATUE.replace("0.4g", "0.1g")
+    page = opened(f"{query}&gravity=1.62&view=compare&compare=block&other.width=0.36&other.height=1.65")
+    page.until("document.body.dataset.compared")
+    for shape, name in (("pivots", "gyration"), ("parameters", "p"), ("sizes", "width")):
+        page.page.select_option("#other-shape", shape)
+        page.until(f"new URLSearchParams(location.search).has('other.{name}')")
+    found = query_of(page)
+    assert [float(found[f"other.{name}"]) for name in ("width", "height")] == pytest.approx([0.36, 1.65], rel=1e-9)
+
+
 def test_a_late_answer_of_a_view_that_was_left_changes_nothing(opened):
     page = opened(SINE)
     for view, pattern in (("compare", "**/api/compare?*"), ("periodic", "**/api/orbit?*")):

@@ -90,7 +90,8 @@ export class View {
     if (state.window && state.window[0] >= header.duration) state.window = null; // it was of longer responses
     this.page.remember({other: chosen, compare: kind, align});
     this.draw(header, arrays, kind, chosen);
-    if (state.other === chosen) this.block?.show(chosen, header.cases[1].block.sides);
+    // Both blocks have the gravity of the case.
+    if (state.other === chosen) this.block?.show({...chosen, gravity: texts.gravity}, header.cases[1].block.sides);
     this.files(header, kind, asked);
     counted("compared");
     if (kind === "treatment") await this.schemes(texts);
