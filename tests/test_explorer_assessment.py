@@ -184,6 +184,8 @@ def test_levels_go_from_where_a_record_lifts_the_block_to_where_most_overturn_it
         ({"records": PLAIN, "level_from": "2g", "level_to": "1g"}, "below the last"),
         ({"records": PLAIN, "friction": "7"}, "coefficient"),
         ({"records": "motion=none"}, "shakes nothing"),
+        ({"records": "0"}, "names no motion"),
+        ({"records": "key=x"}, "names no motion"),
         ({"records": "motion=file:00"}, "not here any more"),
         ({"records": PLAIN, "level_from": "1", "level_to": "1e40"}, "must stay below"),
     ],

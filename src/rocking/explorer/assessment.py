@@ -110,6 +110,8 @@ def assessment_of(case: Case, texts: Texts, uploads: UploadStore) -> Assessment:
     entries = entries_of(given.get("records", ""))
     if not entries:
         raise InvalidOption("an assessment needs {}: tick one or more in the list", "records")
+    if not all("motion" in entry for entry in entries):
+        raise InvalidOption("an entry of the list of {} names no motion: take it out", "records")
     require_rest(case.block)
     measure = _measure(given)
     count = number(given.get("levels", "16"), "levels")
