@@ -101,7 +101,7 @@ def test_measures_are_compared_by_the_levels_of_incremental_analyses():
             rocking.simulate(FACADE, motion.scaled(f * level / motion.pga)).overturned for f in (0.999, 1.001)
         )
         assert (below, above) == (False, True)
-    in_units = found.data.intensity.sel(measure="PGA / (g tan α)").values[:, 0]
+    in_units = found.data.intensity.sel(measure="PGA / uplift acceleration").values[:, 0]
     np.testing.assert_allclose(in_units, pga / FACADE.uplift_thresholds()[0], rtol=1e-12)
 
 

@@ -118,7 +118,7 @@ def compare_measures(
     >>> pulses = [rocking.pulses.rectangular(1.0, length) for length in (0.05, 0.1, 0.2)]
     >>> found = compare_measures(block, pulses, periods=[1.0])
     >>> [f"{name} {beta:.2f}" for name, beta in zip(found.measure.values, found.dispersion.values)]
-    ['PGA 0.67', 'PGV 0.02', 'SA(1 s) 0.01', 'PGA / (g tan α) 0.67', 'p PGV / (g tan α) 0.02']
+    ['PGA 0.67', 'PGV 0.02', 'SA(1 s) 0.01', 'PGA / uplift acceleration 0.67', 'p PGV / uplift acceleration 0.02']
     """
     many, shaken = bodies_of(blocks), several_motions(motions)
     slenderness_of(many)  # refused before the work

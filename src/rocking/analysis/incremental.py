@@ -73,7 +73,7 @@ def incremental_dynamic_analysis(
         m motions; a mapping gives them its names.
     measure : {"pga", "pgv", "pga_ratio", "pgv_ratio"} or Measure
         Intensity measure that motions are scaled to: peak acceleration (m/s^2), peak velocity (m/s); in each block's
-        own units PGA/(g tan alpha) and p PGV/(g tan alpha); or spectral acceleration (m/s^2) as
+        own units PGA and p PGV over the acceleration that lifts it; or spectral acceleration (m/s^2) as
         ``rocking.Measure("sa", period=1.0)``.
     levels : array_like, optional
         Increasing levels of the measure. By default from the lowest that lifts a block, in steps of 5 %, to three

@@ -61,8 +61,8 @@ class MeasureOptions:
     measure: Annotated[
         IntensityName,
         hint(
-            "Intensity: PGA, PGV, spectral acceleration, or in the block's own units PGA/(g tan alpha) and "
-            "p PGV/(g tan alpha)."
+            "Intensity: PGA, PGV, spectral acceleration, or in the block's own units PGA and p PGV "
+            "over the acceleration that lifts it."
         ),
     ] = "pga"
     period: Annotated[float | None, hint("Period of the spectral acceleration, s.")] = None

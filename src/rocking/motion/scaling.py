@@ -30,8 +30,8 @@ _MEASURES: Final[dict[str, tuple[str, str]]] = {
     "pga": ("m/s^2", "peak ground acceleration"),
     "pgv": ("m/s", "peak ground velocity"),
     "sa": ("m/s^2", "spectral acceleration"),
-    "pga_ratio": ("1", "PGA / (g tan α)"),
-    "pgv_ratio": ("1", "p PGV / (g tan α)"),
+    "pga_ratio": ("1", "PGA / uplift acceleration"),
+    "pgv_ratio": ("1", "p PGV / uplift acceleration"),
 }
 
 
@@ -43,9 +43,9 @@ class Measure:
     ----------
     name : {"factor", "pga", "pgv", "sa", "pga_ratio", "pgv_ratio"}
         Factor on the motion as it is; peak acceleration (m/s^2), peak velocity (m/s), spectral acceleration (m/s^2); or
-        a block's own dimensionless ones: peak acceleration over the smallest that lifts it, PGA/(g tan alpha), and peak
-        velocity over that acceleration in the block's time, p PGV/(g tan alpha). In the linear model alpha stands for
-        tan alpha.
+        a block's own dimensionless ones: peak acceleration over the smallest that lifts it, and peak velocity over that
+        acceleration in the block's time. Of a free block they are PGA/(g tan alpha) and p PGV/(g tan alpha), in the
+        linear model with alpha for tan alpha; what restrains a block, or makes it lean, changes what lifts it.
     period : float, optional
         Period of the oscillator of "sa", s.
     damping : float

@@ -74,8 +74,9 @@ def fragility(
     motions : Motion, sequence of Motion, or mapping of str to Motion
         m motions; a mapping gives them its names.
     measure : {"pga", "pgv", "pga_ratio", "pgv_ratio"} or Measure
-        Intensity measure: peak acceleration (m/s^2), peak velocity (m/s); in each block's own units PGA/(g tan alpha)
-        and p PGV/(g tan alpha); or spectral acceleration (m/s^2) as ``rocking.Measure("sa", period=1.0)``.
+        Intensity measure: peak acceleration (m/s^2), peak velocity (m/s); in each block's own units PGA and
+        p PGV over the acceleration that lifts it; or spectral acceleration (m/s^2) as
+        ``rocking.Measure("sa", period=1.0)``.
     levels : array_like, optional
         Stripes: every motion scaled to each of these levels. Without them a cloud: every motion as it is.
     limits : mapping of str to float
