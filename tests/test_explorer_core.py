@@ -1057,7 +1057,10 @@ def test_a_block_that_hardly_comes_to_rest_is_mapped_over_no_points_that_would_b
     )
     with pytest.raises(InvalidOption, match="hardly comes to rest"):
         maps.grid_of(case, {"x": "p", "y": "pga"})
-    assert maps.grid_of(case, {"x": "p", "y": "restitution"})
+    axes = {"x": "restitution", "y": "pga", "x_to": "0.9989"}
+    assert maps.grid_of(case, axes)
+    with pytest.raises(InvalidOption, match="hardly comes to rest"):
+        maps.grid_of(case, {**axes, "x_to": "0.9991"})
 
 
 # Studies

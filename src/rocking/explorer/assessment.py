@@ -112,7 +112,7 @@ def assessment_of(case: Case, texts: Texts, uploads: UploadStore) -> Assessment:
         raise InvalidOption("an assessment needs {}: tick one or more in the list", "records")
     if not all("motion" in entry for entry in entries):
         raise InvalidOption("an entry of the list of {} names no motion: take it out", "records")
-    require_rest(case.block)
+    require_rest(side.restitution for side in case.block.sides)
     measure = _measure(given)
     count = number(given.get("levels", "16"), "levels")
     if not (_LEAST <= count <= _MOST and count == int(count)):

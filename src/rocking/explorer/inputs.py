@@ -7,7 +7,7 @@ The texts are those of the page's address: names of the command line's options a
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -105,7 +105,7 @@ def read_case(texts: Texts, uploads: UploadStore) -> Case:
     block = found_block.block
     found = motion_of(given, values, uploads)
     if "duration" not in values:
-        require_rest(block)
+        require_rest(side.restitution for side in block.sides)
     elif values["duration"] < _SHORTEST:
         raise InvalidOption(f"{{}} must be {_SHORTEST:g} s or more here", "duration", value=values["duration"])
     return Case(
@@ -127,9 +127,9 @@ def read_case(texts: Texts, uploads: UploadStore) -> Case:
     )
 
 
-def require_rest(block: Block) -> None:
-    """Raise `InvalidOption` unless a block comes to rest soon enough for a page to wait for it."""
-    if math.prod(side.restitution for side in block.sides) > _LIVELIEST:
+def require_rest(restitutions: Iterable[float]) -> None:
+    """Raise `InvalidOption` unless a block with these on its sides comes to rest before a page has waited for long."""
+    if math.prod(restitutions) > _LIVELIEST:
         raise InvalidOption(
             f"the product of {{}} on both sides is above {_LIVELIEST:g}, so that the block hardly comes to rest: lower "
             "it, or simulate it in Python",

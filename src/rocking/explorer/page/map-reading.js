@@ -57,6 +57,7 @@ export class MapReading {
     this.running?.abort();
     this.at = "";
     one("map-small").hidden = true;
+    this.view.page.problem(null, "map-at"); // it was about another point
   }
 
   /** @param {number[]} point */
@@ -70,7 +71,7 @@ export class MapReading {
       if (this.spoken) say(inWords(header.verdict));
       this.spoken = false;
     } catch (error) {
-      if (!running.signal.aborted) this.view.page.problem(error, "view-map");
+      if (!running.signal.aborted) this.view.page.problem(error, "map-at");
     }
   }
 

@@ -76,6 +76,7 @@ export class View {
     if (this.offer) {
       this.running?.abort();
       this.key = "";
+      this.page.problem(null, "view-periodic"); // a diagram may have been asked for, which this motion has not
       one("orbit-verdict").textContent = phrase("orbit.no_sine");
       one("orbit-about").textContent = "";
       one("orbit-sine").textContent = phrase("orbit.offer", {amplitude: this.offer.amplitude, frequency: this.offer.frequency});
