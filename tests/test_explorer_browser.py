@@ -267,6 +267,11 @@ def test_tracks_end_where_the_other_fields_let_the_block_end(opened):
     assert query_of(page)["offset"] == "0.06" and page.js("document.getElementById('problem').hidden")
     first, here = page.js("['min', 'value'].map((name) => Number(document.getElementById('width-slider')[name]))")
     assert first == here > 0  # a narrower block has no centre of mass there
+    # They end there in whatever unit the number is shown.
+    page = opened("width=0.4&height=1&offset=0.05&motion=none&initial_rotation=3deg&length_in=in")
+    page.rested(lambda: page.page.press("#offset-slider", "End"))
+    assert page.page.locator("#problem").is_hidden() and page.page.input_value("#offset") == "3.937"
+    assert query_of(page)["offset"] == "0.1"
 
 
 def test_a_number_that_is_being_typed_stays_when_a_response_arrives(opened):

@@ -72,11 +72,11 @@ class NumberControl {
 
   slid() {
     const part = Number(this.slider.value) / this.steps;
-    const {low, high, logarithmic, suffix, unit} = this.spec;
-    const number = String(Number((logarithmic ? low * (high / low) ** part : low + part * (high - low)).toPrecision(3)));
-    this.text = number + suffix;
-    this.field.value = number;
-    this.slider.setAttribute("aria-valuetext", `${number} ${unit}`.trim());
+    const {low, high, logarithmic, suffix} = this.spec.own ?? this.spec; // rounded in the unit in which the server says where tracks end
+    this.text = Number((logarithmic ? low * (high / low) ** part : low + part * (high - low)).toPrecision(3)) + suffix;
+    const written = shown(this.value(this.text));
+    this.field.value = written;
+    this.slider.setAttribute("aria-valuetext", `${written} ${this.spec.unit}`.trim());
     this.form.tell();
   }
 

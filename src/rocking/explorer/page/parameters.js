@@ -11,7 +11,7 @@ import {known, phrase} from "./texts.js";
 /** @typedef {{view: string, texts: Texts, other: Texts, compare: string, align: string, window: [number, number] | null, at: number | null, lecture: boolean, example: {name: string, step: number} | null, map: Texts, sweep: Texts, assessment: Texts, good: Good}} State */
 /** What was answered last of each part of the state: it alone enters the address.
  * @typedef {{texts: Texts, other: Texts, compare: string, align: string, map: Texts, sweep: Texts, assessment: Texts}} Good */
-/** @typedef {{name: string, label: string, group: string, kind: string, unit: string, suffix: string, default: string, units: Record<string, number>, low: number, high: number, logarithmic: boolean, step: number, values: string, explanation: string}} Parameter */
+/** @typedef {{name: string, label: string, group: string, kind: string, unit: string, suffix: string, default: string, units: Record<string, number>, low: number, high: number, logarithmic: boolean, step: number, values: string, explanation: string, own?: Parameter}} Parameter `own` is as the server says, where the page shows another unit */
 
 /** @type {any} */
 export const specification = await json("/api/start", {}).catch(stop);

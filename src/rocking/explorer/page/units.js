@@ -37,7 +37,7 @@ export function inUnits(spec) {
   const scale = unit && spec.units[unit.replace("/", "")];
   if (!unit || !scale || unit === offered[name][0]) return spec;
   const units = Object.fromEntries(Object.entries(spec.units).map(([each, size]) => [each, size / scale]));
-  return {...spec, units, unit: KNOWN[unit][1].trim(), suffix: unit, low: spec.low / scale, high: spec.high / scale};
+  return {...spec, own: spec, units, unit: KNOWN[unit][1].trim(), suffix: unit, low: spec.low / scale, high: spec.high / scale};
 }
 
 /** @param {string} name @param {number | null} value in SI units @param {number} [digits] @param {1 | 2} [which] */
