@@ -285,6 +285,16 @@ def test_the_bootstrap_draws_whole_clusters():
     assert np.diff(apart.median_interval) < 0.5 * np.diff(kept.median_interval)
 
 
+@pytest.mark.parametrize("apart", [0.3, 1e-6])
+def test_the_covariance_of_close_intensities_is_that_of_wide_ones(apart):
+    wide, close = (
+        fit_fragility(3.0 * np.exp(share * np.arange(4)), [2, 4, 5, 8], trials=10).curves[0] for share in (1.0, apart)
+    )
+    # The same data but for the unit of ln x; the error of the slope is in proportion.
+    assert close.covariance[1, 1] * apart**2 == pytest.approx(wide.covariance[1, 1], rel=1e-5)
+    assert np.all(np.linalg.eigvalsh(wide.covariance) > 0.0)
+
+
 @pytest.mark.parametrize("count", [1, 2])
 def test_one_or_two_clusters_bound_nothing_by_the_bootstrap_either(count):
     intensity, exceeded = outcomes(2, 60)

@@ -207,8 +207,12 @@ def likelihood(data: Outcomes, beta: Floats) -> Floats:
 
 def covariance(data: Outcomes, fitted: Probit) -> Floats:
     """Inverse of Fisher's expected information of intercept and slope, shape (2, 2), of one fit."""
-    counts = Outcomes(data.z, np.zeros_like(data.trials), data.trials)
-    return np.asarray(np.linalg.inv(scores(counts, np.column_stack(fitted))[1][0]), dtype=np.float64)
+    # About the middle of the intensities, and over their spread: else that of close ones is singular by rounding.
+    centre, spread = data.z.mean(), data.z.std()
+    counts = Outcomes((data.z - centre) / spread, np.zeros_like(data.trials), data.trials)
+    about = np.column_stack([fitted.intercept + fitted.slope * centre, fitted.slope * spread])
+    change = np.array([[1.0, -centre / spread], [0.0, 1.0 / spread]])
+    return np.asarray(change @ np.linalg.inv(scores(counts, about)[1][0]) @ change.T, dtype=np.float64)
 
 
 def gain(data: Outcomes, fitted: Probit, *, independent: bool) -> Likelihood:
