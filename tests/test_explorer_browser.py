@@ -1632,6 +1632,24 @@ def test_uneven_cells_of_a_study_lie_where_their_values_do(opened, tmp_path_fact
     running.server.should_exit = True
 
 
+@pytest.mark.parametrize(
+    ("query", "field", "done"),
+    [
+        (f"view=map&{SINE}&points=8&x=omega&x_to=4", "map-x-to", "map"),
+        pytest.param(f"view=periodic&{SINE}&sweep_points=12&sweep_to=4", "sweep_to", "sweep", marks=MORE),
+        pytest.param(f"view=assessment&{STATUE}&levels=4&records={RECORDS}", "levels", "assessment", marks=MORE),
+    ],
+)
+def test_the_way_back_shows_the_number_that_was_there_before_also_where_the_keys_are(opened, query, field, done):
+    page = opened(query)
+    shown, name = f"document.getElementById('{field}').value", field.replace("map-", "").replace("-", "_")
+    page.until(f"document.body.dataset.{done} === 'complete' && {shown} === '4'")
+    entered(page, field, "5")
+    page.until(f"new URLSearchParams(location.search).get('{name}') === '5'")
+    page.page.go_back()
+    page.until(f"new URLSearchParams(location.search).get('{name}') === '4' && {shown} === '4'", timeout=10.0)
+
+
 def test_a_map_is_zoomed_from_the_ends_that_are_asked_for(opened):
     page = opened(f"view=map&{SINE}&points=24&x=omega&x_from=1&x_to=5&y=a&y_from=1&y_to=1.1")
     complete(page)

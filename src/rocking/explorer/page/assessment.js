@@ -1,6 +1,7 @@
 // What the records of the list say of the case's block: fragility as it is computed, friction, rules of thumb, the margin.
 
 import {Latest, frames, unpacked} from "./api.js";
+import {isTyped} from "./controls.js";
 import {showExports, withLegend} from "./exports.js";
 import {bokeh, colour, figure, showPlot, themed} from "./theme.js";
 import {acceleration, accelerationAxis, velocity, withUnit} from "./units.js";
@@ -122,7 +123,7 @@ export class View {
     found.level_to = shown(levels[levels.length - 1] * scale);
     for (const name of FIELDS) {
       const input = /** @type {HTMLInputElement} */ (one(name));
-      if (document.activeElement !== input || !input.value || name === "measure") input.value = found[name];
+      if (!isTyped(input)) input.value = found[name];
     }
     one("measure-period").hidden = measure !== "sa";
     for (const each of document.querySelectorAll("#view-assessment .of-level")) each.textContent = accelerationAxis()[1];

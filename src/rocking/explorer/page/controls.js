@@ -20,6 +20,14 @@ export function choose(select, value) {
   select.value = value;
 }
 
+/** The field in which somebody types, until that counts. @type {EventTarget | null} */
+let typing = null;
+document.addEventListener("input", ({target}) => { typing = target; }, true);
+for (const end of ["change", "blur"]) document.addEventListener(end, () => { typing = null; }, true);
+
+/** Whether somebody types in a field: what arrives meanwhile leaves it as it is. @param {HTMLElement} field */
+export const isTyped = (field) => field === typing;
+
 /** @param {string} id @param {string} label @param {() => void} changed */
 export function check(id, label, changed) {
   const box = /** @type {HTMLInputElement} */ (make("input", {type: "checkbox", id, on: {change: changed}}));

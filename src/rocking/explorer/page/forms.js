@@ -1,7 +1,7 @@
 // Forms that change the texts of a case: its block, its motion, its model.
 
 import {json} from "./api.js";
-import {check, choice, choose, offer} from "./controls.js";
+import {check, choice, choose, isTyped, offer} from "./controls.js";
 import {remaking} from "./focus.js";
 import {MeshFields} from "./mesh.js";
 import {namesOf, parameter, pulseOf, specification} from "./parameters.js";
@@ -27,13 +27,11 @@ class NumberControl {
     this.spec = spec;
     this.form = form;
     this.steps = spec.step ? (spec.high - spec.low) / spec.step : STEPS;
-    /** Whether somebody types in the field: what arrives meanwhile leaves it as it is. */
-    this.typing = false;
     const id = `${prefix}${spec.name}`;
     this.slider = /** @type {HTMLInputElement} */ (make("input", {
       type: "range", id: `${id}-slider`, min: "0", max: String(this.steps), step: "1", "aria-label": phrase("form.slider", {label: spec.label}), on: {input: () => this.slid()},
     }));
-    this.field = /** @type {HTMLInputElement} */ (make("input", {type: "text", id, inputMode: "decimal", size: 6, "data-argument": spec.name, on: {input: () => { this.typing = true; }, change: () => this.typed(), blur: () => { this.typing = false; }}}));
+    this.field = /** @type {HTMLInputElement} */ (make("input", {type: "text", id, inputMode: "decimal", size: 6, "data-argument": spec.name, on: {change: () => this.typed()}}));
     const [button, words] = spec.explanation ? explained(spec.explanation, spec.label) : [];
     this.element = make("div", {className: "number"}, [
       make("div", {className: "number-head"}, [make("label", {for: id}, [spec.label]), ...(button ? [button] : [])]),
@@ -52,14 +50,14 @@ class NumberControl {
     this.text = text;
     const value = this.value(text);
     if (!Number.isFinite(value)) {
-      if (!this.typing) this.field.value = text;
+      if (!isTyped(this.field)) this.field.value = text;
       return;
     }
     const {low, high, logarithmic} = this.spec;
     const part = logarithmic ? Math.log(Math.max(value, 1e-300) / low) / Math.log(high / low) : (value - low) / (high - low);
     this.slider.value = String(Math.round(this.steps * Math.min(1, Math.max(0, part))));
     const written = shown(value);
-    if (!this.typing) this.field.value = written;
+    if (!isTyped(this.field)) this.field.value = written;
     this.slider.setAttribute("aria-valuetext", `${written} ${this.spec.unit}`.trim());
   }
 
@@ -81,7 +79,6 @@ class NumberControl {
   }
 
   typed() {
-    this.typing = false;
     const given = typed(this.field.value);
     if (given === "") {
       this.show(this.text);

@@ -1,7 +1,7 @@
 // A map of the case over two of its parameters, coarse to fine; or of a study.
 
 import {Latest, frames, json, payload} from "./api.js";
-import {choose} from "./controls.js";
+import {choose, isTyped} from "./controls.js";
 import {showExports} from "./exports.js";
 import {goOnAt} from "./focus.js";
 import {MapPicture, labelled, quantityLabel} from "./map-picture.js";
@@ -182,7 +182,7 @@ export class View {
       for (const [k, end] of ["from", "to"].entries()) {
         const field = /** @type {HTMLInputElement} */ (one(`map-${which}-${end}`)), name = `${which}_${end}`;
         this.usual[name] = String((wide ? axis.wide : axis.close)[k]);
-        if (document.activeElement !== field || !field.value) field.value = scaled(map[name] || this.usual[name], this.scale(name), 6);
+        if (!isTyped(field)) field.value = scaled(map[name] || this.usual[name], this.scale(name), 6);
       }
     }
   }

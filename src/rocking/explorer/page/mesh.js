@@ -1,7 +1,7 @@
 // The fields of a body of a mesh: its file, how that is read, and the picture on which it is turned.
 
 import {payload} from "./api.js";
-import {choice, choose, offer} from "./controls.js";
+import {choice, choose, isTyped, offer} from "./controls.js";
 import {namesOf, parameter, specification} from "./parameters.js";
 import {Plan} from "./plan.js";
 import {make} from "./words.js";
@@ -50,7 +50,7 @@ export class MeshFields {
     this.file.select.value = texts.mesh;
     choose(this.unit.select, texts.unit ?? "");
     choose(this.up.select, texts.up ?? "");
-    for (const [name, input] of Object.entries(this.typed)) if (document.activeElement !== input) input.value = texts[name] ?? "";
+    for (const [name, input] of Object.entries(this.typed)) if (!isTyped(input)) input.value = texts[name] ?? "";
   }
 
   /** @param {string} text @param {string} name */

@@ -1,7 +1,7 @@
 // The case under a sine that never ends: what it settles on in the phase plane, and a diagram of that over a parameter.
 
 import {Latest, frames, json, payload, unpacked} from "./api.js";
-import {choose} from "./controls.js";
+import {choose, isTyped} from "./controls.js";
 import {showExports, withLegend} from "./exports.js";
 import {specification} from "./parameters.js";
 import {bokeh, colour, figure, showPlot, themed} from "./theme.js";
@@ -167,7 +167,7 @@ export class View {
     for (const field of FIELDS) {
       const input = /** @type {HTMLElement} */ (one(field)), value = sweep[field] || shown[field];
       if (input instanceof HTMLSelectElement) choose(input, value);
-      else if (input instanceof HTMLInputElement && (document.activeElement !== input || !input.value)) input.value = value;
+      else if (input instanceof HTMLInputElement && !isTyped(input)) input.value = value;
     }
   }
 
