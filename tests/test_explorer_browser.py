@@ -1773,6 +1773,22 @@ def test_a_diagram_is_read_by_keys_and_swept_over_the_frequency(opened):
 
 
 @MORE
+def test_points_beside_each_other_read_otherwise(opened):
+    ends = "from=2&{0}_to=2.004"
+    for query, done, field, said in (
+        (f"view=map&{SINE}&points=8&x=omega&y=a&y_{ends.format('y')}", "map", "map", "map-at"),
+        (f"view=periodic&{SINE}&sweep_points=12&sweep_{ends.format('sweep')}", "sweep", "diagram", "sweep-at"),
+    ):
+        page = opened(query)
+        page.until(f"document.body.dataset.{done} === 'complete'")
+        page.page.focus(f"#{field}")
+        read = set()
+        for _ in range(3):
+            page.page.keyboard.press("ArrowUp" if field == "map" else "ArrowRight")
+            read.add(re.findall(r"2\.\d+", page.text(f"#{said}"))[0])
+        assert len(read) == 3
+
+
 def test_a_diagram_is_taken_away_and_computed_again(opened, tmp_path):
     only_chromium("hand over what it has saved")
     page = periodic(opened, f"{CASCADE}&sweep_points=100&sweep_from=1&sweep_to=7.2")

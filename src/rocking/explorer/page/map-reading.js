@@ -4,7 +4,7 @@ import {payload} from "./api.js";
 import {quantityValue} from "./map-picture.js";
 import {colour} from "./theme.js";
 import {make, one, say, tell} from "./words.js";
-import {joined, short} from "./numbers.js";
+import {amongst, joined, short} from "./numbers.js";
 import {inWords, phrase} from "./texts.js";
 
 /** How long pointer or mark must lie still before a response is asked for, ms. */
@@ -128,7 +128,7 @@ export class MapReading {
     if (!this.view.about || !this.view.values) return;
     const [row, column] = this.place(x, y);
     const written = (/** @type {any} */ axis, /** @type {number} */ k) => {
-      const label = inWords(axis.label), value = joined(short(axis.values[k]), axis.unit);
+      const label = inWords(axis.label), value = joined(amongst(axis.values, k), axis.unit);
       return axis.names ? phrase("map.coordinate_named", {label, value, name: axis.names[k]}) : phrase("map.coordinate", {label, value});
     };
     const index = row * this.view.about.shape[1] + column;

@@ -38,6 +38,12 @@ export function short(value, digits = 3) {
   return `${formatted("significant", digits, Number(mantissa))}${power(Number(exponent))}`;
 }
 
+/** A value of an axis, to so many digits that it is told from those beside it. @param {number[]} values @param {number} k */
+export function amongst(values, k) {
+  const step = Math.min(...[values[k - 1], values[k + 1]].filter((each) => each !== undefined).map((each) => Math.abs(each - values[k])));
+  return short(values[k], Math.min(15, 3 + Math.max(0, Math.ceil(Math.log10(Math.abs(values[k]) / step)) - 2)));
+}
+
 /** A number with so many decimals, or a dash where there is none. @param {number | null | undefined} value @param {number} digits */
 export const fixed = (value, digits) => (Number.isFinite(value) ? formatted("fixed", digits, /** @type {number} */ (value)) : NONE);
 

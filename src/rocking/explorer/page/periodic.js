@@ -6,7 +6,7 @@ import {showExports, withLegend} from "./exports.js";
 import {specification} from "./parameters.js";
 import {bokeh, colour, figure, showPlot, themed} from "./theme.js";
 import {counted, legend, one, tell} from "./words.js";
-import {short, typed} from "./numbers.js";
+import {amongst, typed} from "./numbers.js";
 import {inWords, phrase} from "./texts.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
@@ -322,7 +322,7 @@ export class View {
       const found = this.found[each].get(index);
       return found && phrase(`orbit.found_${each}`, {found: found.words});
     });
-    one("sweep-at").textContent = phrase("orbit.at", {label: inWords(label), value: short(values[index]), found: words.filter(Boolean).join("; ") || phrase("orbit.nothing")});
+    one("sweep-at").textContent = phrase("orbit.at", {label: inWords(label), value: amongst(values, index), found: words.filter(Boolean).join("; ") || phrase("orbit.nothing")});
   }
 
   /** @param {KeyboardEvent} event */
