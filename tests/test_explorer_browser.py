@@ -2289,6 +2289,14 @@ def test_what_is_wrong_with_dropped_files_is_said_and_the_next_are_read(opened, 
     page.until("document.getElementById('said').textContent.includes('last.csv')")
 
 
+def test_a_record_that_is_chosen_where_nothing_shook_the_block_shakes_it_from_rest(opened):
+    page = opened("width=0.24&height=1.1&motion=none&initial_rotation=3deg&view=records")
+    page.until("document.querySelector('[data-record^=el-centro]')")
+    page.rested(lambda: page.page.click("[data-record='el-centro-meloland-270#']"))
+    found = query_of(page)
+    assert found["motion"] == "el-centro-meloland-270" and "initial_rotation" not in found
+
+
 def test_an_entry_of_the_list_without_a_motion_is_left_out(opened):
     page = opened(f"{STATUE}&records=dt%3D0.01")
     assert not page.js("document.body.inert")
@@ -3209,6 +3217,21 @@ def test_the_last_of_two_files_shakes_the_block_however_late_the_first_arrives(o
     page.until(f"location.search.includes('{key}')")
     page.page.wait_for_timeout(500)
     assert query_of(page)["motion"] == f"file:{key}" and "'second.csv'" in page.text("#python")
+
+
+def test_a_block_is_never_drawn_with_the_rotation_of_another_case(opened):
+    page = opened(f"{STATUE}&view=block")
+    stage = "document.getElementById('stage').dataset.shown"
+    page.until(stage)
+    with held(page, "**/api/window?*") as waiting:
+        page.page.click("#to-rest")
+        asked(page, waiting)
+        page.rested(lambda: entered(page, "pga", "0.2"))
+        waiting[0].continue_()
+        asked(page, waiting, 2)
+        page.page.wait_for_timeout(200)
+        assert not page.js(stage)
+    page.until(stage)
 
 
 def test_a_late_answer_leaves_alone_what_was_chosen_after_the_question(opened):

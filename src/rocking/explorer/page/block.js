@@ -176,7 +176,8 @@ export class View {
   async bring(from, to) {
     if (!(to > from)) return;
     const texts = {...this.page.state.good.texts, from: String(from), to: String(to), ground: "1", points: "1200"};
-    const {header, arrays} = await payload("/api/window", texts);
+    const {of} = this, {header, arrays} = await payload("/api/window", texts);
+    if (this.of !== of) return; // another case is shown meanwhile
     this.lines = {...header.window, ...arrays};
     if (!this.playing) this.paint();
   }

@@ -80,9 +80,10 @@ export class RecordList {
   /** Texts of a record as the motion of a case, with its vertical component where that is wanted. @param {Row} row @returns {Texts} */
   motion({texts, vertical}) { return {...texts, ...(this.rising && vertical ? {vertical} : {})}; }
 
-  /** Texts of a case shaken by a record, scaled as it was. @param {Row} row @returns {Texts} */
+  /** Texts of a case shaken by a record, scaled as it was; what nothing shook is released no more. @param {Row} row @returns {Texts} */
   casePut(row) {
     const gone = namesOf("motion").filter((name) => !["scale", "pga", "pgv", "sa"].includes(name));
+    if (this.state.texts.motion === "none") gone.push(...namesOf("start"));
     return {...Object.fromEntries(Object.entries(this.state.texts).filter(([name]) => !gone.includes(name))), ...this.motion(row)};
   }
 
