@@ -588,11 +588,10 @@ def test_deeper_goes_on_from_the_window_that_is_asked_for(opened):
     with held(page, "**/api/window?*") as waiting:
         page.page.click("#deeper")
         asked(page, waiting)
-        page.until("location.search.includes('from=')")
-        low, high = page.js(WINDOW)
+        low, high = (float(parse_qs(urlsplit(waiting[0].request.url).query)[end][0]) for end in ("from", "to"))
         page.page.click("#deeper")
-        page.until(f"{WINDOW}[0] !== {low!r}")
-        lower, upper = page.js(WINDOW)
+    page.until(f"![0, {low!r}].includes({WINDOW}[0])")
+    lower, upper = page.js(WINDOW)
     assert upper - lower == pytest.approx(0.1 * (high - low), rel=1e-6)
 
 
@@ -657,6 +656,15 @@ def test_a_view_that_was_chosen_while_a_field_was_wrong_has_files_of_its_own(ope
     page.page.click('[data-view="response"]')
     page.until("document.getElementById('python').textContent.includes('rocking.simulate(')")
     assert "chattering_map" not in page.text("#python")
+
+
+def test_the_address_has_the_window_that_is_drawn_also_beside_a_refused_value(opened):
+    page = opened(f"{STATUE}&from=231&to=239", allowed=["422"])
+    entered(page, "width", "-1")
+    page.until("!document.getElementById('problem').hidden")
+    page.page.click("[data-zoom=in]")
+    page.page.wait_for_timeout(400)
+    assert page.js(WINDOW) == [231.0, 239.0]
 
 
 def test_a_reading_is_of_the_case_and_of_the_time_that_are_shown(opened):
@@ -2449,6 +2457,8 @@ def test_a_view_is_printed_on_one_page_with_its_keys(opened, view, query):
     page.js("window.print = () => { document.body.dataset.printed = '1'; }; 1")
     page.page.click("#print")
     page.until("document.body.dataset.printed", "the page is ready to be printed")
+    if view == "assessment":
+        assert "levels=6" in page.text("#print-head") and "records=" not in page.text("#print-head")
     if view == "block":  # it is drawn for paper: shrunk, its letters would be smaller than those of the page
         stage = "document.getElementById('stage')"
         drawn = page.js(f"[{stage}.clientHeight, {stage}.height, {stage}.width - 3 * {stage}.clientWidth]")
@@ -3065,6 +3075,19 @@ def test_a_case_is_pinned_as_it_was_when_its_name_was_asked_for_and_replaces_no_
     for _ in range(3):
         page.page.locator(".chip .remove").first.click()
     assert page.js(pins) == []
+
+
+def test_no_case_is_pinned_in_place_of_another_where_another_tab_has_pinned_the_last(opened):
+    page = opened(STATUE)
+    page.page.click("#pin")
+    kept = [{"name": str(k), "texts": {"width": f"0.{k}"}} for k in range(1, 9)]
+    page.js("(kept) => localStorage.setItem('rocking-snapshots', JSON.stringify(kept))", kept)
+    page.page.press("#pin-name", "Enter")
+    page.says("problem", "remove one to pin another")
+    assert page.js("JSON.parse(localStorage.getItem('rocking-snapshots'))") == kept
+    page.page.press("#pin-name", "Escape")
+    assert page.page.locator("#problem").is_hidden()
+    page.js("localStorage.clear()")
 
 
 def test_back_out_of_a_lecture_leaves_its_large_text(opened):

@@ -88,7 +88,7 @@ export class View {
     const {header, arrays} = await payload("/api/compare", {...asked, ...ends(state)});
     if (state.good !== good || state.view !== "compare") return; // somebody went back, or elsewhere, meanwhile
     if (state.window && state.window[0] >= header.duration) state.window = null; // it was of longer responses
-    this.page.remember({other: chosen, compare: kind, align});
+    this.page.remember({other: chosen, compare: kind, align, window: state.window});
     this.draw(header, arrays, kind, chosen);
     // Both blocks have the gravity of the case.
     if (state.other === chosen) this.block?.show({...chosen, gravity: texts.gravity}, header.cases[1].block.sides);

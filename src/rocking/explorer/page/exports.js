@@ -14,7 +14,7 @@ const FORMS = /** @type {[string, string, boolean][]} */ ([
  * @param {(error: unknown) => void} problem is told what went wrong, or null */
 export function showFiles(state, problem) {
   offer(FORMS.map(([form, label, windowed]) => [
-    `rocking-response.${form}`, label, () => file("/api/export", {...state.good.texts, form, ...(windowed ? ends(state) : {})}),
+    `rocking-response.${form}`, label, () => file("/api/export", {...state.good.texts, form, ...(windowed ? ends(state.good) : {})}),
   ]), problem);
 }
 

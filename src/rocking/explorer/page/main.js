@@ -52,14 +52,14 @@ const lecture = new Lecture(page, histories);
 const examples = new Examples(state, revisit, problem);
 new Sheet();
 const ghosts = new Ghosts(histories);
-new Snapshots({now: () => (page.shown ? {name: caseName(page.shown.header), texts: {...state.good.texts}} : null), open: restate, changed: () => views.compare?.repinned()});
+new Snapshots({problem: (error) => problem(error, "snapshots"), now: () => (page.shown ? {name: caseName(page.shown.header), texts: {...state.good.texts}} : null), open: restate, changed: () => views.compare?.repinned()});
 
 /** Whether a case is drawn, be it the one that the state says or another one. */
 let drawn = false;
 /** What is wrong at each place of the page, by its id. @type {Record<string, string | null>} */
 const problems = {};
 /** Places where somebody has just done something: what is wrong there is said before what views make of it. */
-const FIRST = ["settings", "files", "exports", "print-head"];
+const FIRST = ["settings", "files", "snapshots", "exports", "print-head"];
 
 /** Say what is wrong, or that nothing is, and mark the field that is wrong. @param {unknown} error @param {string} [place] id of what holds the field */
 function problem(error, place = "settings") {
@@ -115,7 +115,7 @@ async function compute() {
     if (state.texts === asked) forms.block.known = found.header.block.sides;
     // It was chosen for a longer response; where two are compared, the other may be longer.
     if (state.view !== "compare" && state.window && state.window[0] >= found.header.duration) state.window = null;
-    accepted(state, {texts});
+    accepted(state, {texts, window: state.window});
     draw();
     counted("drawn");
   } catch (error) {
@@ -128,8 +128,9 @@ async function compute() {
 
 /** Another window of the case that is shown. */
 async function look() {
-  const {header, arrays} = await payload("/api/window", {...texts, ...ends(state)});
-  if (!page.shown) return; // another case is on its way
+  const {window: asked, good} = state, {header, arrays} = await payload("/api/window", {...texts, ...ends(state)});
+  if (!page.shown || state.good !== good) return; // another case is on its way, or somebody went back
+  accepted(state, {window: asked});
   page.shown.header.window = header.window;
   Object.assign(page.shown.arrays, arrays);
   draw();
@@ -175,7 +176,6 @@ function follow(time, playing) {
 /** @param {[number, number] | null} chosen */
 function showWindow(chosen) {
   state.window = chosen;
-  writeAddress(state);
   void load.ask();
 }
 

@@ -10,7 +10,7 @@ import {known, phrase} from "./texts.js";
 /** @typedef {import("./api.js").Texts} Texts */
 /** @typedef {{view: string, texts: Texts, other: Texts, compare: string, align: string, window: [number, number] | null, at: number | null, lecture: boolean, example: {name: string, step: number} | null, map: Texts, sweep: Texts, assessment: Texts, good: Good}} State */
 /** What was answered last of each part of the state: it alone enters the address.
- * @typedef {{texts: Texts, other: Texts, compare: string, align: string, map: Texts, sweep: Texts, assessment: Texts}} Good */
+ * @typedef {{texts: Texts, other: Texts, compare: string, align: string, window: [number, number] | null, map: Texts, sweep: Texts, assessment: Texts}} Good */
 /** @typedef {{name: string, label: string, group: string, kind: string, unit: string, suffix: string, default: string, units: Record<string, number>, low: number, high: number, logarithmic: boolean, step: number, values: string, explanation: string, own?: Parameter}} Parameter `own` is as the server says, where the page shows another unit */
 
 /** @type {any} */
@@ -71,13 +71,12 @@ export function readAddress() {
   const parts = {
     texts: complete(Object.keys(texts).length ? texts : opening), other: those(namesOf(), "other."),
     compare: COMPARED.find((each) => each === given.get("compare")) ?? COMPARED[0], align: ALIGNED.find((each) => each === given.get("align")) ?? ALIGNED[0],
-    map: those(specification.map), sweep: those(specification.sweep), assessment: those(specification.assessment),
+    window: /** @type {[number, number] | null} */ (from < to ? [from, to] : null), map: those(specification.map), sweep: those(specification.sweep), assessment: those(specification.assessment),
   };
   return {
     ...parts,
     good: {...parts},
     view: VIEWS.includes(view) ? view : "response",
-    window: from < to ? [from, to] : null,
     at: time >= 0 && time < Infinity ? time : null,
     lecture: given.get("lecture") === "1",
     example: given.get("example") ? {name: given.get("example") ?? "", step: Number(given.get("step") ?? 1)} : null,
@@ -91,7 +90,7 @@ function complete(texts) {
   return ["width", "p", "pivots", "mesh"].some((name) => name in texts) ? texts : {width, height, ...texts};
 }
 
-/** The window as texts. @param {State} state @returns {Texts} */
+/** The window as texts. @param {Pick<State, "window">} state @returns {Texts} */
 export const ends = ({window: chosen}) => (chosen ? {from: String(chosen[0]), to: String(chosen[1])} : {});
 
 /** Parts of the state were answered: what they were then belongs into the address. @param {State} state @param {Partial<Good>} parts */
@@ -122,7 +121,7 @@ export function writeAddress(state) {
     if (state.view === "periodic") put(good.sweep, specification.sweep);
     if (state.view === "records" || state.view === "assessment") put(good.assessment, specification.assessment);
     for (const [name, unit] of unitsChosen()) given.set(name, unit);
-    put(ends(state), ["from", "to"]);
+    put(ends(good), ["from", "to"]);
     if (state.at !== null && (state.view === "response" || state.view === "block")) given.set("at", String(state.at));
     if (state.lecture) given.set("lecture", "1");
     if (state.example) { given.set("example", state.example.name); given.set("step", String(state.example.step)); }

@@ -55,9 +55,12 @@ function head(rows) {
   one("print-head").replaceChildren(...rows.map(([name, text]) => make("div", {}, [make("dt", {}, [name]), make("dd", {}, [text])])));
 }
 
-/** @param {any} state */
-function address({view, assessment, good}) {
-  return view === "assessment" && assessment.records ? phrase("print.listed", {address: `?${new URLSearchParams(good.texts)}&view=assessment`}) : `?${location.search.slice(1)}`;
+/** The address, of an assessment without its list of records, which is on the page. @param {any} state */
+function address({view, assessment}) {
+  const given = new URLSearchParams(location.search);
+  if (view !== "assessment" || !assessment.records) return `?${given}`;
+  given.delete("records");
+  return phrase("print.listed", {address: `?${given}`});
 }
 
 /** Which study it is, what of it is drawn, and what is fixed. @returns {string[][]} */

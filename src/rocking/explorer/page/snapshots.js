@@ -1,5 +1,6 @@
 // Cases that somebody has pinned, each with a name: the storage of this origin keeps them, so that they outlive a reload.
 
+import {Problem} from "./api.js";
 import {make, one, say} from "./words.js";
 import {phrase} from "./texts.js";
 
@@ -43,8 +44,8 @@ function unused({name, texts}) {
 }
 
 export class Snapshots {
-  /** @param {{now: () => Snapshot | null, open: (texts: Texts) => void, changed: () => void}} page the present case with a name for it, what
-   * opens another, and what is told that others are pinned */
+  /** @param {{now: () => Snapshot | null, open: (texts: Texts) => void, changed: () => void, problem: (error: unknown) => void}} page the present
+   * case with a name for it, what opens another, and what is told that others are pinned, or what went wrong */
   constructor(page) {
     this.page = page;
     this.name = /** @type {HTMLInputElement} */ (make("input", {type: "text", id: "pin-name", maxLength: LONGEST, hidden: true, "aria-label": phrase("snapshots.name"),
@@ -69,6 +70,11 @@ export class Snapshots {
       this.name.select();
       return;
     }
+    read();
+    if (known.length >= MOST) { // another tab may have pinned the last one
+      this.page.problem(new Problem(phrase("snapshots.full", {count: MOST})));
+      return;
+    }
     const {texts} = this.asked, name = unused({name: this.name.value.trim() || this.asked.name, texts});
     this.keep((all) => [...all.filter((each) => each.name !== name), {name, texts}]);
     say(phrase("snapshots.pinned", {name}));
@@ -77,6 +83,7 @@ export class Snapshots {
 
   close() {
     this.asked = null;
+    this.page.problem(null);
     this.name.hidden = true;
     this.button.textContent = phrase("snapshots.pin");
     this.focus();
