@@ -759,7 +759,7 @@ def test_what_would_be_ignored_of_a_study_that_is_there_is_refused(tmp_path):
     rocking.study(tmp_path / "one", BLOCKS, MOTIONS, levels=[0.5, 1.0], unit_blocks=512)
     with pytest.raises(rocking.errors.InvalidOption, match="levels, measure belong to blocks and motions"):
         rocking.study(tmp_path / "one", levels=[1.0], measure="pga")
-    for given in ({"model": "nonlinear"}, {"chattering": "velocity"}, {"measure": "pga"}, {"polarity": "both"}):
+    for given in ({"model": "linear"}, {"chattering": "velocity"}, {"measure": "pga"}, {"polarity": "both"}):
         with pytest.raises(rocking.errors.InvalidOption, match=f"{next(iter(given))} belongs to blocks and motions"):
             rocking.study(tmp_path / "one", **given)
     with pytest.raises(rocking.errors.InvalidOption, match="duration, outcomes belong to"):

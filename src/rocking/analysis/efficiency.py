@@ -126,8 +126,6 @@ def compare_measures(
     if len(shaken) < 2:
         raise InvalidOption("measures are compared by how {} scatter: give two or more, not one", "motions")
     times = checks.positive_numbers(periods, "periods", InvalidOption)
-    together = clusters_of(shaken, clusters)
-    _check_enough(len(np.unique(together)), clusters)
     measures = [
         Measure("pga"),
         Measure("pgv"),
@@ -135,6 +133,8 @@ def compare_measures(
         Measure("pga_ratio"),
         Measure("pgv_ratio"),
     ]
+    together = clusters_of(shaken, clusters)
+    _check_enough(len(np.unique(together)), clusters)
     scaled = incremental_dynamic_analysis(
         many, shaken, measure="pga_ratio", model=model, tolerance=tolerance, threads=threads, progress=progress
     )

@@ -462,11 +462,11 @@ def study(
     blocks: Bodies | Body | Sequence[Body] | None = None,
     motions: Motions | None = None,
     *,
-    model: Model | None = None,
-    chattering: str | Treatment | None = None,
+    model: Model = "nonlinear",
+    chattering: str | Treatment = "certified",
     levels: ArrayLike | None = None,
-    measure: MeasureName | Measure | None = None,
-    polarity: Polarity | None = None,
+    measure: MeasureName | Measure = "factor",
+    polarity: Polarity = "+",
     duration: float | None = None,
     refine: float | Mapping[str, float] | None = None,
     outcomes: Sequence[str] | None = None,
@@ -484,15 +484,15 @@ def study(
         argument (but `refine`).
     motions : Motion, sequence of Motion, or mapping of str to Motion, optional
         As for `simulate_many`.
-    model : {"nonlinear", "linear"}, optional
-        As for `simulate_many`, with its default for a new study; likewise the next five.
-    chattering : str or Treatment, optional
+    model : {"nonlinear", "linear"}
+        As for `simulate_many`.
+    chattering : str or Treatment
         As for `simulate_many`.
     levels : array_like, optional
         As for `simulate_many`.
-    measure : {"factor", "pga", "pgv"} or Measure, optional
+    measure : {"factor", "pga", "pgv"} or Measure
         As for `simulate_many`.
-    polarity : {"+", "-", "both"}, optional
+    polarity : {"+", "-", "both"}
         As for `simulate_many`.
     duration : float, optional
         As for `simulate_many`.
@@ -537,11 +537,11 @@ def study(
         if blocks is not None or motions is not None:
             raise InvalidOption("a new study needs {} and {}; one that is there needs neither", "blocks", "motions")
         _refuse_inputs(
-            model=model,
-            chattering=chattering,
+            model=None if model == "nonlinear" else model,
+            chattering=None if chattering == "certified" else chattering,
             levels=levels,
-            measure=measure,
-            polarity=polarity,
+            measure=None if measure == "factor" else measure,
+            polarity=None if polarity == "+" else polarity,
             duration=duration,
             outcomes=outcomes,
             unit_blocks=unit_blocks,
@@ -550,8 +550,7 @@ def study(
         if refine is not None:
             keep_plan(store, tolerances_of(store.product, refine, store.grid.outcomes))
         return Study(store)
-    given = measure or "factor", polarity or "+", model or "nonlinear", chattering or "certified"
-    product = product_of(blocks, motions, levels, *given, duration)
+    product = product_of(blocks, motions, levels, measure, polarity, model, chattering, duration)
     return study_of(place, product, unit_blocks, refine=refine, outcomes=chosen_outcomes(outcomes))
 
 
