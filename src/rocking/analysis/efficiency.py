@@ -292,9 +292,9 @@ def _dataset(
 def _check_enough(count: int, clusters: object) -> None:
     """Refuse a sample of one: so many clusters, or motions if no clusters were given."""
     if count < 2:
-        which = "motions that are not multiples of one another" if clusters is None else "{}"
+        kind, which = ("motions", " that are not multiples of one another") if clusters is None else ("clusters", "")
         raise InvalidOption(
-            f"fewer than two {which} overturn a block, however strong; a dispersion needs more", "clusters"
+            f"fewer than two {{}}{which} overturn a block, however strong; a dispersion needs more", kind
         )
 
 

@@ -391,11 +391,8 @@ def _check_shape(unit: Motion, pulse: Callable[[float, float], Motion], frequenc
     """Refuse a pulse whose motion is another one than `unit` when it is as many times as fast, and stronger."""
     stronger = 1.0 + ratio
     other = _called(pulse, stronger, ratio * frequency)
-    same = (unit.vertical is None) == (other.vertical is None) and _is_as_long(unit, other, ratio)
-    for first, second in ((unit, other), (unit.vertical, other.vertical)):
-        if same and first is not None and second is not None:
-            same = _is_as_long(first, second, ratio) and _is_alike(first, second, stronger)
-    if not same:
+    pairs = (unit, other), (unit.vertical, other.vertical)
+    if not all(_is_alike(first, second, stronger, ratio) for first, second in pairs):
         raise InvalidOption(
             "the {} must have one shape: a function of amplitude and frequency whose motion is proportional to the "
             f"amplitude, and over in half the time at twice the frequency; that of {frequency:g} Hz is another one "
@@ -404,12 +401,12 @@ def _check_shape(unit: Motion, pulse: Callable[[float, float], Motion], frequenc
         )
 
 
-def _is_as_long(first: Motion, second: Motion, ratio: float) -> bool:
-    return abs(ratio * second.duration - first.duration) <= _SAME * first.duration
-
-
-def _is_alike(first: Motion, second: Motion, factor: float) -> bool:
-    """Whether one motion is the other by a factor, each over its own duration."""
+def _is_alike(first: Motion | None, second: Motion | None, factor: float, ratio: float) -> bool:
+    """Whether the second component is the first by a factor, and so many times as fast; or none is there."""
+    if first is None or second is None:
+        return first is second
+    if abs(ratio * second.duration - first.duration) > _SAME * first.duration:
+        return False
     phases = (np.arange(_PHASES) + 0.5) / _PHASES
     one, other = first.acceleration(phases * first.duration), second.acceleration(phases * second.duration) / factor
     return bool(np.abs(other - one).mean() <= _SAME * np.abs(one).max())

@@ -132,6 +132,7 @@ def grid_of(case: Case, texts: Texts) -> MapGrid:
     x, y = (_axis(which, case, texts, int(points)) for which in ("x", "y"))
     if x.name == y.name or {x.name, y.name} in _SAME:
         raise InvalidOption("{} and {} vary the same: choose another pair of axes", x.name, y.name)
+    # Blocks of a map over the restitution have one on both sides, and the highest comes to rest last.
     eta = [float(axis.values[-1]) for axis in (x, y) if axis.name == "restitution"]
     require_rest(eta * 2 or [side.restitution for side in case.block.sides])
     grid = MapGrid(case, case.motion, x, y)

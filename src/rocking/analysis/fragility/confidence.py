@@ -23,6 +23,7 @@ from rocking.analysis.fragility.lognormal import (
     logarithms,
     scores,
     solved,
+    standardised,
 )
 from rocking.arrays import Floats, Integers
 
@@ -72,9 +73,7 @@ class LikelyRegion:
         """Measure the region from the maximum outwards; without clusters every outcome is on its own."""
         from scipy.special import chdtri, stdtrit
 
-        centre, spread = data.z.mean(), data.z.std()
-        scaled = data._replace(z=(data.z - centre) / spread)
-        best = Probit(fitted.intercept + fitted.slope * centre, fitted.slope * spread)
+        scaled, best, centre, spread = standardised(data, fitted)
         if clusters is None:
             around = _around(scaled, best, 0.5 * float(chdtri(1.0, 1.0 - confidence)))
         elif (count := int(clusters.max()) + 1) < FEWEST:

@@ -207,12 +207,20 @@ def likelihood(data: Outcomes, beta: Floats) -> Floats:
 
 def covariance(data: Outcomes, fitted: Probit) -> Floats:
     """Inverse of Fisher's expected information of intercept and slope, shape (2, 2), of one fit."""
-    # About the middle of the intensities, and over their spread: else that of close ones is singular by rounding.
-    centre, spread = data.z.mean(), data.z.std()
-    counts = Outcomes((data.z - centre) / spread, np.zeros_like(data.trials), data.trials)
-    about = np.column_stack([fitted.intercept + fitted.slope * centre, fitted.slope * spread])
+    scaled, about, centre, spread = standardised(data, fitted)
+    counts = scaled._replace(exceeded=np.zeros_like(data.trials))
     change = np.array([[1.0, -centre / spread], [0.0, 1.0 / spread]])
-    return np.asarray(change @ np.linalg.inv(scores(counts, about)[1][0]) @ change.T, dtype=np.float64)
+    return np.asarray(change @ np.linalg.inv(scores(counts, np.column_stack(about))[1][0]) @ change.T, dtype=np.float64)
+
+
+def standardised(data: Outcomes, fitted: Probit) -> tuple[Outcomes, Probit, float, float]:
+    """Return data and fits with z about its mean and over its deviation, and these two.
+
+    Intensities that are close to each other would else be told apart by their last digits only.
+    """
+    centre, spread = float(data.z.mean()), float(data.z.std())
+    scaled = data._replace(z=(data.z - centre) / spread)
+    return scaled, Probit(fitted.intercept + fitted.slope * centre, fitted.slope * spread), centre, spread
 
 
 def gain(data: Outcomes, fitted: Probit, *, independent: bool) -> Likelihood:
