@@ -31,7 +31,7 @@ RECORD = "el-centro-meloland-270"
 def test_simulate_prints_a_verdict(run):
     code, out, err = run("simulate", "ridgecrest-clc-090", *BLOCK)
     assert (code, err) == (0, "")
-    for word in ("uplift", "impacts resolved", "complete chattering proven", "peak rotation", "friction", "verdict"):
+    for word in ("uplift", "impacts resolved", "complete chattering proven", "peak rotation", "friction", "outcome"):
         assert word in out
 
 

@@ -385,7 +385,7 @@ def test_an_ascii_locale_is_no_error(tmp_path):
 def test_what_looks_like_a_mistake_is_noted_and_computed(run, arguments, sentence):
     code, out, err = run("simulate", *arguments)
     assert code == 0
-    assert "verdict" in out
+    assert "outcome" in out
     assert err.count("\n") == 1
     assert err.startswith("rocking: note: ")
     assert sentence in err

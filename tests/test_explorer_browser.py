@@ -162,7 +162,7 @@ def test_the_first_page_shows_a_block_that_chatters(opened):
     assert cells[4] == "± 7.1 s" and cells[5].endswith(" ps")
     head = page.page.locator("#sequences th").all_text_contents()
     assert page.js("(({scrollWidth, clientWidth}) => scrollWidth <= clientWidth)(document.querySelector('.scroll'))")
-    assert head[3:5] == ["Moves, if the motion is off by a millionth", "Bracket of the computation"]
+    assert head[3:5] == ["Moves, if the motion changes by 3e-6", "Bracket of the computation"]
 
 
 def test_a_slider_changes_the_response(opened):

@@ -319,7 +319,7 @@ def test_the_case_as_python_runs_and_has_the_same_peak(texts, tmp_path, capsys):
     script.write_text(case_as_python(case), "utf-8")
     found = runpy.run_path(str(script))
     assert found["response"].peak_rotation == case.simulate().peak_rotation
-    assert "verdict" in capsys.readouterr().out
+    assert "outcome" in capsys.readouterr().out
 
 
 @pytest.mark.cases(fast=3)

@@ -173,10 +173,10 @@ def test_the_zoom_shows_every_interval_against_the_time_to_rest():
 def test_the_zoom_says_how_far_the_rest_is_known_before_the_bracket_of_the_computation():
     response = simulate(Block(width=0.24, height=1.1), records.load("ridgecrest-clc-090"))
     zoom = response.plot(longest_sequence=True).axes[2]
-    change = abs(response.sensitivity.events["motion"][-1])
-    assert zoom.get_title(loc="left") == "A: at rest at 239.9167\N{NO-BREAK SPACE}s"
+    near = response.perturbed()
+    assert zoom.get_title(loc="left") == "A: at rest at 239.917\N{NO-BREAK SPACE}s"
     first, second = zoom.texts[0].get_text().replace("\n", " ").split("; ")
-    assert first == f"± {1e-6 * change:.0e} s if the motion is off by a millionth"
+    assert first == f"± {near.event_spreads[-1]:.0e} s in all 5 motions within 3e-6"
     assert second.startswith("bracket of the computation ")
 
 

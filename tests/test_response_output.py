@@ -119,51 +119,26 @@ def test_a_response_of_a_million_impacts_shows_itself_at_once(shaken, monkeypatc
 
 
 @pytest.mark.parametrize(
-    ("time", "change", "text"),
+    ("below", "above", "text"),
     [
-        (230.7262443771, 0.0, "230.726244377 s"),
-        (230.7262443771, 0.9e-3, "230.726244377 s"),
-        (230.7262443771, 0.02, "230.7262444 s"),
-        (230.7262443771, 3.0, "230.72624 s"),
-        (230.7262443771, 0.9e3, "230.726 s"),
-        (230.7262443771, 1.2e3, "230.726 +- 0.001 s"),
-        (230.7262443771, 4e5, "230.7 +- 0.4 s"),
-        (230.7262443771, 2e6, "231 +- 2 s"),
-        (230.7262443771, 1e9, "about 231 s"),
+        (0.0, 0.0, "230.726244377 s"),
+        (0.9e-9, 0.0, "230.726244377 s"),
+        (0.0, 0.02e-6, "230.7262444 s"),
+        (3e-6, 1e-6, "230.72624 s"),
+        (1e-5, 0.9e-3, "230.726 s"),
+        (1.2e-3, 0.0, "230.725 to 230.726 s"),
+        (0.4, 0.3, "230.3 to 231.0 s"),
+        (1.0, 2.0, "230 to 233 s"),
     ],
 )
-def test_a_time_has_the_digits_that_a_millionth_of_the_motion_leaves(time, change, text):
-    assert time_text(time, change) == text
+def test_a_time_has_the_digits_that_repeated_simulations_leave(below, above, text):
+    time = 230.7262443771
+    assert time_text(time, time - below, time + above) == text
 
 
-def test_a_summary_explains_the_margins_that_it_has():
-    fallen = rocking.simulate(Block(width=0.22, height=1.1), rocking.records.load("ridgecrest-tow2-360")).summary()
-    assert "overturn            38.747 +- 0.004 s" in fallen
-    last = fallen.splitlines()[-1]
-    assert last == "+-                  by how much the number before it is off if the motion is off by a millionth"
-
-
-@pytest.mark.parametrize("change", [math.inf, math.nan])
-def test_a_change_beyond_all_numbers_leaves_no_digit_that_is_told_as_known(change):
-    assert time_text(230.7, change) == "about 231 s"
-    assert summary.digits_of(0.123, change) == 1
-
-
-@pytest.mark.parametrize("name", ["motion", "initial_rotation", "initial_velocity"])
-def test_digits_are_those_that_are_left_by_whatever_drives_the_block(name):
-    """Motion, initial rotation and initial velocity, each where it alone drives: peak and impacts by differences."""
-    block, h = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9), 1e-6
-
-    def driven(factor):
-        motion = rocking.pulses.one_sine(2.5, 1.0).scaled(factor) if name == "motion" else None
-        return simulate(block, motion, **({} if name == "motion" else {name: 0.1 * factor}))
-
-    response, more, less = driven(1.0), driven(1.0 + h), driven(1.0 - h)
-    peak, events, impacts = sensitivity.driving(response.sensitivity)
-    assert peak == pytest.approx(abs(more.peak_rotation - less.peak_rotation) / (2.0 * h), rel=1e-4)
-    slopes = (more.impacts["time"][:3] - less.impacts["time"][:3]) / (2.0 * h)
-    assert impacts[:3] == pytest.approx(np.abs(slopes), rel=1e-3)
-    assert min(peak, *impacts[:3]) > 1e-3 and len(events) == len(response.events)
+@pytest.mark.parametrize("unknown", [math.inf, math.nan])
+def test_an_infinite_change_leaves_no_digit_that_is_shown_as_known(unknown):
+    assert summary.digits_of(0.123, unknown) == 1
 
 
 def test_a_sensitivity_that_there_is_not_is_kept_by_its_error(shaken):
@@ -184,10 +159,9 @@ def test_each_sensitivity_is_one_pass_when_asked_for_and_a_share_of_nothing_is_n
     passes, vary = [], sensitivity.vary
     monkeypatch.setattr(sensitivity, "vary", lambda *given: (passes.append(given[3]), vary(*given)))
     found = simulate(shaken.body, shaken.motion).sensitivity
-    peak, _, impacts = sensitivity.driving(found)
-    assert passes == [0]
-    assert peak == abs(found.peak["motion"][0]) > 0.0
-    assert impacts.tolist() == np.abs(found.impacts["motion"]).tolist()
+    assert found.peak["motion"][0] != 0.0
+    assert passes == [0, 3, 4, 5]
+    assert found.impacts["motion"].any()
     assert passes == [0, 3, 4, 5]
     for quantity, name in ((1, "initial_rotation"), (2, "initial_velocity")):
         changes = np.ones(1), np.ones(len(found.impacts)), np.ones(len(found.events))
@@ -217,9 +191,7 @@ def test_a_summary_says_what_was_resolved_and_until_when_forces_count(shaken, fa
 def test_an_ambiguous_response_says_what_is_affected_and_what_to_do(ambiguous, shaken):
     assert ambiguous.ambiguities == ("events",)
     assert shaken.ambiguities == ()
-    verdict = ambiguous.summary().splitlines()[-1]
-    assert "changes times of events or impacts: scale the motion" in verdict
-    assert "spread" in verdict
+    assert "AMBIGUOUS: one unit in the last place of the input changes times of events" in ambiguous.summary()
     assert "AMBIGUOUS" not in shaken.summary()
 
 
@@ -359,45 +331,42 @@ def test_unknown_units_and_times_that_are_no_numbers_are_refused(shaken):
 
 
 def test_no_time_beside_another_has_more_digits_than_it():
-    """A rectangular pulse that takes the block just over its balance point: nobody knows when it falls, or tips."""
+    """A rectangular pulse takes the block just over its balance: the times of tipping and falling are not known."""
     amplitude, block = 3.0, Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     critical = math.acosh(1.0 + 0.5 / (amplitude * (amplitude - 1.0))) / 2.0  # Housner (1963)
     pulse = rocking.pulses.rectangular(amplitude * 9.80665 * 0.2, critical * (1.0 + 1e-11))
     response = simulate(block, pulse, model="linear")
     assert response.overturned
-    assert summary.overturn_text(response).startswith("about ")
-    for text in (summary.tipping_text(response), summary.peak_time_text(response)):
-        assert text == f"about {float(text.split()[1]):.0f} s"
-    assert "AMBIGUOUS" in response.summary()
+    lines = response.summary().splitlines()
+    assert "undecided: overturns in 3 of 5 motions within 3e-6, at 8 to 14 s; AMBIGUOUS" in lines[-2]
+    assert re.search(r"^peak rotation +1.5708 rad at 8 to 14 s", "\n".join(lines), re.MULTILINE)
+    assert re.fullmatch(r"about \d s", summary.tipping_text(response))
     (row,) = survey(block, {"pulse": pulse}, model="linear").rows()
-    assert row["ambiguous"]
-    assert row["verdict"] == f"overturns at {summary.overturn_text(response)}, AMBIGUOUS"
+    assert row["ambiguous"] and not row["decided"]
+    assert row["verdict"] == "undecided: overturns in 3 of 5 (3e-6), 6 of 11 (0.1 %), AMBIGUOUS"
     known = simulate(block, rocking.pulses.rectangular(amplitude * 9.80665 * 0.2, 1.2 * critical), model="linear")
-    assert re.fullmatch(r"\d+\.\d{4} s", summary.peak_time_text(known))
-    assert re.fullmatch(r"\d+\.\d{4} s", summary.tipping_text(known))
+    assert re.fullmatch(r"\d+\.\d{3,4} s", summary.peak_time_text(known))
+    assert re.fullmatch(r"\d+\.\d{3,4} s", summary.tipping_text(known))
 
 
 @pytest.mark.parametrize(
-    ("below", "told"),
+    ("below", "shown"),
     [
-        (1e-4, r"at about \d+\.\d{3} s \(\+- 0\.00\d s if the motion is off by a millionth\); rest proven"),
-        (1e-11, r"at about \d+ s \(far from it if the motion is off by a millionth\); rest proven"),
+        (1e-4, r"\d+\.\d{2,3} to \d+\.\d{2,3} s, complete chattering proven"),
+        (1e-5, r"\d+\.\d to \d+\.\d s, complete chattering proven"),
     ],
 )
-def test_a_time_of_rest_is_told_no_better_than_the_motion_is_known(below, told):
-    """A bracket of 1e-13 s beside a time that a millionth of the motion moves by seconds said too much."""
+def test_a_time_of_rest_has_no_more_digits_than_the_motion_leaves(below, shown):
+    """A bracket of 1e-13 s beside a time that a millionth of the motion moves by seconds would be misleading."""
     amplitude, block = 3.0, Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     critical = math.acosh(1.0 + 0.5 / (amplitude * (amplitude - 1.0))) / 2.0  # Housner (1963)
     pulse = rocking.pulses.rectangular(amplitude * 9.80665 * 0.2, critical * (1.0 - below))
     response = simulate(block, pulse, model="linear")
     assert not response.overturned
     (rest,) = re.findall(r"^rest +(.*)$", response.summary(), re.MULTILINE)
-    assert re.fullmatch(told, rest), rest
-    assert "bracket" not in rest
-    free = simulate(block, None, model="linear", initial_rotation=0.2 * (1.0 - 1e-9)).summary()
-    assert "if the initial state is off by a millionth); rest proven" in free
+    assert re.fullmatch(shown, rest), rest
     by_threshold = simulate(block, pulse, model="linear", chattering="velocity").summary()
-    assert "if the motion is off by a millionth); by the treatment, not proven" in by_threshold
+    assert ", by the treatment, not proven" in by_threshold
 
 
 def test_the_time_of_a_peak_is_as_uncertain_as_its_swing():
@@ -413,20 +382,21 @@ def test_the_time_of_a_peak_is_as_uncertain_as_its_swing():
 def test_a_stop_that_is_not_reached_changes_no_digit_of_the_time_of_a_peak():
     motion = rocking.pulses.sine(2.0, 0.5, cycles=4)
     free = dynamics.simulate(dynamics.ImpactOscillator(1.0, 0.8, stop=0.01), motion)
-    for above in (1e-9, 1e-3):
+    for above in (1e-5, 1e-3):
         body = dynamics.ImpactOscillator(1.0, 0.8, stop=0.01, second_stop=free.peak_rotation + above)
         held = dynamics.simulate(body, motion)
         assert held.peak_time == free.peak_time
         assert summary.peak_time_text(held) == summary.peak_time_text(free)
 
 
-def test_the_time_of_a_peak_just_short_of_a_fall_is_told_with_fewer_digits():
-    """There a millionth of the motion moves it by milliseconds: a fourth decimal would be made up."""
+def test_the_time_of_a_peak_just_short_of_a_fall_has_fewer_digits():
+    """There a millionth of the motion moves it by milliseconds, so that a fourth decimal would be wrong."""
     motion = rocking.records.load("el-centro-meloland-270").scaled(1.0673813104946)
     block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     one, other = (simulate(block, motion.scaled(factor)) for factor in (1.0, 1.0 - 1e-6))
     assert 1e-3 < abs(other.peak_time - one.peak_time) < 1e-2
-    assert summary.peak_time_text(one) == f"about {one.peak_time:.3f} s"
+    low, high = map(float, re.fullmatch(r"(\d+\.\d{3}) to (\d+\.\d{3}) s", summary.peak_time_text(one)).groups())
+    assert low - 0.0005 <= one.peak_time <= high + 0.0005
 
 
 def test_a_g_is_the_standard_one_whatever_gravity_the_block_has():

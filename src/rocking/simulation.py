@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rocking.arrays import Floats
 from rocking.body import Bodies, Body
 from rocking.compiling import SIMULATIONS, announce
 from rocking.constants import Model
@@ -104,15 +106,20 @@ def response_to(
     duration: float | None,
     initial: tuple[float, float],
     name: str | None = None,
+    factor: float = 1.0,
 ) -> Response:
-    """Response as of `simulate`, to a caller that has another name for the initial coordinate."""
+    """Compute a response as `simulate` does, with another ``name`` for the initial coordinate in messages.
+
+    A ``factor`` scales the motion and the initial state; the response keeps the motion as it is.
+    """
     announce(SIMULATIONS)
     how, alone, motion = treatment(chattering), one_body(block).alone(), one_motion(motion)
     check_components(alone, motion)
     rules = rules_of(alone, model, how, duration, record=True)
-    records = alone.kernel_records(model, how.limits(alone, motion, model))
-    trail = Trail(ground_of(motion, block.gravity), records[0], rules, NO_NODES)
-    start = started(alone, records, *initial, name)
+    records = alone.kernel_records(model, how.limits(alone, motion, model, factor))
+    lay_out = ground_of if factor == 1.0 else ground_of.__wrapped__  # repeated simulations leave the cache as it is
+    trail = Trail(lay_out(motion, block.gravity, factor), records[0], rules, NO_NODES)
+    start = started(alone, records, *_scaled(initial, factor, records, alone.stops[0]), name)
     ending, table = marched(trail, start)
     if ending == state.Ending.BALANCED:
         raise InvalidOption("the block balances on its corner for ever; give {} or another initial state", "duration")
@@ -135,7 +142,18 @@ def response_to(
         stalled=int(start["stalled"]),
         near_ties=int(start["near_ties"]),
         _trail=trail._replace(nodes=state.attributed(np.array(table["node"][: start["nodes"]]))),
+        _again=functools.partial(response_to, block, motion, model, how, duration, initial, name),
     )
+
+
+def _scaled(initial: tuple[float, float], factor: float, records: state.Records, stops: Floats) -> tuple[float, float]:
+    """Scale the distance of an initial coordinate from its stop, short of the fallen body, and its rate."""
+    coordinate, rate = initial
+    if factor == 1.0 or coordinate in stops:
+        return coordinate, factor * rate
+    fallen = math.nextafter(float(records["fallen"].min()), 0.0)
+    distance = factor * (coordinate - float(stops[0]))
+    return float(stops[0]) + min(max(distance, -fallen), fallen), factor * rate
 
 
 def marched(trail: Trail, start: state.Record) -> tuple[int, state.Records]:

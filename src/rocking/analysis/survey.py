@@ -18,7 +18,7 @@ from rocking.motion.motion import Motion
 from rocking.motion.named import Motions, motions_by_name, names_of
 from rocking.problem import one_body
 from rocking.progress import Progress, note
-from rocking.response import Response, in_brief, ratio_text
+from rocking.response import PRECISION, Response, in_brief, ratio_text, steps_within
 from rocking.response.contact import friction_coefficient
 from rocking.result import TableResult
 from rocking.simulation import simulate
@@ -86,7 +86,7 @@ class BlockUnderRecords(TableResult):
 
     def _headline(self) -> str:
         """Say under how many records the block overturns."""
-        overturned = sum(response.overturned for response in self.responses)
+        overturned = sum(one.overturned and one.perturbed().is_decided for one in self.responses)
         return f"{self.block.description}: {counted(len(self.records), 'record')}, overturned by {overturned}"
 
 
@@ -98,15 +98,18 @@ class Survey(BlockUnderRecords):
     ----------
     friction : float or None
         Coefficient of friction at which sliding is looked for.
+    precision : float
+        Relative precision of the motions.
     block, records, responses, skipped
         What rocks, the name of each motion, the response to each, and why records could not be read.
     """
 
     friction: float | None = None
+    precision: float = PRECISION
 
     def rows(self) -> list[dict[str, Any]]:
         each = zip(self._labels(), self.responses, strict=True)
-        return [label | _row(response) | self._sliding(response) for label, response in each]
+        return [label | _row(response, self.precision) | self._sliding(response) for label, response in each]
 
     def summary(self) -> str:
         limit = self.block.coordinate.limit
@@ -121,8 +124,11 @@ class Survey(BlockUnderRecords):
         return f"{self._headline()}\n\n{table}"
 
     def _headline(self) -> str:
-        undecided = sum(response.stopped or response.unfinished for response in self.responses)
-        known = f", not decided under {undecided}" if undecided else ""
+        undecided = sum(
+            response.stopped or response.unfinished or not response.perturbed().is_decided
+            for response in self.responses
+        )
+        known = f", undecided under {undecided}" if undecided else ""
         unread = f"; {counted(len(self.skipped), 'record')} skipped" if self.skipped else ""
         return super()._headline() + known + unread
 
@@ -173,7 +179,13 @@ class Survey(BlockUnderRecords):
 
 
 def survey(
-    block: Body, motions: Motions, *, friction: float | None = None, progress: bool | None = None, **options: Any
+    block: Body,
+    motions: Motions,
+    *,
+    friction: float | None = None,
+    precision: float = PRECISION,
+    progress: bool | None = None,
+    **options: Any,
 ) -> Survey:
     """Simulate a block under many motions.
 
@@ -185,6 +197,8 @@ def survey(
         m motions; the table shows the names of a mapping, or else the motions' own.
     friction : float, optional
         Coefficient of friction at which to look for sliding.
+    precision : float
+        Relative precision of the motions, from 1e-6 to 0.1: outcomes are also counted within it.
     progress : bool, optional
         Show a progress bar; by default if stderr is a terminal.
     **options : object
@@ -220,9 +234,9 @@ def survey(
     with Progress("simulating", total=len(named_motions), show=progress) as bar:
         for motion in named_motions.values():
             responses.append(simulate(block, motion, **options))
-            _row(responses[-1])  # what takes long in it, the response keeps: while the bar is there
+            _row(responses[-1], precision)  # what takes long in it, the response keeps: while the bar is there
             bar.advance()
-    return Survey(block, tuple(named_motions), tuple(responses), friction)
+    return Survey(block, tuple(named_motions), tuple(responses), friction, precision)
 
 
 def folder_names(records: Sequence[str]) -> list[str]:
@@ -251,15 +265,20 @@ def motion_of(response: Response) -> Motion:
     return response.motion
 
 
-def _row(response: Response) -> dict[str, Any]:
+def _row(response: Response, precision: float) -> dict[str, Any]:
     motion = motion_of(response)
+    near, further = response.perturbed(), response.perturbed(*steps_within(precision))
     return {
         named("duration", "s"): motion.duration,
         named("pga", "g"): decimal(motion.pga / STANDARD_GRAVITY),
         named("pgv", "m/s"): motion.pgv,
         "processing": "; ".join(motion.history),
-        "verdict": in_brief(response),
+        "verdict": in_brief(response, precision),
         "overturned": response.overturned,
+        "decided": near.is_decided,
+        "overturned_share": float(near.overturned.mean()),
+        "precision": precision,
+        "overturned_share_at_precision": float(further.overturned.mean()),
         "unfinished": response.unfinished,
         "stopped": response.stopped,
         "ambiguous": response.ambiguous,

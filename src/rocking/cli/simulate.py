@@ -17,7 +17,7 @@ from rocking.cli.options import BLOCK, MODEL, ModelOptions, TreatmentOptions, me
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, subfolder, write_results
 from rocking.cli.records import RECORDS, MotionOptions, Names
 from rocking.errors import InvalidOption
-from rocking.response import Response
+from rocking.response import PRECISION, Response, steps_within
 from rocking.response.contact import friction_coefficient
 from rocking.simulation import simulate as run
 
@@ -42,6 +42,10 @@ class _Start:
     friction: Annotated[
         float | None, Parameter(help="Coefficient of friction: say whether the block would slide, and when first.")
     ] = None
+    precision: Annotated[
+        float,
+        Parameter(help="Relative precision of the record: the outcome is also counted in 11 motions within it."),
+    ] = PRECISION
 
 
 def simulate(
@@ -71,6 +75,8 @@ def simulate(
     """
     if start.friction is not None:
         friction_coefficient(start.friction)  # before the work
+    steps_within(start.precision)
+    shown: dict[str, Any] = {"friction": start.friction, "precision": start.precision}
     body = block.body()
     options: dict[str, Any] = {
         **model.chosen(),
@@ -85,26 +91,26 @@ def simulate(
         if read.single:
             ((record, shaking),) = read.motions.items()
             response = run(body, shaking, **options)
-            result, text = _result(response, record, start.friction, folder, energy), response.summary(start.friction)
+            result, text = _result(response, record, shown, folder, energy), response.summary(**shown)
         else:
             if energy and not each:
                 raise InvalidOption("{} draws single responses; of several records give {}, too", "energy", "each")
-            found = replace(survey(body, read.motions, friction=start.friction, **options), skipped=read.skipped)
+            found = replace(survey(body, read.motions, **shown, **options), skipped=read.skipped)
             if folder is not None:
                 found.write(folder)
             if folder is not None and each:
                 folders = folder_names(found.records)
                 for name, record, response in zip(folders, found.records, found.responses, strict=True):
-                    _result(response, record, start.friction, subfolder(folder, name), energy)
+                    _result(response, record, shown, subfolder(folder, name), energy)
             result, text = found.to_dict(), found.summary()
         print_result(result, text, as_json=output.as_json)
 
 
 def _result(
-    response: Response, record: str, friction: float | None, folder: Path | None, energy: bool
+    response: Response, record: str, shown: dict[str, Any], folder: Path | None, energy: bool
 ) -> dict[str, Any]:
     """Return the result, and write it with figures, histories and events into a folder where there is one."""
-    result = response.to_dict(friction)
+    result = response.to_dict(**shown)
     # Its motion is named by the record that was read, too, as in tables of many.
     result |= {"motion": {"record": record, **result["motion"]}}
     if folder is not None:

@@ -238,6 +238,7 @@ def _row(assessment: Assessment, motion: Motion) -> dict[str, Any]:
         **_rated(case, motion),
         "measure": assessment.measure.value(motion),
         "overturns": response.overturned,
+        "undecided": not response.perturbed().is_decided,
         "peak_over_slenderness": response.peak_over_slenderness,
         "friction_needed": response.required_friction,
         "sliding_time": None if friction is None else response.sliding_time(friction),

@@ -67,6 +67,9 @@ def verdict(response: Response, thresholds: tuple[float, float]) -> dict[str, An
         if response.motion.vertical is not None:
             return phrase("verdict.unlifted")
         return phrase("verdict.below", lifting=min(thresholds))
+    near = response.perturbed()
+    if not near.is_decided:
+        return phrase("verdict.undecided", overturned=int(near.overturned.sum()), count=len(near.repeats))
     rests = int(np.sum(response.events["kind"] == "rest"))
     if response.overturned:
         time = response.overturn_time

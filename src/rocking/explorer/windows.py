@@ -13,7 +13,6 @@ from rocking.errors import InvalidOption
 from rocking.explorer.inputs import Case
 from rocking.explorer.simulated import Simulated, unresolved
 from rocking.response import Response
-from rocking.response.sensitivity import KNOWN, driving
 
 #: Times at which a rotation is evaluated across a window, and points of a line that are sent.
 _TIMES: Final = 12_000
@@ -143,12 +142,11 @@ def lines_of(response: Response) -> dict[str, Floats]:
 
 
 def _uncertain(response: Response) -> Floats:
-    """Return by how much the rest of each sequence moves if what drives the block is off by a millionth, s."""
+    """Return how far the rest of each sequence moves in the repeated simulations, s; NaN where it is not in all."""
     if not len(response.chattering):
         return np.empty(0)
-    changes = driving(response.sensitivity)[1]
     rests = np.searchsorted(response.events["time"], response.chattering["end"])
-    return KNOWN * changes[rests]
+    return response.perturbed().event_spreads[rests]
 
 
 def _intervals(response: Response) -> tuple[Floats, Floats]:

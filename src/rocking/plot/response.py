@@ -40,14 +40,14 @@ _Y_LABELS: Final = {"slenderness": "rotation / {}", "rad": "rotation (rad)", "de
 class DrawnSequence(NamedTuple):
     """One chattering sequence: the times of its impacts and the bracket on the time of rest, s.
 
-    ``off`` says by how much (s) the rest moves if what drives the body (``driver``) is off by a millionth.
+    ``off`` is how far (s) the rest moves in repeated simulations (``sample``); NaN where it is not in all of them.
     """
 
     impact_times: Floats
     rest_lower: float
     rest_upper: float
     off: float = 0.0
-    driver: str = "the motion"
+    sample: str = ""
 
 
 class _Scale(NamedTuple):
@@ -277,9 +277,11 @@ def _draw_sequence(axes: Axes, sequence: DrawnSequence) -> None:
     add_labels(axes, "time to rest (s)", "interval to next impact (s)")
     axes.grid(True)
     width = sequence.rest_upper - sequence.rest_lower
-    decimals = 6 if sequence.off < 1e-6 else max(0, math.floor(-math.log10(sequence.off)))
+    off = sequence.off
+    decimals = 6 if off < 1e-6 else 0 if math.isnan(off) else max(0, math.floor(-math.log10(off)))
     axes.set_title(f"A: at rest at {rest:.{decimals}f}\N{NO-BREAK SPACE}s", color=ABOVE, loc="left", wrap=True)
-    known = f"± {sequence.off:.0e} s if\n{sequence.driver} is off\nby a millionth;\n" if sequence.off >= 1e-6 else ""
+    moves = "not" if math.isnan(off) else f"± {off:.0e} s"
+    known = "" if off < 1e-6 else f"{moves} in all\n{sequence.sample.replace(' within', chr(10) + 'within')};\n"
     # Below the falling line there is space.
     words = f"{known}bracket of the\ncomputation\n{width:.0e} s"
     axes.text(0.04, 0.03, words, color=ABOVE, fontsize=7.0, transform=axes.transAxes, ha="left", va="bottom")

@@ -3,21 +3,28 @@
 from rocking.response.answers import trail_of
 from rocking.response.derivatives import Gradient, gradient
 from rocking.response.export import active_span, drawing_times
+from rocking.response.perturbed import COUNT, PRECISION, RELATIVE, Perturbed, factors_near, steps_within
 from rocking.response.response import Response
 from rocking.response.sensitivity import AMBIGUITY, QUANTITIES, Sensitivity
 from rocking.response.summary import in_brief, in_words, ratio_text
 
 __all__ = [
     "AMBIGUITY",
+    "COUNT",
+    "PRECISION",
     "QUANTITIES",
+    "RELATIVE",
     "Gradient",
+    "Perturbed",
     "Response",
     "Sensitivity",
     "active_span",
     "drawing_times",
+    "factors_near",
     "gradient",
     "in_brief",
     "in_words",
     "ratio_text",
+    "steps_within",
     "trail_of",
 ]

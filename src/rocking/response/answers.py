@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
@@ -21,6 +22,7 @@ from rocking.motion.motion import Motion
 from rocking.response.contact import Contact, friction_coefficient, friction_demand, pull
 from rocking.response.energy import Energy, energy_of, linear_balance
 from rocking.response.history import History, with_all_impacts
+from rocking.response.perturbed import COUNT, OVERTURNS, RELATIVE, STANDS, UNMOVED, Perturbed, Repeat, repeated
 from rocking.response.sensitivity import Sensitivity, ambiguities
 from rocking.treatment import Treatment
 
@@ -45,6 +47,7 @@ class Answers:
     stalled: int
     near_ties: int
     _trail: Trail
+    _again: Callable[[float], Answers]
 
     @property
     def block(self) -> Block:
@@ -118,6 +121,28 @@ class Answers:
         return bool(self._trail.nodes["side"][-1] >= 0)
 
     @property
+    def moved(self) -> bool:
+        """Whether the body moves at any time."""
+        return bool(np.any(self._trail.nodes["side"] >= 0))
+
+    @property
+    def outcome(self) -> str:
+        """What becomes of the body, as a verb: "overturns", "stands", "does not move".
+
+        Also "has not overturned" where the simulation is `stopped`, "is given up" where it is `unfinished`, and "comes
+        to rest" of a body that cannot overturn.
+        """
+        if self.overturned:
+            return OVERTURNS
+        if self.unfinished:
+            return "is given up"
+        if self.stopped:
+            return "has not overturned"
+        if not self.moved:
+            return UNMOVED
+        return STANDS if self.body.coordinate.limit else "comes to rest"
+
+    @property
     def stopped(self) -> bool:
         """Whether `duration` ended the simulation before a verdict: the block still moved, or the motion went on.
 
@@ -168,6 +193,65 @@ class Answers:
         millionths, simulate each, and take the spread of the results for the answer.
         """
         return ambiguities(self.sensitivity, abs(self.peak_rotation - self.body.stops[0]), self.near_ties)
+
+    def perturbed(self, relative: float = RELATIVE, count: int = COUNT) -> Perturbed:
+        """Repeat the simulation with the motion scaled by factors near 1.
+
+        Parameters
+        ----------
+        relative : float
+            Relative step of the factors, from 1e-12 to 0.1.
+        count : int
+            Number of factors, odd and at least 3: 1, 1 +- relative, 1 +- 3 relative, 1 +- 5 relative, and so on.
+
+        Returns
+        -------
+        Perturbed
+            Outcome, peak and times for each factor, and the ranges of these.
+
+        Raises
+        ------
+        InvalidOption
+            If an argument is out of its range.
+
+        Notes
+        -----
+        An initial rotation and velocity are scaled with the motion, or alone where there is no motion; of a body with
+        a stop it is the initial distance from the stop. Ground motions are known to three digits or so, and file
+        formats print four to seven. An outcome that changes within a few millionths is therefore undecided for every
+        practical purpose. Conversely, an outcome that is the same in a few simulations may still change between them.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> block, record = rocking.Block(width=0.24, height=1.1), rocking.records.load("ridgecrest-clc-090")
+        >>> found = rocking.simulate(block, record.scaled_to(0.53 * 9.80665)).perturbed()
+        >>> found.overturned.tolist(), found.is_decided
+        ([True, False, False, False, True], False)
+        """
+        if (relative, count) not in self._repeated:
+            scaled = "initial states" if self.motion is None else "motions"
+            self._repeated[relative, count] = repeated(
+                self._as_repeat(1.0), self._repeat, relative, count, self.body.coordinate, scaled
+            )
+        return self._repeated[relative, count]
+
+    def _repeat(self, factor: float) -> Repeat:
+        try:
+            return self._again(factor)._as_repeat(factor)
+        except InvalidOption:  # a state of balance: `simulate` requires a duration
+            return Repeat(factor, "balances", math.nan, math.nan, math.nan, math.nan, self.events[:0])
+
+    def _as_repeat(self, factor: float) -> Repeat:
+        rests = self.events["time"][self.events["kind"] == "rest"]
+        last_rest = float(rests[-1]) if len(rests) and not self.moves_at_end else math.nan
+        return Repeat(
+            factor, self.outcome, self.peak_rotation, self.peak_time, self.overturn_time, last_rest, self.events
+        )
+
+    @cached_property
+    def _repeated(self) -> dict[tuple[float, int], Perturbed]:
+        return {}
 
     @property
     def time_at_rest(self) -> float:

@@ -17,7 +17,6 @@ from rocking.plot.response import RotationUnits
 from rocking.problem import thresholds_of
 from rocking.response.answers import Answers, history_of
 from rocking.response.history import even_times
-from rocking.response.sensitivity import KNOWN, driver, driving
 from rocking.tables import as_written, named, rows_of
 
 if TYPE_CHECKING:
@@ -231,9 +230,9 @@ def _longest_sequence(response: Answers, start: float, end: float) -> tuple[Floa
     if longest is None:
         return None
     times = _within(response.impacts["time"], longest["start"], longest["end"])
-    change = driving(response.sensitivity)[1][response.events["time"] == longest["end"]]
-    off = KNOWN * float(change.max(initial=0.0))
-    return times, float(longest["lower"]), float(longest["upper"]), off, driver(response.motion)
+    near = response.perturbed()
+    off = float(near.event_spreads[response.events["time"] == longest["end"]].max(initial=0.0))
+    return times, float(longest["lower"]), float(longest["upper"]), off, near.sample
 
 
 def _within(times: Floats, start: float, end: float) -> Floats:

@@ -14,6 +14,7 @@ from rocking import svg
 from rocking.plot.response import RotationUnits
 from rocking.response import export, phase, summary
 from rocking.response.answers import Answers
+from rocking.response.perturbed import PRECISION
 from rocking.result import DrawnResult, Row, dictionary_of, text_of
 from rocking.tables import write_csv, write_netcdf
 
@@ -81,13 +82,15 @@ class Response(Answers, DrawnResult):
             label = f"{coordinate.name} / {coordinate.limit}"
         return svg.captioned(f"Response: {self._headline()}", svg.history(times, drawn, label))
 
-    def summary_rows(self, friction: float | None = None) -> Sequence[Row]:
+    def summary_rows(self, friction: float | None = None, *, precision: float = PRECISION) -> Sequence[Row]:
         """Return what happened for people, as rows of name, value, unit and note: the lines of `summary`.
 
         Parameters
         ----------
         friction : float, optional
             Coefficient of friction: says whether the block would slide, and when first.
+        precision : float
+            Relative precision of the ground motion, from 1e-6 to 0.1: the outcome is also counted within it.
 
         Returns
         -------
@@ -101,14 +104,14 @@ class Response(Answers, DrawnResult):
         >>> response.summary_rows()[-1]
         Row(name='verdict', value='overturns at 1.532021 s', unit='1', note='')
         """
-        return summary.summary_rows(self, friction)
+        return summary.summary_rows(self, friction, precision)
 
-    def facts(self, friction: float | None = None) -> Sequence[Row]:
+    def facts(self, friction: float | None = None, *, precision: float = PRECISION) -> Sequence[Row]:
         """Return what happened for machines, as rows of name, value and unit: the entries of `to_dict`.
 
         Parameters
         ----------
-        friction : float, optional
+        friction, precision
             As for `summary_rows`.
 
         Returns
@@ -123,15 +126,17 @@ class Response(Answers, DrawnResult):
         >>> response.facts()[4]
         Row(name='overturned', value=True, unit='1', note='')
         """
-        return summary.facts(self, friction)
+        return summary.facts(self, friction, precision)
 
-    def summary(self, friction: float | None = None) -> str:
+    def summary(self, friction: float | None = None, *, precision: float = PRECISION) -> str:
         """Return what happened in words, line by line, as ``rocking simulate`` prints it.
 
         Parameters
         ----------
         friction : float, optional
             Coefficient of friction: says whether the block would slide, and when first.
+        precision : float
+            Relative precision of the ground motion, from 1e-6 to 0.1: the outcome is also counted within it.
 
         Notes
         -----
@@ -157,9 +162,9 @@ class Response(Answers, DrawnResult):
         least normal force  0.8919 of the weight, until it tips at 0.9319 s
         verdict             overturns at 1.532021 s
         """
-        return text_of(self.summary_rows(friction), _WIDTH)
+        return text_of(self.summary_rows(friction, precision=precision), _WIDTH)
 
-    def to_dict(self, friction: float | None = None) -> dict[str, Any]:
+    def to_dict(self, friction: float | None = None, *, precision: float = PRECISION) -> dict[str, Any]:
         """Return the result in plain values for machines, as ``rocking simulate --json`` prints it.
 
         Units are in the names; None stands for what is not a finite number.
@@ -168,6 +173,8 @@ class Response(Answers, DrawnResult):
         ----------
         friction : float, optional
             Coefficient of friction: says whether the block would slide, and when first.
+        precision : float
+            Relative precision of the ground motion, from 1e-6 to 0.1: the outcome is also counted within it.
 
         Examples
         --------
@@ -177,7 +184,7 @@ class Response(Answers, DrawnResult):
         >>> result["overturned"], result["lift_off_time_s"], result["events"][0]["kind"]
         (True, None, 'uplift')
         """
-        return dictionary_of(self.facts(friction))
+        return dictionary_of(self.facts(friction, precision=precision))
 
     def to_xarray(self, dt: float | None = None) -> xr.Dataset:
         """Time histories and events as a dataset.

@@ -22,15 +22,8 @@ from rocking.tables import counted
 #: move its peak by more than this fraction, or one of its events or impacts by more than this many seconds.
 AMBIGUITY: Final = 1e-6
 
-#: What drives a body (the motion, or the initial state) is taken to be known to this part of itself, about what the
-#: usual record formats print: digits of times and of the peak that it would change are not shown.
-KNOWN: Final = 1e-6
-
 #: What a sensitivity is to.
 QUANTITIES: Final = ("motion", "initial_rotation", "initial_velocity", "p", "alpha", "restitution")
-
-#: What drives the block, as against what it is.
-DRIVING: Final = QUANTITIES[:3]
 
 #: What a rotation may be differentiated by, in the order of the kernels.
 _NAMES: Final = (*QUANTITIES, *(f"{name}_{side}" for side in ("plus", "minus") for name in QUANTITIES[3:]))
@@ -156,17 +149,6 @@ def ambiguities(found: Sensitivity, height: float, near_ties: int) -> tuple[str,
         "touch": near_ties == 0,
     }
     return tuple(name for name, is_known in known.items() if not is_known)
-
-
-def driving(found: Sensitivity) -> tuple[float, Floats, Floats]:
-    """Sizes of the changes of peak, events and impacts with all that drives the block, per relative change."""
-    peak, impacts, events = (np.sum(np.abs(rows), axis=0) for rows in found._along(DRIVING))
-    return float(peak[0]), events, impacts
-
-
-def driver(motion: object | None) -> str:
-    """Say what drives the body: a motion or, where there is none, its initial state."""
-    return "the initial state" if motion is None else "the motion"
 
 
 def _total(values: NDArray[np.void], quantities: tuple[str, ...]) -> Floats:

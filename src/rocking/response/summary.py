@@ -13,19 +13,20 @@ from rocking.constants import STANDARD_GRAVITY
 from rocking.problem import thresholds_of
 from rocking.response.answers import Answers
 from rocking.response.export import records
-from rocking.response.sensitivity import KNOWN, driver, driving
+from rocking.response.perturbed import percent, steps_within
 from rocking.result import Row
 from rocking.tables import counted, named
 
-#: Decimals of a time, and digits of a peak, at most.
+#: Decimals of a time at most; digits of a peak, at most and where its range is shown.
 _MOST_DECIMALS: Final = 9
 _MOST_DIGITS: Final = 6
+_FEWEST_DIGITS: Final = 3
 
 #: Decimals of a time in a table, and of one beside others in a summary.
 _BRIEF: Final = 2
 _SHORT: Final = 4
 
-#: From so much on, s, the unknown part of a time is shown with it.
+#: From so much on, s, the range of a time is shown.
 _SHOWN: Final = 1e-3
 
 #: Events that a summary lists.
@@ -39,7 +40,7 @@ _AFFECTED: Final = {
 }
 
 
-def summary_rows(response: Answers, friction: float | None) -> list[Row]:
+def summary_rows(response: Answers, friction: float | None, precision: float) -> list[Row]:
     """Return what happened, line by line; with a coefficient of friction, whether it is enough."""
     body = response.body
     sliding = math.nan if friction is None else response.sliding_time(friction)
@@ -63,12 +64,12 @@ def summary_rows(response: Answers, friction: float | None) -> list[Row]:
             Row("least normal force", f"{response.minimum_normal_force:.4f}", "of the weight", tips),
             *_contact_rows(response, friction, sliding),
         ]
-    rows.append(Row("verdict", _verdict(response), note="" if math.isnan(sliding) else " (as if it did not slide)"))
-    if any(" +- " in row.text for row in rows):
-        rows.append(
-            Row("+-", f"by how much the number before it is off if {driver(response.motion)} is off by a millionth")
-        )
-    return rows
+    without_sliding = "" if math.isnan(sliding) else " (as if it did not slide)"
+    return [
+        *rows,
+        Row("outcome", _outcome(response), note=without_sliding),
+        Row("", response.perturbed(*steps_within(precision)).share()),
+    ]
 
 
 def line(response: Answers) -> str:
@@ -85,7 +86,7 @@ def line(response: Answers) -> str:
     )
 
 
-def facts(response: Answers, friction: float | None) -> list[Row]:
+def facts(response: Answers, friction: float | None, precision: float) -> list[Row]:
     """Return the result for machines, by name."""
     body, motion, (name, _, _, unit, limit) = response.body, response.motion, response.body.coordinate
     block = {
@@ -130,6 +131,10 @@ def facts(response: Answers, friction: float | None) -> list[Row]:
         Row("impacts_resolved", len(response.impacts)),
         Row("duration", response.duration, "s"),
         Row("time_at_rest", response.time_at_rest, "s"),
+        Row(
+            "perturbed",
+            [each.to_dict() for each in (response.perturbed(), response.perturbed(*steps_within(precision)))],
+        ),
         Row("ambiguous", response.ambiguous),
         Row("ambiguities", response.ambiguities),
         Row("events", records(response, "events")),
@@ -148,24 +153,29 @@ def in_words(response: Answers, overturn_time: str) -> str:
         goes_on = motion is not None and response.duration < motion.end
         to_come = f"; the motion goes on to {motion.end:.6g} s" if motion is not None and goes_on else ""
         return f"{_when_stopped(response)}, where the simulation was stopped{to_come}"
-    if not _has_moved(response):
+    if not response.moved:
         return "does not move"
     return "rocks and does not overturn" if _can_overturn(response) else "moves, and comes to rest"
 
 
-def in_brief(response: Answers) -> str:
+def in_brief(response: Answers, precision: float) -> str:
     """Return what became of the body, for a row of a table."""
-    doubtful = ", AMBIGUOUS" if response.ambiguous else ""
-    if response.overturned:
-        is_known = _decimals(KNOWN * _change_of_fall(response)) >= _BRIEF
-        time = f"{response.overturn_time:.{_BRIEF}f} s" if is_known else overturn_text(response)
-        return f"overturns at {time}{doubtful}"
-    if response.unfinished:
-        return f"unfinished, given up at {response.duration:.2f} s{doubtful}"
-    if response.stopped:
-        return f"{_when_stopped(response)}{doubtful}"
-    moves = "rocks" if _can_overturn(response) else "moves"
-    return f"{moves if _has_moved(response) else 'does not move'}{doubtful}"
+    near, further = response.perturbed(), response.perturbed(*steps_within(precision))
+    if not near.is_decided and near.overturned.any():
+        shares = [int(each.overturned.sum()) for each in (near, further)]
+        text = "undecided: overturns"
+    else:
+        shares = [len(each.alike) for each in (near, further)]
+        text = near.outcome if near.is_decided else f"undecided: {near.outcome}"
+    if response.overturned and near.is_decided:
+        text += f" at {_short_text(response.overturn_time, *near.overturn_range, most=_BRIEF)}"
+    elif response.stopped:
+        text = _when_stopped(response) if near.is_decided else text
+    parts = [
+        f"{share} of {len(each.repeats)} ({percent(each.within)})"
+        for share, each in zip(shares, (near, further), strict=True)
+    ]
+    return f"{text} in {', '.join(parts)}{', AMBIGUOUS' if response.ambiguous else ''}"
 
 
 def ratio_text(response: Answers) -> str:
@@ -173,57 +183,56 @@ def ratio_text(response: Answers) -> str:
     return f"{response.peak_over_slenderness:.{min(_peak_digits(response), 4)}g}"
 
 
-def time_text(time: float, change: float) -> str:
-    """Time in s, as far as it is known where what drives the block is known to `KNOWN` of itself.
+def time_text(time: float, low: float, high: float) -> str:
+    """Return a time in s with the digits that repeated simulations leave, or the range where that is wide.
 
     Parameters
     ----------
     time : float
         Time, s.
-    change : float
-        Change of the time per relative change of what drives the block, s.
+    low, high : float
+        Earliest and latest time in repeated simulations, s.
 
     Examples
     --------
-    >>> time_text(230.726244377, 0.0), time_text(230.726244377, 3.0), time_text(230.726244377, 4e5)
-    ('230.726244377 s', '230.72624 s', '230.7 +- 0.4 s')
+    >>> time_text(230.726244377, 230.726244377, 230.726244377), time_text(230.726244377, 230.72624, 230.72625)
+    ('230.726244377 s', '230.72624 s')
+    >>> time_text(230.726244377, 230.3, 231.1)
+    '230.3 to 231.1 s'
     """
-    unknown = KNOWN * change
-    text = f"{time:.{_decimals(unknown)}f}"
+    unknown = _unknown(time, low, high)
+    decimals = _decimals(unknown)
     if unknown < _SHOWN:
-        return f"{text} s"
-    return f"{text} +- {unknown:.1g} s" if unknown < 0.5 * time else f"about {text} s"
+        return f"{time:.{decimals}f} s"
+    return f"{low:.{decimals}f} to {high:.{decimals}f} s"
 
 
 def overturn_text(response: Answers) -> str:
     """Time at which the block overturns, as far as it is known."""
-    return time_text(response.overturn_time, _change_of_fall(response))
+    return time_text(response.overturn_time, *response.perturbed().overturn_range)
 
 
 def tipping_text(response: Answers) -> str:
     """Time at which the block tips, as far as it is known: it falls as late or as early as it tips."""
-    return _short_text(response.tipping_time, KNOWN * _change_of_fall(response) if response.overturned else 0.0)
+    unknown = 0.0
+    if response.overturned:
+        unknown = _unknown(response.overturn_time, *response.perturbed().overturn_range)
+    about = "" if unknown < _SHOWN else "about "
+    return f"{about}{response.tipping_time:.{min(_decimals(unknown), _SHORT)}f} s"
 
 
 def peak_time_text(response: Answers) -> str:
-    """Time of the peak: that of a swing which is uncertain by a share of itself, by this share of its duration."""
-    if response.overturned:
-        return _short_text(response.peak_time, KNOWN * _change_of_fall(response))
-    if response._reaches_second_stop:
-        hit = response.impacts["time"] == response.peak_time
-        return _short_text(response.peak_time, KNOWN * float(np.sum(driving(response.sensitivity)[2][hit])))
-    change = driving(response.sensitivity)[0]
-    bend = abs(response.peak_rotation - response.body.stops[0]) * abs(float(response.states(response.peak_time)[2]))
-    return _short_text(response.peak_time, KNOWN * change / math.sqrt(bend) if bend > 0.0 else 0.0)
+    """Time of the peak, as far as it is known."""
+    return _short_text(response.peak_time, *response.perturbed().peak_time_range)
 
 
-def digits_of(value: float, change: float) -> int:
-    """Digits that are known of a value, which changes so much per relative change of what drives the body."""
-    if not math.isfinite(change):
+def digits_of(value: float, unknown: float) -> int:
+    """Digits that are known of a value of which so much is unknown."""
+    if not math.isfinite(unknown):
         return 1
-    if not (change > 0.0 and value != 0.0):
+    if not (unknown > 0.0 and value != 0.0):
         return _MOST_DIGITS
-    return min(max(math.floor(-math.log10(KNOWN * change / abs(value))), 1), _MOST_DIGITS)
+    return min(max(math.floor(-math.log10(unknown / abs(value))), 1), _MOST_DIGITS)
 
 
 def _motion_text(response: Answers) -> str:
@@ -255,48 +264,54 @@ def _thresholds_text(response: Answers) -> str:
 
 def _event_rows(response: Answers) -> list[Row]:
     sequences = {float(row["end"]): row for row in response.chattering}
-    changes = driving(response.sensitivity)[1]
-    rows = []
-    for event, change in zip(response.events[:_LISTED], changes, strict=False):
+    near = response.perturbed()
+    rows: list[Row] = []
+    for event, (low, high) in zip(response.events[:_LISTED], near.event_ranges, strict=False):
+        if math.isnan(low):
+            break
         time, kind = float(event["time"]), str(event["kind"])
+        text = time_text(time, low, high)
         if kind == "rest" and time in sequences:
-            rows.append(Row(kind, _rest_text(response, time, float(change), sequences[time])))
+            rows.append(Row(kind, text, note=_rest_note(_unknown(time, low, high), sequences[time])))
         else:
             side = f", to side {'+' if event['side'] > 0 else '-'}" if kind == "uplift" else ""
-            rows.append(Row(kind, time_text(time, float(change)), note=side))
-    if len(response.events) > _LISTED:
-        rows.append(Row("...", f"{len(response.events) - _LISTED} more events"))
+            rows.append(Row(kind, text, note=side))
+    if left := len(response.events) - len(rows):
+        differ = "" if len(rows) == _LISTED else f", not the same in all {len(near.repeats)} {near.scaled}"
+        rows.append(Row("...", f"{counted(left, 'more event')}{differ}"))
     return rows or [Row("uplift", "none")]
 
 
-def _rest_text(response: Answers, time: float, change: float, sequence: np.void) -> str:
-    """Return when the body comes to rest, and how that is known: no more of it than the record's digits tell."""
-    unknown, width = KNOWN * change, sequence["upper"] - sequence["lower"]
+def _rest_note(unknown: float, sequence: np.void) -> str:
+    """Return how a time of rest, of which so much is unknown, is known: no more of it than the record's digits tell."""
+    width = sequence["upper"] - sequence["lower"]
+    if not width >= 0.0:
+        return ", by the treatment, not proven"
     decimals = _decimals(unknown)
-    if unknown < _SHOWN:
-        text = time_text(time, change)
-        if not width >= 0.0:
-            return f"{text}, by the treatment, not proven"
-        start = f"{sequence['start']:.{min(decimals, 4)}f}"
-        # The bracket is for the motion to the last place: beside a time with fewer digits it would say too much.
-        bracket = f", bracket {width:.1e} s wide" if decimals >= _MOST_DECIMALS else ""
-        return f"{text}, complete chattering proven from {start} s on{bracket}"
-    off = f"+- {unknown:.1g} s" if unknown < 0.5 * time else "far from it"
-    known = "rest proven" if width >= 0.0 else "by the treatment, not proven"
-    return f"at about {time:.{decimals}f} s ({off} if {driver(response.motion)} is off by a millionth); {known}"
+    # The bracket is for the motion to the last place: beside a time with fewer digits it would say too much.
+    bracket = f", bracket {width:.1e} s wide" if decimals >= _MOST_DECIMALS else ""
+    start = f" from {sequence['start']:.{min(decimals, 4)}f} s on" if unknown < _SHOWN else ""
+    return f", complete chattering proven{start}{bracket}"
 
 
 def _peak_rows(response: Answers) -> list[Row]:
     """Peak and its time, each as far as it is known."""
-    name, _, _, unit, limit = response.body.coordinate
+    near, (name, _, _, unit, limit) = response.perturbed(), response.body.coordinate
+    (low, high), digits, balance = near.peak_range, _peak_digits(response), response._balance_at_peak
+    value = f"{response.peak_rotation:.{digits}g}"
+    if spread := digits < _FEWEST_DIGITS and math.isfinite(high):
+        value = f"{low:.{_FEWEST_DIGITS}g} to {high:.{_FEWEST_DIGITS}g}"
     note = f" at {peak_time_text(response)}"
     if response.overturned:
         note += ", where the block has fallen"
     elif response._reaches_second_stop:
         note += ", at the stop"
-    elif limit and math.isfinite(response._balance_at_peak):
-        note += f", {ratio_text(response)} of the {limit}"
-    return [Row(f"peak {name}", f"{response.peak_rotation:.{_peak_digits(response)}g}", unit, note)]
+    elif limit and math.isfinite(balance):
+        ratios = f"{low / balance:.3g} to {high / balance:.3g}" if spread else ratio_text(response)
+        note += f", {ratios} of the {limit}"
+    if not near.is_decided:
+        note += f", in {len(near.alike)} of {len(near.repeats)} {near.scaled}"
+    return [Row(f"peak {name}", value, unit, note)]
 
 
 def _balance_rows(response: Answers) -> list[Row]:
@@ -334,17 +349,18 @@ def _contact_rows(response: Answers, friction: float | None, sliding: float) -> 
     return rows
 
 
-def _verdict(response: Answers) -> str:
-    verdict = in_words(response, overturn_text(response) if response.overturned else "")
+def _outcome(response: Answers) -> str:
+    text = response.perturbed().sentence()
+    if response.overturned:
+        text += f", at {overturn_text(response)}"
+    elif response.unfinished or response.stopped:
+        text += f"; {in_words(response, '')}"
     if response.stalled:
-        verdict += f"; {counted(response.stalled, 'rest')} not proven"
+        text += f"; {counted(response.stalled, 'rest')} not proven"
     if response.ambiguous:
-        verdict += (
-            f"; AMBIGUOUS: one unit in the last place of the input changes "
-            f"{' and '.join(_AFFECTED[name] for name in response.ambiguities)}: scale the motion (or the initial "
-            "state) by 1 plus some millionths, several times, and take the spread for the answer"
-        )
-    return verdict
+        affected = " and ".join(_AFFECTED[name] for name in response.ambiguities)
+        text += f"; AMBIGUOUS: one unit in the last place of the input changes {affected}"
+    return text
 
 
 def _when_stopped(response: Answers) -> str:
@@ -353,7 +369,7 @@ def _when_stopped(response: Answers) -> str:
         return f"beyond its balance point since {response.tipping_time:.4f} s and not yet fallen at {end}"
     if response.moves_at_end:
         return f"still {'rocking' if _can_overturn(response) else 'moving'} at {end}"
-    return f"at rest at {end}" if _has_moved(response) else f"has not moved by {end}"
+    return f"at rest at {end}" if response.moved else f"has not moved by {end}"
 
 
 def _can_overturn(response: Answers) -> bool:
@@ -361,17 +377,14 @@ def _can_overturn(response: Answers) -> bool:
     return bool(response.body.coordinate.limit)
 
 
-def _has_moved(response: Answers) -> bool:
-    return bool(np.any(response._trail.nodes["side"] >= 0))
-
-
-def _change_of_fall(response: Answers) -> float:
-    """Change of the time at which the block overturns per relative change of what drives it, s."""
-    return float(driving(response.sensitivity)[1][-1])
-
-
 def _peak_digits(response: Answers) -> int:
-    return digits_of(response.peak_rotation, driving(response.sensitivity)[0])
+    unknown = _unknown(response.peak_rotation, *response.perturbed().peak_range)
+    return digits_of(response.peak_rotation - response.body.stops[0], unknown)
+
+
+def _unknown(value: float, low: float, high: float) -> float:
+    """Largest distance of a value from the ends of its range."""
+    return max(high - value, value - low)
 
 
 def _decimals(unknown: float) -> int:
@@ -384,7 +397,10 @@ def _decimals(unknown: float) -> int:
     return min(max(math.ceil(known) if unknown >= _SHOWN else math.floor(known), 0), _MOST_DECIMALS)
 
 
-def _short_text(time: float, unknown: float) -> str:
-    """Time to four decimals at most, of which so much is unknown, s."""
-    about = "" if unknown < _SHOWN else "about "
-    return f"{about}{time:.{min(_decimals(unknown), _SHORT)}f} s"
+def _short_text(time: float, low: float, high: float, most: int = _SHORT) -> str:
+    """Time, s, or its range, to ``most`` decimals."""
+    unknown = _unknown(time, low, high)
+    decimals = min(_decimals(unknown), most)
+    if 10.0**decimals * unknown < 1.0:
+        return f"{time:.{decimals}f} s"
+    return f"{low:.{decimals}f} to {high:.{decimals}f} s"

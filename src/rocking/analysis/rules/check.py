@@ -20,7 +20,7 @@ from rocking.motion.motion import Motion
 from rocking.motion.named import Motions, motions_by_name
 from rocking.motion.scaling import Measure
 from rocking.progress import Progress
-from rocking.response import Response, in_brief
+from rocking.response import PRECISION, Response, in_brief
 from rocking.simulation import simulate
 from rocking.tables import decimal, named, text_table
 
@@ -221,11 +221,9 @@ def _margin(response: Response, block: Block, motion: Motion, model: Model, thre
 
 
 def _verdict(response: Response, margin: float, *, falls_under_less: bool) -> str:
-    if not falls_under_less:
-        return in_brief(response)
-    factor = 1.0 / margin
+    outcome, factor = in_brief(response, PRECISION), 1.0 / margin
     text = f"{factor:.2f}" if factor < _NEAR else f"{factor:.4f}"
-    return f"stands here, falls at x {text}" + (", AMBIGUOUS" if response.ambiguous else "")
+    return f"{outcome}; overturns at x {text}" if falls_under_less else outcome
 
 
 def _short(entry: Any) -> Any:

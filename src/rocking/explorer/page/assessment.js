@@ -175,7 +175,7 @@ export class View {
   records() {
     const {friction} = this.about;
     const rows = this.rows.map((row) => [
-      this.about.records[row.number], acceleration(row.pga), velocity(row.pgv), row.overturns ? phrase("assessment.overturns") : `${short(row.peak_over_slenderness)} α`,
+      this.about.records[row.number], acceleration(row.pga), velocity(row.pgv), row.undecided ? phrase("assessment.undecided") : row.overturns ? phrase("assessment.overturns") : `${short(row.peak_over_slenderness)} α`,
       row.friction_needed === null ? phrase("assessment.leaves") : fixed(row.friction_needed, 3),
       ...(friction === null ? [] : [row.sliding_time === null ? phrase("assessment.holds") : phrase("assessment.slides", {time: fixed(row.sliding_time, 2)})]),
       phrase("assessment.percent", {share: fixed(100 * row.overturned_levels.reduce((/** @type {number} */ sum, /** @type {number} */ each) => sum + each, 0) / row.overturned_levels.length, 0)}),
@@ -266,7 +266,7 @@ export class View {
 
   /** What each record does, in SI units. */
   table() {
-    const rows = this.rows.map((row) => [textCell(this.about.records[row.number]), row.pga, row.pgv, row.overturns, row.peak_over_slenderness ?? "inf", row.friction_needed ?? "inf", row.sliding_time ?? ""]);
-    return [["record", "pga_m_s2", "pgv_m_s", "overturns", "peak_over_alpha", "friction_needed", "sliding_time_s"], ...rows].map((row) => `${row.join(",")}\n`).join("");
+    const rows = this.rows.map((row) => [textCell(this.about.records[row.number]), row.pga, row.pgv, row.overturns, row.undecided, row.peak_over_slenderness ?? "inf", row.friction_needed ?? "inf", row.sliding_time ?? ""]);
+    return [["record", "pga_m_s2", "pgv_m_s", "overturns", "undecided", "peak_over_alpha", "friction_needed", "sliding_time_s"], ...rows].map((row) => `${row.join(",")}\n`).join("");
   }
 }

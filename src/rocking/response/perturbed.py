@@ -1,0 +1,290 @@
+"""A simulation repeated with its motion, or its initial state, scaled by factors near 1: which results survive."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rocking import checks
+from rocking.arrays import Flags, Floats
+from rocking.body import Coordinate
+from rocking.errors import InvalidOption
+from rocking.result import TableResult
+from rocking.tables import frame_of, named, text_table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: Relative step of the factors, and their number, in summaries and tables.
+RELATIVE: Final = 1e-6
+COUNT: Final = 5
+
+#: Relative precision of a ground motion, and the number of factors within it, in summaries and tables.
+PRECISION: Final = 1e-3
+_WITHIN_PRECISION: Final = 11
+
+#: Outcomes; a block that does not move stands, too.
+OVERTURNS: Final = "overturns"
+UNMOVED: Final = "does not move"
+STANDS: Final = "stands"
+
+
+class Repeat(NamedTuple):
+    """One of the repeated simulations: its factor, outcome, peak and times (s; NaN where there is none), and events."""
+
+    factor: float
+    outcome: str
+    peak: float
+    peak_time: float
+    overturn_time: float
+    last_rest: float
+    events: NDArray[np.void]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Perturbed(TableResult):
+    """One simulation repeated with its motion, or its initial state, scaled; from `Response.perturbed`.
+
+    Its table "repeats" has a row for each factor.
+
+    Attributes
+    ----------
+    relative : float
+        Relative step of the factors.
+    repeats : tuple of Repeat
+        Factor, outcome, peak (rad), peak_time, overturn_time, last_rest (s; NaN where there is none) and events of
+        each simulation, by ascending factor; the one in the middle has factor 1.
+    coordinate : Coordinate
+        Name and unit of what the peak is of.
+    scaled : str
+        What was scaled: "motions" or "initial states".
+    """
+
+    TABLES = ("repeats",)
+
+    relative: float
+    repeats: tuple[Repeat, ...]
+    coordinate: Coordinate
+    scaled: str
+
+    @property
+    def within(self) -> float:
+        """Largest relative distance of a factor from 1."""
+        return self.relative * max(1, len(self.repeats) - 2)
+
+    @property
+    def sample(self) -> str:
+        """Number of simulations, what was scaled and how far, in words."""
+        return f"{len(self.repeats)} {self.scaled} within {percent(self.within)}"
+
+    @property
+    def factors(self) -> Floats:
+        """Factors on the motion or the initial state."""
+        return np.array([repeat.factor for repeat in self.repeats])
+
+    @property
+    def overturned(self) -> Flags:
+        """Whether the block overturns, for each factor."""
+        return np.array([repeat.outcome == OVERTURNS for repeat in self.repeats])
+
+    @property
+    def is_decided(self) -> bool:
+        """Whether the outcome is the same for all factors."""
+        return len({_kind(repeat.outcome) for repeat in self.repeats}) == 1
+
+    @property
+    def peak_range(self) -> tuple[float, float]:
+        """Smallest and largest peak among the simulations with the outcome of factor 1, rad."""
+        return _range([repeat.peak for repeat in self.alike])
+
+    @property
+    def peak_time_range(self) -> tuple[float, float]:
+        """Earliest and latest time of the peak among the simulations with the outcome of factor 1, s."""
+        return _range([repeat.peak_time for repeat in self.alike])
+
+    @property
+    def overturn_range(self) -> tuple[float, float]:
+        """Earliest and latest time at which the block overturns, s; NaN where it does not at factor 1."""
+        return _range([repeat.overturn_time for repeat in self.alike])
+
+    @property
+    def last_rest_range(self) -> tuple[float, float]:
+        """Earliest and latest time of the last rest, s; NaN where a simulation does not end at rest."""
+        return _range([repeat.last_rest for repeat in self.repeats])
+
+    @property
+    def event_ranges(self) -> Floats:
+        """Earliest and latest time of each event at factor 1, s, shape (n, 2).
+
+        NaN from the first event on that is not the same (kind and side) for all factors.
+        """
+        events = self._middle.events
+        ranges = np.full((len(events), 2), np.nan)
+        common = min(len(repeat.events) for repeat in self.repeats)
+        every = np.array([repeat.events[:common] for repeat in self.repeats])
+        same = ((every["kind"] == every["kind"][0]) & (every["side"] == every["side"][0])).all(axis=0)
+        count = int(np.argmin(np.append(same, False)))
+        times = every["time"][:, :count]
+        ranges[:count] = np.stack([times.min(axis=0), times.max(axis=0)], axis=1)
+        return ranges
+
+    @property
+    def event_spreads(self) -> Floats:
+        """Largest distance of each event from its time at factor 1, s; NaN as `event_ranges`."""
+        return np.asarray(np.abs(self.event_ranges - self._middle.events["time"][:, None]).max(axis=1))
+
+    @property
+    def _middle(self) -> Repeat:
+        return self.repeats[len(self.repeats) // 2]
+
+    @property
+    def alike(self) -> list[Repeat]:
+        """The simulations with the outcome of factor 1."""
+        return [repeat for repeat in self.repeats if _kind(repeat.outcome) == _kind(self._middle.outcome)]
+
+    @property
+    def outcome(self) -> str:
+        """Outcome at factor 1, as a verb: a block that moves for other factors "stands"."""
+        outcomes = [self._middle.outcome, *(repeat.outcome for repeat in self.alike)]
+        return next((outcome for outcome in outcomes if outcome != UNMOVED), UNMOVED)
+
+    def share(self) -> str:
+        """Return how many simulations have the outcome of factor 1, in words.
+
+        Returns
+        -------
+        str
+            The outcome, the number of simulations that have it, and how far the factors are from 1.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
+        >>> response.perturbed().share()
+        'overturns in 5 of 5 motions within 3e-6'
+        """
+        return _counted(self.outcome, len(self.alike), self)
+
+    def sentence(self) -> str:
+        """Return the outcome in words: "undecided" where it is not the same for all factors.
+
+        Returns
+        -------
+        str
+            As `share`; where the outcomes differ, how many simulations overturn.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> block, record = rocking.Block(width=0.24, height=1.1), rocking.records.load("ridgecrest-clc-090")
+        >>> rocking.simulate(block, record.scaled_to(0.53 * 9.80665)).perturbed().sentence()
+        'undecided: overturns in 1 of 5 motions within 3e-6'
+        """
+        if self.is_decided:
+            return self.share()
+        overturned = int(np.count_nonzero(self.overturned))
+        return f"undecided: {_counted(OVERTURNS, overturned, self) if overturned else self.share()}"
+
+    def summary(self) -> str:
+        names = {
+            "factor": "factor - 1",
+            "outcome": "outcome",
+            named(f"peak_{self.coordinate.name}", self.coordinate.unit): f"peak, {self.coordinate.unit}",
+            named("peak_time", "s"): "peak time, s",
+            named("last_rest", "s"): "last rest, s",
+        }
+        rows = [row | {"factor": f"{row['factor'] - 1.0:+.2g}"} for row in self.rows()]
+        return f"{self.sentence()}\n\n{text_table([*names.values()], [[row[name] for name in names] for row in rows])}"
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return a row for each factor.
+
+        Returns
+        -------
+        list of dict
+            Values by name, with units in the names.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
+        >>> [row["outcome"] for row in response.perturbed(count=3).rows()]
+        ['overturns', 'overturns', 'overturns']
+        """
+        return [
+            {
+                "factor": repeat.factor,
+                "outcome": repeat.outcome,
+                named(f"peak_{self.coordinate.name}", self.coordinate.unit): repeat.peak,
+                named("peak_time", "s"): repeat.peak_time,
+                named("overturn_time", "s"): repeat.overturn_time,
+                named("last_rest", "s"): repeat.last_rest,
+            }
+            for repeat in self.repeats
+        ]
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            "relative": self.relative,
+            "within": self.within,
+            "decided": self.is_decided,
+            "overturned": int(np.count_nonzero(self.overturned)),
+            "count": len(self.repeats),
+            "repeats": self.rows(),
+        }
+
+    def _frame(self, table: str) -> pd.DataFrame:
+        return frame_of(self.rows(), {})
+
+
+def repeated(
+    middle: Repeat, again: Callable[[float], Repeat], relative: float, count: int, coordinate: Coordinate, scaled: str
+) -> Perturbed:
+    """Repeat a simulation with factors 1, 1 +- relative, 1 +- 3 relative, and so on; see `Response.perturbed`."""
+    step = checks.within(relative, "relative", InvalidOption, 1e-12, 0.1)
+    if checks.whole(count, "count", InvalidOption, 3, 1001) % 2 == 0:
+        raise InvalidOption(
+            f"{{}} must be odd, with as many factors below 1 as above; got {count}", "count", value=count
+        )
+    if step * (count - 2) >= 1.0:
+        raise InvalidOption(
+            f"{{}} must be below 1/{count - 2} for {count} factors; got {step:g}", "relative", value=step
+        )
+    repeats = (middle if factor == 1.0 else again(factor) for factor in factors_near(step, count))
+    return Perturbed(step, tuple(repeats), coordinate, scaled)
+
+
+def factors_near(relative: float, count: int) -> list[float]:
+    """Return the factors 1, 1 +- relative, 1 +- 3 relative, and so on, in ascending order."""
+    more = range(1, count - 1, 2)
+    return [*(1.0 - k * relative for k in reversed(more)), 1.0, *(1.0 + k * relative for k in more)]
+
+
+def steps_within(precision: float) -> tuple[float, int]:
+    """Return the relative step and the number of eleven factors within a precision, for `Response.perturbed`."""
+    most = checks.within(precision, "precision", InvalidOption, 1e-6, 0.1)
+    return most / (_WITHIN_PRECISION - 2), _WITHIN_PRECISION
+
+
+def percent(share: float) -> str:
+    """Return a small share as text: in percent from a hundredth of that on."""
+    if share >= 1e-4:
+        return f"{100.0 * share:.3g} %"
+    mantissa, _, exponent = f"{share:.1e}".partition("e")
+    return f"{float(mantissa):g}e{int(exponent)}"
+
+
+def _counted(outcome: str, number: int, found: Perturbed) -> str:
+    return f"{outcome} in {number} of {found.sample}"
+
+
+def _kind(outcome: str) -> str:
+    return STANDS if outcome == UNMOVED else outcome
+
+
+def _range(values: Sequence[float]) -> tuple[float, float]:
+    return float(np.min(values)), float(np.max(values))
