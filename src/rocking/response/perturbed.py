@@ -182,7 +182,7 @@ class Perturbed(TableResult):
         >>> import rocking
         >>> block, record = rocking.Block(width=0.24, height=1.1), rocking.records.load("ridgecrest-clc-090")
         >>> rocking.simulate(block, record.scaled_to(0.53 * 9.80665)).perturbed().sentence()
-        'undecided: overturns in 1 of 5 motions within 3e-6'
+        'undecided: overturns in 2 of 5 motions within 3e-6'
         """
         if self.is_decided:
             return self.share()

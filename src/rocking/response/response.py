@@ -101,8 +101,8 @@ class Response(Answers, DrawnResult):
         --------
         >>> import rocking
         >>> response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
-        >>> response.summary_rows()[-1]
-        Row(name='verdict', value='overturns at 1.532021 s', unit='1', note='')
+        >>> response.summary_rows()[-2]
+        Row(name='outcome', value='overturns in 5 of 5 motions within 3e-6, at 1.53202 s', unit='1', note='')
         """
         return summary.summary_rows(self, friction, precision)
 
@@ -111,7 +111,9 @@ class Response(Answers, DrawnResult):
 
         Parameters
         ----------
-        friction, precision
+        friction : float, optional
+            As for `summary_rows`.
+        precision : float
             As for `summary_rows`.
 
         Returns
@@ -140,10 +142,9 @@ class Response(Answers, DrawnResult):
 
         Notes
         -----
-        What drives the block (the motion, or the initial state) is taken to be known to a millionth of itself, about
-        what the usual record formats print. Times and the peak are given without the digits that so small a change of
-        it moves, by `sensitivity`, and with nine decimals and six digits at most; a change of a time by a millisecond
-        or more is told with it, after +-.
+        Times and the peak have the digits that are the same in five simulations with the motion (without one, the
+        initial state) scaled by 1, 1 +- 1e-6 and 1 +- 3e-6, at most nine decimals and six digits; where these differ
+        by a millisecond, or in the third digit of the peak, their range is given. See `Response.perturbed`.
 
         Examples
         --------
@@ -155,12 +156,13 @@ class Response(Answers, DrawnResult):
         motion              one-sine, 1.00 s, peak 0.3059 g
         uplift above        0.2182 g
         uplift              0.126380 s, to side -
-        overturn            1.532021 s
+        overturn            1.53202 s
         impacts resolved    1
         peak rotation       1.5708 rad at 1.5320 s, where the block has fallen
         friction needed     0.2372, until it tips at 0.9319 s
         least normal force  0.8919 of the weight, until it tips at 0.9319 s
-        verdict             overturns at 1.532021 s
+        outcome             overturns in 5 of 5 motions within 3e-6, at 1.53202 s
+                            overturns in 11 of 11 motions within 0.1 %
         """
         return text_of(self.summary_rows(friction, precision=precision), _WIDTH)
 

@@ -187,8 +187,8 @@ def check(
     >>> found = check(tombstone, records, rules=["west", "ishiyama"])
     >>> for row in found.rows():
     ...     print(f"{row['west']:.2f} {row['ishiyama']:.2f} {row['exact']:.2f} {row['verdict']}")
-    0.90 0.90 0.71 does not move
-    0.93 0.93 0.64 does not move
+    0.90 0.90 0.71 does not move in 5 of 5 (3e-6), 11 of 11 (0.1 %)
+    0.93 0.93 0.64 does not move in 5 of 5 (3e-6), 11 of 11 (0.1 %)
     """
     named_motions = motions_by_name(motions)
     names = None if rules is None else checks.several(rules, "rules", InvalidOption)
