@@ -5,6 +5,7 @@ import io
 import os
 import pickle
 import re
+import struct
 import sys
 import tempfile
 import tracemalloc
@@ -964,6 +965,54 @@ def test_other_formats_go_through_obspy(form: str, file: Callable[[bytes], Path]
     (channel,) = channels(path, units="cm/s2")
     assert (channel.name, channel.dt, len(channel.acceleration)) == ("HNZ", 0.01, 50)
     np.testing.assert_allclose(channel.acceleration, 0.03 * np.arange(50), rtol=1e-6, atol=1e-12)
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize("form", ["MSEED", "SAC"])
+@pytest.mark.filterwarnings("ignore")
+def test_a_binary_file_with_a_line_of_digits_in_it_is_no_text_table(form: str, order: str, file) -> None:
+    """The bytes of one sample read "a line end, 5, a line end", in a file that is mostly no text."""
+    obspy = pytest.importorskip("obspy")
+    digits = (b"=\n5\n" if order == ">" else b"\n5\n=") if form == "SAC" else (b"\0\n5\n", b"\n5\n\0")[order == "<"]
+    (sample,) = struct.unpack(order + ("f" if form == "SAC" else "i"), digits)
+    samples = np.arange(400) % 37 * abs(sample) / 37.0
+    samples[200] = sample
+    trace = obspy.Trace(samples.astype("f4" if form == "SAC" else "i4"), {"delta": 0.01, "channel": "HNE"})
+    content = io.BytesIO()
+    if form == "SAC":
+        from obspy.io.sac import SACTrace
+
+        SACTrace.from_obspy_trace(trace).write(content, byteorder="little" if order == "<" else "big")
+    else:
+        trace.write(content, format="MSEED", encoding="INT32", byteorder=order)
+    assert b"\n5\n" in content.getvalue()
+    path = file(content.getvalue())
+    assert identify(path).format == f"{form} (through ObsPy)"
+    (channel,) = channels(path, units="m/s2")
+    np.testing.assert_array_equal(channel.acceleration, trace.data.astype(float))
+
+
+def test_without_obspy_a_binary_file_is_no_text_table_either(monkeypatch, file: Callable[[bytes], Path]) -> None:
+    path = file(bytes(range(256)) * 3 + b"\n5\n6\n7\n")
+    monkeypatch.setitem(sys.modules, "obspy", None)
+    assert "this is a binary file (byte 0 at 0) in no format known here" in complaint(path)
+
+
+def test_a_stray_control_byte_in_a_heading_does_not_make_a_table_binary(file: Callable[[bytes], Path]) -> None:
+    rows = b"".join(b"%.2f %.3f\n" % (0.01 * k, (-1) ** k * 0.1) for k in range(100))
+    assert read(file(b"logger\x00 3\ntime (s) a (g)\n" + rows)).pga == pytest.approx(0.1 * GRAVITY)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_obspy_s_checks_of_formats_leave_the_bytes_of_a_file_as_they_are(file: Callable[[bytes], Path]) -> None:
+    """The check for GCF writes to the bytes of this file, which another reader then refuses."""
+    obspy = pytest.importorskip("obspy")
+    header = {"network": "XX", "station": "ABC", "channel": "HNE", "delta": 0.01}
+    header["starttime"] = obspy.UTCDateTime(1998, 5, 22, 20, 0, 0, 364243)
+    content = io.BytesIO()
+    obspy.Trace(np.arange(757, dtype=np.int32), header).write(content, format="MSEED", encoding="STEIM2", reclen=512)
+    (channel,) = channels(file(content.getvalue()), units="m/s2")
+    np.testing.assert_array_equal(channel.acceleration, np.arange(757.0))
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ import os
 import re
 import stat
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
@@ -32,6 +33,8 @@ _ALIKE = 0.8
 _UTF8_MARK = b"\xef\xbb\xbf"
 _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 _CONTROL = bytes(c for c in range(32) if c not in b"\t\n")
+#: A larger share of such bytes makes a file binary; a stray one in a text does not.
+_MOST_CONTROL = 0.01
 _ENDS_OF_TEXT = b"\x00\x1a"
 _VISIBLE = re.compile(rb"\S")
 
@@ -108,6 +111,12 @@ class Source:
     def line_number(self, at: int) -> int:
         """Return the number (from 1) of the line that holds the offset `at`."""
         return self.data.count(b"\n", 0, at) + 1
+
+    @cached_property
+    def is_binary(self) -> bool:
+        """Whether too many bytes are such as no text file holds."""
+        control = len(self.data) - len(self.data.translate(None, _CONTROL))
+        return control > _MOST_CONTROL * len(self.data)
 
     def binary_at(self) -> int | None:
         """Return the offset of the first byte that no text file holds, or None if this is text."""

@@ -263,7 +263,7 @@ def _check_count(source: Source, shape: _Shape, numbers: Floats) -> None:
 
 
 def _shape(source: Source) -> _Shape | None:
-    lines = source.lines(0, _HEADING_LINES)
+    lines = [] if source.is_binary else source.lines(0, _HEADING_LINES)
     for k, line in enumerate(lines):
         if line.text.startswith(_OTHER_TITLES):
             return None

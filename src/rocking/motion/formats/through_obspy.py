@@ -131,10 +131,15 @@ def _claimed_by(name: str, source: Source) -> bool:
         warnings.simplefilter("ignore")
         try:
             is_format = buffered_load_entry_point("obspy", f"obspy.plugin.waveform.{name}", "isFormat")
-            return bool(is_format(io.BytesIO(source.raw)))
+            return bool(is_format(_opened(source)))
         except Exception:
             # A reader that stumbles over foreign bytes (they raise anything) does not claim them.
             return False
+
+
+def _opened(source: Source) -> io.BytesIO:
+    """Return a copy of the file's bytes: ObsPy's check for GCF writes to those that it is given."""
+    return io.BytesIO(bytearray(source.raw))
 
 
 def _traces(source: Source, name: str, *, headonly: bool = False) -> Any:
@@ -147,7 +152,7 @@ def _traces(source: Source, name: str, *, headonly: bool = False) -> Any:
         # What does not pass MiniSEED's own check of its numbers is a warning only.
         warnings.simplefilter("error", InternalMSEEDWarning)
         try:
-            traces = obspy.read(io.BytesIO(source.raw), format=name, headonly=headonly)
+            traces = obspy.read(_opened(source), format=name, headonly=headonly)
         except Exception as error:
             # ObsPy's readers raise whatever their parsing ran into.
             return " ".join(str(error).split())[:_REASON_LENGTH] or type(error).__name__
