@@ -329,3 +329,72 @@ def test_components_that_begin_apart_are_noted(tmp_path):
     path.write_text("t (s),a1 (g),a2 (g)\n" + "\n".join(f"{0.01 * k:.2f},{k % 3},{(k + 1) % 3}" for k in range(50)))
     found = named_motion(str(path), channel="a1").with_vertical(named_vertical("a2", str(path), channel="a1"))
     assert vertical_notes(found) == ()
+
+
+#: Periods of response spectra and ordinates, none of them negative.
+PERIODS = {
+    "logarithmic": np.geomspace(0.01, 10.0, 30).tolist(),
+    "even": (0.02 * np.arange(100)).tolist(),
+    "even in parts": [0.02, 0.04, 0.06, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 1.0, 1.5, 2.0],
+}
+SPECTRA = """
+T (s),Spectral Acceleration (g)  Period T (s),Acceleration (g)  T [s],Se [g]  T (s),RotD50 (g)  T (s),SA (g)
+Period (s),PSA (g)  Period (s),Acceleration (g)  T (s),Pseudo-acceleration (g)  T [s],Sd [g]  T,S_a (g)
+T (s),RotD100 (g)  T (s),GMRotI50 (g)  Periodo (s),Aceleracion espectral (g)  Período (s),Accelerazione (g)
+Periode T [s],Beschleunigung [m/s2]  T [s],Spektralbeschleunigung [m/s2]  T (s),Accelerazione spettrale (g)
+Tn (s),A (g)  Natural period (s),Peak acceleration (g)  Time period (s),Sa/g (g)  T_s,Sa_g  T (s),Acceleration (g)
+T [s],a [g]  T (s),Response spectrum (g)  T (s),Design spectrum Se(T) (g)  T (s),5% damped SA (g)  T (s),Geomean (g)
+T (s),Sae (g)  per (s),psa05 (g)  Frequency (Hz),SA (g)  Time (s),Spectral acceleration (g)
+"""
+ACCELEROGRAMS = """
+Time (s),Acceleration (g)  t [s],a [m/s2]  T (s),Acceleration (g)  T (s),Acc (g)  T [s],a [g]  Time T (s),a (g)
+Tempo (s),Accelerazione (g)  Zeit [s],Beschleunigung [m/s2]  Time (s),SE (g)  Time (s),Spectrum-compatible a (g)
+Time (s),Spectrally matched acceleration (g)  Time (s),Long-period acceleration (g)  x (s),a (g)  seconds,g
+Time,Long-period acceleration
+"""
+
+
+def headings(text: str) -> list[str]:
+    return re.split(r"\s{2,}|\n", text.strip())
+
+
+@pytest.mark.parametrize("periods", PERIODS.values(), ids=PERIODS.keys())
+@pytest.mark.parametrize("heading", headings(SPECTRA))
+def test_a_response_spectrum_is_no_accelerogram(heading: str, periods: list[float], tmp_path: Path) -> None:
+    path = tmp_path / "record.csv"
+    path.write_text(heading + "\n" + wide(periods, [0.9 / (0.3 + period) for period in periods]), encoding="utf-8")
+    with pytest.raises(UnreadableRecord, match=r"that of a spectrum|seems to be a response spectrum"):
+        read(path)
+
+
+@pytest.mark.parametrize("title", ["Response spectrum for 5 % damping\n", "# Pseudo-acceleration (g)\n"])
+@pytest.mark.parametrize(("columns", "dt"), [(2, None), (1, 0.01)])
+def test_a_title_says_that_a_table_is_a_response_spectrum(title: str, columns: int, dt, tmp_path: Path) -> None:
+    path = tmp_path / "record.txt"
+    for sign, refused in ((1.0, True), (-1.0, False)):
+        path.write_text(title + wide(*(TIMES, [0.5, 0.7 * sign, 0.6, 0.1])[2 - columns :], sign=" "))
+        if refused:
+            with pytest.raises(UnreadableRecord, match="seems to be a response spectrum"):
+                read(path, units="g", dt=dt)
+        else:
+            assert read(path, units="g", dt=dt).pga == pytest.approx(0.7 * G)
+
+
+@pytest.mark.parametrize("heading", headings(ACCELEROGRAMS))
+def test_an_accelerogram_is_no_response_spectrum(heading: str, tmp_path: Path) -> None:
+    path = tmp_path / "record.csv"
+    path.write_text(heading + "\n" + rows(), encoding="utf-8")
+    units = None if "g" in heading.replace("Long", "") or "m/s2" in heading else "g"
+    motion = read(path, units=units)
+    assert motion.duration == pytest.approx(0.03) and motion.pga in (pytest.approx(0.4 * G), pytest.approx(0.4))
+
+
+def test_accelerations_that_are_never_negative_are_read_where_a_column_is_named_as_that_of_times(tmp_path) -> None:
+    path = tmp_path / "pulse.csv"
+    for name, is_read in (("Time (s)", True), ("t (s)", True), ("T (s)", False)):
+        path.write_text(f"{name},Acceleration (g)\n0,0\n0.1,0.3\n0.2,0\n")
+        if is_read:
+            assert read(path).pga == pytest.approx(0.3 * G)
+        else:
+            with pytest.raises(UnreadableRecord, match="or name their column so"):
+                read(path)

@@ -44,6 +44,11 @@ _COUNTS: Final = frozenset(
     | {"step", "scan", "count", "id", "record"}
 )
 _SPECTRA: Final = frozenset({"period", "periods", "frequency", "frequencies", "freq", "sa", "psa"})
+#: What names the ordinates of a response spectrum, unless it is that of an accelerogram which was fitted to one.
+_SPECTRAL: Final = re.compile(
+    r"(?!.*(?:match|[ck]ompat|consist|accelerogr)).*(?:spe[ckt]tr|pseudo|rotd\d|gmrot)", re.IGNORECASE
+)
+_PERIOD: Final = re.compile(r"p[eé]r[ií]od|periyot", re.IGNORECASE)
 _ACCELERATION: Final = re.compile(r"\b(a|acc\w*|acel\w*|beschl\w*)(?![a-z])", re.IGNORECASE)
 
 
@@ -60,13 +65,15 @@ class Column(NamedTuple):
 class Heading:
     """What a heading says of each column, whether it names them and where (the offset of that line).
 
-    Where it names no column as that of times, the first of several is `assumed` to be.
+    Where it names no column as that of times, the first of several is `assumed` to be. It is `doubtful` whether they
+    are times where no name but "T" says so, or a title names a spectrum.
     """
 
     columns: tuple[Column, ...]
     named: bool
     at: int
     assumed: bool = False
+    doubtful: bool = False
 
     def places(self, kind: Kind) -> list[int]:
         """Return the places of the columns of one kind."""
@@ -93,7 +100,9 @@ def heading_of(source: Source, end: int, count: int, delimiter: str) -> Heading:
     named = _Names(names, above, rest)
     columns = named.columns() if names else _unnamed(rest, count)
     assumed = count > 1 and not (names and named.names_times())
-    return Heading(tuple(columns), bool(names), lines[-1][1] if lines else end, assumed)
+    spectral = any(map(_SPECTRAL.match, texts))
+    doubtful = not named.names_times(surely=True) if names and count > 1 else spectral
+    return Heading(tuple(columns), bool(names), lines[-1][1] if lines else end, assumed, doubtful)
 
 
 def names_columns(line: bytes, count: int, delimiter: str) -> bool:
@@ -123,9 +132,11 @@ class _Names:
             unit, strange = self._time_unit(place) if kind == "time" else self._acceleration_unit(place)
             yield Column(kind, _without_brackets(self._label(place)), unit, strange)
 
-    def names_times(self) -> bool:
-        """Whether a name is that of times."""
-        return any(self._kind(place) == "time" for place in range(len(self.names)))
+    def names_times(self, *, surely: bool = False) -> bool:
+        """Whether a name is that of times; surely so if it is more than "T", which is that of periods as well."""
+        places = [place for place in range(len(self.names)) if self._kind(place) == "time"]
+        words = [set(_WORD.findall(self._label(place))) for place in places]
+        return any(not surely or "T" not in each or {word.lower() for word in each} & _TIMES - {"t"} for each in words)
 
     def understood(self) -> bool:
         """Whether a name is that of times, row numbers or a spectrum, or has a unit of acceleration."""
@@ -139,10 +150,12 @@ class _Names:
         name = _without_brackets(self._label(place))
         words = {word.lower() for word in _WORD.findall(name)}
         texts = [text for line in self._lines(place) for text in _texts(line)]
-        if words and words <= _SPECTRA:
+        if (words and words <= _SPECTRA) or _SPECTRAL.match(name):
             return "spectrum"
         if any(map(find_unit, texts)):
             return "channel"
+        if _PERIOD.search(name) and not _ACCELERATION.search(name):
+            return "spectrum"
         counts = words <= _COUNTS | _STEPS and words != {"time"} if words else re.search(r"\w", name) is None
         if counts and not any(map(find_time_unit, texts)):
             return "count"

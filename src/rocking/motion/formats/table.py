@@ -165,6 +165,13 @@ def _read(source: Source, shape: _Shape, heading: Heading, request: Request) -> 
     if heading.assumed and (fault := first_fault(table[:, 0])) is not None:
         heading = _without_times(source, request, shape, heading, fault)
     held = _channels(source, heading)
+    abscissas = shape.columns == 1 or heading.places("time")
+    if heading.doubtful and abscissas and np.all(table[:, held] >= 0.0):
+        raise source.error(
+            "this seems to be a response spectrum: no value is negative, and no column is named 'time'; give a table "
+            "of accelerations at times, or name their column so",
+            heading.at,
+        )
     if not heading.places("time") and request.dt is None:
         raise source.error("the file does not say its sampling step; give {} in seconds", shape.start, "dt")
     for place in heading.places("time"):
@@ -202,12 +209,12 @@ def _without_times(source: Source, request: Request, shape: _Shape, heading: Hea
 
 def _channels(source: Source, heading: Heading) -> list[int]:
     """Return the places of the accelerations: with a unit of acceleration if any has one, else without any unit."""
-    if heading.places("spectrum") and not heading.places("time"):
+    channels = heading.places("channel")
+    if heading.places("spectrum") and not (channels and heading.places("time")):
         name = heading.columns[heading.places("spectrum")[0]].name
         raise source.error(
             f"the column {name!r} is that of a spectrum; give a table of accelerations at times", heading.at
         )
-    channels = heading.places("channel")
     known = [place for place in channels if heading.columns[place].unit]
     plain = [place for place in channels if not heading.columns[place].strange]
     if not channels:
