@@ -19,6 +19,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from oracles import record_files as written
 
+from rocking.analysis.levels import clusters_of
 from rocking.errors import InvalidMotion, RockingError, UnreadableRecord
 from rocking.motion import formats, records
 from rocking.motion.formats import Channel, channels, identify, read, source, through_obspy, values
@@ -362,6 +363,85 @@ def test_a_channel_cut_short_is_refused(file: Callable[[str], Path]) -> None:
         cut = "".join((written.FOLDER / name).read_text().splitlines(keepends=True)[:lines])
         message = complaint(file(cut), channel=1, **({} if "knet" not in name else {"dt": 0.01}))
         assert what in message or "knet" in name, (name, message)
+
+
+@pytest.mark.parametrize("title", ["1 UNCORRECTED ACCELEROGRAM", "2 CORRECTED ACCELEROGRAM"])
+@pytest.mark.parametrize("rate", [200.0, None])
+@pytest.mark.parametrize("padding", [0, 1, 3, 8, 9])
+@pytest.mark.parametrize("count", [40, 42])
+def test_the_first_values_of_smc_are_the_record(title, rate, padding: int, count: int, file) -> None:
+    """Whether the row that follows them is a part of another one, or whole."""
+    values = [value for k in range(count // 2) for value in (0.003 * k * (1 + 0.01 * k), written.series(1)[k])]
+    padded = written.smc(values, rate=rate, title=title) + "".join(
+        f"{4.0 + k:10.4f}" + "\n" * (k == 7) for k in range(padding)
+    )
+    if padding == 9:
+        assert f"the header says {count} values but {count + 9} follow" in complaint(file(padded))
+        return
+    (plain,), (channel,) = channels(file(written.smc(values, rate=rate, title=title))), channels(file(padded))
+    np.testing.assert_array_equal(channel.acceleration, plain.acceleration)
+    np.testing.assert_array_equal(channel.times, plain.times)
+
+
+@pytest.mark.parametrize("ends_at", ["before the data", "within them"])
+@pytest.mark.parametrize(
+    "title",
+    [
+        "Uncorrected accelerogram 20990101_000000_ABCD_20 Some Institute",
+        "Corrected accelerogram 20990101_000000_ABCD_20 Some Institute",
+        "CORRECTED ACCELEROGRAM  IIAB123  99.123.0 COMP N08W   FILE   0  CORRESPONDING T",
+        "FILE     0 OF UNCORRECTED ACCELEROGRAM DATA OF VOLUME I:",
+    ],
+)
+def test_accelerograms_of_geonet_and_usc_are_not_called_cut(title: str, ends_at: str, file) -> None:
+    data = "       0" * 10 + "\n" + ("    0.00" * 10 + "\n") * 20 + "0.5\n" if ends_at == "within them" else ""
+    path = file(f"{title}\nSite ABCD  42 00 00S  172 00 00E\nNumber of points  60    Duration 0.30 s\n{data}")
+    for act in (read, identify):
+        with pytest.raises(UnreadableRecord, match=r"layout of GeoNet or USC, .*; write it as a text table") as caught:
+            act(path)
+        assert "again" not in str(caught.value)
+
+
+def test_a_header_without_its_last_line_may_be_cut_or_another_one(file: Callable[[str], Path]) -> None:
+    text = (written.FOLDER / "two.v1").read_text().replace("data are sec and g.", "accel is g.        ")
+    text = text.replace("Accelerogram points at 200 pts/sec", "points of accel data equally spaced at .005 sec")
+    assert "if the file is cut, get it again; if its layout is another one, write it" in complaint(
+        file(text), channel=1
+    )
+
+
+@pytest.mark.parametrize("form", ["CSMIP V1", "SMC"])
+def test_uneven_times_contradict_a_step(form: str, file: Callable[[str], Path]) -> None:
+    times = [0.005 * k + 0.002 * (k % 3 == 1) for k in range(40)]
+    pairs = [x for pair in zip(times, written.series(1) + [0.0] * 3, strict=True) for x in pair]
+    v1 = written.csmip_v1_pairs([(1, "90 Deg", times, [x / 1000.0 for x in pairs[1::2]])])
+    path = file(v1 if form == "CSMIP V1" else written.smc(pairs, rate=None))
+    assert channels(path)[0].times is not None
+    assert "the times are not evenly 0.02 s apart; leave dt out" in complaint(path, dt=0.02)
+    request = source.Request.checked(0.02, None, several=True)
+    assert formats.chosen(path, request).times is not None
+
+
+def test_times_printed_with_few_digits_have_the_step_that_is_given(file: Callable[[str], Path]) -> None:
+    step = 1.0 / 640.0
+    pairs = [x for k, value in enumerate(written.series(1)) for x in (round(100.0 + step * k, 3), value)]
+    path = file(written.csmip_v1_pairs([(1, "Up", pairs[0::2], [x / 1000.0 for x in pairs[1::2]])]))
+    assert channels(path)[0].dt is None and channels(path, dt=step)[0].dt == step
+
+
+@pytest.mark.parametrize("owner", [" (CDMG STATION 54428)", " (CWB)", "(CUE)", ", (CWB)", " (CWB, TAIWAN)", ""])
+@pytest.mark.parametrize("date", ["", " 9/20/1999,"])
+@pytest.mark.parametrize("place", ["TCU068", "PACOIMA DAM (UPPER LEFT)"])
+def test_the_owner_at_the_end_of_a_title_of_at2_is_no_part_of_the_component(owner, date, place, file) -> None:
+    components = {}
+    for name, azimuth in (("360", 0.0), ("090", 90.0), ("UP", None)):
+        title = f"CHI-CHI 09/20/99,{date} {place}, {name}{owner}"
+        text = written.at2([0.1, -0.2], "NPTS= 2, DT= .01").replace("Somewhere-01, 1/2/1999, Town Hall, 090", title)
+        (channel,) = channels(file(text))
+        assert (channel.name, channel.azimuth, channel.station) == (name, azimuth, place)
+        assert channel.metadata.get("station line", "") == owner.strip(" ,()")
+        components[name] = channel.motion()
+    assert clusters_of(list(components.values()), "station").tolist() == [0, 0, 0]
 
 
 def test_smc_unknown_values_are_refused(file: Callable[[str], Path]) -> None:
@@ -926,7 +1006,7 @@ def test_foreign_files_are_said_to_be_text_or_binary(file: Callable[[bytes], Pat
     for byte in set(range(32)) - set(b"\t\n\f\r"):
         assert f"this is a binary file (byte {byte} at 2)" in complaint(file(b"ab%ccd\n" % byte))
     assert "this is text in no format known here" in complaint(file(b"Dear reader,\nthere is no record here.\n"))
-    assert "no line of it holds numbers alone" in complaint(file("time (s), acceleration (g)\n"))
+    assert "none of its first 1000 lines holds numbers alone" in complaint(file("time (s), acceleration (g)\n"))
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Text tables as spreadsheets, loggers and programs write them: what is read of each, or the line that is refused."""
 
+import itertools
 import re
 from pathlib import Path
 
@@ -7,7 +8,8 @@ import numpy as np
 import pytest
 
 from rocking.errors import UnreadableRecord
-from rocking.motion.formats import channels, identify, read
+from rocking.motion.formats import channels, chosen, identify, read
+from rocking.motion.formats.source import Request
 from rocking.motion.named import named_motion, named_vertical
 from rocking.plausibility import reading_notes, vertical_notes
 
@@ -200,13 +202,59 @@ def test_units_overrule_what_a_heading_says_and_lines_before_the_rows_may_hold_n
     assert identify(path).reason == "from line 2 on each line holds two numbers, between them a comma"
 
 
-def test_the_first_row_of_a_table_is_among_its_first_64_lines(tmp_path: Path) -> None:
+def test_the_first_row_of_a_table_is_among_its_first_1000_lines(tmp_path: Path) -> None:
     path = tmp_path / "table.txt"
-    path.write_text("words of a laboratory\n" * 63 + rows())
-    assert read(path, units="g").samples[1] == pytest.approx(G * np.array(SAMPLES))
-    path.write_text("words of a laboratory\n" * 64 + rows())
-    with pytest.raises(UnreadableRecord, match="no line of it holds numbers alone"):
+    for count, line in itertools.product((62, 63, 64, 200, 999), ("words of a laboratory", "# words", "", "KEY : 3 m")):
+        path.write_text(f"{line}\n" * count + rows())
+        assert read(path, units="g").samples[1] == pytest.approx(G * np.array(SAMPLES))
+    path.write_text("words of a laboratory\n" * 1000 + rows())
+    with pytest.raises(UnreadableRecord, match="none of its first 1000 lines holds numbers alone"):
         read(path, units="g")
+
+
+@pytest.mark.parametrize(
+    "stated",
+    """SAMPLING INTERVAL (sec) : 0.01  Sampling rate: 100 Hz  sampling frequency (Hz),100  dt = 0.01 s  DT 0.0100
+Time step (s) = .01  Samples/sec=100  100 samples per second  100 sps  Delta t = 10 ms  time_step: 1.0E-02
+EQUALLY SPACED INTERVALS OF: 0.010 SEC  INTERVALO DE MUESTREO, C1-C6 (s) : /0.01/0.01/0.01
+VEL. DE MUESTREO, C1-C6 (muestras/s) : /100/100/100  Sampling period 1/100 s""".replace("\n", "  ").split("  "),
+)
+@pytest.mark.parametrize("columns", [1, 3])
+def test_a_step_that_a_heading_states_is_not_contradicted(stated: str, columns: int, tmp_path: Path) -> None:
+    path = tmp_path / "table.txt"
+    names = "N-S (gal)  E-W (gal)  U-D (gal)\n" if columns == 3 else ""
+    path.write_text(f"A STATION\n{stated}\n{names}" + wide(*[SAMPLES] * columns, sign="  "))
+    channel = 1 if columns == 3 else None
+    assert read(path, dt=0.01, units="gal", channel=channel).step == 0.01
+    for several in (False, True):
+        with pytest.raises(UnreadableRecord, match=r"line 2: the heading says .*, not dt 0.02 s; correct one of them"):
+            chosen(path, Request.checked(0.02, "gal", channel, several=several))
+    if columns == 1:
+        with pytest.raises(
+            UnreadableRecord, match=r"no column holds times, but the heading says .*; give dt in seconds"
+        ):
+            read(path, units="gal")
+
+
+@pytest.mark.parametrize("dt", [0.0078125, 0.0078, 0.008])
+def test_a_step_that_a_heading_states_may_be_rounded(dt: float, tmp_path: Path) -> None:
+    path = tmp_path / "table.txt"
+    for stated, refused in (("0.0078", dt == 0.008), ("0.008", False), ("0.01", True), ("1e-9999", True)):
+        path.write_text(f"sampling interval: {stated} s\n" + wide(SAMPLES))
+        if refused:
+            with pytest.raises(UnreadableRecord, match="correct one of them"):
+                read(path, dt=dt, units="g")
+        else:
+            assert read(path, dt=dt, units="g").step == dt
+
+
+@pytest.mark.parametrize(
+    "line", ["Sample 3 of test 12", "low-pass filter 25 Hz", "PGA 0.3 g", "dt", "sampling rate {}"]
+)
+def test_a_number_of_something_else_is_no_step(line: str, tmp_path: Path) -> None:
+    path = tmp_path / "table.txt"
+    path.write_text(f"{line}\n" + wide(SAMPLES))
+    assert read(path, dt=0.02, units="g").step == 0.02
 
 
 def test_even_and_uneven_times_are_in_the_unit_of_their_heading(tmp_path: Path) -> None:
@@ -239,7 +287,9 @@ def test_a_column_of_times_alone_is_not_read_as_accelerations(tmp_path, name):
         read(path, dt=0.005, units="g")
 
 
-@pytest.mark.parametrize("name", ["T", "S", "NS", "Time history", "time series (g)", "Time: 12:03", "dt = 0.01 s", "1"])
+@pytest.mark.parametrize(
+    "name", ["T", "S", "NS", "Time history", "time series (g)", "Time: 12:03", "dt = 0.005 s", "1"]
+)
 def test_a_title_above_a_column_of_accelerations_may_speak_of_time(tmp_path, name):
     path = tmp_path / "column.csv"
     path.write_text(f"# {name}\n0.000\n0.005\n0.010\n")

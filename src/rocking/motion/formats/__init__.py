@@ -196,8 +196,8 @@ def _unknown(source: Source) -> UnreadableRecord:
     position = source.binary_at()
     if position is None and not table.is_foreign(source):
         return source.error(
-            "this is text in no format known here, and no line of it holds numbers alone: if it is the heading of a "
-            "record, get the whole file"
+            f"this is text in no format known here, and none of its first {table.HEADING_LINES} lines holds numbers "
+            "alone: if it is the heading of a record, get the whole file; if its heading is longer, shorten it"
         )
     what = "this is text" if position is None else f"this is a binary file (byte {source.data[position]} at {position})"
     if through_obspy.installed():

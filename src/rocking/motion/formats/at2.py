@@ -22,6 +22,8 @@ _KEYS_FIRST = re.compile(rf"NPTS\s*[=:]?\s*(\d{{1,12}})\b.*?\bDT\s*[=:]?\s*({NUM
 _VALUES_FIRST = re.compile(rf"^\s*(\d{{1,12}})[\s,]+({NUMBER})[\s,]+NPTS\s*,\s*DT\b", re.IGNORECASE)
 _UNITS = re.compile(r"UNITS\s+OF\s+([A-Z0-9/^*]+)", re.IGNORECASE)
 _OTHER_QUANTITY = re.compile(r"\b(VELOCITY|DISPLACEMENT)\s+TIME\b", re.IGNORECASE)
+#: Who owns the station, and its number there, at the end of a title.
+_OWNER = re.compile(r"(.*?)[\s,]*\(([^()]*)\)")
 _EXTENSIONS = {"velocity": "VT2", "displacement": "DT2"}
 
 
@@ -53,7 +55,7 @@ def _read(source: Source, header: _PeerHeader, other: tuple[str, int] | None, re
     stated = Stated(header.points, at, "NPTS")
     values = read_values(source, header.sizes.next, len(source.data), _LAYOUT, stated)
     title = header.titles[1].text.strip() if len(header.titles) > 1 else ""
-    event, station, name = _places(title)
+    event, station, name, owner = _places(title)
     return [
         Channel(
             name=name,
@@ -64,7 +66,7 @@ def _read(source: Source, header: _PeerHeader, other: tuple[str, int] | None, re
             units=spelling or unit.name,
             station=station,
             event=event,
-            metadata={"format": NAME, "file": source.file},
+            metadata={"format": NAME, "file": source.file} | ({"station line": owner} if owner else {}),
         )
     ]
 
@@ -88,9 +90,11 @@ def _other_quantity(header: _PeerHeader) -> tuple[str, int] | None:
     return None
 
 
-def _places(title: str) -> tuple[str, str, str]:
-    """Split "event, date, station, component" (or "event, station, component")."""
-    parts = [part.strip() for part in title.split(",")]
+def _places(title: str) -> tuple[str, str, str, str]:
+    """Split "event, date, station, component (owner)" (or "event, station, component", "..., component, (owner)")."""
+    owned = _OWNER.fullmatch(title)
+    text, owner = owned.groups() if owned else (title, "")
+    parts = [part.strip() for part in text.split(",")]
     if len(parts) < 3:
-        return title, "", "acceleration"
-    return ", ".join(parts[:-2]), parts[-2], parts[-1] or "acceleration"
+        return title, "", "acceleration", ""
+    return ", ".join(parts[:-2]), parts[-2], parts[-1] or "acceleration", owner

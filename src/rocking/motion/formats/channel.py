@@ -107,6 +107,20 @@ def _simplest_fit(times: NDArray[np.float64], step: float, drift: float, allowed
     return simplest if spread <= allowed else None
 
 
+def step_or_times(
+    source: Source, request: Request, times: NDArray[np.float64], at: int
+) -> tuple[float | None, NDArray[np.float64] | None]:
+    """Return the step (s) of increasing times, or the times where they are uneven; refuse another step."""
+    step = even_step(times) if len(times) > 1 else None
+    if step is not None:
+        return request.step(source, step, at), None
+    if request.dt is None or request.several:
+        return None, times
+    if not prints_as(times, request.dt):
+        raise source.error(f"the times are not evenly {request.dt:g} s apart; leave {{}} out", at, "dt")
+    return request.dt, None
+
+
 #: Numbers that files have where a value is missing: nines before and after the point, those of well logs and of SAC,
 #: the ends of 16 and 24 bits.
 _MARKS = [float("9" * whole + "." + "9" * decimals) for whole in range(2, 9) for decimals in range(5)]

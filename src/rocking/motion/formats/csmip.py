@@ -16,13 +16,25 @@ import re
 from typing import NamedTuple
 
 from rocking.arrays import Floats
-from rocking.motion.formats.channel import Channel, Identification, Recognised, even_step, first_fault, to_acceleration
+from rocking.motion.formats.channel import (
+    Channel,
+    Identification,
+    Recognised,
+    first_fault,
+    step_or_times,
+    to_acceleration,
+)
 from rocking.motion.formats.source import Line, Request, Source
 from rocking.motion.formats.values import Layout, Stated, bad_number, numeric_end, parse, read_values
 from rocking.motion.units import Unit
 
 V1_TITLE = re.compile(r"^\s*uncorrected accelerogram", re.IGNORECASE)
 V2_TITLE = re.compile(r"^\s*corrected accelerogram", re.IGNORECASE)
+#: Titles of GeoNet and of USC, which begin alike; their headers are others.
+_OTHER_LAYOUT = re.compile(
+    r"^\s*(?:un)?corrected accelerogram(?: \d{8}_\d{6}_|.*\bfile\s+\d)|^\s*file\s+\d+ of uncorrected accelerogram",
+    re.IGNORECASE | re.ASCII,
+)
 
 _CHANNEL = re.compile(r"^\s*chan\S*\s*(\d{1,6})\s*:\s*(.*)$", re.IGNORECASE | re.ASCII)
 _STATION = re.compile(r"^\s*sta\w*\s+(?:no|id)\b\.?\s*(.*)$", re.IGNORECASE)
@@ -33,11 +45,15 @@ _FORMAT = re.compile(r"\(\s*(\d{1,3})\s*[EFGI]\s*(\d{1,3})(?:\.\d+)?\s*\)", re.I
 _END_OF_DATA = re.compile(r"^\s*(/&|-*\s*end[ -]of[ -]data)", re.IGNORECASE)
 
 _NAME_COLUMNS = 40
+_NO_DATA_LINE = "if the file is cut, get it again; if its layout is another one, write it as a text table"
 
 
 def recognise(source: Source) -> Recognised | None:
-    """Return the format if the first line is its title."""
+    """Return the format if the first line is its title; refuse other layouts with such a title."""
     line = source.first_line()
+    if line is not None and _OTHER_LAYOUT.search(line.text):
+        text = "this accelerogram has the layout of GeoNet or USC, which is not read here"
+        raise source.error(f"{text}; write it as a text table", line.start)
     kinds = ("CSMIP V1", V1_TITLE, "Uncorrected", _read_v1), ("CSMIP V2", V2_TITLE, "Corrected", _read_v2)
     for form, title, words, read in kinds:
         if line is not None and title.search(line.text):
@@ -179,8 +195,7 @@ def _v1_pairs(source: Source, request: Request, header: list[Line], ordinal: int
     times, acceleration = values[0::2], to_acceleration(source, at, values[1::2], unit)
     if first_fault(times) is not None:
         raise source.error("the times of the points that follow do not increase throughout; correct the file", start)
-    step = even_step(times)
-    dt, uneven = (None, times) if step is None else (request.step(source, step, start), None)
+    dt, uneven = step_or_times(source, request, times, start)
     return _v1_labelled(source, header, ordinal, spelling, acceleration, dt, uneven), end
 
 
@@ -191,7 +206,7 @@ def _v1_pair_header(source: Source, request: Request, header: list[Line]) -> tup
     complete = len(numbers) == _V1_NUMBER_LINES and numeric_end(source, numbers[0].start) >= numbers[-1].next
     if points is None or spelling is None or not complete:
         raise source.error(
-            "no line 'points at ... in units of ...' ends this channel's header; get the file again", header[0].start
+            f"no line 'points at ... in units of ...' ends this channel's header; {_NO_DATA_LINE}", header[0].start
         )
     return int(points), spelling, request.units(source, spelling, header[0].start)
 
@@ -257,7 +272,7 @@ def _v2_channel(source: Source, request: Request, start: int, ordinal: int) -> t
         stated = _V2_DATA_LINE.match(line.text)
         if stated:
             return _v2_acceleration(source, request, lines[: index + 1], stated, ordinal)
-    raise source.error("no line 'points of accel data' ends this channel's header; get the file again", start)
+    raise source.error(f"no line 'points of accel data' ends this channel's header; {_NO_DATA_LINE}", start)
 
 
 def _v2_acceleration(

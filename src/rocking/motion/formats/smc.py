@@ -1,7 +1,8 @@
 """USGS SMC: 11 text lines, 48 integers, 50 reals, comments that start with a bar, one component in cm/s^2.
 
-Integer 16 counts the comment lines, integer 17 the values; real 2 is the rate in samples per second. A digitised
-film record has no rate: its values are pairs of time and acceleration. Unknown values are -32768 and 1.7e38.
+Integer 16 counts the comment lines, integer 17 the values, after which a last row may be padded; real 2 is the rate in
+samples per second. A digitised film record has no rate: its values are pairs of time and acceleration. Unknown values
+are -32768 and 1.7e38.
 """
 
 from __future__ import annotations
@@ -18,12 +19,12 @@ from rocking.motion.formats.channel import (
     Identification,
     Recognised,
     azimuth_of,
-    even_step,
     first_fault,
+    step_or_times,
     to_acceleration,
 )
 from rocking.motion.formats.source import Line, Request, Source
-from rocking.motion.formats.values import Layout, Stated, read_values
+from rocking.motion.formats.values import Layout, Stated, read_values, wrong_count
 
 NAME = "USGS SMC"
 
@@ -119,17 +120,19 @@ def _series(source: Source, request: Request, header: _SmcHeader) -> tuple[float
         return request.step(source, 1.0 / rate, at), None, values
     times = values[0::2]
     if len(values) % 2 or len(values) == 0 or first_fault(times) is not None:
-        raise source.error("there is no rate, nor are the values pairs of increasing time and value; correct it", at)
-    dt = even_step(times) if len(times) > 1 else None
-    if dt is None:
-        return None, times, values[1::2]
-    return request.step(source, dt, at), None, values[1::2]
+        text = "there is no rate, nor are the values pairs of increasing time and value"
+        raise source.error(f"{text}; correct it, or get the corrected accelerogram", at)
+    return *step_or_times(source, request, times, at), values[1::2]
 
 
 def _values(source: Source, header: _SmcHeader) -> Floats:
     count = header.integer(_VALUE_COUNT)
     layout = _PRECISE_VALUES if header.integer(_DIGITS) == _PRECISE_DIGITS else _VALUES
-    values = read_values(source, header.data, len(source.data), layout, Stated(count, header.text[-1].next))
+    values = read_values(source, header.data, len(source.data), layout)
+    if not 0 <= len(values) - count <= layout.per_line:
+        at = header.text[-1].next
+        raise wrong_count(source, at, f"the header says {count} values", len(values), more=len(values) > count)
+    values = values[:count]
     if (np.abs(values) >= _UNKNOWN).any():
         raise source.error("some values are 1.7e38, which means 'unknown'; get a record without gaps", header.data)
     return values

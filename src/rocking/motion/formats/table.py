@@ -14,12 +14,13 @@ import itertools
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from decimal import Decimal
 from typing import NamedTuple
 
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.errors import UnreadableRecord
+from rocking.errors import UnreadableRecord, literal
 from rocking.motion.formats.channel import (
     Channel,
     Identification,
@@ -33,14 +34,16 @@ from rocking.motion.formats.channel import (
 )
 from rocking.motion.formats.heading import RULE, Column, Heading, heading_of, names_columns
 from rocking.motion.formats.source import Line, Request, Source
-from rocking.motion.formats.values import convert, not_a_number, parse, rows_of_numbers
+from rocking.motion.formats.values import NUMBER, convert, not_a_number, parse, rows_of_numbers
 from rocking.motion.units import CHOICES, Unit
 
 NAME = "text table"
 
 _DELIMITERS = {",": "a comma", ";": "a semicolon", " ": "a blank"}
 
-_HEADING_LINES = 64
+#: Headings are no longer; as many lines are looked through for the second and third row.
+HEADING_LINES = 1000
+_LINES_BELOW = 64
 #: So many rows, as Python keeps them, take some twenty times the memory of their text.
 _LINES_AT_ONCE = 5_000
 
@@ -71,6 +74,17 @@ _SAME_STEP = 0.5
 _OF_OTHER_QUANTITY = re.compile(r".*[/%].*|m|cm|mm|in|ft|m?v|counts?|rad|deg", re.IGNORECASE)
 
 _LENGTH_OR_SPEED = re.compile(r"(?:[muµ]?m|cm|in|ft)(?:/s(?:ec)?)?", re.IGNORECASE)
+
+#: What a step is stated by, or a rate: "sampling interval (sec) : 0.01", "200 sps".
+_STATES_STEP = re.compile(
+    rf"({NUMBER})\s*(?:sps\b|samples?\s*(?:/|per)\s*s)|(?:sampl\w*[\s_-]*(?:rate|freq|interval|step|period|/\s*s)"
+    r"|time[\s_-]*(?:step|interval)|\b(?:dt|delta[\s_-]?t)\b|intervals? of|(?:interval|vel|frec)\S* de muestreo)"
+    r"(?:[^:=]*[:=])?(.*)",
+    re.IGNORECASE,
+)
+#: A stated step may be rounded by this share of it, and by half a unit of its last digit.
+_ROUNDED = 0.03
+_SHOWN = 100
 
 #: Titles of other formats' tables, which ObsPy reads.
 _OTHER_TITLES = ("TIMESERIES ",)
@@ -137,7 +151,7 @@ def refusal(source: Source) -> UnreadableRecord | None:
         )
     if is_foreign(source) or source.binary_at() is not None:
         return None
-    rows = [_row(line, _delimiter(line)[0]) for line in _filled(source.lines(0, _HEADING_LINES))]
+    rows = [_row(line, _delimiter(line)[0]) for line in _filled(source.lines(0, HEADING_LINES))]
     for row, following in itertools.pairwise(rows):
         damaged = _damaged_in(row.tokens)
         if damaged and len(row.tokens) == len(following.tokens) and _damaged_in(following.tokens):
@@ -147,7 +161,7 @@ def refusal(source: Source) -> UnreadableRecord | None:
 
 def is_foreign(source: Source) -> bool:
     """Whether the first line is the title of another format's table."""
-    return any(line.text.startswith(_OTHER_TITLES) for line in source.lines(0, _HEADING_LINES))
+    return any(line.text.startswith(_OTHER_TITLES) for line in source.lines(0, HEADING_LINES))
 
 
 def _read(source: Source, shape: _Shape, heading: Heading, request: Request) -> list[Channel]:
@@ -165,15 +179,11 @@ def _read(source: Source, shape: _Shape, heading: Heading, request: Request) -> 
     if heading.assumed and (fault := first_fault(table[:, 0])) is not None:
         heading = _without_times(source, request, shape, heading, fault)
     held = _channels(source, heading)
-    abscissas = shape.columns == 1 or heading.places("time")
-    if heading.doubtful and abscissas and np.all(table[:, held] >= 0.0):
-        raise source.error(
-            "this seems to be a response spectrum: no value is negative, and no column is named 'time'; give a table "
-            "of accelerations at times, or name their column so",
-            heading.at,
-        )
-    if not heading.places("time") and request.dt is None:
-        raise source.error("the file does not say its sampling step; give {} in seconds", shape.start, "dt")
+    if heading.doubtful and (shape.columns == 1 or heading.places("time")) and np.all(table[:, held] >= 0.0):
+        text = "this seems to be a response spectrum: no value is negative, and no column is named 'time'"
+        raise source.error(f"{text}; give accelerations at times, or name their column so", heading.at)
+    if not heading.places("time"):
+        _check_step(source, request.dt, shape)
     for place in heading.places("time"):
         _refuse_strange_times(source, heading, place)
     units = [_unit(source, request, heading, place, shape.start) for place in held]
@@ -258,6 +268,28 @@ def _refuse_strange_times(source: Source, heading: Heading, place: int) -> None:
         )
 
 
+def _check_step(source: Source, dt: float | None, shape: _Shape) -> None:
+    """Refuse a table without times if no step is given, or another one than a line before the rows states."""
+    said = "the file does not say its sampling step"
+    for line in itertools.takewhile(lambda line: line.start < shape.start, source.lines(0, HEADING_LINES)):
+        found = _STATES_STEP.search(line.text)
+        numbers = re.findall(NUMBER, found[1] or found[2]) if found else []
+        stated = literal(repr(line.text.strip()[:_SHOWN]))
+        if dt is not None and numbers and not any(_is_step(number, dt) for number in numbers):
+            text = f"the heading says {stated}, not {{}} {dt:g} s; correct one of them"
+            raise source.error(text, line.start, "dt", value=dt)
+        said = f"no column holds times, but the heading says {stated}" if numbers else said
+    if dt is None:
+        raise source.error(f"{said}; give {{}} in seconds", shape.start, "dt")
+
+
+def _is_step(number: str, dt: float) -> bool:
+    """Whether a number may be a step (s): in s or ms, or as a rate, rounded as it is printed."""
+    printed = Decimal(number.upper().replace("D", "E"))
+    rounded = min(float(f"0.5e{printed.as_tuple().exponent}"), _ROUNDED * abs(float(printed)))
+    return any(abs(each - float(printed)) <= rounded for each in (dt, 1e3 * dt, 1.0 / dt))
+
+
 def _check_count(source: Source, shape: _Shape, numbers: Floats) -> None:
     """Refuse rows whose numbers do not follow each other: one is missing."""
     steps = np.diff(numbers)
@@ -270,14 +302,14 @@ def _check_count(source: Source, shape: _Shape, numbers: Floats) -> None:
 
 
 def _shape(source: Source) -> _Shape | None:
-    lines = [] if source.is_binary else source.lines(0, _HEADING_LINES)
+    lines = [] if source.is_binary else source.lines(0, HEADING_LINES)
     for k, line in enumerate(lines):
         if line.text.startswith(_OTHER_TITLES):
             return None
         translation, delimiter = _delimiter(line)
         tokens = _row(line, translation).tokens
         if tokens and not _is_comment(line) and all(parse(token) is not None for token in tokens):
-            following = _filled(source.lines(line.next, _HEADING_LINES))
+            following = _filled(source.lines(line.next, _LINES_BELOW))
             if delimiter == " " and len(tokens) > 1:
                 translation = _with_decimal_commas(following) or translation
             rows = [_row(each, translation) for each in (line, *following[:2])]
