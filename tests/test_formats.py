@@ -1006,7 +1006,7 @@ def test_foreign_files_are_said_to_be_text_or_binary(file: Callable[[bytes], Pat
     for byte in set(range(32)) - set(b"\t\n\f\r"):
         assert f"this is a binary file (byte {byte} at 2)" in complaint(file(b"ab%ccd\n" % byte))
     assert "this is text in no format known here" in complaint(file(b"Dear reader,\nthere is no record here.\n"))
-    assert "none of its first 1000 lines holds numbers alone" in complaint(file("time (s), acceleration (g)\n"))
+    assert "no line of it holds numbers alone" in complaint(file("time (s), acceleration (g)\n"))
 
 
 @pytest.mark.parametrize(

@@ -195,10 +195,12 @@ def _unknown(source: Source) -> UnreadableRecord:
         return source.error(f"this is {foreign}")
     position = source.binary_at()
     if position is None and not table.is_foreign(source):
-        return source.error(
-            f"this is text in no format known here, and none of its first {table.HEADING_LINES} lines holds numbers "
-            "alone: if it is the heading of a record, get the whole file; if its heading is longer, shorten it"
-        )
+        what = "no line of it holds numbers alone: if it is the heading of a record, get the whole file"
+        if source.data.count(b"\n") >= table.HEADING_LINES:
+            what = (
+                f"none of its first {table.HEADING_LINES} lines holds numbers alone: shorten a heading that is longer"
+            )
+        return source.error(f"this is text in no format known here, and {what}")
     what = "this is text" if position is None else f"this is a binary file (byte {source.data[position]} at {position})"
     if through_obspy.installed():
         return source.error(f"{what} in no format known here, nor to ObsPy; give a strong-motion record")

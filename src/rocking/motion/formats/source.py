@@ -115,8 +115,7 @@ class Source:
     @cached_property
     def is_binary(self) -> bool:
         """Whether too many bytes are such as no text file holds."""
-        control = len(self.data) - len(self.data.translate(None, _CONTROL))
-        return control > _MOST_CONTROL * len(self.data)
+        return len(self.data.translate(None, _CONTROL)) < (1.0 - _MOST_CONTROL) * len(self.data)
 
     def binary_at(self) -> int | None:
         """Return the offset of the first byte that no text file holds, or None if this is text."""
