@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 Polarity = Literal["+", "-", "both"]
 
-_SIGNS: Final[Mapping[str, tuple[int, ...]]] = {"+": (1,), "-": (-1,), "both": (1, -1)}
+SIGNS: Final[Mapping[str, tuple[int, ...]]] = {"+": (1,), "-": (-1,), "both": (1, -1)}
 
 #: Outcomes that are kept of a simulation, from the fields of the engine's: units, and what each one means.
 VARIABLES: Final[Mapping[str, tuple[str, str]]] = {
@@ -180,7 +180,7 @@ class Product:
     duration: float | None
 
     def __post_init__(self) -> None:
-        checks.one_of(self.polarity, "polarity", InvalidOption, list(_SIGNS))
+        checks.one_of(self.polarity, "polarity", InvalidOption, list(SIGNS))
         rules_of(self.bodies, self.model, self.treatment, self.duration, record=False)  # checked before any work
         for motion in self.motions:
             check_components(self.bodies, motion)
@@ -188,7 +188,7 @@ class Product:
     @property
     def signs(self) -> tuple[int, ...]:
         """Factors of the polarities."""
-        return _SIGNS[self.polarity]
+        return SIGNS[self.polarity]
 
     @property
     def shape(self) -> tuple[int, int, int, int]:

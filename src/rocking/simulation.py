@@ -119,7 +119,8 @@ def response_to(
     records = alone.kernel_records(model, how.limits(alone, motion, model, factor))
     lay_out = ground_of if factor == 1.0 else ground_of.__wrapped__  # repeated simulations leave the cache as it is
     trail = Trail(lay_out(motion, block.gravity, factor), records[0], rules, NO_NODES)
-    start = started(alone, records, *_scaled(initial, factor, records, alone.stops[0]), name)
+    at = initial if factor == 1.0 else _scaled(initial, factor, records, alone.stops[0])
+    start = started(alone, records, *at, name)
     ending, table = marched(trail, start)
     if ending == state.Ending.BALANCED:
         raise InvalidOption("the block balances on its corner for ever; give {} or another initial state", "duration")
@@ -149,7 +150,7 @@ def response_to(
 def _scaled(initial: tuple[float, float], factor: float, records: state.Records, stops: Floats) -> tuple[float, float]:
     """Scale the distance of an initial coordinate from its stop, short of the fallen body, and its rate."""
     coordinate, rate = initial
-    if factor == 1.0 or coordinate in stops:
+    if coordinate in stops:
         return coordinate, factor * rate
     fallen = math.nextafter(float(records["fallen"].min()), 0.0)
     distance = factor * (coordinate - float(stops[0]))

@@ -15,7 +15,7 @@ from rocking.arrays import Flags, Floats, Integers
 from rocking.block import Blocks
 from rocking.body import Bodies, Body, title_of
 from rocking.constants import Model
-from rocking.engine import require_finished
+from rocking.engine import Setup, Task, require_finished, simulate_tasks
 from rocking.ensemble import body_coordinates, simulate_many
 from rocking.errors import InvalidOption, Message
 from rocking.motion.description import Origin
@@ -23,6 +23,7 @@ from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
 from rocking.problem import bodies_of
 from rocking.progress import Progress, note
+from rocking.response import COUNT, RELATIVE, factors_near, percent
 from rocking.tables import counted
 
 if TYPE_CHECKING:
@@ -37,6 +38,9 @@ _ROUNDING: Final = 1e-9
 
 #: What stands for labels of motions that are their stations.
 BY_STATION: Final = "station"
+
+#: Simulations of an ensemble that are repeated to see how many outcomes are undecided.
+_SAMPLE: Final = 30
 
 #: From so many changes on, no further ones are looked for in an interval of the grid.
 _MOST: Final = 64
@@ -198,6 +202,33 @@ def simulate_levels(
     require_finished(whole.unfinished.values)
     ordered = whole.isel(block=np.argsort(np.concatenate(groups))).rename(scale="level")
     return ordered.assign_coords(body_coordinates(blocks))
+
+
+def undecided_text(
+    setup: Setup, motions: Sequence[Motion], factors: Floats, overturned: Flags, threads: int | None
+) -> str:
+    """Repeat a random sample of simulations with the motion scaled by 1 +- 3e-6; return how many outcomes change.
+
+    `factors` on the motions, negative for reversed ones, have the shape (level, motion, block, polarity) of the
+    outcomes `overturned`.
+    """
+    shape = overturned.shape
+    drawn = np.random.default_rng(0).permutation(overturned.size)[:_SAMPLE]
+    sample = np.unravel_index(np.sort(drawn), shape)
+    near = factors_near(RELATIVE, COUNT)
+    factor = np.broadcast_to(factors, shape)[sample]
+    tasks = (
+        Task(slice(b, b + 1), motions[m], float(factor[k] * scale), (k,))
+        for k, (m, b) in enumerate(zip(sample[1], sample[2], strict=True))
+        for scale in (near[0], near[-1])
+    )
+    changed = np.zeros(len(factor), dtype=bool)
+    for task, outcomes in simulate_tasks(setup, tasks, threads=threads):
+        changed[task.key[0]] |= outcomes["overturned"][0] != overturned[sample][task.key[0]]
+    return (
+        f"undecided within {percent(near[-1] - 1.0)} of the motion: {np.count_nonzero(changed)} of a sample of "
+        f"{counted(len(changed), 'outcome')}"
+    )
 
 
 @dataclass(frozen=True, eq=False)

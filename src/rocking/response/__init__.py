@@ -3,7 +3,7 @@
 from rocking.response.answers import trail_of
 from rocking.response.derivatives import Gradient, gradient
 from rocking.response.export import active_span, drawing_times
-from rocking.response.perturbed import COUNT, PRECISION, RELATIVE, Perturbed, factors_near, steps_within
+from rocking.response.perturbed import COUNT, PRECISION, RELATIVE, Perturbed, factors_near, percent, steps_within
 from rocking.response.response import Response
 from rocking.response.sensitivity import AMBIGUITY, QUANTITIES, Sensitivity
 from rocking.response.summary import in_brief, in_words, ratio_text
@@ -24,6 +24,7 @@ __all__ = [
     "gradient",
     "in_brief",
     "in_words",
+    "percent",
     "ratio_text",
     "steps_within",
     "trail_of",

@@ -20,20 +20,21 @@ from rocking.analysis.levels import (
     only_block,
     pooled,
     simulate_levels,
+    undecided_text,
     units_of,
     values_of,
 )
 from rocking.arrays import Floats
 from rocking.body import Bodies, Body
 from rocking.constants import Model
-from rocking.engine import require_finished
-from rocking.ensemble import Polarity, simulate_many
+from rocking.engine import Setup, require_finished
+from rocking.ensemble import SIGNS, Polarity, simulate_many
 from rocking.errors import InvalidOption, Unfitted
 from rocking.motion.named import Motions, several_motions
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.problem import bodies_of, slenderness_of
 from rocking.tables import counted
-from rocking.treatment import Treatment
+from rocking.treatment import Treatment, treatment
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -171,6 +172,11 @@ def fragility(
     except Unfitted as refused:
         refused.outcomes = outcomes
         raise
+    scales = (
+        np.ones((1, 1, 1)) if stripes is None else stripes[:, None, None] * units_of(many, how, model) / values[:, None]
+    )
+    signs = np.array(SIGNS[options["polarity"]])
+    setup = Setup(many, model, treatment(chattering))
     kind = "cloud" if levels is None else counted(len(intensity), "stripe")
     text = f"{pooled(blocks, weights)}, {motions_in_words(together, clusters)}, {kind}, {model} model"
     return Fragility(
@@ -184,6 +190,7 @@ def fragility(
         with_vertical="vertical" in table.coords,
         several_blocks=bool(np.count_nonzero(shares) > 1),
         source="motion" if clusters is None else "cluster",
+        undecided=undecided_text(setup, shaken, scales[..., None] * signs, table.overturned.values, threads),
     )
 
 

@@ -68,6 +68,8 @@ class Fragility(DrawnResult, TableResult):
         Whether outcomes of several blocks count together.
     source : str
         What a cluster of outcomes comes from: a motion, or, where outcomes were given, a cluster.
+    undecided : str
+        How many outcomes of a sample change within 3e-6 of the motion; empty where outcomes were given.
     """
 
     TABLES = ("curves", "outcomes")
@@ -82,6 +84,7 @@ class Fragility(DrawnResult, TableResult):
     with_vertical: bool = False
     several_blocks: bool = False
     source: str = "motion"
+    undecided: str = ""
 
     def summary(self) -> str:
         scale = self.measure.scale
@@ -106,7 +109,7 @@ class Fragility(DrawnResult, TableResult):
     @property
     def notes(self) -> tuple[str, ...]:
         """What is to be known before the curves are believed, a sentence each."""
-        notes = []
+        notes = [self.undecided] if self.undecided else []
         if self.one_way:
             notes.append(
                 "the sides differ, and motions came in one polarity only: reversed ones give another curve; "
