@@ -365,7 +365,7 @@ def test_a_wheel_holds_the_kernels_that_were_compiled_for_it_and_else_none(hooks
 def test_on_a_package_index_the_readme_leads_to_nothing_that_is_not_there(hooks):
     shown = hooks["for_index"]((ROOT / "README.md").read_text("utf-8"))
     assert not re.search(r"\]\((?!https?:)", shown)
-    assert "(the explorer, `docs/howto/explorer.md` in the source)" in shown
+    assert "an interactive explorer, `docs/howto/explorer.md` in the source" in " ".join(shown.split())
     assert "`ARCHITECTURE.md` in the source" in shown
     assert "```pycon\n>>> import rocking" in shown
     metadata: dict = {}
@@ -411,5 +411,10 @@ def test_the_readme_tells_what_the_last_run_has_judged():
     ]
     assert len(told) == 3
     events = (ROOT / "docs" / "_tables" / "reliability-events.txt").read_text("utf-8").splitlines()[2:]
-    missed = sum(int(row.strip("|").split("|")[5].split("/")[0]) for row in events)
-    assert f"{missed:,} of them SciPy" in readme
+    undecided, silent = (sum(int(row.strip("|").split("|")[k]) for row in events) for k in (2, 3))
+    assert f"Another {undecided:,} cases cannot be decided" in readme
+    assert f"{silent:,} of these responses are wrong and not flagged" in readme
+    for name, specimens in (("shake-table", "160 left-out tests"), ("small-table", "83 and 135 tests")):
+        rows = (ROOT / "docs" / "_tables" / f"validation-{name}.txt").read_text("utf-8").splitlines()
+        first, second = (row.split("|")[-4].strip() for row in rows if "| rocking blocks |" in row)
+        assert f"{first} and {second} of {specimens}" in readme

@@ -11,7 +11,7 @@ HIGHEST_DEGREE: Final = 20
 #: Version of the package.
 VERSION: Final = "0.1.0"
 
-#: Exact, or linearised for slender blocks (paper, Eqs 2 and 3).
+#: Equation of finite rotations, or linearised for slender blocks (paper, Eqs 2 and 3).
 Model = Literal["nonlinear", "linear"]
 
 MODELS: Final[tuple[Model, ...]] = ("nonlinear", "linear")

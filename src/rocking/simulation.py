@@ -1,4 +1,4 @@
-"""The main job: one body, one motion, an exact response."""
+"""The main job: simulate one body under one motion."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def simulate(
     motion : Motion or None
         Horizontal ground acceleration; None for free rocking.
     model : {"nonlinear", "linear"}
-        Equation of motion: exact, or linearised for slender blocks (paper, Eqs 2 and 3).
+        Equation of motion: of finite rotations, or linearised for slender blocks (paper, Eqs 2 and 3).
     chattering : str or treatment
         How sequences of impacts end: "certified" (default), "velocity", "bypass", "interval" or "time", or the object
         with its parameter (`Certified`, `VelocityThreshold`, `GeometricBypass`, `IntervalThreshold`, `AsymptoticTime`).

@@ -98,7 +98,7 @@ class ModelOptions:
         Model | None,
         Parameter(
             name="--model",
-            help="Equation of motion: exact (nonlinear, the default), or linearised for slender blocks.",
+            help="Equation of motion: of finite rotations (nonlinear, the default), or linearised for slender blocks.",
         ),
     ] = None
 

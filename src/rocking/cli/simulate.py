@@ -133,7 +133,7 @@ def check(
     model: Annotated[ModelOptions, MODEL] = ModelOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
-    """Say of each record what rules of thumb make of a block, and what it really does.
+    """Compare rules of thumb with the simulated response of a block under records.
 
     The block is a rectangle (--width, --height, or half of each) or given by its parameters (--p, --alpha). Numbers are
     demand over capacity: from 1 on the block overturns. --out holds check.csv and result.json.

@@ -1,4 +1,4 @@
-"""A block under records: what each rule of thumb says of it, beside the exact answer."""
+"""A block under records: rules of thumb compared with simulations."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _NEAR: Final = 0.985
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Check(BlockUnderRecords):
-    """Rules of thumb beside the exact answer, for a block under several motions; from `check`.
+    """Rules of thumb compared with simulations, for a block under several motions; from `check`.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class Check(BlockUnderRecords):
         For each motion, one over the lowest factor on it at which the block is found to overturn. NaN if it overturns
         at none. Above 1 the block need not overturn under the motion as it is: see `falls_under_less`.
     block, records, responses, skipped
-        What rocks, the name of each motion, the exact response to each, and why records could not be read.
+        The block, the name of each motion, the simulated response to each, and why records could not be read.
     """
 
     ratios: tuple[Mapping[str, float], ...]
@@ -65,7 +65,7 @@ class Check(BlockUnderRecords):
                 named("pga", "g"): decimal(motion_of(response).pga / STANDARD_GRAVITY),
                 named("pgv", "m/s"): motion_of(response).pgv,
                 **ratios,
-                "exact": margin,
+                "simulated": margin,
                 "lowest_factor": 1.0 / margin,
                 "peak_over_slenderness": response.peak_over_slenderness,
                 "overturned": response.overturned,
@@ -84,17 +84,17 @@ class Check(BlockUnderRecords):
             named("pga", "g"): "PGA, g",
             named("pgv", "m/s"): "PGV, m/s",
             **{rule: TITLES[rule] for rule in rules},
-            "exact": "exact",
+            "simulated": "simulated",
             "peak_over_slenderness": "peak/slenderness",
-            "verdict": "exact verdict",
+            "verdict": "outcome",
         }
         rows = self.rows()
         table = text_table(list(shown.values()), [[_short(row[name]) for name in shown] for row in rows])
         return "\n".join(
             [
                 str(self.block),
-                "demand over capacity: from 1 on a rule says that the block overturns; exact: one over the lowest "
-                "factor on the motion that was found to overturn it, in steps of 5 %",
+                "demand over capacity: from 1 on a rule predicts overturning; simulated: one over the lowest factor on the "
+                "motion that was found to overturn the block, in steps of 5 %",
                 "",
                 table,
                 *(["", *self._disagreements(rules)] if rules else []),
@@ -144,7 +144,7 @@ def check(
     threads: int | None = None,
     progress: bool | None = None,
 ) -> Check:
-    """Apply rules of thumb to a block under motions, and compute what it really does.
+    """Apply rules of thumb to a block under motions, and simulate the block.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def check(
     rules : iterable of str, optional
         Names in `RULES`; by default all.
     model : {"nonlinear", "linear"}
-        Equation of motion of the exact answer.
+        Equation of motion of the simulations.
     threads : int, optional
         Number of threads; by default one for every core.
     progress : bool, optional
@@ -164,7 +164,7 @@ def check(
     Returns
     -------
     Check
-        Demand over capacity by each rule, and the exact margin.
+        Demand over capacity by each rule, and the simulated margin.
 
     Raises
     ------
@@ -175,7 +175,7 @@ def check(
 
     Notes
     -----
-    The exact margin comes from `incremental_dynamic_analysis`, whose levels are 5 % apart: a thinner band of levels
+    The simulated margin comes from `incremental_dynamic_analysis`, whose levels are 5 % apart: a thinner band of levels
     that overturn may lie below it. The factor that overturns is known to 1e-4. Where 1 is within that of it, the
     response to the motion as it is decides on which side of 1 the margin is.
 
@@ -186,7 +186,7 @@ def check(
     >>> records = {name: rocking.records.load(name) for name in ["el-centro-meloland-270", "el-centro-meloland-360"]}
     >>> found = check(tombstone, records, rules=["west", "ishiyama"])
     >>> for row in found.rows():
-    ...     print(f"{row['west']:.2f} {row['ishiyama']:.2f} {row['exact']:.2f} {row['verdict']}")
+    ...     print(f"{row['west']:.2f} {row['ishiyama']:.2f} {row['simulated']:.2f} {row['verdict']}")
     0.90 0.90 0.71 does not move in 5 of 5 (3e-6), 11 of 11 (0.1 %)
     0.93 0.93 0.64 does not move in 5 of 5 (3e-6), 11 of 11 (0.1 %)
     """
