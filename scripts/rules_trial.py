@@ -14,6 +14,7 @@ import numpy as np
 import rocking
 from rocking import rules
 from rocking.analysis.rules.criteria import TITLES
+from rocking.constants import MODELS
 from rocking.plot.canvas import CURVES, add_labels, add_legend, figure_for, handles_of
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
@@ -30,16 +31,21 @@ STYLES = (*CURVES, {"color": "0.45", "linestyle": (0, (3, 1, 1, 1, 1, 1))})
 #: Peak accelerations that every record is scaled to, over gravity.
 LEVELS = np.geomspace(0.1, 2.0, 40)
 
+#: Housner's demand over capacity to which white noises are scaled, and their number, step and duration, s.
+RATIOS = (1.0, 1.5, 2.0)
+NOISES, STEP, DURATION = 300, 0.02, 20.0
+
 
 def main() -> None:
     """Write the tables and the figure."""
     blocks, motions = all_blocks(), all_motions()
     ratios = ratings(blocks, motions)
     TABLES.mkdir(exist_ok=True)
-    verdicts = exact_verdicts(blocks, motions)
+    verdicts = simulated_verdicts(blocks, motions)
     (TABLES / "rules-verdicts.txt").write_text(verdict_table(blocks, motions, ratios, verdicts), encoding="utf-8")
-    capacities = exact_capacities(blocks, motions)
+    capacities = simulated_capacities(blocks, motions)
     (TABLES / "rules-capacities.txt").write_text(capacity_table(ratios, capacities), encoding="utf-8")
+    (TABLES / "rules-noise.txt").write_text(noise_table(overturned_by_noise(range(NOISES))), encoding="utf-8")
     figure(ratios, capacities).savefig(IMAGE, dpi=110)
 
 
@@ -85,20 +91,20 @@ def ratings(blocks, motions):
     return {name: np.array(rows) for name, rows in found.items()}
 
 
-def exact_verdicts(blocks, motions):
+def simulated_verdicts(blocks, motions):
     """Whether each block overturns under each motion at every level, shape (motion, level, block)."""
     found = rocking.simulate_many(blocks, motions, levels=LEVELS * blocks.gravity, measure="pga", progress=False)
     return found.overturned.transpose("motion", "scale", "block").values
 
 
-def exact_capacities(blocks, motions):
+def simulated_capacities(blocks, motions):
     """Lowest PGA, over gravity, that overturns each block under each motion, shape (motion, block)."""
     found = rocking.incremental_dynamic_analysis(blocks, motions, tolerance=1e-3, progress=False)
     return found.overturning_level.transpose("motion", "block").values / blocks.gravity
 
 
 def verdict_table(blocks, motions, ratios, fell):
-    """Verdicts of each rule against the exact ones, over all cases in which the block is lifted."""
+    """Verdicts of each rule against the simulated ones, over all cases in which the block is lifted."""
     lifted = np.broadcast_to(LEVELS[:, None] >= np.tan(blocks.alpha[:, 0]), fell.shape)
     rows = []
     for name, ratio in ratios.items():
@@ -115,7 +121,7 @@ def verdict_table(blocks, motions, ratios, fell):
 
 
 def capacity_table(ratios, capacities):
-    """Peak acceleration that overturns by each rule, over the exact one."""
+    """Peak acceleration that overturns by each rule, over the simulated one."""
     rows = []
     for name, ratio in ratios.items():
         share = (1.0 / ratio / capacities)[np.isfinite(capacities)]
@@ -125,8 +131,36 @@ def capacity_table(ratios, capacities):
     return markdown(("rule", "5 %", "median", "95 %", "largest", "above 1, %"), rows)
 
 
+def overturned_by_noise(seeds):
+    """Whether white noise overturns a block at each of Housner's ratios in both models, shape (seed, ratio, model)."""
+    block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.925)
+    found = []
+    for seed in seeds:
+        noise = rocking.Motion.from_samples(np.random.default_rng(seed).normal(size=round(DURATION / STEP)), STEP)
+        unit = noise.scaled(1.0 / rules.housner(block, noise).ratio[0])
+        found.append(
+            [
+                [rocking.simulate(block, unit.scaled(ratio), model=model).overturned for model in MODELS]
+                for ratio in RATIOS
+            ]
+        )
+    return np.array(found)
+
+
+def noise_table(fell):
+    """Share of white noises that overturn the block, with its standard error."""
+    share = fell.mean(axis=0)
+    guess = (fell.sum(axis=0) + 0.5) / (len(fell) + 1.0)  # a share of 0 is uncertain, too
+    error = np.sqrt(guess * (1.0 - guess) / len(fell))
+    rows = [
+        (f"{ratio:g}", *(f"{100.0 * p:.1f} +- {100.0 * s:.1f}" for p, s in zip(*row, strict=True)))
+        for ratio, row in zip(RATIOS, zip(share, error, strict=True), strict=True)
+    ]
+    return markdown(("p S_v/(g alpha)", "nonlinear, % overturned", "linear, % overturned"), rows)
+
+
 def figure(ratios, capacities):
-    """Distribution of the rules' overturning accelerations over the exact ones."""
+    """Distribution of the rules' overturning accelerations over the simulated ones."""
     with figure_for(None, (5.6, 3.9)) as drawn:
         axes = drawn.add_subplot()
         for (name, ratio), curve in zip(ratios.items(), STYLES, strict=True):
@@ -141,7 +175,7 @@ def figure(ratios, capacities):
         axes.set_ylim(0.0, 1.0)
         axes.text(0.97, 0.02, "safe side", ha="right", color="0.35", fontsize=8)
         axes.text(1.03, 0.02, "unsafe side", ha="left", color="0.35", fontsize=8)
-        add_labels(axes, "overturning PGA by the rule over the exact one", "share of blocks and records")
+        add_labels(axes, "overturning PGA by the rule over the simulated one", "share of blocks and records")
         add_legend(drawn, None, handles_of(axes))
     return drawn
 

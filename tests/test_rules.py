@@ -235,16 +235,37 @@ def test_a_check_of_unequal_sides_says_that_reversed_motions_differ():
     assert equal.to_dict()["notes"] == []
 
 
-@pytest.mark.slow
-def test_the_tables_of_the_trial_are_those_that_the_script_makes():
+@pytest.fixture(scope="module")
+def script():
     path = Path(__file__).resolve().parents[1] / "scripts" / "rules_trial.py"
     specification = importlib.util.spec_from_file_location("rules_trial", path)
-    script = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(script)
+    module = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(module)
+    return module
+
+
+def test_white_noise_at_housners_ratio_does_not_overturn_one_block_in_two(script):
+    """Of fourteen fair coins three heads or fewer have a probability of 0.03, and eleven or more as well."""
+    at_one, at_one_and_a_half, at_two = script.overturned_by_noise(range(14)).sum(axis=0)[:, 0]
+    assert at_one == 0 < at_one_and_a_half < 11 <= at_two
+
+
+@pytest.mark.slow
+def test_the_table_of_white_noises_is_that_which_the_script_makes(script):
+    made = script.noise_table(script.overturned_by_noise(range(script.NOISES)))
+    kept = (script.TABLES / "rules-noise.txt").read_text("utf-8")
+    assert NUMBER.sub("#", made) == NUMBER.sub("#", kept)
+    # Some responses are ambiguous: the last digit of another platform may let another noise overturn the block.
+    for now, before in zip(NUMBER.findall(made), NUMBER.findall(kept), strict=True):
+        assert float(now) == pytest.approx(float(before), abs=1.0)
+
+
+@pytest.mark.slow
+def test_the_tables_of_the_trial_are_those_that_the_script_makes(script):
     blocks, motions = script.all_blocks(), script.all_motions()
     ratios = script.ratings(blocks, motions)
-    verdicts = script.verdict_table(blocks, motions, ratios, script.exact_verdicts(blocks, motions))
-    capacities = script.capacity_table(ratios, script.exact_capacities(blocks, motions))
+    verdicts = script.verdict_table(blocks, motions, ratios, script.simulated_verdicts(blocks, motions))
+    capacities = script.capacity_table(ratios, script.simulated_capacities(blocks, motions))
     for name, made, share in (("verdicts", verdicts, 0.11), ("capacities", capacities, 0.021)):
         kept = (script.TABLES / f"rules-{name}.txt").read_text("utf-8")
         assert NUMBER.sub("#", made) == NUMBER.sub("#", kept)
@@ -265,13 +286,13 @@ def test_the_command_prints_and_writes_the_check(run, tmp_path):
     arguments = ["check", RECORD, "--width", "0.3", "--height", "0.9", "--rules", "west, ishiyama", "--out", tmp_path]
     code, out, err = run(*arguments)
     assert (code, err) == (0, "")
-    assert "exact verdict" in out and "does not move" in out and "Ishiyama: right 1" in out
+    assert "simulated" in out and "exact" not in out and "does not move" in out and "Ishiyama: right 1" in out
     assert {path.name for path in tmp_path.iterdir()} == {"check.csv", "result.json"}
     (row,) = json.loads((tmp_path / "result.json").read_text("utf-8"))["records"]
     assert row["west"] == rules.west(TOMBSTONE, rocking.records.load(RECORD)).ratio[0]
     header = (tmp_path / "check.csv").read_text("utf-8").splitlines()[0]
     assert header == (
-        "record,motion,block,p_rad_s,alpha_rad,restitution,pga_g,pgv_m_s,west,ishiyama,exact,lowest_factor,"
+        "record,motion,block,p_rad_s,alpha_rad,restitution,pga_g,pgv_m_s,west,ishiyama,simulated,lowest_factor,"
         "peak_over_slenderness,overturned,falls_under_less,verdict"
     )
 

@@ -11,9 +11,9 @@ import diffrax
 import jax
 import jax.numpy as jnp
 import optimistix
-from loop import Case, Push, answer, event_driven
+from loop import Case, Push, event_program
 
-SETTINGS = "Dopri8 in double precision, rtol 1e-12, atol 1e-14; steps of 2 ms at most; rest below 1e-9 m/s"
+SETTINGS = "Dopri8 in double precision, rtol 1e-12, atol 1e-14; steps of 2 ms at most"
 
 jax.config.update("jax_enable_x64", True)
 
@@ -44,10 +44,6 @@ def arc(t: Any, until: Any, first: Any, state: Any, given: Any) -> tuple[Any, An
     return found.ts[-1], found.ys[-1]
 
 
-def solve(case: Case) -> dict[str, Any]:
-    return event_driven(case, advance, slowest=1e-9)
-
-
 def advance(case: Case, t: float, u: float, v: float, push: Push, until: float) -> tuple[float, float, float, bool]:
     first = 0.2 * v / (abs(push(t)) + 10.0 * v) if v > 0.0 and u == 0.0 else 1e-4
     given = jnp.array([case.stiffness, case.damping, *push, case.gap if math.isfinite(case.gap) else 1e9])
@@ -57,4 +53,4 @@ def advance(case: Case, t: float, u: float, v: float, push: Push, until: float) 
 
 
 if __name__ == "__main__":
-    answer("diffrax", SETTINGS, solve)
+    event_program("diffrax", SETTINGS, advance, slowest=1e-12)

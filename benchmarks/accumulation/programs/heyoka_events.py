@@ -8,9 +8,9 @@ import math
 from typing import Any
 
 import heyoka as hy
-from loop import Case, Push, answer, event_driven
+from loop import Case, Push, event_program
 
-SETTINGS = "Taylor series to double precision; rest below 1e-9 m/s"
+SETTINGS = "Taylor series to double precision"
 
 
 def integrator() -> Any:
@@ -31,10 +31,6 @@ TAYLOR = integrator()
 OFFSET = 1e-13
 
 
-def solve(case: Case) -> dict[str, Any]:
-    return event_driven(case, advance, slowest=1e-9)
-
-
 def advance(case: Case, t: float, u: float, v: float, push: Push, until: float) -> tuple[float, float, float, bool]:
     # An event that is zero at the start hides the next one, and so does a step that is far longer than the arc.
     height, reach = 0.5 * v * v / (abs(push(t)) + 10.0 * v), 4.0 * v / (abs(push(t)) + 10.0 * v)
@@ -50,4 +46,4 @@ def advance(case: Case, t: float, u: float, v: float, push: Push, until: float) 
 
 
 if __name__ == "__main__":
-    answer("heyoka", SETTINGS, solve)
+    event_program("heyoka", SETTINGS, advance, slowest=1e-12)

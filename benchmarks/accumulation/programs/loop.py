@@ -6,8 +6,11 @@ u'' = stiffness u - damping u' - push(t), and an impact is where u falls to 0 or
 
 from __future__ import annotations
 
+import argparse
 import json
 import math
+import statistics
+import sys
 import time
 from collections.abc import Callable, Iterable
 from importlib.metadata import version
@@ -18,6 +21,9 @@ FOLDER = Path(__file__).resolve().parents[1]
 
 #: Impacts that an answer holds.
 KEPT = 60
+
+#: Processor time after which a case is given up, s.
+BUDGET = 20.0
 
 
 class Push(NamedTuple):
@@ -74,16 +80,22 @@ class Case:
 Advance = Callable[[Case, float, float, float, Push, float], tuple[float, float, float, bool]]
 
 
-def event_driven(case: Case, advance: Advance, slowest: float) -> dict[str, Any]:
-    """Go from impact to impact; the body is at rest when an impact leaves less than the slowest speed, m/s or rad/s."""
+def event_driven(case: Case, advance: Advance, slowest: float) -> dict[str, Any] | None:
+    """Go from impact to impact; the body is at rest when an impact leaves less than the slowest speed, m/s or rad/s.
+
+    None where that takes longer than the budget.
+    """
     x, v = case.given["start"]
     side = -1 if case.is_block and x < 0.0 else 1
     u, v = (abs(x), side * v) if case.is_block else (x - case.low, v)
     t, piece, resting = 0.0, 0, False
+    latest = time.process_time() + BUDGET
     impacts: list[float] = []
     rests: list[float] = []
     deepest = 0.0
     while t < case.end:
+        if time.process_time() > latest:
+            return None
         until = case.ends[piece]
         if resting:
             t, side, resting = released(case, t, piece, side, until)
@@ -145,6 +157,32 @@ def seen_in_steps(
             rests.append(since)
             resting = True
     return {"impacts": impacts[:KEPT], "rests": rests, "penetration": deepest}
+
+
+def event_program(package: str, settings: str, advance: Advance, slowest: float) -> None:
+    """Write the answers with a threshold; with ``--thresholds 1e-9 1e-10 ...``, print what each of these is worth."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--thresholds", nargs="+", type=float)
+    thresholds = parser.parse_args().thresholds
+    if thresholds is None:
+        answer(package, f"{settings}; rest below {slowest:g} m/s", lambda case: event_driven(case, advance, slowest))
+        return
+    sys.path.insert(0, str(FOLDER))
+    from score import scored
+
+    cases = [Case(given) for given in json.loads((FOLDER / "cases.json").read_text("utf-8"))]
+    print("| program | rest below, m/s | no answer | right to 10 ms | to 1 us | to 1 ns | to 0.1 ns | ms a case |")
+    for threshold in thresholds:
+        event_driven(cases[0], advance, threshold)
+        seconds, errors = [], []
+        for case in cases:
+            start = time.process_time()
+            found = event_driven(case, advance, threshold)
+            seconds.append(time.process_time() - start)
+            errors.append(scored(case.given, found).error)
+        right = (sum(error <= limit for error in errors) for limit in (1e-2, 1e-6, 1e-9, 1e-10))
+        cells = (package, f"{threshold:g}", sum(map(math.isnan, errors)), *right)
+        print(f"| {' | '.join(map(str, cells))} | {1e3 * statistics.median(seconds):.3g} |", flush=True)
 
 
 def answer(package: str, settings: str, solve: Callable[[Case], dict[str, Any] | None]) -> None:

@@ -16,7 +16,8 @@ from pathlib import Path
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("program", help="name of a file of this folder, without .py")
-    script = Path(__file__).with_name(f"{parser.parse_args().program}.py")
+    given, options = parser.parse_known_args()
+    script = Path(__file__).with_name(f"{given.program}.py")
     found = re.search(r"^# requires: (.*)$", script.read_text("utf-8"), re.MULTILINE)
     if found is None:
         parser.error(f"{script.name} has no line '# requires: PACKAGE==VERSION ...'")
@@ -24,7 +25,7 @@ def main() -> None:
         venv.create(folder, with_pip=True)
         python = Path(folder) / "bin" / "python"
         subprocess.run([python, "-m", "pip", "install", "-q", *found[1].split()], check=True)
-        subprocess.run([python, script], check=True)
+        subprocess.run([python, script, *options], check=True)
 
 
 if __name__ == "__main__":

@@ -7,14 +7,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from loop import Case, Push, answer, event_driven
+from loop import Case, Push, event_program
 from scipy.integrate import solve_ivp
 
-SETTINGS = "DOP853, rtol 1e-12, atol 1e-14; steps of 2 ms at most; rest below 1e-9 m/s"
-
-
-def solve(case: Case) -> dict[str, Any]:
-    return event_driven(case, advance, slowest=1e-9)
+SETTINGS = "DOP853, rtol 1e-12, atol 1e-14; steps of 2 ms at most"
 
 
 def advance(case: Case, t: float, u: float, v: float, push: Push, until: float) -> tuple[float, float, float, bool]:
@@ -40,4 +36,4 @@ def advance(case: Case, t: float, u: float, v: float, push: Push, until: float) 
 
 
 if __name__ == "__main__":
-    answer("scipy", SETTINGS, solve)
+    event_program("scipy", SETTINGS, advance, slowest=1e-12)

@@ -93,8 +93,8 @@ class Check(BlockUnderRecords):
         return "\n".join(
             [
                 str(self.block),
-                "demand over capacity: from 1 on a rule predicts overturning; simulated: one over the lowest factor on the "
-                "motion that was found to overturn the block, in steps of 5 %",
+                "demand over capacity: from 1 on a rule predicts overturning; simulated: one over the lowest factor on "
+                "the motion that was found to overturn the block, in steps of 5 %",
                 "",
                 table,
                 *(["", *self._disagreements(rules)] if rules else []),

@@ -188,7 +188,7 @@ def overturning_velocity(blocks: Blocks) -> Floats:
 
 @_rule("Housner", "rad", "1.840")
 def housner(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
-    """Compare energies: one block in two overturns where alpha = S_v sqrt(m R/(g I)) = p S_v/g (Housner).
+    """Compare energies: a block may overturn from alpha = S_v sqrt(m R/(g I)) = p S_v/g on (Housner).
 
     Returns
     -------
@@ -203,9 +203,10 @@ def housner(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     Notes
     -----
     The mean energy of a block under white noise is set equal to what takes it to its balance point, m g R alpha^2/2 of
-    a slender one. The undamped velocity spectrum S_v of white noise does not depend on the period; that of a motion
-    does, and is taken here as the mean of 2 pi S_d/T over periods T of 0.1 to 2.5 s, Housner's spectrum intensity over
-    its range.
+    a slender one. Housner concluded that one block in two overturns there. White noise itself contradicts this: of 300
+    noises (p = 2 rad/s, alpha = 0.2, restitution 0.925) 1 % overturn the block at a ratio of 1, 28 % at 1.5 and 80 % at
+    2. The undamped velocity spectrum S_v of white noise does not depend on the period. For other motions the mean of
+    2 pi S_d/T over periods T of 0.1 to 2.5 s is used, Housner's spectrum intensity divided by its range.
 
     References
     ----------
