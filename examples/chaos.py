@@ -44,7 +44,8 @@ print(f"largest Lyapunov exponent {largest:.2f} a period, standard error {error:
 
 # %%
 # A block under a sine that goes on for ever settles on one of two orbits, or overturns to one side or
-# the other: which, depends on how it starts, along a boundary that is a fractal.
+# the other, depending on how it starts. The estimated dimension of the boundary between these outcomes is
+# above 1 on this grid, as of a fractal.
 
 block = rocking.Block.from_parameters(p=3.0, alpha=0.25, restitution=0.9)
 sine = rocking.pulses.sine(6.0, 2.5, cycles=1)

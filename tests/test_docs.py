@@ -414,6 +414,8 @@ def test_the_readme_tells_what_the_last_run_has_judged():
     undecided, silent = (sum(int(row.strip("|").split("|")[k]) for row in events) for k in (2, 3))
     assert f"Another {undecided:,} cases cannot be decided" in readme
     assert f"{silent:,} of these responses are wrong and not flagged" in readme
+    page = " ".join((ROOT / "docs" / "reliability.md").read_text("utf-8").split())
+    assert f"These are {silent:,} of the {undecided:,} undecided cases." in page
     for name, specimens in (("shake-table", "160 left-out tests"), ("small-table", "83 and 135 tests")):
         rows = (ROOT / "docs" / "_tables" / f"validation-{name}.txt").read_text("utf-8").splitlines()
         first, second = (row.split("|")[-4].strip() for row in rows if "| rocking blocks |" in row)

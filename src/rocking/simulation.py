@@ -44,7 +44,7 @@ def simulate(
     initial_rotation: float = 0.0,
     initial_velocity: float = 0.0,
 ) -> Response:
-    """Response of a block to a ground motion, with every impact located and chattering resolved by proof.
+    """Simulate a block under a ground motion, locating impacts and resolving chattering by proof.
 
     Parameters
     ----------

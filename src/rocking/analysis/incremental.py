@@ -103,9 +103,8 @@ def incremental_dynamic_analysis(
     Notes
     -----
     Ends of bands are found by bisection between neighbouring levels whose verdicts differ; what lies between two levels
-    with the same verdict is not seen. Under records the set of levels that overturn is often a fractal: thinner bands
-    beside every band, at any resolution. The lowest level that is found then depends on how finely is looked, and is no
-    safety margin by itself.
+    with the same verdict is not seen. Under records a finer search may find thinner bands beside those that were found.
+    The lowest level that is found then depends on the resolution of the search, and is not a safety margin by itself.
 
     References
     ----------

@@ -263,9 +263,8 @@ def boundaries(
     `outcome_of` tells outcomes for arrays of columns and levels; the tolerance is relative to the level.
 
     Where a bisection meets a third outcome both halves are followed, so each bracket ends with two outcomes that are
-    neighbours to within the tolerance. Only where an interval of the grid holds 64 changes or more, as between the
-    regions of a fractal, one is followed up for all that lie between two outcomes. Outcomes between two levels of the
-    grid with the same outcome are not seen.
+    neighbours to within the tolerance. Only where an interval of the grid holds 64 changes or more, one is followed up
+    for all that lie between two outcomes. Outcomes between two levels of the grid with the same outcome are not seen.
     """
     here = _on_grid(levels, outcome)
     origin = np.arange(len(here.level))
