@@ -3,7 +3,7 @@ Ten thousand blocks in a second
 ===============================
 
 A hundred sizes by a hundred slendernesses, all under one record of 57 s: which of these blocks fall?
-Each block is followed impact by impact, and each rest is proven, as if it were alone. On two shared
+Each block is followed impact by impact until its rest is proven, as if it were alone. On two shared
 cores this took less than half a second of processor time once the kernels were compiled
 (``benchmarks/bench_ensemble.py``).
 """

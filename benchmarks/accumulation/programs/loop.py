@@ -23,7 +23,7 @@ FOLDER = Path(__file__).resolve().parents[1]
 KEPT = 60
 
 #: Processor time after which a case is given up, s.
-BUDGET = 20.0
+BUDGET = 10.0
 
 
 class Push(NamedTuple):
