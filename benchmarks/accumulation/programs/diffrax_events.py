@@ -46,10 +46,13 @@ def arc(t: Any, until: Any, first: Any, state: Any, given: Any) -> tuple[Any, An
 
 def advance(case: Case, t: float, u: float, v: float, push: Push, until: float) -> tuple[float, float, float, bool]:
     first = 0.2 * v / (abs(push(t)) + 10.0 * v) if v > 0.0 and u == 0.0 else 1e-4
+    # Time starts with the arc: the root finder's tolerance is relative to it, and would exceed a short arc late on.
+    push = push._replace(start=push.start - t, phase=push.phase + push.w * t)
     given = jnp.array([case.stiffness, case.damping, *push, case.gap if math.isfinite(case.gap) else 1e9])
-    end, state = arc(t, until, min(max(first, 1e-13), until - t), jnp.array([u, v]), given)
-    # The result does not tell: the root finder may report that it did not converge where it has, to rounding.
-    return float(end), float(state[0]), float(state[1]), bool(end < until)
+    passed, state = arc(0.0, until - t, min(max(first, 1e-13), until - t), jnp.array([u, v]), given)
+    end = t + float(passed) if passed < until - t else until
+    # The result does not say it: the root finder may report that it did not converge where it has, to rounding.
+    return end, float(state[0]), float(state[1]), bool(passed < until - t)
 
 
 if __name__ == "__main__":
