@@ -3,6 +3,7 @@
 import functools
 import json
 import math
+import tracemalloc
 
 import mpmath as mp
 import numpy as np
@@ -10,10 +11,11 @@ import pytest
 from matplotlib.figure import Figure
 from oracles import closed_orbits, exact_arcs
 
-from rocking import Block, InvalidMotion, InvalidOption, Motion, dynamics, pulses
+from rocking import Block, InvalidMotion, InvalidOption, Motion, dynamics, pulses, records
 from rocking.chattering import critical_amplitude
 from rocking.dynamics.orbits import sizes_of
 from rocking.dynamics.repeated import scale_of
+from rocking.dynamics.symmetry import distances
 
 G = 10.0
 TABLE = 5.0  # Hz
@@ -552,3 +554,25 @@ def test_a_family_that_loses_its_mirror_image_is_followed_as_orbits():
         away.append(np.max(np.abs(strobe(state, symmetric.period) - state)))
     assert len(away) > 5 and max(away) < 1e-9
     assert (branch.values.min(), branch.values.max()) == (-0.1, 0.1)
+
+
+def test_distances_in_a_period_are_those_of_all_pairs() -> None:
+    random = np.random.default_rng(5)
+    for _ in range(300):
+        period = 10.0 ** random.uniform(-2.0, 2.0)
+        marks, times = (period * random.uniform(size=random.integers(1, 12)) for _ in range(2))
+        away = np.abs(times[:, None] - marks)
+        assert distances(times, marks, period).tolist() == np.minimum(away, period - away).min(axis=1).tolist()
+
+
+def test_a_record_that_repeats_takes_no_memory_by_the_square_of_its_length() -> None:
+    block, record = Block(width=0.3, height=1.5), records.load("el-centro-meloland-360").scaled(0.5)
+    tracemalloc.start()
+    try:
+        orbits = dynamics.periodic_orbits(block, record, starts=16)
+        _, most = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert any(orbit.is_stable for orbit in orbits)
+    assert len(record.coefficients) > 5000
+    assert most < 100e6  # numbers for all pairs of its pieces would take 260 MB

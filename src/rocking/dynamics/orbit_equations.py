@@ -22,7 +22,7 @@ from rocking.dynamics.courses import Course, course_of, response_of
 from rocking.dynamics.maps import Fate, StroboscopicMap
 from rocking.dynamics.orbits import SAME, PeriodicOrbit, multipliers_at, orbit_at
 from rocking.dynamics.repeated import scale_of
-from rocking.dynamics.symmetry import HalfMap, are_halved, is_mirrored
+from rocking.dynamics.symmetry import HalfMap, are_halved, distances, is_mirrored
 from rocking.errors import InvalidOption, RockingError
 from rocking.motion.motion import Motion
 from rocking.treatment import Treatment
@@ -251,8 +251,7 @@ class OrbitEquations:
         phases = np.mod(course.phases + starts[self.shift], period)
         if not len(phases):
             return self, z
-        away = np.abs(starts[:, None] - phases)
-        nearest = np.min(np.minimum(away, period - away), axis=1)
+        nearest = distances(starts, phases, period)
         if self.by_half:  # the map of half a period ends at a breakpoint, too
             nearest[~are_halved(motion)] = -1.0
         best = int(np.argmax(nearest))

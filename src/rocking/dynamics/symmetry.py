@@ -67,11 +67,18 @@ def _first_half(motion: Motion) -> Motion:
     return Motion(motion.breakpoints[: middle + 1], motion.coefficients[:middle], error=motion.error)
 
 
+def distances(times: Floats, marks: Floats, period: float) -> Floats:
+    """Distance in time of each of some times to the nearest of some marks, all of them within a period that repeats."""
+    marks = np.sort(marks)
+    after = np.searchsorted(marks, times)
+    away = np.abs(times - marks[[after - 1, after % len(marks)]])
+    return np.asarray(np.min(np.minimum(away, period - away), axis=0))
+
+
 def are_halved(motion: Motion) -> Flags:
     """Of each breakpoint but the last: whether there is another one half a period later."""
     starts, period = motion.breakpoints[:-1] - motion.breakpoints[0], motion.duration
-    away = np.abs(starts[:, None] - np.mod(starts + 0.5 * period, period))
-    return np.asarray(np.min(np.minimum(away, period - away), axis=0) <= 1e-14 * period)
+    return distances(np.mod(starts + 0.5 * period, period), starts, period) <= 1e-14 * period
 
 
 def _is_antisymmetric(motion: Motion) -> bool:
