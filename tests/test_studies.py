@@ -595,6 +595,14 @@ class Dying(ThreadPoolExecutor):
         return super().submit(function, *arguments)
 
 
+@pytest.mark.parametrize("executor", [3, "tcp://127.0.0.1:8786", ProcessPoolExecutor])
+def test_what_is_no_executor_is_refused_before_a_unit(tmp_path, executor):
+    study = made(tmp_path)
+    with pytest.raises(rocking.InvalidOption, match=r"^executor must be a concurrent.futures.Executor or a client of"):
+        study.run(executor=executor)
+    assert study.status.done == 0
+
+
 def test_a_unit_whose_worker_dies_is_tried_again(complete, tmp_path):
     with Dying(4) as pool:
         report = made(tmp_path).run(executor=pool)

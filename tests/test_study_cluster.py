@@ -114,6 +114,25 @@ def test_a_scheduler_s_workers_compute_the_same_bytes(complete, tmp_path, run):
     assert digest(tmp_path) == complete
 
 
+def test_a_client_is_run_as_its_executor_is(tmp_path):
+    """Without a worker's process: units are pickled and computed as on a cluster."""
+    here = {"protocol": "tcp", "host": "127.0.0.1", "dashboard_address": None, "processes": False}
+    pulse = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
+    with (
+        distributed.LocalCluster(n_workers=1, threads_per_worker=1, **here) as pool,
+        distributed.Client(pool, set_as_default=False) as client,
+    ):
+        for name, executor in {
+            "client": client,
+            "its executor": client.get_executor(pure=False),
+            "threads": None,
+        }.items():
+            study = rocking.study(tmp_path / name, BLOCKS, pulse, levels=[0.5, 1.0], unit_blocks=1024)
+            report = study.run(executor=executor)
+            assert (report.units, report.failed) == (4, {})
+    assert digest(tmp_path / "client") == digest(tmp_path / "its executor") == digest(tmp_path / "threads")
+
+
 def test_the_caller_s_own_dask_goes_on_as_it_was():
     here = {"protocol": "tcp", "host": "127.0.0.1", "dashboard_address": None, "processes": False}
     with (

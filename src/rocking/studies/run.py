@@ -26,6 +26,7 @@ from dataclasses import dataclass
 from types import FrameType
 from typing import Any, Final
 
+from rocking import checks
 from rocking.compiling import SIMULATIONS, announce
 from rocking.errors import InvalidOption, RockingError, StudyError
 from rocking.progress import Progress, note
@@ -130,7 +131,7 @@ def run(
     *,
     stop: Stop,
     threads: int | None,
-    executor: Executor | None,
+    executor: Any,
     progress: bool | None,
     failing: Callable[[str, str], None],
 ) -> RunReport:
@@ -248,10 +249,18 @@ class Workers:
 
 
 @contextlib.contextmanager
-def workers_of(executor: Executor | None, threads: int | None) -> Iterator[Workers]:
+def workers_of(executor: Any, threads: int | None) -> Iterator[Workers]:
     """Workers of an executor, or threads, which stop in the middle of their units when this is left by an error."""
     if executor is not None:
-        yield Workers(executor)
+        pool = executor.get_executor(pure=False) if hasattr(executor, "get_executor") else executor
+        if not isinstance(pool, Executor):
+            raise InvalidOption(
+                "{} must be a concurrent.futures.Executor or a client of dask.distributed; got "
+                f"{checks.shown(executor)}",
+                "executor",
+                value=executor,
+            )
+        yield Workers(pool)
         return
     cancelled = Cancellation()
     with ThreadPoolExecutor(threads or cores()) as pool:

@@ -87,7 +87,7 @@ class Study(WrittenToFiles):
         return status_of(self._store)
 
     def run(
-        self, threads: int | None = None, executor: Executor | None = None, *, progress: bool | None = None
+        self, threads: int | None = None, executor: Executor | Any = None, *, progress: bool | None = None
     ) -> RunReport:
         """Compute every unit that is not done, and the rounds of the refinement after them.
 
@@ -95,9 +95,8 @@ class Study(WrittenToFiles):
         ----------
         threads : int, optional
             Number of threads; by default one for every core.
-        executor : concurrent.futures.Executor, optional
-            Who computes instead: processes, or a cluster (``client.get_executor()`` of dask.distributed). Workers only
-            compute; this process alone writes.
+        executor : concurrent.futures.Executor or dask.distributed.Client, optional
+            Processes, or the client of a cluster, whose workers compute instead; only this process writes.
         progress : bool, optional
             Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
 
@@ -109,6 +108,8 @@ class Study(WrittenToFiles):
 
         Raises
         ------
+        InvalidOption
+            If the number of threads is not a whole number from 1, or the executor is neither kind.
         StudyError
             If the study is being run elsewhere, was made by another version, or the workers are gone.
         OutputError
