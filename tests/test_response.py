@@ -269,3 +269,26 @@ def test_a_block_on_its_corner_needs_a_duration():
 def test_thresholds_must_be_positive(make, value):
     with pytest.raises(InvalidOption, match="positive"):
         make(value)
+
+
+OF_TIME = (
+    "states", "rotation", "angular_velocity", "angular_acceleration", "kinetic_energy", "potential_energy",
+    "normal_force", "friction_demand",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [*OF_TIME, "sensitivity.rotation"])
+@pytest.mark.parametrize("model", ["nonlinear", "linear"])
+@pytest.mark.parametrize("duration", [None, 0.7])
+def test_functions_of_time_are_nan_outside_the_response_and_nowhere_within(block, name, model, duration):
+    response = simulate(block, sine(2.0, 3.0, block), model=model, duration=duration)
+    function = getattr(response, name) if name in OF_TIME else lambda time: response.sensitivity.rotation(time)["p"]
+    end = response.duration
+    within, outside = [0.0, 0.5 * end, end], [-1e-9, np.nextafter(end, np.inf), 1e9, np.inf, -np.inf, np.nan]
+    assert not np.isnan(function(within)).any()  # a friction demand may be infinite
+    assert np.isnan(function(outside)).all()
+    assert np.isnan(function(100.0 * end)).all()
+    with pytest.raises(InvalidOption, match="time must be a number"):
+        function("soon")
+    documented = (getattr(type(response), name) if name in OF_TIME else rocking.response.Sensitivity.rotation).__doc__
+    assert "NaN" in documented or "As of `kinetic_energy`" in documented

@@ -731,3 +731,20 @@ def test_a_measure_that_is_not_that_of_observed_outcomes_is_refused(tmp_path):
         with pytest.raises(InvalidOption, match=f"measure is {measure.name}, but the outcomes are given by pga"):
             read_observed(table, measure)
     assert read_observed(table, Measure("pga"))["measure"] == Measure("pga")
+
+
+def test_functions_of_intensity_have_one_range():
+    curve, site = fragility_with(3.0, 0.4).curves[0], HazardCurve([1.0, 2.0, 4.0], [1e-2, 2e-3, 2e-4])
+    functions = (site.rate_of, curve.probability, curve.band, lambda x: curve.largest_rate(x, 100.0))
+    for function in functions:
+        for wrong in (-1e-300, -1.0, math.nan, [1.0, math.nan]):
+            with pytest.raises(InvalidOption, match="intensities must be numbers that are not negative"):
+                function(wrong)
+        assert not np.isnan(function([0.0, 1e-300, 1.0, 1e300, math.inf])).any()
+    assert [float(function(0.0)) for function in (functions[0], functions[1], functions[3])] == [
+        math.inf,
+        0.0,
+        math.inf,
+    ]
+    assert float(site.rate_of(8.0)) == pytest.approx(2e-5)  # the last line, extended
+    assert "infinite at 0" in HazardCurve.rate_of.__doc__

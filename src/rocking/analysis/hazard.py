@@ -177,7 +177,8 @@ class HazardCurve(Result):
         Returns
         -------
         ndarray
-            Rates (1/year), shaped like the intensities; infinite at 0.
+            Rates (1/year), shaped like the intensities: below the first and above the last point of the curve those of
+            its extended lines, which are infinite at 0.
 
         Raises
         ------

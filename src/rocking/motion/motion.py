@@ -290,7 +290,7 @@ class Motion:
     @overload
     def velocity(self, time: Sequence[float] | NDArray[Any]) -> Floats: ...
     def velocity(self, time: float | Sequence[float] | NDArray[Any]) -> float | Floats:
-        """Ground velocity, from rest; constant after the end of the motion.
+        """Ground velocity, from rest; zero before the motion and constant after its end.
 
         Parameters
         ----------
@@ -316,7 +316,7 @@ class Motion:
     @overload
     def displacement(self, time: Sequence[float] | NDArray[Any]) -> Floats: ...
     def displacement(self, time: float | Sequence[float] | NDArray[Any]) -> float | Floats:
-        """Ground displacement, from rest; after the end of the motion at its last velocity.
+        """Ground displacement, from rest; zero before the motion, and after its end at its last velocity.
 
         Parameters
         ----------

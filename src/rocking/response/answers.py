@@ -275,18 +275,18 @@ class Answers:
         Returns
         -------
         ndarray
-            One more dimension, of length 3, in the unit of the coordinate, over s and over s^2; NaN outside
-            [0, duration].
+            One more dimension, of length 3, in the unit of the coordinate, over s and over s^2; NaN at times outside
+            [0, duration], and where a time is NaN.
 
         Raises
         ------
         InvalidOption
-            If a time is not a number.
+            If `time` contains anything but numbers.
         """
         return self._history.states(time)
 
     def rotation(self, time: ArrayLike) -> Floats:
-        """Rotation theta, rad, at times of any shape, as `states`: from the series of the arc in which each lies."""
+        """Rotation theta, rad, at any time, from the series of the arc in which it lies; NaN outside [0, duration]."""
         return as_asked(self.states(time)[..., 0])
 
     def angular_velocity(self, time: ArrayLike) -> Floats:
@@ -314,8 +314,8 @@ class Answers:
         Raises
         ------
         InvalidOption
-            If a time is not a number, the body is no block, one of its tendons yields, or its restraints hold it back
-            at any rotation.
+            If `time` contains anything but numbers, the body is no block, one of its tendons yields, or its restraints
+            hold it back at any rotation.
 
         Notes
         -----
@@ -372,13 +372,13 @@ class Answers:
         return self._energy.losses(self.impacts)
 
     def normal_force(self, time: ArrayLike) -> Floats:
-        """Return the normal force over the weight at any time; impulses at impacts are not part of it."""
+        """Return the normal force over the weight without the impulses of impacts; NaN outside the response."""
         return as_asked(self._contact.forces(time)[1])
 
     def friction_demand(self, time: ArrayLike) -> Floats:
         """Friction coefficient that sticking needs at any time: infinite where the normal force is not positive.
 
-        NaN outside the response.
+        NaN outside [0, duration].
         """
         return as_asked(friction_demand(*self._contact.forces(time)))
 

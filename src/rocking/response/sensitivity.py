@@ -99,7 +99,7 @@ class Sensitivity:
         Raises
         ------
         InvalidOption
-            If a time is not a number, or there is no such quantity.
+            If `time` contains anything but numbers, or there is no such quantity.
 
         Notes
         -----
