@@ -8,8 +8,10 @@ from pathlib import Path
 
 import mpmath
 import numpy as np
+import pandas as pd
 import pytest
 import scipy.integrate
+import scipy.optimize
 import scipy.stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -20,7 +22,7 @@ from rocking.analysis import Band
 from rocking.analysis.fragility.lognormal import Probit
 from rocking.analysis.hazard import log_parts, powers
 from rocking.analysis.input_tables import read_observed
-from rocking.analysis.survival import _log_rate_within, _log_standing
+from rocking.analysis.survival import _log_rate_within, _log_standing, mean_of_blocks
 from rocking.motion.scaling import Measure
 
 G = 9.80665
@@ -452,23 +454,117 @@ def test_survival_is_what_the_rate_and_the_curve_say() -> None:
         fitted.survival(0.0)
 
 
-@pytest.mark.thorough
-def test_a_survival_of_one_block_of_several_is_likelier_than_of_their_mean() -> None:
-    """Of a weak and a strong block the strong one stands: what each does alone says how probably."""
-    blocks = [
-        rocking.Block.from_parameters(p=p, alpha=alpha, restitution=0.6) for p, alpha in ((3.0, 0.08), (1.5, 0.35))
-    ]
+def test_a_survival_of_one_block_of_several_is_the_mean_of_their_own() -> None:
+    """Of weak and strong blocks the strong ones stand: what each does alone, by another optimiser and by quadrature."""
+    shapes = [(3.0, 0.08), (1.5, 0.35), (2.0, 0.2), (2.5, 0.15)]
+    blocks = [rocking.Block.from_parameters(p=p, alpha=alpha, restitution=0.6) for p, alpha in shapes]
     pulses = [rocking.pulses.one_sine(1.0, f) for f in np.linspace(0.5, 2.0, 10)]
-    hazard = HazardCurve([0.01, 0.1, 1.0, 10.0, 100.0], [9e-1, 1e-1, 1e-2, 1e-4, 1e-8])
-    options = {"levels": np.geomspace(0.4, 40.0, 16)}
-    both = rocking.fragility(blocks, pulses, **options).survival(2000.0, hazard)
-    alone = [rocking.fragility(block, pulses, **options).survival(2000.0, hazard) for block in blocks]
-    true = 0.5 * sum(one.probability for one in alone)
-    assert both.probability < 0.05 < true < both.most_probable
+    points = np.array([0.01, 0.1, 1.0, 10.0, 100.0])
+    hazard = HazardCurve(points, [9e-1, 1e-1, 1e-2, 1e-4, 1e-8])
+    levels, weights, years = np.geomspace(0.4, 40.0, 16), [1.0, 3.0, 0.0, 2.0], 2000.0
+
+    def own(block: rocking.Block) -> float:
+        z, exceeded = [], []
+        for pulse in pulses:
+            for level in levels:
+                z.append(math.log(level))
+                exceeded.append(rocking.simulate(block, pulse.scaled_to(level)).overturned)
+        at, sign = np.array(z), np.where(exceeded, 1.0, -1.0)
+
+        def loss(parameters: np.ndarray) -> float:
+            return -float(scipy.stats.norm.logcdf(sign * (parameters[0] + parameters[1] * at)).sum())
+
+        a, b = scipy.optimize.minimize(
+            loss, [-1.0, 1.0], method="Nelder-Mead", options={"xatol": 1e-10, "fatol": 1e-12}
+        ).x
+        middle, width = -a / b, 12.0 / b
+
+        def density(x: float) -> float:
+            return float(hazard.rate_of(math.exp(x)) * scipy.stats.norm.pdf(a + b * x) * b)
+
+        corners = sorted({middle - width, middle + width, *(x for x in np.log(points) if abs(x - middle) < width)})
+        rate = sum(
+            scipy.integrate.quad(density, *ends, epsabs=0.0, epsrel=1e-9)[0] for ends in itertools.pairwise(corners)
+        )
+        return math.exp(-years * rate)
+
+    both = rocking.fragility(blocks, pulses, levels=levels, weights=weights).survival(years, hazard)
+    expected = np.average([own(block) for block in blocks], weights=weights)
+    assert 0.05 < expected < 0.95
+    assert both.mean_probability == pytest.approx(expected, rel=1e-5)
+    assert both.probability < 0.05 < both.mean_probability < both.most_probable
+    assert both.to_dict()["mean_probability"] == both.mean_probability
     assert not both.contradicts
-    assert alone[0].contradicts
-    assert "if one of them has stood all the time" in both.summary()
-    assert "if one of them" not in alone[0].summary()
+    said = f"is {expected:.2g} in the mean and at most {both.most_probable:.2g} if one of the blocks has stood all the"
+    assert said in both.summary()
+    alone = rocking.fragility(blocks[0], pulses, levels=levels).survival(years, hazard)
+    assert alone.contradicts
+    assert math.isnan(alone.mean_probability)
+    assert "if one of the blocks" not in alone.summary()
+
+
+def test_blocks_that_always_or_never_fall_or_at_once_have_their_part_in_the_mean() -> None:
+    """Limits of fits: a probability of 0 or 1, or a step, whose rate is that of the hazard curve there."""
+    site = HazardCurve([1.0, 2.0, 4.0], [1e-2, 2e-3, 2e-4])
+    kinds = {"never": [0, 0, 0], "always": [1, 1, 1], "step": [0, 1, 1]}
+    table = pd.DataFrame(
+        [
+            {"block": k, "pga_m_s2": level, "exceeded_overturning": bool(one)}
+            for level, *fell in zip([1.0, 2.25, 4.0], *kinds.values(), strict=True)
+            for k, one in enumerate(fell)
+        ]
+    )
+    rates = [0.0, 1e-2 - 2e-4, float(site.rate_of(1.5))]
+    found = mean_of_blocks(table, "pga_m_s2", "overturning", site, 100.0)
+    assert found == pytest.approx(np.mean(np.exp(-100.0 * np.array(rates))), rel=1e-4)
+
+
+@pytest.mark.parametrize("hazard", [None, HazardCurve([0.5, 1.0, 2.0, 4.0, 8.0], [5e-2, 2e-2, 6e-3, 1.2e-3, 1.5e-4])])
+def test_no_text_goes_beyond_the_hazard_curve(hazard: HazardCurve | None) -> None:
+    """A curve that hardly rises: its own numbers are rates of a million a year and intensities of 1e12 g."""
+    flat = rocking.fit_fragility([1.0, 2.0, 3.0, 4.0], [470, 480, 485, 495], trials=1000, measure="pga")
+    stood = flat.survival(10_000.0, hazard)
+    texts = [stood.summary(), repr(stood)]
+    if hazard is not None:
+        risk = flat.annual_rate(hazard)
+        assert risk.rates[0].annual_rate > 10.0
+        texts += [risk.summary(), repr(risk), repr(risk.rates[0]), risk.rates[0].in_words()]
+        assert "once in < 20 years" in risk.summary() + repr(risk)
+        assert "> 0.05" in risk.summary()
+        assert "> 0.05" in stood.summary()
+        assert "< 0.00015" in stood.summary()
+    assert stood.intensity[-1] > 1e6
+    assert "some intensity above" in repr(stood)
+    for text in texts:
+        assert not re.search(r"e[+]\d\d", text), text
+        assert not re.search(r"(?:once in|years\)).*\de-0[2-9]", text), text
+
+
+def test_a_rate_from_above_the_hazard_curve_has_a_bound_and_no_estimate() -> None:
+    strong = fragility_with(40.0, 0.3)
+    site = HazardCurve([0.5, 1.0, 2.0, 4.0, 8.0], [5e-2, 2e-2, 6e-3, 1.2e-3, 1.5e-4])
+    (rate,) = strong.annual_rate(site).rates
+    assert rate.above > 0.99
+    assert rate.annual_rate < 1.5e-4
+    assert "once in > 6700 years" in rate.in_words()
+    # Were every motion above the last point to exceed the limit, the rate would be this.
+    assert rate.bounds[0] == pytest.approx((1.0 - rate.above) * rate.annual_rate + 1.5e-4)
+
+
+def test_a_row_of_a_survival_never_denies_what_the_last_line_says() -> None:
+    """The bound of each row is above the probability of the whole, which is what every motion adds to."""
+    hazard = HazardCurve([0.5, 1.0, 2.0, 4.0, 8.0], [5e-2, 2e-2, 6e-3, 1.2e-3, 1.5e-4])
+    compared = 0
+    for median in (1.0, 2.0, 3.0, 5.0):
+        for dispersion in (0.2, 0.5, 1.0):
+            for years in (100.0, 1000.0, 10_000.0):
+                found = fragility_with(median, dispersion).survival(years, hazard)
+                header, *rows = found.summary().splitlines()[4:10]
+                assert header.endswith("survival at most")
+                for row in rows:
+                    assert float(row.split()[-1]) >= 0.99 * found.probability
+                    compared += 1
+    assert compared == 180
 
 
 @pytest.mark.parametrize(("a", "b"), [(-1.0, 1.5), (2.0, 0.7), (-6.0, 9.0), (20.0, 2.0), (-20.0, 1.0)])
@@ -503,7 +599,7 @@ def test_motions_beyond_the_hazard_curve_contradict_nothing() -> None:
     assert found.most_probable > 0.99
     assert not found.contradicts
     assert "100 % of the rate is from above the hazard curve" in found.summary()
-    assert "(its line extended)" in found.summary()
+    assert "< 0.01 " in found.summary()
     assert found.to_dict()["share_above_hazard_curve"] > 0.99
 
 

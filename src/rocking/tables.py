@@ -12,7 +12,7 @@ import os
 import re
 import shutil
 import uuid
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -78,8 +78,23 @@ def counted(number: float, noun: str) -> str:
     return f"{text} {noun[:-1]}ies" if noun.endswith("y") else f"{text} {noun}s"
 
 
-def known_digits(value: float, interval: tuple[float, float]) -> tuple[str, str]:
-    """Value and ends of its interval as text, to the digits that the interval leaves, and two at least.
+def within(value: float, bounds: tuple[float, float], text: Callable[[float], str]) -> str:
+    """Write a number or, outside of bounds, the one that it passes, behind < or >.
+
+    Examples
+    --------
+    >>> [within(x, (0.1, 0.8), "{:g}".format) for x in (0.02, 0.4, 5e11)]
+    ['< 0.1', '0.4', '> 0.8']
+    """
+    low, high = bounds
+    sign = "< " if value < low else "> " if value > high else ""
+    return sign + text(min(max(value, low), high))
+
+
+def known_digits(
+    value: float, interval: tuple[float, float], bounds: tuple[float, float] = (0.0, math.inf)
+) -> tuple[str, str]:
+    """Value and ends of its interval as text, to the digits that the interval leaves, and two at least; or bounds.
 
     Examples
     --------
@@ -97,7 +112,7 @@ def known_digits(value: float, interval: tuple[float, float]) -> tuple[str, str]
         digits = int(max(2, math.floor(math.log10(abs(number))) - last + 1))
         return f"{float(f'{number:.{digits - 1}e}'):.{max(digits, 6)}g}"
 
-    return text(value), f"{text(low)} to {text(high)}"
+    return within(value, bounds, text), f"{within(low, bounds, text)} to {within(high, bounds, text)}"
 
 
 def range_text(values: Floats) -> str:

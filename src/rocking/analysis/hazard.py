@@ -209,7 +209,7 @@ class HazardCurve(Result):
         return text_table([self.measure.label, "annual rate", "return period (years)"], rows)
 
     def _headline(self) -> str:
-        low, high = self.measure.scale * self.intensity[[0, -1]]
+        low, high = shown_range(self)
         return (
             f"{self.name}; {self.measure.label} from {low:.4g} to {high:.4g}, "
             f"annual rate from {self.rate[0]:.3g} to {self.rate[-1]:.3g}"
@@ -223,12 +223,17 @@ def powers(hazard: HazardCurve) -> tuple[Floats, Floats]:
     return exponents, y[:-1] + exponents * x[:-1]
 
 
+def shown_range(hazard: HazardCurve) -> tuple[float, float]:
+    """Return the first and the last intensity, in the unit of texts and figures."""
+    low, high = hazard.measure.scale * hazard.intensity[[0, -1]]
+    return float(low), float(high)
+
+
 def hazard_line(hazard: HazardCurve, intensity: Floats) -> HazardLine:
     """Return rates at intensities (SI) as a figure takes them: neither 0 nor infinite."""
     from rocking.plot.risk import HazardLine
 
-    low, high = hazard.measure.scale * hazard.intensity[[0, -1]]
-    return HazardLine(np.clip(hazard.rate_of(intensity), *_DRAWN), (float(low), float(high)))
+    return HazardLine(np.clip(hazard.rate_of(intensity), *_DRAWN), shown_range(hazard))
 
 
 def _check_order(what: str, values: Floats, way: float) -> None:

@@ -19,12 +19,13 @@ from rocking.analysis.hazard import (
     quantile_intensities,
     share_density,
     shares_beyond,
+    shown_range,
 )
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
 from rocking.result import DrawnResult
-from rocking.tables import as_written, counted, known_digits, text_table
+from rocking.tables import as_written, counted, known_digits, text_table, within
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,6 +33,9 @@ if TYPE_CHECKING:
 
 #: Relative change by which a rate's slope is taken.
 _STEP: Final = 1e-5
+
+#: Share of a rate from above the hazard curve, beyond which only a bound on the rate is stated.
+_MOST_BEYOND: Final = 0.5
 
 #: A figure shows what is between quantiles of a rate, and so many times as far beyond them.
 _BEYOND: Final = 2.0
@@ -57,6 +61,8 @@ class Rate:
         only extended.
     intensities : (float, float, float)
         Intensities (SI) of the motions below which 16, 50 and 84 % of the rate arise.
+    bounds : (float, float)
+        Rates between which the hazard curve can tell the rate; texts state the bound in place of a rate beyond them.
     """
 
     limit_state: str
@@ -65,9 +71,10 @@ class Rate:
     below: float
     above: float
     intensities: tuple[float, float, float]
+    bounds: tuple[float, float] = (0.0, math.inf)
 
     def __repr__(self) -> str:
-        rate, between = known_digits(self.annual_rate, self.interval)
+        rate, between = known_digits(self.annual_rate, self.interval, self.bounds)
         return f"<Rate: {self.limit_state}: {rate} a year ({between}), {self.in_words()}>"
 
     def in_words(self) -> str:
@@ -83,7 +90,7 @@ class Rate:
         >>> Rate("overturning", 1 / 464.8, (1 / 826, 1 / 206.1), 0.0, 0.0, (1.0, 2.0, 3.0)).in_words()
         'once in 460 years (210 to 830)'
         """
-        period, between = known_digits(self.return_period, self.return_interval)
+        period, between = _period_digits(self)
         return f"once in {period} year{'' if period == '1' else 's'} ({between})"
 
     def probability(self, years: float) -> float:
@@ -146,6 +153,12 @@ class Rate:
         """Confidence interval of the return period, years."""
         low, high = self.interval
         return _period(high), _period(low)
+
+
+def _period_digits(rate: Rate) -> tuple[str, str]:
+    """Return period and its interval, as text."""
+    low, high = rate.bounds
+    return known_digits(rate.return_period, rate.return_interval, (_period(high), _period(low)))
 
 
 def _period(rate: float) -> float:
@@ -229,14 +242,14 @@ class Risk(DrawnResult):
         scale, confidence = self.hazard.measure.scale, 100 * self.curves[0].confidence
         rows = []
         for one in self.rates:
-            chances = [-math.expm1(-rate * years) for rate in (one.annual_rate, *one.interval)]
+            chances = [-math.expm1(-rate * years) for rate in (one.annual_rate, *one.interval, *one.bounds)]
             rows.append(
                 [
                     one.limit_state,
-                    *known_digits(one.annual_rate, one.interval),
-                    *known_digits(one.return_period, one.return_interval),
-                    *known_digits(chances[0], (chances[1], chances[2])),
-                    "{:.3g}, {:.3g}, {:.3g}".format(*(scale * x for x in one.intensities)),
+                    *known_digits(one.annual_rate, one.interval, one.bounds),
+                    *_period_digits(one),
+                    *known_digits(chances[0], (chances[1], chances[2]), (chances[3], chances[4])),
+                    ", ".join(within(scale * x, shown_range(self.hazard), "{:.3g}".format) for x in one.intensities),
                 ]
             )
         between = f"{confidence:g} % between"
@@ -371,12 +384,12 @@ def _rate(curve: FragilityCurve, hazard: HazardCurve) -> Rate:
     low, high = interval_of(curve, logarithm, logarithm(curve.fitted)[0], gradient_of(logarithm, curve.fitted))
     with np.errstate(over="ignore", under="ignore"):
         rate, lower, upper = (float(np.exp(value)) for value in (total, low[0], high[0]))
+    below, above = shares_beyond(curve.fitted, hazard)
+    # Motions above the last point add no more than its rate, and those below the first one what nobody knows.
+    least = (1.0 - above) * rate + float(hazard.rate[-1]) if above > _MOST_BEYOND else 0.0
+    intensities = quantile_intensities(curve.fitted, hazard)
     return Rate(
-        curve.limit_state,
-        rate,
-        (lower, upper),
-        *shares_beyond(curve.fitted, hazard),
-        quantile_intensities(curve.fitted, hazard),
+        curve.limit_state, rate, (lower, upper), below, above, intensities, (least, max(least, float(hazard.rate[0])))
     )
 
 

@@ -10,16 +10,17 @@ import numpy as np
 
 from rocking import checks
 from rocking.analysis.fragility.curve import FragilityCurve, in_units, interval_of
-from rocking.analysis.fragility.lognormal import Probit
+from rocking.analysis.fragility.lognormal import Outcomes, Probit, fit_or_limits
 from rocking.analysis.hazard import HazardCurve, hazard_line, log_parts
 from rocking.analysis.risk import Rate, beyond_notes, gradient_of
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
 from rocking.result import DrawnResult
-from rocking.tables import as_written, counted, known_digits, text_table
+from rocking.tables import as_written, counted, known_digits, text_table, within
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -41,10 +42,10 @@ class Survival(DrawnResult):
 
     Its figure has the largest rates that fit with the survival, and the hazard curve beside them.
 
-    A curve of several blocks (an ensemble that stands for one which is not quite known, say) does not tell which part
-    of its dispersion is theirs. Rates and `probability` are then those of motions that each meet another of the blocks;
-    if one of them has stood all the time, it may well be a strong one: `most_probable` counts all of the dispersion as
-    the blocks', and the truth is between the two.
+    A curve of several blocks (for example an ensemble that stands for one block which is not quite known) does not
+    separate their dispersion from that of the motions. Rates and `probability` are then those of motions that each meet
+    another of the blocks. If one of the blocks has stood all the time, the probability is `mean_probability`, and
+    `most_probable` bounds it.
 
     Attributes
     ----------
@@ -64,6 +65,10 @@ class Survival(DrawnResult):
         Annual rate of the limit state under that hazard curve.
     several_blocks : bool
         Whether outcomes of several blocks count together in the curve.
+    mean_probability : float
+        Probability of the survival under the hazard curve of one of several blocks: the mean, by their weights, of the
+        probabilities of the blocks, each by a fragility curve of its own. NaN of one block, without a hazard curve, and
+        where the outcomes of each block are not kept.
     """
 
     curve: FragilityCurve
@@ -74,6 +79,7 @@ class Survival(DrawnResult):
     hazard: HazardCurve | None
     rate: Rate | None
     several_blocks: bool = False
+    mean_probability: float = math.nan
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "years", checks.positive(self.years, "years", InvalidOption))
@@ -147,49 +153,68 @@ class Survival(DrawnResult):
         measure, share = self.measure, f"{100.0 * self.confidence:g} %"
         header = [measure.label, "probability", "at most a year", "at most once in (years)"]
         columns: list[list[Any]] = [
-            [measure.scale * x for x in self.intensity],
+            [within(x, self._known, lambda end: f"{measure.scale * end:.5g}") for x in self.intensity],
             [*_CHANCES],
             [f"{rate:.2g}" for rate in self.largest_rate],
             [f"{float(f'{1.0 / rate:.2g}'):.7g}" for rate in self.largest_rate],
         ]
         if self.hazard is not None:
+            header += ["hazard curve, a year", "survival at most"]
+            highest, lowest = self.hazard.rate[[0, -1]]
             rates = self.hazard.rate_of(self.intensity)
-            header += ["hazard curve, a year", "too often"]
-            low, high = self.hazard.intensity[[0, -1]]
-            held = (low <= self.intensity) & (self.intensity <= high)
-            told = ["" if inside else " (its line extended)" for inside in held]
+            known = np.where(rates < lowest, 0.0, np.minimum(rates, highest))
             columns += [
-                [f"{rate:.2g}{said}" for rate, said in zip(rates, told, strict=True)],
-                (rates > self.largest_rate).tolist(),
+                [within(rate, (lowest, highest), "{:.2g}".format) for rate in rates],
+                [f"{chance:.2g}" for chance in np.exp(-self.years * known * _CHANCES)],
             ]
         return "\n".join(
             [
                 f"{self.curve.limit_state}: not in {counted(self.years, 'year')}; intensity: {measure.label}",
-                f"most likely no motion reached {in_units(self.unlikely, self.measure)}: one that did would have "
-                f"exceeded the limit with {share}",
+                f"most likely never {self._never}: one such motion would have exceeded the limit with {share}",
                 f"largest rates of motions of an intensity or more; with larger ones the limit would have been "
                 f"exceeded with {share}" + (", if each met another of the blocks" if self.several_blocks else ""),
                 "",
                 text_table(header, [*map(list, zip(*columns, strict=True))]),
-                *([] if self.hazard is None else ["", self._verdict(self.hazard)]),
+                *([] if self.rate is None or self.hazard is None else ["", self._verdict(self.rate, self.hazard)]),
                 *([] if self.rate is None else beyond_notes(self.rate)),
             ]
         )
 
-    def _verdict(self, hazard: HazardCurve) -> str:
+    @property
+    def _known(self) -> tuple[float, float]:
+        """Lowest and highest intensity (SI) of the data and of the hazard curve."""
+        known = np.concatenate([self.curve.intensity, [] if self.hazard is None else self.hazard.intensity])
+        return float(known.min()), float(known.max())
+
+    @property
+    def _never(self) -> str:
+        """Say which motions have most likely never come."""
+        last = self._known[1]
+        if self.unlikely > last:
+            beyond = "the data" if self.hazard is None else "data and hazard curve"
+            return f"some intensity above {in_units(last, self.measure)}, beyond {beyond}"
+        return f"{in_units(self.unlikely, self.measure)} or more"
+
+    def _verdict(self, rate: Rate, hazard: HazardCurve) -> str:
         """Say how probable the survival is under a hazard curve."""
-        chance, between = known_digits(self.probability, self.interval)
+        low, high = rate.bounds
+        bounds = math.exp(-high * self.years), math.exp(-low * self.years)
+        chance, between = known_digits(self.probability, self.interval, bounds)
+        pooled = f"{chance} ({100.0 * self.curve.confidence:g} % interval {between})"
+        likely, mean = self.probability, ""
+        if not math.isnan(self.mean_probability):
+            likely, mean = self.mean_probability, f"{self.mean_probability:.2g} in the mean and "
+        if self.several_blocks:
+            pooled = (
+                f"{mean}at most {self.most_probable:.2g} if one of the blocks has stood all the time, and {pooled} if "
+                "each motion met another of them"
+            )
         text = (
             f"under the hazard curve {hazard.name!r} the probability of {counted(self.years, 'year')} without it is "
-            f"{chance} ({100.0 * self.curve.confidence:g} % interval {between})"
+            f"{pooled}"
         )
-        if self.several_blocks:
-            text += (
-                " if each motion met another of the blocks, and no more than "
-                f"{self.most_probable:.2g} if one of them has stood all the time"
-            )
         least = f"{1.0 - self.confidence:.3g}"
-        if self.probability >= 1.0 - self.confidence:
+        if likely >= 1.0 - self.confidence:
             return f"{text}, so they do not contradict each other"
         if not self.contradicts:
             return f"{text}; below {least} they would contradict each other, which is not settled"
@@ -216,6 +241,7 @@ class Survival(DrawnResult):
             "probability": self.probability,
             "probability_interval": [*self.interval],
             "most_probable": self.most_probable,
+            "mean_probability": self.mean_probability,
             "share_below_hazard_curve": math.nan if self.rate is None else self.rate.below,
             "share_above_hazard_curve": math.nan if self.rate is None else self.rate.above,
             "contradicts": self.contradicts,
@@ -244,8 +270,24 @@ class Survival(DrawnResult):
         )
 
     def _headline(self) -> str:
-        time, never = counted(self.years, "year"), in_units(self.unlikely, self.measure)
-        return f"{self.curve.limit_state}: not in {time}; most likely never {never} or more"
+        return f"{self.curve.limit_state}: not in {counted(self.years, 'year')}; most likely never {self._never}"
+
+
+def mean_of_blocks(outcomes: pd.DataFrame, column: str, limit_state: str, hazard: HazardCurve, years: float) -> float:
+    """Mean of the probabilities that blocks survive, each by a curve fitted to its own outcomes."""
+    table = outcomes.sort_values("block", kind="stable")
+    blocks = table.drop_duplicates("block")
+    intensity, exceeded = (
+        table[name].to_numpy(np.float64).reshape(len(blocks), -1) for name in (column, f"exceeded_{limit_state}")
+    )
+    fits, _ = fit_or_limits(Outcomes(np.log(intensity[0]), exceeded, np.ones_like(exceeded)))
+    # Of a curve that does not rise, motions below the hazard curve would exceed the limit as often as they come.
+    rising = fits.slope > 0.0
+    logarithm = np.where(
+        rising, np.logaddexp.reduce(log_parts(fits, hazard), axis=1), _log_rate_within(fits, hazard)[:, 0]
+    )
+    rates = np.exp(logarithm)
+    return float(np.average(np.exp(-years * rates), weights=blocks.get("weight")))
 
 
 def _log_rate_within(fits: Probit, hazard: HazardCurve) -> Floats:

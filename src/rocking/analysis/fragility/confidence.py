@@ -17,9 +17,8 @@ from rocking.analysis.fragility.lognormal import (
     Outcomes,
     Probit,
     covariance,
-    fit,
+    fit_or_limits,
     likelihood,
-    limits,
     logarithms,
     scores,
     solved,
@@ -123,10 +122,7 @@ class Resamples:
         weights = drawn[:, clusters[order]]
         yes, trials = (np.add.reduceat(weights * values[order], starts, axis=1) for values in data[1:])
         anew = Outcomes(data.z[order][starts], yes, trials)
-        fits, regular = limits(anew)
-        if regular.any():
-            found = fit(anew.of(regular))
-            fits.intercept[regular], fits.slope[regular] = found.intercept, found.slope
+        fits, regular = fit_or_limits(anew)
         return cls(fits, 1.0 - float(regular.mean()), _influences(data, clusters, alike, fitted), alike)
 
     def interval(self, quantity: Quantity, estimate: Floats, gradient: Floats, confidence: float) -> Ends:

@@ -17,6 +17,7 @@ from rocking.analysis.fragility.lognormal import Outcomes, Probit, normal_scores
 from rocking.arrays import Floats, Integers, as_asked
 from rocking.errors import InvalidOption, Unfitted
 from rocking.motion.scaling import Measure, intensities
+from rocking.tables import within
 
 BandKind = Literal["likelihood", "bootstrap"]
 
@@ -26,8 +27,8 @@ _BEYOND_ENDS: Final = 2.0
 #: Share of the trials by which two sums of the same weights may differ.
 _SAME: Final = 1e-12
 
-#: Logarithm of how far beyond the data a median is still believed.
-_BEYOND: Final = math.log(1000.0)
+#: How many times beyond the data a median is still believed.
+_FARTHEST: Final = 1000.0
 
 
 @dataclass(frozen=True)
@@ -124,7 +125,7 @@ class FragilityCurve:
     _uncertainty: Confidence
 
     def __repr__(self) -> str:
-        median, dispersion = (interval_text(each, 4) for each in (self.median_interval, self.dispersion_interval))
+        median, dispersion = median_text(self, 1.0), interval_text(self.dispersion_interval, 4)
         count = f"{self.exceeded.sum():.0f} of {self.trials.sum():.0f} exceeded"
         return (
             f"<FragilityCurve: {self.limit_state}, {count}; median {self.median:.4g} ({median}) in SI units, "
@@ -373,7 +374,7 @@ def fitted_curve(
         raise Unfitted(f"no lognormal can be fitted to {name!r}: {fault}")
     fitted = lognormal.fit(outcomes.alone())
     middle = float(-fitted.intercept[0] / fitted.slope[0])
-    if not z.min() - _BEYOND <= middle <= z.max() + _BEYOND:
+    if not z.min() - math.log(_FARTHEST) <= middle <= z.max() + math.log(_FARTHEST):
         raise Unfitted(
             f"no lognormal can be fitted to {name!r}: the outcomes hardly depend on the intensity, and put the median "
             f"{'above' if middle > z.max() else 'below'} all intensities by a factor of more than 1000: motions nearer "
@@ -428,9 +429,16 @@ def in_units(intensity: float, measure: Measure) -> str:
     return f"{measure.scale * intensity:.4g} {measure.shown_in}".rstrip()
 
 
-def interval_text(ends: Sequence[float], digits: int) -> str:
-    """Write the ends of an interval, to some digits."""
-    return " to ".join("infinity" if math.isinf(end) else f"{end:.{digits}g}" for end in ends)
+def interval_text(ends: Sequence[float], digits: int, bounds: tuple[float, float] = (0.0, math.inf)) -> str:
+    """Write the ends of an interval, to some digits; in place of finite ones outside of bounds the bounds."""
+    text = f"{{:.{digits}g}}".format
+    return " to ".join("infinity" if math.isinf(end) else within(end, bounds if end else (0, 0), text) for end in ends)
+
+
+def median_text(curve: FragilityCurve, scale: float) -> str:
+    """Write the interval of the median, times a factor, without numbers that are too far from the data."""
+    bounds = scale * curve.intensity.min() / _FARTHEST, scale * curve.intensity.max() * _FARTHEST
+    return interval_text([scale * end for end in curve.median_interval], 4, bounds)
 
 
 def _log_medians(fits: Probit) -> Floats:

@@ -280,6 +280,15 @@ def limits(data: Outcomes) -> tuple[Probit, Flags]:
     return Probit(intercept, slope), ~step & _rises(data)
 
 
+def fit_or_limits(data: Outcomes) -> tuple[Probit, Flags]:
+    """Fit several data sets, by limits where a likelihood has no maximum; and which of them have one."""
+    fits, regular = limits(data)
+    if regular.any():
+        found = fit(data.of(regular))
+        fits.intercept[regular], fits.slope[regular] = found.intercept, found.slope
+    return fits, regular
+
+
 def _overlap(z: Floats) -> float:
     """Overlap of the outcomes of either kind that is too narrow for a slope to be found from it."""
     return _NARROW * float(z.max() - z.min())

@@ -12,11 +12,11 @@ import numpy as np
 
 from rocking import checks
 from rocking.analysis.fragility import nrml
-from rocking.analysis.fragility.curve import FragilityCurve, in_units, interval_text
+from rocking.analysis.fragility.curve import FragilityCurve, in_units, interval_text, median_text
 from rocking.analysis.fragility.lognormal import groups
 from rocking.analysis.hazard import HazardCurve
 from rocking.analysis.risk import Risk, risk_of
-from rocking.analysis.survival import Survival
+from rocking.analysis.survival import Survival, mean_of_blocks
 from rocking.arrays import Floats
 from rocking.body import Body
 from rocking.constants import STANDARD_GRAVITY, Model
@@ -93,7 +93,7 @@ class Fragility(DrawnResult, TableResult):
                 curve.limit_state,
                 f"{curve.exceeded.sum():.0f} of {curve.trials.sum():.0f}",
                 scale * curve.median,
-                interval_text([scale * end for end in curve.median_interval], 4),
+                median_text(curve, scale),
                 curve.dispersion,
                 interval_text(curve.dispersion_interval, 3),
                 float(f"{curve.goodness.p_value:.2g}"),
@@ -267,8 +267,11 @@ class Fragility(DrawnResult, TableResult):
         """
         curve = self.curve(limit_state)
         rate = None if hazard is None else self.annual_rate(hazard).rate(limit_state)
+        mean = math.nan
+        if hazard is not None and self.several_blocks and self.outcomes is not None:
+            mean = mean_of_blocks(self.outcomes, self.measure.column, limit_state, hazard, years)
         return Survival(
-            curve, self.measure, self.description, years, confidence, hazard, rate, several_blocks=self.several_blocks
+            curve, self.measure, self.description, years, confidence, hazard, rate, self.several_blocks, mean
         )
 
     @property
