@@ -41,7 +41,7 @@ def main():
     try:
         from playwright.sync_api import sync_playwright
     except ImportError:
-        print("no browser: install rocking[browser]")
+        print("no browser: pip install '.[browser]'")
         return
     if shutil.which("chromium") is None:
         print("no browser: install Chromium")

@@ -54,7 +54,7 @@ def launched():
     try:
         from playwright.sync_api import sync_playwright
     except ImportError:
-        missing("playwright is not installed: pip install 'rocking[browser]'")
+        missing("playwright is not installed: pip install '.[browser]'")
     with sync_playwright() as player:
         started = _launched(player)
         yield started

@@ -66,3 +66,14 @@ def test_a_mistake_is_one_line(run, arguments, sentence):
     assert (code, out) == (2, "")
     assert sentence in err
     assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("body", "overturning"),
+    [(BALL, False), (["--p", 2, "--alpha", 0.2, "--restitution", 0.8, "--initial-position", "0.05"], True)],
+)
+def test_only_of_what_may_overturn_is_it_said_that_it_does_not(run, body, overturning):
+    code, out, _ = run("schemes", *body, "--schemes", "velocity=1e-3", "--repetitions", 0)
+    assert code == 0
+    assert "every rest known to" in out
+    assert ("does not overturn" in out) is overturning

@@ -325,3 +325,27 @@ def test_a_rest_at_the_first_impact_is_proven(restitution):
         assert len(rests) >= 2 and found.stalled == 0 and "not proven" not in found.summary()
         assert np.all(rests["upper"] - rests["lower"] <= 64.0 * np.spacing(rests["end"]))
         assert np.all((rests["lower"] <= rests["end"]) & (rests["end"] <= rests["upper"]))
+
+
+@pytest.mark.parametrize("entry", ["simulate", "simulate_many", "study"])
+@pytest.mark.parametrize(
+    "body",
+    [
+        dynamics.BouncingBall(0.5),
+        dynamics.ImpactOscillator(1.0, 0.8, stop=0.01),
+        dynamics.InvertedPendulum(3.0, 0.1, 0.7),
+    ],
+    ids=["ball", "oscillator", "pendulum"],
+)
+def test_the_entry_points_for_blocks_lead_to_those_for_bodies_between_stops(tmp_path, entry, body):
+    """Nobody who gave no model is told of a wrong one alone."""
+    calls = {
+        "simulate": lambda **model: rocking.simulate(body, pulses.sine(12.0, 5.0, cycles=2), **model),
+        "simulate_many": lambda **model: rocking.simulate_many(body, pulses.sine(12.0, 5.0, cycles=2), **model),
+        "study": lambda **model: rocking.study(tmp_path, body, pulses.sine(12.0, 5.0, cycles=2), levels=[1.0], **model),
+    }
+    with pytest.raises(
+        InvalidOption, match=r"call simulate or simulate_many of rocking.dynamics, or give model \"linear\""
+    ):
+        calls[entry]()
+    assert calls[entry](model="linear") is not None

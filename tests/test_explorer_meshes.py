@@ -309,7 +309,7 @@ def test_a_process_that_takes_too_much_is_ended(tmp_path, monkeypatch):
 
 def test_what_reads_meshes_may_be_missing(here, monkeypatch):
     monkeypatch.setitem(sys.modules, "trimesh", None)
-    with pytest.raises(InvalidOption, match=r"trimesh, which is not installed: pip install 'rocking\[mesh\]'"):
+    with pytest.raises(InvalidOption, match=r"trimesh, which is not installed: run pip install '\.\[mesh\]'"):
         Explorer().take_mesh("box.stl", content(box()))
 
 

@@ -902,7 +902,7 @@ def test_a_missing_package_is_named(run, monkeypatch):
     monkeypatch.setattr(launch.util, "find_spec", lambda name: None)
     code, _, err = run("explore", "--no-open")
     assert code == 2
-    assert "pip install 'rocking[explorer]'" in err
+    assert "pip install '.[explorer]' in the source folder" in err
 
 
 @pytest.mark.thorough

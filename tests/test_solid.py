@@ -668,7 +668,7 @@ def test_a_file_without_a_mesh_is_refused_by_its_name(tmp_path, name, content, s
 
 def test_without_trimesh_it_is_said_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "trimesh", None)
-    with pytest.raises(InvalidOption, match=r"pip install 'rocking\[mesh\]'"):
+    with pytest.raises(InvalidOption, match=r"pip install '\.\[mesh\]'"):
         Solid.from_mesh("statue")
 
 

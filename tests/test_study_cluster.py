@@ -269,7 +269,7 @@ def test_what_is_wrong_with_a_cluster_is_one_sentence(tmp_path, run, monkeypatch
 def test_without_dask_it_says_what_to_install(tmp_path, run, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     made(tmp_path)
-    assert "install rocking[cluster]" in run("study", "run", tmp_path, "--workers", 2)[2]
+    assert "pip install '.[cluster]' in the source folder" in run("study", "run", tmp_path, "--workers", 2)[2]
 
 
 # The page

@@ -209,7 +209,7 @@ def test_a_store_that_is_not_there_is_one_sentence(run, bucket, monkeypatch):
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert "nonsense://x/y: this is no URL of an object store" in err
     monkeypatch.setitem(sys.modules, "obstore", None)
-    assert "install rocking[objects]" in run("study", "run", "s3://nobody/has/this")[2]
+    assert "pip install '.[objects]' in the source folder" in run("study", "run", "s3://nobody/has/this")[2]
 
 
 def test_a_renewal_whose_answer_is_lost_is_none_of_another_run(url, monkeypatch):

@@ -43,6 +43,11 @@ def literal(text: str) -> str:
     return text.replace("{}", "{{}}")
 
 
+def install(part: str) -> str:
+    """Return the advice that installs the optional packages of a part."""
+    return f"run pip install '.[{part}]' in the source folder of rocking"
+
+
 @dataclass(frozen=True)
 class Message:
     """A sentence that may name arguments.

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 from rocking.body import Body
 from rocking.constants import STANDARD_GRAVITY
 from rocking.ensemble import body_coordinates, verticals_of
-from rocking.errors import InvalidOption
+from rocking.errors import InvalidOption, install
 from rocking.motion.motion import Motion
 from rocking.motion.named import Motions, motions_by_name, names_of
 from rocking.problem import one_body
@@ -174,7 +174,7 @@ class Survey(BlockUnderRecords):
             table.to_excel(workbook, sheet_name="summary", freeze_panes=(1, 0), index=False, float_format="%.15g")
             write_bytes(folder / "summary.xlsx", workbook.getvalue())
         except ImportError:
-            note("no summary.xlsx: install rocking[excel] for a workbook; summary.csv holds the same table")
+            note(f"no summary.xlsx: {install('excel')} for a workbook; summary.csv contains the same table")
         self.to_json(folder / "summary.json")
 
 

@@ -308,10 +308,11 @@ def _cost_unit(scheme: Scheme) -> str:
 
 def _account(certified: Response) -> str:
     """Say what the certified response comes to."""
-    ending = "overturns" if certified.overturned else "does not overturn"
+    falls = math.isfinite(min(certified.body.balance))
+    ending = "" if not falls else "; overturns" if certified.overturned else "; does not overturn"
     widths = certified.chattering["upper"] - certified.chattering["lower"]
     if not widths.size:
-        return f"no rest; {ending}"
+        return f"no rest{ending}"
     if np.isnan(widths).any():
-        return f"{counted(int(np.isnan(widths).sum()), 'rest')} not proven; {ending}"
-    return f"every rest known to {widths.max():.0e} s; {ending}"
+        return f"{counted(int(np.isnan(widths).sum()), 'rest')} not proven{ending}"
+    return f"every rest known to {widths.max():.0e} s{ending}"

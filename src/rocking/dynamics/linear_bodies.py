@@ -95,7 +95,7 @@ class LinearBody(ABC):
         >>> BouncingBall(0.8, gravity=9.81).uplift_thresholds()
         (9.81, inf)
         """
-        checks.one_of(model, "model", InvalidOption, ["linear"])
+        _check_model(model)
         return self.thresholds
 
     def alone(self) -> LinearBodies:
@@ -301,7 +301,7 @@ class LinearBodies:
         >>> BouncingBall(0.8).alone().kernel_records("linear", np.zeros((1, 2)))["stiffness"]
         array([[0., 0.]])
         """
-        checks.one_of(model, "model", InvalidOption, ["linear"])
+        _check_model(model)
         made = state.records(len(self), state.BLOCK)
         laws = np.array([each.law for each in self.members])
         facing = np.isfinite(laws[:, 4])
@@ -320,6 +320,16 @@ class LinearBodies:
     def _pairs(self, name: str) -> Floats:
         values = [getattr(each, name) for each in self.members]
         return np.repeat(np.array([math.nan if value is None else value for value in values])[:, None], 2, axis=1)
+
+
+def _check_model(model: Model) -> None:
+    if model != "linear":
+        raise InvalidOption(
+            "a body of rocking.dynamics moves by linear equations: call simulate or simulate_many of rocking.dynamics, "
+            f'or give {{}} "linear", not {checks.shown(model)}',
+            "model",
+            value=model,
+        )
 
 
 class MakerOfKind:

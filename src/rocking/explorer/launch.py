@@ -16,7 +16,7 @@ from ipaddress import IPv6Address, ip_address
 from typing import TYPE_CHECKING, Final
 from urllib.parse import urlencode
 
-from rocking.errors import InvalidOption
+from rocking.errors import InvalidOption, install
 from rocking.explorer.authentication import LOOPBACK, RequestAuthentication
 from rocking.progress import note
 from rocking.response import Response
@@ -41,7 +41,7 @@ _WAITING: Final = 128
 def require_packages() -> None:
     """Raise `InvalidOption` unless what the explorer needs is installed."""
     if any(util.find_spec(name) is None for name in ("starlette", "uvicorn", "bokeh")):
-        raise InvalidOption("the explorer needs packages that are not installed: pip install 'rocking[explorer]'")
+        raise InvalidOption(f"the explorer needs packages that are not installed: {install('explorer')}")
 
 
 @dataclass(frozen=True)

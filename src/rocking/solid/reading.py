@@ -10,7 +10,7 @@ import numpy as np
 
 from rocking import checks
 from rocking.arrays import Floats, Integers
-from rocking.errors import InvalidBlock, InvalidOption, literal
+from rocking.errors import InvalidBlock, InvalidOption, install, literal
 
 if TYPE_CHECKING:
     from typing import BinaryIO
@@ -131,9 +131,7 @@ def _loaded(source: Path | BinaryIO, named: str, **how: Any) -> Scene:
     try:
         import trimesh
     except ImportError:
-        raise InvalidOption(
-            "meshes are read with trimesh, which is not installed: pip install 'rocking[mesh]'"
-        ) from None
+        raise InvalidOption(f"meshes are read with trimesh, which is not installed: {install('mesh')}") from None
     suffix = PurePath(source.name).suffix.lower().removeprefix(".")
     # Every object and group of an OBJ file is a part, whatever its material; corners stay as they are.
     how |= {"split_objects": True, "split_groups": True, "skip_materials": True, "group_material": False}

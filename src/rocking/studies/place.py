@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import IO, Any, Final, Protocol
 
 from rocking import checks
-from rocking.errors import InvalidOption, OutputError, StudyError
+from rocking.errors import InvalidOption, OutputError, StudyError, install
 
 #: End of the names of files that are half-written; a crash leaves them, the next run removes them.
 _PART: Final = ".part"
@@ -242,7 +242,7 @@ class ObjectStore:
             import obstore
             from obstore.store import from_url
         except ImportError:
-            raise InvalidOption("an object store needs obstore: install rocking[objects]") from None
+            raise InvalidOption(f"an object store needs obstore: {install('objects')}") from None
         self._url, self._library, self._taken_over = url, obstore, False
         #: What tells the locks that this object has put from those of others.
         self._renewals: set[str] = set()

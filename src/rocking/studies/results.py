@@ -19,7 +19,7 @@ from rocking import checks
 from rocking.analysis.fragility.fit import OVERTURNING
 from rocking.analysis.fragility.result import Fragility
 from rocking.engine import OUTCOME
-from rocking.errors import InvalidOption, Message, StudyError, Unfitted
+from rocking.errors import InvalidOption, Message, StudyError, Unfitted, install
 from rocking.motion.scaling import INTENSITIES, IntensityName, Measure
 from rocking.progress import Progress, note
 from rocking.studies.fragility import BlockFragilities, block_fragilities, pooled_fragility
@@ -173,7 +173,7 @@ def _write_parquet(frames: Iterator[pd.DataFrame], dataset: xr.Dataset, target: 
         import pyarrow
         from pyarrow import parquet
     except ImportError:
-        raise InvalidOption("Parquet needs pyarrow: install rocking[parquet], or write CSV or NetCDF") from None
+        raise InvalidOption(f"Parquet needs pyarrow: {install('parquet')}, or write CSV or NetCDF") from None
     tables = (pyarrow.Table.from_pandas(frame, preserve_index=False) for frame in frames)
     first = next(tables)
     with parquet.ParquetWriter(target, first.schema) as file:
@@ -186,7 +186,7 @@ def _write_excel(frames: Iterator[pd.DataFrame], dataset: xr.Dataset, target: Pa
     try:
         import openpyxl
     except ImportError:
-        raise InvalidOption("a workbook needs openpyxl: install rocking[excel], or write CSV or NetCDF") from None
+        raise InvalidOption(f"a workbook needs openpyxl: {install('excel')}, or write CSV or NetCDF") from None
     count = math.prod(dataset.sizes.values())
     if count > _SHEET:
         raise InvalidOption(f"a sheet holds {_SHEET} rows, the study has {count}: write CSV, Parquet or NetCDF")

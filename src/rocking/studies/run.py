@@ -28,7 +28,7 @@ from typing import Any, Final
 
 from rocking import checks
 from rocking.compiling import SIMULATIONS, announce
-from rocking.errors import InvalidOption, RockingError, StudyError
+from rocking.errors import InvalidOption, RockingError, StudyError, install
 from rocking.progress import Progress, note
 from rocking.studies.store import UnitArray
 from rocking.studies.units import Key, Work, compute
@@ -340,7 +340,7 @@ def _distributed() -> Any:
     try:
         import distributed
     except ImportError:
-        raise InvalidOption("a cluster needs dask.distributed: install rocking[cluster]") from None
+        raise InvalidOption(f"a cluster needs dask.distributed: {install('cluster')}") from None
     # What is worth saying of workers that come and go is said in sentences of our own.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     return distributed

@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import BinaryIO, Final
 
 from rocking import checks
-from rocking.errors import UnreadableRecord
+from rocking.errors import UnreadableRecord, install
 from rocking.motion.formats import at2, cosmos, csmip, esm, knet, smc, table, through_obspy
 from rocking.motion.formats.channel import Channel, Identification, Recognised
 from rocking.motion.formats.source import Request, Source, open_source
@@ -206,7 +206,7 @@ def _unknown(source: Source) -> UnreadableRecord:
         return source.error(f"{what} in no format known here, nor to ObsPy; give a strong-motion record")
     return source.error(
         f"{what} in no format known here; if it is MiniSEED, SAC or another format that ObsPy reads, "
-        "install rocking[formats]"
+        f"{install('formats')}"
     )
 
 
