@@ -12,11 +12,13 @@ import xarray as xr
 
 import rocking
 from rocking import Block, InvalidOption, OutputError, dynamics, simulate
+from rocking.analysis.rules.check import Check
 from rocking.analysis.survey import survey
+from rocking.explorer.facts import verdict
 from rocking.kernels import state
 from rocking.response import QUANTITIES, history, sensitivity, summary
 from rocking.response.contact import Contact
-from rocking.response.summary import time_text
+from rocking.response.summary import known_ratio, time_text
 from rocking.tables import named
 
 TABLES = {
@@ -50,7 +52,7 @@ def test_a_response_and_its_sensitivity_show_themselves_in_one_short_line(shaken
     for shown in (repr(shaken), repr(fallen), repr(shaken.sensitivity)):
         assert len(shown) < 250 and "\n" not in shown
         assert not re.search(r"\d\.\d{7}", shown)
-    assert f"peak {shaken.peak_over_slenderness:.4f} of the slenderness" in repr(shaken)
+    assert f"peak {shaken.peak_over_slenderness:.3g} of the slenderness" in repr(shaken)
     assert "overturns at" in repr(fallen)
 
 
@@ -421,3 +423,18 @@ def test_the_last_row_is_the_end_whatever_the_multiples_of_the_step_round_to():
     assert judged > 1000
     for steps in range(1, 6000, 7):
         assert history.even_times(round(0.005 * steps, 3), 0.005)[-1] <= round(0.005 * steps, 3)
+
+
+@pytest.mark.parametrize("pga", [0.47, 0.5, 0.53, 0.55, 0.6, 0.65])
+def test_one_case_has_one_peak_in_every_output(pga):
+    """Rounded to the digits that are known, or in a table with fewer digits to those of the column."""
+    block, motion = Block(width=0.24, height=1.1), rocking.records.load("ridgecrest-clc-090").scaled_to(pga * 9.80665)
+    response = rocking.simulate(block, motion)
+    (line,) = (row for row in response.summary().splitlines() if row.startswith("peak rotation"))
+    (shown,) = re.findall(r"([0-9.]+) of the slenderness", line)
+    assert f"peak {shown} of the slenderness" in repr(response)
+    assert survey(block, {"x": motion}).summary().splitlines()[-1].split()[2] == shown
+    assert known_ratio(response) == pytest.approx(float(shown), abs=5.1e-5)
+    assert verdict(response, block.uplift_thresholds())["values"]["share"]["values"]["value"] == 100.0 * known_ratio(response)
+    checked = Check(block, ("x",), (response,), ({},), (0.5,)).summary()
+    assert f"{float(shown):.3g}" in checked.splitlines()[4].split()

@@ -16,7 +16,7 @@ from rocking.explorer.phrases import phrase
 from rocking.explorer.simulated import Simulated, drifts
 from rocking.motion.motion import Motion
 from rocking.plausibility import block_notes, motion_notes
-from rocking.response import Response, in_words
+from rocking.response import Response, in_words, known_ratio
 
 
 def facts(shown: Simulated) -> dict[str, Any]:
@@ -44,7 +44,7 @@ def facts(shown: Simulated) -> dict[str, Any]:
         "overturn_time": response.overturn_time,
         "tipping_time": response.tipping_time,
         "peak_rotation": response.peak_rotation,
-        "peak_over_slenderness": response.peak_over_slenderness,
+        "peak_over_slenderness": known_ratio(response),
         "peak_time": response.peak_time,
         "impacts": len(response.impacts),
         "rests": int(np.sum(response.events["kind"] == "rest")),
@@ -84,7 +84,7 @@ def verdict(response: Response, thresholds: tuple[float, float]) -> dict[str, An
     resting = phrase("verdict.rests", count=rests) if rests else phrase("verdict.no_rest")
     if unproven:
         resting = phrase("verdict.unproven", rests=resting, unproven=unproven)
-    return phrase("verdict.stays", share=_percent(response.peak_over_slenderness), resting=resting)
+    return phrase("verdict.stays", share=_percent(known_ratio(response)), resting=resting)
 
 
 def _percent(share: float) -> dict[str, Any]:

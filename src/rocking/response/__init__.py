@@ -6,7 +6,7 @@ from rocking.response.export import active_span, drawing_times
 from rocking.response.perturbed import COUNT, PRECISION, RELATIVE, Perturbed, factors_near, percent, steps_within
 from rocking.response.response import Response
 from rocking.response.sensitivity import AMBIGUITY, QUANTITIES, Sensitivity
-from rocking.response.summary import in_brief, in_words, ratio_text
+from rocking.response.summary import in_brief, in_words, known_ratio, ratio_text
 
 __all__ = [
     "AMBIGUITY",
@@ -24,6 +24,7 @@ __all__ = [
     "gradient",
     "in_brief",
     "in_words",
+    "known_ratio",
     "percent",
     "ratio_text",
     "steps_within",

@@ -77,7 +77,7 @@ def line(response: Answers) -> str:
     motion, limit = response.motion, response.body.coordinate.limit
     peak = ""
     if limit and not response.overturned and math.isfinite(response._balance_at_peak):
-        peak = f", peak {response.peak_over_slenderness:.4g} of the {limit}"
+        peak = f", peak {ratio_text(response)} of the {limit}"
     return (
         f"{response.body.description} under {'no motion' if motion is None else motion.label}: "
         f"{in_words(response, f'{response.overturn_time:.4f} s')}{peak}; "
@@ -181,6 +181,11 @@ def in_brief(response: Answers, precision: float) -> str:
 def ratio_text(response: Answers) -> str:
     """Peak rotation over slenderness, to the digits that are known."""
     return f"{response.peak_over_slenderness:.{min(_peak_digits(response), 4)}g}"
+
+
+def known_ratio(response: Answers) -> float:
+    """Peak rotation over slenderness, rounded where fewer than four digits are known: to show it in fewer still."""
+    return response.peak_over_slenderness if _peak_digits(response) >= _SHORT else float(ratio_text(response))
 
 
 def time_text(time: float, low: float, high: float) -> str:

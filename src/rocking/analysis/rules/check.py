@@ -20,7 +20,7 @@ from rocking.motion.motion import Motion
 from rocking.motion.named import Motions, motions_by_name
 from rocking.motion.scaling import Measure
 from rocking.progress import Progress
-from rocking.response import PRECISION, Response, in_brief
+from rocking.response import PRECISION, Response, in_brief, known_ratio
 from rocking.simulation import simulate
 from rocking.tables import decimal, named, text_table
 
@@ -88,7 +88,8 @@ class Check(BlockUnderRecords):
             "peak_over_slenderness": "peak/slenderness",
             "verdict": "outcome",
         }
-        rows = self.rows()
+        known = [{"peak_over_slenderness": known_ratio(response)} for response in self.responses]
+        rows = [row | each for row, each in zip(self.rows(), known, strict=True)]
         table = text_table(list(shown.values()), [[_short(row[name]) for name in shown] for row in rows])
         return "\n".join(
             [
