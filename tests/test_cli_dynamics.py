@@ -1,6 +1,8 @@
 """`rocking bifurcation` and `rocking basin`: the public functions' numbers, their files, one line for every mistake."""
 
 import json
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -115,3 +117,14 @@ def test_every_body_has_a_basin_and_a_diagram(run, options, body):
 def test_a_mistake_gets_one_line_with_the_options_in_it(run, arguments, words):
     code, _, err = run(*arguments, *BLOCK)
     assert code == 2 and words in err and err.count("\n") == 1
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("page", ["bifurcation", "command-line"])
+def test_the_command_of_the_documentation_draws_bifurcations(run, page):
+    """The example of a diagram is one in which something happens: doublings, chaos, and overturning."""
+    text = (Path(__file__).parents[1] / "docs" / "howto" / f"{page}.md").read_text("utf-8")
+    (command,) = re.findall(r"^\$ rocking (bifurcation .*) --out results$", text, re.MULTILINE)
+    code, out, _ = run(*command.split(), "--json")
+    assert code == 0
+    assert {*np.ravel(json.loads(out)["period"])} >= {1, 2, 4, 0, -1}

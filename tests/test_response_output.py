@@ -435,6 +435,8 @@ def test_one_case_has_one_peak_in_every_output(pga):
     assert f"peak {shown} of the slenderness" in repr(response)
     assert survey(block, {"x": motion}).summary().splitlines()[-1].split()[2] == shown
     assert known_ratio(response) == pytest.approx(float(shown), abs=5.1e-5)
-    assert verdict(response, block.uplift_thresholds())["values"]["share"]["values"]["value"] == 100.0 * known_ratio(response)
+    assert verdict(response, block.uplift_thresholds())["values"]["share"]["values"]["value"] == 100.0 * known_ratio(
+        response
+    )
     checked = Check(block, ("x",), (response,), ({},), (0.5,)).summary()
     assert f"{float(shown):.3g}" in checked.splitlines()[4].split()
