@@ -10,7 +10,9 @@ PAGE_TOOLS := axe-core@4.14.1 typescript@7.0.2 eslint@10.15.0 @eslint/js@10.0.1 
 # Work stealing gives each worker a run of neighbouring tests, so that few of a module's fixtures are made twice.
 PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal --benchmark-disable
 FAST := "not thorough and not slow and not browser"
-QUICKLY := -m $(FAST) --hypothesis-profile=few
+# The longest that a test which is not slow may take, s: generous, since machines may be slow, too, and compile first.
+LIMITED := -o faulthandler_timeout=400
+QUICKLY := -m $(FAST) --hypothesis-profile=few $(LIMITED)
 # Something of every library that the package needs, for other versions than those that are pinned; `make lowest EVERY_PART=tests` runs all.
 EVERY_PART := $(addprefix tests/test_,reference.py result.py plot.py cli.py response.py chattering_maps.py processing.py explorer_server.py first_response.py)
 # What the oldest numba compiles; all else uses the compiled kernels of the wheel.
@@ -35,21 +37,20 @@ wheel: .venv/.all ## build a wheel for this platform, with kernels compiled befo
 	@rm -f dist/rocking-*.whl
 	$(BIN)/python -m pip wheel --disable-pip-version-check -q --no-deps --wheel-dir dist .
 
-quick: .venv/.all ## run the tests of what has changed since the last commit, or since BASE=..., within half a minute
-	@files=$$($(BIN)/python tests/of_changes.py $(BASE)) && { test -z "$$files" || \
-	    $(PYTEST) --dist load --maxschedchunk 4 --within 14 $(QUICKLY) $$files; }
+quick: .venv/.all ## run the nearest tests of what has changed since the last commit, or since BASE=..., in about half a minute
+	@$(BIN)/python tests/of_changes.py $(or $(BASE),HEAD) $(PYTEST) --dist load --maxschedchunk 4 $(QUICKLY)
 
 test: .venv/.all ## run the tests (three to four minutes on two slow cores)
 	$(PYTEST) $(QUICKLY)
 
 test-all: .venv/.all ## run them with more cases each, and longer ones (three times as long)
-	$(PYTEST) -m "not slow and not browser"
+	$(PYTEST) -m "not slow and not browser" $(LIMITED)
 
 browser: .venv/.all .page-tools/.installed ## drive the explorer's page in Chromium, which must be installed
-	ROCKING_BROWSER_REQUIRED=1 $(PYTEST) -m "browser and not thorough"
+	ROCKING_BROWSER_REQUIRED=1 $(PYTEST) -m "browser and not thorough" $(LIMITED)
 
 browser-all: .venv/.all .page-tools/.installed ## drive it through more cases each
-	ROCKING_BROWSER_REQUIRED=1 $(PYTEST) -m browser
+	ROCKING_BROWSER_REQUIRED=1 $(PYTEST) -m browser $(LIMITED)
 
 slow: .venv/.all ## run the tests that take long: wider ranges, many digits, a hundred thousand pairs
 	$(PYTEST) -m slow

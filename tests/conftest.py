@@ -6,9 +6,7 @@ import os
 import signal
 import sys
 import tempfile
-import time
 import zlib
-from collections import Counter
 from collections.abc import Callable, Generator, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
@@ -31,16 +29,6 @@ hypothesis.settings.load_profile("fixed")
 
 # Figures are not looked at here, whatever display there is.
 os.environ["MPLBACKEND"] = "agg"
-
-
-TOO_LATE = "later than --within allows"
-STARTED = pytest.StashKey[float]()
-
-
-def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the limit that `make quick` sets."""
-    help_text = "leave out the tests that would start later than that after the first"
-    parser.addoption("--within", type=float, metavar="SECONDS", help=help_text)
 
 
 @pytest.hookimpl(wrapper=True)
@@ -79,23 +67,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def _tier(case: pytest.Item) -> int:
     """Tier of a case by the marks of its own."""
     return 2 if case.get_closest_marker("slow") else 1 if case.get_closest_marker("thorough") else 0
-
-
-def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Leave out what comes too late."""
-    within = item.config.getoption("within")
-    started = item.session.stash.setdefault(STARTED, time.monotonic())
-    if within is not None and time.monotonic() - started > within:
-        pytest.skip(TOO_LATE)
-
-
-def pytest_terminal_summary(terminalreporter: Any) -> None:
-    """Say what came too late."""
-    late = [each for each in terminalreporter.stats.get("skipped", ()) if TOO_LATE in str(each.longrepr)]
-    if late:
-        files = Counter(each.nodeid.partition("::")[0] for each in late)
-        counted = ", ".join(f"{count} of {file}" for file, count in files.items())
-        terminalreporter.write_line(f"left out for lack of time: {counted}", yellow=True)
 
 
 def pytest_configure(config: pytest.Config) -> None:

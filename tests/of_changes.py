@@ -1,9 +1,9 @@
 """Which files of tests judge what was changed: by their names, and by what they and the package import.
 
-    python tests/of_changes.py            # since the last commit
-    python tests/of_changes.py COMMIT     # since that one
+    python tests/of_changes.py HEAD                     # since the last commit
+    python tests/of_changes.py COMMIT python -m pytest  # since that one
 
-prints their paths, the nearest first, and on stderr what is left out. `make quick` runs them.
+prints their paths, the nearest first, or runs a command on them. The last line says on stderr what is left out.
 """
 
 from __future__ import annotations
@@ -170,20 +170,27 @@ def ordered(found: Iterable[dict[Path, tuple[int, int]]]) -> list[Path]:
     return sorted(nearest, key=lambda path: (nearest[path], path))
 
 
-def main() -> None:
+def main() -> int:
     tests = FilesOfTests()
-    found = {path: tests.of(path) for path in changed(sys.argv[1] if sys.argv[1:] else "HEAD")}
-    for path, files in found.items():
-        if not files:
-            print(f"no test is known for {path.relative_to(ROOT)}", file=sys.stderr)
-    if not found:
+    commit, *command = sys.argv[1:]
+    found = {path: tests.of(path) for path in changed(commit)}
+    everything = {path: tests.of(path, sys.maxsize) for path in found}
+    near, left = ordered(found.values())[:MOST], ordered(everything.values())
+    names = [str(path.relative_to(ROOT)) for path in near]
+    print(*names, sep="\n", flush=True)
+    status = subprocess.call([*command, *names], cwd=ROOT) if command and names else 0
+    if unknown := [str(path.relative_to(ROOT)) for path, files in found.items() if not files]:
+        print(f"NO TEST IS KNOWN for {', '.join(unknown)}", file=sys.stderr)
+    if len(left) > len(near):
+        print(
+            f"NOT ALL TESTS WERE RUN: {len(left) - len(near)} more files of tests use what has changed; "
+            "make test runs them",
+            file=sys.stderr,
+        )
+    elif not found:
         print("nothing has changed", file=sys.stderr)
-    near = ordered(found.values())
-    for path in near[:MOST]:
-        print(path.relative_to(ROOT))
-    if near[MOST:]:
-        print(f"left out: {len(near) - MOST} files of tests that are farther from the changes", file=sys.stderr)
+    return status
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -1,9 +1,9 @@
 """The tests of a change are found: for every module some, and first those that are about it."""
 
-import os
 import subprocess
 import sys
 
+import of_changes
 import pytest
 from of_changes import ROOT, FilesOfTests, changed, ordered
 
@@ -123,15 +123,28 @@ def test_a_change_is_staged_unstaged_untracked_or_since_a_commit(tmp_path):
     assert changed("HEAD~1", tmp_path) == sorted([*expected, committed])
 
 
-@pytest.mark.thorough
-def test_a_test_that_comes_too_late_is_left_out_and_said(tmp_path):
-    options = ["-n0", "-p", "no:cacheprovider", "--rootdir", str(tmp_path), "--confcutdir", str(tmp_path)]
-    (tmp_path / "conftest.py").write_text((ROOT / "tests" / "conftest.py").read_text("utf-8"), "utf-8")
-    (tmp_path / "test_it.py").write_text(
-        "import time\ndef test_one(): time.sleep(0.1)\ndef test_other(): assert False\n", "utf-8"
-    )
-    command = [sys.executable, "-m", "pytest", "-q", *options, "--within", "0.05", "test_it.py"]
-    environment = os.environ | {"PYTEST_ADDOPTS": ""}  # those of whoever runs this test would change the output
-    done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True)
-    assert "left out for lack of time: 1 of test_it.py" in done.stdout
-    assert "1 passed, 1 skipped" in done.stdout
+@pytest.mark.parametrize("status", [0, 1])
+@pytest.mark.parametrize(("most", "ran", "left"), [(1, 1, 2), (2, 2, 1), (9, 3, 0)])
+def test_the_nearest_files_are_run_and_the_last_line_says_which_were_not(
+    few, capfd, monkeypatch, status, most, ran, left
+):
+    edited = [few.root / name for name in ("tests/test_this.py", "src/rocking/studies/refine.py", "src/rocking/far.py")]
+    for name, value in {"ROOT": few.root, "MOST": most, "FilesOfTests": lambda: few}.items():
+        monkeypatch.setattr(of_changes, name, value)
+    monkeypatch.setattr(of_changes, "changed", lambda commit: edited)
+    command = [sys.executable, "-c", f"import sys; print('ran', len(sys.argv) - 1); sys.exit({status})"]
+    monkeypatch.setattr(sys, "argv", ["of_changes.py", "HEAD", *command])
+    assert of_changes.main() == status
+    out, err = capfd.readouterr()
+    nearest = ["tests/test_this.py", "tests/test_study_refine.py", "tests/test_other.py"]
+    assert out.split() == [*nearest[:most], "ran", f"{ran}"]
+    assert err.startswith(f"NOT ALL TESTS WERE RUN: {left} ") if left else not err
+
+
+def test_a_file_that_no_test_judges_is_named_last(few, capfd, monkeypatch):
+    for name, value in {"ROOT": few.root, "FilesOfTests": lambda: few}.items():
+        monkeypatch.setattr(of_changes, name, value)
+    monkeypatch.setattr(of_changes, "changed", lambda commit: [few.root / "src/rocking/alone.py"])
+    monkeypatch.setattr(sys, "argv", ["of_changes.py", "HEAD"])
+    assert of_changes.main() == 0
+    assert capfd.readouterr().err == "NO TEST IS KNOWN for src/rocking/alone.py\n"

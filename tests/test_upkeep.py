@@ -1,11 +1,13 @@
 """What surrounds the code: workflows, supported versions, addresses."""
 
 import json
+import os
 import re
 import runpy
 import shlex
 import shutil
 import subprocess
+import sys
 import tomllib
 from datetime import date
 from pathlib import Path
@@ -202,3 +204,18 @@ def test_advice_to_install_a_part_names_one_that_the_source_has() -> None:
     assert parts == {"explorer", "mesh", "objects", "parquet", "excel", "cluster", "formats"}
     assert parts <= {*PROJECT["optional-dependencies"]}
     assert [path.name for path, text in sources.items() if re.search(r"install '?\"?rocking\[", text)] == []
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("processes", [0, 1])
+def test_a_test_that_hangs_fails_and_the_others_go_on(tmp_path: Path, processes: int) -> None:
+    """In the process itself all ends there; the others go on where tests run in processes of their own."""
+    file = tmp_path / "test_it.py"
+    file.write_text("import time\ndef test_hanging(): time.sleep(600)\ndef test_other(): pass\n", "utf-8")
+    options = ["-n", f"{processes}", "-c", ROOT / "pyproject.toml", "-p", "no:cacheprovider", "--benchmark-disable"]
+    command = [sys.executable, "-m", "pytest", *options, "-o", "faulthandler_timeout=1", "--rootdir", tmp_path, file]
+    environment = os.environ | {"PYTEST_ADDOPTS": ""}
+    done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 1
+    assert "in test_hanging" in done.stderr
+    assert ("1 failed, 1 passed" in done.stdout) == (processes > 0)
