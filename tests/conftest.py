@@ -1,11 +1,14 @@
 """Fixtures shared by all tests."""
 
+import functools
 import gc
+import inspect
 import json
 import os
 import signal
 import sys
 import tempfile
+import traceback
 import zlib
 from collections.abc import Callable, Generator, Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -107,7 +110,56 @@ def coarse(coarsely: Callable[[], AbstractContextManager[None]]) -> Iterator[Non
         yield
 
 
-SHARED = Path(__file__).resolve().parents[2] / "shared"
+#: Errors of doubles since the test began.
+FAULTS: list[Exception] = []
+MISTAKES = (AssertionError, AttributeError, LookupError, NameError, TypeError)
+
+
+def as_taken(real: Callable[..., Any], double: Callable[..., Any]) -> Callable[..., Any]:
+    """Double of a function that takes what the function takes, and whose own mistakes fail the test, whoever catches them.
+
+    What a double raises on purpose is any other error.
+    """
+    signature = inspect.signature(real)
+
+    @functools.wraps(double)
+    def called(*arguments: Any, **options: Any) -> Any:
+        try:
+            signature.bind(*arguments, **options)
+            return double(*arguments, **options)
+        except MISTAKES as error:
+            *_, (frame, _) = traceback.walk_tb(error.__traceback__)
+            if frame.f_code.co_filename.startswith((str(TESTS), inspect.__file__)):
+                FAULTS.append(error)
+            raise
+
+    return called
+
+
+class MonkeyPatch(pytest.MonkeyPatch):
+    """One that holds doubles of functions to what these take."""
+
+    def setattr(self, *arguments: Any, **options: Any) -> None:
+        super().setattr(*arguments, **options)
+        owner, name, real = self._setattr[-1]
+        double = inspect.getattr_static(owner, name)
+        if inspect.isfunction(double) and (inspect.isfunction(real) or inspect.ismethod(real)):
+            super().setattr(owner, name, as_taken(real, double))
+
+
+@pytest.fixture
+def monkeypatch() -> Iterator[pytest.MonkeyPatch]:
+    """Replace attributes for the time of a test, which fails where a double does something that it does not mean to."""
+    with MonkeyPatch.context() as patched:
+        yield patched
+    faults = FAULTS.copy()
+    FAULTS.clear()
+    if faults:
+        raise faults[0]
+
+
+TESTS = Path(__file__).resolve().parent
+SHARED = TESTS.parents[1] / "shared"
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -3,6 +3,7 @@
 import errno
 import hashlib
 import importlib
+import itertools
 import json
 import os
 import re
@@ -238,14 +239,14 @@ class Interrupted(Exception):
     """Stands for a second signal."""
 
 
-@pytest.mark.thorough
 def test_the_second_signal_stops_in_the_middle_of_a_unit(complete, tmp_path, monkeypatch):
-    study, begun = made(tmp_path), []
+    study, numbers, stopped = made(tmp_path), itertools.count(), []
 
-    def compute(work, stop):
-        begun.append(work)
-        if len(begun) > 1:
-            assert stop.wait(60.0)
+    def compute(work, cancelled):
+        number, late = next(numbers), time.monotonic() + 30.0
+        while number and not cancelled.asked and time.monotonic() < late:
+            time.sleep(0.001)
+        stopped.append(cancelled.asked)
         return units.compute(work)
 
     put = study._store.put
@@ -259,7 +260,8 @@ def test_the_second_signal_stops_in_the_middle_of_a_unit(complete, tmp_path, mon
         patched.setattr(study._store, "put", put_and_stop)
         with pytest.raises(Interrupted):
             study.run(threads=2)
-    assert len(begun) > 1
+    assert stopped.count(False) == 1  # the unit that is stored
+    assert len(stopped) == next(numbers) > 1
     assert study.status.done == 1
     study.run()
     assert digest(tmp_path) == digest(complete)
