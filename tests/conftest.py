@@ -116,7 +116,7 @@ MISTAKES = (AssertionError, AttributeError, LookupError, NameError, TypeError)
 
 
 def as_taken(real: Callable[..., Any], double: Callable[..., Any]) -> Callable[..., Any]:
-    """Double of a function that takes what the function takes, and whose own mistakes fail the test, whoever catches them.
+    """Double that takes what a function takes, and whose own mistakes fail the test, whoever catches them.
 
     What a double raises on purpose is any other error.
     """

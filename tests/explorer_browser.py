@@ -24,6 +24,9 @@ _PROGRAMS = {
 }
 _PACKAGES = {"chromium": "chromium", "firefox": "firefox-esr", "webkit": "webkit2gtk-driver xvfb"}
 
+#: How many times slower than it is the processor of a page shall be; Chromium alone can be told.
+SLOWDOWN = float(os.environ.get("ROCKING_BROWSER_SLOWDOWN", "1"))
+
 _FLAGS = (
     "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
     "--disable-component-update", "--disable-sync",
@@ -90,6 +93,14 @@ def remembering(browser, folder):
     return browser.browser_type.launch_persistent_context(folder, executable_path=program(), args=_chromium_flags())
 
 
+def slowed(page):
+    """Return a page whose processor is as slow as the tests are to find it."""
+    if SLOWDOWN > 1.0:
+        only_chromium("be slow")
+        page.context.new_cdp_session(page).send("Emulation.setCPUThrottlingRate", {"rate": SLOWDOWN})
+    return page
+
+
 def typing(locator):
     """Let a class of Playwright fill fields by keys where else no `change` follows, as it does when a person types."""
 
@@ -120,8 +131,8 @@ def tool(path):
 
 
 def _busy():
-    """How many processes share a core, or 1."""
-    return max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1)) if hasattr(os, "getloadavg") else 1.0
+    """How many processes share a core, or 1, times how many times slower a page is."""
+    return SLOWDOWN * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1)) if hasattr(os, "getloadavg") else SLOWDOWN
 
 
 class Watched:

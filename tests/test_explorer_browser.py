@@ -21,7 +21,7 @@ import explorer_addresses
 import numpy as np
 import pytest
 import trimesh
-from explorer_browser import BROWSER, Watched, launched, only_chromium, remembering, tool
+from explorer_browser import BROWSER, Watched, launched, only_chromium, remembering, slowed, tool
 from explorer_texts import in_english
 from PIL import Image
 
@@ -87,7 +87,7 @@ def new_page(browser, tmp_path_factory):
         if BROWSER == "chromium" and not options:
             if "plain" not in contexts:
                 contexts["plain"] = remembering(browser, tmp_path_factory.mktemp("profile"))
-            page = contexts["plain"].new_page()
+            page = slowed(contexts["plain"].new_page())
             page.set_viewport_size(viewport)
             page.emulate_media(color_scheme=scheme)
             return page
@@ -95,7 +95,7 @@ def new_page(browser, tmp_path_factory):
         key = json.dumps(options, sort_keys=True)
         if key not in contexts:
             contexts[key] = browser.new_context(**options)
-        return contexts[key].new_page()
+        return slowed(contexts[key].new_page())
 
     yield made
     for context in contexts.values():

@@ -132,6 +132,18 @@ def test_nothing_is_said_of_a_file_before_its_units_and_step_are_answered():
     assert row["measures"]["pga"] == read_motion(row["texts"], store).motion.pga
 
 
+@pytest.mark.parametrize("other", [{"channel": "2"}, {"dt": 0.02}, {"units": "gal"}])
+def test_a_file_that_is_read_otherwise_is_another_motion(other, tmp_path):
+    store, path = UploadStore(), tmp_path / "two.txt"
+    path.write_text("NS,EW\n" + samples(1).replace("\n", ",0.5\n") + ",0.25\n")
+    key = store.add_file("two.txt", path.read_bytes())
+    usual = {"channel": "1", "dt": 0.01, "units": "g"}
+    for asked in (usual, usual | other, usual):
+        motion, own = store.read(key, **asked), rocking.read(path, **asked | {"channel": int(asked["channel"])})
+        assert np.array_equal(motion.breakpoints, own.breakpoints)
+        assert np.array_equal(motion.coefficients, own.coefficients)
+
+
 @pytest.mark.parametrize(
     ("answer", "words"),
     [({"dt": "0"}, "“Sampling step”"), ({"dt": "soon"}, "“Sampling step”"), ({"units": "furlong"}, "furlong")],

@@ -1,5 +1,6 @@
 """Readers of strong-motion records: what each format says comes out, and what is wrong with a file is said."""
 
+import calendar
 import contextlib
 import io
 import os
@@ -8,8 +9,9 @@ import re
 import struct
 import sys
 import tempfile
+import time
 import tracemalloc
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -1155,13 +1157,26 @@ def test_traces_with_gaps_or_without_numbers_are_refused(
         assert what in complaint(path, units="g")
 
 
-def test_files_say_when_their_first_sample_is(file: Callable[[bytes], Path]) -> None:
+@pytest.fixture(params=["UTC0", "XXX-9", "XXX+8", "XXX-5:30"])
+def zone(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Be somewhere on the earth."""
+    if not hasattr(time, "tzset"):
+        pytest.skip("the time zone of a process cannot be changed here")
+    with monkeypatch.context() as patched:
+        patched.setenv("TZ", request.param)
+        time.tzset()
+        yield
+    time.tzset()
+
+
+def test_files_say_when_their_first_sample_is_wherever_they_are_read(zone: None, file: Callable[[bytes], Path]) -> None:
     obspy = pytest.importorskip("obspy")
     buffer, header = io.BytesIO(), {"station": "X", "channel": "HNE", "delta": 0.01}
     header["starttime"] = obspy.UTCDateTime(1999, 1, 2, 18, 0, 19, 870000)
     obspy.Stream([obspy.Trace(np.arange(50, dtype=np.int32), header)]).write(buffer, format="MSEED")
     (trace,) = channels(file(buffer.getvalue()), units="g")
     (esm,) = channels(written.FOLDER / "esm.asc")
+    assert esm.start == calendar.timegm((1999, 1, 2, 18, 0, 19)) + 0.87
     assert trace.start == pytest.approx(esm.start, abs=1e-6) and pickle.loads(pickle.dumps(esm)).start == esm.start
 
 

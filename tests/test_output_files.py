@@ -7,11 +7,14 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 import rocking
+from rocking import tables
 from rocking.analysis.survey import folder_names, survey
 from rocking.cli.output import write_results
 from rocking.result import DatasetResult
@@ -179,3 +182,13 @@ def test_figures_of_a_command_have_the_size_and_resolution_of_a_page(tmp_path: P
 def test_records_of_one_name_have_a_folder_each() -> None:
     assert folder_names(["a/one.csv", "b/one.csv", "c/one.csv", "two.csv"]) == ["one", "one-2", "one-3", "two"]
     assert folder_names(["-", "sine:amplitude=1"]) == ["standard-input", "sine-amplitude=1"]
+
+
+@pytest.mark.parametrize("index", [False, True])
+def test_numbers_of_a_table_have_fifteen_digits_whatever_their_size(tmp_path: Path, index: bool) -> None:
+    values = np.random.default_rng(1).uniform(1.0, 10.0, 200) * 10.0 ** np.arange(-100.0, 100.0)
+    frame = pd.DataFrame({"value": values}, index=pd.Index(-values, name="place"))
+    tables.write_csv(tmp_path / "it.csv", frame, index=index)
+    read = pd.read_csv(tmp_path / "it.csv", float_precision="round_trip")
+    for column, expected in (("value", values), *[("place", -values)] * index):
+        np.testing.assert_allclose(read[column], expected, rtol=5e-15, atol=0.0)

@@ -62,9 +62,9 @@ def change(made, name, nonlinear, strength):
 
 @pytest.mark.parametrize("model", ["linear", "nonlinear"])
 @pytest.mark.parametrize("name", BODIES)
-def test_rotations_change_with_everything_as_differences_say(name, model, monkeypatch):
+def test_rotations_impacts_and_uplifts_change_with_everything_as_differences_say(name, model, monkeypatch):
     """From rest to either side, with a vertical component and without one."""
-    body, judged, h = BODIES[name], 0, 1e-6
+    body, judged, h = BODIES[name], {"rotation": 0, "impact": 0, "uplift": 0}, 1e-6
     made = RestrainedBlocks.kernel_records
     for sign in (1.0, -1.0):
         size = sign * 1.35 * max(each for each in body.uplift_thresholds(model) if np.isfinite(each))
@@ -91,9 +91,22 @@ def test_rotations_change_with_everything_as_differences_say(name, model, monkey
         times = times[times < (found.impacts["time"][4] if len(found.impacts) > 4 else np.inf)]
         # Of a tendon that yields, what is held while slenderness changes is another thing before and after that.
         names = [each for each in BY_SIDE if name != "yielding tendon" or not each.startswith("alpha")]
-        changes = found.sensitivity.rotation(times, of=("motion", *names))
-        for of, values in changes.items():
-            slope = (simulated(h, of).rotation(times) - simulated(-h, of).rotation(times)) / (2.0 * h)
-            assert values == pytest.approx(slope, rel=2e-5, abs=2e-5 * max(0.01, np.max(np.abs(slope)))), (of, sign)
-            judged += int(np.count_nonzero(slope))
-    assert judged >= (20 if body.is_one_sided else 40)
+        names = ("motion", *names)
+        changes = found.sensitivity.rotation(times, of=names)
+        _, by_impact, by_event = found.sensitivity._along(names)
+        uplifts = np.flatnonzero(found.events["kind"] == "uplift")[:2]
+        for k, of in enumerate(names):
+            more, less = (simulated(strength, of) for strength in (h, -h))
+            for what, values, high, low in (
+                ("rotation", changes[of], more.rotation(times), less.rotation(times)),
+                ("impact", by_impact[k], more.impacts["time"], less.impacts["time"]),
+                ("uplift", by_event[k][uplifts], more.events["time"][uplifts], less.events["time"][uplifts]),
+            ):
+                n = len(impacts) if what == "impact" else len(values)
+                slope = (high[:n] - low[:n]) / (2.0 * h)
+                close = 2e-5 * max(0.01, np.max(np.abs(slope), initial=0.0))
+                assert values[:n] == pytest.approx(slope, rel=2e-5, abs=close), (what, of, sign)
+                judged[what] += int(np.count_nonzero(slope))
+    assert judged["rotation"] >= (20 if body.is_one_sided else 40)
+    assert judged["impact"] >= 5
+    assert judged["uplift"] >= (1 if body.is_one_sided else 2) * (2 - (name == "yielding tendon"))

@@ -571,9 +571,10 @@ def test_other_blocks_and_motions_are_refused_by_name(tmp_path):
         rocking.study(tmp_path, BLOCKS, MOTIONS[:2], **OPTIONS)
 
 
-def test_another_version_may_read_a_study_but_not_go_on_with_it(tmp_path, monkeypatch):
+@pytest.mark.parametrize(("part", "other"), [("VERSION", "9.9.9"), ("fingerprint", lambda: "9.9.9")])
+def test_another_version_or_other_kernels_may_read_a_study_but_not_go_on_with_it(tmp_path, monkeypatch, part, other):
     study = made(tmp_path)
-    monkeypatch.setattr("rocking.studies.store.VERSION", "9.9.9")
+    monkeypatch.setattr(f"rocking.studies.store.{part}", other)
     assert rocking.study(tmp_path).results().sizes["block"] == 1300
     for compute in (study.run, lambda: study.verify(recompute=1), lambda: study.verify(repair=True)):
         with pytest.raises(rocking.StudyError, match=r"9\.9\.9"):

@@ -1,6 +1,6 @@
 // The page: one state, in its address; forms that change it, and five views that show it.
 
-import {accepted, ends, readAddress, specification, writeAddress} from "./parameters.js";
+import {accepted, ends, readAddress, specification, writeAddress, writeNow} from "./parameters.js";
 import {Latest, Problem, json, payload} from "./api.js";
 import {ChatteringPanel} from "./chattering.js";
 import {makeCopying, showCode, showFiles} from "./exports.js";
@@ -259,7 +259,7 @@ async function go(name) {
   one("figures").hidden = one("at-slider").hidden = name === "block";
   if (name === "block") histories.size(190, 140);
   else if (name === "response") histories.size(290, 190);
-  writeAddress(state);
+  writeNow(state);
   examples.check();
   for (const [each, view] of Object.entries(views)) if (each !== name) view.leave?.();
   for (const place of Object.keys(problems)) if (one(place).closest("[hidden]")) problem(null, place);

@@ -105,26 +105,31 @@ let waiting = 0;
  * @param {State} state */
 export function writeAddress(state) {
   window.clearTimeout(waiting);
-  waiting = window.setTimeout(() => {
-    const given = new URLSearchParams();
-    /** @param {Texts} texts @param {string[]} names @param {string} [prefix] */
-    const put = (texts, names, prefix = "") => { for (const name of names) if (texts[name]) given.set(prefix + name, texts[name]); };
-    if (state.view !== "response") given.set("view", state.view);
-    const {good} = state;
-    put(good.texts, namesOf());
-    if (state.view === "compare") {
-      given.set("compare", good.compare);
-      if (good.align !== ALIGNED[0]) given.set("align", good.align);
-      put(good.other, namesOf(), "other.");
-    }
-    if (state.view === "map") put(good.map, specification.map);
-    if (state.view === "periodic") put(good.sweep, specification.sweep);
-    if (state.view === "records" || state.view === "assessment") put(good.assessment, specification.assessment);
-    for (const [name, unit] of unitsChosen()) given.set(name, unit);
-    put(ends(good), ["from", "to"]);
-    if (state.at !== null && (state.view === "response" || state.view === "block")) given.set("at", String(state.at));
-    if (state.lecture) given.set("lecture", "1");
-    if (state.example) { given.set("example", state.example.name); given.set("step", String(state.example.step)); }
-    write(given.toString());
-  }, 150);
+  waiting = window.setTimeout(() => writeNow(state), 150);
+}
+
+/** Write the state into the address at once, as another view needs it: somebody may go back from it at any time.
+ * @param {State} state */
+export function writeNow(state) {
+  window.clearTimeout(waiting);
+  const given = new URLSearchParams();
+  /** @param {Texts} texts @param {string[]} names @param {string} [prefix] */
+  const put = (texts, names, prefix = "") => { for (const name of names) if (texts[name]) given.set(prefix + name, texts[name]); };
+  if (state.view !== "response") given.set("view", state.view);
+  const {good} = state;
+  put(good.texts, namesOf());
+  if (state.view === "compare") {
+    given.set("compare", good.compare);
+    if (good.align !== ALIGNED[0]) given.set("align", good.align);
+    put(good.other, namesOf(), "other.");
+  }
+  if (state.view === "map") put(good.map, specification.map);
+  if (state.view === "periodic") put(good.sweep, specification.sweep);
+  if (state.view === "records" || state.view === "assessment") put(good.assessment, specification.assessment);
+  for (const [name, unit] of unitsChosen()) given.set(name, unit);
+  put(ends(good), ["from", "to"]);
+  if (state.at !== null && (state.view === "response" || state.view === "block")) given.set("at", String(state.at));
+  if (state.lecture) given.set("lecture", "1");
+  if (state.example) { given.set("example", state.example.name); given.set("step", String(state.example.step)); }
+  write(given.toString());
 }
