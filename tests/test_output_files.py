@@ -189,6 +189,6 @@ def test_numbers_of_a_table_have_fifteen_digits_whatever_their_size(tmp_path: Pa
     values = np.random.default_rng(1).uniform(1.0, 10.0, 200) * 10.0 ** np.arange(-100.0, 100.0)
     frame = pd.DataFrame({"value": values}, index=pd.Index(-values, name="place"))
     tables.write_csv(tmp_path / "it.csv", frame, index=index)
-    read = pd.read_csv(tmp_path / "it.csv", float_precision="round_trip")
-    for column, expected in (("value", values), *[("place", -values)] * index):
-        np.testing.assert_allclose(read[column], expected, rtol=5e-15, atol=0.0)
+    found = np.loadtxt(tmp_path / "it.csv", delimiter=",", skiprows=1, ndmin=2)
+    expected = np.column_stack([*[-values] * index, values])
+    np.testing.assert_allclose(found.reshape(expected.shape), expected, rtol=5e-15, atol=0.0)
