@@ -152,6 +152,10 @@ class Watched:
     def js(self, expression, *given):
         return self.page.evaluate(expression, *given)
 
+    def paused(self, duration):
+        """Wait for so many ms of the page's own time: what it does within these is done then, however slow it is."""
+        self.page.evaluate("(duration) => new Promise((wake) => setTimeout(wake, duration))", duration)
+
     def until(self, expression, what="", timeout=60.0):
         """Wait until an expression holds; the page's policy forbids the browser to wait by itself.
 

@@ -123,8 +123,8 @@ def opened(new_page, here):
 
 
 def query_of(page):
-    page.page.wait_for_timeout(250)
-    return {name: values[0] for name, values in parse_qs(urlsplit(page.page.url).query).items()}
+    page.paused(250)
+    return {name: values[0] for name, values in parse_qs(page.js("location.search.slice(1)")).items()}
 
 
 def statue(level, measure="pga"):
@@ -410,11 +410,11 @@ def test_nothing_moves_while_a_view_is_computed(opened, viewport):
 def test_nothing_moves_where_plots_are_drawn_once_they_are_seen(opened, viewport):
     page = opened(STATUE, viewport=viewport)
     top = "document.getElementById('deeper').getBoundingClientRect().top"
-    page.js("document.getElementById('phase-legend').scrollIntoView({block: 'center'})")
-    assert page.js("document.body.dataset.phases") is None
-    before = page.js(top)
+    seen = "document.getElementById('phase-legend').scrollIntoView({block: 'center'})"
+    drawn, before = page.js(f"{seen}; [document.body.dataset.phases ?? '', {top}]")
+    assert drawn == ""
     page.until("document.body.dataset.phases === '1'")
-    page.page.wait_for_timeout(100)
+    page.paused(100)
     assert page.js(top) == pytest.approx(before, abs=1)
 
 
@@ -453,7 +453,7 @@ def test_the_mark_in_the_phase_plane_is_where_the_time_went_while_nobody_saw_it(
     page.page.locator("#phase-legend").scroll_into_view_if_needed()
     page.until("document.body.dataset.phases === '1'")
     page.js("scrollTo(0, 0)")
-    page.page.wait_for_timeout(200)
+    page.paused(200)
     entered(page, "at", "232.5")
     page.says("cursor", "At 232.500 s")
     page.page.locator("#phase-legend").scroll_into_view_if_needed()
@@ -511,7 +511,7 @@ def test_the_time_that_is_spoken_is_the_last_one_however_late_its_answer_comes(o
     with held(page, "**/api/at?*") as waiting:
         slider.press("ArrowLeft")
         asked(page, waiting)
-        page.page.wait_for_timeout(800)  # by now the time before would have been spoken
+        page.paused(800)  # by now the time before would have been spoken
         assert not page.js(said)
     page.until(said)
     assert page.text("#said").startswith("At 232.492 s")
@@ -556,7 +556,7 @@ def windows(page, act):
     before = page.js("document.getElementById('histories').dataset.origin + document.body.dataset.drawn")
     act()
     page.until(f"document.getElementById('histories').dataset.origin + document.body.dataset.drawn !== {before!r}")
-    page.page.wait_for_timeout(250)
+    page.paused(250)
     return page.js(WINDOW)
 
 
@@ -643,7 +643,7 @@ def test_going_back_over_a_change_of_units_changes_them_back(opened):
     with page.page.expect_event("load"):
         page.page.go_back()
     page.until(READY)
-    page.page.wait_for_timeout(400)
+    page.paused(400)
     assert "acceleration_in" not in page.page.url
     assert page.page.locator("#pga").input_value().strip() in ("0.4", "0.40")
 
@@ -663,7 +663,7 @@ def test_the_address_has_the_window_that_is_drawn_also_beside_a_refused_value(op
     entered(page, "width", "-1")
     page.until("!document.getElementById('problem').hidden")
     page.page.click("[data-zoom=in]")
-    page.page.wait_for_timeout(400)
+    page.paused(400)
     assert page.js(WINDOW) == [231.0, 239.0]
 
 
@@ -685,8 +685,8 @@ def test_a_reading_is_of_the_case_and_of_the_time_that_are_shown(opened):
         page.page.mouse.move(box["x"] + 400, box["y"] + 80)
         asked(page, waiting)
         page.page.mouse.move(box["x"] + 400, box["y"] - 60)
-        page.page.wait_for_timeout(100)
-    page.page.wait_for_timeout(300)
+        page.paused(100)
+    page.paused(300)
     assert page.text("#cursor").startswith("Click on the plots")
     # A mistake in the settings is said before an older one of the reading.
     entered(page, "at", "9999")
@@ -697,7 +697,7 @@ def test_a_reading_is_of_the_case_and_of_the_time_that_are_shown(opened):
 
 def test_what_never_moves_is_read_and_where_no_case_is_shown_nothing_is(opened, here):
     page = opened("width=0.24&height=1.1&motion=none&view=block")
-    page.page.wait_for_timeout(300)
+    page.paused(300)
     assert page.page.locator("#problem").is_hidden()
     page.page.click("[data-view=response]")
     page.says("cursor", "At 0.000 s the block stands on both corners")
@@ -708,7 +708,7 @@ def test_what_never_moves_is_read_and_where_no_case_is_shown_nothing_is(opened, 
     page.page.click("[data-view=block]")
     page.page.click("#to-uplift")
     page.page.click("#play")
-    page.page.wait_for_timeout(200)
+    page.paused(200)
     assert page.text("#problem").startswith("“Width”")
 
 
@@ -797,7 +797,7 @@ def test_another_description_has_the_value_that_was_changed_before_it(opened):
         entered(page, "width", "0.3")
         asked(page, waiting)
         page.page.select_option("#shape", "parameters")
-        page.page.wait_for_timeout(300)
+        page.paused(300)
     page.until("new URLSearchParams(location.search).has('alpha')")
     alpha = quantities.angle(query_of(page)["alpha"], "alpha")
     assert alpha == pytest.approx(rocking.Block(width=0.3, height=1.1).alpha, rel=1e-12)
@@ -940,7 +940,7 @@ def test_names_of_files_and_channels_are_shown_as_they_are_written(opened):
             page.until(f"document.getElementById('{where}').textContent.includes({json.dumps(written)})")
         for view in VIEWS:
             page.page.click(f"[data-view={view}]")
-            page.page.wait_for_timeout(150)
+            page.paused(150)
         assert page.js("document.getElementById('hostile')") is None
         page.rested(lambda: page.page.click("[data-view=response]"))
 
@@ -964,7 +964,7 @@ def test_dragged_text_opens_nothing_and_leads_nowhere(opened, kind):
     title = page.page.locator("#chattering-title")
     title.select_text()
     title.drag_to(page.page.locator("#verdict"))
-    page.page.wait_for_timeout(200)
+    page.paused(200)
     assert (page.page.url, page.js("document.body.dataset.drawn")) == before
     assert page.js("document.getElementById('dropping').hidden && document.getElementById('problem').hidden")
 
@@ -1416,7 +1416,7 @@ def test_a_map_that_has_changed_shows_nothing_of_the_one_before(opened):
     page.until("location.search.includes('x_from')")
     while query_of(page).get("x") == "p":
         page.page.go_back()
-        page.page.wait_for_timeout(200)
+        page.paused(200)
     complete(page)
     assert query_of(page) == first and page.page.locator("#map-out").is_disabled()
     # Another motion has another axis to the right, with its own ends.
@@ -1666,7 +1666,7 @@ def test_a_map_is_zoomed_from_the_ends_that_are_asked_for(opened):
         page.page.keyboard.press("+")
         asked(page, waiting)
         page.page.keyboard.press("+")
-        page.page.wait_for_timeout(100)
+        page.paused(100)
         low, high = (float(page.page.input_value(f"#map-x-{end}")) for end in ("from", "to"))
         assert high - low == pytest.approx(1.0, rel=0.01)
         page.page.keyboard.press("-")
@@ -1708,7 +1708,7 @@ def test_a_point_of_a_map_is_of_the_axes_that_are_drawn(opened):
         page.page.keyboard.press("+")
         page.page.mouse.move(box["x"] + 200 + 30 * k, box["y"] + 120)
         complete(page)
-        page.page.wait_for_timeout(200)
+        page.paused(200)
         assert page.page.locator("#problem").is_hidden()
 
 
@@ -1881,7 +1881,7 @@ def test_a_record_is_answered_with_the_nearest_sine(opened):
         asked(page, waiting)
         page.page.select_option("#kind", "record")
     page.until("document.getElementById('orbit-offer').checkVisibility()")
-    page.page.wait_for_timeout(500)
+    page.paused(500)
     assert page.page.locator("#problem").is_hidden()
 
 
@@ -2100,7 +2100,7 @@ def test_a_late_answer_of_a_view_that_was_left_changes_nothing(opened):
             asked(page, waiting)
             page.rested(lambda: page.page.click("[data-view=response]"))
             before = [page.text("#python-title"), page.page.locator("#exports button").all_text_contents()]
-        page.page.wait_for_timeout(500)
+        page.paused(500)
         assert [page.text("#python-title"), page.page.locator("#exports button").all_text_contents()] == before
         assert len(before[1]) == 6 and page.js("document.body.dataset.sweep") is None
 
@@ -2118,7 +2118,7 @@ def test_a_late_slice_of_a_study_changes_nothing_in_another_view(opened, tmp_pat
         page.page.locator("#study-tools label", has_text="scale").locator("select").select_option("1")
         asked(page, waiting)
         page.rested(lambda: page.page.click("[data-view=response]"))
-    page.page.wait_for_timeout(500)
+    page.paused(500)
     assert page.text("#python-title") == "This case as Python"
     assert page.page.locator("#exports button").count() == 6
     running.server.should_exit = True
@@ -2205,7 +2205,7 @@ def test_an_assessment_that_was_left_while_its_list_came_begins_anew(opened, exp
         asked(page, waiting)
         page.page.click('[data-view="response"]')
         page.page.locator("#view-response").wait_for(state="visible")
-    page.page.wait_for_timeout(200)
+    page.paused(200)
     page.page.click('[data-view="assessment"]')
     page.until("document.body.dataset.assessment === 'complete'", "the assessment is complete", timeout=120.0)
     assert page.text("#assessment-verdict")
@@ -2230,7 +2230,7 @@ def test_what_is_ticked_is_what_the_address_says_and_what_is_assessed(opened, ex
     page.until(f"JSON.stringify({ticked}) === {json.dumps(json.dumps(before).replace(' ', ''))}")
     for k in range(boxes.count()):
         boxes.nth(k).uncheck()
-    page.page.wait_for_timeout(250)
+    page.paused(250)
     page.page.reload()
     page.until(f"document.body?.dataset.ready && {LISTED}")
     assert True not in page.js(ticked)
@@ -2275,7 +2275,7 @@ def test_what_is_wrong_with_dropped_files_is_said_and_the_next_are_read(opened, 
         )
         page.says("problem", "worse.csv")
     page.until("document.body.dataset.added")
-    page.page.wait_for_timeout(300)
+    page.paused(300)
     assert page.page.locator("#problem").is_visible() and "bad.csv" in page.text("#problem")
     # One file that is dropped on the list is in it.
     before = page.js(LISTED)
@@ -2338,7 +2338,7 @@ def test_an_assessment_is_the_packages_fragility_and_stops_when_the_reader_goes(
     page.until("document.body.dataset.assessment === 'running'")
     done = page.js("document.body.dataset.assessed")
     page.page.click("[data-view=response]")
-    page.page.wait_for_timeout(500)
+    page.paused(500)
     assert page.js("document.body.dataset.assessed") == done and not page.page.is_visible("#problem")
 
 
@@ -2507,7 +2507,7 @@ def test_no_view_has_a_barrier(opened, viewport, scheme):
     for view in (*views, "records", "assessment"):
         page.page.click(f"[data-view={view}]")
         page.until(COMPUTED.get(view, "true"))
-        page.page.wait_for_timeout(300)
+        page.paused(300)
         assert barriers(page) == [], view
         assert page.js("document.documentElement.scrollWidth") <= viewport["width"], view
         # One way of writing numbers: 5·10⁻¹⁰, on the page as at the axes.
@@ -2962,7 +2962,7 @@ def test_back_and_forward_go_from_change_to_change_and_show_an_unchanged_map_at_
     assert query_of(page) == opened_at and width.input_value() == "0.92"
     page.page.go_back()
     page.until("document.querySelector('[data-view=map]').getAttribute('aria-current')")
-    page.page.wait_for_timeout(100)
+    page.paused(100)
     assert page.js("[document.body.dataset.map, document.body.dataset.mapTook]") == ["complete", took]
     assert "a" in page.text("#map-at") and query_of(page)["view"] == "map"
     page.page.go_forward()
@@ -3098,7 +3098,7 @@ def test_back_out_of_a_lecture_leaves_its_large_text(opened):
     page.until("location.search.includes('lecture=1')")
     while "lecture" in query_of(page):
         page.page.go_back()
-        page.page.wait_for_timeout(200)
+        page.paused(200)
     page.until("!document.body.classList.contains('lecture')", timeout=5.0)
     shown = query_of(page).get("view", "response")
     assert page.page.locator("nav").is_visible() and page.page.locator(f"#view-{shown}").is_visible()
@@ -3123,7 +3123,7 @@ def asked(page, waiting, count=1):
     for _ in range(400):
         if len(waiting) >= count:
             return
-        page.page.wait_for_timeout(25)
+        page.paused(25)
     raise AssertionError(f"{len(waiting)} of {count} were asked for")
 
 
@@ -3140,7 +3140,7 @@ def test_a_view_is_shown_once_it_hears_what_is_chosen_and_is_made_once(opened):
     with held(page, "**/page/compare.js") as waiting:
         page.page.click("[data-view=compare]")
         asked(page, waiting)
-        page.page.wait_for_timeout(100)
+        page.paused(100)
         assert page.page.locator("#compare-with").is_hidden() and page.page.locator("#histories").is_visible()
         assert page.js("document.querySelector('[aria-current]').dataset.view") == "response"
         page.page.click("[data-view=response]")
@@ -3159,7 +3159,7 @@ def test_a_refused_value_stays_marked_when_what_was_asked_before_comes_late(open
         entered(page, "width", "-1")
         page.until("!document.getElementById('problem').hidden")
     page.says("python", "width=0.3")
-    page.page.wait_for_timeout(300)
+    page.paused(300)
     assert page.js(MARKED) == ["width"] and page.text("#problem").startswith("“Width” must be a positive number")
     assert page.js("document.getElementById('main').classList.contains('old')") and query_of(page)["width"] == "0.3"
 
@@ -3193,9 +3193,9 @@ def test_a_window_that_is_chosen_while_a_case_is_computed_is_the_one_that_is_dra
         entered(page, "pga", "0.45")
         asked(page, waiting)
         page.page.click("[data-zoom=in]")
-        page.page.wait_for_timeout(400)
+        page.paused(400)
     page.until("new URLSearchParams(location.search).has('from') && location.search.includes('0.45g')")
-    page.page.wait_for_timeout(300)
+    page.paused(300)
     found, line = query_of(page), plotted(page)
     times = line["origin"] + np.array(line["x"])[[0, -1]] * line["unit"]
     assert times == pytest.approx([float(found["from"]), float(found["to"])], abs=0.05)
@@ -3221,7 +3221,7 @@ def test_changes_before_a_links_file_is_known_or_before_the_units_change_are_kep
         entered(page, "width", "0.3")
         asked(page, waiting)
         page.page.select_option("#length_in", "cm")
-        page.page.wait_for_timeout(500)
+        page.paused(500)
     page.until(READY)
     assert page.page.input_value("#width") == "30" and query_of(page)["width"] == "0.3"
 
@@ -3235,10 +3235,10 @@ def test_the_last_of_two_files_shakes_the_block_however_late_the_first_arrives(o
         page.js(DROP, ["first.csv", one_])
         asked(page, waiting)
         page.js(DROP, ["second.csv", other])
-        page.page.wait_for_timeout(500)
+        page.paused(500)
     key = hashlib.sha256(other.encode()).hexdigest()[:24]
     page.until(f"location.search.includes('{key}')")
-    page.page.wait_for_timeout(500)
+    page.paused(500)
     assert query_of(page)["motion"] == f"file:{key}" and "'second.csv'" in page.text("#python")
 
 
@@ -3252,7 +3252,7 @@ def test_a_block_is_never_drawn_with_the_rotation_of_another_case(opened):
         page.rested(lambda: entered(page, "pga", "0.2"))
         waiting[0].continue_()
         asked(page, waiting, 2)
-        page.page.wait_for_timeout(200)
+        page.paused(200)
         assert not page.js(stage)
     page.until(stage)
 
@@ -3264,7 +3264,7 @@ def test_a_late_answer_leaves_alone_what_was_chosen_after_the_question(opened):
         page.page.click("#map-open")
         asked(page, waiting)
         page.rested(lambda: entered(page, "restitution", "0.9"))
-    page.page.wait_for_timeout(300)
+    page.paused(300)
     complete(page)
     assert query_of(page)["restitution"] == "0.9" and query_of(page)["view"] == "map"
     # Another quantity before the first part of a map is there.
@@ -3281,7 +3281,7 @@ def test_a_late_answer_leaves_alone_what_was_chosen_after_the_question(opened):
         entered(page, "at", "1.25")
         asked(page, waiting)
         page.page.press("#at-slider", "End")
-    page.page.wait_for_timeout(300)
+    page.paused(300)
     chosen = float(query_of(page)["at"])
     assert chosen != 1.25 and page.js("Number(document.getElementById('at').value)") == pytest.approx(chosen, abs=0.01)
 
@@ -3294,7 +3294,7 @@ def test_a_lecture_that_is_left_before_it_has_begun_leaves_no_large_text(opened)
         asked(page, waiting)
         page.page.keyboard.press("f")
     page.until("document.getElementById('stage').checkVisibility()")
-    page.page.wait_for_timeout(200)
+    page.paused(200)
     sizes = f"{MODELS}.filter((each) => each.type === 'LinearAxis').map((each) => each.major_label_text_font_size)"
     assert set(page.js(sizes)) == {"12px"} and page.page.locator("#settings").is_visible()
 
