@@ -99,3 +99,15 @@ def test_what_no_floor_can_be_is_refused_in_one_sentence(given, says):
 def test_a_floor_that_would_move_for_days_is_refused_at_once(given):
     with pytest.raises(InvalidMotion, match="too long for a period of 1 s; give a shorter time for it"):
         rocking.pulses.sine(1.0, 2.0, cycles=2).floor(1.0, **given)
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.02, 0.2])
+def test_a_floor_is_as_uncertain_as_all_that_its_motion_may_differ_by(damping):
+    ground = rocking.Motion.from_samples([0.0, 1.0, -1.0, 0.5, 0.0], 0.2)
+    off = 1e-3
+    other = rocking.Motion(ground.breakpoints, ground.coefficients + np.array([off, 0.0]))
+    uncertain = rocking.Motion(ground.breakpoints, ground.coefficients, error=off)
+    one, shifted = (each.floor(0.3, damping, ringing=2.0) for each in (uncertain, other))
+    times = np.linspace(0.0, one.duration, 500)
+    differ = np.max(np.abs(one.acceleration(times) - shifted.acceleration(times)))
+    assert off < differ <= one.error

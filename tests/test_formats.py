@@ -179,6 +179,51 @@ def test_labels_of_a_channel() -> None:
     assert cosmos.metadata["location"] == "Ground floor"
 
 
+@pytest.mark.parametrize(
+    ("direction", "name", "azimuth"),
+    [
+        *((each, each, azimuth) for each, azimuth in (("N-S", 0.0), ("E-W", 90.0), ("U-D", None))),
+        *(("1", "N-S borehole", 0.0), ("2", "E-W borehole", 90.0), ("3", "U-D borehole", None)),
+        *(("4", "N-S", 0.0), ("5", "E-W", 90.0), ("6", "U-D", None)),
+    ],
+)
+def test_every_sensor_of_knet_and_kik_net_has_its_name_and_azimuth(
+    direction: str, name: str, azimuth: float | None, file: Callable[[str], Path]
+) -> None:
+    (channel,) = channels(file(written.knet(list(range(100)), direction=direction)))
+    assert (channel.name, channel.azimuth) == (name, azimuth)
+
+
+@pytest.mark.parametrize(("stream", "azimuth"), [("HNN", 0.0), ("HNE", 90.0), ("HNZ", None), ("HN1", None)])
+def test_every_component_of_esm_has_its_azimuth(
+    stream: str, azimuth: float | None, file: Callable[[str], Path]
+) -> None:
+    (channel,) = channels(file(written.esm(written.series(1)).replace("STREAM: HNE", f"STREAM: {stream}")))
+    assert (channel.name, channel.azimuth) == (stream, azimuth)
+
+
+def test_smc_of_more_digits_has_fewer_columns(file: Callable[[str], Path]) -> None:
+    integers = [-32768] * 48
+    text = written.smc([1.0] * 7).splitlines()
+    integers[15], integers[16], integers[46] = 2, 7, 8
+    values = [-1234.567891, 2345.678912, -3.456789, 4.5, -5.5, 6.5, -7.5]
+    text[11:17] = written.rows([f"{each:10d}" for each in integers], 8).splitlines()
+    text[-1:] = written.rows([f"{each:14.7E}" for each in values], 5).splitlines()
+    (channel,) = channels(file("\n".join([*text, ""])))
+    assert channel.acceleration == pytest.approx(0.01 * np.array(values), rel=1e-7)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_counts_are_multiplied_by_the_calibration_of_their_file(
+    monkeypatch: pytest.MonkeyPatch, file: Callable[[bytes], Path]
+) -> None:
+    obspy = pytest.importorskip("obspy")
+    stream = obspy.Stream([obspy.Trace(np.arange(9.0), {"calib": by, "channel": f"HN{by}"}) for by in (1.0, -2.5)])
+    monkeypatch.setattr(through_obspy, "_traces", lambda *_, **__: stream)
+    one, other = channels(file(waveform("MSEED", 900)), units="m/s2")
+    assert np.array_equal(other.acceleration, -2.5 * one.acceleration) and one.acceleration[-1] == 8.0
+
+
 def test_a_channel_is_immutable_and_survives_pickling() -> None:
     channel = channels(written.FOLDER / "two.v1")[0]
     with pytest.raises(ValueError, match="read-only"):
@@ -1103,6 +1148,7 @@ def test_obspy_s_checks_of_formats_leave_the_bytes_of_a_file_as_they_are(file: C
         ({"cmpaz": 40.0, "cmpinc": 90.0}, 40.0),
         ({"cmpaz": -50.0, "cmpinc": 88.0}, 310.0),
         ({"cmpaz": 0.0, "cmpinc": 0.0}, None),
+        ({"cmpaz": 0.0, "cmpinc": 180.0}, None),
         ({"cmpaz": 40.0}, None),
         ({}, None),
     ],

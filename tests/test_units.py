@@ -115,6 +115,19 @@ def test_every_measure_is_labelled_in_the_unit_in_which_it_is_shown(name, column
     assert measure.scale == pytest.approx(scale, rel=1e-15)
 
 
+@pytest.mark.parametrize("damping", [0.0, 0.05, 0.2])
+@pytest.mark.parametrize("period", [0.3, 2.0])
+def test_a_spectral_acceleration_is_labelled_with_its_oscillator(period, damping):
+    measure = Measure("sa", period, damping)
+    assert measure.options() == {"period": period, "damping": damping}
+    assert measure.alone == Measure.of(measure) == measure
+    assert (
+        (f"damping {damping:g}" in measure.label) == (f"damping {damping:g}" in measure.short_name) == (damping != 0.05)
+    )
+    motion = rocking.pulses.one_sine(2.0, 1.0)
+    assert measure.value(motion) == pytest.approx(motion.spectral_acceleration(period, damping), rel=1e-15)
+
+
 @pytest.mark.parametrize(("unit", "metres"), [each for each in LENGTHS.items() if each[0]])
 def test_a_mesh_is_as_large_as_its_unit_says(unit, metres):
     trimesh = pytest.importorskip("trimesh")

@@ -38,6 +38,6 @@ document.addEventListener("input", (event) => {
   slid = performance.now();
 }, true);
 document.addEventListener("change", (event) => {
-  if (!isSlider(event)) begin();
+  if (!isSlider(event) && event.bubbles) begin(); // one that the page sends by itself does not bubble
   held = false;
 }, true);
