@@ -144,6 +144,23 @@ def test_a_file_that_is_read_otherwise_is_another_motion(other, tmp_path):
         assert np.array_equal(motion.coefficients, own.coefficients)
 
 
+def test_what_is_said_of_a_file_is_said_for_the_step_and_the_units_that_are_given():
+    store = UploadStore()
+    key = store.add_file("a.txt", samples(1).encode())
+    for dt, units, size in ((0.01, "g", 9.80665), (0.01, "gal", 0.01), (0.02, "gal", 0.01), (0.01, "g", 9.80665)):
+        ((told,),) = [store.contents(key, dt, units)["channels"]]
+        assert told["measures"]["duration"] == pytest.approx(399 * dt)
+        assert told["measures"]["pga"] == pytest.approx(size * np.max(np.abs(np.array(samples(1).split(), float))))
+
+
+def test_motions_of_the_program_are_told_apart_by_everything_that_is_theirs():
+    store, sine = UploadStore(), rocking.pulses.one_sine(2.0, 1.0)
+    motions = [sine, sine * 1.5, rocking.pulses.one_sine(2.0, 1.1), *map(sine.with_vertical, (sine, sine * 0.5))]
+    keys = [store.add_motion(each) for each in motions]
+    assert len({*keys}) == len(motions)
+    assert [store.motion(key) for key in keys] == motions
+
+
 @pytest.mark.parametrize(
     ("answer", "words"),
     [({"dt": "0"}, "“Sampling step”"), ({"dt": "soon"}, "“Sampling step”"), ({"units": "furlong"}, "furlong")],

@@ -60,7 +60,8 @@ def test_a_response_under_more_gravity_is_the_same(name, model):
 def test_a_rule_compares_the_same_under_more_gravity(name):
     ratios = [
         rules.RULES[name](
-            Blocks([[2.0, 2.0], [2.5, 3.0]], [[0.2, 0.2], [0.3, 0.2]], 0.85, gravity=k * G), motion_of(k, False)
+            Blocks([[2.0, 2.0], [2.5, 3.0], [0.3, 0.3]], [[0.2, 0.2], [0.3, 0.2], [0.2, 0.2]], 0.85, gravity=k * G),
+            motion_of(k, False),
         ).ratio
         for k in (1.0, K)
     ]
@@ -69,6 +70,13 @@ def test_a_rule_compares_the_same_under_more_gravity(name):
 
 def blocks_of(k):
     return Blocks.grid(p=[1.5, 3.0], alpha=[0.15, 0.25], restitution=[0.9], gravity=k * G)
+
+
+def rectangle(k):
+    return rocking.Block(width=0.4 * k, height=1.6 * k, restitution=0.95, gravity=k * G)
+
+
+TIMES = rocking.simulate(rectangle(1.0), None, initial_rotation=0.15).impacts["time"][:6]
 
 
 #: An analysis under so many times the gravity, and what of it is the same.
@@ -92,6 +100,9 @@ ANALYSES = {
     "critical scale": lambda k: rocking.critical_scale(
         rocking.Block.from_parameters(2.0, 0.2, 0.9, gravity=k * G), motion_of(k), low=0.1, high=9.0
     ).scale,
+    "laws of restitution": lambda k: [
+        each["log_likelihood"] for each in rocking.compare_restitution([TIMES], rectangle(k)).to_dict()["laws"]
+    ],
     "sizes of spectrum": lambda k: rocking.rocking_spectrum(blocks_of(k), motion_of(k)).data["size"].values / k,
 }  # fmt: skip
 
@@ -114,3 +125,15 @@ def test_a_level_in_the_unit_of_a_block_lifts_it_under_more_gravity(name, model)
     found = rocking.incremental_dynamic_analysis(block, motion, measure=name, levels=levels, model=model)
     same = [rocking.simulate(block, motion * (per_unit * each), model=model).peak_rotation for each in levels]
     assert found.data.peak_rotation.values.ravel() == pytest.approx(same, rel=1e-6, abs=1e-12)
+
+
+@pytest.mark.parametrize("model", ["linear", "nonlinear"])
+@pytest.mark.parametrize("k", [1.0, K])
+def test_a_figure_has_the_thresholds_of_both_sides_under_the_weight_of_the_moment(k, model, monkeypatch):
+    response, drawn = rocking.simulate(body_of("free", k), motion_of(k), model=model), {}
+    monkeypatch.setattr("rocking.plot.response.response_figure", lambda **given: drawn.update(given))
+    response.plot()
+    weight = 1.0 + drawn["vertical_acceleration_g"] / k
+    for threshold, side in zip(drawn["thresholds_g"], response.body.sides, strict=True):
+        own = side.alpha if model == "linear" else np.tan(side.alpha)
+        assert threshold == pytest.approx(k * own * weight, rel=1e-12)
