@@ -320,16 +320,29 @@ def test_where_a_block_leaves_as_it_comes_to_rest_there_is_no_derivative() -> No
     assert np.all(np.isfinite(gradient(response, "event", int(at_once[0])).coefficients))
 
 
-def test_of_an_unfinished_simulation_all_but_the_peak_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("model", ["linear", "nonlinear"])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_of_an_unfinished_simulation_no_derivative_is_known(
+    monkeypatch: pytest.MonkeyPatch, model: Any, side: float
+) -> None:
     monkeypatch.setattr("rocking.simulation.SLICE", 20)
     monkeypatch.setattr("rocking.simulation.slices", lambda _: 1)
-    response = rocking.simulate(BLOCK, None, initial_rotation=0.05)
+    response = rocking.simulate(BLOCK, None, model=model, initial_rotation=0.05 * side)
     assert response.unfinished
-    found = gradient(response)
-    assert "not finished" in found.reason
-    assert np.isnan(found.initial_rotation)
-    assert np.isfinite(gradient(response, "rotation", 0.5).initial_rotation)
-    assert np.isfinite(gradient(response, "impact", -1).initial_rotation)
+    assert len(response.impacts) > 1
+    asked: list[tuple[Any, float | None]] = [("peak", None), ("rotation", 0.5), ("velocity", 0.5), ("impact", -1)]
+    for of, at in asked:
+        found = gradient(response, of, at)
+        assert "not finished" in found.reason, of
+        assert np.isnan([found.initial_rotation, found.initial_velocity]).all(), of
+        assert np.isnan(found.coefficients).all(), of
+    changes = response.sensitivity
+    for table in (changes.peak, changes.impacts):
+        assert len(table)
+        assert all(np.isnan(table[name]).all() for name in table.dtype.names or ())
+    assert all(np.isnan(values).all() for values in changes.rotation([0.0, 0.5]).values())
+    assert "UNFINISHED" in response.summary()
+    assert "nan" not in response.summary()
 
 
 def test_the_time_of_overturning_has_derivatives_though_the_peak_has_none() -> None:

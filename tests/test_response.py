@@ -292,3 +292,45 @@ def test_functions_of_time_are_nan_outside_the_response_and_nowhere_within(block
         function("soon")
     documented = (getattr(type(response), name) if name in OF_TIME else rocking.response.Sensitivity.rotation).__doc__
     assert "NaN" in documented or "As of `kinetic_energy`" in documented
+
+
+@pytest.mark.parametrize("model", ["nonlinear", "linear"])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_of_equal_maxima_of_free_rocking_the_first_has_the_time(model, side):
+    """Without losses every swing reaches the same rotation; rounding makes later ones higher by some last digits."""
+    random, higher = np.random.default_rng(4), 0
+    for _ in range(20):
+        p, alpha, share = random.uniform([1.0, 0.1, 0.05], [4.0, 0.3, 0.9])
+        free = Block.from_parameters(p=p, alpha=alpha, restitution=1.0)
+        response = simulate(free, None, model=model, initial_rotation=side * share * alpha, duration=30.0)
+        assert response.peak_time == 0.0
+        assert response.peak_rotation == pytest.approx(share * alpha, rel=1e-13)
+        higher += response.peak_rotation > share * alpha
+    assert higher >= 5
+
+
+@pytest.mark.parametrize("model", ["nonlinear", "linear"])
+@pytest.mark.parametrize("polarity", [1.0, -1.0])
+@pytest.mark.parametrize("lanes", [1, 3, 20])
+def test_of_equal_maxima_of_a_motion_that_comes_again_the_first_has_the_time(model, polarity, lanes):
+    step, judged = 0.02, 0
+    for restitution, frequency, strength in ((0.55, 1.0, 1.3), (0.7, 1.4, 1.7), (0.85, 1.8, 2.1), (0.6, 1.7, 2.2)):
+        once = rocking.pulses.one_sine(strength * 0.2 * G * polarity, frequency).acceleration(np.arange(52) * step)
+        again = np.concatenate([once, np.zeros(600)])
+        motion = rocking.Motion.from_samples(np.tile(again, 3), step)
+        one = simulate(Block.from_parameters(p=2.0, alpha=0.2, restitution=restitution), motion, model=model)
+        many = rocking.Blocks(p=np.full(lanes, 2.0), alpha=0.2, restitution=restitution)
+        times = rocking.simulate_many(many, motion, model=model).peak_time.values.ravel()
+        assert 0.0 < one.peak_time < len(again) * step
+        assert times == pytest.approx(one.peak_time, abs=1e-12)
+        judged += len(one.chattering) >= 3 and not one.overturned
+    assert judged >= 2
+
+
+def test_a_maximum_that_is_higher_has_its_own_time():
+    """By a billionth: that is no rounding."""
+    step = 0.02
+    once = rocking.pulses.one_sine(1.7 * 0.2 * G, 1.4).acceleration(np.arange(52) * step)
+    motion = rocking.Motion.from_samples(np.concatenate([once, np.zeros(600), (1.0 + 1e-9) * once, np.zeros(9)]), step)
+    response = simulate(Block.from_parameters(p=2.0, alpha=0.2, restitution=0.7), motion)
+    assert response.peak_time > 652 * step

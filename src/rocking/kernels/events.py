@@ -92,6 +92,10 @@ def deflated(c: Floats, lead: int, order: int, t: float) -> tuple[float, float]:
     return f, slope
 
 
+#: Relative difference of maxima that rounding may make.
+_SAME_PEAK = 2.0**-40
+
+
 class StepEnd(NamedTuple):
     """How a step ends (`Outcome`); time, u, u' there; time and value of the highest rotation on it.
 
@@ -129,6 +133,17 @@ def advance(state: Record, scratch: Record, order: int, h: float, fallen: float)
     if outcome == Outcome.IMPACT:
         end = 0.0
     return StepEnd(outcome, time, end, speed, peak_time, peak)
+
+
+@inlined
+def raise_peak(state: Record, peak: float, time: float) -> None:
+    """Keep a rotation above all before. Its time is that of the first of maxima which differ by rounding alone.
+
+    A step that starts at the highest rotation so far goes on with the same rise.
+    """
+    if state.u == state.peak or peak > state.peak * (1.0 + _SAME_PEAK):
+        state.peak_time = time
+    state.peak = peak
 
 
 @inlined

@@ -13,6 +13,7 @@ import numpy as np
 
 from rocking.arrays import Floats, Integers
 from rocking.kernels.compiled import inlined, kernel
+from rocking.kernels.events import raise_peak
 from rocking.kernels.ground import Ground, coefficient, has_vertical, last_piece, length_of, start_of, vertical_of
 from rocking.kernels.lane_steps import GROUP, STEP_CONSTANTS, WIDTH, step_linear, step_nonlinear, step_weighted
 from rocking.kernels.march import march
@@ -157,8 +158,7 @@ def unload(ground: Ground, pool: Pool, lane: int, piece: int) -> int:
     state.u = group.u[slot]
     state.v = group.v[slot]
     if state.u > state.peak:
-        state.peak = state.u
-        state.peak_time = start_of(ground, piece)
+        raise_peak(state, state.u, start_of(ground, piece))
     return index
 
 

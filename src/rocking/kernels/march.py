@@ -8,7 +8,7 @@ import numpy as np
 from rocking.kernels.arc import evaluate, expand, restoring
 from rocking.kernels.certificate import unproven
 from rocking.kernels.compiled import inlined, kernel, shared
-from rocking.kernels.events import StepEnd, advance, apply_impact, first_root
+from rocking.kernels.events import StepEnd, advance, apply_impact, first_root, raise_peak
 from rocking.kernels.ground import Ground, has_vertical, is_straight, last_piece, length_of, start_of
 from rocking.kernels.interpreted import Interpreted
 from rocking.kernels.rest import (
@@ -207,8 +207,7 @@ def yielding_step(block: Record, rules: Record, scratch: Record, state: Record, 
 def finish_step(ground: Ground, rules: Record, state: Record, end: StepEnd, left: float) -> int:
     """Move the state to the end of a step; returns what ended it (`Outcome`)."""
     if end.peak > state.peak:
-        state.peak = end.peak
-        state.peak_time = time_of(ground, state) + end.peak_time
+        raise_peak(state, end.peak, time_of(ground, state) + end.peak_time)
     stopped = end.outcome == Outcome.STEP and end.time >= left and is_last(ground, rules, state)
     advance_time(state, end.time)
     state.u = end.u

@@ -171,6 +171,7 @@ class Answers:
             self.peak_time,
             (len(self.impacts), len(self.events)),
             self.overturned or self._reaches_second_stop,
+            self.unfinished,
         )
 
     @property

@@ -31,7 +31,7 @@ _CLOSE: Final = 1e-5
 _NO_REASON: Final = ""
 _OVERTURNS: Final = "the block overturns: its peak is where it falls, whatever changes a little"
 _AT_STOP: Final = "the body reaches its second stop: its peak is there, whatever changes a little"
-_UNFINISHED: Final = "the simulation was not finished: its peak is not known"
+_UNFINISHED: Final = "the simulation was not finished: its derivatives are not known"
 _FROM_REST: Final = "the response starts on the ground: a start to the other side changes it otherwise"
 _REASONS: Final = {
     Ends.GRAZES: "the block touches the ground without speed: with a little less motion it does not, or it hits it",
@@ -132,7 +132,8 @@ def gradient(response: Response, of: Told = "peak", at: float | None = None) -> 
     rotation does not change. The time of an uplift changes with the motion about it alone, and not at all where the
     motion jumps past the threshold; that of a rest follows its impacts up to 0.01 ms before it, and is to first order
     from there. Numbers are NaN where there is no derivative, and `Gradient.reason` says why: where a block overturns,
-    so that its peak is fixed, touches the ground without speed, or leaves it as it comes to rest.
+    so that its peak is fixed, touches the ground without speed, or leaves it as it comes to rest, and throughout where
+    the simulation was not finished.
 
     Examples
     --------
@@ -157,7 +158,7 @@ def gradient(response: Response, of: Told = "peak", at: float | None = None) -> 
     trail = trail_of(response)
     out = np.zeros((len(trail.ground.pieces), trail.ground.columns * trail.ground.stretches.shape[1]))
     change = np.zeros(3)
-    reason = asked.reason
+    reason = _UNFINISHED if response.unfinished else asked.reason
     if response.near_ties and not reason and _ties_before(trail, asked.instant):
         reason = _REASONS[Ends.GRAZES]
     reason = reason or _taken_back(asked, change, out)
@@ -200,8 +201,8 @@ def _peak(response: Response, at: float | None) -> _Asked:
         raise InvalidOption('{} is for other quantities: a "peak" is where it is', "at", value=at)
     trail, value, instant = trail_of(response), response.peak_rotation, response.peak_time
     reason = _NO_REASON
-    if response.overturned or response.unfinished:
-        reason = _OVERTURNS if response.overturned else _UNFINISHED
+    if response.overturned:
+        reason = _OVERTURNS
     elif response._reaches_second_stop:
         reason = _AT_STOP
     row = max(0, int(np.searchsorted(trail.nodes["time"], instant)) - 1)

@@ -42,7 +42,8 @@ class Sensitivity:
     """Changes of a response per unit of relative change of what it was computed from, found when first asked for.
 
     Structured arrays with the fields motion, initial_rotation, initial_velocity, p, alpha and restitution (of both
-    sides together): a field times 1e-3 is what 0.1 % more of that quantity changes, to first order.
+    sides together): a field times 1e-3 is what 0.1 % more of that quantity changes, to first order. NaN throughout
+    where the simulation was not finished.
     """
 
     _trail: Trail
@@ -50,22 +51,31 @@ class Sensitivity:
     _peak_time: float
     _sizes: tuple[int, int]
     _fixed: bool
+    _unfinished: bool
     _found: dict[int, Changes] = field(default_factory=dict)
 
     @cached_property
     def peak(self) -> NDArray[np.void]:
         """Of the peak rotation, rad, shape (1,); 0 when overturned."""
-        return _by_quantity(self._along(QUANTITIES)[0])
+        return self._public(0)
 
     @cached_property
     def impacts(self) -> NDArray[np.void]:
         """Of the times of the response's impacts, s."""
-        return _by_quantity(self._along(QUANTITIES)[1])
+        return self._public(1)
 
     @cached_property
     def events(self) -> NDArray[np.void]:
         """Of the times of the response's events, s."""
-        return _by_quantity(self._along(QUANTITIES)[2])
+        return self._public(2)
+
+    def _public(self, which: int) -> NDArray[np.void]:
+        """Return changes of peak, impacts or events, in a field for each quantity."""
+        values = self._along(QUANTITIES)[which]
+        table = np.empty(values.shape[1], dtype=[(name, "f8") for name in QUANTITIES])
+        for name, row in zip(QUANTITIES, values, strict=True):
+            table[name] = np.nan if self._unfinished else row
+        return table
 
     def _along(self, names: tuple[str, ...]) -> Changes:
         """Return changes of peak, impacts and events, in a row for each name: one pass along the steps for each."""
@@ -94,7 +104,8 @@ class Sensitivity:
         -------
         dict of str to ndarray
             By quantity, for each time: rad (of another body in the unit of its coordinate) per unit of relative change,
-            with the sign of the rotation. 0 at rest; just before an impact, at one; NaN outside the response.
+            with the sign of the rotation. 0 at rest; just before an impact, at one; NaN outside the response, and
+            throughout where the simulation was not finished.
 
         Raises
         ------
@@ -116,7 +127,8 @@ class Sensitivity:
         >>> {name: [f"{each:.5f}" for each in values] for name, values in changes.items()}
         {'p': ['-0.01640', '-0.09310'], 'restitution_plus': ['0.00000', '-0.11430']}
         """
-        return changes_along(self._history, time, of)
+        found = changes_along(self._history, time, of)
+        return {name: np.full_like(values, np.nan) for name, values in found.items()} if self._unfinished else found
 
     def __repr__(self) -> str:
         event = np.max(np.abs(self.events["motion"]), initial=0.0)
@@ -142,25 +154,13 @@ def ambiguities(found: Sensitivity, height: float, near_ties: int) -> tuple[str,
 
     ``height`` is that of the peak above the stop.
     """
-    peak, *times = (_ULP * _total(values, QUANTITIES) for values in (found.peak, found.events, found.impacts))
+    peak, *times = (_ULP * np.sum(np.abs(rows), axis=0) for rows in found._along(QUANTITIES))
     known = {
         "peak": bool(np.all(peak <= AMBIGUITY * max(height, 1e-300))),
         "events": bool(np.all(np.concatenate(times) <= AMBIGUITY)),
         "touch": near_ties == 0,
     }
     return tuple(name for name, is_known in known.items() if not is_known)
-
-
-def _total(values: NDArray[np.void], quantities: tuple[str, ...]) -> Floats:
-    total: Floats = np.sum([np.abs(values[name]) for name in quantities], axis=0)
-    return total
-
-
-def _by_quantity(values: Floats) -> NDArray[np.void]:
-    table = np.empty(values.shape[1], dtype=[(name, "f8") for name in QUANTITIES])
-    for name, row in zip(QUANTITIES, values, strict=True):
-        table[name] = row
-    return table
 
 
 def changes_along(history: History, time: ArrayLike, of: Iterable[str]) -> dict[str, Floats]:
