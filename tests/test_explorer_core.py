@@ -17,7 +17,7 @@ from explorer_texts import in_english
 import rocking
 from rocking.chattering import chattering_map, critical_amplitude, families
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingError, StudyError, UnreadableRecord
-from rocking.explorer import maps, readings
+from rocking.explorer import maps, readings, windows
 from rocking.explorer.code import case_as_command, case_as_python, map_as_command, map_as_python
 from rocking.explorer.core import Explorer
 from rocking.explorer.inputs import read_case, texts_of
@@ -1381,3 +1381,17 @@ def test_names_of_texts_are_options_of_the_command():
     names = set(NAMES) - {"gravity", "motion", "mesh", "azimuth", "up", "unit", "density", "tolerance"}
     assert len(names) >= 15
     assert {f"--{name.replace('_', '-')}" for name in names} <= options
+
+
+@pytest.mark.parametrize(
+    "pulse", ["sine:amplitude=0.3g,frequency=1Hz,cycles=2", "one-sine:amplitude=0.4g,frequency=1Hz"]
+)
+def test_what_only_rounding_leaves_of_a_number_is_shown_as_zero(explorer, pulse):
+    texts = {"width": "0.24", "height": "1.1", "motion": pulse}
+    found = [readings.at(explorer, texts, time)["ground_g"] for time in ("0", "0.25", "0.5", "1")]
+    assert [abs(each) > 0.2 for each in found] == [False, True, False, False]
+    assert [found[k] for k in (0, 2, 3)] == [0.0, 0.0, 0.0]
+    shown = explorer.show(texts)
+    drawn = np.abs(windows._shaking(shown.case, 0.0, 1.0, 200)["ground_g"])
+    assert not np.any((drawn > 0.0) & (drawn < 1e-9))
+    assert np.any(drawn == 0.0)

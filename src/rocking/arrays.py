@@ -1,7 +1,7 @@
 """Names for the arrays that the package passes about."""
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -12,6 +12,17 @@ def as_asked(values: Floats) -> Floats:
     """Return an array, or where it has no dimension the number in it: a number for a number, an array for an array."""
     answer: Floats = values[()]
     return answer
+
+
+def without_dust(values: ArrayLike, size: float) -> Floats:
+    """Return values, and zeros in place of those that are only rounding beside a size.
+
+    Examples
+    --------
+    >>> without_dust([1e-16, -2e-3, 5.0], 5.0).tolist()
+    [0.0, -0.002, 5.0]
+    """
+    return np.where(np.abs(values) > 2.0**-40 * size, values, 0.0)
 
 
 def evenly(count: int, most: int) -> list[int]:

@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from rocking.arrays import without_dust
 from rocking.errors import InvalidOption
 from rocking.motion.exceedance import exceedances
 from rocking.response import Response
@@ -150,5 +151,6 @@ def chattering_episodes(response: Response) -> ChatteringEpisodes:
     if not len(beyond) or beyond[0, 0] >= response.duration:
         return ChatteringEpisodes(episodes, (math.nan, math.nan), 0.0)
     start, end = float(beyond[0, 0]), min(float(beyond[-1, 1]), response.duration)
-    at_rest = np.diff(np.clip(response.rest_intervals, start, end)).sum()
+    # The shaking starts with an uplift, to rounding.
+    at_rest = without_dust(np.diff(np.clip(response.rest_intervals, start, end)), end).sum()
     return ChatteringEpisodes(episodes, (start, end), float(at_rest))

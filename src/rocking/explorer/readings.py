@@ -6,6 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from rocking.arrays import without_dust
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
 from rocking.explorer.core import Explorer
@@ -110,7 +111,8 @@ def _ground(shown: Simulated, time: float) -> dict[str, float | None]:
     motion = shown.case.motion
     both = {"ground_g": motion, "vertical_g": None if motion is None else motion.vertical}
     return {
-        name: None if each is None else float(each.acceleration(time)) / STANDARD_GRAVITY for name, each in both.items()
+        name: None if each is None else float(without_dust(each.acceleration(time), each.pga)) / STANDARD_GRAVITY
+        for name, each in both.items()
     }
 
 

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from rocking.arrays import Floats, Integers
+from rocking.arrays import Floats, Integers, without_dust
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
 from rocking.explorer.inputs import Case
@@ -105,7 +105,7 @@ def _shaking(case: Case, start: float, end: float, points: int) -> dict[str, Flo
         return {"ground_time": np.empty(0), "ground_g": np.empty(0)}
     last = motion.duration if motion.vertical is None else max(motion.duration, motion.vertical.duration)
     corners = motion.drawing_times(start, min(end, max(start, last)))
-    acceleration = motion.acceleration(corners) / STANDARD_GRAVITY
+    acceleration = without_dust(motion.acceleration(corners), motion.pga) / STANDARD_GRAVITY
     if motion.vertical is None:
         kept = extremes(acceleration, points)
         return {"ground_time": corners[kept] - start, "ground_g": acceleration[kept]}
