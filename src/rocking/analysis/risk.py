@@ -34,9 +34,6 @@ if TYPE_CHECKING:
 #: Relative change by which a rate's slope is taken.
 _STEP: Final = 1e-5
 
-#: Share of a rate from above the hazard curve, beyond which only a bound on the rate is stated.
-_MOST_BEYOND: Final = 0.5
-
 #: A figure shows what is between quantiles of a rate, and so many times as far beyond them.
 _BEYOND: Final = 2.0
 
@@ -385,8 +382,8 @@ def _rate(curve: FragilityCurve, hazard: HazardCurve) -> Rate:
     with np.errstate(over="ignore", under="ignore"):
         rate, lower, upper = (float(np.exp(value)) for value in (total, low[0], high[0]))
     below, above = shares_beyond(curve.fitted, hazard)
-    # Motions above the last point add no more than its rate, and those below the first one what nobody knows.
-    least = (1.0 - above) * rate + float(hazard.rate[-1]) if above > _MOST_BEYOND else 0.0
+    # Motions above the last point add no more than its rate; of a rate that is mostly theirs only the bound is known.
+    least = (1.0 - above) * rate + float(hazard.rate[-1]) if above > 0.5 else 0.0
     intensities = quantile_intensities(curve.fitted, hazard)
     return Rate(
         curve.limit_state, rate, (lower, upper), below, above, intensities, (least, max(least, float(hazard.rate[0])))

@@ -189,11 +189,8 @@ class Survival(DrawnResult):
     @property
     def _never(self) -> str:
         """Say which motions have most likely never come."""
-        last = self._known[1]
-        if self.unlikely > last:
-            beyond = "the data" if self.hazard is None else "data and hazard curve"
-            return f"some intensity above {in_units(last, self.measure)}, beyond {beyond}"
-        return f"{in_units(self.unlikely, self.measure)} or more"
+        text = in_units(min(self.unlikely, self._known[1]), self.measure)
+        return f"some intensity above {text}, beyond the data" if self.unlikely > self._known[1] else f"{text} or more"
 
     def _verdict(self, rate: Rate, hazard: HazardCurve) -> str:
         """Say how probable the survival is under a hazard curve."""
@@ -201,10 +198,10 @@ class Survival(DrawnResult):
         bounds = math.exp(-high * self.years), math.exp(-low * self.years)
         chance, between = known_digits(self.probability, self.interval, bounds)
         pooled = f"{chance} ({100.0 * self.curve.confidence:g} % interval {between})"
-        likely, mean = self.probability, ""
-        if not math.isnan(self.mean_probability):
-            likely, mean = self.mean_probability, f"{self.mean_probability:.2g} in the mean and "
+        has_mean = not math.isnan(self.mean_probability)
+        likely = self.mean_probability if has_mean else self.probability
         if self.several_blocks:
+            mean = f"{likely:.2g} in the mean and " if has_mean else ""
             pooled = (
                 f"{mean}at most {self.most_probable:.2g} if one of the blocks has stood all the time, and {pooled} if "
                 "each motion met another of them"
@@ -282,11 +279,9 @@ def mean_of_blocks(outcomes: pd.DataFrame, column: str, limit_state: str, hazard
     )
     fits, _ = fit_or_limits(Outcomes(np.log(intensity[0]), exceeded, np.ones_like(exceeded)))
     # Of a curve that does not rise, motions below the hazard curve would exceed the limit as often as they come.
-    rising = fits.slope > 0.0
-    logarithm = np.where(
-        rising, np.logaddexp.reduce(log_parts(fits, hazard), axis=1), _log_rate_within(fits, hazard)[:, 0]
-    )
-    rates = np.exp(logarithm)
+    parts = np.where(fits.slope[:, None] > 0.0, log_parts(fits, hazard), -np.inf)
+    parts[fits.slope <= 0.0, :1] = _log_rate_within(fits, hazard)[fits.slope <= 0.0]
+    rates = np.exp(np.logaddexp.reduce(parts, axis=1))
     return float(np.average(np.exp(-years * rates), weights=blocks.get("weight")))
 
 

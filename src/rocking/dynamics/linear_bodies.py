@@ -324,12 +324,8 @@ class LinearBodies:
 
 def _check_model(model: Model) -> None:
     if model != "linear":
-        raise InvalidOption(
-            "a body of rocking.dynamics moves by linear equations: call simulate or simulate_many of rocking.dynamics, "
-            f'or give {{}} "linear", not {checks.shown(model)}',
-            "model",
-            value=model,
-        )
+        advice = 'call simulate or simulate_many of rocking.dynamics, or give {} "linear"'
+        raise InvalidOption(f"a body of rocking.dynamics moves by linear equations: {advice}", "model", value=model)
 
 
 class MakerOfKind:

@@ -254,12 +254,8 @@ def workers_of(executor: Any, threads: int | None) -> Iterator[Workers]:
     if executor is not None:
         pool = executor.get_executor(pure=False) if hasattr(executor, "get_executor") else executor
         if not isinstance(pool, Executor):
-            raise InvalidOption(
-                "{} must be a concurrent.futures.Executor or a client of dask.distributed; got "
-                f"{checks.shown(executor)}",
-                "executor",
-                value=executor,
-            )
+            kinds = "a concurrent.futures.Executor or a client of dask.distributed"
+            raise InvalidOption(f"{{}} must be {kinds}; got {checks.shown(executor)}", "executor", value=executor)
         yield Workers(pool)
         return
     cancelled = Cancellation()
