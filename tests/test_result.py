@@ -15,11 +15,11 @@ from test_output_files import full_disk
 
 import rocking
 from rocking import chattering, dynamics, engine
+from rocking.analysis.calibration.result import overturned_under
 from rocking.chattering import chattering_map, critical_amplitude_nonlinear, families
-from rocking.errors import Unfinished
 from rocking.progress import Progress
 from rocking.result import DatasetResult
-from rocking.tables import write_netcdf
+from rocking.tables import counted, write_netcdf
 
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
 PULSE = rocking.pulses.one_sine(6.0, 1.0)
@@ -32,28 +32,103 @@ def small_budget(monkeypatch):
     monkeypatch.setattr(engine, "BUDGET", 0)
 
 
-@pytest.mark.cases(fast=3)
+#: Two blocks, of which the second is given up at a small budget where it does not overturn.
+TWO = [BLOCK, RESTLESS]
+
+#: How one outcome that is missing is reported.
+ONE_MISSING = "1 simulation given up after too many steps: outcomes missing"
+
+
 @pytest.mark.usefixtures("small_budget")
-@pytest.mark.parametrize(
-    "analysis",
-    [
-        lambda: rocking.rocking_spectrum(
-            rocking.Blocks.grid(alpha=[0.2], p=[2.0], restitution=[1.0 - 1e-9]), PULSE.scaled(0.4)
-        ),
-        lambda: rocking.overturning_map(RESTLESS, "one-sine", amplitudes=[1.2, 1.4], frequencies=[3.0]),
-        lambda: rocking.incremental_dynamic_analysis(RESTLESS, PULSE, levels=[2.2, 2.4]),
-        lambda: rocking.compare_measures(RESTLESS, [PULSE, rocking.pulses.one_sine(6.0, 2.0)]),
-        lambda: rocking.fragility(RESTLESS, PULSE, levels=[2.2, 2.4]),
-        lambda: rocking.fragility(RESTLESS, PULSE.scaled(0.4)),
-        lambda: rocking.calibrate(
-            [PULSE.scaled(0.35), PULSE], [False, True], candidates=128, restitution=(1.0 - 2e-9, 1.0 - 1e-9)
-        ),
-    ],
-    ids=["spectrum", "map", "scaling", "measures", "stripes", "cloud", "calibration"],
-)
-def test_a_simulation_that_was_given_up_is_no_verdict(analysis):
-    with pytest.raises(Unfinished, match="were given up"):
-        analysis()
+def test_a_fragility_leaves_out_what_was_given_up_and_reports_it():
+    pulses = [PULSE, rocking.pulses.one_sine(6.0, 1.8)]
+    found = rocking.fragility(TWO, pulses, levels=np.linspace(1.5, 6.0, 10))
+    missing = found.outcomes.unfinished
+    count = int(missing.sum())
+    assert 0 < count < len(found.outcomes)
+    assert found.outcomes.peak_over_alpha[missing].isna().all()
+    assert found.curves[0].trials.sum() == len(found.outcomes) - count
+    assert found.curves[0].exceeded.sum() == found.outcomes.overturned.sum()
+    assert f"{count} simulations given up after too many steps: outcomes missing" in found.summary()
+    known = found.outcomes[~missing]
+    again = rocking.fit_fragility(known.pga_m_s2, known.overturned, clusters=known.motion)
+    assert found.curves[0].median == pytest.approx(again.curves[0].median, rel=1e-12)
+
+
+@pytest.mark.usefixtures("small_budget")
+def test_scaling_has_no_peak_where_a_simulation_was_given_up():
+    found = rocking.incremental_dynamic_analysis(TWO, PULSE, levels=[2.2, 9.0])
+    np.testing.assert_array_equal(
+        np.isnan(found.peak_over_alpha.transpose("motion", "block", "level").values), [[[False] * 2, [True, False]]]
+    )
+    assert f"note: {ONE_MISSING}" in found.summary()
+
+
+@pytest.mark.usefixtures("small_budget")
+@pytest.mark.parametrize("ensemble", [False, True])
+def test_a_spectrum_leaves_out_what_was_given_up(ensemble):
+    blocks = [BLOCK, RESTLESS] if ensemble else rocking.Blocks.grid(p=[2.0], alpha=[0.2], restitution=[0.9, 1.0 - 1e-9])
+    found = rocking.rocking_spectrum(blocks, PULSE.scaled(0.4), **({"p": [2.0]} if ensemble else {}))
+    assert f"note: {ONE_MISSING}" in found.summary()
+    alone = rocking.rocking_spectrum(rocking.Blocks.grid(p=[2.0], alpha=[0.2], restitution=[0.9]), PULSE.scaled(0.4))
+    fractiles = found.fractile_over_alpha.values.reshape(3, -1)
+    np.testing.assert_array_equal(fractiles[:, 0], alone.fractile_over_alpha.values.ravel())
+    shares = found.overturned_share.values.ravel()
+    assert shares[0] == 0.0
+    if not ensemble:
+        assert np.isnan(fractiles[:, 1]).all()
+        assert np.isnan(shares[1])
+
+
+@pytest.mark.usefixtures("small_budget")
+def test_a_map_has_a_mode_for_what_was_given_up():
+    found = rocking.overturning_map(RESTLESS, "one-sine", amplitudes=[0.5, 1.2], frequencies=[3.0])
+    assert found.mode.values[:, 0].tolist() == [-3, -5]
+    assert "not finished" in found.summary()
+    assert f"note: {ONE_MISSING}" in found.summary()
+    found.plot()
+
+
+@pytest.mark.usefixtures("small_budget")
+def test_a_rose_leaves_out_what_was_given_up():
+    solid = rocking.Solid.from_mesh("statue")
+    pulses = PULSE, rocking.pulses.one_sine(2.0, 0.8)
+    pair = tuple(pulses[0].rotated(pulses[1], azimuth, recorded=(90.0, 0.0)) for azimuth in (90.0, 0.0))
+    found = rocking.response_rose(solid, [pair], azimuths=[45.0], levels=[0.6, 0.9, 1.2], restitution=1.0 - 1e-9)
+    missing, fell = np.isnan(found.peak_over_slenderness.values.ravel()), found.overturned.values.ravel()
+    assert missing.tolist() == [False, True, False]
+    assert fell.tolist() == [False, False, True]
+    for shares in (found.overturned_share.values.ravel(), found.anywhere.values):
+        np.testing.assert_array_equal(shares, [0.0, np.nan, 1.0])
+    assert f"{counted(missing.sum(), 'simulation')} given up after too many steps" in found.summary()
+
+
+@pytest.mark.usefixtures("small_budget")
+def test_a_study_leaves_out_what_was_given_up(tmp_path):
+    pulses = [PULSE, rocking.pulses.one_sine(6.0, 1.8)]
+    levels = np.linspace(1.5, 6.0, 10)
+    study = rocking.study(tmp_path / "study", TWO, pulses, levels=levels, measure="pga")
+    study.run(progress=False)
+    direct = rocking.fragility(TWO, pulses, levels=levels)
+    missing = int(direct.outcomes.unfinished.sum())
+    text = f"{missing} simulations given up after too many steps: outcomes missing"
+    together, each, spectrum = study.fragility(measure="pga"), study.block_fragilities(measure="pga"), study.spectrum()
+    assert together.missing == direct.missing == text
+    assert together.curves[0].median == pytest.approx(direct.curves[0].median, rel=1e-9)
+    assert each.outcomes.values[0].tolist() == [20.0, 20.0 - missing]
+    for found in (together, each, spectrum):
+        assert text in found.summary()
+    known = direct.outcomes[direct.outcomes.block == 1]
+    shares = known[~known.unfinished].groupby("pga_m_s2").overturned.mean().reindex(levels).values
+    np.testing.assert_array_equal(spectrum.overturned_share.values[:, 1], shares)
+
+
+@pytest.mark.usefixtures("small_budget")
+def test_a_calibration_takes_what_was_given_up_for_half_overturned():
+    outcomes = overturned_under(
+        rocking.Blocks.of(TWO), [PULSE.scaled(0.4), PULSE.scaled(2.0)], "nonlinear", None, False
+    )
+    assert outcomes.tolist() == [[0.0, 1.0], [0.5, 1.0]]
 
 
 @pytest.mark.usefixtures("small_budget")
@@ -296,9 +371,11 @@ def test_a_fragility_keeps_every_simulation_for_an_audit(tmp_path):
 
 
 def test_the_nonlinear_critical_amplitude_is_not_read_off_an_unfinished_simulation(monkeypatch):
+    whole = critical_amplitude_nonlinear(2.0, 0.9, 0.2)
     monkeypatch.setattr(engine, "BUDGET", 0)
-    with pytest.raises(Unfinished):
-        critical_amplitude_nonlinear(2.0, 0.99999, 0.2)
+    found = critical_amplitude_nonlinear(2.0, [0.9, 0.99999], 0.2)
+    assert found[0] == whole
+    assert np.isnan(found[1])
 
 
 def _sine() -> rocking.Motion:

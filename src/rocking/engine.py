@@ -26,16 +26,19 @@ from rocking.kernels.state import Record, Records
 from rocking.kernels.uplift import note_complete
 from rocking.motion.motion import Motion
 from rocking.problem import ground_of, highest, rules_of, set_start, step_of
+from rocking.tables import counted
 from rocking.threads import AHEAD, Cancellation, as_done, cores
 from rocking.treatment import Treatment
 
 #: What is kept of a simulation. ``unfinished``: it took more than its budget of steps; ``stopped``: the duration ended
-#: it while the body moved or the motion went on. All else is then as far as it came. ``complete_chattering``: it
+#: it while the body moved or the motion went on. All else is then as far as it came. ``leans``: restraints hold it
+#: leaning for ever. ``residual_rotation``: where it stays, NaN where that is not known. ``complete_chattering``: it
 #: rested after its first uplift before the motion passed a threshold again. ``stalled`` counts the rests that were not
 #: proven. Times of what never happened are 0.
 OUTCOME = np.dtype(
     [
-        ("overturned", "?"), ("unfinished", "?"), ("stopped", "?"), ("peak_rotation", "f8"), ("peak_time", "f8"),
+        ("overturned", "?"), ("unfinished", "?"), ("stopped", "?"), ("leans", "?"), ("peak_rotation", "f8"),
+        ("residual_rotation", "f8"), ("peak_time", "f8"),
         ("impacts", "i8"), ("uplifts", "i8"), ("rests", "i8"), ("time_at_rest", "f8"), ("first_uplift", "f8"),
         ("first_rest", "f8"), ("last_rest", "f8"), ("complete_chattering", "?"), ("stalled", "i8"), ("duration", "f8"),
     ]
@@ -139,39 +142,35 @@ def parts_of(count: int, motion: Motion) -> Iterator[slice]:
 def simulate_each(
     setup: Setup, motion: Motion, factors: Floats, *, threads: int | None = None
 ) -> Iterator[tuple[Task, NDArray[np.void]]]:
-    """Outcomes for body k under the motion times factor k; those that share a factor are simulated together.
-
-    Raises
-    ------
-    Unfinished
-        If a simulation is given up.
-    """
+    """Outcomes for body k under the motion times factor k; those that share a factor are simulated together."""
     order = np.argsort(factors, kind="stable")
     starts = np.flatnonzero(np.diff(factors[order], prepend=np.nan) != 0.0)
     groups = np.split(order, starts[1:])
     tasks = (
         Task(group[part], motion, float(factors[group[0]])) for group in groups for part in parts_of(len(group), motion)
     )
-    for task, outcomes in simulate_tasks(setup, tasks, threads=threads):
-        require_finished(outcomes["unfinished"])
-        yield task, outcomes
+    yield from simulate_tasks(setup, tasks, threads=threads)
 
 
-def require_finished(unfinished: Flags) -> None:
-    """Check that no simulation was given up: what is known of one that was is no verdict.
+def require_finished(unfinished: bool) -> None:
+    """Check that a simulation without which there is no answer was not given up.
 
     Raises
     ------
     Unfinished
-        If one was.
+        If it was.
     """
-    count = int(np.count_nonzero(unfinished))
-    if count:
+    if unfinished:
         raise Unfinished(
-            f"{count} of {unfinished.size} simulations were given up after more than {BUDGET} steps, so that their "
-            "verdicts are not known: blocks whose restitution is near 1 hardly come to rest, nor do blocks under "
-            "motions that nobody has seen; lower the one or the other, or look at each with simulate_many"
+            f"a simulation was given up after more than {BUDGET:,} steps, so that its outcome is not known; "
+            "simulate it alone to see how far it came, or give a duration"
         )
+
+
+def missing_text(missing: Flags | int) -> str:
+    """Sentence on the simulations that were given up, whose outcomes are missing; empty where there are none."""
+    count = int(np.sum(missing))
+    return f"{counted(count, 'simulation')} given up after too many steps: outcomes missing" * (count > 0)
 
 
 def _in_flight(
@@ -221,6 +220,9 @@ def simulate_task(setup: Setup, task: Task, cancelled: Cancellation | None = Non
     _march_on(ground, rules, records, states, cancelled)
     outcomes = _outcomes(states, task.motion.end)
     outcomes["peak_rotation"] = highest(states, records, bodies.stops)
+    known, side = ~(outcomes["overturned"] | outcomes["unfinished"] | outcomes["stopped"]), states["side"]
+    stop = np.where((side == 1) | (side == -2), bodies.stops[:, 1], bodies.stops[:, 0])
+    outcomes["residual_rotation"] = np.where(known, stop + (1.0 - 2.0 * side) * states["leaning"], np.nan)
     outcomes["complete_chattering"] = complete_chattering(ground, records, states)
     return outcomes
 
@@ -300,6 +302,7 @@ def _outcomes(states: Records, motion_end: float) -> NDArray[np.void]:
     outcomes = np.empty(len(states), dtype=OUTCOME)
     outcomes["overturned"] = states["ending"] == state.Ending.OVERTURNED
     outcomes["unfinished"] = states["ending"] == state.Ending.UNFINISHED
+    outcomes["leans"] = states["ending"] == state.Ending.LEANS
     early = (states["side"] >= 0) | (states["end"] < motion_end)
     # A body that balances for ever has no verdict either.
     undecided = np.isin(states["ending"], (state.Ending.DONE, state.Ending.BALANCED))

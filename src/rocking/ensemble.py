@@ -40,6 +40,7 @@ SIGNS: Final[Mapping[str, tuple[int, ...]]] = {"+": (1,), "-": (-1,), "both": (1
 VARIABLES: Final[Mapping[str, tuple[str, str]]] = {
     "overturned": ("1", "whether the rotation reached pi/2"),
     "peak_rotation": ("rad", "largest rotation in size"),
+    "residual_rotation": ("rad", "rotation at which it stays; NaN where it overturns or that is not known"),
     "peak_time": ("s", "time of the peak rotation"),
     "impacts": ("1", "resolved impacts: those of a sequence after its proof are not among them"),
     "uplifts": ("1", "uplifts from rest"),
@@ -50,6 +51,7 @@ VARIABLES: Final[Mapping[str, tuple[str, str]]] = {
         "whether the block came to rest after its first uplift before the motion passed a threshold again",
     ),
     "stalled": ("1", "rests that were not proven, as time no longer advanced between impacts"),
+    "leans": ("1", "whether restraints hold the block leaning for ever"),
     "unfinished": ("1", "whether the simulation was given up after too many steps; the rest is as far as it came"),
     "stopped": (
         "1",
@@ -255,6 +257,7 @@ def dataset_of(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
     coordinate = product.bodies[0].coordinate if len(product.bodies) else ROTATION
     if coordinate.unit != ROTATION.unit:
         described["peak_rotation"] = {"units": coordinate.unit, "long_name": f"largest {coordinate.name} in size"}
+        described["residual_rotation"]["units"] = coordinate.unit
         described["overturned"]["long_name"] = f"whether the {coordinate.name} passed its limit, where it has one"
     for name, (_, what) in {**OF_BLOCKS, **BETWEEN_STOPS}.items():
         described[name] = {"units": "rad", "long_name": f"change of the peak per relative change of {what}"}

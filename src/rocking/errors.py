@@ -189,7 +189,7 @@ class Unfitted(InvalidOption):
 
 
 class Unfinished(RockingError):
-    """Simulations were given up after too many steps, so that an analysis has no answer."""
+    """A simulation was given up after too many steps, without which an analysis has no answer."""
 
 
 class StudyError(RockingError):

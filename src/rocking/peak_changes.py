@@ -88,7 +88,7 @@ def _changes(setup: Setup, task: Task, overturned: Flags, quantities: Sequence[Q
     for k in np.flatnonzero(~overturned):
         start, trail = states[k], Trail(ground, records[k], rules, NO_NODES)
         ending, table = marched(trail, start)
-        known = ending == state.Ending.DONE and start["near_ties"] == 0
+        known = ending in (state.Ending.DONE, state.Ending.LEANS) and start["near_ties"] == 0
         if not known or (records["facing"][k] and highest(start, records[k], bodies.stops[k]) == bodies.stops[k, 1]):
             continue
         trail = trail._replace(nodes=state.attributed(np.array(table["node"][: start["nodes"]])))

@@ -58,8 +58,9 @@ def simulate(
         How sequences of impacts end: "certified" (default), "velocity", "bypass", "interval" or "time", or the object
         with its parameter (`Certified`, `VelocityThreshold`, `GeometricBypass`, `IntervalThreshold`, `AsymptoticTime`).
     duration : float, optional
-        Time to stop at, s. By default to the end of the motion, and on until rest or overturning. Where it ends the
-        response while the block still moves or the motion goes on, the response is `stopped`, and has no verdict.
+        Time to stop at, s. By default to the end of the motion, and on until rest or overturning, or until it is proven
+        that restraints hold the block leaning for ever. Where the duration ends the response while the block still
+        moves or the motion goes on, the response is `stopped`, and has no verdict.
     initial_rotation : float
         Rotation at time 0, rad; positive leans to side +. Of another body its coordinate.
     initial_velocity : float
@@ -133,6 +134,7 @@ def response_to(
         treatment=how,
         overturned=overturned,
         unfinished=ending == state.Ending.UNFINISHED,
+        leans=ending == state.Ending.LEANS,
         overturn_time=float(events["time"][-1]) if overturned else math.nan,
         peak_rotation=float(highest(start, trail.block, np.array(block.stops))),
         peak_time=float(start["peak_time"]),
@@ -142,6 +144,7 @@ def response_to(
         chattering=_public(table["sequence"][: start["sequences"]], _CHATTERING),
         stalled=int(start["stalled"]),
         near_ties=int(start["near_ties"]),
+        _residual=float(block.stops[int(start["side"] in (1, -2))] + (1 - 2 * start["side"]) * start["leaning"]),
         _trail=trail._replace(nodes=state.attributed(np.array(table["node"][: start["nodes"]]))),
         _again=functools.partial(response_to, block, motion, model, how, duration, initial, name),
     )

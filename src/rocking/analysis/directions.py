@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
+from rocking.analysis.levels import ratios_of
+from rocking.analysis.spectrum import overturned_share
 from rocking.constants import Model
-from rocking.engine import require_finished
+from rocking.engine import missing_text
 from rocking.ensemble import Scales, simulate_many
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.motion.motion import Motion
@@ -126,25 +128,23 @@ def response_rose(
                 motion.scaled(factor) for motion, own in zip(along, factors, strict=True) for factor in own.tolist()
             ]
             found = simulate_many(block, motions, model=model, chattering=chattering, threads=threads, progress=False)
-            require_finished(found.unfinished.values)
-            overturned[..., k] = found.overturned.values.reshape(shape[:2])
-            ratio = found.peak_rotation.values.reshape(shape[:2]) / min(block.balance)
-            peak[..., k] = np.where(overturned[..., k], np.inf, ratio)
+            fell = found.overturned.values
+            ratio = ratios_of(found.peak_rotation.values, fell, found.unfinished.values, min(block.balance))
+            overturned[..., k], peak[..., k] = fell.reshape(shape[:2]), ratio.reshape(shape[:2])
             bar.advance()
+    anywhere = np.where(overturned.any(axis=2), np.inf, peak.max(axis=2))
     dims = ("pair", "level", "azimuth")
     return ResponseRose(
         xr.Dataset(
             {
                 "overturned": variable(dims, overturned, "whether the body overturns in the plane of the azimuth"),
                 "peak_over_slenderness": variable(
-                    dims, peak, "largest rotation over the smaller slenderness; infinite where it overturns", "1"
+                    dims, peak, "largest rotation over the smaller slenderness; inf: overturns, NaN: not finished", "1"
                 ),
                 "overturned_share": variable(
-                    dims[1:], overturned.mean(axis=0), "share of the pairs that overturn the body", "1"
+                    dims[1:], overturned_share(peak), "share of the pairs that overturn the body", "1"
                 ),
-                "anywhere": variable(
-                    "level", overturned.any(axis=2).mean(axis=0), "share that does at any azimuth", "1"
-                ),
+                "anywhere": variable("level", overturned_share(anywhere), "share that does at any azimuth", "1"),
             },
             {
                 "pair": [*named],
@@ -202,7 +202,8 @@ class ResponseRose(DatasetResult):
             where = f"{most[0]:g} deg" if len(most) == 1 else f"{len(most)} azimuths"
             rows.append([name, share.min(), share.max(), where, float(data.anywhere[k])])
         table = text_table(["level", "least share", "largest share", "at", "at any azimuth"], rows)
-        return f"{self._headline()}\n\n{table}"
+        missing = missing_text(np.isnan(data.peak_over_slenderness.values))
+        return f"{self._headline()}\n\n{table}" + f"\nnote: {missing}" * bool(missing)
 
     def to_dict(self) -> dict[str, Any]:
         data = self.data

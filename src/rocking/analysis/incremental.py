@@ -26,7 +26,7 @@ from rocking.analysis.levels import (
 from rocking.arrays import Floats, Integers
 from rocking.body import Bodies, Body
 from rocking.constants import Model
-from rocking.engine import Setup, simulate_each
+from rocking.engine import Setup, missing_text, simulate_each
 from rocking.errors import InvalidOption
 from rocking.motion.exceedance import lifting_factors
 from rocking.motion.motion import Motion
@@ -177,11 +177,12 @@ class IncrementalDynamicAnalysis(DatasetResult):
     ----------
     data : xarray.Dataset
         Over (motion, level, block): peak_rotation (rad; pi/2 where the block overturns), peak_over_alpha (over the
-        smaller slenderness; infinite where it overturns) and overturned. Over (motion, block): overturning_level, the
-        lowest; NaN where no level overturns, or the first one already does. Over (band): band_motion and band_block
-        (positions along these dimensions), band_start and band_end; NaN where the band goes on below or above the
-        levels. Its attribute lowest_uplift is the level from which on a motion lifts a block; its
-        attribute undecided, how many outcomes of a sample change within 3e-6 of the motion.
+        smaller slenderness; infinite where it overturns, NaN where the simulation was given up, which bands take for
+        one that does not overturn) and overturned. Over (motion, block): overturning_level, the lowest; NaN where no
+        level overturns, or the first one already does. Over (band): band_motion and band_block (positions along these
+        dimensions), band_start and band_end; NaN where the band goes on below or above the
+        levels. Its attribute lowest_uplift is the level from which on a motion lifts a block; its attribute undecided,
+        how many outcomes of a sample change within 3e-6 of the motion.
     """
 
     TABLES = MappingProxyType(
@@ -259,6 +260,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         head = f"{blocks}, {data.model} model; {data.level.label} that overturns"
         notes = [f"note: {REVERSED_TOO}"] if data.sides_differ else []
         notes.append(f"note: {data.undecided}")
+        notes += [f"note: {text}"] if (text := missing_text(np.isnan(data.peak_over_alpha.values))) else []
         return "\n".join([head, looked_at.summary(data.lowest_uplift), "", table, *notes])
 
     def to_dict(self) -> dict[str, Any]:
@@ -407,7 +409,7 @@ def _dataset(table: xr.Dataset, bands: _Bands, alpha: Floats, measure: Measure) 
     level |= measure.options()
     table = table.assign_coords(level=("level", table.level.values, level))
     slenderness = xr.DataArray(alpha, dims="block")
-    over_alpha = (table.peak_rotation / slenderness).where(~table.overturned, np.inf)
+    over_alpha = (table.peak_rotation / slenderness).where(~table.overturned, np.inf).where(~table.unfinished)
     return table[["peak_rotation", "overturned"]].assign(
         peak_over_alpha=over_alpha.assign_attrs(units="1", long_name="peak rotation over slenderness"),
         overturning_level=(("motion", "block"), lowest, level),

@@ -15,7 +15,7 @@ from rocking.arrays import Flags, Floats, Integers
 from rocking.block import Blocks
 from rocking.body import Bodies, Body, title_of
 from rocking.constants import Model
-from rocking.engine import Setup, Task, require_finished, simulate_tasks
+from rocking.engine import Setup, Task, missing_text, simulate_tasks
 from rocking.ensemble import body_coordinates, simulate_many
 from rocking.errors import InvalidOption, Message
 from rocking.motion.description import Origin
@@ -199,9 +199,19 @@ def simulate_levels(
         part = part.drop_vars(body_coordinates(blocks.select(group)))  # their names hang on the whole: added at last
         parts.append(part.assign_coords(scale=("scale", levels, {"measure": measure.name, "units": measure.units})))
     whole = xr.concat(parts, "block", data_vars="all", coords="minimal", compat="override", join="override")
-    require_finished(whole.unfinished.values)
     ordered = whole.isel(block=np.argsort(np.concatenate(groups))).rename(scale="level")
     return ordered.assign_coords(body_coordinates(blocks))
+
+
+def ratios_of(peak: Floats, overturned: Flags, unfinished: Flags, slenderness: Floats | float) -> Floats:
+    """Peak rotation over slenderness: infinite where a block overturned, NaN where the simulation was given up."""
+    return np.asarray(np.where(unfinished, np.nan, np.where(overturned, np.inf, peak / slenderness)))
+
+
+def note_missing(unfinished: Flags) -> None:
+    """Report simulations that were given up, where each counts as half overturned."""
+    if text := missing_text(unfinished):
+        note(f"{text}, and each counts as half overturned")
 
 
 def undecided_text(

@@ -17,7 +17,7 @@ from rocking.analysis.levels import Boundaries, boundaries
 from rocking.arrays import Flags, Floats, Integers
 from rocking.block import Block, Blocks, one_block
 from rocking.constants import VERSION, Model
-from rocking.engine import OUTCOME, Setup, simulate_each
+from rocking.engine import OUTCOME, Setup, missing_text, simulate_each
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.named import one_motion
@@ -38,6 +38,8 @@ class Mode(IntEnum):
 
     Attributes
     ----------
+    UNFINISHED
+        Its simulation was given up after too many steps.
     OVERTURNS_AFTER_REST
         It overturns after it has been at rest.
     NO_UPLIFT
@@ -48,6 +50,7 @@ class Mode(IntEnum):
         It rocks until the pulse is over.
     """
 
+    UNFINISHED = -5
     OVERTURNS_AFTER_REST = -4
     NO_UPLIFT = -3
     RESTS = -2
@@ -55,6 +58,7 @@ class Mode(IntEnum):
 
 
 _NAMES: Final = {
+    Mode.UNFINISHED: "not finished",
     Mode.OVERTURNS_AFTER_REST: "overturns after a rest",
     Mode.NO_UPLIFT: "no uplift",
     Mode.RESTS: "rests before the pulse is over",
@@ -235,7 +239,8 @@ class OverturningMap(DatasetResult):
 
         A mode is a whole number (`mode_name` says it in words). -3: no uplift. -2: rests, that is complete chattering
         brings the block to rest at least once before the pulse is over. -1: rocks until the pulse is over, that is it
-        comes to rest only after it. n >= 0: overturns, after n impacts. -4: overturns after it has been at rest.
+        comes to rest only after it. n >= 0: overturns, after n impacts. -4: overturns after it has been at rest. -5:
+        the simulation was given up.
     """
 
     TABLES = MappingProxyType(
@@ -264,6 +269,7 @@ class OverturningMap(DatasetResult):
                 f"{self.data.pulse_name} on a block with {self._proportions}; {self.data.model} model",
                 text_table(["outcome", "share of the map"], shares),
                 table_of_some(["2 pi f/p", "lowest amplitude that overturns, over the smallest that lifts"], rows),
+                *([f"note: {missing}"] if (missing := missing_text(self.data.mode.values == Mode.UNFINISHED)) else []),
             ]
         )
 
@@ -352,7 +358,8 @@ class _PulseProblem:
         for task, outcomes in simulate_each(setup, self.unit, self.threshold * level, threads=self.threads):
             ends[task.bodies] = outcomes
             done(len(outcomes))
-        return modes_of(ends, self.unit.end), ends["peak_rotation"]
+        modes = np.where(ends["unfinished"], Mode.UNFINISHED, modes_of(ends, self.unit.end))
+        return modes, ends["peak_rotation"]
 
 
 def _pulse_function(
@@ -430,7 +437,7 @@ def _dataset(
     np.minimum.at(lowest, edges.column[overturns], edges.level[overturns])
     lowest[np.isinf(lowest) | _overturns(modes[0])] = np.nan
     meaning = (
-        "-4: overturns after a rest, -3: no uplift, -2: rests before the pulse is over, -1: rocks, "
+        "-5: not finished, -4: overturns after a rest, -3: no uplift, -2: rests before the pulse is over, -1: rocks, "
         "n >= 0: overturns after n impacts"
     )
     over = "over the smallest acceleration that lifts the block"

@@ -12,13 +12,13 @@ from numpy.typing import ArrayLike
 
 from rocking import checks
 from rocking.analysis.labels import curves_of, labels_of, motions_in_words
-from rocking.analysis.levels import mean_one, pooled
+from rocking.analysis.levels import mean_one, pooled, ratios_of
 from rocking.arrays import Floats
 from rocking.block import Blocks, RestrainedBlocks
 from rocking.block.many import rates_of
 from rocking.body import Bodies, Body
 from rocking.constants import Model
-from rocking.engine import require_finished
+from rocking.engine import missing_text
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
@@ -39,6 +39,8 @@ Abscissa = Literal["p", "period", "size"]
 _FACTORS: Final = np.geomspace(0.5, 2.0, 25)
 
 _HALF: Final = np.array([0.5])
+
+_SIMULATED: Final = ("peak_rotation", "overturned", "unfinished")
 
 _UNITS: Final = {"p": "rad/s", "alpha": "rad", "restitution": "1", "fractile": "1"}
 
@@ -129,7 +131,6 @@ def rocking_spectrum(
     if isinstance(gathered, Blocks) and gathered.axes is not None and p is None and size is None and weights is None:
         checks.grid_size({"motions": len(shaken), "blocks": len(gathered)}, InvalidOption)
         table = simulate_many(gathered, shaken, **options)
-        require_finished(table.unfinished.values)
         return RockingSpectrum(_grid_spectrum(table, gathered.axes, gathered.gravity, shares))
     weight = mean_one(weights, len(gathered))
     median = float(weighted_fractiles(gathered.p.mean(axis=1), weight, _HALF)[0])
@@ -143,29 +144,40 @@ def rocking_spectrum(
 def fractiles_of(peaks: Floats, shares: Floats) -> Floats:
     """Fractiles of peaks (n, ...) along the first axis, shape (k, ...), for k shares from 0 to 1.
 
-    They are interpolated in the ordered values, and infinite where either neighbour is.
+    They are interpolated in the ordered values that are not NaN, and infinite where either neighbour is.
     """
-    ordered = np.sort(peaks, axis=0)
-    place = shares * (len(ordered) - 1)
+    ordered = np.sort(peaks, axis=0)  # those that are missing come last
+    known = np.maximum(np.count_nonzero(~np.isnan(peaks), axis=0), 1)
+    place = shares.reshape(-1, *[1] * known.ndim) * (known - 1)
     # Rounding must not take the place of one value for one above it, which may be infinite: 0.28 * 25 > 7.
     nearest = np.rint(place)
     place = np.where(np.abs(place - nearest) <= 1e-12 * np.maximum(nearest, 1.0), nearest, place)
     below = np.floor(place).astype(np.int64)
-    low, high = ordered[below], ordered[np.ceil(place).astype(np.int64)]
-    weight = (place - below).reshape(-1, *[1] * (ordered.ndim - 1))
+    low, high = (np.take_along_axis(ordered, at, axis=0) for at in (below, np.ceil(place).astype(np.int64)))
+    weight = place - below
     level = (weight == 0.0) | (low == high)
     between: Floats = low + weight * (np.where(level, 0.0, high) - np.where(level, 0.0, low))
     return between
 
 
 def weighted_fractiles(values: Floats, weights: Floats, shares: Floats) -> Floats:
-    """Lowest of the values (n, ...), some perhaps infinite, that k shares of the weight do not pass, shape (k, ...)."""
+    """Lowest of the values (n, ...) that are not NaN which k shares of the weight do not pass, shape (k, ...)."""
     order = np.argsort(values, axis=0, kind="stable")
     ordered = np.take_along_axis(values, order, axis=0)
-    passed = np.cumsum(weights[order], axis=0)
+    passed = np.cumsum(weights[order] * ~np.isnan(ordered), axis=0)
     # Rounding must not take a share that is met for one that is not.
     enough = passed[None] >= shares.reshape(-1, *[1] * values.ndim) * passed[-1] * (1.0 - 1e-12)
     return np.asarray(np.take_along_axis(ordered, np.argmax(enough, axis=1), axis=0))
+
+
+def overturned_share(peaks: Floats, weights: Floats | None = None) -> Floats:
+    """Share of the peaks (n, ...) along the first axis that are infinite, of those that are not NaN."""
+    known, fell = ~np.isnan(peaks), np.isinf(peaks)
+    if weights is not None and known.all():
+        return np.asarray(np.average(fell, axis=0, weights=weights))
+    counts = known if weights is None else known * weights.reshape(-1, *[1] * (peaks.ndim - 1))
+    with np.errstate(invalid="ignore"):
+        return np.asarray((fell * counts).sum(axis=0) / counts.sum(axis=0))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -176,7 +188,8 @@ class RockingSpectrum(DatasetResult):
     ----------
     data : xarray.Dataset
         Over (motion, alpha, restitution if given, p): peak_rotation (rad; pi/2 where the block
-        overturns), peak_over_alpha (infinite where it overturns) and overturned. Over (fractile, alpha, ..., p):
+        overturns), peak_over_alpha (infinite where it overturns, NaN where the simulation was given
+        up, which fractiles and shares leave out) and overturned. Over (fractile, alpha, ..., p):
         fractile_over_alpha. Over (alpha, ..., p): overturned_share. Coordinates besides: period 2 pi/p (s), and size R
         (m) of the rectangular block. Of an ensemble peaks are over (motion, block, p), fractiles and shares over p
         alone, p is the ensemble's median, and the blocks' weights (1 in the mean) are a coordinate.
@@ -205,7 +218,8 @@ class RockingSpectrum(DatasetResult):
                 for j in range(self.data.sizes["p"])
             ]
             parts.append(f"{title}\n{table_of_some(header, rows)}")
-        return "\n\n".join(parts)
+        missing = missing_text(np.isnan(self.data.peak_over_alpha.values))
+        return "\n\n".join(parts + [f"note: {missing}"] * bool(missing))
 
     def to_dict(self) -> dict[str, Any]:
         data = self.data
@@ -330,17 +344,15 @@ def _ensemble_spectrum(
     checks.grid_size({"motions": len(motions), "blocks": n, "p": count}, InvalidOption)
     resized = blocks.select(np.repeat(np.arange(n), count)).resized(np.tile(factors, n))
     table = simulate_many(resized, motions, **options)
-    require_finished(table.unfinished.values)
-    peak, overturned = (
-        table[name].transpose("motion", "block").values.reshape(-1, n, count)
-        for name in ("peak_rotation", "overturned")
+    peak, overturned, unfinished = (
+        table[name].transpose("motion", "block").values.reshape(-1, n, count) for name in _SIMULATED
     )
-    over_alpha = np.where(overturned, np.inf, peak / blocks.alpha.min(axis=1)[:, None])
+    over_alpha = ratios_of(peak, overturned, unfinished, blocks.alpha.min(axis=1)[:, None])
     weights_of_all = np.tile(weight, len(peak))
     found = (
         ("p",),
         weighted_fractiles(over_alpha.reshape(-1, count), weights_of_all, shares),
-        np.average(overturned.reshape(-1, count), axis=0, weights=weights_of_all),
+        overturned_share(over_alpha.reshape(-1, count), weights_of_all),
     )
     axes, peaks = {"p": rates, "fractile": shares}, (peak, over_alpha, overturned)
     described = _described_spectrum(table, ("block", "p"), peaks, found, axes, blocks.gravity)
@@ -354,9 +366,9 @@ def _grid_spectrum(table: xr.Dataset, axes: dict[str, Floats], gravity: float, s
     def on_grid(values: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
         return np.moveaxis(values.reshape(len(values), *map(len, axes.values())), 1, -1)
 
-    peak, overturned = on_grid(table.peak_rotation.values), on_grid(table.overturned.values)
-    over_alpha = np.where(overturned, np.inf, peak / axes["alpha"].reshape(-1, *[1] * (len(names) - 1)))
-    found = names, fractiles_of(over_alpha, shares), overturned.mean(axis=0)
+    peak, overturned, unfinished = (on_grid(table[name].values) for name in _SIMULATED)
+    over_alpha = ratios_of(peak, overturned, unfinished, axes["alpha"].reshape(-1, *[1] * (len(names) - 1)))
+    found = names, fractiles_of(over_alpha, shares), overturned_share(over_alpha)
     return _described_spectrum(
         table, names, (peak, over_alpha, overturned), found, {**axes, "fractile": shares}, gravity
     )

@@ -19,7 +19,7 @@ from rocking.chattering.coefficients import COEFFICIENTS
 from rocking.chattering.parameters import broadcast, checked_frequency, checked_restitution, checked_slenderness
 from rocking.compiling import AMPLITUDES, announce
 from rocking.engine import require_finished
-from rocking.errors import InvalidOption
+from rocking.errors import InvalidOption, Unfinished
 from rocking.kernels.sine.sequence import critical_amplitudes, fitted_amplitudes
 from rocking.motion import pulses
 from rocking.progress import Progress
@@ -169,15 +169,14 @@ def critical_amplitude_nonlinear(
     Returns
     -------
     array of float
-        Ground acceleration over g tan(alpha), the block's own threshold of uplift, of the broadcast shape. Multiply by
-        tan(alpha)/alpha to get it over g alpha, as in the slender theory.
+        Ground acceleration over g tan(alpha), the block's own threshold of uplift, of the broadcast shape; NaN where a
+        simulation is given up since eta is too close to 1. Multiply by tan(alpha)/alpha to get it over g alpha, as in
+        the slender theory.
 
     Raises
     ------
     InvalidOption
         If a parameter is NaN, infinite or out of range.
-    Unfinished
-        If a simulation is given up: eta is too close to 1.
 
     Notes
     -----
@@ -207,9 +206,12 @@ def _critical(omega: float, eta: float, alpha: float) -> float:
         return 1.0
     block = Block.from_parameters(p=1.0, alpha=alpha, restitution=eta)
     low, high = 1.0, _FIRST_HIGH
-    while _comes_to_rest(block, high, omega):
-        low, high = high, 2.0 * high
-    return bisected(low, high, lambda a: not _comes_to_rest(block, a, omega), width=_WIDTH)[0]
+    try:
+        while _comes_to_rest(block, high, omega):
+            low, high = high, 2.0 * high
+        return bisected(low, high, lambda a: not _comes_to_rest(block, a, omega), width=_WIDTH)[0]
+    except Unfinished:
+        return math.nan
 
 
 def _comes_to_rest(block: Block, a: float, omega: float) -> bool:
@@ -218,5 +220,5 @@ def _comes_to_rest(block: Block, a: float, omega: float) -> bool:
     turn = 2.0 * math.pi
     motion = pulses.sine(amplitude, omega / turn, cycles=(math.pi + _LEAD) / turn, phase=math.asin(1.0 / a) - _LEAD)
     response = simulate(block, motion, model="nonlinear", duration=motion.duration)
-    require_finished(np.array([response.unfinished]))
+    require_finished(response.unfinished)
     return bool((response.events["kind"] == "rest").any())

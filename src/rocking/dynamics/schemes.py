@@ -154,7 +154,7 @@ def compare_schemes(
         found = simulate_any(
             body, motion, model=equation, chattering=how, duration=duration, initial_position=position, **shared
         )
-        require_finished(np.array([found.unfinished]))
+        require_finished(found.unfinished)
         return found
 
     proof = marched(Certified())

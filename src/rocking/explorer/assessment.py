@@ -178,7 +178,7 @@ def described(assessment: Assessment) -> dict[str, Any]:
 def parts(assessment: Assessment) -> Generator[Payload]:
     """Simulate one record after the other, fit what has come so far, and find the margin of the case in the end."""
     case, count = assessment.case, len(assessment.entries)
-    fallen: list[Flags] = []
+    fallen: list[Floats] = []
     for k in range(count):
         motion = assessment.motion(k)
         fallen.append(_stripes(assessment, motion))
@@ -187,8 +187,8 @@ def parts(assessment: Assessment) -> Generator[Payload]:
     yield _part({"share": 1.0, "margin": _margin(case)}, assessment, fallen)
 
 
-def _stripes(assessment: Assessment, motion: Motion) -> Flags:
-    """Return whether the block overturns, at each level and in each polarity."""
+def _stripes(assessment: Assessment, motion: Motion) -> Floats:
+    """Return 1 where the block overturns, at each level and in each polarity, else 0; NaN where that is not known."""
     case = assessment.case
     many = Blocks.of(case.block)
     table = simulate_levels(
@@ -197,22 +197,24 @@ def _stripes(assessment: Assessment, motion: Motion) -> Flags:
     )  # fmt: skip
     if "polarity" not in table.dims:
         table = table.expand_dims("polarity")
-    found: Flags = table.overturned.transpose("level", "polarity", "motion", "block").values[:, :, 0, 0]
-    return found
+    found = table.overturned.where(~table.unfinished).transpose("level", "polarity", "motion", "block")
+    return np.asarray(found.values[:, :, 0, 0], dtype=float)
 
 
-def _part(header: dict[str, Any], assessment: Assessment, fallen: list[Flags]) -> Payload:
+def _part(header: dict[str, Any], assessment: Assessment, fallen: list[Floats]) -> Payload:
     """Return what is sent with a part: the curve through all outcomes so far, as `rocking.fragility` fits it."""
     outcomes = np.stack(fallen, axis=1)  # level, motion, polarity, in the order of `rocking.fragility`
     levels = np.broadcast_to(assessment.levels[:, None, None], outcomes.shape).ravel()
     own = np.array(assessment.clusters[: len(fallen)])
     clusters = np.broadcast_to(own[None, :, None], outcomes.shape).ravel()
-    arrays = {"seen": outcomes.mean(axis=(1, 2))}
+    known = ~np.isnan(outcomes.ravel())
+    arrays, count = {"seen": outcomes.mean(axis=(1, 2), where=~np.isnan(outcomes))}, int(known.sum())
+    data, groups = (levels[known], outcomes.ravel()[known]), clusters[known]
     try:
-        fitted = fit_fragility(levels, outcomes.ravel(), clusters=clusters, measure=assessment.measure)
+        fitted = fit_fragility(*data, clusters=groups, measure=assessment.measure)
     except Unfitted as refused:
         words = phrase("assessment.no_fit", reason=str(refused))
-        return Payload({**header, "fit": None, "why": words, "outcomes": outcomes.size}, arrays)
+        return Payload({**header, "fit": None, "why": words, "outcomes": count}, arrays)
     curve, at = fitted.curves[0], np.linspace(0.0, assessment.levels[-1], _POINTS)
     lower, upper = curve.band(at) if curve.bounded else (np.zeros_like(at), np.ones_like(at))
     fit = {
@@ -225,7 +227,7 @@ def _part(header: dict[str, Any], assessment: Assessment, fallen: list[Flags]) -
         "exceeded": int(curve.exceeded.sum()),
         "notes": list(replace(fitted, source="motion" if assessment.stations is None else "cluster").notes),
     }
-    header = {**header, "fit": fit, "why": None, "outcomes": outcomes.size}
+    header = {**header, "fit": fit, "why": None, "outcomes": count}
     return Payload(header, {**arrays, "at": at, "probability": curve.probability(at), "lower": lower, "upper": upper})
 
 

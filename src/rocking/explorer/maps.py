@@ -10,6 +10,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rocking.analysis.levels import ratios_of
 from rocking.analysis.overturning import modes_of
 from rocking.arrays import Flags, Floats, Integers
 from rocking.block import Blocks
@@ -162,8 +163,8 @@ def parts(grid: MapGrid, threads: int | None = None) -> Generator[Part]:
         quantities = {
             "outcome": outcome,
             "rest": np.where(ends["rests"] > 0, rest, np.nan),
-            "peak": np.where(ends["overturned"], np.inf, ends["peak_rotation"] / alpha.min(axis=1)),
-            "mode": modes_of(ends, grid.motion.duration),
+            "peak": ratios_of(ends["peak_rotation"], ends["overturned"], ends["unfinished"], alpha.min(axis=1)),
+            "mode": np.where(ends["unfinished"], np.nan, modes_of(ends, grid.motion.duration)),
         }
         values = np.array([quantities[name] for name in QUANTITIES], np.float32)
         yield Part(task.key[0], chosen, values)

@@ -11,6 +11,7 @@ from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.events import StepEnd, advance, apply_impact, first_root, raise_peak
 from rocking.kernels.ground import Ground, has_vertical, is_straight, last_piece, length_of, start_of
 from rocking.kernels.interpreted import Interpreted
+from rocking.kernels.leaning import leaning_at
 from rocking.kernels.rest import (
     ULP,
     Rest,
@@ -118,6 +119,9 @@ def march_step(ground: Ground, block: Record, rules: Record, table: Records, scr
         return end_by_overturning(ground, block, rules, table, state)
     if outcome == Outcome.STOPPED:
         return end_by_stopping(ground, rules, table, state)
+    if outcome == Outcome.LEANS:
+        state.end = time_of(ground, state)
+        return Ending.LEANS
     return Ending.BALANCED if outcome == Outcome.BALANCED else Ending.RUNNING
 
 
@@ -183,6 +187,11 @@ def long_step(ground: Ground, block: Record, rules: Record, scratch: Record, sta
     order, h, _ = expand(ground, block, rules, scratch, state, left)
     if state.smooth:  # rounding may say that the body is pushed back at an uplift
         scratch.rotation[2] = max(0.0, scratch.rotation[2])
+    if block.restrained and rules.endless and state.piece == last_piece(ground):
+        leaning = leaning_at(block, rules, state, 2.0 * scratch.rotation[2])
+        if leaning > 0.0:
+            state.leaning = leaning
+            return StepEnd(Outcome.LEANS, 0.0, state.u, state.v, 0.0, state.u)
     if block.yielding:
         return yielding_step(block, rules, scratch, state, order, h)
     balanced = state.v == 0.0 and scratch.rotation[2] == 0.0

@@ -39,6 +39,8 @@ class Outcome(IntEnum):
     BALANCED = 4
     #: A short step does not decide it; the full series does.
     UNDECIDED = 5
+    #: The motion is over, and the body leans for ever, held by its restraints.
+    LEANS = 6
 
 
 class TendonLaw(IntEnum):
@@ -82,6 +84,8 @@ class Ending(IntEnum):
     PAUSED = 5
     #: The whole budget of a simulation is spent.
     UNFINISHED = 6
+    #: The body leans for ever, held by its restraints.
+    LEANS = 7
 
 
 def _record(**fields: Any) -> np.dtype[np.void]:
@@ -124,13 +128,13 @@ RULES = _record(nonlinear="?", treatment="i8", tolerance="f8", stop="f8", endles
 #: jump; a proof is tried only at a speed below ``proof_speed``; ``stalled`` counts the rests only because time hardly
 #: advanced from one impact to the next. ``uplifted`` and ``rested`` are the last such times. ``near_ties`` counts the
 #: decisions by the last digits whether a block without weight touches the ground, or to which side it goes. ``law``
-#: and ``plastic`` are those of a tendon that yields.
+#: and ``plastic`` are those of a tendon that yields; ``leaning`` is the rotation about which the body leans at the end.
 STATE = _record(
     piece="i8", offset="f8", side="i8", u="f8", v="f8", peak="f8", until="i8", budget="i8",
     run="i8", proof_speed="f8", last_impact_time="f8", impacts="i8", ending="i8", smooth="?", peak_time="f8",
     run_start="f8", uplifted="f8", rested="f8", first_uplift="f8", first_rest="f8", resting="f8", end="f8",
     nodes="i8", events="i8", sequences="i8", uplifts="i8", rests="i8", stalled="i8", near_ties="i8",
-    law="i8", plastic="f8",
+    law="i8", plastic="f8", leaning="f8",
 )  # fmt: skip
 
 #: A step of a response: the state at its start, as `expand` takes it. Elsewhere a side is +1 or -1, and 0 at rest.

@@ -32,6 +32,7 @@ _LATER: Final = "#b0390c"
 #: which it stays is the darkest, as it is often a strip and must be seen between the others.
 _STAYS: Final = (("#ffffff", ""), ("#5d7da6", ""), ("#dde7f0", ""))
 _OVERTURNS_AFTER_REST: Final = ("#b0390c", "ooo")
+_UNFINISHED: Final = ("#b5b5b5", "++")
 _OVERTURNS: Final = (
     ("#7d2706", ""),
     ("#d9692a", "////"),
@@ -156,9 +157,9 @@ def regions_figure(
 
 
 def _look(region: int) -> tuple[str, str]:
-    """Colour and hatch of a region: from -4, overturns after a rest, and -3, no uplift, to n impacts."""
+    """Colour and hatch of a region: from -5, not finished, and -4, overturns after a rest, to n impacts."""
     if region < 0:
-        return (_OVERTURNS_AFTER_REST, *_STAYS)[region + 4]
+        return (_UNFINISHED, _OVERTURNS_AFTER_REST, *_STAYS)[region + 5]
     return _OVERTURNS[min(region, len(_OVERTURNS) - 1)]
 
 

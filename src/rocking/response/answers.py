@@ -37,6 +37,7 @@ class Answers:
     treatment: Treatment
     overturned: bool
     unfinished: bool
+    leans: bool
     overturn_time: float
     peak_rotation: float
     peak_time: float
@@ -46,6 +47,7 @@ class Answers:
     chattering: NDArray[np.void]
     stalled: int
     near_ties: int
+    _residual: float
     _trail: Trail
     _again: Callable[[float], Answers]
 
@@ -127,7 +129,7 @@ class Answers:
 
     @property
     def outcome(self) -> str:
-        """What becomes of the body, as a verb: "overturns", "stands", "does not move".
+        """What becomes of the body, as a verb: "overturns", "stands", "leans", "does not move".
 
         Also "has not overturned" where the simulation is `stopped`, "is given up" where it is `unfinished`, and "comes
         to rest" of a body that cannot overturn.
@@ -138,9 +140,19 @@ class Answers:
             return "is given up"
         if self.stopped:
             return "has not overturned"
+        if self.leans:
+            return "leans"
         if not self.moved:
             return UNMOVED
         return STANDS if self.body.coordinate.limit else "comes to rest"
+
+    @property
+    def residual_rotation(self) -> float:
+        """Rotation at which the block stays, rad: 0 where it rests upright, the equilibrium where it `leans`.
+
+        NaN where it overturns or its end is not known. Of another body its coordinate.
+        """
+        return math.nan if self.overturned or self.unfinished or self.stopped else self._residual
 
     @property
     def stopped(self) -> bool:
@@ -149,7 +161,7 @@ class Answers:
         What became of the block is then not known, and `overturned` says no more than "not by then".
         """
         over = self.motion is None or self.duration >= self.motion.end
-        return not (self.overturned or self.unfinished) and (self.moves_at_end or not over)
+        return not (self.overturned or self.unfinished or self.leans) and (self.moves_at_end or not over)
 
     @cached_property
     def tipping_time(self) -> float:

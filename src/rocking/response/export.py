@@ -123,8 +123,10 @@ def _attributes(response: Answers) -> dict[str, Any]:
         "overturned": int(response.overturned),
         "unfinished": int(response.unfinished),
         "stopped": int(response.stopped),
+        "leans": int(response.leans),
         named("overturn_time", "s"): response.overturn_time,
         named(f"peak_{coordinate.name}", coordinate.unit): response.peak_rotation,
+        named(f"residual_{coordinate.name}", coordinate.unit): response.residual_rotation,
         named("peak_time", "s"): response.peak_time,
         "ambiguous": int(response.ambiguous),
     }

@@ -43,12 +43,15 @@ class Response(Answers, DrawnResult):
         Whether the rotation reached pi/2.
     unfinished : bool
         Whether the simulation was given up after too many steps; all else is then as far as it came.
+    leans : bool
+        Whether restraints hold it leaning for ever, about `residual_rotation`: proven at the end, `duration`. It may
+        still oscillate then, and never reaches zero rotation again nor more than the peak.
     overturn_time : float
         When it first did, s; NaN otherwise.
     peak_rotation, peak_time : float
         Largest |theta|, rad, and when, s; pi/2 when overturned. Of another body its coordinate.
     duration : float
-        End of the response, s.
+        End of the response, s; of one that leans when that was proven.
     events : structured array
         time (s), kind ("uplift", "rest", "overturn"), side (+1, -1; 0 at rest).
     impacts : structured array

@@ -53,6 +53,7 @@ def summary_rows(response: Answers, friction: float | None, precision: float) ->
         *_event_rows(response),
         Row("impacts resolved", f"{len(response.impacts)}"),
         *_peak_rows(response),
+        *([Row("residual rotation", _residual_text(response))] if response.leans else []),
         *_tendon_rows(response),
     ]
     if isinstance(body, RestrainedBlock) and body.contact is None:
@@ -109,9 +110,11 @@ def facts(response: Answers, friction: float | None, precision: float) -> list[R
         Row("overturned", response.overturned),
         Row("unfinished", response.unfinished),
         Row("stopped", response.stopped),
+        Row("leans", response.leans),
         Row("overturn_time", response.overturn_time, "s"),
         Row("tipping_time", response.tipping_time, "s"),
         Row(f"peak_{name}", response.peak_rotation, unit),
+        Row(f"residual_{name}", response.residual_rotation, unit),
     ]
     if limit:
         rows.append(Row(f"peak_over_{limit}", response.peak_over_slenderness))
@@ -153,6 +156,8 @@ def in_words(response: Answers, overturn_time: str) -> str:
         goes_on = motion is not None and response.duration < motion.end
         to_come = f"; the motion goes on to {motion.end:.6g} s" if motion is not None and goes_on else ""
         return f"{_when_stopped(response)}, where the simulation was stopped{to_come}"
+    if response.leans:
+        return f"does not overturn: it stays leaning, at {_residual_text(response)}"
     if not response.moved:
         return "does not move"
     return "rocks and does not overturn" if _can_overturn(response) else "moves, and comes to rest"
@@ -169,6 +174,8 @@ def in_brief(response: Answers, precision: float) -> str:
         text = near.outcome if near.is_decided else f"undecided: {near.outcome}"
     if response.overturned and near.is_decided:
         text += f" at {_short_text(response.overturn_time, *near.overturn_range, most=_BRIEF)}"
+    elif response.leans:
+        text += f" at {_residual_text(response)}"
     elif response.stopped:
         text = _when_stopped(response) if near.is_decided else text
     parts = [
@@ -176,6 +183,11 @@ def in_brief(response: Answers, precision: float) -> str:
         for share, each in zip(shares, (near, further), strict=True)
     ]
     return f"{text} in {', '.join(parts)}{', AMBIGUOUS' if response.ambiguous else ''}"
+
+
+def _residual_text(response: Answers) -> str:
+    """Rotation about which the block leans; it depends on the peak where a tendon has yielded."""
+    return f"{response.residual_rotation:.{_peak_digits(response)}g} {response.body.coordinate.unit}"
 
 
 def ratio_text(response: Answers) -> str:

@@ -16,12 +16,13 @@ from rocking.analysis.fragility.fit import OVERTURNING, fit_fragility, of_polari
 from rocking.analysis.fragility.result import Fragility
 from rocking.analysis.levels import clusters_of, motions_in_words, only_block, pooled, units_of, values_of
 from rocking.arrays import Floats
+from rocking.engine import missing_text
 from rocking.ensemble import Product, body_coordinates, verticals_of
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
 from rocking.progress import Progress
 from rocking.result import table_of_some, variable
-from rocking.studies.spectrum import BlocksResult, peak_ratios, polarities_that_count, require_limits
+from rocking.studies.spectrum import BlocksResult, missing_attribute, peak_ratios, polarities_that_count, require_limits
 from rocking.studies.store import Store
 from rocking.tables import counted
 
@@ -57,10 +58,12 @@ def pooled_fragility(
     shares, band = weights_of(weights, len(product.bodies)), Band(confidence=confidence)
     motions, scales, _, _ = product.shape
     counts = {name: np.zeros((motions, scales, len(units))) for name in limits}
-    trials = np.zeros((motions, scales, len(units)))
+    trials, missing = np.zeros((motions, scales, len(units))), 0
     for blocks, ratios in peak_ratios(store):
         belongs = np.where(which[blocks][:, None] == np.arange(len(units)), shares[blocks][:, None], 0.0)
-        trials += np.full(ratios.shape[:2] + ratios.shape[3:], float(ratios.shape[2])) @ belongs
+        known = ~np.isnan(ratios)
+        trials += known.sum(axis=2, dtype=float) @ belongs
+        missing += int(np.count_nonzero(~known))
         for name, limit in limits.items():
             counts[name] += passed(ratios, limit, name).sum(axis=2) @ belongs
     x = _intensities(product, measure)[:, :, None] / units
@@ -91,6 +94,7 @@ def pooled_fragility(
         with_vertical=bool(verticals_of(product.motions)),
         several_blocks=bool(np.count_nonzero(shares) > 1),
         source="motion" if clusters is None else "cluster",
+        missing=missing_text(missing),
     )
 
 
@@ -110,20 +114,22 @@ def block_fragilities(
     faults = np.full(shape, "", dtype=object)
     intensities = _intensities(store.product, measure).ravel()
     units = units_of(store.product.bodies, measure, store.product.model)
-    options: dict[str, Any] = {
-        "clusters": np.repeat(clusters_of(store.product.motions, clusters), scales),
-        "measure": measure,
-        "band": Band(confidence=confidence),
-    }
+    together, missing = np.repeat(clusters_of(store.product.motions, clusters), scales), 0
+    options: dict[str, Any] = {"measure": measure, "band": Band(confidence=confidence)}
     with Progress("fitting", count * len(limits), show=progress) as bar:
         for blocks, ratios in peak_ratios(store):
             counted = polarities_that_count(store.product.bodies.select(blocks), ratios.shape[2])
             for (i, (name, limit)), j in itertools.product(enumerate(limits.items()), range(blocks.start, blocks.stop)):
                 polarities = int(counted[j - blocks.start])
-                exceeded = passed(ratios[:, :, :polarities, j - blocks.start], limit, name).sum(axis=2).ravel()
-                kept["exceeded"][i, j], kept["outcomes"][i, j] = exceeded.sum(), exceeded.size * polarities
+                own = ratios[:, :, :polarities, j - blocks.start]
+                exceeded = passed(own, limit, name).sum(axis=2).ravel()
+                trials = np.count_nonzero(~np.isnan(own), axis=2).ravel()
+                some = trials > 0
+                data = intensities[some] / units[j], {name: exceeded[some]}
+                kept["exceeded"][i, j], kept["outcomes"][i, j] = exceeded.sum(), trials.sum()
+                missing += exceeded.size * polarities - int(trials.sum())
                 try:
-                    fitted = fit_fragility(intensities / units[j], {name: exceeded}, trials=polarities, **options)
+                    fitted = fit_fragility(*data, trials=trials[some], clusters=together[some], **options)
                 except InvalidOption as error:  # no lognormal fits outcomes that are all alike, or separated
                     faults[i, j] = str(error)
                 else:
@@ -146,6 +152,7 @@ def block_fragilities(
                 "model": store.product.model,
                 "measure": measure.name,
                 **measure.options(),
+                **missing_attribute(missing),
             },
         )
     )
@@ -202,6 +209,7 @@ class BlockFragilities(BlocksResult):
         without = int(np.count_nonzero(data.fault.values != ""))
         text = f"{self._heading}; intensity: {self.measure.label}"
         text += f"; {counted(without, 'curve')} cannot be fitted (fault says why)" if without else ""
+        text += f"; {data.missing}" if "missing" in data.attrs else ""
         return f"{text}\n\n{table_of_some(header, rows)}"
 
     def to_dict(self) -> dict[str, Any]:

@@ -12,10 +12,11 @@ import numpy as np
 
 from rocking import checks
 from rocking.analysis.fragility.curve import checked_limit
-from rocking.analysis.spectrum import fractiles_of
+from rocking.analysis.levels import ratios_of
+from rocking.analysis.spectrum import fractiles_of, overturned_share
 from rocking.arrays import Floats, Integers, evenly
 from rocking.body import Bodies
-from rocking.engine import require_finished
+from rocking.engine import missing_text
 from rocking.ensemble import body_coordinates
 from rocking.errors import InvalidOption, StudyError
 from rocking.motion.scaling import Measure
@@ -65,7 +66,8 @@ def polarities_that_count(bodies: Bodies, polarities: int) -> Integers:
 def peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
     """Peak rotation over the slenderness, infinite where a block overturned, for a range of blocks after the other.
 
-    Of blocks that stand it is NaN where the study keeps no peak rotation: whoever needs it asks `require_ratios` first.
+    It is NaN where the simulation was given up. Of blocks that stand it is 0 where the study keeps no peak rotation:
+    whoever needs it asks `require_ratios` first.
 
     Yields
     ------
@@ -79,8 +81,6 @@ def peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
     ------
     StudyError
         If units are missing or damaged, or the study's duration stopped simulations before their end.
-    Unfinished
-        If simulations were given up, so that their verdicts are not known.
     """
     store.require_complete()
     motions, scales, polarities, _ = store.grid.shape
@@ -101,7 +101,6 @@ def _read(store: Store, shape: tuple[int, int, int], unit: int, blocks: slice) -
         motions, scales, polarities, whole = store.grid.ranges(key)
         some = slice(blocks.start - whole.start, blocks.stop - whole.start)
         outcomes = {name: values[..., some] for name, values in store.present(key).items()}
-        require_finished(outcomes["unfinished"].astype(bool))
         stopped = int(np.count_nonzero(outcomes["stopped"]))
         if stopped:
             raise StudyError(
@@ -110,7 +109,8 @@ def _read(store: Store, shape: tuple[int, int, int], unit: int, blocks: slice) -
                 "without a duration"
             )
         there = ratios[motions, scales, polarities]
-        found = np.where(outcomes["overturned"] != 0.0, np.inf, outcomes.get("peak_rotation", np.nan) / alpha)
+        peak = outcomes.get("peak_rotation", np.zeros_like(outcomes["overturned"]))
+        found = ratios_of(peak, outcomes["overturned"] != 0.0, outcomes["unfinished"] != 0.0, alpha)
         there[...] = found[:, :, : there.shape[2]]
     return ratios
 
@@ -142,7 +142,7 @@ def study_spectrum(store: Store, fractiles: Sequence[float] = FRACTILES, progres
     shares = checked_fractiles(fractiles)
     product, count = store.product, len(store.product.bodies)
     values = np.empty((len(shares), product.scales.count, count))
-    overturned = np.empty((product.scales.count, count))
+    overturned, missing = np.empty((product.scales.count, count)), 0
     with Progress("reading", count, show=progress) as bar:
         for blocks, ratios in peak_ratios(store):
             counted = polarities_that_count(product.bodies.select(blocks), ratios.shape[2])
@@ -151,7 +151,8 @@ def study_spectrum(store: Store, fractiles: Sequence[float] = FRACTILES, progres
                 own = ratios[:, :, :polarities, some]
                 pooled = own.swapaxes(1, 2).reshape(-1, product.scales.count, some.size)
                 values[:, :, blocks.start + some] = fractiles_of(pooled, shares)
-                overturned[:, blocks.start + some] = np.isinf(pooled).mean(axis=0)
+                overturned[:, blocks.start + some] = overturned_share(pooled)
+                missing += int(np.count_nonzero(np.isnan(pooled)))
             bar.advance(blocks.stop - blocks.start)
     words = "peak rotation over the slenderness, infinite where that share overturns"
     return StudySpectrum(
@@ -165,9 +166,14 @@ def study_spectrum(store: Store, fractiles: Sequence[float] = FRACTILES, progres
                 "scale": ("scale", product.scales.values, product.scales.about),
                 **body_coordinates(product.bodies),
             },
-            {"motions": len(product.motions), "model": product.model},
+            {"motions": len(product.motions), "model": product.model, **missing_attribute(missing)},
         )
     )
+
+
+def missing_attribute(missing: int) -> dict[str, str]:
+    """Return what a result of a study says on simulations that were given up; nothing where there are none."""
+    return {"missing": missing_text(missing)} if missing else {}
 
 
 def checked_fractiles(fractiles: Sequence[float]) -> Floats:
@@ -276,7 +282,8 @@ class StudySpectrum(BlocksResult):
         """Say what the figure and the table are about, and of which scales."""
         motions, scales, shown = int(self.data.motions), self.data.sizes["scale"], len(self._some_scales())
         left_out = f"; {shown} of {scales} scales are shown" if shown < scales else ""
-        return f"{counted(motions, 'motion')}, {self.data.model} model{left_out}"
+        missing = f"; {self.data.missing}" if "missing" in self.data.attrs else ""
+        return f"{counted(motions, 'motion')}, {self.data.model} model{left_out}{missing}"
 
     def _some_scales(self) -> list[int]:
         return evenly(self.data.sizes["scale"], _SCALES)

@@ -18,11 +18,11 @@ from rocking.analysis.calibration.space import unit_of
 from rocking.analysis.fragility.fit import fragility
 from rocking.analysis.fragility.result import Fragility
 from rocking.analysis.labels import groups_of
+from rocking.analysis.levels import note_missing
 from rocking.analysis.spectrum import RockingSpectrum, rocking_spectrum
 from rocking.arrays import Flags, Floats
 from rocking.block import Blocks
 from rocking.constants import Model
-from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
@@ -380,10 +380,11 @@ class Calibration(DrawnResult, TableResult):
 def overturned_under(
     blocks: Blocks, motions: Motions, model: Model, threads: int | None, progress: bool | None
 ) -> NDArray[np.float32]:
-    """1 where a block overturns under a motion, else 0; shape (n, m)."""
+    """1 where a block overturns under a motion, else 0, and 0.5 where the simulation was given up; shape (n, m)."""
     simulated = simulate_many(blocks, motions, model=model, threads=threads, progress=progress)
-    require_finished(simulated.unfinished.values)
-    return np.asarray(simulated.overturned.transpose("block", "motion").values, dtype=np.float32)
+    note_missing(simulated.unfinished.values)
+    known = simulated.overturned.astype(np.float32).where(~simulated.unfinished, np.float32(0.5))
+    return np.asarray(known.transpose("block", "motion").values, dtype=np.float32)
 
 
 def group_labels(groups: Sequence[object] | None, count: int, folds: int) -> NDArray[np.int64]:

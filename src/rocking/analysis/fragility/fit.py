@@ -19,6 +19,7 @@ from rocking.analysis.levels import (
     motions_in_words,
     only_block,
     pooled,
+    ratios_of,
     simulate_levels,
     undecided_text,
     units_of,
@@ -27,7 +28,7 @@ from rocking.analysis.levels import (
 from rocking.arrays import Floats
 from rocking.body import Bodies, Body
 from rocking.constants import Model
-from rocking.engine import Setup, require_finished
+from rocking.engine import Setup, missing_text
 from rocking.ensemble import SIGNS, Polarity, simulate_many
 from rocking.errors import InvalidOption, Unfitted
 from rocking.motion.named import Motions, several_motions
@@ -148,7 +149,6 @@ def fragility(
     }
     if stripes is None:
         table = simulate_many(many, shaken, model=model, **options).expand_dims("level")
-        require_finished(table.unfinished.values)
         intensity = (values[:, None] / units_of(many, how, model)[None, :])[None, :, :, None]
     else:
         table = simulate_levels(many, shaken, how, stripes, model=model, **options)
@@ -156,15 +156,15 @@ def fragility(
     if "polarity" not in table.dims:
         table = table.expand_dims("polarity")
     table = table.transpose("level", "motion", "block", "polarity")
-    ratio = table.peak_rotation.values / slenderness[:, None]
-    ratio[table.overturned.values] = np.inf
+    missing = table.unfinished.values
+    ratio = ratios_of(table.peak_rotation.values, table.overturned.values, missing, slenderness[:, None])
     groups = np.broadcast_to(together[None, :, None, None], ratio.shape)
     x, trials = (np.broadcast_to(each, ratio.shape).ravel() for each in (intensity, shares[:, None]))
     outcomes = _outcomes(table, how, x, ratio, states)
     if weights is not None:
         outcomes["weight"] = trials
-    # What a block without weight does is told, but is none of the data.
-    counts = trials > 0.0
+    # What a block without weight does is told, but is none of the data; nor is what was given up.
+    counts = (trials > 0.0) & ~missing.ravel()
     x, trials, groups = x[counts], trials[counts], groups.ravel()[counts]
     data = {name: (x, trials * passed(ratio, limit, name).ravel()[counts], trials) for name, limit in states.items()}
     try:
@@ -191,6 +191,7 @@ def fragility(
         several_blocks=bool(np.count_nonzero(shares) > 1),
         source="motion" if clusters is None else "cluster",
         undecided=undecided_text(setup, shaken, scales[..., None] * signs, table.overturned.values, threads),
+        missing=missing_text(missing),
     )
 
 
@@ -228,6 +229,7 @@ def _outcomes(
             "peak_rotation_rad": table.peak_rotation.values.ravel(),
             "peak_over_alpha": ratio.ravel(),
             "overturned": table.overturned.values.ravel(),
+            "unfinished": table.unfinished.values.ravel(),
             **{f"exceeded_{name}": passed(ratio, limit, name).ravel().astype(bool) for name, limit in limits.items()},
         }
     )

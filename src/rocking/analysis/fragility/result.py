@@ -58,8 +58,8 @@ class Fragility(DrawnResult, TableResult):
     outcomes : pandas.DataFrame or None
         What was simulated, one row each, so that the fit can be audited: motion, block (position), polarity, the
         measure with its unit (SI, as pga_m_s2), peak_rotation_rad, peak_over_alpha (infinite where it overturned),
-        overturned, whether each limit state was exceeded, and the weight of the block where it has one; None where the
-        outcomes were given.
+        overturned, unfinished (its peak_over_alpha is NaN then), whether each limit state was exceeded, and the weight
+        of the block where it has one; None where the outcomes were given.
     one_way : bool
         Whether sides that differ met motions in one polarity only: reversed, they do something else.
     with_vertical : bool
@@ -70,6 +70,8 @@ class Fragility(DrawnResult, TableResult):
         What a cluster of outcomes comes from: a motion, or, where outcomes were given, a cluster.
     undecided : str
         How many outcomes of a sample change within 3e-6 of the motion; empty where outcomes were given.
+    missing : str
+        How many simulations were given up, which the curves leave out; empty where there are none.
     """
 
     TABLES = ("curves", "outcomes")
@@ -85,6 +87,7 @@ class Fragility(DrawnResult, TableResult):
     several_blocks: bool = False
     source: str = "motion"
     undecided: str = ""
+    missing: str = ""
 
     def summary(self) -> str:
         scale = self.measure.scale
@@ -109,7 +112,7 @@ class Fragility(DrawnResult, TableResult):
     @property
     def notes(self) -> tuple[str, ...]:
         """What is to be known before the curves are believed, a sentence each."""
-        notes = [self.undecided] if self.undecided else []
+        notes = [text for text in (self.missing, self.undecided) if text]
         if self.one_way:
             notes.append(
                 "the sides differ, and motions came in one polarity only: reversed ones give another curve; "

@@ -17,13 +17,12 @@ from numpy.typing import ArrayLike
 
 from rocking.analysis.calibration.evidence import blurred, expected_share
 from rocking.analysis.calibration.result import Calibration, Validation
-from rocking.analysis.levels import mean_one, pooled
+from rocking.analysis.levels import mean_one, note_missing, pooled, ratios_of
 from rocking.analysis.validation.scores import Ranks
 from rocking.analysis.validation.tested import Observed
 from rocking.arrays import Flags, Floats, Integers
 from rocking.body import Bodies, Body
 from rocking.constants import Model
-from rocking.engine import require_finished
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
 from rocking.problem import bodies_of, slenderness_of
@@ -141,7 +140,7 @@ class Predicted:
             places = np.minimum(np.searchsorted(ranks.points, values), len(ranks.points) - 1)
             uniform = ranks.uniform_at(places, uniform)
         low, high = ranks.intervals(uniform)
-        fell = np.isinf(values)
+        fell = ~np.isfinite(values)
         return tuple(np.where(fell, math.nan, each) for each in (values, low, high))  # type: ignore[return-value]
 
     def drawn_blocks(self, labels: Integers | None, count: int, rng: np.random.Generator) -> Integers | None:
@@ -256,10 +255,12 @@ def _simulated(
     needed, which = np.unique(tests.which[where], return_inverse=True)
     motions = [tests.distinct[k] for k in needed]
     simulated = simulate_many(bodies, motions, model=model, threads=threads, progress=progress)
-    require_finished(simulated.unfinished.values)
-    fell = simulated.overturned.transpose("block", "motion").values
-    peaks = np.where(fell, math.inf, simulated.peak_rotation.transpose("block", "motion").values)[:, which]
-    share = shares @ np.isinf(peaks).astype(np.float64)
+    peak, fell, missing = (
+        simulated[name].transpose("block", "motion").values for name in ("peak_rotation", "overturned", "unfinished")
+    )
+    note_missing(missing)
+    peaks = ratios_of(peak, fell, missing, 1.0)[:, which]
+    share = shares @ np.where(np.isnan(peaks), 0.5, np.isinf(peaks).astype(np.float64))
     expected = share if math.isinf(effective) else expected_share(share, effective)
     lapse = 0.0 if lapse is None else lapse
     # A sum of weights may be a rounding above 1.
