@@ -431,12 +431,18 @@ def test_one_case_has_one_peak_in_every_output(pga):
     block, motion = Block(width=0.24, height=1.1), rocking.records.load("ridgecrest-clc-090").scaled_to(pga * 9.80665)
     response = rocking.simulate(block, motion)
     (line,) = (row for row in response.summary().splitlines() if row.startswith("peak rotation"))
-    (shown,) = re.findall(r"([0-9.]+) of the slenderness", line)
+    low, high = re.search(r"([0-9.]+)(?: to ([0-9.]+))? of the slenderness", line).groups()
+    shown = survey(block, {"x": motion}).summary().splitlines()[-1].split()[2]
     assert f"peak {shown} of the slenderness" in repr(response)
-    assert survey(block, {"x": motion}).summary().splitlines()[-1].split()[2] == shown
+    if high is None:
+        assert low == shown
+    else:  # fewer than three digits are known
+        assert len(shown) <= 4 and float(low) - 0.05 <= float(shown) <= float(high) + 0.05
     assert known_ratio(response) == pytest.approx(float(shown), abs=5.1e-5)
-    assert verdict(response, block.uplift_thresholds())["values"]["share"]["values"]["value"] == 100.0 * known_ratio(
-        response
-    )
+    told = verdict(response, block.uplift_thresholds())
+    if response.perturbed().is_decided:
+        assert told["values"]["share"]["values"]["value"] == 100.0 * known_ratio(response)
+    else:
+        assert told["phrase"] == "verdict.undecided"
     checked = Check(block, ("x",), (response,), ({},), (0.5,)).summary()
     assert f"{float(shown):.3g}" in checked.splitlines()[4].split()

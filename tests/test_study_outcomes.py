@@ -12,7 +12,7 @@ import xarray as xr
 import rocking
 from rocking.explorer.studies import StudyView
 from rocking.studies import read_study
-from rocking.studies.inputs import ALWAYS_KEPT, OUTCOMES
+from rocking.studies.inputs import ALWAYS_KEPT, OUTCOMES, UNNAMED
 from rocking.studies.units import UnitGrid
 
 BLOCKS = rocking.Blocks.grid(p=np.linspace(1.0, 6.0, 130), alpha=[0.1, 0.2, 0.25, 0.3], restitution=[0.85])
@@ -90,26 +90,34 @@ def test_a_unit_holds_only_what_is_kept(complete, whole):
 @pytest.mark.parametrize(
     "outcomes", [None, OUTCOMES, OUTCOMES[::-1], [name for name in OUTCOMES if name not in ALWAYS_KEPT]]
 )
-def test_without_a_choice_or_with_all_outcomes_a_study_is_what_it_always_was(few_blocks, tmp_path, outcomes):
+def test_without_a_choice_or_with_all_outcomes_a_study_keeps_all(few_blocks, tmp_path, outcomes):
     made(tmp_path, FEW, outcomes=outcomes).run(threads=1)
     found = contents(tmp_path)
     assert found == contents(few_blocks.place)
     about = json.loads(found["study.json"])
+    assert (about["format"], about["outcomes"]) == (3, [*OUTCOMES])
+
+
+def test_a_store_from_before_blocks_could_lean_names_no_outcomes_and_is_read(tmp_path):
+    made(tmp_path, FEW, outcomes=UNNAMED).run(threads=1)
+    about = json.loads(contents(tmp_path)["study.json"])
     assert [*about] == ["format", "version", "kernels", "unit", "shape", "inputs", "parts", "seal"]
     assert about["format"] == 2
+    assert [*rocking.study(tmp_path).results().data_vars] == [*UNNAMED]
+    assert {*OUTCOMES} - {*UNNAMED} == {"leans", "residual_rotation"}
 
 
 @pytest.mark.parametrize(
     ("grid", "digest"),
     [
         (
-            UnitGrid((3, 2, 2, 1300), (1, 1, 1, 9), OUTCOMES),
+            UnitGrid((3, 2, 2, 1300), (1, 1, 1, 9), UNNAMED),
             "344b720410338e6b86fca1e59ed56b68767297c9741e5ed4f09b56901d050cad",
         ),
-        (UnitGrid((1000,), (64,), OUTCOMES), "bc3f04121c5e20dc9ef2e117ffc2ffd0936905edd73ae4252670bd3c6987781f"),
+        (UnitGrid((1000,), (64,), UNNAMED), "bc3f04121c5e20dc9ef2e117ffc2ffd0936905edd73ae4252670bd3c6987781f"),
     ],
 )
-def test_the_array_of_all_outcomes_is_described_to_the_byte_as_it_always_was(grid, digest):
+def test_the_array_of_the_former_outcomes_is_described_to_the_byte_as_it_always_was(grid, digest):
     assert hashlib.sha256(grid.metadata()).hexdigest() == digest
 
 
@@ -144,7 +152,7 @@ def test_a_unit_of_another_choice_is_damage(complete, whole, tmp_path):
     name = "result/c.0.0.0.0.0"
     (tmp_path / name).write_bytes(contents(whole)[name])
     (fault,) = study.verify()
-    assert "c.0.0.0.0.0 is damaged, it holds 45056 bytes, not 20480" in fault
+    assert "c.0.0.0.0.0 is damaged, it holds 53248 bytes, not 20480" in fault
 
 
 @pytest.mark.parametrize(

@@ -33,6 +33,9 @@ _EPOCH: Final = (1980, 1, 1, 0, 0, 0)
 #: All outcomes of a simulation, in the order in which a store holds them.
 OUTCOMES: Final = tuple(VARIABLES)
 
+#: Outcomes of a store that names none: all that there were before blocks could lean.
+UNNAMED: Final = tuple(name for name in OUTCOMES if name not in {"leans", "residual_rotation"})
+
 #: Kept whatever is chosen: without them nobody could tell an answer from one that was given up, stopped or not proven.
 ALWAYS_KEPT: Final = ("stalled", "unfinished", "stopped")
 

@@ -17,7 +17,7 @@ from rocking.ensemble import Product, setup_of
 from rocking.errors import DamagedStudy, StudyError
 from rocking.kernels.compiled import fingerprint
 from rocking.studies import inputs
-from rocking.studies.inputs import OUTCOMES, outcomes_text
+from rocking.studies.inputs import UNNAMED, outcomes_text
 from rocking.studies.place import Place
 from rocking.studies.units import DamagedUnit, GridWork, Key, UnitGrid, Work, decoded, key_of, name_of
 from rocking.tables import counted
@@ -154,7 +154,7 @@ class Store(UnitArray):
             "inputs": hashlib.sha256(archive).hexdigest(),
             "parts": inputs.hashes(product),
         }
-        if outcomes != OUTCOMES:
+        if outcomes != UNNAMED:
             about |= {"format": _CHOSEN, "outcomes": list(outcomes)}
         place.put("study.json", sealed(about))
         return made
@@ -169,7 +169,7 @@ class Store(UnitArray):
                 "inputs.npz is missing or damaged; restore it, or create the study again elsewhere", path=str(place)
             )
         product = inputs.from_bytes(archive)
-        grid = UnitGrid(product.shape, tuple(about["unit"]), tuple(about.get("outcomes", OUTCOMES)))
+        grid = UnitGrid(product.shape, tuple(about["unit"]), tuple(about.get("outcomes", UNNAMED)))
         return cls(place, product, grid)
 
     @property
