@@ -65,6 +65,12 @@ def summary_rows(response: Answers, friction: float | None, precision: float) ->
             Row("least normal force", f"{response.minimum_normal_force:.4f}", "of the weight", tips),
             *_contact_rows(response, friction, sliding),
         ]
+    near = response.perturbed()
+    if (
+        np.max(np.nan_to_num(near.event_spreads, nan=math.inf), initial=0.0) >= _SHOWN
+        or _peak_digits(response) < _FEWEST_DIGITS
+    ):
+        rows.append(Row("ranges", f"those of the {near.sample}; other factors can lead beyond them"))
     without_sliding = "" if math.isnan(sliding) else " (as if it did not slide)"
     return [
         *rows,
