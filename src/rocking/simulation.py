@@ -141,7 +141,7 @@ def response_to(
         duration=float(start["end"]),
         events=_events(events),
         impacts=_public(table["impact"][: start["impacts"]], _IMPACT),
-        chattering=_public(table["sequence"][: start["sequences"]], _CHATTERING),
+        _sequences=_public(table["sequence"][: start["sequences"]], _CHATTERING),
         stalled=int(start["stalled"]),
         near_ties=int(start["near_ties"]),
         _residual=float(block.stops[int(start["side"] in (1, -2))] + (1 - 2 * start["side"]) * start["leaning"]),

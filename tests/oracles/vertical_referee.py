@@ -405,13 +405,13 @@ def _cancellation(motion: rocking.Motion | None) -> float:
 
 @dataclass(frozen=True)
 class Event:
-    """An event or impact; how a relative change of all that is given changes its time, and how well it is known."""
+    """An event or impact; how a relative change of all that is given changes its time; of a rest its bracket."""
 
     time: Any
     kind: str
     side: int
     change: float = 0.0
-    known: float = 0.0
+    bracket: Pair = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -454,7 +454,7 @@ class _Judge:
             self.value("peak", response.peak_rotation, course.peak, self.peak[0])
         if self.given.rotation == self.given.velocity == 0.0:
             self.ensemble()
-        for sequence in response.chattering:
+        for sequence in response._sequences:
             self.bracket(sequence)
         mine, theirs = self.found_rockings(), self.true_rockings()
         visible = [[rocking for rocking in side if rocking.height > self.nothing] for side in (mine, theirs)]
@@ -502,12 +502,12 @@ class _Judge:
         return NOTHING * min(self.given.alpha)
 
     def found_rockings(self) -> list[Rocking]:
-        """From uplift to rest each; known is the width of the bracket."""
+        """From uplift to rest each."""
         response = self.response
-        widths = iter(np.nan_to_num(response.chattering["upper"] - response.chattering["lower"]))
+        brackets = iter(response.chattering[["lower", "upper"]].tolist())
         rockings, events, start = [], [], 0.0
         for k, (time, kind, side) in enumerate(response.events.tolist()):
-            events.append(Event(time, kind, side, self.events[k], next(widths) if kind == "rest" else 0.0))
+            events.append(Event(time, kind, side, self.events[k], next(brackets) if kind == "rest" else (time, time)))
             if kind == "uplift":
                 start = time
                 continue
@@ -536,7 +536,10 @@ class _Judge:
 
     def compare(self, found: Rocking, true: Rocking) -> None:
         for mine, theirs in zip(found.events, true.events, strict=True):
-            self.value(f"time of {mine.kind}", mine.time, theirs.time, mine.change, mine.known)
+            lower, upper = mine.bracket
+            self.value(f"time of {mine.kind}", mine.time, theirs.time, mine.change, float(np.nan_to_num(upper - lower)))
+            if mine.kind == "rest" and (theirs.time < lower or theirs.time > upper):
+                self.fault("bracket", (lower, upper), float(theirs.time), self.outside(theirs.time, lower, upper))
         rests = true.events[-1].kind == "rest"
         if len(true.impacts) < len(found.impacts) if rests else len(true.impacts) != len(found.impacts):
             self.fault("impacts", len(found.impacts), len(true.impacts))
@@ -550,7 +553,7 @@ class _Judge:
             self.value("time of an impact", mine.time, theirs.time, mine.change)
 
     def bracket(self, sequence: Any) -> None:
-        """The bracket holds from the state at the impact where it was proven, whatever came before."""
+        """What is proven holds from the state at the impact where it was proven, whatever came before."""
         lower, upper = float(sequence["lower"]), float(sequence["upper"])
         if np.isnan(lower):
             self.verdict.unproven += 1

@@ -16,7 +16,8 @@ from rocking.kernels import signatures
 #: What responses, maps and periodic motion need.
 _KERNELS: Final = (
     "ground.fill", "march.march", "trace.trace", "trace.vary", "uplift.note_complete", "lanes.run_lanes",
-    "lanes.march_each", "periodic.iterate", "periodic.differentiate",
+    "lanes.march_each", "periodic.iterate", "periodic.differentiate", "adjoint.adjoint", "adjoint.of_ending",
+    "uplift.next_uplifts",
 )  # fmt: skip
 
 #: Lowest priority of all: such a thread takes what others leave, and all of it where they leave everything.

@@ -48,7 +48,7 @@ def facts(shown: Simulated) -> dict[str, Any]:
         "peak_time": response.peak_time,
         "impacts": len(response.impacts),
         "rests": int(np.sum(response.events["kind"] == "rest")),
-        "proven": int(np.sum(np.isfinite(response.chattering["upper"]))),
+        "proven": int(np.sum(~np.isnan(response.chattering["upper"]))),
         "time_at_rest": response.time_at_rest,
         "share_at_rest": episodes.share_at_rest,
         "eta_squared": math.prod(side.restitution for side in block.sides),
@@ -80,7 +80,7 @@ def verdict(response: Response, thresholds: tuple[float, float]) -> dict[str, An
         )
     if response.unfinished:
         return phrase("verdict.given_up", time=response.duration)
-    unproven = rests - int(np.sum(np.isfinite(response.chattering["upper"])))
+    unproven = rests - int(np.sum(~np.isnan(response.chattering["upper"])))
     resting = phrase("verdict.rests", count=rests) if rests else phrase("verdict.no_rest")
     if unproven:
         resting = phrase("verdict.unproven", rests=resting, unproven=unproven)

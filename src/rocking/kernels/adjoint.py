@@ -13,7 +13,7 @@ from enum import IntEnum
 from rocking.arrays import Floats
 from rocking.kernels.arc import evaluate, expand, restoring, sign_of
 from rocking.kernels.compiled import inlined, kernel, shared
-from rocking.kernels.ground import has_vertical
+from rocking.kernels.ground import absolute_sums, has_vertical, vertical_of
 from rocking.kernels.recurrences import variation_coefficients
 from rocking.kernels.restitution import middle_factor
 from rocking.kernels.state import Record, Records, TendonLaw
@@ -32,6 +32,12 @@ from rocking.kernels.trace import (
     restoring_by_tendon,
     saltation,
 )
+
+#: Numbers of a change with u, v and a plastic elongation.
+_PLAIN = 3
+
+#: Rounding of a step, over the largest terms that it is computed from.
+_ROUNDING = 2.0**-51
 
 
 class Ends(IntEnum):
@@ -56,7 +62,7 @@ def adjoint(trail: Trail, scratch: Record, work: Record, row: int, time: float, 
     It is that at ``time`` after the node of a row; infinite, at the end of its step, before an impact there. In
     ``change`` stays that at the start of the response, 0 where the body has come to rest. To row k of ``out`` is added
     the change with the coefficients of piece k, in units of g, horizontal ones first. ``work`` is scratch space
-    (`state.VARIATION`).
+    (`state.VARIATION`). Where ``change`` has two numbers more, see `add_rounding`.
     """
     block, nodes = trail.block, trail.nodes
     number = impacts_up_to(nodes, row)
@@ -82,9 +88,38 @@ def adjoint(trail: Trail, scratch: Record, work: Record, row: int, time: float, 
             if not back_through_impact(trail, k, v, number, change):
                 return Ends.GRAZES
         if t > 0.0:
+            if change.shape[0] > _PLAIN:
+                add_rounding(trail, scratch, k, order, t, change)
             back_through(trail, scratch, work, node, (order, degree), t, change, out)
     change[0] += plastic_by_start(trail) * change[2]
     return Ends.START
+
+
+@inlined
+def add_rounding(trail: Trail, scratch: Record, k: int, order: int, t: float, change: Floats) -> None:
+    """Add what the rounding of a time t of the arc from the k-th node changes, at most, to ``change[3]``.
+
+    In ``change[4]`` stays the greatest rate of the relative decrease of a speed just before its impact.
+    """
+    ground, block, node = trail.ground, trail.block, trail.nodes[k]
+    side, end = node.side, node.offset + t
+    u, v, w = evaluate(scratch.rotation, order, t)
+    if trail.nodes[k + 1].u == 0.0:
+        change[4] = max(change[4], -w / v)
+    speed = max(abs(node.v), abs(v))
+    height = max(node.u, u) + speed * t
+    operations = 0.5 * ground.columns
+    push = absolute_sums(ground, node.piece, end)[0] * operations + abs(block.added_push[side])
+    weight = 1.0 + abs(block.added_weight[side])
+    if has_vertical(ground):
+        weight += absolute_sums(vertical_of(ground), node.piece, end)[0] * operations
+    force = block.gain[side] * (abs(block.threshold[side]) * weight + abs(block.hold[side]) + push)
+    force += (abs(block.stiffness[side]) * (weight + push) + abs(block.spring[side])) * height
+    force = _ROUNDING * (force + abs(block.prestress[side]) + block.damping[side] * speed)
+    force += block.gain[side] * ground.error
+    change[3] += abs(change[0]) * (_ROUNDING * height + 0.5 * force * t * t)
+    change[3] += abs(change[1]) * (_ROUNDING * speed + force * t)
+    change[3] += abs(change[0] * v + change[1] * w) * _ROUNDING * end
 
 
 @inlined
@@ -244,9 +279,11 @@ def back_through(
     variation_coefficients(work, drag, order)
     u_by_v, v_by_v, _ = evaluate(x, order, t)
     change[0], change[1] = change[0] * u_by_u + change[1] * v_by_u, change[0] * u_by_v + change[1] * v_by_v
+    ground, block = trail.ground, trail.block
+    if change.shape[0] > _PLAIN and not block.yielding:  # only the rounding is asked for
+        return
     x[0], x[1] = change[1], drag * change[1] - change[0]
     variation_coefficients(work, -drag, order)
-    ground, block = trail.ground, trail.block
     lam, gain, threshold = block.stiffness[node.side], block.gain[node.side], block.threshold[node.side]
     m = work.forcing
     for k in range(order - 1):  # times d u'' / d A, of the horizontal motion in the frame of the side
@@ -264,7 +301,7 @@ def back_through(
         add_moments(scratch.other, m, order, node.offset, t, 1.0, out[node.piece, ground.columns :])
     if block.yielding and node.law == TendonLaw.ELASTIC:
         plastic_series(trail, scratch, node.side, x, order, m)
-        add_moments(scratch.other, m, order, 0.0, t, 1.0, change[2:])
+        add_moments(scratch.other, m, order, 0.0, t, 1.0, change[2:_PLAIN])
 
 
 @inlined

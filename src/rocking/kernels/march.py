@@ -42,7 +42,7 @@ from rocking.kernels.state import (
 from rocking.kernels.tendon import adopt, change_law, elongation_at, next_law
 from rocking.kernels.uplift import is_hardly_pushed, next_uplift
 
-#: Distance below zero rotation that is within rounding, over the highest rotation so far.
+#: Distance from zero rotation that is within rounding, over the highest rotation so far.
 _TOUCH = 2.0**-46
 
 #: Distance from zero rotation at which the rounding of the input may decide on an impact.
@@ -176,7 +176,7 @@ def follow_arc(ground: Ground, block: Record, rules: Record, scratch: Record, st
         end = short_step(ground, block, rules, state, left)
     if end.outcome == Outcome.UNDECIDED:
         end = long_step(ground, block, rules, scratch, state, left)
-    if has_vertical(ground) and end.outcome == Outcome.STEP and state.v < 0.0 <= end.v:
+    if state.v < 0.0 <= end.v and end.outcome == Outcome.STEP:
         state.near_ties += nearly_touches(ground, block, rules, scratch, state, end.time)
     return finish_step(ground, rules, state, end, left)
 
@@ -267,7 +267,7 @@ def is_weightless(ground: Ground, block: Record, state: Record, offset: float) -
 def nearly_touches(ground: Ground, block: Record, rules: Record, scratch: Record, state: Record, h: float) -> bool:
     """Whether the arc from a state has within h a minimum so near zero that rounding may hide an impact.
 
-    With a positive weight the motion is the same with the impact and without.
+    With a positive weight the motion is the same with the impact and without, and the number of impacts is not.
     """
     order, _, _ = expand(ground, block, rules, scratch, state, h)
     c, d = scratch.rotation, scratch.other
@@ -275,7 +275,8 @@ def nearly_touches(ground: Ground, block: Record, rules: Record, scratch: Record
         d[k] = -(k + 1) * c[k + 1]
     lowest_time = first_root(d, 0, order - 1, h)
     lowest, _, _ = evaluate(c, order, lowest_time)
-    return bool(lowest <= _NEAR_TIE * state.peak and is_weightless(ground, block, state, state.offset + lowest_time))
+    near = lowest <= _NEAR_TIE * state.peak and is_weightless(ground, block, state, state.offset + lowest_time)
+    return bool(near or lowest <= _TOUCH * state.peak)
 
 
 @inlined

@@ -66,6 +66,7 @@ def signatures() -> dict[str, list[tuple[Any, ...]]]:
         ],
         "periodic.to_next_impact": [(trail, scratch, state.record(state.VARIATION), table, states, reals(1, 2, 2))],
         "uplift.note_complete": [(seen, blocks, states, scratch, flags)],
+        "uplift.next_uplifts": [(trail, scratch, reals())],
         "ground.fill": [(given(3), given(2, 2), 1.0, seen, reals())],
         "lanes.run_lanes": [(seen, rules, scratch, pool, 0)],
         "lanes.march_each": [(seen, rules, scratch, pool)],

@@ -127,7 +127,7 @@ RULES = _record(nonlinear="?", treatment="i8", tolerance="f8", stop="f8", endles
 #: iterations left; ``run`` counts the impacts since chattering was proven; ``smooth`` marks an uplift that is not a
 #: jump; a proof is tried only at a speed below ``proof_speed``; ``stalled`` counts the rests only because time hardly
 #: advanced from one impact to the next. ``uplifted`` and ``rested`` are the last such times. ``near_ties`` counts the
-#: decisions by the last digits whether a block without weight touches the ground, or to which side it goes. ``law``
+#: decisions by the last digits whether a block touches the ground, or to which side it goes without weight. ``law``
 #: and ``plastic`` are those of a tendon that yields; ``leaning`` is the rotation about which the body leans at the end.
 STATE = _record(
     piece="i8", offset="f8", side="i8", u="f8", v="f8", peak="f8", until="i8", budget="i8",

@@ -20,6 +20,8 @@ from rocking.kernels.ground import (
     vertical_of,
 )
 from rocking.kernels.state import AT_REST, Record, Records, stop_of
+from rocking.kernels.tendon import adopt, plastic_after
+from rocking.kernels.trace import Trail
 
 #: Accelerations closer to a threshold than this fraction of it are at the threshold.
 _ROUNDING = 2.0**-48
@@ -73,6 +75,24 @@ def next_uplift(
                 return Uplift(piece, offset + passed, side, jump_minus if side == 1 else jump_plus)
         piece += 1
         offset = 0.0
+
+
+@kernel
+def next_uplifts(trail: Trail, scratch: Record, times: Floats) -> None:
+    """Write the time of the next uplift from each node at rest; an infinity where there is none.
+
+    The law of a tendon that yields changes in the trail's block.
+    """
+    ground, block, rules, nodes = trail
+    plastic = 0.0
+    for k in range(nodes.shape[0]):
+        node = nodes[k]
+        if block.yielding:
+            plastic = plastic_after(block, rules, nodes, k, plastic)
+            adopt(block, node.law, plastic)
+        if node.side < 0:
+            found = next_uplift(ground, block, scratch, node.side, node.piece, node.offset, rules.stop)
+            times[k] = start_of(ground, found.piece) + found.offset if found.side != AT_REST else np.inf
 
 
 @inlined

@@ -23,7 +23,7 @@ from rocking.response.contact import Contact, friction_coefficient, friction_dem
 from rocking.response.energy import Energy, energy_of, linear_balance
 from rocking.response.history import History, with_all_impacts
 from rocking.response.perturbed import COUNT, OVERTURNS, RELATIVE, STANDS, UNMOVED, Perturbed, Repeat, repeated
-from rocking.response.sensitivity import Sensitivity, ambiguities
+from rocking.response.sensitivity import Sensitivity, ambiguities, carried_errors
 from rocking.treatment import Treatment
 
 
@@ -44,7 +44,7 @@ class Answers:
     duration: float
     events: NDArray[np.void]
     impacts: NDArray[np.void]
-    chattering: NDArray[np.void]
+    _sequences: NDArray[np.void]
     stalled: int
     near_ties: int
     _residual: float
@@ -69,9 +69,18 @@ class Answers:
         """Its course, with the impacts that follow where a proof has closed a sequence."""
         if int(self._trail.rules["treatment"]) != state.RestRule.CERTIFIED:
             return History(self._trail, self.duration, self.body.stops)
-        closed = bool(len(self.chattering)) and bool(self.chattering["end"][-1] >= self.duration)
+        closed = bool(len(self._sequences)) and bool(self._sequences["end"][-1] >= self.duration)
         trail = with_all_impacts(self._trail, cut=closed and self.moves_at_end)
         return History(trail, self.duration, self.body.stops)
+
+    @cached_property
+    def chattering(self) -> NDArray[np.void]:
+        """Sequences of impacts that ended at rest, a row for each: see `Response`."""
+        found = self._sequences.copy()
+        error = carried_errors(self._trail, len(found), max(map(abs, self.body.stops)))
+        found["lower"] -= error
+        found["upper"] += error
+        return found
 
     @cached_property
     def balance(self) -> tuple[float, float]:
@@ -200,7 +209,8 @@ class Answers:
     def ambiguities(self) -> tuple[str, ...]:
         """What makes the response ambiguous: "peak", "events" (a time of one, or of an impact) and "touch".
 
-        The last is that of a block that nothing weighs down, which may just reach the ground, or just not.
+        With the last, the last digits decide whether the motion passes a threshold of uplift, whether the body touches
+        the ground, or whether it falls from its balance.
 
         An ambiguous response is one of those that are possible. Scale the motion, or the initial state, by 1 plus some
         millionths, simulate each, and take the spread of the results for the answer.

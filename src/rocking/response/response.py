@@ -59,16 +59,18 @@ class Response(Answers, DrawnResult):
         that were resolved before its rest was closed.
     chattering : structured array
         One row for each sequence of impacts that ended at rest: start (time of the impact from which it was proven to
-        be complete), end (time of rest), lower and upper bound on the end (NaN if not proven), number of impacts
-        resolved since the start.
+        be complete), end (time of rest), lower and upper bound on the end, number of impacts resolved since the start.
+        The bounds contain the time of rest that follows exactly from the body, the motion and the start as they are
+        given: what rounding may have changed before the proof is part of them. They are NaN if the rest is not proven,
+        and infinite if it is, but rounding may move it as far as the response is from its balance or a touch.
     tendons : structured array
         One row for each tendon of a restrained block: largest elongation (m) and force (N), and the plastic_elongation
         (m) that a tendon which yields has at the end.
     stalled : int
         Sequences that ended because time no longer advanced between impacts, without proof.
     near_ties : int
-        Times that the last digits decided whether a block that nothing weighs down touches the ground, or to which side
-        it leaves it.
+        Times that the last digits decided whether a block touches the ground, or to which side it leaves it where
+        nothing weighs it down.
     """
 
     def _headline(self) -> str:

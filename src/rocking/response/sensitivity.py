@@ -14,7 +14,9 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.kernels import state
+from rocking.kernels.adjoint import Ends, adjoint, of_ending
 from rocking.kernels.trace import Quantity, Trail, own, vary
+from rocking.kernels.uplift import next_uplifts
 from rocking.response.history import History
 from rocking.tables import counted
 
@@ -32,6 +34,15 @@ _NAMES: Final = (*QUANTITIES, *(f"{name}_{side}" for side in ("plus", "minus") f
 _STARTS: Final[dict[int, str]] = {Quantity.ROTATION: "u", Quantity.VELOCITY: "v"}
 
 _ULP: Final = 2.0**-52
+
+#: A motion that passes a threshold by less than this share of it, or misses it by less, may do either.
+_TIE: Final = 2.0**-44
+
+#: Largest ratio of the derivative of the time to rest by the speed to that of its first order, where a proof holds.
+_STEEPEST: Final = 2.5
+
+#: Largest product of an error with the rates of balance and impacts at which its first order is taken for a bound.
+_MOST_NONLINEAR: Final = 0.5
 
 #: Of peak, impacts and events; in rows where there are several quantities.
 Changes = tuple[Floats, Floats, Floats]
@@ -152,8 +163,12 @@ def _varied(trail: Trail, quantity: int, times: Floats, impacts: int, events: in
 def ambiguities(found: Sensitivity, height: float, near_ties: int) -> tuple[str, ...]:
     """Which of "peak", "events" and "touch" one unit in the last place of everything changes visibly.
 
-    ``height`` is that of the peak above the stop.
+    ``height`` is that of the peak above the stop; ``near_ties`` are those that the march has counted.
     """
+    early, late = (_uplifts(found._trail, share) for share in (1.0 - _TIE, 1.0 + _TIE))
+    rotation, velocity, acceleration = found._history.states(0.0)
+    balanced = velocity == acceleration == 0.0 != rotation - found._history.stops[0]
+    near_ties += int(np.any(late > early + AMBIGUITY)) + balanced
     peak, *times = (_ULP * np.sum(np.abs(rows), axis=0) for rows in found._along(QUANTITIES))
     known = {
         "peak": bool(np.all(peak <= AMBIGUITY * max(height, 1e-300))),
@@ -161,6 +176,37 @@ def ambiguities(found: Sensitivity, height: float, near_ties: int) -> tuple[str,
         "touch": near_ties == 0,
     }
     return tuple(name for name, is_known in known.items() if not is_known)
+
+
+def _uplifts(trail: Trail, share: float) -> Floats:
+    """Return times of the next uplifts from all rests, with thresholds that are multiplied by a share."""
+    block, times = trail.block.copy(), np.zeros(len(trail.nodes))
+    block["threshold"] *= share
+    block["hold"] *= share
+    next_uplifts(trail._replace(block=block), state.new_scratch(), times)
+    return times
+
+
+def carried_errors(trail: Trail, count: int, stop: float) -> Floats:
+    """Bound what the rounding of all steps before their proofs changes of the first rests, s; infinite: no bound.
+
+    ``count`` of rests; ``stop``: size of the coordinate at which the body stands.
+    """
+    nodes = state.attributed(np.append(trail.nodes, trail.nodes[-1:]))
+    nodes["side"][-1] = state.AT_REST
+    trail, scratch, work = own(trail._replace(nodes=nodes)), state.new_scratch(), state.record(state.VARIATION)
+    fastest, out = np.sqrt(np.max(np.abs(trail.block["stiffness"]))), np.zeros_like(trail.ground.pieces[:, 2:])
+    found = np.full(count, np.inf)
+    for k, row in enumerate(np.flatnonzero((nodes["side"][:-1] >= 0) & (nodes["side"][1:] < 0))[:count]):
+        at_once, change = bool(nodes["v"][row] == 0.0), np.zeros(5)
+        of_ending(trail, scratch, row - at_once, change, out)
+        change[:3] *= _STEEPEST
+        ends = adjoint(trail, scratch, work, row - at_once, np.inf if at_once else 0.0, change, out)
+        error = change[3] + 4.0 * _ULP * stop * abs(change[0])
+        nonlinear = error * max(fastest, change[4])
+        if ends in (Ends.START, Ends.REST) and nonlinear <= _MOST_NONLINEAR:
+            found[k] = error / (1.0 - nonlinear)
+    return found
 
 
 def changes_along(history: History, time: ArrayLike, of: Iterable[str]) -> dict[str, Floats]:

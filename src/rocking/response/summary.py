@@ -36,7 +36,7 @@ _LISTED: Final = 12
 _AFFECTED: Final = {
     "peak": "the peak rotation",
     "events": "times of events or impacts",
-    "touch": "whether a block without weight touches the ground",
+    "touch": "whether the body lifts off, touches the ground or falls from its balance",
 }
 
 
