@@ -626,6 +626,7 @@ COLUMNS = [
     *("motion", "pga_m_s2", "polarity", "block", "p_rad_s", "alpha_rad", "restitution", "overturned"),
     *(
         "peak_rotation_rad",
+        "residual_rotation_rad",
         "peak_time_s",
         "impacts_resolved",
         "uplifts",
@@ -633,7 +634,7 @@ COLUMNS = [
         "time_at_rest_s",
         "complete_chattering",
     ),
-    *("stalled", "unfinished", "stopped"),
+    *("stalled", "leans", "unfinished", "stopped"),
 ]
 
 

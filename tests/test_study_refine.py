@@ -225,8 +225,12 @@ def test_damage_to_a_round_is_named_and_corrected(complete, tmp_path):
 def test_rounds_are_arrays_that_any_zarr_reader_opens(complete):
     zarr = pytest.importorskip("zarr")
     array = zarr.open_group(complete, mode="r")["round.1"]
-    assert array.shape == (11, rocking.study(complete).critical_scales().sizes["change"])
-    assert not np.isnan(array[:]).any()
+    names = list(array.attrs["outcomes"])
+    assert array.shape == (13, rocking.study(complete).critical_scales().sizes["change"])
+    found = dict(zip(names, array[:], strict=True))
+    residual, fell = found.pop("residual_rotation"), found["overturned"] == 1.0
+    assert not np.isnan([*found.values()]).any()
+    np.testing.assert_array_equal(np.isnan(residual), fell)
 
 
 def completes(block, motion, model, pga, sign):

@@ -229,8 +229,10 @@ def simulate_many(
     )
     by = BETWEEN_STOPS if checks.flag(derivatives, "derivatives", InvalidOption) else None
     results = outcomes_of(product, setup, threads, progress, by)
-    found = dataset_of(product, results).drop_vars("overturned").rename(peak_rotation="peak_position", block="body")
+    names = {"peak_rotation": "peak_position", "residual_rotation": "residual_position", "block": "body"}
+    found = dataset_of(product, results).drop_vars(["overturned", "leans"]).rename(names)
     found["peak_position"].attrs.update(units="m", long_name="highest position")
+    found["residual_position"].attrs.update(units="m", long_name="position at which it stays; NaN where not known")
     found["peak_time"].attrs.update(long_name="time of the highest position")
     for kept in found.values():
         kept.attrs["long_name"] = kept.attrs["long_name"].replace("the block", "the body")

@@ -53,7 +53,7 @@ def summary_rows(response: Answers, friction: float | None, precision: float) ->
         *_event_rows(response),
         Row("impacts resolved", f"{len(response.impacts)}"),
         *_peak_rows(response),
-        *([Row("residual rotation", _residual_text(response))] if response.leans else []),
+        *([Row(f"residual {body.coordinate.name}", _residual_text(response))] if response.leans else []),
         *_tendon_rows(response),
     ]
     if isinstance(body, RestrainedBlock) and body.contact is None:
@@ -162,7 +162,7 @@ def in_words(response: Answers, overturn_time: str) -> str:
         goes_on = motion is not None and response.duration < motion.end
         to_come = f"; the motion goes on to {motion.end:.6g} s" if motion is not None and goes_on else ""
         return f"{_when_stopped(response)}, where the simulation was stopped{to_come}"
-    if response.leans:
+    if response.leans and _can_overturn(response):
         return f"does not overturn: it stays leaning, at {_residual_text(response)}"
     if not response.moved:
         return "does not move"
