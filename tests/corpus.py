@@ -1,0 +1,1206 @@
+"""Digests of what the package computes: which groups of results has a change altered?
+
+`python tests/corpus.py --compare` prints the groups that differ from the digests in `tests/data/corpus.json`, `--write`
+writes the file anew, and `--items GROUP` prints one digest for each item of a group, to compare with those of another
+version of the package. `test_corpus.py` compares, too.
+
+Results of kernels are compared in all their bits. Their inputs come from basic arithmetic alone, because trigonometric
+functions differ in the last bits between builds of NumPy. Analyses that use other libraries are rounded to six digits.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import dataclasses
+import functools
+import hashlib
+import inspect
+import io
+import json
+import math
+import re
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+import rocking
+from rocking import chattering, dynamics, pulses
+from rocking.analysis import Band
+from rocking.chattering import families
+
+FILE: Final = Path(__file__).parent / "data" / "corpus.json"
+FORMATS: Final = Path(__file__).parent / "data" / "formats"
+G: Final = 9.80665
+
+Item = tuple[str, Any]
+
+
+class Group(NamedTuple):
+    """Results with one digest.
+
+    Attributes
+    ----------
+    items : callable
+        Makes the results, each with a label.
+    digits : int or None
+        Significant digits to which numbers are rounded before they are compared; None: all bits.
+    fast : bool
+        Whether the fast tests compare it.
+    """
+
+    items: Callable[[], Iterable[Item]]
+    digits: int | None
+    fast: bool
+
+
+GROUPS: dict[str, Group] = {}
+
+
+def group(*, digits: int | None = None, fast: bool = True, **cases: Any) -> Callable[[Any], Any]:
+    """Enter a function of results under its name; `cases` is one option with the values that make a group each."""
+
+    def enter(function: Callable[..., Iterable[Item]]) -> Callable[..., Iterable[Item]]:
+        name = function.__name__.replace("_", "-")
+        if not cases:
+            GROUPS[name] = Group(function, digits, fast)
+        for option, values in cases.items():
+            for value in values:
+                GROUPS[f"{name}-{value}"] = Group(functools.partial(function, **{option: value}), digits, fast)
+        return function
+
+    return enter
+
+
+# Digests
+
+
+def encoded(value: Any, digits: int | None = None) -> Iterator[bytes]:
+    """Encode a result by its kind: exact bytes of numbers and text, or text of rounded numbers."""
+    if isinstance(value, rocking.Response):
+        value = of_response(value)
+    elif dataclasses.is_dataclass(value) and not isinstance(value, type):
+        value = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
+    if isinstance(value, (str, Path)):
+        yield b"text:" + (rounded_text(str(value), digits) if digits else str(value)).encode()
+    elif value is None or isinstance(value, (bool, np.bool_)):
+        yield f"{value}:".encode()
+    elif isinstance(value, Mapping):
+        yield b"mapping:"
+        for key, entry in value.items():
+            yield f"{key}=".encode()
+            yield from encoded(entry, digits)
+    elif isinstance(value, (list, tuple)):
+        yield f"{len(value)} entries:".encode()
+        for entry in value:
+            yield from encoded(entry, digits)
+    else:
+        yield from encoded_array(np.asarray(value), digits)
+
+
+def encoded_array(array: Any, digits: int | None) -> Iterator[bytes]:
+    """Encode an array; all NaNs are alike."""
+    if array.dtype.names:
+        for name in array.dtype.names:
+            yield name.encode()
+            yield from encoded_array(array[name], digits)
+        return
+    yield f"{array.shape}:".encode()
+    if array.dtype.kind == "c":
+        yield from encoded_array(np.stack([array.real, array.imag]), digits)
+    elif array.dtype.kind == "f" and digits is None:
+        yield np.where(np.isnan(array), np.nan, array).astype("<f8").tobytes()
+    elif array.dtype.kind == "f":
+        yield " ".join(rounded(number, digits) for number in array.ravel().tolist()).encode()
+    elif array.dtype.kind in "biu":
+        yield array.astype("<i8").tobytes()
+    elif array.dtype.kind in "UO":
+        yield json.dumps([str(entry) for entry in array.ravel().tolist()]).encode()
+    else:
+        raise TypeError(f"a corpus has no results of type {array.dtype}")
+
+
+def rounded(number: float, digits: int) -> str:
+    """Write a number with a few digits; what is left of a difference of equal numbers is 0."""
+    return "0" if abs(number) < 1e-12 else f"{number:.{digits}g}"
+
+
+def rounded_text(text: str, digits: int) -> str:
+    """Round the numbers of a text that have more digits."""
+
+    def shorter(match: re.Match[str]) -> str:
+        return (
+            rounded(float(match[0]), digits) if len(re.sub(r"e.*|\D", "", match[0]).lstrip("0")) > digits else match[0]
+        )
+
+    return re.sub(r"-?\d+(\.\d+(e[+-]?\d+)?|e[+-]?\d+)", shorter, text)
+
+
+def attempt(function: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+    """Return what a function returns, or the sentence with which it refuses."""
+    try:
+        return function(*arguments, **options)
+    except rocking.RockingError as error:
+        return f"{type(error).__name__}: {error}"
+
+
+def of_response(response: Any) -> dict[str, Any]:
+    """Everything that one simulation found, but for the bracket on the time of a rest."""
+    fields = ("outcome", "overturned", "unfinished", "stopped", "overturn_time", "peak_rotation", "peak_time")
+    times = np.arange(26) * (response.duration / 25.0)
+    sequences = response.chattering
+    return {
+        **{name: getattr(response, name) for name in (*fields, "duration", "stalled", "near_ties")},
+        "events": {name: response.events[name] for name in ("time", "kind", "side")},
+        "impacts": {name: response.impacts[name] for name in ("time", "side", "speed_before", "speed_after")},
+        "sequences": {name: sequences[name] for name in ("start", "end", "impacts")},
+        "states": response.states(times),
+    }
+
+
+def of_dataset(data: Any, *leave: str) -> dict[str, Any]:
+    """Arrays of an ensemble, and its axes."""
+    return {str(name): data[name].values for name in sorted([*data.data_vars, *data.coords]) if name not in leave}
+
+
+def of_result(result: Any, *, tables: bool = True) -> Iterator[Item]:
+    """Everything that a result of an analysis writes as text."""
+    yield "summary", result.summary()
+    numbers = result.to_dict()
+    numbers.pop("program", None)
+    yield "numbers", numbers
+    if tables and hasattr(result, "to_csv"):
+        for table in getattr(result, "TABLES", ()):
+            yield table, attempt(saved, result.to_csv, table)
+
+
+def saved(write: Callable[..., Any], *arguments: Any, **options: Any) -> str:
+    """Read the file that a method writes."""
+    with tempfile.TemporaryDirectory() as folder:
+        write(Path(folder) / "file", *arguments, **options)
+        return (Path(folder) / "file").read_text("utf-8")
+
+
+def digest(name: str) -> tuple[str, int]:
+    """Compute the digest of a group and the number of its single responses."""
+    items, digits, _ = GROUPS[name]
+    whole, responses = hashlib.sha256(), 0
+    for label, value in items():
+        responses += isinstance(value, rocking.Response)
+        for part in (label.encode(), *encoded(value, digits)):
+            whole.update(len(part).to_bytes(8, "little") + part)
+    return whole.hexdigest()[:32], responses
+
+
+# Inputs, of basic arithmetic alone
+
+
+def spread(count: int, *ranges: tuple[float, float]) -> list[tuple[float, ...]]:
+    """Points that fill ranges evenly (a Halton sequence), of a few digits each."""
+    return [
+        tuple(
+            float(f"{low + (high - low) * halton(k + 1, base):.5g}")
+            for (low, high), base in zip(ranges, PRIMES, strict=False)
+        )
+        for k in range(count)
+    ]
+
+
+PRIMES: Final = (2, 3, 5, 7, 11, 13)
+
+
+def halton(k: int, base: int) -> float:
+    value, share = Fraction(0), Fraction(1, base)
+    while k:
+        value, k, share = value + k % base * share, k // base, share / base
+    return float(value)
+
+
+def lobes(amplitude: float, frequency: float, *factors: float, name: str = "lobes") -> rocking.Motion:
+    """Half waves of degree 4 that follow each other, as a sine's do."""
+    half = 0.5 / frequency
+    shape = np.array([3.2 / half, 0.0, -6.4 / (half * half * half), 3.2 / (half * half * half * half)])
+    rows = [[0.0, *(amplitude * factor * shape)] for factor in factors or (1.0, -1.0)]
+    return rocking.Motion(half * np.arange(len(rows) + 1), rows, name=name)
+
+
+def steady(motion: rocking.Motion) -> rocking.Motion:
+    """Round a pulse's polynomials to nine decimals, which hides how NumPy was built."""
+    whole = np.ldexp(np.rint(np.ldexp(motion.coefficients, 30)), -30) + 0.0
+    return dataclasses.replace(motion, coefficients=whole)
+
+
+@functools.cache
+def record(name: str = "el-centro-meloland-270", start: int = 350, end: int = 1100) -> rocking.Motion:
+    """Part of a shipped record."""
+    whole = rocking.records.load(name)
+    return rocking.Motion.from_samples(whole.samples[1][start:end], whole.step, name=name)
+
+
+def shaking() -> list[rocking.Motion]:
+    """Motions of every kind: records, pulses, sines, points."""
+    return [
+        record(),
+        record("ridgecrest-clc-090", 1500, 2500),
+        lobes(4.0, 0.8, 1.0, -1.0),
+        lobes(6.0, 1.5, 0.5, -1.0, 0.75, -0.25),
+        steady(pulses.sine(3.0, 1.25, cycles=4.0)),
+        steady(pulses.ricker(5.0, 1.0)),
+        pulses.rectangular(4.0, 0.5),
+        rocking.Motion.from_points([0.0, 0.3, 0.5, 1.1, 1.2], [1.0, 4.0, -5.0, 2.0, 0.0]),
+    ]
+
+
+def scaled(factor: float) -> list[rocking.Motion]:
+    return [motion.scaled(factor) for motion in shaking()]
+
+
+def under(bodies: Iterable[Any], motions: Iterable[rocking.Motion], **options: Any) -> Iterator[Item]:
+    """Responses of every body to every motion."""
+    motions = list(motions)
+    for b, body in enumerate(bodies):
+        for m, motion in enumerate(motions):
+            yield f"body {b}, motion {m}", rocking.simulate(body, motion, **options)
+
+
+# Responses of free blocks
+
+MODELS: Final = ("nonlinear", "linear")
+RECTANGLES: Final = [rocking.Block(width=w, height=h) for w, h in spread(6, (0.15, 0.8), (0.8, 3.0))]
+STATUE: Final = rocking.Block(width=0.24, height=1.1)
+SLENDER: Final = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.92)
+UNEVEN: Final = [
+    rocking.Block.from_pivots((0.2, 0.15), 0.6, 0.4),
+    rocking.Block.from_pivots((0.3, 0.12), 0.9, 0.5, restitution=(0.8, 0.9), mass=400.0),
+    rocking.Block.from_parameters(p=(2.0, 2.5), alpha=(0.2, 0.14), restitution=(0.85, 0.9)),
+    rocking.Block(width=0.4, height=1.5, offset=0.03),
+    rocking.Block.from_frame(half_width=0.2, half_height=1.0, mass_ratio=2.0),
+]
+
+
+@group(model=MODELS)
+def rectangles(model: str) -> Iterator[Item]:
+    for factor in (0.7, 1.1):
+        yield from under(RECTANGLES, scaled(factor), model=model)
+
+
+@group(model=MODELS)
+def parameters(model: str) -> Iterator[Item]:
+    for p, alpha, e in spread(14, (1.0, 8.0), (0.05, 0.4), (0.4, 0.98)):
+        block = rocking.Block.from_parameters(p=p, alpha=alpha, restitution=e)
+        yield from under(
+            [block], [lobes(1.5 * G * alpha, 0.15 * p * k, 1.0, -1.0, 0.5) for k in (1, 2, 3)], model=model
+        )
+        yield from under([block], [record("ridgecrest-tow2-360", 900, 1500).scaled_to(1.6 * G * alpha)], model=model)
+
+
+@group(model=MODELS)
+def two_sided(model: str) -> Iterator[Item]:
+    yield from under(UNEVEN, [*shaking(), *scaled(-0.8)], model=model)
+
+
+@group(model=MODELS)
+def one_sided(model: str) -> Iterator[Item]:
+    walls = [
+        rocking.Block.one_sided(width=0.5, height=4.0, restitution=0.4),
+        rocking.Block.one_sided(width=0.3, height=2.0, lean=0.02),
+        rocking.Block.one_sided(width=0.4, height=2.5, lean=-0.01, restitution=0.6),
+    ]
+    yield from under(walls, [*shaking(), *scaled(-0.6)], model=model)
+
+
+@group(digits=6, fast=False)
+def meshes() -> Iterator[Item]:
+    statue = rocking.Solid.from_mesh("statue", density={"plinth": 2700.0, "figure": 2650.0, "head": 2650.0})
+    yield from of_result(statue)
+    yield from of_result(statue.rose([0.0, 45.0, 100.0]))
+    for azimuth in (0.0, 50.0, 90.0, 230.0):
+        block = statue.block(azimuth)
+        sides = [(side.p, side.alpha, side.restitution) for side in block.sides]
+        p, alpha, e = ([float(f"{value:.9g}") for value in values] for values in zip(*sides, strict=True))
+        body = rocking.Block.from_parameters(p=p, alpha=alpha, restitution=e)
+        yield from under([body], scaled(0.7))
+
+
+@group(model=MODELS)
+def restitution_laws(model: str) -> Iterator[Item]:
+    laws = [
+        rocking.FallingRestitution(0.95, 0.2, 0.7),
+        rocking.FallingRestitution((0.95, 0.9), (0.1, 0.3), (0.6, 0.8)),
+        rocking.RandomRestitution(0.8, 0.95, seed=3),
+        rocking.RandomRestitution((0.7, 0.8), (0.9, 0.99), seed=11),
+    ]
+    bodies = [rocking.RestrainedBlock(block, restitution=law) for block in (STATUE, UNEVEN[0]) for law in laws]
+    yield from under(bodies, shaking(), model=model)
+
+
+@group(model=MODELS)
+def vertical(model: str) -> Iterator[Item]:
+    up = record("el-centro-meloland-up", 350, 1100)
+    motions = [
+        record().with_vertical(up),
+        record().scaled(0.6).with_vertical(up.scaled(-2.0)),
+        lobes(4.0, 0.8).with_vertical(lobes(6.0, 1.3, 1.0, -1.0, 0.5)),
+        lobes(3.0, 1.2, 1.0, -1.0, 1.0).with_vertical(lobes(14.0, 2.0, 1.0, -1.0, 1.0, -1.0)),
+    ]
+    yield from under([STATUE, SLENDER, *RECTANGLES[:3], *UNEVEN[:2]], motions, model=model)
+
+
+@group(model=MODELS)
+def starts(model: str) -> Iterator[Item]:
+    """Initial states, durations, and motions that start late, or none."""
+    for rotation, velocity, duration in spread(12, (-0.15, 0.15), (-0.3, 0.3), (0.4, 12.0)):
+        start = {"initial_rotation": rotation, "initial_velocity": velocity, "model": model}
+        yield "free", rocking.simulate(SLENDER, None, duration=duration, **start)
+        yield from under([SLENDER, UNEVEN[1]], [lobes(3.0, 0.9), record()], duration=duration, **start)
+        yield from under([STATUE], [lobes(3.0, 0.9).delayed(0.25 * duration)], **start)
+
+
+TREATMENTS: Final = (
+    "certified=1e-6", "velocity=1e-6", "velocity=0.01", "interval=1e-6", "interval=0.01", "time=eq76", "time=exact",
+    "bypass=0.01",
+)  # fmt: skip
+
+
+@group(treatment=("certified", "velocity", "interval", "time", "bypass"))
+def treatments(treatment: str) -> Iterator[Item]:
+    for text in (each for each in TREATMENTS if each.startswith(treatment)):
+        symmetric = [SLENDER, rocking.Block.from_parameters(p=3.0, alpha=0.15, restitution=0.8)]
+        motions = [steady(pulses.sine(2.2, 0.8, cycles=3.0)), steady(pulses.sine(2.6, 1.2, cycles=2.0))]
+        if treatment != "time":
+            symmetric, motions = [*symmetric, STATUE, UNEVEN[0]], [*motions, *shaking()]
+        for model in MODELS if treatment != "time" else ("linear",):
+            yield from under(symmetric, motions, model=model, chattering=text)
+
+
+@group()
+def chattering_brackets() -> Iterator[Item]:
+    """Bounds on the times of rest, of free blocks, walls, restrained blocks and bodies between stops."""
+    bodies = [
+        STATUE,
+        SLENDER,
+        UNEVEN[0],
+        rocking.Block.one_sided(width=0.5, height=4.0, restitution=0.4),
+        HELD["spring"][0],
+    ]
+    for label, response in under(bodies, [*shaking(), *scaled(0.6)]):
+        yield label, {name: response.chattering[name] for name in ("lower", "upper")}
+    for kind in BETWEEN:
+        for label, response in moved(kind):
+            yield f"{kind}: {label}", {name: response.chattering[name] for name in ("lower", "upper")}
+
+
+# Responses of restrained blocks
+
+COLUMN: Final = rocking.Block(width=0.4, height=2.0, mass=2000.0)
+LOPSIDED: Final = rocking.Block.from_pivots((0.3, 0.12), 0.9, 0.5, restitution=(0.8, 0.9), mass=400.0)
+
+
+def held(*restraints: Any, **options: Any) -> list[Any]:
+    """A column and a lopsided body with the same restraints, the latter's smaller as it is lighter."""
+    lighter = [
+        dataclasses.replace(
+            each,
+            **{
+                field.name: 0.2 * getattr(each, field.name)
+                for field in dataclasses.fields(each)
+                if field.name not in ("offset", "height", "follows")
+            },
+        )
+        for each in restraints
+    ]
+    return [
+        rocking.RestrainedBlock(COLUMN, *restraints, **options),
+        rocking.RestrainedBlock(LOPSIDED, *lighter, **options),
+    ]
+
+
+HELD: Final = {
+    "spring": held(rocking.Spring(2000.0)),
+    "damper": held(rocking.Damper(400.0)),
+    "tendon": held(rocking.Tendon(2e5, prestress=2e3)),
+    "yielding": held(rocking.Tendon(2e5, prestress=2e3, strength=2e4)),
+    "thrust": held(rocking.Thrust(500.0, height=1.5)),
+    "load": held(rocking.Load(500.0, height=2.0)) + held(rocking.Load(500.0, height=2.0, offset=0.05, follows=False)),
+    "several": held(rocking.Tendon(1e5, prestress=1e3, offset=0.05), rocking.Damper(200.0), rocking.Spring(500.0))
+    + held(rocking.Tendon(1e5, prestress=1e3, strength=8e3), rocking.Damper(200.0), one_sided=True, restitution=0.5),
+}  # fmt: skip
+
+
+@group(kind=tuple(HELD))
+def restrained(kind: str) -> Iterator[Item]:
+    for model in MODELS:
+        yield from under(HELD[kind], [*shaking(), *scaled(1.6)], model=model)
+        yield from under(HELD[kind], [lobes(2.0, 0.7)], model=model, initial_rotation=0.03, duration=5.0)
+
+
+# Responses of bodies between stops
+
+BETWEEN: Final = {
+    "ball": [dynamics.BouncingBall(0.8), dynamics.BouncingBall(0.5)],
+    "oscillator": [
+        dynamics.ImpactOscillator(1.0, 0.8),
+        dynamics.ImpactOscillator(0.7, 0.6, damping_ratio=0.05, stop=0.02),
+        dynamics.ImpactOscillator(2.0, 0.7, damping_ratio=0.1, stop=-0.05, second_stop=0.2),
+    ],
+    "pendulum": [dynamics.InvertedPendulum(3.0, 0.3, 0.7), dynamics.InvertedPendulum(1.5, 0.1, 0.9)],
+}
+
+
+def moved(kind: str) -> Iterator[Item]:
+    motions = [*shaking(), steady(pulses.sine(12.0, 2.0, cycles=3))]
+    for b, body in enumerate(BETWEEN[kind]):
+        low, high = body.stops
+        about = low + 0.25 * (min(high, low + 0.2) - low)
+        for m, motion in enumerate(motions):
+            for duration, velocity in ((3.0, 0.0), (6.0, 0.4)):
+                start = {"initial_position": about, "initial_velocity": velocity}
+                yield f"body {b}, motion {m}", dynamics.simulate(body, motion, duration=duration, **start)
+
+
+@group(kind=tuple(BETWEEN))
+def between(kind: str) -> Iterator[Item]:
+    for label, response in moved(kind):
+        yield label, response
+        yield "peak", response.peak_position
+
+
+# What a response answers
+
+
+@group(digits=6)
+def forces_and_energies() -> Iterator[Item]:
+    up = record("el-centro-meloland-up", 350, 1100)
+    for block in (STATUE, UNEVEN[1], HELD["several"][0], rocking.Block.one_sided(width=0.5, height=4.0)):
+        for motion in (record(), record().with_vertical(up), lobes(4.0, 0.8)):
+            response = rocking.simulate(block, motion, duration=12.0)
+            times = np.arange(60) * 0.2
+            for name in (
+                "normal_force",
+                "friction_demand",
+                "kinetic_energy",
+                "potential_energy",
+                "angular_acceleration",
+            ):
+                yield name, attempt(getattr(response, name), times)
+            yield "least and most", [response.minimum_normal_force, response.required_friction, response.lift_off_time]
+            yield "sliding", attempt(response.sliding_time, 0.3)
+            yield "rest", [response.rest_intervals, response.time_at_rest]
+
+
+@group(digits=6)
+def sensitivities() -> Iterator[Item]:
+    for block in (STATUE, SLENDER, HELD["tendon"][0]):
+        for motion in (lobes(2.3, 0.8), lobes(2.2, 0.6).with_vertical(lobes(1.0, 1.0)), record().scaled(0.5)):
+            response = rocking.simulate(block, motion)
+            yield "peak", response.sensitivity.peak
+            yield "rotation", response.sensitivity.rotation(np.arange(8) * 0.1)
+            found = rocking.gradient(response)
+            yield (
+                "gradient",
+                [found.value, found.coefficients[:60], found.vertical, found.initial_rotation, found.reason],
+            )
+
+
+@group(digits=6)
+def perturbed() -> Iterator[Item]:
+    for block in (STATUE, UNEVEN[0]):
+        for motion in (record(), lobes(4.0, 0.8)):
+            yield from of_result(rocking.simulate(block, motion).perturbed(1e-4, 5))
+
+
+# Ensembles
+
+OUTCOMES: Final = (
+    "overturned", "peak_rotation", "peak_time", "impacts", "uplifts", "rests", "time_at_rest", "complete_chattering",
+    "stalled", "unfinished", "stopped",
+)  # fmt: skip
+GRID: Final = rocking.Blocks.grid(p=[1.5, 3.0, 5.0], alpha=[0.1, 0.2, 0.3], restitution=[0.85, 0.93])
+ENSEMBLES: Final = {
+    "levels": (GRID, {"levels": [1.0, 2.5, 6.0], "measure": "pga", "polarity": "both"}),
+    "linear": (GRID, {"levels": [0.5, 1.0], "model": "linear"}),
+    "times": (GRID, {"times": True, "polarity": "-"}),
+    "derivatives": (GRID, {"derivatives": True}),
+    "robust": (GRID.select(slice(0, 6)), {"robust": True}),
+    "treatment": (GRID, {"chattering": "velocity=0.001", "duration": 5.0}),
+    "two-sided": (UNEVEN, {"levels": [0.4, 1.0], "measure": "pgv"}),
+    "restrained": ([*HELD["tendon"], *HELD["damper"], *HELD["yielding"]], {"levels": [1.0, 2.0]}),
+    "laws": (
+        [rocking.RestrainedBlock(STATUE, restitution=rocking.RandomRestitution(0.8, 0.95, s)) for s in range(4)],
+        {},
+    ),
+}
+
+
+@group(kind=tuple(ENSEMBLES))
+def ensembles(kind: str) -> Iterator[Item]:
+    bodies, options = ENSEMBLES[kind]
+    motions = shaking()
+    if "vertical" not in kind:
+        motions.append(record().with_vertical(record("el-centro-meloland-up", 350, 1100)))
+    if options.get("measure"):
+        motions = [motion for motion in motions if motion.pgv > 0.0]
+    data = rocking.simulate_many(bodies, motions, progress=False, **options)
+    yield "outcomes", of_dataset(data, "p", "alpha", "restitution", "scale", "level", "motion")
+
+
+@group()
+def ensembles_between_stops() -> Iterator[Item]:
+    for kind, bodies in BETWEEN.items():
+        for options in ({}, {"derivatives": True}) if kind != "oscillator" else ({},):
+            data = dynamics.simulate_many(bodies, shaking()[:6], duration=4.0, progress=False, **options)
+            yield kind, of_dataset(data)
+
+
+# Motions
+
+
+@group(digits=6)
+def pulse_shapes() -> Iterator[Item]:
+    times = np.arange(40) * 0.05
+    for motion in (
+        pulses.half_sine(3.0, 0.8),
+        pulses.one_sine(3.0, 0.8),
+        pulses.one_cosine(3.0, 0.8),
+        pulses.triangular(3.0, 0.6),
+        pulses.n_lobe(3.0, 0.8, lobes=4),
+        pulses.n_lobe([1.0, 2.0, 1.5], 0.8),
+        pulses.rectangular(3.0, 0.7),
+        pulses.ricker(3.0, 1.0),
+        pulses.ricker(3.0, 1.0, kind="antisymmetric"),
+        pulses.sine(3.0, 1.2, cycles=2.5, phase=0.4),
+        pulses.mavroeidis_papageorgiou(3.0, 0.8, phase=0.5, gamma=2.0),
+    ):
+        yield motion.label, [motion.acceleration(times), motion.velocity(times), motion.displacement(times)]
+        yield "measures", motion.measures((0.5, 1.0))
+
+
+@group(digits=6, fast=False)
+def measures_of_records() -> Iterator[Item]:
+    motions = [rocking.records.load(name) for name in rocking.records.names()[:8:3]]
+    motions.append(motions[0].processed(trim=(10.0, 30.0), baseline=1, band_pass=(0.1, 20.0)))
+    motions.append(record().processed(resample=0.02).scaled_to(3.0, "pgv"))
+    motions.append(record().rotated(record("el-centro-meloland-360"), 30.0, recorded=(270.0, 0.0)))
+    motions.append(record().floor(0.3))
+    for motion in motions:
+        yield motion.name, [motion.measures((0.3, 1.0, 3.0)), motion.significant_duration(), motion.history]
+        yield "spectrum", motion.spectral_acceleration([0.05, 0.2, 0.7, 2.0], 0.02)
+
+
+@group()
+def record_files() -> Iterator[Item]:
+    from rocking.motion import formats
+
+    for path in sorted(FORMATS.iterdir()):
+        channels = repr(attempt(formats.channels, path))
+        yield path.name, channels.replace(str(path), path.name)
+        for channel in (None, 1, 2):
+            motion = attempt(rocking.read, path, channel=channel)
+            yield "motion", str(motion).replace(str(path), path.name)
+            yield "samples", [motion.step, motion.samples] if isinstance(motion, rocking.Motion) else None
+    for name in rocking.records.names():
+        yield name, [rocking.records.load(name).samples, str(rocking.records.info(name))]
+
+
+# Analyses
+
+
+@functools.cache
+def suite() -> dict[str, rocking.Motion]:
+    """Motions of various strength and length for analyses."""
+    points = spread(9, (0.35, 2.2), (3.0, 6.0), (0.4, 1.2))
+    found = {f"pulse {k}": lobes(a, f, 1.0, -1.0, third, name=f"pulse {k}") for k, (f, a, third) in enumerate(points)}
+    return found | {"meloland": record()}
+
+
+SUITE_BLOCKS: Final = rocking.Blocks.grid(p=[1.0, 2.5], alpha=[0.15, 0.25], restitution=[0.9])
+LEVELS: Final = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0]
+LIMITS: Final = {"overturning": math.inf, "half": 0.5}
+QUIET: Final = {"progress": False}
+
+
+@group(digits=6)
+def spectra() -> Iterator[Item]:
+    p = [0.8, 1.5, 3.0, 6.0]
+    blocks = rocking.Blocks.grid(alpha=[0.1, 0.2], p=p)
+    yield from of_result(rocking.rocking_spectrum(blocks, suite(), **QUIET))
+    weighted = rocking.rocking_spectrum([STATUE, SLENDER], suite(), size=[0.5, 1.0, 2.0], weights=[1, 2], **QUIET)
+    yield from of_result(weighted)
+    walls = [rocking.Block.one_sided(width=0.5, height=4.0, restitution=0.4)]
+    yield from of_result(rocking.rocking_spectrum(walls, suite(), size=[1.0, 2.0], model="linear", **QUIET))
+
+
+@group(digits=6)
+def incremental() -> Iterator[Item]:
+    ida = functools.partial(rocking.incremental_dynamic_analysis, **QUIET)
+    yield from of_result(ida(STATUE, suite(), levels=LEVELS))
+    yield from of_result(ida([SLENDER, STATUE], dict(list(suite().items())[:4]), measure="pgv", levels=[0.3, 0.6, 1.2]))
+
+
+@group(digits=6)
+def overturning_maps() -> Iterator[Item]:
+    axes = {"amplitudes": np.arange(1.0, 9.0, 1.0), "frequencies": [1.0, 2.0, 4.0], "tolerance": 1e-7}
+    for pulse, options in (("one_sine", {}), ("sine", {"cycles": 1.5}), (lambda a, f: lobes(a, f), {})):
+        yield from of_result(rocking.overturning_map(SLENDER, pulse, **axes, **options, **QUIET))
+
+
+@group(digits=6)
+def critical_scales() -> Iterator[Item]:
+    for block in (STATUE, SLENDER, UNEVEN[0], HELD["tendon"][0]):
+        for motion in (lobes(1.0, 0.8), lobes(1.0, 1.3, 1.0, -1.0, 0.5)):
+            found = attempt(rocking.critical_scale, block, motion, 0.5, 60.0)
+            names = ("scale", "p", "alpha", "restitution")
+            yield "scale", found if isinstance(found, str) else [getattr(found, name) for name in names]
+
+
+@group(digits=6)
+def fragilities() -> Iterator[Item]:
+    for measure in ("pga", "pgv", rocking.Measure("sa", 1.0)):
+        levels = np.array(LEVELS) * (1.0 if measure == "pga" else 0.2 if measure == "pgv" else 1.3)
+        found = rocking.fragility(SLENDER, suite(), measure=measure, levels=levels, limits=LIMITS, **QUIET)
+        yield from of_result(found)
+        yield "nrml", re.sub(r"rocking \d+\.\d+\.\d+", "", saved(found.to_nrml))
+    clusters = [k // 2 for k in range(len(suite()))]
+    yield from of_result(
+        rocking.fragility(SUITE_BLOCKS, suite(), levels=LEVELS, polarity="both", clusters=clusters, **QUIET)
+    )
+
+
+@group(digits=6)
+def bands() -> Iterator[Item]:
+    options = {"trials": [10, 10, 10, 9, 10]}
+    for kind in ("likelihood", "bootstrap"):
+        band = Band(kind, confidence=0.95, samples=80, seed=4)
+        yield from of_result(rocking.fit_fragility([1.0, 2.0, 3.0, 4.0, 5.0], [0, 2, 4, 7, 9], band=band, **options))
+    found = rocking.fragility(SLENDER, suite(), levels=LEVELS, band=Band("bootstrap", samples=60, seed=1), **QUIET)
+    yield from of_result(found)
+
+
+SITE: Final = rocking.HazardCurve([0.3, 0.5, 1.0, 2.0, 5.0, 10.0], [0.2, 0.1, 0.02, 0.004, 2e-4, 1e-5])
+
+
+@group(digits=6)
+def risks() -> Iterator[Item]:
+    fitted = rocking.fit_fragility([1.0, 2.0, 3.0, 4.0, 5.0], [0, 2, 4, 7, 10], trials=10)
+    yield from of_result(fitted.annual_rate(SITE))
+    yield from of_result(SITE)
+    yield from of_result(fitted.survival(1000.0, SITE))
+    yield from of_result(fitted.survival(500.0))
+
+
+@group(digits=6)
+def efficiencies() -> Iterator[Item]:
+    yield from of_result(rocking.compare_measures(STATUE, suite(), periods=[0.5, 1.0], **QUIET))
+
+
+@group(digits=6)
+def rules_of_thumb() -> Iterator[Item]:
+    blocks = [STATUE, *RECTANGLES]
+    for name, rating in rocking.rules.rate(blocks, record()).items():
+        yield name, [rating.demand, rating.capacity, rating.ratio, rating.overturns, rating.unit]
+    motions = dict(list(suite().items())[-3:])
+    yield from of_result(rocking.rules.check(STATUE, motions, **QUIET))
+
+
+@group(digits=6, fast=False)
+def roses() -> Iterator[Item]:
+    statue = rocking.Solid.from_mesh("statue", density={"plinth": 2700.0, "figure": 2650.0, "head": 2650.0})
+    pairs = {"meloland": (record(), record("el-centro-meloland-360"))}
+    options = {"azimuths": [0.0, 60.0, 130.0], "levels": [0.3, 0.6], "measure": "pgv", "recorded": (270.0, 0.0)}
+    yield from of_result(rocking.response_rose(statue, pairs, **options, **QUIET))
+
+
+# Calibrations
+
+
+@functools.cache
+def observed() -> tuple[list[rocking.Motion], list[bool]]:
+    motions = [lobes(a, f) for a in (2.0, 3.5, 5.0, 6.5, 8.0) for f in (0.6, 1.0, 1.6)]
+    block = rocking.Block.from_parameters(p=3.0, alpha=0.2, restitution=0.9)
+    return motions, [rocking.simulate(block, one, model="linear").overturned for one in motions]
+
+
+@functools.cache
+def calibrated() -> Any:
+    motions, overturned = observed()
+    options = {"candidates": 128, "ensemble": 60, "p": 3.0, "two_sided": False, "seed": 5}
+    return rocking.calibrate(motions, overturned, model="linear", **options, **QUIET)
+
+
+@group(digits=6, fast=False)
+def calibrations() -> Iterator[Item]:
+    found = calibrated()
+    yield from of_result(found)
+    yield "predictions", found.predict(suite(), **QUIET)
+    scores = found.cross_validate(folds=3, seed=2, **QUIET)
+    yield "scores", [scores.probabilities, str(scores.scores)]
+
+
+@group(digits=5, fast=False)
+def calibrations_of_histories() -> Iterator[Item]:
+    times = np.arange(301) * 0.01
+    block = rocking.Block.from_parameters(p=3.0, alpha=0.2, restitution=0.9)
+    response = rocking.simulate(block, None, initial_rotation=0.1, duration=4.0)
+    found = rocking.calibrate_history(times, response.rotation(times), alpha=0.2, seed=1, **QUIET)
+    yield "estimates", {name: found.block.sides[0].__getattribute__(name) for name in ("p", "alpha", "restitution")}
+
+
+@group(digits=6)
+def validations() -> Iterator[Item]:
+    motions, overturned = observed()
+    tests = [
+        rocking.ShakeTest(
+            motion, fell, peak_rotation=None if fell else 0.02 * (k % 5), name=f"test {k}", specimen=f"{k % 3}"
+        )
+        for k, (motion, fell) in enumerate(zip(motions, overturned, strict=True))
+    ]
+    block = rocking.Block.from_parameters(p=3.2, alpha=0.21, restitution=0.88)
+    options = {"lapse": 0.01, "peak_error": 0.005, "bins": 4, "simulations": 200, "seed": 3}
+    yield from of_result(rocking.validate(tests, block, **options, **QUIET))
+    yield from of_result(rocking.validate(tests, SUITE_BLOCKS, weights=[1.0, 2.0, 1.0, 1.0], **options, **QUIET))
+
+
+# Dynamics
+
+TABLE: Final = steady(pulses.sine(12.0, 2.0, cycles=1))
+FORCING: Final = steady(pulses.sine(3.5, 1.2, cycles=1))
+PERIODIC: Final = {
+    "block": (SLENDER, FORCING, ([-0.1, 0.02, 0.1], [-0.2, 0.0, 0.3])),
+    "ball": (dynamics.BouncingBall(0.8), TABLE, ([0.05, 0.1, 0.3], [0.1, 0.5, 1.0])),
+    "oscillator": (
+        dynamics.ImpactOscillator(1.0, 0.8, damping_ratio=0.05),
+        TABLE,
+        ([0.01, 0.1, 0.2], [-0.5, 0.0, 0.5]),
+    ),
+    "pendulum": (dynamics.InvertedPendulum(3.0, 0.3, 0.7), TABLE.scaled(0.3), ([-0.2, 0.0, 0.2], [-0.5, 0.1, 0.5])),
+}
+
+
+@group()
+def maps_of_a_period() -> Iterator[Item]:
+    for kind, (body, motion, (positions, velocities)) in PERIODIC.items():
+        strobe = dynamics.stroboscopic_map(body, motion)
+        states = np.array([(x, v) for x in positions for v in velocities])
+        yield kind, list(strobe.followed(states, 12))
+        yield "orbit", strobe.orbit(states[1], 5)
+
+
+@group(digits=6)
+def periodic_orbits() -> Iterator[Item]:
+    for kind, (body, motion, _) in PERIODIC.items():
+        for orbit in dynamics.periodic_orbits(body, motion, starts=24)[:4]:
+            yield kind, [orbit.state, np.sort(np.abs(orbit.multipliers)), orbit.impacts, orbit.symmetric, orbit.rests]
+            yield "summary", orbit.summary()
+
+
+@group(digits=6, fast=False)
+def continuations() -> Iterator[Item]:
+    ball, one = dynamics.BouncingBall(0.5, gravity=10.0), steady(pulses.sine(10.0, 5.0, cycles=1))
+
+    def family(level: float) -> tuple[Any, rocking.Motion]:
+        return ball, one.scaled(level)
+
+    found = dynamics.periodic_orbits(*family(1.2), starts=40)
+    start = next(each for each in found if each.is_stable and not each.rests and each.impacts)
+    branch = dynamics.continue_orbit(start, family, 1.2, (1.0, 1.7), step=0.2)
+    yield "ends", branch.ends
+    yield "bifurcations", [[each.kind, each.value] for each in branch.bifurcations]
+    yield "stable", [branch.orbit(0).state, branch.is_stable[[0, -1]]]
+
+
+@group(digits=6)
+def bifurcation_diagrams() -> Iterator[Item]:
+    ball, one = dynamics.BouncingBall(0.5, gravity=10.0), steady(pulses.sine(10.0, 5.0, cycles=1))
+    options = {"transient": 300, "kept": 8, "direction": "both"}
+    found = dynamics.bifurcation_diagram(
+        lambda q: (ball, one.scaled(q)), [1.1, 1.3, 1.45, 1.6], [0.0, 0.8], **options, **QUIET
+    )
+    yield from of_result(found)
+    yield "changes", found.changes()
+
+
+@group(digits=6, fast=False)
+def basins() -> Iterator[Item]:
+    for body, motion, (positions, velocities) in PERIODIC.values():
+        x, v = np.linspace(positions[0], positions[-1], 7), np.linspace(velocities[0], velocities[-1], 5)
+        found = dynamics.basins(body, motion, x, v, 40, **QUIET)
+        yield from of_result(found)
+        yield "entropy", list(found.entropy)
+
+
+@group(digits=5)
+def exponents() -> Iterator[Item]:
+    for body, motion, (positions, velocities) in PERIODIC.values():
+        found = dynamics.lyapunov_exponents(body, motion, (positions[1], velocities[2]), 40, transient=5)
+        yield "exponents", [found.largest, found.smallest, found.impacts, found.resting, int(found.fate)]
+        yield "summary", found.summary()
+
+
+# Chattering of the paper's problem
+
+
+@group(digits=6)
+def chattering_times() -> Iterator[Item]:
+    a, omega, eta = np.array([1.01, 1.03, 1.1]), np.array([[0.8], [2.0], [5.0]]), 0.9
+    for method in ("exact", "asymptotic", "series", "semianalytical", "eq76", "eq77", "approximation"):
+        yield method, attempt(chattering.chattering_time, a, omega, eta, method=method)
+        critical = functools.partial(chattering.critical_amplitude, omega, [0.7, 0.92])
+        yield f"critical {method}", attempt(critical, method=method)
+    yield "complete", chattering.is_complete(a, omega, eta)
+    yield "first", [chattering.first_interval(a, omega), chattering.first_impact_speed(a, omega)]
+    yield "ratios", chattering.interval_ratios(1.03, 2.0, 0.92, 12)
+    yield "coefficients", chattering.series_coefficients(omega, eta, order=4)
+    yield "nonlinear", chattering.critical_amplitude_nonlinear([1.0, 3.0], 0.9, 0.1, **QUIET)
+    found = chattering.series_diagnosis(a, omega, eta)
+    yield "diagnosis", [found.time, found.error, found.radius]
+
+
+@group(digits=6)
+def chattering_sequences() -> Iterator[Item]:
+    for a, omega, eta in ((1.03, 2.0, 0.92), (1.01, 0.8, 0.7), (1.2, 5.0, 0.95)):
+        found = chattering.sequence(a, omega, eta)
+        yield "sequence", [found.impacts[:40], found.complete, found.time]
+        yield "table", chattering.asymptotic_table(a, omega, eta) if found.complete else None
+
+
+@group(digits=6)
+def chattering_reports() -> Iterator[Item]:
+    yield from of_result(chattering.chattering_report(1.03, 2.0, 0.92), tables=False)
+    yield from of_result(chattering.chattering_report(1.02, 1.0, 0.8, p=2.0, order=3), tables=False)
+    yield from of_result(chattering.critical_report(2.0, 0.92))
+
+
+@group(digits=6)
+def chattering_maps() -> Iterator[Item]:
+    for family, axes in (
+        (families.sine(SLENDER, model="linear"), {"a": [1.02, 1.1, 1.5, 4.0], "omega": [1.0, 2.0, 4.0]}),
+        (families.record(record(), 0.2, 0.92), {"a": [1.1, 2.0], "p": [1.5, 3.0]}),
+    ):
+        found = chattering.chattering_map(family, axes, **QUIET)
+        yield "map", of_dataset(found.data, "lower", "upper")
+
+
+@group(digits=6)
+def chattering_episodes() -> Iterator[Item]:
+    for block in (STATUE, SLENDER):
+        for motion in (record(), lobes(4.0, 0.8)):
+            yield from of_result(chattering.chattering_episodes(rocking.simulate(block, motion)))
+
+
+# Texts and files
+
+
+def kinds_of_summary() -> Iterator[tuple[str, Any]]:
+    yield "free", rocking.simulate(STATUE, record())
+    yield "free-overturns", rocking.simulate(STATUE, record().scaled(3.0))
+    yield "free-still", rocking.simulate(STATUE, record().scaled(0.1))
+    yield "two-sided", rocking.simulate(UNEVEN[0], record())
+    yield "wall", rocking.simulate(rocking.Block.one_sided(width=0.5, height=4.0, restitution=0.4), record())
+    yield "vertical", rocking.simulate(STATUE, record().with_vertical(record("el-centro-meloland-up", 350, 1100)))
+    yield "threshold", rocking.simulate(STATUE, lobes(4.0, 0.8), chattering="velocity=0.001", model="linear")
+
+
+@group(digits=6)
+def summaries_of_responses() -> Iterator[Item]:
+    for kind, response in kinds_of_summary():
+        yield kind, response.summary(0.5)
+        yield "shown", repr(response)
+
+
+@group(digits=6)
+def summaries_of_restrained_bodies() -> Iterator[Item]:
+    for kind, bodies in HELD.items():
+        for body in bodies:
+            response = rocking.simulate(body, record())
+            yield kind, response.summary()
+            yield "numbers", response.to_dict()
+            yield "shown", [repr(response), repr(body)]
+
+
+@group(digits=6)
+def summaries_between_stops() -> Iterator[Item]:
+    for kind, bodies in BETWEEN.items():
+        for body in bodies:
+            response = dynamics.simulate(body, TABLE, duration=4.0, initial_position=body.stops[0] + 0.05)
+            yield kind, response.summary()
+            yield "numbers", response.to_dict()
+
+
+@group(digits=6)
+def numbers_of_responses() -> Iterator[Item]:
+    for kind, response in kinds_of_summary():
+        yield kind, response.to_dict(0.5)
+
+
+@group(digits=6)
+def tables_of_responses() -> Iterator[Item]:
+    for kind, response in kinds_of_summary():
+        for table in ("histories", "events", "impacts"):
+            yield f"{kind}: {table}", saved(response.to_csv, table, dt=0.1 if table == "histories" else None)
+
+
+@group(digits=6)
+def surveys() -> Iterator[Item]:
+    found = rocking.survey(STATUE, {"one": record(), "two": lobes(4.0, 0.8)}, friction=0.4, **QUIET)
+    yield from of_result(found)
+
+
+@group(digits=6)
+def descriptions() -> Iterator[Item]:
+    for block in (*RECTANGLES[:2], SLENDER, *UNEVEN, *(bodies[0] for bodies in HELD.values()), GRID):
+        yield "block", [repr(block), getattr(block, "description", "")]
+        if hasattr(block, "uplift_thresholds"):
+            yield "thresholds", [block.uplift_thresholds(model) for model in MODELS]
+    for motion in shaking():
+        yield "motion", [repr(motion), motion.label]
+
+
+SIZES: Final = "--width 0.24 --height 1.1"
+RECORD: Final = "el-centro-meloland-270"
+PULSE: Final = "--pulse one-sine:amplitude=0.4g,frequency=1Hz"
+TWO: Final = f"{RECORD} el-centro-meloland-360"
+COMMANDS: Final = {
+    "simulate": [
+        f"simulate {RECORD} {SIZES}",
+        f"simulate {PULSE} {SIZES} --json",
+        f"simulate {TWO} {SIZES}",
+        f"simulate {PULSE} --p 2 --alpha 10deg --model linear --chattering interval=1e-6",
+    ],
+    "restrained": [
+        f"simulate {RECORD} {SIZES} --mass 200 --damper 50 --spring 100",
+        f"simulate {PULSE} --width 0.5 --height 4 --one-sided --lean 1deg --json",
+    ],
+    "analyses": [
+        f"spectrum {TWO} --alpha 0.1,0.2 --p 1:4:4:log",
+        f"ida {TWO} {SIZES} --levels 1:6:6",
+        "map one-sine --p 2 --alpha 0.2 --amplitudes 1:6:6 --frequencies 1,2",
+        f"check {TWO} {SIZES}",
+        f"measures {TWO} el-centro-meloland-up {SIZES}",
+    ],
+    "catalogues": ["records", f"records {RECORD}", "pulses", "pulses --json"],
+    "chattering": ["chatter 1.03 2 0.92", "chatter 1.03 2 0.92 --table", "critical 2 0.92"],
+    "dynamics": ["orbits --pulse sine:amplitude=3.5,frequency=1.2Hz --p 2 --alpha 0.2 --restitution 0.9"],
+    "mesh": ["mesh statue --density 2600 --azimuth 0,90"],
+    "mistakes": [
+        f"simulate {RECORD}",
+        f"simulate {RECORD} --width -1 --height 1",
+        f"simulate no-such-record {SIZES}",
+        f"simulate {PULSE} {SIZES} --chattering wrong=1",
+        f"spectrum {RECORD} --alpha x",
+        f"ida {RECORD} {SIZES} --levels 0",
+        f"map no-pulse {SIZES}",
+    ],
+}
+
+
+@group(digits=6, subject=("simulate", "restrained", "catalogues", "chattering", "dynamics", "mistakes"))
+def commands(subject: str) -> Iterator[Item]:
+    for command in COMMANDS[subject]:
+        yield command, printed(command)
+
+
+def printed(command: str) -> list[Any]:
+    """Run a command in this process: its exit code, output and messages."""
+    from rocking.cli import main
+
+    out, err, code = io.StringIO(), io.StringIO(), 0
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            main(command.split())
+        except SystemExit as stop:
+            code = int(stop.code or 0)
+    messages = [line for line in err.getvalue().splitlines() if "note: compiling" not in line]
+    text = re.sub(r'"program": "[^"]*"', "", out.getvalue())
+    return [code, re.sub(r" in \S+ s \(\S+ a second\)", "", text), messages]
+
+
+@group(digits=6, fast=False, subject=("analyses", "mesh"))
+def long_commands(subject: str) -> Iterator[Item]:
+    yield from commands(subject)
+
+
+STUDY: Final = """\
+[blocks]
+p = [1.5, 3.0]
+alpha = ["10deg", 0.2]
+restitution = 0.9
+
+[motions]
+records = ["el-centro-meloland-270"]
+
+[[motions.pulses]]
+family = "one-sine"
+amplitude = ["0.3g", "0.5g"]
+frequency = [0.5, 1.0]
+
+[scales]
+pga = [1.0, 2.0, 3.0, 4.5, 6.0]
+polarity = "both"
+
+[report.fragility]
+measure = "pga"
+
+[report.spectrum]
+fractiles = [0.25, 0.5]
+"""
+OBSERVED: Final = "pga_m_s2,overturned\n1,0\n2,0\n2.5,1\n3,0\n3.5,1\n4,0\n4.5,1\n5,1\n6,1\n"
+RATES: Final = "pga_m_s2,annual_rate\n0.3,0.2\n0.5,0.1\n1,0.02\n2,0.004\n5,0.0002\n10,0.00001\n"
+TESTS: Final = """\
+motion,scale,specimen,overturned,peak_rotation_deg
+ridgecrest-clc-090,0.5,a,0,0.1
+ridgecrest-clc-090,0.5,a,0,0.2
+ridgecrest-clc-090,2,b,1,
+el-centro-meloland-270,1,b,0,1.5
+"""
+SHAKEN: Final = "motion,scale,overturned\n" + "".join(
+    f"{name},{scale},{int(scale > 1.2)}\n" for name in TWO.split() for scale in (0.4, 0.8, 1.1, 1.3, 2, 3)
+)
+BODY: Final = "--p 2 --alpha 0.2 --restitution 0.9"
+SINE: Final = "--pulse sine:frequency=1.2Hz"
+ON_FILES: Final = {
+    "fragility": [
+        "fragility --outcomes observed.csv --hazard rates.csv --years 50 --out fitted",
+        f"fragility {TWO} ridgecrest-tow2-090 --p 1 --alpha 0.25 --levels 0.5:30:12 --limits overturning,half=0.5",
+        "fragility --outcomes observed.csv --bootstrap 50 --seed 3 --json",
+    ],
+    "tests": [
+        f"validate tests.csv {SIZES} --peak-error 0.1deg --lapse 0.01 --out judged",
+        "calibrate shaken.csv --candidates 128 --p 3 --restitution housner --no-two-sided",
+    ],
+    "periods": [
+        f"basin {SINE},amplitude=0.4g {BODY} --positions -0.1:0.1:5 --velocities -0.2:0.2:3 --periods 30",
+        f"bifurcation {SINE} {BODY} --along amplitude:0.2g:0.4g:4 --start 0.02,0.1 --transient 30 --kept 8",
+    ],
+    "study": [
+        "study new template.toml",
+        "study run study.toml kept --quiet",
+        "study status kept",
+        "study report kept report --quiet",
+        "study verify kept --quiet",
+    ],
+}
+
+
+@group(digits=6, fast=False, subject=tuple(ON_FILES))
+def commands_on_files(subject: str) -> Iterator[Item]:
+    """What commands print of files, and the tables that they write."""
+    texts = {
+        "observed.csv": OBSERVED,
+        "rates.csv": RATES,
+        "tests.csv": TESTS,
+        "shaken.csv": SHAKEN,
+        "study.toml": STUDY,
+    }
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        for name, text in texts.items():
+            Path(name).write_text(text, encoding="utf-8")
+        for command in ON_FILES[subject]:
+            yield command, printed(command)
+        for path in sorted(Path().rglob("*.csv")):
+            if path.name not in texts:
+                yield str(path), path.read_text("utf-8")
+
+
+#: Public functions that are about to leave the package.
+LEAVING: Final = {
+    "compare_restitution", "median_gradient", "compare_schemes", "paper_figure", "safe_basin_erosion", "scheme_of",
+    "switch_branch", "uncertainty_exponent",
+}  # fmt: skip
+
+
+@group()
+def defaults() -> Iterator[Item]:
+    """Arguments of public functions, and their defaults."""
+    for place in (rocking, rocking.pulses, rocking.records, rocking.rules, dynamics, chattering, families):
+        for name in sorted(set(getattr(place, "__all__", vars(place))) - LEAVING):
+            function = getattr(place, name)
+            if inspect.isfunction(function) and not name.startswith("_"):
+                parameters = inspect.signature(function).parameters.values()
+                yield name, [f"{each.name} = {each.default}" for each in parameters if each.name != "refine"]
+
+
+@group(digits=6)
+def studies() -> Iterator[Item]:
+    from rocking.studies import read_study
+
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "study.toml").write_text(STUDY, encoding="utf-8")
+        product = read_study(folder / "study.toml").product
+        yield "product", [product.shape, product.model, str(product.treatment)]
+        motions = dict(list(suite().items())[:5])
+        study = rocking.study(folder / "study", SUITE_BLOCKS, motions, levels=LEVELS, measure="pga")
+        study.run(threads=1, progress=False)
+        yield "complete", [study.status.complete, study.status.done, study.status.units, study.status.simulations]
+        yield "results", of_dataset(study.results())
+        yield "critical", of_dataset(study.critical_scales())
+        yield from of_result(study.fragility(limits=LIMITS))
+        yield from of_result(study.block_fragilities(**QUIET))
+        yield from of_result(study.spectrum(**QUIET))
+        yield "verified", study.verify(recompute=1, progress=False)
+        for critical in (None, "overturning"):
+            yield "table", saved(study.to_csv, critical=critical, progress=False)
+            yield (
+                "numbers",
+                re.sub(r'"program": "[^"]*",?', "", saved(study.to_json, critical=critical, progress=False)),
+            )
+
+
+# The file of digests
+
+
+def written() -> dict[str, list[Any]]:
+    """Read the digests of the file: for each group its digest, and how many single responses are in it."""
+    found: dict[str, list[Any]] = json.loads(FILE.read_text("utf-8"))
+    return found
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Write or compare digests."""
+    parser = argparse.ArgumentParser(description="Digests of what the package computes.")
+    how = parser.add_mutually_exclusive_group(required=True)
+    how.add_argument("--compare", action="store_true", help="print the groups that differ; the exit status is 1 then")
+    how.add_argument("--write", action="store_true", help="write the digests of these groups anew")
+    how.add_argument("--items", action="store_true", help="print a digest for each item, to compare two versions")
+    parser.add_argument("--times", action="store_true", help="print the processor time of each group")
+    parser.add_argument("groups", nargs="*", metavar="GROUP", help="by default all")
+    options = parser.parse_args(arguments)
+    chosen = options.groups or [*GROUPS]
+    if unknown := sorted(set(chosen) - set(GROUPS)):
+        parser.error(f"{', '.join(unknown)} is no group; the groups are {', '.join(GROUPS)}")
+    if options.items:
+        for name in chosen:
+            for k, (label, value) in enumerate(GROUPS[name].items()):
+                parts = b"\0".join(encoded(value, GROUPS[name].digits))
+                print(name, k, hashlib.sha256(parts).hexdigest()[:12], label)
+        return 0
+    known = written() if FILE.exists() else {}
+    found = {}
+    for name in chosen:
+        start = time.process_time()
+        found[name] = [*digest(name)]
+        if options.times:
+            print(f"{time.process_time() - start:7.2f} s  {found[name][1]:4d} responses  {name}", flush=True)
+    differ = [name for name in chosen if known.get(name) != found[name]]
+    if not options.groups:
+        differ += sorted(set(known) - set(found))
+    if options.write:
+        kept = {name: (known | found)[name] for name in GROUPS if name in found or name in known}
+        rows = ",\n".join(f"  {json.dumps(name)}: {json.dumps(entry)}" for name, entry in kept.items())
+        FILE.write_text(f"{{\n{rows}\n}}\n", encoding="utf-8")
+    for name in differ:
+        print(
+            f"differs: {name}" if name in known and name in found else f"{'new' if name in found else 'gone'}: {name}"
+        )
+    print(f"{len(differ)} of {len(chosen)} groups differ" + (f"; {FILE.name} was written" if options.write else ""))
+    return bool(differ) and not options.write
+
+
+if __name__ == "__main__":
+    sys.exit(main())
