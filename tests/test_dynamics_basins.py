@@ -210,31 +210,6 @@ def test_an_interrupt_keeps_what_was_computed_and_a_folder_goes_on(tmp_path, mon
         dynamics.basins(BLOCK, SHAKING, x, v, 100, folder=tmp_path / "kept")
 
 
-def test_an_interrupted_erosion_goes_on_in_its_folder(tmp_path, monkeypatch):
-    x, v = np.linspace(-0.2, 0.2, 6), np.linspace(-0.4, 0.4, 5)
-    whole = dynamics.safe_basin_erosion(BLOCK, SHAKING, [0.5, 1.0, 1.5], x, v, 40)
-    follow, calls = basin_grid.Grid._follow, []
-
-    def interrupted(self, cells):
-        calls.append(len(cells))
-        if len(calls) == 2:
-            raise KeyboardInterrupt
-        follow(self, cells)
-
-    monkeypatch.setattr(basin_grid.Grid, "_follow", interrupted)
-    part = dynamics.safe_basin_erosion(BLOCK, SHAKING, [0.5, 1.0, 1.5], x, v, 40, folder=tmp_path)
-    assert part.factor.values.tolist() == [0.5] and part.data.identical(whole.data.isel(factor=[0]))
-    again = dynamics.safe_basin_erosion(BLOCK, SHAKING, [0.5, 1.0, 1.5], x, v, 40, folder=tmp_path)
-    assert len(calls) == 4 and again.data.identical(whole.data)
-    more = dynamics.safe_basin_erosion(BLOCK, SHAKING, [0.5, 1.2, 1.5], x, v, 40, folder=tmp_path)
-    assert len(calls) == 5 and more.safe.values[[0, 2]].tolist() == whole.safe.values[[0, 2]].tolist()
-    with pytest.raises(InvalidOption, match="something else"):
-        dynamics.safe_basin_erosion(BLOCK, SHAKING, [0.5], x, v, 41, folder=tmp_path)
-    calls[:] = [0]
-    with pytest.raises(KeyboardInterrupt):  # nothing was reached
-        dynamics.safe_basin_erosion(BLOCK, SHAKING, [0.5, 1.0], x, v, 40)
-
-
 @pytest.mark.thorough
 def test_a_state_at_any_point_of_a_long_orbit_has_settled_on_it():
     """A few points of a long orbit have a neighbourhood; a cell may end at another one, before or after it is known."""
@@ -327,18 +302,6 @@ def test_measures_of_a_straight_boundary_of_random_outcomes_and_of_a_cantor_set(
     assert math.isnan(dynamics.uncertainty_exponent(np.ones((40, 40), dtype=int))[0])
 
 
-def test_a_safe_basin_shrinks_by_the_states_that_overturn():
-    x, v = np.linspace(-0.19, 0.19, 20), np.linspace(-0.38, 0.38, 20)
-    factors = [0.3, 1.0, 1.5]
-    found = dynamics.safe_basin_erosion(BLOCK, SHAKING, factors, x, v, 60)
-    states = np.stack(np.meshgrid(x, v), axis=-1).reshape(-1, 2)
-    for k, factor in enumerate(factors):
-        _, fates, _ = dynamics.stroboscopic_map(BLOCK, SHAKING.scaled(factor)).followed(states, 60)
-        assert found.safe.values[k] == pytest.approx(np.mean(fates != dynamics.Fate.OVERTURNED), abs=1e-12)
-    assert np.all(np.diff(found.safe.values) < 0.0)
-    assert (found.safe + found.to_plus + found.to_minus).values == pytest.approx(1.0)
-
-
 @pytest.mark.parametrize(
     ("make", "error", "words"),
     [
@@ -349,8 +312,6 @@ def test_a_safe_basin_shrinks_by_the_states_that_overturn():
         (lambda: dynamics.basins(dynamics.BouncingBall(0.5), SHAKING, [-1.0, 1.0], [0.0]), InvalidOption, "in front"),
         (lambda: dynamics.basin_entropy([0, 1]), InvalidOption, "outcomes"),
         (lambda: dynamics.basin_entropy(np.zeros((3, 3), dtype=int)), InvalidOption, "at least one box"),
-        (lambda: dynamics.safe_basin_erosion(BLOCK, SHAKING, [0.0], [0.1], [0.0]), InvalidOption, "factors"),
-        (lambda: dynamics.safe_basin_erosion(BLOCK, None, [1.0], [0.1], [0.0]), InvalidMotion, "one period"),
     ],
 )
 def test_wrong_input_gets_one_sentence(make, error, words):

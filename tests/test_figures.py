@@ -12,7 +12,7 @@ from matplotlib.text import Text
 
 import rocking
 from rocking import dynamics
-from rocking.plot.basins import basins_figure, erosion_figure
+from rocking.plot.basins import basins_figure
 from rocking.plot.bifurcation import bifurcation_figure
 from rocking.plot.calibration import Parameter, factors_figure, measured_figure, outcomes_figure
 from rocking.plot.fragility import FragilityLine, fragility_figure
@@ -246,12 +246,6 @@ def basins_of(**options):
     return basins_figure(**arrays, names=names, kinds=kinds, **(texts | options))
 
 
-def erosion_of(**options):
-    factor = np.linspace(0.2, 3.0, 15)
-    texts = {"x_label": "factor on the motion"}
-    return erosion_figure(factor=factor, safe=1.0 / (1.0 + factor), error=0.02 / factor, **(texts | options))
-
-
 def bifurcation_of(**options):
     value = np.linspace(1.0, 2.0, 30)
     states = {way: np.sin(np.outer(value, np.arange(1.0, 9.0)) + k) for k, way in enumerate(("up", "down"))}
@@ -276,7 +270,6 @@ def branch_of(**options):
 FIGURES = {
     "schemes": (schemes_of, 5.4),
     "basins": (basins_of, 4.8),
-    "erosion": (erosion_of, 3.6),
     "bifurcation": (bifurcation_of, 3.8),
     "intervals": (intervals_of, 4.2),
     "outcomes of tests": (trials_of, 4.8),

@@ -188,7 +188,6 @@ def results(bars, spectrum, study):
         "StudySpectrum": study.spectrum().select(scale=3.0),
         "BlockFragilities": study.block_fragilities(),
         "Basins": dynamics.basins(BLOCK, ONE_PERIOD, np.linspace(-0.2, 0.2, 5), np.linspace(-0.4, 0.4, 5)),
-        "BasinErosion": dynamics.safe_basin_erosion(BLOCK, ONE_PERIOD, [0.5, 1.0], [-0.1, 0.1], [0.0, 0.2]),
         "BifurcationDiagram": dynamics.bifurcation_diagram(
             lambda factor: (BLOCK, ONE_PERIOD.scaled(factor)), [0.5, 1.0], [0.01, 0.1], kept=4, direction="both"
         ),
@@ -208,7 +207,7 @@ def test_every_public_result_with_a_dataset_is_among_those_that_are_judged(resul
 
 
 def test_every_bar_comes_to_its_end(results, bars):
-    assert {"mapping", "simulating", "refining", "basins", "eroding", "fitting"} <= {what for what, *_ in bars}
+    assert {"mapping", "simulating", "refining", "basins", "fitting"} <= {what for what, *_ in bars}
     assert len(bars) > 12
     assert [each for each in bars if not each[1] == each[2] > 0] == []
 
@@ -221,9 +220,9 @@ def test_a_result_shows_itself_in_a_line(results):
         assert name in found._repr_html_()
 
 
-@pytest.mark.parametrize("written", [3, pytest.param(12, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("written", [3, pytest.param(11, marks=pytest.mark.thorough)])
 def test_a_result_has_the_variables_of_its_dataset(results, tmp_path, written):
-    assert len(results) == 12
+    assert len(results) == 11
     for number, found in enumerate(results.values()):
         for again in (copy.copy(found), pickle.loads(pickle.dumps(found))):
             assert again.data.identical(found.data)
@@ -270,7 +269,6 @@ HEADERS = {
     ("Basins", "attractors"): "attractor,share,standard_error,period,impacts,rests,multiplier",
     ("Basins", "outcomes"): "angular_velocity_rad_s,rotation_rad,outcome,periods",
     ("Basins", "orbits"): "attractor,phase,orbit_coordinate_rad,orbit_velocity_rad_s",
-    ("BasinErosion", "erosion"): "factor,safe,standard_error,to_plus,to_minus",
     ("BifurcationDiagram", "states"): "direction,value,start,iterate,coordinate_rad,velocity_rad_s",
     ("BifurcationDiagram", "orbits"): "direction,value,start,period,impacts",
     ("Rose", "rose"): "azimuth_deg,acceleration_g,alpha_rad,p_rad_s,restitution,radius_m,rise_m,coupling,aside_m,gap_m",

@@ -5,7 +5,6 @@ from .bodies import BouncingBall, ImpactOscillator, InvertedPendulum
 from .branches import Bifurcation, Branch
 from .comparison import SchemeComparison, SchemeOutcome
 from .continuation import continue_orbit
-from .erosion import BasinErosion, safe_basin_erosion
 from .exponents import LyapunovExponents, lyapunov_exponents
 from .impact_maps import ImpactMap, impact_map
 from .linear_bodies import Law, LinearBodies
@@ -18,7 +17,6 @@ from .stepping import MoreauJean, SchatzmanPaoli, SteppedResponse, TimeStepping,
 from .switching import switch_branch
 
 __all__ = [
-    "BasinErosion",
     "Basins",
     "Bifurcation",
     "BifurcationDiagram",
@@ -49,7 +47,6 @@ __all__ = [
     "integrate",
     "lyapunov_exponents",
     "periodic_orbits",
-    "safe_basin_erosion",
     "scheme_of",
     "simulate",
     "simulate_many",

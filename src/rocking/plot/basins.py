@@ -1,4 +1,4 @@
-"""Basins of attraction, and how a safe one shrinks."""
+"""Basins of attraction."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.arrays import Floats
-from rocking.plot.canvas import ABOVE, INK, add_labels, add_legend, cell_edges, figure_for
+from rocking.plot.canvas import INK, add_labels, add_legend, cell_edges, figure_for
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -79,30 +79,4 @@ def basins_figure(
             marked += 1
         add_labels(axes, x_label, y_label)
         add_legend(figure, ax, handles)
-    return figure
-
-
-def erosion_figure(
-    *,
-    factor: Floats,
-    safe: Floats,
-    error: Floats,
-    x_label: str,
-    title: str = "",
-    ax: Axes | None = None,
-    figsize: tuple[float, float] | None = None,
-) -> Figure:
-    """Draw the share of states that stay, with a band of two standard errors, against the factor on a motion."""
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
-    with figure_for(ax, (4.8, 3.4), figsize, title) as figure:
-        axes = ax or figure.add_subplot()
-        low, high = np.clip(safe - 2.0 * error, 0.0, 1.0), np.clip(safe + 2.0 * error, 0.0, 1.0)
-        axes.fill_between(factor, low, high, color="#e8b9a4", linewidth=0.0)
-        axes.plot(factor, safe, color=ABOVE, marker="o", markersize=2.5, linewidth=1.0)
-        axes.set_ylim(0.0, 1.02)
-        add_labels(axes, x_label, "share of the states that do not overturn")
-        line = Line2D([], [], color=ABOVE, marker="o", markersize=2.5, label="safe basin over the grid")
-        add_legend(figure, ax, [line, Patch(facecolor="#e8b9a4", label="two standard errors")])
     return figure
