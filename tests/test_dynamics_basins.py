@@ -276,7 +276,7 @@ def test_a_neighbourhood_holds_what_enters_it():
 
 
 @pytest.mark.thorough
-def test_measures_of_a_straight_boundary_of_random_outcomes_and_of_a_cantor_set():
+def test_the_entropy_of_a_straight_boundary_and_of_random_outcomes():
     half = np.zeros((100, 100), dtype=int)
     half[:, 52:] = 1  # two of five columns of one box in twenty
     mixed = -(0.4 * math.log(0.4) + 0.6 * math.log(0.6))
@@ -285,21 +285,6 @@ def test_measures_of_a_straight_boundary_of_random_outcomes_and_of_a_cantor_set(
     noise = default_rng(1).integers(0, 3, (500, 500))
     whole, boundary = dynamics.basin_entropy(noise, box=20)
     assert whole == boundary == pytest.approx(math.log(3.0) - 2.0 / (2.0 * 400.0), abs=1e-3)  # bias of 400 draws
-    assert dynamics.uncertainty_exponent(noise)[0] == pytest.approx(0.0, abs=0.01)
-    rows = np.arange(1024)
-    disc = (np.add.outer((rows - 511.5) ** 2, (rows - 511.5) ** 2) < 300.0**2).astype(int)
-    assert dynamics.uncertainty_exponent(disc)[0] == pytest.approx(1.0, abs=0.02)
-    # Gaps of the middle-third Cantor set, in three colours by turns: a boundary of dimension 1 + ln 2/ln 3.
-    cells = (np.arange(3**7) + 0.5) / 3**7
-    colour = np.zeros(cells.size, dtype=int)
-    open_ = np.ones(cells.size, dtype=bool)
-    for level in range(1, 8):
-        digit = (cells * 3**level).astype(int) % 3
-        colour[open_ & (digit == 1)] = 1 + level % 3
-        open_ &= digit != 1
-    exponent, _ = dynamics.uncertainty_exponent(np.tile(colour, (400, 1)))
-    assert exponent == pytest.approx(1.0 - math.log(2.0) / math.log(3.0), abs=0.04)
-    assert math.isnan(dynamics.uncertainty_exponent(np.ones((40, 40), dtype=int))[0])
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,5 @@
 from .basin_maps import Basins, basins
-from .basin_measures import basin_entropy, uncertainty_exponent
+from .basin_measures import basin_entropy
 from .bifurcation import BifurcationDiagram, bifurcation_diagram
 from .bodies import BouncingBall, ImpactOscillator, InvertedPendulum
 from .branches import Bifurcation, Branch
@@ -52,5 +52,4 @@ __all__ = [
     "simulate_many",
     "stroboscopic_map",
     "switch_branch",
-    "uncertainty_exponent",
 ]

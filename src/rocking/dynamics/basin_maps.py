@@ -14,7 +14,7 @@ from rocking import checks
 from rocking.body import Body
 from rocking.constants import Model
 from rocking.dynamics.basin_grid import NAMES, NOT_REACHED, Grid
-from rocking.dynamics.basin_measures import basin_entropy, uncertainty_exponent
+from rocking.dynamics.basin_measures import basin_entropy
 from rocking.dynamics.maps import StroboscopicMap
 from rocking.dynamics.repeated import sensible
 from rocking.errors import InvalidOption
@@ -64,11 +64,6 @@ class Basins(DatasetResult):
         grid = self.data.outcome.values
         return basin_entropy(grid, _BOX) if min(grid.shape) >= _BOX else (np.nan, np.nan)
 
-    @property
-    def uncertainty(self) -> tuple[float, float]:
-        """Uncertainty exponent and its standard error; see `uncertainty_exponent`."""
-        return uncertainty_exponent(self.data.outcome.values)
-
     def summary(self) -> str:
         data = self.data
         rows = [
@@ -90,18 +85,12 @@ class Basins(DatasetResult):
         if np.isfinite(whole):
             said = "above ln 2: fractal, if the grid is fine enough" if boundary > np.log(2.0) else "not above ln 2"
             text.append(f"basin entropy {whole:.4f}, of the boundary {boundary:.4f} ({said})")
-        exponent, error = self.uncertainty
-        if np.isfinite(exponent):
-            dimension = f"dimension of the boundary {2.0 - exponent:.3f}"
-            known = "" if np.isnan(error) else f" (standard error {error:.2g})"
-            text.append(f"uncertainty exponent {exponent:.3f}{known}, {dimension}")
         return "\n".join(text)
 
     def to_dict(self) -> dict[str, Any]:
         data = self.data
         complete = not np.any(data.outcome.values == NOT_REACHED)
         whole, boundary = self.entropy if complete else (np.nan, np.nan)
-        exponent, error = self.uncertainty if complete else (np.nan, np.nan)
         names = self.TABLES["attractors"]
         return {
             "body": data.body,
@@ -123,9 +112,6 @@ class Basins(DatasetResult):
             ],
             "basin_entropy": whole,
             "boundary_basin_entropy": boundary,
-            "uncertainty_exponent": exponent,
-            "uncertainty_exponent_standard_error": error,
-            "boundary_dimension": 2.0 - exponent,
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
