@@ -188,43 +188,6 @@ def test_a_stop_that_moves_takes_the_body_with_it():
     assert np.all(found.coordinate.values[0, :, 0].min(axis=-1) >= np.array([0.3, 0.2, 0.0]))
 
 
-@pytest.mark.thorough
-@pytest.mark.parametrize("direction", ["both", pytest.param("afresh", marks=pytest.mark.thorough)])
-def test_an_interrupted_diagram_goes_on_in_its_folder(tmp_path, monkeypatch, direction):
-    values, starts = np.linspace(1.0, 1.7, 25), [[0.1, 0.5], [0.0, 0.0]]
-    options = {"direction": direction, "transient": 20, "kept": 8}
-    whole = dynamics.bifurcation_diagram(ball_case(0.5), values, starts, **options)
-    follow, calls = bifurcation._Work.follow, []
-
-    def interrupted(self, item):
-        calls.append(item)
-        if len(calls) == 12:
-            raise KeyboardInterrupt
-        return follow(self, item)
-
-    monkeypatch.setattr(bifurcation._Work, "follow", interrupted)
-    if direction == "both":
-        calls += [None] * 8  # in the second of three portions, each of a range in either direction
-    with pytest.raises(KeyboardInterrupt):
-        dynamics.bifurcation_diagram(ball_case(0.5), values, starts, folder=tmp_path, **options)
-    del calls[:]
-    calls += [None] * 12
-    again = dynamics.bifurcation_diagram(ball_case(0.5), values, starts, folder=tmp_path, **options)
-    assert len(calls) - 12 == {"both": 4, "afresh": 15}[direction] and again.data.identical(whole.data)
-    dynamics.bifurcation_diagram(ball_case(0.5), values, starts, folder=tmp_path, **options)
-    assert len(calls) - 12 == {"both": 4, "afresh": 15}[direction]
-    judged = 0
-    for changes in (
-        {"case": ball_case(0.51)}, {"values": values + 1e-9}, {"starts": [[0.1, 0.5], [0.0, 1e-9]]}, {"kept": 9},
-        {"transient": 21}, {"direction": "up"}, {"chattering": "velocity=0.01"},
-    ):  # fmt: skip
-        given = {"case": ball_case(0.5), "values": values, "starts": starts, **options} | changes
-        with pytest.raises(InvalidOption, match=r"something else in bifurcation-diagram\.npz"):
-            dynamics.bifurcation_diagram(**given, folder=tmp_path)
-        judged += 1
-    assert judged == 7
-
-
 @pytest.mark.parametrize(
     ("change", "error", "words"),
     [

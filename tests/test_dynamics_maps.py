@@ -377,21 +377,3 @@ def test_a_spring_that_presses_against_one_of_two_stops_brings_the_body_to_rest_
 def test_a_body_under_a_motion_without_acceleration_rests():
     (orbit,) = dynamics.periodic_orbits(dynamics.BouncingBall(0.5), pulses.sine(0.0, 5.0, cycles=1), starts=64)
     assert orbit.rests and orbit.impacts == 0.0
-
-
-@pytest.mark.parametrize(
-    ("content", "error", "words"),
-    [("file", rocking.OutputError, "cannot be made"), ("folder", InvalidOption, "bifurcation-diagram.npz that cannot")],
-)
-def test_a_folder_that_is_a_file_or_holds_another_is_refused_in_one_sentence(tmp_path, content, error, words):
-    place = tmp_path / "kept"
-    if content == "file":
-        place.write_text("mine")
-    else:
-        place.mkdir()
-        (place / "bifurcation-diagram.npz").write_bytes(b"mine")
-    with pytest.raises(error, match=words) as caught:
-        dynamics.bifurcation_diagram(
-            lambda value: (dynamics.BouncingBall(0.5), TABLE), [1.0], [0.0, 1.0], transient=1, kept=2, folder=place
-        )
-    assert "\n" not in str(caught.value)

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-from cyclopts import Parameter
 
 from rocking import checks
 from rocking.arrays import Floats
@@ -38,10 +37,6 @@ if TYPE_CHECKING:
 
 #: Cells of a basin along each axis.
 _CELLS = 200
-
-KEPT = Annotated[
-    Path | None, Parameter(help="Where to keep what was computed, again and again; the same call goes on there.")
-]
 
 
 def orbits(
@@ -107,7 +102,6 @@ def bifurcation(
     direction: Direction = "both",
     transient: Annotated[int, WHOLE] = 200,
     kept: Annotated[int, WHOLE] = 64,
-    folder: KEPT = None,
     body: Annotated[BodyOptions, BLOCK] = BodyOptions(),
     model: Annotated[ModelOptions, MODEL] = ModelOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
@@ -149,7 +143,6 @@ def bifurcation(
             kept=kept,
             parameter=f"{name} ({unit})" if unit else name,
             model=model.equation,
-            folder=folder,
         )
         deliver(found, "bifurcation", folder=place, as_json=output.as_json)
 
@@ -166,7 +159,6 @@ def basin(
         written("Velocities, rad/s or 5deg/s, or m/s; by default up to p times the balance, or what is natural."),
     ] = None,
     periods: Annotated[int, WHOLE] = 200,
-    folder: KEPT = None,
     body: Annotated[BodyOptions, BLOCK] = BodyOptions(),
     model: Annotated[ModelOptions, MODEL] = ModelOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
@@ -197,7 +189,6 @@ def basin(
             rates if velocities is None else values(velocities, "velocities", read_velocity),
             periods,
             model=model.equation,
-            folder=folder,
         )
         deliver(found, "basin", folder=place, as_json=output.as_json)
 

@@ -1,5 +1,4 @@
-from .basin_maps import Basins, basins
-from .basin_measures import basin_entropy
+from .basin_maps import Basins, basin_entropy, basins
 from .bifurcation import BifurcationDiagram, bifurcation_diagram
 from .bodies import BouncingBall, ImpactOscillator, InvertedPendulum
 from .branches import Bifurcation, Branch

@@ -6,7 +6,6 @@ size the derivative contracts in that norm and the impacts are as many as on the
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -239,12 +238,10 @@ class Known:
     #: States from which attractors are sought in one go, those that lead to a known one not counted.
     MOST_TRIES: Final = 12
 
-    def __init__(self, strobe: StroboscopicMap, size: Floats, states: Sequence[Floats] = ()) -> None:
+    def __init__(self, strobe: StroboscopicMap, size: Floats) -> None:
         self.strobe, self.size = strobe, size
         self.attractors: list[Attractor] = []
         self.traps, self.owner = np.empty((0, TRAP)), np.empty(0, dtype=np.int64)
-        for state in states:
-            self._add(attractor_from(strobe, np.asarray(state), size))
 
     def owners(self, states: Floats) -> Integers:
         """Attractor of each of some states, -1 where it is in no trap."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -12,7 +11,6 @@ from numpy.typing import NDArray
 from rocking.arrays import Floats, Integers
 from rocking.constants import VERSION
 from rocking.dynamics.attractors import Known
-from rocking.dynamics.kept import Kept, key_of
 from rocking.dynamics.maps import StroboscopicMap
 from rocking.dynamics.repeated import described, parts_of, scale_of
 from rocking.kernels import state
@@ -49,33 +47,18 @@ class Grid:
         self.outcome = np.full(len(x) * len(v), NOT_REACHED, dtype=np.int16)
         self.taken = np.zeros(len(x) * len(v), dtype=np.int32)
         self.known = Known(strobe, self.size)
-        self.kept: Kept | None = None
         corners = self._states(np.array([0, len(x) * len(v) - 1]))
         strobe._states(corners, "positions", "velocities")  # a start behind a stop, or into one, is refused at once
 
-    def keep_in(self, folder: str | Path) -> None:
-        """Go on from what a folder holds, and keep what is computed there."""
-        self.kept = Kept(folder, "basins", key_of([self.strobe], self.x, self.v, self.periods))
-        if found := self.kept.arrays():
-            self.outcome, self.taken = found["outcome"], found["taken"]
-            self.known = Known(self.strobe, self.size, [*found["attractors"]])
-
     def run(self, progress: bool | None) -> None:
-        """Follow all cells that are not done; what an interrupt leaves is kept where there is a folder."""
-        done = int(np.count_nonzero(self.outcome != NOT_REACHED))
-        try:
-            with Progress("basins", self.outcome.size, show=progress, done=done) as bar:
-                for cells in self._batches():
-                    self._follow(cells)
-                    bar.advance(len(cells))
-                    if self.kept is not None and self.kept.is_due:
-                        self._save(self.kept)
-        finally:
-            if self.kept is not None:
-                self._save(self.kept)
+        """Follow all cells."""
+        with Progress("basins", self.outcome.size, show=progress) as bar:
+            for cells in self._batches():
+                self._follow(cells)
+                bar.advance(len(cells))
 
     def _batches(self) -> Iterator[Integers]:
-        """Cells that are not done, coarse to fine; which ones go together does not depend on what is done."""
+        """Cells, coarse to fine."""
         stride = 1
         while self.outcome.size // (4 * stride * stride) >= _COARSEST:
             stride *= 2
@@ -89,9 +72,7 @@ class Grid:
             # Those of a pass in a mixed order: what an interrupt leaves out is then left out all over the grid.
             cells = np.random.default_rng(pass_).permutation(np.flatnonzero(level == pass_))
             for start in range(0, len(cells), _BATCH):
-                batch = cells[start : start + _BATCH]
-                if self.outcome[batch[0]] == NOT_REACHED:
-                    yield batch
+                yield cells[start : start + _BATCH]
 
     def _states(self, cells: Integers) -> Floats:
         row, column = np.divmod(cells, len(self.x))
@@ -118,10 +99,6 @@ class Grid:
         later = self.known.settle(ends)
         outcome[left] = np.where(later >= 0, _FIRST + later, _UNSETTLED)
         self.taken[cells], self.outcome[cells] = taken, outcome
-
-    def _save(self, kept: Kept) -> None:
-        starts = [attractor.states[0] for attractor in self.known.attractors]
-        kept.save(outcome=self.outcome, taken=self.taken, attractors=np.array(starts).reshape(-1, 2))
 
     def dataset(self) -> xr.Dataset:
         """Everything that was found, attractors in the order of their shares, then what is none."""

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
 from rocking.body import Body
 from rocking.constants import Model
 from rocking.dynamics.basin_grid import NAMES, NOT_REACHED, Grid
-from rocking.dynamics.basin_measures import basin_entropy
 from rocking.dynamics.maps import StroboscopicMap
 from rocking.dynamics.repeated import sensible
 from rocking.errors import InvalidOption
@@ -144,7 +142,6 @@ def basins(
     *,
     model: Model | None = None,
     chattering: str | Treatment = "certified",
-    folder: str | Path | None = None,
     threads: int | None = None,
     progress: bool | None = None,
 ) -> Basins:
@@ -166,8 +163,6 @@ def basins(
         As for `stroboscopic_map`.
     chattering : str or treatment
         As for `rocking.simulate`.
-    folder : str or pathlib.Path, optional
-        Where to keep what was computed, again and again; a call with the same arguments goes on from there.
     threads : int, optional
         Number of threads; by default one for every core.
     progress : bool, optional
@@ -184,7 +179,7 @@ def basins(
     InvalidMotion
         If the motion is none, or has no length.
     InvalidOption
-        If an argument is out of its range, or the folder holds basins of something else.
+        If an argument is out of its range.
 
     Notes
     -----
@@ -210,7 +205,14 @@ def basins(
     overturns to side -: 0.52
     overturns to side +: 0.12
     """
-    work = grid_of(body, motion, positions, velocities, periods, model, chattering, folder, threads)
+    strobe = StroboscopicMap(body, motion, model, chattering)
+    x, v = checks.axis(positions, "positions", InvalidOption), checks.axis(velocities, "velocities", InvalidOption)
+    sensible(x, "positions")
+    sensible(v, "velocities")
+    checks.grid_size({"positions": len(x), "velocities": len(v)}, InvalidOption)
+    most = checks.whole(periods, "periods", InvalidOption, least=1)
+    count = None if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
+    work = Grid(strobe, x, v, most, cores() if count is None else count)
     try:
         work.run(progress)
     except KeyboardInterrupt:
@@ -220,26 +222,58 @@ def basins(
     return Basins(work.dataset())
 
 
-def grid_of(
-    body: Body,
-    motion: Motion,
-    positions: ArrayLike,
-    velocities: ArrayLike,
-    periods: int,
-    model: Model | None,
-    chattering: str | Treatment,
-    folder: str | Path | None,
-    threads: int | None,
-) -> Grid:
-    """Grid of initial states that `basins` follows, checked, with what the folder holds of it."""
-    strobe = StroboscopicMap(body, motion, model, chattering)
-    x, v = checks.axis(positions, "positions", InvalidOption), checks.axis(velocities, "velocities", InvalidOption)
-    sensible(x, "positions")
-    sensible(v, "velocities")
-    checks.grid_size({"positions": len(x), "velocities": len(v)}, InvalidOption)
-    most = checks.whole(periods, "periods", InvalidOption, least=1)
-    count = None if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
-    work = Grid(strobe, x, v, most, cores() if count is None else count)
-    if folder is not None:
-        work.keep_in(folder)
-    return work
+def basin_entropy(outcomes: ArrayLike, box: int = 5) -> tuple[float, float]:
+    """Basin entropy and boundary basin entropy of a grid of outcomes.
+
+    Parameters
+    ----------
+    outcomes : array_like of int, shape (m, n)
+        What becomes of each state.
+    box : int
+        Cells along each side of a box; rows and columns that fill no box are left out.
+
+    Returns
+    -------
+    entropy : float
+        Mean over the boxes of the entropy of the outcomes in one, natural logarithms.
+    boundary : float
+        Mean over those boxes that hold several outcomes: above ln 2 a boundary is fractal, but not every fractal one
+        is; 0 where there are none.
+
+    Raises
+    ------
+    InvalidOption
+        If the outcomes are no grid of at least one box.
+
+    References
+    ----------
+    A. Daza and others, "Basin entropy: a new tool to analyze uncertainty in dynamical systems", Scientific Reports 6
+    (2016).
+
+    Examples
+    --------
+    A straight boundary through the middle of each second box:
+
+    >>> import numpy as np
+    >>> from rocking import dynamics
+    >>> outcomes = np.arange(8) // 2 % 2 * np.ones((8, 1), dtype=int)
+    >>> [round(value, 12) for value in dynamics.basin_entropy(outcomes, box=4)]
+    [0.69314718056, 0.69314718056]
+    """
+    grid = _grid(outcomes)
+    side = checks.whole(box, "box", InvalidOption, least=2)
+    rows, columns = (length // side for length in grid.shape)
+    if rows * columns == 0:
+        raise InvalidOption(f"{{}} must hold at least one box of {side} by {side} cells", "outcomes")
+    cut = grid[: rows * side, : columns * side].reshape(rows, side, columns, side)
+    shares = np.stack([np.mean(cut == value, axis=(1, 3)) for value in np.unique(grid)])
+    entropies = -np.sum(shares * np.log(np.where(shares > 0.0, shares, 1.0)), axis=0)
+    mixed = np.count_nonzero(shares > 0.0, axis=0) > 1
+    return float(entropies.mean()), float(entropies[mixed].mean()) if mixed.any() else 0.0
+
+
+def _grid(outcomes: ArrayLike) -> NDArray[np.int64]:
+    grid = np.asarray(outcomes)
+    if grid.ndim != 2 or grid.size == 0 or grid.dtype.kind not in "iub":
+        raise InvalidOption("{} must be a grid of whole numbers", "outcomes")
+    return grid.astype(np.int64)

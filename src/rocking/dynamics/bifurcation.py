@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
@@ -16,7 +15,6 @@ from rocking.arrays import Floats, Integers
 from rocking.body import Body
 from rocking.constants import VERSION, Model
 from rocking.dynamics.attractors import RETURN
-from rocking.dynamics.kept import Kept, key_of
 from rocking.dynamics.linear_bodies import LinearBody
 from rocking.dynamics.maps import Fate, StroboscopicMap, stroboscopic_map
 from rocking.dynamics.orbits import impacts_of
@@ -180,7 +178,6 @@ def bifurcation_diagram(
     parameter: str = "parameter",
     model: Model | None = None,
     chattering: str | Treatment = "certified",
-    folder: str | Path | None = None,
     progress: bool | None = None,
 ) -> BifurcationDiagram:
     """Follow orbits of a body under periodic motion as a parameter changes, and keep where they settle.
@@ -206,8 +203,6 @@ def bifurcation_diagram(
         As for `stroboscopic_map`.
     chattering : str or treatment
         As for `rocking.simulate`.
-    folder : str or pathlib.Path, optional
-        Where to keep what was computed, again and again; a call with the same arguments goes on from there.
     progress : bool, optional
         Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
 
@@ -221,7 +216,7 @@ def bifurcation_diagram(
     InvalidMotion, InvalidBlock
         If the function returns something else than a body and a motion.
     InvalidOption
-        If an argument is out of its range, a state is behind a stop, or the folder holds a diagram of something else.
+        If an argument is out of its range, or a state is behind a stop.
 
     Notes
     -----
@@ -253,8 +248,6 @@ def bifurcation_diagram(
     checks.grid_size({"values": levels.size, "starts": len(first), "kept": count}, InvalidOption)
 
     work = _Work(case, levels, first, way, (before, count), model, chattering)
-    if folder is not None:
-        work.keep_in(folder)
     work.run(progress)
     return BifurcationDiagram(work.dataset(name))
 
@@ -279,40 +272,16 @@ class _Work:
         shape = len(self.ways), levels.size, len(first)
         self.states = np.full((*shape, self.kept, 2), np.nan)
         self.period, self.impacts = np.full(shape, OVERTURNED), np.full(shape, -1.0)
-        self.done = 0
-        self.file: Kept | None = None
         self.ends = [self.mapped(0), self.mapped(levels.size - 1)]
         for strobe in self.ends:
             strobe.checked_starts(first, "starts")  # a start behind a stop is refused
 
-    def keep_in(self, folder: str | Path) -> None:
-        """Go on from what a folder holds, and keep what is computed there."""
-        maps = (self.mapped(k) for k in range(self.levels.size))
-        key = key_of(maps, self.levels, self.first, self.ways, self.transient, self.kept)
-        self.file = Kept(folder, "bifurcation diagram", key)
-        if found := self.file.arrays():
-            self.states, self.period, self.impacts = (found[name] for name in ("states", "period", "impacts"))
-            self.done = int(found["done"])
-
     def run(self, progress: bool | None) -> None:
-        """Follow the orbits at all values that are not done; where there is a folder an interrupt leaves them there."""
-        portions = [*self.items()]
-        before = sum(len(values) for items in portions[: self.done] for _, values in items)
-        try:
-            with Progress("bifurcation diagram", len(self.ways) * self.levels.size, show=progress, done=before) as bar:
-                for items in portions[self.done :]:
-                    for done in in_threads(self.follow, items):
-                        bar.advance(done)
-                    self.done += 1
-                    if self.file is not None and self.file.is_due:
-                        self.save(self.file)
-        finally:
-            if self.file is not None:
-                self.save(self.file)
-
-    def save(self, file: Kept) -> None:
-        """Keep what was found."""
-        file.save(states=self.states, period=self.period, impacts=self.impacts, done=np.array(self.done))
+        """Follow the orbits at all values."""
+        with Progress("bifurcation diagram", len(self.ways) * self.levels.size, show=progress) as bar:
+            for items in self.items():
+                for done in in_threads(self.follow, items):
+                    bar.advance(done)
 
     def before(self, w: int, k: int) -> Floats:
         """States at the value before one, in one direction; at the first value the initial ones."""
