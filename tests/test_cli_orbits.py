@@ -29,38 +29,6 @@ def test_orbits_are_those_of_the_functions_and_one_is_followed(run, tmp_path):
     assert {f"orbit-{k}.pdf" for k in range(1, len(expected) + 1)} <= names
 
 
-AT_FLIPS = "orbits", "--ball", 0.5, "--pulse", "sine:amplitude=14.95,frequency=5Hz", "--along", "amplitude:14.9:16.5"
-
-
-@pytest.mark.slow
-def test_what_begins_at_a_flip_is_followed(run):
-    code, out, err = run(*AT_FLIPS, "--switch", "15", "--json")
-    assert (code, err) == (0, "")
-    result = json.loads(out)
-    (switched,) = result["switched"]
-    (flip,) = result["branch"]["bifurcations"]
-    assert (result["branch"]["period"], switched["period"]) == (1, 2)
-    assert switched["bifurcations"][0]["value"] == pytest.approx(flip["value"], abs=1e-8)
-
-
-def test_each_branch_begins_at_the_nearest_bifurcation_of_the_one_before(monkeypatch):
-    made = []
-
-    def branch(name, *values):
-        made.append(name)
-        kinds = [SimpleNamespace(kind=kind, value=value) for kind, value in values]
-        return SimpleNamespace(name=name, period=1, bifurcations=kinds)
-
-    def switched(before, k):
-        return branch((before.name, k), ("fold", 4.0), ("flip", 2.0))
-
-    monkeypatch.setattr(commands, "continue_orbit", lambda *_, **__: branch("first", ("flip", 1.0), ("flip", 3.0)))
-    monkeypatch.setattr(commands, "switch_branch", switched)
-    shaking = commands._Repeating("sine:amplitude=2,frequency=1")
-    follow = commands._follower(dynamics.BouncingBall(0.5), shaking, "amplitude:1:3", "2.5,4")
-    assert [each.name for each in follow(None)] == made == ["first", ("first", 1), (("first", 1), 1)]
-
-
 def test_the_first_stable_orbit_is_followed_unless_one_is_named():
     unstable, stable, other = (SimpleNamespace(is_stable=k > 0) for k in range(3))
     found = [unstable, stable, other]
@@ -70,20 +38,6 @@ def test_the_first_stable_orbit_is_followed_unless_one_is_named():
     for number in (0, 4):
         with pytest.raises(InvalidOption, match="from 1 to 3"):
             commands._chosen(found, number)
-
-
-@pytest.mark.slow
-def test_branches_that_begin_at_flips_are_followed_one_after_the_other_and_written(run, tmp_path):
-    code, out, _ = run(*AT_FLIPS, "--switch", "15,16.3", "--out", tmp_path)
-    assert code == 0
-    assert [f"orbits of {count}" in out for count in ("1 period", "2 periods", "4 periods")] == [True] * 3
-    result = json.loads((tmp_path / "result.json").read_text())
-    second, third = result["switched"]
-    assert third["bifurcations"][0]["value"] == pytest.approx(second["bifurcations"][1]["value"], abs=1e-8)
-    names = {path.name for path in tmp_path.iterdir()}
-    assert {f"switched-{k}-{table}.csv" for k in (1, 2) for table in ("points", "bifurcations")} <= names
-    rows = (tmp_path / "switched-2-points.csv").read_text().splitlines()
-    assert len(rows) == len(third["values"]) + 1
 
 
 @pytest.mark.cases(fast=2)
@@ -125,9 +79,7 @@ MISTAKES = [
     ((*BLOCK, "--along", "amplitude:0.04:0.06", "--orbit", 9), "--orbit must be from 1 to 3"),
     (("--ball", 0.5, "--along", "amplitude:13:16"), "12"),
     (("--ball", 0.5, "--period", 0), "--period"),
-    (("--ball", 0.5, "--switch", 15.0), "--along"),
     (("--ball", 0.5, "--along", "amplitude:16:9"), "a lower value to a higher one"),
-    ((*BLOCK, "--along", "amplitude:0.04:0.06", "--switch", 0.05), "leave --switch"),
     (("--width", 0.5, "--height", 3.0, "--mass", 9, "--tendon", "stiffness=9,strength=5"), "a tendon that yields"),
     ((), "a block is needed"),
 ]
@@ -138,8 +90,6 @@ MORE = [
     (("--ball", 0.5, "--along", "amplitude:1"), "--along takes a parameter"),
     (("--ball", 0.5, "--along", "amplitude:9:16", "--orbit", 9), "--orbit must be from 1 to 3"),
     (("--ball", 0.5, "--orbit", 1), "--along"),
-    (("--ball", 0.5, "--along", "amplitude:11:13", "--switch", 12), "leave --switch"),
-    (("--ball", 0.5, "--along", "amplitude:11:13", "--switch", "wide"), "--switch"),
     (("--ball", 0.5, "--spring", 9.0), "leave --spring out"),
     (("--width", 0.5, "--height", 3.0, "--spring", 9.0), "needs its --mass"),
 ]

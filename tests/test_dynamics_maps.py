@@ -332,7 +332,6 @@ TABLE = pulses.sine(12.0, 5.0, cycles=1)
         (lambda ball: dynamics.basins(ball, TABLE, [0.0, math.nan], [0.0, 1.0]), "positions must be increasing finite"),
         (lambda ball: dynamics.basins(ball, TABLE, [0.0, 1.0], [0.0, 1e308]), "velocities must be finite"),
         (lambda ball: dynamics.continue_orbit(None, lambda v: (ball, TABLE), 1.0, (0.0, 2.0)), "periodic_orbits"),
-        (lambda ball: dynamics.switch_branch(None, 0), "continue_orbit"),
         (lambda ball: dynamics.stroboscopic_map(BLOCK, TABLE, model="cubic"), "model must be one of nonlinear, linear"),
         (lambda ball: dynamics.impact_map(BLOCK, TABLE, model="cubic"), "model must be one of nonlinear, linear"),
         (lambda ball: dynamics.basins(ball, TABLE, [0.0, 1.0], [-1.0, 1.0]), "^velocities must not lead into a stop"),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -25,7 +24,6 @@ from rocking.dynamics.maps import stroboscopic_map
 from rocking.dynamics.orbit_search import periodic_orbits
 from rocking.dynamics.orbits import PeriodicOrbit
 from rocking.dynamics.repeated import scale_of
-from rocking.dynamics.switching import LEAVING, switch_branch
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.named_pulses import PulseFamily, pulse_values
@@ -45,7 +43,6 @@ def orbits(
     period: Annotated[int, WHOLE] = 1,
     along: str | None = None,
     orbit: Annotated[int | None, WHOLE] = None,
-    switch: str | None = None,
     body: Annotated[BodyOptions, BLOCK] = BodyOptions(),
     model: Annotated[ModelOptions, MODEL] = ModelOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
@@ -55,7 +52,7 @@ def orbits(
     The body is a block (--width, --height, or --p, --alpha), perhaps a wall or with restraints (--one-sided,
     --tendon, ...), or --ball, --oscillator or --pendulum. --out holds
     orbit-1.png, .pdf, orbit-1-histories.csv, ... of every orbit and result.json; with --along, branch.png, .pdf,
-    points.csv and bifurcations.csv; with --switch, switched-1-points.csv, switched-1-bifurcations.csv, ...
+    points.csv and bifurcations.csv.
 
     Parameters
     ----------
@@ -69,26 +66,20 @@ def orbits(
         bifurcates is located.
     orbit
         Number of the orbit that is followed; by default the first stable one.
-    switch
-        Value of the parameter near a flip, or near where symmetry breaks: the branch that begins there is followed,
-        too. Of several, 15.3,16.7, each is on the branch before it.
     """
     moving, shaking = body.body(), _Repeating(pulse)
-    for name, value in (("orbit", orbit), ("switch", switch)):
-        if along is None and value is not None:
-            raise InvalidOption("{} is about the branch that is followed with {}, which is missing", name, "along")
-    follow = None if along is None else _follower(moving, shaking, along, switch)
+    if along is None and orbit is not None:
+        raise InvalidOption("{} is about the branch that is followed with {}, which is missing", "orbit", "along")
+    follow = None if along is None else _follower(moving, shaking, along)
     with output.folder() as folder:
         found = periodic_orbits(moving, shaking.motion(), period=period, model=model.equation)
-        branches = [] if follow is None else follow(_chosen(found, orbit))
+        branch = None if follow is None else follow(_chosen(found, orbit))
         result: dict[str, Any] = {"orbits": [each.to_dict() for each in found]}
-        if branches:
-            result["branch"] = branches[0].to_dict()
-        if switch is not None:
-            result["switched"] = [each.to_dict() for each in branches[1:]]
+        if branch is not None:
+            result["branch"] = branch.to_dict()
         if folder is not None:
-            _write(folder, found, branches, result)
-        text = "\n\n".join([_text(found), *(each.summary() for each in branches)])
+            _write(folder, found, branch, result)
+        text = _text(found) if branch is None else f"{_text(found)}\n\n{branch.summary()}"
         print_result(result, text, as_json=output.as_json)
 
 
@@ -216,10 +207,8 @@ class _Repeating:
         return name, quantity, rest
 
 
-def _follower(
-    body: Body, shaking: _Repeating, along: str, switch: str | None
-) -> Callable[[PeriodicOrbit], list[Branch]]:
-    """Return what follows an orbit along a parameter of the pulse, and then what begins at bifurcations."""
+def _follower(body: Body, shaking: _Repeating, along: str) -> Callable[[PeriodicOrbit], Branch]:
+    """Return what follows an orbit along a parameter of the pulse."""
     example = "amplitude:0.1g:0.5g"
     name, quantity, rest = shaking.parameter(along, example)
     ends = rest.split(":")
@@ -231,31 +220,13 @@ def _follower(
         raise InvalidOption(f"{{}} takes a range from a lower value to a higher one, not {rest}", "along", value=along)
     if not low <= value <= high:
         raise InvalidOption(f"{{}} must hold the pulse's own {name}, {value:g}, at which orbits are found", "along")
-    places = [] if switch is None else [quantity(each, "switch") for each in switch.split(",")]
 
-    def follow(orbit: PeriodicOrbit) -> list[Branch]:
-        branches = [
-            continue_orbit(
-                orbit, lambda at: (body, shaking.motion(**{name: at})), value, (low, high), name=name, unit=unit
-            )
-        ]
-        for place in places:
-            branches.append(switch_branch(branches[-1], _nearest(branches[-1], place)))
-        return branches
+    def follow(orbit: PeriodicOrbit) -> Branch:
+        return continue_orbit(
+            orbit, lambda at: (body, shaking.motion(**{name: at})), value, (low, high), name=name, unit=unit
+        )
 
     return follow
-
-
-def _nearest(branch: Branch, value: float) -> int:
-    """Return the number of the bifurcation, of those at which another branch begins, that is nearest to a value."""
-    leaving = [k for k, each in enumerate(branch.bifurcations) if each.kind in LEAVING]
-    if not leaving:
-        raise InvalidOption(
-            f"the branch of orbits of {counted(branch.period, 'period')} has no flip and keeps its symmetry: no other "
-            "begins there, so leave {}, or its last value, out",
-            "switch",
-        )
-    return min(leaving, key=lambda k: abs(branch.bifurcations[k].value - value))
 
 
 def _chosen(found: list[PeriodicOrbit], number_of: int | None) -> PeriodicOrbit:
@@ -291,17 +262,14 @@ def _text(found: list[PeriodicOrbit]) -> str:
     return f"{counted(len(found), 'periodic orbit')}\n\n{text_table(header, rows)}"
 
 
-def _write(folder: Path, found: list[PeriodicOrbit], branches: list[Branch], result: dict[str, Any]) -> None:
+def _write(folder: Path, found: list[PeriodicOrbit], branch: Branch | None, result: dict[str, Any]) -> None:
     """Write figures, tables and the result."""
     for k, each in enumerate(found, 1):
         each.to_csv(folder / f"orbit-{k}-histories.csv", "histories")
     figures: dict[str, Callable[[], Figure]] = {f"orbit-{k}": each.plot for k, each in enumerate(found, 1)}
-    if branches:
-        first, *others = branches
-        write_tables(folder, first)
-        for k, branch in enumerate(others, 1):
-            write_tables(folder, branch, f"switched-{k}-")
-        figures["branch"] = partial(first.plot, others=others)
+    if branch is not None:
+        write_tables(folder, branch)
+        figures["branch"] = branch.plot
     write_results(folder, figures=figures, result=result)
 
 

@@ -73,10 +73,10 @@ def write_results(folder: Path, *, figures: Mapping[str, Callable[[], Figure]], 
     write_text(folder / "result.json", to_json(result) + "\n")  # last: where it is, all is there
 
 
-def write_tables(folder: Path, found: TableResult, before: str = "") -> None:
-    """Write every table of a result into a folder, each into a file of its name, with something before it."""
+def write_tables(folder: Path, found: TableResult) -> None:
+    """Write every table of a result into a folder, each into a file of its name."""
     for table in found.TABLES:
-        found.to_csv(folder / f"{before}{table}.csv", table)
+        found.to_csv(folder / f"{table}.csv", table)
 
 
 @contextmanager

@@ -13,7 +13,6 @@ from .orbits import PeriodicOrbit
 from .schemes import compare_schemes, scheme_of
 from .simulation import Response, simulate, simulate_many
 from .stepping import MoreauJean, SchatzmanPaoli, SteppedResponse, TimeStepping, integrate
-from .switching import switch_branch
 
 __all__ = [
     "Basins",
@@ -50,5 +49,4 @@ __all__ = [
     "simulate",
     "simulate_many",
     "stroboscopic_map",
-    "switch_branch",
 ]

@@ -81,7 +81,7 @@ class Bifurcation(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Branch(DrawnResult, TableResult):
-    """Periodic orbits along a parameter, made by `continue_orbit` and `switch_branch`.
+    """Periodic orbits along a parameter, made by `continue_orbit`.
 
     Attributes
     ----------
@@ -242,7 +242,7 @@ class Branch(DrawnResult, TableResult):
         figsize : (float, float), optional
             Width and height of a new figure, inches.
         others : sequence of Branch
-            Branches along the same parameter that are drawn with it, as those of `switch_branch`.
+            Branches along the same parameter that are drawn with it, for example of twice the period.
 
         Returns
         -------
@@ -257,7 +257,9 @@ class Branch(DrawnResult, TableResult):
         ...     return ball, pulses.sine(amplitude, 5.0, cycles=1)
         >>> stable = next(each for each in dynamics.periodic_orbits(*family(12.0)) if each.is_stable)
         >>> branch = dynamics.continue_orbit(stable, family, 12.0, (11.0, 16.0), unit="m/s^2")
-        >>> figure = branch.plot(others=[dynamics.switch_branch(branch, 0)])
+        >>> found = dynamics.periodic_orbits(*family(15.8), period=2, starts=64)
+        >>> doubled = next(each for each in found if each.period == 2)
+        >>> figure = branch.plot(others=[dynamics.continue_orbit(doubled, family, 15.8, (15.0, 16.0))])
         """
         from rocking.plot.orbits import branch_figure
 
