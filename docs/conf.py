@@ -43,7 +43,7 @@ autodoc_member_order = "bysource"
 numpydoc_show_class_members = False
 
 GALLERY = ["paper", "museum", "threshold", "bouncing_ball", "chaos", "pulse_map", "frame", "sizes", "ten_thousand"]
-GALLERY += ["precarious_rock", "statue", "calibration"]
+GALLERY += ["precarious_rock", "median_gradient", "statue", "calibration", "restitution_law"]
 sphinx_gallery_conf = {
     "examples_dirs": "../examples",
     "gallery_dirs": "gallery",

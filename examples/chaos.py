@@ -53,7 +53,18 @@ basins = dynamics.basins(block, sine, np.linspace(-0.25, 0.25, 120), np.linspace
 shares = basins.share.values
 for name, share in zip(basins.attractor.values, shares, strict=True):
     print(f"{name}: {100.0 * share:.1f} %")
-dimension = 2.0 - basins.uncertainty[0]
+
+# %%
+# The share of states with a neighbour k cells away that has another outcome grows as k to the power of two minus
+# the dimension (McDonald and others 1985).
+
+outcome, steps = basins.outcome.values, (1, 2, 4)
+uncertain = []
+for k in steps:
+    middle, rows, columns = outcome[k:-k, k:-k], outcome[:, k:-k], outcome[k:-k]
+    differs = [middle != each for each in (rows[2 * k :], rows[: -2 * k], columns[:, 2 * k :], columns[:, : -2 * k])]
+    uncertain.append(np.mean(np.any(differs, axis=0)))
+dimension = 2.0 - np.polyfit(np.log(steps), np.log(uncertain), 1)[0]
 print(f"dimension of the boundary {dimension:.2f}")
 
 # %%

@@ -20,7 +20,6 @@ TAKES_A_MOTION = {
     "simulate_many": lambda motion: rocking.simulate_many(BLOCK, motion),
     "rocking_spectrum": lambda motion: rocking.rocking_spectrum(rocking.Blocks.grid(alpha=[0.2], p=[2.0]), motion),
     "fragility": lambda motion: rocking.fragility(BLOCK, motion, levels=[1.0, 2.0], measure="pga"),
-    "median_gradient": lambda motion: rocking.median_gradient(BLOCK, motion, 1.0, 2.0),
     "incremental_dynamic_analysis": lambda motion: rocking.incremental_dynamic_analysis(BLOCK, motion, measure="pga"),
 }
 
@@ -74,7 +73,6 @@ TAKES_A_BLOCK = {
     "simulate": lambda block: rocking.simulate(block, MOTION),
     "simulate_many": lambda block: rocking.simulate_many(block, MOTION),
     "fragility": lambda block: rocking.fragility(block, MOTION, levels=[1.0, 2.0], measure="pga"),
-    "median_gradient": lambda block: rocking.median_gradient(block, MOTION, 1.0, 2.0),
     "Blocks.of": Blocks.of,
 }
 

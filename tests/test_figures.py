@@ -14,7 +14,7 @@ import rocking
 from rocking import dynamics
 from rocking.plot.basins import basins_figure
 from rocking.plot.bifurcation import bifurcation_figure
-from rocking.plot.calibration import Parameter, factors_figure, measured_figure, outcomes_figure
+from rocking.plot.calibration import Parameter, measured_figure, outcomes_figure
 from rocking.plot.fragility import FragilityLine, fragility_figure
 from rocking.plot.histories import intervals_figure
 from rocking.plot.ida import ScaledMotion, ida_figure, levels_reaching
@@ -226,15 +226,6 @@ def measured_of(**options):
     return measured_figure(**arrays, fitted_time=fine, fitted=np.sin(fine), **options)
 
 
-def factors_of(**options):
-    speed = np.linspace(0.1, 0.5, 9)
-    at = np.linspace(0.0, 0.525, 50)
-    names = ("drawn at each impact", "falling with the speed", "angular momentum (Housner)", "several points")
-    curves = {name: (at, 0.95 - 0.02 * k * at, np.full(50, 0.03 * (k == 0))) for k, name in enumerate(names)}
-    measured = {"speed": speed, "factor": 0.94 - 0.1 * speed, "deviation": np.full(9, 0.01)}
-    return factors_figure(**measured, curves=curves, **options)
-
-
 def basins_of(**options):
     kinds = ["orbit"] * 4 + ["overturns"] * 2 + ["unsettled"]
     orbits = np.full((7, 3, 2), np.nan)
@@ -275,7 +266,6 @@ FIGURES = {
     "outcomes of tests": (trials_of, 4.8),
     "validation": (validation_of, 5.2),
     "measured": (measured_of, 3.8),
-    "factors": (factors_of, 3.8),
     "response": (response_of, 4.8),
     "phase plane": (phase_of, 4.2),
     "energy": (energy_over_time_of, 3.4),

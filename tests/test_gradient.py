@@ -290,3 +290,14 @@ def test_a_gradient_counts_the_pieces_that_its_value_depends_on():
     moved = int(np.count_nonzero(found.coefficients.any(axis=1)))
     assert 0 < moved < len(found.coefficients) == 7
     assert f"depends on {moved} of 7 pieces of the motion" in repr(found)
+
+
+def test_where_a_touch_decides_on_overturning_a_critical_scale_has_no_derivative():
+    """Nothing weighs the block down for a while: a push, sooner or later, decides whether it lands."""
+    lift = Motion([0.0, 2.6, 4.0], [[-2.0 * 9.80665], [0.0]])
+    push = Motion([0.0, 0.01, 0.9, 1.1, 2.6, 3.2, 4.0], [[-1e-3], [0.0], [1.0], [0.0], [3.5], [0.0]])
+    block, motion = Block.from_parameters(p=3.0, alpha=0.2, restitution=0.5), push.with_vertical(lift)
+    touch = rocking.critical_scale(block, motion, 0.99, 1.001)
+    assert touch.scale == pytest.approx(0.99996, abs=1e-5)
+    assert "without the block coming to the balance point" in touch.gradient.reason
+    assert np.all(np.isnan([touch.p, touch.alpha, touch.restitution, *touch.gradient.coefficients.ravel()]))

@@ -72,13 +72,6 @@ def blocks_of(k):
     return Blocks.grid(p=[1.5, 3.0], alpha=[0.15, 0.25], restitution=[0.9], gravity=k * G)
 
 
-def rectangle(k):
-    return rocking.Block(width=0.4 * k, height=1.6 * k, restitution=0.95, gravity=k * G)
-
-
-TIMES = rocking.simulate(rectangle(1.0), None, initial_rotation=0.15).impacts["time"][:6]
-
-
 #: An analysis under so many times the gravity, and what of it is the same.
 ANALYSES = {
     "ensemble": lambda k: rocking.simulate_many(
@@ -100,9 +93,6 @@ ANALYSES = {
     "critical scale": lambda k: rocking.critical_scale(
         rocking.Block.from_parameters(2.0, 0.2, 0.9, gravity=k * G), motion_of(k), low=0.1, high=9.0
     ).scale,
-    "laws of restitution": lambda k: [
-        each["log_likelihood"] for each in rocking.compare_restitution([TIMES], rectangle(k)).to_dict()["laws"]
-    ],
     "sizes of spectrum": lambda k: rocking.rocking_spectrum(blocks_of(k), motion_of(k)).data["size"].values / k,
 }  # fmt: skip
 

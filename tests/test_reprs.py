@@ -57,7 +57,6 @@ RESULTS = {
     "response of a wall": lambda path: rocking.simulate(WALL, RECORD),
     "gradient": lambda path: rocking.gradient(rocking.simulate(WALL, RECORD)),
     "critical scale": lambda path: rocking.critical_scale(WALL, MOTIONS[0], 0.5, 20.0),
-    "median gradient": lambda path: median(),
     "map": lambda path: rocking.dynamics.stroboscopic_map(BLOCK, MOTIONS[0]),
     "impact map": lambda path: rocking.dynamics.impact_map(rocking.dynamics.BouncingBall(0.8), MOTIONS[0]),
     "solid": lambda path: SOLID,
@@ -82,11 +81,6 @@ RESULTS = {
     "calibrated history": lambda path: calibrated_history(),
     "validation": lambda path: validated(),
 }
-
-
-@functools.cache
-def median():
-    return rocking.median_gradient(BLOCK, MOTIONS[6:8], 2.0, 9.0, levels=5)
 
 
 # What a calibration says does not hang on how well the block is known, and no test here changes a result.
@@ -194,7 +188,3 @@ def test_a_summary_says_which_side_has_which_parameters():
 def test_a_gradient_of_a_block_that_stays_says_what_it_is_and_what_it_cannot_tell():
     found = rocking.gradient(rocking.simulate(BLOCK, RECORD.scaled(0.01)))
     assert re.match(r"<Gradient: 0 depends on 0 of \d+ pieces of the motion; the response starts on the", repr(found))
-
-
-def test_a_median_has_the_unit_of_its_measure():
-    assert "m/s^2, dispersion" in repr(RESULTS["median gradient"](None))

@@ -7,13 +7,11 @@ from .analysis.critical import CriticalScale, critical_scale
 from .analysis.directions import response_rose
 from .analysis.efficiency import compare_measures
 from .analysis.fragility.fit import fit_fragility, fragility
-from .analysis.fragility.gradient import MedianGradient, median_gradient
 from .analysis.fragility.result import Fragility
 from .analysis.hazard import HazardCurve
 from .analysis.incremental import incremental_dynamic_analysis
 from .analysis.input_tables import read_tests
 from .analysis.overturning import overturning_map
-from .analysis.restitution import compare_restitution
 from .analysis.spectrum import rocking_spectrum
 from .analysis.survey import survey
 from .analysis.validation.judging import validate
@@ -95,7 +93,6 @@ __all__ = [
     "InvalidOption",
     "Load",
     "Measure",
-    "MedianGradient",
     "ModelValidation",
     "Motion",
     "Origin",
@@ -134,7 +131,6 @@ __all__ = [
     "calibrate_history",
     "chattering",
     "compare_measures",
-    "compare_restitution",
     "critical_scale",
     "dynamics",
     "explore",
@@ -143,7 +139,6 @@ __all__ = [
     "gradient",
     "impact_restitution",
     "incremental_dynamic_analysis",
-    "median_gradient",
     "one_sided_restitution",
     "overturning_map",
     "pulses",

@@ -8,7 +8,6 @@ from .fragility.curve import Band, FragilityCurve
 from .fragility.lognormal import Goodness, Likelihood, Probit
 from .incremental import IncrementalDynamicAnalysis
 from .overturning import Mode, OverturningMap, mode_name
-from .restitution import LawFit, RestitutionComparison
 from .risk import Rate, Risk
 from .spectrum import RockingSpectrum
 from .survey import Survey
@@ -25,7 +24,6 @@ __all__ = [
     "Goodness",
     "IncrementalDynamicAnalysis",
     "JudgedTest",
-    "LawFit",
     "Likelihood",
     "MeasureComparison",
     "Measured",
@@ -35,7 +33,6 @@ __all__ = [
     "Rate",
     "Repeatability",
     "ResponseRose",
-    "RestitutionComparison",
     "Risk",
     "RockingSpectrum",
     "Score",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -119,22 +118,7 @@ def critical_scale(
         if response(value).overturned is not expected:
             does, wanted = ("does not overturn", "raise") if expected else ("overturns", "lower")
             raise InvalidOption(f"the block {does} at the scale {{}} = {value:g}: {wanted} it", name, value=value)
-    return critical_between(response, motion, least, most)
-
-
-def critical_between(
-    response: Callable[[float], Response], motion: Motion, low: float, high: float, *, falls_above: bool = True
-) -> CriticalScale:
-    """Find the critical scale of a motion between two scales, at one of which a response overturns.
-
-    It is on the side of those that do, which may be the lower one.
-    """
-
-    def falls(scale: float) -> bool:
-        return response(scale).overturned
-
-    ends = bisected(low, high, falls if falls_above else lambda scale: not falls(scale))
-    scale = ends[1] if falls_above else ends[0]
+    _, scale = bisected(least, most, lambda scale: response(scale).overturned)
     last = response(scale)
     by_scale = {name: float(last.sensitivity.events[name][-1]) for name in ("motion", "p", "alpha", "restitution")}
     turned, share = gradient(last, "event", -1), -scale / by_scale["motion"]

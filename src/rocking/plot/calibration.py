@@ -89,39 +89,6 @@ def measured_figure(
     return figure
 
 
-def factors_figure(
-    *,
-    speed: Floats,
-    factor: Floats,
-    deviation: Floats,
-    curves: Mapping[str, tuple[Floats, Floats, Floats]],
-    title: str = "",
-    ax: Axes | None = None,
-    figsize: tuple[float, float] | None = None,
-) -> Figure:
-    """Draw measured factors with their standard errors over the speed of the impact (rad/s), and laws.
-
-    A law is speeds, factors, and half the width of the band in which it draws them; the first one is preferred.
-    """
-    with figure_for(ax, (7.0, 4.0), figsize, title) as figure:
-        axes = figure.subplots() if ax is None else ax
-        axes.errorbar(
-            speed, factor, deviation, fmt="o", color=INK, mfc="white", markersize=3.2, elinewidth=0.6, label="measured"
-        )
-        for k, (name, (at, middle, band)) in enumerate(curves.items()):
-            style = CURVES[k % len(CURVES)]
-            axes.plot(at, middle, linewidth=1.8 if k == 0 else 0.9, label=name, **style)
-            if np.any(band > 0.0):
-                axes.fill_between(at, middle - band, middle + band, color=style["color"], alpha=0.15, linewidth=0.0)
-        span = max(float(np.ptp(factor)), 0.02)
-        axes.set_ylim(float(factor.min()) - 0.4 * span, min(float(factor.max()) + 0.4 * span, 1.05))
-        axes.set_xlim(0.0, 1.05 * float(speed.max()))
-        axes.grid(True)
-        add_labels(axes, "speed before the impact (rad/s)", "factor on the speed")
-        add_legend(figure, ax, handles_of(axes))
-    return figure
-
-
 def _panels(figure: Figure, count: int) -> tuple[Axes, list[Axes]]:
     grid = figure.add_gridspec(2, count, height_ratios=(1.2, 1.0))
     return figure.add_subplot(grid[0, :]), [figure.add_subplot(grid[1, k]) for k in range(count)]
