@@ -1,4 +1,4 @@
-"""Write the tables and images of docs/paper.md, docs/chattering-maps.md and docs/howto/schemes.md from computation.
+"""Write the tables and images of docs/paper.md and docs/chattering-maps.md from computation.
 
 Run ``python scripts/chattering_pages.py`` from the repository's root; a test compares the tables with what it makes.
 """
@@ -17,9 +17,7 @@ from rocking.chattering import chattering_time, critical_amplitude, families
 from rocking.chattering.episodes import chattering_episodes
 from rocking.chattering.maps import chattering_map
 from rocking.chattering.paper import FIGURES, paper_figure
-from rocking.chattering.paper.figure import BlockUnderSine
-from rocking.dynamics import BouncingBall, compare_schemes
-from rocking.dynamics.schemes import STEPPINGS
+from rocking.tables import counted
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 TABLES = DOCS / "_tables"
@@ -30,10 +28,6 @@ DOTS_PER_INCH = 110
 
 PAPER_BLOCK = rocking.Block.from_parameters(p=1.0, alpha=0.2, restitution=0.92)
 STATUE = rocking.Block(half_width=0.12, half_height=0.55)
-
-#: The ball of Siconos' examples, which is dropped from 1 m; and one on a table that moves up and down.
-DROPPED_BALL = BouncingBall(0.9, gravity=9.81), None
-SHAKEN_BALL = BouncingBall(0.8), rocking.pulses.sine(12.0, 2.0, cycles=6)
 
 #: Pulses whose critical amplitude is compared with the sine's.
 PULSES = {
@@ -72,13 +66,6 @@ def tables():
     """Make all tables, by file name."""
     figures = (paper_figure(number) for number in FIGURES)
     made = {f"paper-figure-{figure.number}.txt": paper_table(figure) for figure in figures if figure.statements}
-    made["schemes-complete.txt"] = schemes_table(1.03)
-    made["schemes-incomplete.txt"] = schemes_table(1.05)
-    made["schemes-record.txt"] = table_of_comparison(
-        compare_schemes(STATUE, rocking.records.load("ridgecrest-clc-090"))
-    )
-    made["schemes-ball.txt"] = table_of_comparison(compare_schemes(*DROPPED_BALL, initial_position=1.0))
-    made["schemes-shaken-ball.txt"] = table_of_comparison(compare_schemes(*SHAKEN_BALL))
     made["paper-frequency.txt"] = frequency_table()
     made["paper-excess.txt"] = excess_table()
     made["paper-slow.txt"] = slow_table()
@@ -172,49 +159,35 @@ def robust_table():
     rows = []
     for a, omega in SCHEME_CASES:
         case = families.sine(PAPER_BLOCK, model="linear")(a, omega)
-        schemes = [rocking.AsymptoticTime(critical=name) for name in ("eq76", "eq77", "exact")]
+        certified = rests_under(case, "certified")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", rocking.errors.OutsideFit)
-            outcomes = compare_schemes(case.block, case.motion, schemes=schemes, model="linear").outcomes
+            found = [rests_under(case, rocking.AsymptoticTime(critical=name)) for name in ("eq76", "eq77", "exact")]
         exact = float(critical_amplitude(omega, 0.92))
-        rows.append((f"{a:g}", f"{omega:g}", f"{exact:.5f}", *(outcome.verdict for outcome in outcomes)))
+        rows.append((f"{a:g}", f"{omega:g}", f"{exact:.5f}", *(verdict_on(each, certified) for each in found)))
     return markdown(("a", "omega", "a_cr", "with Eq. 76", "with Eq. 77", "with the exact a_cr"), rows)
 
 
-def schemes_table(a):
-    """All schemes under the paper's sine of amplitude a."""
-    return table_of_comparison(compare_schemes(PAPER_BLOCK, BlockUnderSine(a).excitation(), model="linear"))
+def rests_under(case, chattering):
+    """Start and end of each rest, and how many ended a sequence only because time no longer advanced."""
+    response = rocking.simulate(case.block, case.motion, model="linear", chattering=chattering)
+    times, kinds = response.events["time"], response.events["kind"]
+    return np.column_stack([times, np.append(times[1:], math.inf)])[kinds == "rest"], response.stalled
 
 
-def table_of_comparison(comparison):
-    """Cost, rests, errors and verdict of each scheme."""
-    certified = comparison.certified
-    rows: list[tuple[str | int, ...]] = [("certified", f"{certified.cost} arcs", len(certified.rests), *[""] * 7)]
-    for outcome in comparison.outcomes:
-        worst = outcome.largest_error
-        stepped = outcome.scheme in STEPPINGS
-        rows.append(
-            (
-                outcome.scheme.label,
-                f"{outcome.cost} {'steps' if stepped else 'arcs'}",
-                len(outcome.rests),
-                outcome.false_rests.size,
-                outcome.missed.size,
-                "" if math.isnan(worst) else "0" if abs(worst) < 1e-11 else f"{worst:+.1e}",
-                share(outcome.position_error / comparison.largest),
-                share(abs(outcome.peak_error)),
-                share(outcome.penetration / comparison.largest) if stepped else "",
-                outcome.verdict,
-            )
-        )
-    rows += [(scheme.label, *[""] * 8, "not applicable") for scheme, _ in comparison.not_applicable]
-    heading = ("scheme", "cost", "rests", "false", "missed", "worst error of a true rest, s")
-    return markdown((*heading, "position off by", "peak off by", "penetration", "verdict"), rows)
-
-
-def share(value):
-    """Write an error as a share of the largest position; what rounding makes is none."""
-    return "0" if value < 1e-13 else f"{value:.0e}"
+def verdict_on(found, certified):
+    """Say which rests overlap with no certified rest, and which of these have no counterpart."""
+    (rests, stalled), (proven, _) = found, certified
+    overlap = np.minimum.outer(rests[:, 1], proven[:, 1]) > np.maximum.outer(rests[:, 0], proven[:, 0])
+    false, missed = rests[~overlap.any(axis=1), 0], proven[~overlap.any(axis=0), 0]
+    faults = []
+    if false.size:
+        faults.append(f"{counted(false.size, 'false rest')}, the first at {false[0]:.6f} s")
+    if missed.size:
+        faults.append(f"{counted(missed.size, 'rest')} missed, the first at {missed[0]:.6f} s")
+    if stalled:
+        faults.append(f"{counted(stalled, 'rest')} only as time no longer advanced")
+    return "; ".join(faults) or "every rest found, no other"
 
 
 def pulses_table():
@@ -297,8 +270,6 @@ def images():
         yield f"paper-figure-{number}.png", figure.draw()
         for drawing in [*figure.drawings][1:]:
             yield f"paper-figure-{number}-{drawing}.png", figure.draw(drawing)
-    record = rocking.records.load("ridgecrest-clc-090")
-    yield "schemes.png", compare_schemes(STATUE, record, repetitions=5).plot()
     amplitude = np.linspace(0.98, 1.12, 71)
     omega = np.linspace(0.5, 8.0, 61)
     labels = {"a": "amplitude over the threshold, $a$", "omega": r"frequency over $p$, $\omega$"}

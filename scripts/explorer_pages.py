@@ -73,7 +73,7 @@ def visit(page: Page, link: str, view: str) -> None:
     ready = {
         "map": "document.body.dataset.map === 'complete'",
         "periodic": "document.body.dataset.sweep === 'complete'",
-        "compare": "document.querySelector('#schemes td')",
+        "compare": "document.body.dataset.compared",
     }
     wait(page, f"document.body.dataset.rested && {ready.get(view, 'true')}")
     if view == "block":

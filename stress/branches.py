@@ -70,7 +70,6 @@ PARTS = {
             "test_chattering_kernels.py",
             "test_chattering_first_arc.py",
             "test_chattering_sequence.py",
-            "test_time_stepping.py",
             "test_gradient_told.py",
         ),
         compiled=False,

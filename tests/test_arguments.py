@@ -245,9 +245,3 @@ def test_forces_outside_the_response_are_not_numbers():
     for time in (-1.0, np.nan, np.inf, 1e300):
         assert np.isnan(response.friction_demand(time))
         assert np.isnan(response.normal_force(time))
-
-
-@pytest.mark.parametrize("schemes", ["certified", 0.5, {"velocity": 1e-9}, None])
-def test_schemes_are_a_list(schemes):
-    with pytest.raises(InvalidOption, match="schemes must be a list, not"):
-        rocking.dynamics.compare_schemes(BLOCK, MOTION, schemes=schemes)

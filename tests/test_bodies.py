@@ -125,9 +125,8 @@ def test_balls_and_blocks_are_bodies():
         ],
         lambda body, motion: dynamics.simulate(body, motion, duration=1.0),
         lambda body, motion: dynamics.simulate_many(body, motion, duration=1.0),
-        lambda body, motion: dynamics.integrate(body, motion, dynamics.MoreauJean(1e-3), 1.0),
     ],
-    ids=["simulate", "simulate_many", "engine", "dynamics", "dynamics, many", "time stepping"],
+    ids=["simulate", "simulate_many", "engine", "dynamics", "dynamics, many"],
 )
 def test_a_body_on_a_line_takes_no_vertical_component(simulated):
     motion = rocking.pulses.one_sine(2.0, 1.0)

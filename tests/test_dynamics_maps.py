@@ -344,7 +344,6 @@ TABLE = pulses.sine(12.0, 5.0, cycles=1)
         (lambda ball: dynamics.stroboscopic_map(ball, TABLE)([0.0, -1.0]), "^states must not lead into a stop"),
         (lambda ball: dynamics.stroboscopic_map(ball, TABLE)([-1.0, 0.0]), "^states must be at least 0 m"),
         (lambda ball: dynamics.lyapunov_exponents(ball, TABLE, [0.0, -1.0]), "^state must not lead into a stop"),
-        (lambda ball: dynamics.compare_schemes(ball, TABLE, schemes=[]), "at least one scheme"),
     ],
 )
 def test_what_cannot_be_meant_is_refused_in_one_sentence(make, words):

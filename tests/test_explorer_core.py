@@ -603,20 +603,6 @@ def test_a_comparison_goes_on_until_the_later_of_both_ends(explorer):
         assert header["duration"] == max(first.duration, second.duration + header["shift"])
 
 
-def test_schemes_are_judged_over_the_duration_of_the_case(explorer):
-    """The first rest that a threshold of 0.05 gets wrong is at 230.75 s."""
-    for more, right in (({}, False), ({"duration": "230.5"}, True)):
-        rows = {row["text"]: row["right"] for row in explorer.schemes(STATUE | more)}
-        assert rows["velocity=0.05"] is right
-
-
-def test_schemes_tell_where_each_is_wrong(explorer):
-    rows = {row["text"]: row for row in explorer.schemes(STATUE)}
-    assert rows["velocity=0.05"]["right"] is False
-    assert "false rest" in rows["velocity=0.05"]["verdict"]
-    assert [text for text, row in rows.items() if row["right"] is None] == ["time=eq76"]
-
-
 @pytest.mark.cases(fast=3)
 @pytest.mark.parametrize(
     ("form", "start"),

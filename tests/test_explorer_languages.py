@@ -25,7 +25,7 @@ SHOWN = """() => {
   const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
   while (walker.nextNode()) {
     const {parentElement: around, data} = walker.currentNode;
-    if (!data.trim() || around.closest("script, pre, .unit, .package, h1.name, #words, #schemes td")) continue;
+    if (!data.trim() || around.closest("script, pre, .unit, .package, h1.name, #words")) continue;
     if (!seen(around) && !around.closest("select")) continue;
     found.push(data.trim());
   }

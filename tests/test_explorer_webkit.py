@@ -26,7 +26,7 @@ COMPUTED = {
     "block": "document.getElementById('stage').dataset.shown",
     "map": "document.body.dataset.map === 'complete'",
     "periodic": "document.body.dataset.sweep === 'complete'",
-    "compare": "document.querySelectorAll('#schemes tbody tr').length > 5",
+    "compare": "document.body.dataset.compared",
     "records": "document.querySelectorAll('[data-record]').length > 5",
     "assessment": "document.body.dataset.assessment === 'complete'",
 }

@@ -24,7 +24,6 @@ from rocking.plot.phase import energy_figure, phase_figure
 from rocking.plot.response import DrawnSequence, response_figure
 from rocking.plot.risk import HazardLine, RiskLine, risk_figure, survival_figure
 from rocking.plot.rose import rose_figure, shares_figure
-from rocking.plot.schemes import SchemeCurve, schemes_figure
 from rocking.plot.spectrum import SpectrumCurves, spectrum_figure
 from rocking.plot.validation import Bars, PeaksPlot, validation_figure
 
@@ -210,15 +209,6 @@ def survival_of(**options):
     return survival_figure(intensity=x, largest=1e-3 / x, hazard=hazard, **(texts | options))
 
 
-def schemes_of(**options):
-    cost = np.array([1e2, 1e3, 1e4])
-    names = ("velocity threshold", "interval threshold", "geometric bypass", "asymptotic time", "Moreau-Jean")
-    curves = [
-        SchemeCurve(name, (1 + k) * cost, 1.0 / cost**k, 2.0 / cost**k, cost > 1e2) for k, name in enumerate(names)
-    ]
-    return schemes_figure(curves=curves, certified=500.0, **({"cost_label": "processor time (s)"} | options))
-
-
 def measured_of(**options):
     time = np.linspace(0.0, 5.0, 101)
     fine = np.linspace(0.0, 5.0, 1001)
@@ -259,7 +249,6 @@ def branch_of(**options):
 
 
 FIGURES = {
-    "schemes": (schemes_of, 5.4),
     "basins": (basins_of, 4.8),
     "bifurcation": (bifurcation_of, 3.8),
     "intervals": (intervals_of, 4.2),

@@ -104,8 +104,6 @@ def swing(amplitude):
 orbit = dynamics.periodic_orbits(*swing(16.0), model="linear", starts=8)[0]
 dynamics.continue_orbit(orbit, swing, 16.0, (15.9, 16.1))
 dynamics.simulate(dynamics.ImpactOscillator(1.0, 0.8, damping_ratio=0.1, stop=0.01), table)
-for scheme in (dynamics.MoreauJean(1e-2), dynamics.SchatzmanPaoli(1e-2)):
-    dynamics.integrate(ball, table, scheme, 1.0)
 print(json.dumps(sorted(name.removeprefix("rocking.kernels.") for name in called)))
 """
 

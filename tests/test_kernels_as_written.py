@@ -83,9 +83,6 @@ def treatments(model: str) -> Numbers:
     motion = pulses.sine(2.6, 1.2, cycles=1.5)
     for words in ("certified", "velocity=5e-2", "interval=1e-2", "bypass=1e-3", "time"):
         yield from told(simulate(STATUE, motion, model=model, chattering=words))
-    for scheme in (dynamics.MoreauJean(2e-3), dynamics.SchatzmanPaoli(2e-3)):
-        stepped = dynamics.integrate(STATUE, motion, scheme, 2.0, model=model)
-        yield from stepped.position[::50]
 
 
 def derivatives(model: str) -> Numbers:
@@ -212,9 +209,6 @@ def mapped(model: str) -> Numbers:
         found = impacts.derivative(np.array([(0.1, 0.4), (0.3, 0.05)]))
         yield from np.ravel(found[0])
         yield from np.ravel(found[1])
-        for scheme in (dynamics.MoreauJean(5e-3), dynamics.SchatzmanPaoli(5e-3)):
-            stepped = dynamics.integrate(other, pulses.sine(12.0, 2.0, cycles=1), scheme, 0.8, model=impacts.model)
-            yield from stepped.position[::20]
     states = np.stack(np.meshgrid(np.linspace(0.005, 0.4, 12), [-1.0, 0.1, 1.5]), axis=-1).reshape(-1, 2)
     for body in (dynamics.BouncingBall(0.0), dynamics.ImpactOscillator(3.0, 0.0, 0.05, stop=0.02, second_stop=0.5)):
         section = dynamics.stroboscopic_map(body, pulses.sine(12.0, 2.0, cycles=1))

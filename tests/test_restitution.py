@@ -375,12 +375,8 @@ def test_an_error_keeps_the_bound_that_is_wrong(given):
 def test_what_needs_the_same_factor_each_time_refuses_a_law():
     shaking = rocking.pulses.sine(6.0, 0.8, cycles=1)
     random = RestrainedBlock(COLUMN, restitution=RandomRestitution(0.9, 0.95, 1))
-    falling = RestrainedBlock(COLUMN, restitution=FallingRestitution(0.95, 0.1, 0.9))
     with pytest.raises(InvalidOption, match="draws its restitution at each impact"):
         dynamics.stroboscopic_map(random, shaking)
-    for body in (random, falling):
-        with pytest.raises(InvalidBlock, match="time stepping knows no restitution that varies"):
-            dynamics.integrate(body, None, dynamics.MoreauJean(0.001), 0.1, initial_position=0.1)
 
 
 @pytest.mark.parametrize("alpha", ["a", math.nan, 5.0])

@@ -389,8 +389,6 @@ def _sine() -> rocking.Motion:
         lambda: chattering.sequence(1.2, 2.0, 0.92),
         lambda: chattering.chattering_report(1.03, 2.0, 0.92),
         lambda: chattering.critical_report(2.0, 0.92),
-        lambda: dynamics.compare_schemes(BLOCK, _sine()),
-        lambda: dynamics.compare_schemes(BLOCK, _sine()).outcomes[0],
         lambda: chattering.chattering_episodes(rocking.simulate(BLOCK, _sine())),
         lambda: chattering.series_diagnosis(1.01, 2.0, 0.92),
     ],

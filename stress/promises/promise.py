@@ -10,8 +10,8 @@ from typing import Any, Protocol
 #: Parts of the package above single simulations and ensembles.
 ABOVE_ENSEMBLES = ("cli", "explorer", "studies", "analysis", "chattering", "dynamics")
 
-#: And kernels that no simulation with certified chattering calls: of periodic motion, time stepping and sines.
-OF_NO_SIMULATION = (*ABOVE_ENSEMBLES, "kernels/periodic.py", "kernels/stepping.py", "kernels/sine")
+#: And kernels that no simulation with certified chattering calls: of periodic motion and sines.
+OF_NO_SIMULATION = (*ABOVE_ENSEMBLES, "kernels/periodic.py", "kernels/sine")
 
 #: Failures of a part that are told in words; all are counted.
 MOST_TOLD = 20

@@ -39,7 +39,6 @@ for _module, _commands in {
     "simulate": ("simulate", "check"),
     "records": ("records", "pulses"),
     "chattering": ("chatter", "critical", "paper"),
-    "schemes": ("schemes",),
     "analysis": ("spectrum", "map", "ida", "measures"),
     "dynamics": ("orbits", "bifurcation", "basin"),
     "fragility": ("fragility",),

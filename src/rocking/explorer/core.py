@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any, Final
 
 from rocking.arrays import Floats
-from rocking.dynamics.schemes import TREATMENTS, compare_schemes
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.explorer.code import case_as_command, case_as_python
 from rocking.explorer.comparing import as_csv, shift_of
@@ -197,19 +196,6 @@ class Explorer:
         """Return a case as Python, and as a command where the command line does it."""
         case = self.show(texts).case
         return {"python": case_as_python(case), "command": case_as_command(case)}
-
-    def schemes(self, texts: Texts) -> list[dict[str, Any]]:
-        """Return what each treatment of chattering makes of a case, against the proven response."""
-        case = self.show(texts).case
-        start: dict[str, Any] = {"initial_position": case.initial_rotation, "initial_velocity": case.initial_velocity}
-        start["duration"] = case.duration
-        found = compare_schemes(case.block, case.motion, schemes=TREATMENTS, model=case.model, **start)
-        rows = [(each.scheme, each.is_right, each.verdict, each.largest_error) for each in found.outcomes]
-        unfit = [(scheme, None, "", None) for scheme, _ in found.not_applicable]
-        return [
-            {"text": str(scheme), "right": right, "verdict": words, "error": error}
-            for scheme, right, words, error in [*rows, *unfit]
-        ]
 
     def export(self, texts: Texts, form: str, window: tuple[float, float] | None = None) -> bytes:
         """Return a response as the content of a file of one of `EXPORTS`; a figure shows a window (s)."""

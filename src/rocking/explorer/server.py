@@ -173,7 +173,6 @@ class App:
             "/api/body": lambda query: explorer.body(query.texts()),
             "/api/code": lambda query: explorer.code(query.texts()),
             "/api/tracks": lambda query: tracks(query.texts()),
-            "/api/schemes": lambda query: explorer.schemes(query.texts()),
             "/api/compare": lambda query: explorer.compare(*query.compared, query.window, **query.comparison),
             "/api/map/point": lambda query: maps.texts_at(self._grid(query), *query.numbers("at_x", "at_y")),
             "/api/map/response": lambda query: readings.thumbnail(

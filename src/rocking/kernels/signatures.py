@@ -70,8 +70,6 @@ def signatures() -> dict[str, list[tuple[Any, ...]]]:
         "ground.fill": [(given(3), given(2, 2), 1.0, seen, reals())],
         "lanes.run_lanes": [(seen, rules, scratch, pool, 0)],
         "lanes.march_each": [(seen, rules, scratch, pool)],
-        "stepping.moreau_jean": [(seen, block, rules, states[0], 0.5, 0.5, 0.1, reals(2, 4))],
-        "stepping.schatzman_paoli": [(seen, block, rules, states[0], 0.1, reals(2, 4))],
         "oscillator.peak_displacements": [(given(3), given(2, 2), given(), 0.05, reals(), reals())],
         "sine.eq65.eq65_time": [(1.0, 1.0, 1.0)],
         "sine.eq65.eq65_sums": [(1.0,)],

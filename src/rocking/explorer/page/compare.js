@@ -1,6 +1,6 @@
 // Two responses over each other: another treatment of chattering, another block, another motion.
 
-import {Latest, file, json, payload} from "./api.js";
+import {Latest, file, payload} from "./api.js";
 import {BlockForm, MotionForm, TreatmentForm} from "./forms.js";
 import {Histories} from "./histories.js";
 import {offer} from "./exports.js";
@@ -8,8 +8,8 @@ import {ends, namesOf, parameter, specification} from "./parameters.js";
 import {pinnedAs, snapshots} from "./snapshots.js";
 import {colour} from "./theme.js";
 import {caseName, treatmentName} from "./units.js";
-import {counted, fill, legend, make, one, slug, tell} from "./words.js";
-import {short, span} from "./numbers.js";
+import {counted, legend, make, one, slug, tell} from "./words.js";
+import {short} from "./numbers.js";
 import {inWords, phrase} from "./texts.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
@@ -26,7 +26,6 @@ export class View {
     this.align = /** @type {HTMLSelectElement} */ (one("compare-align"));
     this.align.addEventListener("change", () => { page.state.align = this.align.value; page.state.window = null; this.update(); });
     this.histories = new Histories(one("compare-plots"), {window: (chosen) => { page.state.window = chosen; this.update(); }, asked: () => page.state.window, load: () => this.load});
-    this.known = "";
     this.load = new Latest(() => this.run(), (error) => page.problem(error, "view-compare"));
     this.restore();
   }
@@ -68,7 +67,6 @@ export class View {
     if (!Object.keys(state.other).length) state.other = first;
     form.show(state.other);
     this.block = form instanceof BlockForm ? form : null;
-    one("schemes-part").hidden = this.with.value !== "treatment";
   }
 
   update() {
@@ -94,7 +92,6 @@ export class View {
     if (state.other === chosen) this.block?.show({...chosen, gravity: texts.gravity}, header.cases[1].block.sides);
     this.files(header, kind, asked);
     counted("compared");
-    if (kind === "treatment") await this.schemes(texts);
   }
 
   /** @param {any} [header] @param {any} [arrays] @param {string} [kind] of what is compared @param {Texts} [chosen] what is other */
@@ -133,20 +130,6 @@ export class View {
   asked() {
     const {other, compare, align} = this.page.state;
     return {...Object.fromEntries(Object.entries(other).map(([name, value]) => [`other.${name}`, value])), compare, align};
-  }
-
-  /** @param {Texts} texts of the case that is drawn */
-  async schemes(texts) {
-    const key = JSON.stringify(texts);
-    if (this.known === key) return;
-    const rows = await json("/api/schemes", texts);
-    this.known = key;
-    fill(/** @type {HTMLTableElement} */ (one("schemes")), ["", phrase("compare.treatment_head"), phrase("compare.makes")], rows.map((/** @type {any} */ row) => {
-      const name = treatmentName(row.text);
-      const button = make("button", {type: "button", disabled: row.right === null, "aria-label": phrase("compare.button_about", {name}), on: {click: () => { this.page.state.other = {chattering: row.text}; this.form(); this.update(); }}}, [phrase("compare.button")]);
-      const sign = row.right === null ? "" : row.right ? "✓ " : "✗ ";
-      return [button, name, sign + (row.right === null ? phrase("compare.unfit") : row.error ? phrase("compare.worst", {verdict: row.verdict, error: span(row.error)}) : row.verdict)];
-    }));
   }
 }
 
