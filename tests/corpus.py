@@ -643,14 +643,14 @@ def incremental() -> Iterator[Item]:
     yield from of_result(ida([SLENDER, STATUE], dict(list(suite().items())[:4]), measure="pgv", levels=[0.3, 0.6, 1.2]))
 
 
-@group(digits=6)
+@group(digits=6, fast=False)
 def overturning_maps() -> Iterator[Item]:
     axes = {"amplitudes": np.arange(1.0, 9.0, 1.0), "frequencies": [1.0, 2.0, 4.0], "tolerance": 1e-7}
     for pulse, options in (("one_sine", {}), ("sine", {"cycles": 1.5}), (lambda a, f: lobes(a, f), {})):
         yield from of_result(rocking.overturning_map(SLENDER, pulse, **axes, **options, **QUIET))
 
 
-@group(digits=6)
+@group(digits=6, fast=False)
 def critical_scales() -> Iterator[Item]:
     for block in (STATUE, SLENDER, UNEVEN[0], HELD["tendon"][0]):
         for motion in (lobes(1.0, 0.8), lobes(1.0, 1.3, 1.0, -1.0, 0.5)):
@@ -694,7 +694,7 @@ def risks() -> Iterator[Item]:
     yield from of_result(fitted.survival(500.0))
 
 
-@group(digits=6)
+@group(digits=6, fast=False)
 def efficiencies() -> Iterator[Item]:
     yield from of_result(rocking.compare_measures(STATUE, suite(), periods=[0.5, 1.0], **QUIET))
 
