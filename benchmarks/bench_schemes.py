@@ -166,7 +166,7 @@ SCHEMES = {"moreau-jean": moreau_jean, "schatzman-paoli": schatzman_paoli}
 def integrate(body, motion, scheme: str, h: float, duration: float, *, model="linear", position=0.0) -> Stepped:
     """Follow a symmetric block or a ball by a scheme of a fixed step."""
     count = math.ceil(duration / h * (1.0 - 2.0**-50)) + 1
-    times = h * np.arange(count)
+    times: Floats = h * np.arange(count, dtype=np.float64)
     ground = np.zeros(count) if motion is None else motion.acceleration(times)
     rows = np.zeros((count, 4))
     start = (-1, -position, 0.0) if position < 0.0 else (1, position, 0.0)

@@ -7,6 +7,8 @@ therefore gives the speed :math:`p\alpha\tanh(pT/2)`, and the ratio of two such 
 the impact between them. Three laws are compared by Schwarz's criterion.
 """
 
+from typing import Any
+
 import matplotlib.pyplot as plt
 import numpy as np
 from scipy.optimize import least_squares
@@ -17,8 +19,8 @@ block = rocking.Block(width=0.4, height=2.0)
 worn = rocking.RestrainedBlock(block, restitution=rocking.FallingRestitution(0.96, slope=0.15, least=0.7))
 timing, noise = 1e-3, np.random.default_rng(1)  # standard deviation of the error of a time, s
 speeds, factors, roots = [], [], []
-for start in (0.08, 0.12, 0.16):
-    response = rocking.simulate(worn, None, initial_rotation=start, model="linear")
+for rotation in (0.08, 0.12, 0.16):
+    response = rocking.simulate(worn, None, initial_rotation=rotation, model="linear")
     phase = 0.5 * block.p * np.diff(response.impacts["time"][:12] + noise.normal(0.0, timing, 12))
     speed = block.p * block.alpha * np.tanh(phase)
     # An error of a time enters two neighbouring factors, whose errors are therefore correlated.
@@ -30,7 +32,7 @@ for start in (0.08, 0.12, 0.16):
 # %%
 # Each law is fitted to the logarithms of the factors, with the errors of the times made independent.
 
-laws = {
+laws: dict[str, tuple[Any, list[float]]] = {
     "Housner": (lambda w: np.full(w.shape, block.restitution), []),
     "constant": (lambda w, e: np.full(w.shape, e), [0.9]),
     "falling with the speed": (lambda w, e, slope: e - slope * w, [0.9, 0.1]),
