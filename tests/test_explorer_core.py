@@ -492,7 +492,9 @@ def test_what_a_millionth_of_the_motion_moves_a_rest_by_is_told_beside_its_brack
     # Of the three short sequences a change by 1e-10 is linear; the motion drives the block by more than its scale.
     by_scale = 1e4 * 0.5 * np.abs(moved[0] - moved[1])
     assert (rows[:3, 5] >= 0.5 * by_scale).all() and (rows[:3, 5] < 1e-5).all()
-    assert 1.0 < rows[3, 5] < 20.0 and (rows[:, 3] - rows[:, 2] < 1e-9).all()
+    # A unit in the last place of the motion moves the last rest by 1.6e-9 s; its bracket contains that.
+    assert 1.0 < rows[3, 5] < 20.0 and 1e-9 < rows[3, 3] - rows[3, 2] < 1e-8
+    assert (rows[:3, 3] - rows[:3, 2] < 1e-9).all()
 
 
 def test_intervals_do_not_reach_across_a_rest(explorer):

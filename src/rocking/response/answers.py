@@ -215,7 +215,10 @@ class Answers:
         An ambiguous response is one of those that are possible. Scale the motion, or the initial state, by 1 plus some
         millionths, simulate each, and take the spread of the results for the answer.
         """
-        return ambiguities(self.sensitivity, abs(self.peak_rotation - self.body.stops[0]), self.near_ties)
+        start, velocity, acceleration = self.states(0.0)
+        balanced = velocity == acceleration == 0.0 and bool(np.any(np.isclose(abs(start), self.balance)))
+        height = abs(self.peak_rotation - self.body.stops[0])
+        return ambiguities(self.sensitivity, height, self.near_ties + balanced)
 
     def perturbed(self, relative: float = RELATIVE, count: int = COUNT) -> Perturbed:
         """Repeat the simulation with the motion scaled by factors near 1.

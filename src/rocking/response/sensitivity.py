@@ -163,12 +163,10 @@ def _varied(trail: Trail, quantity: int, times: Floats, impacts: int, events: in
 def ambiguities(found: Sensitivity, height: float, near_ties: int) -> tuple[str, ...]:
     """Which of "peak", "events" and "touch" one unit in the last place of everything changes visibly.
 
-    ``height`` is that of the peak above the stop; ``near_ties`` are those that the march has counted.
+    ``height`` is that of the peak above the stop; ``near_ties``: those that are known otherwise.
     """
     early, late = (_uplifts(found._trail, share) for share in (1.0 - _TIE, 1.0 + _TIE))
-    rotation, velocity, acceleration = found._history.states(0.0)
-    balanced = velocity == acceleration == 0.0 != rotation - found._history.stops[0]
-    near_ties += int(np.any(late > early + AMBIGUITY)) + balanced
+    near_ties += int(np.any(late > early + AMBIGUITY))
     peak, *times = (_ULP * np.sum(np.abs(rows), axis=0) for rows in found._along(QUANTITIES))
     known = {
         "peak": bool(np.all(peak <= AMBIGUITY * max(height, 1e-300))),
