@@ -108,17 +108,16 @@ def add_rounding(trail: Trail, scratch: Record, k: int, order: int, t: float, ch
         change[4] = max(change[4], -w / v)
     speed = max(abs(node.v), abs(v))
     height = max(node.u, u) + speed * t
-    operations = 0.5 * ground.columns
-    push = absolute_sums(ground, node.piece, end)[0] * operations + abs(block.added_push[side])
+    push = 0.5 * ground.columns * absolute_sums(ground, node.piece, end)[0] + abs(block.added_push[side])
     weight = 1.0 + abs(block.added_weight[side])
     if has_vertical(ground):
-        weight += absolute_sums(vertical_of(ground), node.piece, end)[0] * operations
+        weight += 0.5 * ground.columns * absolute_sums(vertical_of(ground), node.piece, end)[0]
     force = block.gain[side] * (abs(block.threshold[side]) * weight + abs(block.hold[side]) + push)
     force += (abs(block.stiffness[side]) * (weight + push) + abs(block.spring[side])) * height
     force = _ROUNDING * (force + abs(block.prestress[side]) + block.damping[side] * speed)
     force += block.gain[side] * ground.error
-    change[3] += abs(change[0]) * (_ROUNDING * height + 0.5 * force * t * t)
-    change[3] += abs(change[1]) * (_ROUNDING * speed + force * t)
+    change[3] += abs(change[0]) * (0.5 * _ROUNDING * (height + speed * t) + 0.5 * force * t * t)
+    change[3] += abs(change[1]) * (0.5 * _ROUNDING * speed + force * t)
     change[3] += abs(change[0] * v + change[1] * w) * _ROUNDING * end
 
 

@@ -77,7 +77,7 @@ class Answers:
     def chattering(self) -> NDArray[np.void]:
         """Sequences of impacts that ended at rest, a row for each: see `Response`."""
         found = self._sequences.copy()
-        error = carried_errors(self._trail, len(found), max(map(abs, self.body.stops)))
+        error = carried_errors(self._trail, np.isfinite(found["lower"]), max(map(abs, self.body.stops)))
         found["lower"] -= error
         found["upper"] += error
         return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
-from rocking.arrays import Floats
+from rocking.arrays import Flags, Floats
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.adjoint import Ends, adjoint, of_ending
@@ -37,9 +38,6 @@ _ULP: Final = 2.0**-52
 
 #: A motion that passes a threshold by less than this share of it, or misses it by less, may do either.
 _TIE: Final = 2.0**-44
-
-#: Largest ratio of the derivative of the time to rest by the speed to that of its first order, where a proof holds.
-_STEEPEST: Final = 2.5
 
 #: Largest product of an error with the rates of balance and impacts at which its first order is taken for a bound.
 _MOST_NONLINEAR: Final = 0.5
@@ -185,21 +183,24 @@ def _uplifts(trail: Trail, share: float) -> Floats:
     return times
 
 
-def carried_errors(trail: Trail, count: int, stop: float) -> Floats:
-    """Bound what the rounding of all steps before their proofs changes of the first rests, s; infinite: no bound.
+def carried_errors(trail: Trail, proven: Flags, stop: float) -> Floats:
+    """Bound what the rounding of all steps before their proofs changes of rests, s; infinite: no bound.
 
-    ``count`` of rests; ``stop``: size of the coordinate at which the body stands.
+    ``proven``: which rests are; ``stop``: size of the coordinate at which the body stands.
     """
     nodes = state.attributed(np.append(trail.nodes, trail.nodes[-1:]))
     nodes["side"][-1] = state.AT_REST
     trail, scratch, work = own(trail._replace(nodes=nodes)), state.new_scratch(), state.record(state.VARIATION)
     fastest, out = np.sqrt(np.max(np.abs(trail.block["stiffness"]))), np.zeros_like(trail.ground.pieces[:, 2:])
-    found = np.full(count, np.inf)
-    for k, row in enumerate(np.flatnonzero((nodes["side"][:-1] >= 0) & (nodes["side"][1:] < 0))[:count]):
-        at_once, change = bool(nodes["v"][row] == 0.0), np.zeros(5)
-        of_ending(trail, scratch, row - at_once, change, out)
-        change[:3] *= _STEEPEST
-        ends = adjoint(trail, scratch, work, row - at_once, np.inf if at_once else 0.0, change, out)
+    last, found = np.flatnonzero((nodes["side"][:-1] >= 0) & (nodes["side"][1:] < 0)), np.full(len(proven), np.inf)
+    for k in np.flatnonzero(proven):
+        node, following, change = nodes[last[k]], nodes[last[k] + 1], np.zeros(5)
+        row, time = (last[k], 0.0) if node["v"] > 0.0 else (last[k] - 1, math.inf)
+        if of_ending(trail, scratch, row, change, out) != Ends.START:
+            continue
+        if node["v"] > 0.0:  # as the time to rest differs from its first order, so do its derivatives, twice and more
+            change[:3] *= 1.0 + 4.0 * abs((following["time"] - node["time"]) / (change[1] * node["v"]) - 1.0)
+        ends = adjoint(trail, scratch, work, row, time, change, out)
         error = change[3] + 4.0 * _ULP * stop * abs(change[0])
         nonlinear = error * max(fastest, change[4])
         if ends in (Ends.START, Ends.REST) and nonlinear <= _MOST_NONLINEAR:
