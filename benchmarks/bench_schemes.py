@@ -185,8 +185,7 @@ def rests_of(response: Any) -> Floats:
     if isinstance(response, Stepped):
         return response.rests
     times, kinds = response.events["time"], response.events["kind"]
-    ends = np.append(times[1:], math.inf)
-    return np.column_stack([times, ends])[kinds == "rest"]
+    return np.column_stack([times, np.append(times, math.inf)[1:]])[kinds == "rest"]
 
 
 def judged(scheme: str, response: Any, certified: Any, seconds: float = math.nan) -> Outcome:
@@ -205,7 +204,8 @@ def judged(scheme: str, response: Any, certified: Any, seconds: float = math.nan
         position = position_of(response)(times)
     largest = np.max(np.abs(exact(np.linspace(0.0, certified.duration, COMPARED))))
     missed = np.setdiff1d(proven[:, 0], found[~np.isnan(found)])
-    error = float(np.max(np.abs(position - exact(times))) / largest)
+    off = float(np.max(np.abs(position - exact(times))))
+    error = off / largest if largest > 0.0 else math.nan
     return Outcome(scheme, response, rests, found, missed, error, seconds, response.overturned != certified.overturned)
 
 

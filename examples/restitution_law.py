@@ -7,8 +7,6 @@ therefore gives the speed :math:`p\alpha\tanh(pT/2)`, and the ratio of two such 
 the impact between them. Three laws are compared by Schwarz's criterion.
 """
 
-from typing import Any
-
 import matplotlib.pyplot as plt
 import numpy as np
 from scipy.optimize import least_squares
@@ -32,7 +30,7 @@ for rotation in (0.08, 0.12, 0.16):
 # %%
 # Each law is fitted to the logarithms of the factors, with the errors of the times made independent.
 
-laws: dict[str, tuple[Any, list[float]]] = {
+laws: dict = {
     "Housner": (lambda w: np.full(w.shape, block.restitution), []),
     "constant": (lambda w, e: np.full(w.shape, e), [0.9]),
     "falling with the speed": (lambda w, e, slope: e - slope * w, [0.9, 0.1]),
@@ -42,8 +40,8 @@ for name, (law, start) in laws.items():
 
     def residuals(x, law=law):
         """Residuals of a law over their standard errors."""
-        made = zip(roots, factors, speeds, strict=True)
-        return np.concatenate([np.linalg.solve(root, np.log(e / law(w, *x))) for root, e, w in made])
+        tests = zip(roots, factors, speeds, strict=True)
+        return np.concatenate([np.linalg.solve(root, np.log(e / law(w, *x))) for root, e, w in tests])
 
     fits[name] = least_squares(residuals, start).x if start else np.array([])
     criteria[name] = np.sum(residuals(fits[name]) ** 2) + len(start) * np.log(sum(map(len, factors)))
@@ -52,11 +50,11 @@ for name, criterion in criteria.items():
     print(f"{name}: criterion {criterion - min(criteria.values()):.0f} above the least")
 print(f"slope {slope:.3f} s/rad; the hidden block has 0.15 s/rad")
 
-at = np.linspace(0.0, 0.6, 50)
+at = np.linspace(0.0, 0.6)
 plt.figure(figsize=(5.4, 3.4), layout="constrained")
 plt.plot(np.concatenate(speeds), np.concatenate(factors), "ko", mfc="white", label="from the times of impacts")
 for name, style in zip(laws, ("C0--", "C1:", "k-"), strict=True):
     plt.plot(at, laws[name][0](at, *fits[name]), style, label=name)
 plt.gca().set(xlabel="speed before the impact (rad/s)", ylabel="restitution", ylim=(0.85, 1.0))
-plt.legend(frameon=False)
+plt.legend()
 plt.show()

@@ -16,14 +16,17 @@ import rocking
 from rocking.chattering import chattering_time, critical_amplitude, families
 from rocking.chattering.episodes import chattering_episodes
 from rocking.chattering.maps import chattering_map
-from rocking.chattering.paper import FIGURES, paper_figure
 from rocking.tables import counted
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples/paper"))
+
+from figures import FIGURES, paper_figure
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 TABLES = DOCS / "_tables"
 IMAGES = DOCS / "_static"
 
-#: Small enough for a page: the files of `rocking paper` are finer.
+#: Small enough for a page: the files of `python examples/paper` are finer.
 DOTS_PER_INCH = 110
 
 PAPER_BLOCK = rocking.Block.from_parameters(p=1.0, alpha=0.2, restitution=0.92)
@@ -172,7 +175,7 @@ def rests_under(case, chattering):
     """Start and end of each rest, and how many ended a sequence only because time no longer advanced."""
     response = rocking.simulate(case.block, case.motion, model="linear", chattering=chattering)
     times, kinds = response.events["time"], response.events["kind"]
-    return np.column_stack([times, np.append(times[1:], math.inf)])[kinds == "rest"], response.stalled
+    return np.column_stack([times, np.append(times, math.inf)[1:]])[kinds == "rest"], response.stalled
 
 
 def verdict_on(found, certified):

@@ -156,7 +156,6 @@ TAKES_ONE_THING = {
     "rules of a check": lambda value: rocking.rules.check(BLOCK, {"one": MOTION}, rules=value),
     "parameters of a map": lambda value: rocking.chattering.chattering_map(lambda a, b: None, value),
     "response of episodes": rocking.chattering.chattering_episodes,
-    "number of a figure": rocking.chattering.paper_figure,
     "slenderness": rocking.block.housner_restitution,
     "label of a part": lambda value: a_map().select(frequency=value),
     "limits": lambda value: rocking.fragility(BLOCK, [MOTION], limits=value),

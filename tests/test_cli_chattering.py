@@ -118,24 +118,6 @@ def test_critical_prints_how_far_the_fits_are_off(run):
     assert "off by -6.92e-04" in out
 
 
-@pytest.mark.thorough
-def test_paper_writes_one_figure_and_says_what_the_paper_says(run, tmp_path):
-    code, out, err = run("paper", "--figure", 7, "--out", tmp_path / "new")
-    assert (code, err) == (0, "")
-    names = {path.name for path in (tmp_path / "new").iterdir()}
-    assert names == {"figure-7.pdf", "figure-7.png", "figure-7-critical.csv"}
-    assert all(name in out for name in names)
-    assert "0.5 in the paper, 0.517 here" in out
-
-
-@pytest.mark.slow
-def test_paper_writes_all_figures(run, tmp_path):
-    code, _, _ = run("paper", "--out", tmp_path)
-    assert code == 0
-    drawn = {path.stem for path in tmp_path.glob("*.pdf")}
-    assert drawn == {f"figure-{number}" for number in range(1, 12)} | {"figure-6-surface"}
-
-
 @pytest.mark.parametrize(
     ("arguments", "word"),
     [
@@ -153,8 +135,6 @@ def test_paper_writes_all_figures(run, tmp_path):
         (["critical", 2, "inf"], "eta"),
         (["critical", 2], "eta"),
         (["critical", 2, 0.92, "--method", "exact"], "--method"),
-        (["paper"], "--out"),
-        (["paper", "--figure", "five", "--out", "."], "--figure"),
     ],
 )
 def test_a_mistake_is_one_line_and_exit_2(run, arguments, word):
@@ -163,51 +143,3 @@ def test_a_mistake_is_one_line_and_exit_2(run, arguments, word):
     assert err.count("\n") == 1
     assert err.startswith("rocking: ")
     assert word.lower() in err.lower()
-
-
-@pytest.mark.parametrize("number", [0, 12, 99])
-def test_a_figure_that_there_is_none_of_is_refused(run, tmp_path, number):
-    code, out, err = run("paper", "--figure", number, "--out", tmp_path)
-    assert (code, out) == (2, "")
-    assert err.count("\n") == 1
-    assert "Figs 1 to 11" in err
-
-
-def test_paper_draws_a_figure_for_other_parameters(run, tmp_path, monkeypatch):
-    # What is said is looked at here, and the figure as it is drawn by others.
-    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda *_, **__: None)
-    code, out, err = run("paper", "--figure", 5, "--eta", 0.8, "--omega", 3, "--out", tmp_path)
-    assert (code, err) == (0, "")
-    assert out.startswith("Fig. 5: chattering time against amplitude; omega = 3, eta = 0.8\n")
-    assert f"critical amplitude a_cr: {critical_amplitude(3.0, 0.8):.7g}\n" in out
-    code, out, _ = run("paper", "--figure", 1, "--alpha", "20deg", "--out", tmp_path)
-    assert code == 0
-    assert "alpha = 0.349065850399 rad" in out
-
-
-def test_paper_refuses_a_parameter_that_a_figure_does_not_depend_on(run, tmp_path):
-    code, out, err = run("paper", "--figure", 5, "--p", 2, "--out", tmp_path / "new")
-    assert (code, out) == (2, "")
-    assert err == "rocking: Fig. 5 does not depend on p; it takes omega and eta\n"
-    code, out, err = run("paper", "--eta", 0.8, "--out", tmp_path / "new")
-    assert (code, out) == (2, "")
-    assert err == "rocking: with --eta one figure is drawn: say which with --figure\n"
-    assert not (tmp_path / "new").exists()
-
-
-@pytest.mark.slow
-def test_paper_draws_figure_6_as_contours_and_as_a_surface(run, tmp_path):
-    code, _, _ = run("paper", "--figure", 6, "--out", tmp_path)
-    assert code == 0
-    names = {path.name for path in tmp_path.iterdir()}
-    assert names == {
-        "figure-6.pdf", "figure-6.png", "figure-6-surface.pdf", "figure-6-surface.png", "figure-6-surface.csv",
-    }  # fmt: skip
-
-
-def test_a_folder_that_cannot_be_written_to_is_refused(run, tmp_path):
-    blocked = tmp_path / "file"
-    blocked.write_text("")
-    code, out, err = run("paper", "--out", blocked / "figures")
-    assert (code, out) == (2, "")
-    assert "--out" in err

@@ -29,7 +29,7 @@ def undrawn(run, monkeypatch):
         (f"simulate {RECORD} --width -0.24 --height 1", "--width must be a positive number, in m, not -0.24"),
         (f"simulate {RECORD} --p 0 --alpha 0.2", "--p must be positive, from 1e-06 to 1e+06 rad/s, not 0"),
         (f"spectrum {RECORD} --p 1", "a spectrum needs --alpha, or the --ensemble of a calibration"),
-        ("paper", "rocking paper needs --out; see rocking paper --help"),
+        ("basin --p 2 --alpha 0.2", "rocking basin needs --pulse; see rocking basin --help"),
         ("chatter 1.5 2", "rocking chatter needs ETA; see rocking chatter --help"),
         ("--version x", "rocking --version takes no argument 'x'; see rocking --version --help"),
         ("pulses sine x", "rocking pulses takes no argument 'sine x'; see rocking pulses --help"),

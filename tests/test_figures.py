@@ -16,8 +16,8 @@ from rocking.plot.basins import basins_figure
 from rocking.plot.bifurcation import bifurcation_figure
 from rocking.plot.calibration import Parameter, measured_figure, outcomes_figure
 from rocking.plot.fragility import FragilityLine, fragility_figure
-from rocking.plot.histories import intervals_figure
 from rocking.plot.ida import ScaledMotion, ida_figure, levels_reaching
+from rocking.plot.intervals import intervals_figure
 from rocking.plot.maps import outcome_figure, regions_figure
 from rocking.plot.orbits import branch_figure, orbit_figure
 from rocking.plot.phase import energy_figure, phase_figure

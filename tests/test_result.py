@@ -383,8 +383,6 @@ def _sine() -> rocking.Motion:
 @pytest.mark.parametrize(
     "find",
     [
-        lambda: chattering.paper_figure(2),
-        lambda: chattering.paper_figure(8),
         lambda: chattering.sequence(1.03, 2.0, 0.92),
         lambda: chattering.sequence(1.2, 2.0, 0.92),
         lambda: chattering.chattering_report(1.03, 2.0, 0.92),

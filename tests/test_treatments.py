@@ -61,7 +61,7 @@ def test_a_threshold_is_early_by_what_the_geometric_series_still_adds():
     (outcome,) = compared(1.03, rocking.VelocityThreshold(1e-9))
     delta = float(sine(1.03).acceleration(outcome.certified[0])) / THRESHOLD
     speed, side = last_impact(outcome)
-    arcs = 2.0 * speed * (1.0 / (1.0 - side * delta) + 0.92 / (1.0 + side * delta))
+    arcs = 2.0 * speed * (1.0 / (1.0 + side * delta) + 0.92 / (1.0 - side * delta))
     # A time of rest has an absolute error of some 1e-15 s.
     assert -outcome.errors[0] == pytest.approx(arcs / (1.0 - 0.92**2), rel=1e-6)
 

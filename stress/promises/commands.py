@@ -51,7 +51,6 @@ COMMANDS: Final[dict[str, tuple[str, ...]]] = {
     "spectrum": ("spectrum", _RECORD, "--alpha", "0.15,0.2", "--p", "1:6:20", "--out", "OUT"),
     "fragility": ("fragility", _RECORD, "ridgecrest-clc-090", *_BLOCK, "--levels", "0.1g:1g:19", "--out", "OUT"),
     "study run": ("study", "run", "study.toml", "OUT"),
-    "paper": ("paper", "--figure", "5", "--out", "OUT"),
     "orbits": ("orbits", *_BLOCK, "--pulse", _SINE, "--out", "OUT"),
     "calibrate": ("calibrate", "tests.csv", "--out", "OUT"),
     "validate": ("validate", "tests.csv", *_BLOCK, "--out", "OUT"),

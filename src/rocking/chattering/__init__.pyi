@@ -11,7 +11,6 @@ from .expansions import (
     series_diagnosis,
 )
 from .maps import ChatteringMap, Outcome, chattering_map
-from .paper import PaperFigure, Statement, paper_figure
 from .report import ChatteringReport, CriticalReport, chattering_report, critical_report
 
 __all__ = [
@@ -21,9 +20,7 @@ __all__ = [
     "ChatteringSequence",
     "CriticalReport",
     "Outcome",
-    "PaperFigure",
     "SeriesDiagnosis",
-    "Statement",
     "asymptotic_table",
     "chattering_episodes",
     "chattering_map",
@@ -37,7 +34,6 @@ __all__ = [
     "first_interval",
     "interval_ratios",
     "is_complete",
-    "paper_figure",
     "sequence",
     "series_coefficients",
     "series_diagnosis",

@@ -38,7 +38,7 @@ def _lines_of(module: str) -> dict[str, str]:
 for _module, _commands in {
     "simulate": ("simulate", "check"),
     "records": ("records", "pulses"),
-    "chattering": ("chatter", "critical", "paper"),
+    "chattering": ("chatter", "critical"),
     "analysis": ("spectrum", "map", "ida", "measures"),
     "dynamics": ("orbits", "bifurcation", "basin"),
     "fragility": ("fragility",),

@@ -1,18 +1,14 @@
-"""`rocking chatter`, `rocking critical`, `rocking paper`: the paper's theory of chattering under a sine."""
+"""`rocking chatter`, `rocking critical`: the paper's theory of chattering under a sine."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated
 
-from cyclopts import Group, Parameter
+from cyclopts import Parameter
 
 from rocking.chattering.report import chattering_report, critical_report
 from rocking.cli.options import WHOLE
-from rocking.cli.output import OUTPUT, OutputOptions, QuietOptions, output_folder, print_result, write_results
-from rocking.errors import InvalidOption
-from rocking.quantities import angle
+from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results
 
 
 def chatter(
@@ -79,53 +75,3 @@ def critical(omega: float, eta: float, *, output: Annotated[OutputOptions, OUTPU
         if folder is not None:
             report.to_json(folder / "result.json")
         print_result(report.to_dict(), report.summary(), as_json=output.as_json)
-
-
-_CASE = Parameter(name="*", group=Group("Other parameters than the paper's, for one figure", sort_key=1))
-
-
-@dataclass(frozen=True)
-class _CaseOptions:
-    """Block and excitation that one figure is drawn for."""
-
-    a: Annotated[float | None, Parameter(help="Amplitude of the ground acceleration over g alpha.")] = None
-    omega: Annotated[float | None, Parameter(help="Its frequency (rad/s) over the block's p.")] = None
-    eta: Annotated[float | None, Parameter(help="Coefficient of restitution.")] = None
-    p: Annotated[float | None, Parameter(help="The block's frequency parameter, rad/s.")] = None
-    alpha: Annotated[str | None, Parameter(help="Its slenderness, 12deg or 0.2 (rad).")] = None
-
-    def chosen(self) -> dict[str, float]:
-        """Return what is given, as arguments."""
-        slenderness = None if self.alpha is None else angle(self.alpha, "alpha")
-        given = {"a": self.a, "omega": self.omega, "eta": self.eta, "p": self.p, "alpha": slenderness}
-        return {name: value for name, value in given.items() if value is not None}
-
-
-def paper(
-    *,
-    out: Path,
-    figure: Annotated[int | None, WHOLE] = None,
-    case: Annotated[_CaseOptions, _CASE] = _CaseOptions(),
-    output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
-) -> None:
-    """Redraw the paper's figures from computation: PDF, PNG, the data as CSV, and what the paper states in numbers.
-
-    Parameters
-    ----------
-    out
-        Folder for the files.
-    figure
-        Number of one figure; all of them by default.
-    """
-    from rocking.chattering.paper import FIGURES, paper_figure
-
-    parameters = case.chosen()
-    if parameters and figure is None:
-        named = " and ".join(["{}"] * len(parameters))
-        raise InvalidOption(f"with {named} one figure is drawn: say which with {{}}", *parameters, "figure")
-    with output_folder(out) as folder:
-        for number in FIGURES if figure is None else [figure]:
-            drawn = paper_figure(number, **parameters)
-            print(drawn.summary())
-            for path in drawn.write(folder):
-                print(f"  {path}")

@@ -7,11 +7,7 @@ from functools import partial
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
-
-from rocking.arrays import Floats
-from rocking.chattering.amplitude import critical_amplitude
-from rocking.chattering.duration import chattering_time
-from rocking.chattering.paper.figure import (
+from figure import (
     ALPHA,
     CYCLES,
     ETA,
@@ -25,8 +21,12 @@ from rocking.chattering.paper.figure import (
     dense_times,
     yes_or_no,
 )
-from rocking.plot.histories import Detail, Mark, excitation_figure, history_figure
-from rocking.plot.sketches import Box, Flowchart, Way, block_figure, flowchart_figure
+from histories import Detail, Mark, excitation_figure, history_figure
+from sketches import Box, Flowchart, Way, block_figure, flowchart_figure
+
+from rocking.arrays import Floats
+from rocking.chattering.amplitude import critical_amplitude
+from rocking.chattering.duration import chattering_time
 from rocking.response import Response
 from rocking.treatment import AsymptoticTime, Certified, Treatment, VelocityThreshold
 

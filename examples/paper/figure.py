@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,13 +27,11 @@ from rocking.errors import InvalidOption
 from rocking.motion import pulses
 from rocking.motion.motion import Motion
 from rocking.response import Response
-from rocking.result import TableResult
 from rocking.simulation import simulate
 from rocking.tables import write_figure
 from rocking.treatment import Treatment
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.figure import Figure
 
 #: Columns of equal length by name; a name ends in its unit where there is one.
@@ -193,8 +191,8 @@ class Statement:
         return value if isinstance(value, str) else f"{value:.{self.digits}g}"
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class PaperFigure(TableResult):
+@dataclass(frozen=True, eq=False)
+class PaperFigure:
     """One figure of the paper, computed; from `paper_figure`.
 
     Attributes
@@ -213,9 +211,6 @@ class PaperFigure(TableResult):
         What draws it, by name; the first is what `draw` draws by default.
     """
 
-    _FORMAT = "%.12g"
-    _NAN = "nan"
-
     number: int
     title: str
     conditions: str
@@ -223,29 +218,8 @@ class PaperFigure(TableResult):
     statements: tuple[Statement, ...]
     drawings: Mapping[str, Callable[[], Figure]]
 
-    def __repr__(self) -> str:
-        conditions = f" ({self.conditions})" if self.conditions else ""
-        contents = f"tables: {', '.join(self.tables) or 'none'}; {len(self.statements)} statements"
-        return f"<PaperFigure {self.number}: {self.title}{conditions}; {contents}>"
-
-    def _names(self) -> list[str]:
-        return [*self.tables]
-
     def summary(self) -> str:
         return "\n".join([self.caption, *(f"  {statement.claim}: {statement}" for statement in self.statements)])
-
-    def to_dict(self) -> dict[str, Any]:
-        return {
-            "number": self.number,
-            "title": self.title,
-            "conditions": self.conditions,
-            "statements": [asdict(statement) for statement in self.statements],
-        }
-
-    def _frame(self, table: str) -> pd.DataFrame:
-        import pandas as pd
-
-        return pd.DataFrame(dict(self.tables[table]))
 
     @property
     def caption(self) -> str:
@@ -253,75 +227,23 @@ class PaperFigure(TableResult):
         return f"Fig. {self.number}: {self.title}{self.conditions and f'; {self.conditions}'}"
 
     def draw(self, drawing: str | None = None) -> Figure:
-        """Draw it.
+        """Return a new figure of one of its `drawings`, by default of the first."""
+        return self.drawings[next(iter(self.drawings)) if drawing is None else drawing]()
 
-        Parameters
-        ----------
-        drawing : str, optional
-            Which of its `drawings`, by name; by default the first.
+    def write(self, folder: Path) -> tuple[Path, ...]:
+        """Write all drawings as PDF and PNG, and the tables as CSV, into a folder that exists; returns the files."""
+        import pandas as pd
 
-        Returns
-        -------
-        matplotlib.figure.Figure
-            A new figure.
-
-        Raises
-        ------
-        InvalidOption
-            If there is none of that name.
-
-        Examples
-        --------
-        >>> from rocking.chattering import paper_figure
-        >>> len(paper_figure(6).draw("surface").axes)
-        1
-        """
-        chosen = next(iter(self.drawings)) if drawing is None else drawing
-        if chosen not in self.drawings:
-            raise InvalidOption(
-                f"{{}} of Fig. {self.number} must be {' or '.join(self.drawings)}, not {drawing!r}",
-                "drawing",
-                value=drawing,
-            )
-        return self.drawings[chosen]()
-
-    def write(self, folder: str | Path) -> tuple[Path, ...]:
-        """Write all drawings as PDF and PNG, and the tables as CSV.
-
-        Parameters
-        ----------
-        folder : str or pathlib.Path
-            Folder that exists.
-
-        Returns
-        -------
-        tuple of pathlib.Path
-            The files.
-
-        Raises
-        ------
-        OutputError
-            If a file cannot be written.
-
-        Examples
-        --------
-        >>> import tempfile
-        >>> from rocking.chattering import paper_figure
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     [path.name for path in paper_figure(1).write(folder)]
-        ['figure-1.pdf', 'figure-1.png', 'figure-1-points.csv']
-        """
-        target = Path(folder)
         paths: list[Path] = []
         for k, name in enumerate(self.drawings):
             stem = f"figure-{self.number}-{name}" if k else f"figure-{self.number}"
-            pdf, png = target / f"{stem}.pdf", target / f"{stem}.png"
+            pdf, png = folder / f"{stem}.pdf", folder / f"{stem}.png"
             drawn = self.draw(name)
             # Without a date the files of two runs are the same.
             write_figure(pdf, drawn, metadata={"CreationDate": None})
             write_figure(png, drawn, dpi=_DOTS_PER_INCH)
             paths += [pdf, png]
-        for name in self.tables:
-            paths.append(target / f"figure-{self.number}-{name}.csv")
-            self.to_csv(paths[-1], name)
+        for name, columns in self.tables.items():
+            paths.append(folder / f"figure-{self.number}-{name}.csv")
+            pd.DataFrame(dict(columns)).to_csv(paths[-1], index=False, float_format="%.12g", na_rep="nan")
         return tuple(paths)

@@ -6,14 +6,9 @@ import math
 from functools import partial
 from typing import Final
 
+import amplitudes
 import numpy as np
-
-from rocking.arrays import Floats
-from rocking.bisection import bisected
-from rocking.chattering.amplitude import critical_amplitude
-from rocking.chattering.duration import chattering_time, interval_ratios, resolved_by_default, sequence
-from rocking.chattering.expansions import first_impact_speed, first_interval
-from rocking.chattering.paper.figure import (
+from figure import (
     ALPHA,
     ETA,
     OMEGA,
@@ -27,10 +22,15 @@ from rocking.chattering.paper.figure import (
     in_words,
     yes_or_no,
 )
+from histories import Ratios, chattering_figure, ratio_figure
+
+from rocking.arrays import Floats
+from rocking.bisection import bisected
+from rocking.chattering.amplitude import critical_amplitude
+from rocking.chattering.duration import chattering_time, interval_ratios, resolved_by_default, sequence
+from rocking.chattering.expansions import first_impact_speed, first_interval
 from rocking.chattering.parameters import checked_loss, single
 from rocking.errors import InvalidOption
-from rocking.plot import amplitudes
-from rocking.plot.histories import Ratios, chattering_figure, ratio_figure
 
 #: Amplitudes of Fig. 5, gathered towards both of its vertical tangents, and how far it goes past the second.
 _AMPLITUDES: Final = 201
