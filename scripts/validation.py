@@ -463,16 +463,16 @@ def small_tables(file):
 
 
 def judged_tables(folder, file):
-    """Predictions of both sets of tests judged: scores, whether they are reliable, and repetitions.
+    """Predictions of both sets of tests judged: scores, and whether they are reliable.
 
-    Of the granite tests all that have one source motion belong together, and none is said to be a repetition; on the
-    small table those with one command are repetitions, and those with one shape of the pulse belong together.
+    Of the granite tests all that have one source motion belong together, on the small table those with one shape of the
+    pulse.
     """
     from shake_table import FOLDS, read
 
     tests, motions = read(folder)
     groups = [test["ground_motion"].strip().partition("_")[0] for test in tests]
-    scores, repeated = [], []
+    scores = []
     for specimen in ("1", "2"):
         overturned = [test[f"overturned_specimen_{specimen}"] == "1" for test in tests]
         calibration = rocking.calibrate(motions, overturned, alpha=(0.02, 0.5), **LINEAR)
@@ -484,13 +484,8 @@ def judged_tables(folder, file):
         calibration = rocking.calibrate(motions, overturned, p=MESH_P, alpha=SMALL_ALPHA, **LINEAR)
         judged = judged_of(motions, overturned, groups, calibration, min(FOLDS, len(set(groups))))
         scores += [judged_row(series, name, one) for name, one in judged.items()]
-        repeated += [repeated_row(series, name, one) for name, one in judged.items()]
     heading = ("tests", "predicted", "Brier", "skill", "log loss", "skill", "p of reliability")
-    of_repetitions = ("tests", "predicted", "repetitions", "differ", "expected", "90 %", "one block in a set")
-    return {
-        "validation-judged.txt": markdown(heading, scores),
-        "validation-repeated.txt": markdown(of_repetitions, repeated),
-    }
+    return {"validation-judged.txt": markdown(heading, scores)}
 
 
 def judged_of(motions, overturned, groups, calibration, folds):
@@ -511,14 +506,6 @@ def judged_row(tests, predicted, found):
         for value, error in ((score.value, score.error), (score.skill, score.skill_error))
     ]
     return tests, predicted, *cells, f"{found.reliability_chance:.2g}"
-
-
-def repeated_row(tests, predicted, found):
-    """Repetitions as text."""
-    one = found.repeated_outcomes
-    alone = "-" if math.isnan(one.same_block) else f"{one.same_block:.2f}"
-    band = f"{one.lower:.2f} to {one.upper:.2f}"
-    return tests, predicted, one.sizes, f"{one.observed:.2f}", f"{one.expected:.2f}", band, alone
 
 
 def small_series(file):

@@ -25,7 +25,7 @@ from rocking.plot.response import DrawnSequence, response_figure
 from rocking.plot.risk import HazardLine, RiskLine, risk_figure, survival_figure
 from rocking.plot.rose import rose_figure, shares_figure
 from rocking.plot.spectrum import SpectrumCurves, spectrum_figure
-from rocking.plot.validation import Bars, PeaksPlot, validation_figure
+from rocking.plot.validation import reliability_figure
 
 COLUMN, PAGE = 86.0 / 25.4, 174.0 / 25.4
 LONG = "rectangular block, 0.24 m x 1.1 m, restitution = 0.9318234567890123, under ridgecrest-clc-090, nonlinear model"
@@ -173,23 +173,9 @@ def trials_of(sides=2, **options):
 
 
 def validation_of(**options):
-    rng = np.random.default_rng(1)
-    ends, count = np.linspace(0.0, 1.0, 11), np.full(10, 8)
-    middle = 0.5 * (ends[1:] + ends[:-1])
-    seen = rng.binomial(8, middle) / 8.0
-    bars = Bars(ends[:-1], ends[1:], count, middle, seen, np.maximum(middle - 0.2, 0.0), np.minimum(middle + 0.2, 1.0))
-    probabilities = rng.uniform(size=80)
-    measured = rng.uniform(0.0, 0.1, 20)
-    middle_of_peaks = np.append(measured[1:], np.nan)
-    peaks = PeaksPlot(measured, 0.5 * middle_of_peaks, middle_of_peaks, 2.0 * middle_of_peaks)
-    return validation_figure(
-        reliability=bars,
-        probabilities=probabilities,
-        overturned=probabilities > rng.uniform(size=80),
-        ranks=bars._replace(observed=0.1 * seen, band_lower=np.zeros(10), band_upper=np.full(10, 0.2)),
-        peaks=peaks,
-        **options,
-    )
+    middle = np.linspace(0.05, 0.95, 10)
+    bands = {"band_lower": np.maximum(middle - 0.2, 0.0), "band_upper": np.minimum(middle + 0.2, 1.0)}
+    return reliability_figure(predicted=middle, observed=middle**1.2, **bands, **options)
 
 
 def risk_of(**options):

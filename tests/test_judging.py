@@ -40,7 +40,7 @@ def test_perfect_predictions_score_zero_and_have_skill_one():
     found = rocking.validate(of_outcomes(outcomes), left_out(outcomes))
     for score in (found.brier, found.log_loss):
         assert (score.value, score.error, score.skill, score.skill_error) == (0.0, 0.0, 1.0, 0.0)
-    assert found.reliability_chance == 1.0 and found.crps is None and not found.ranks
+    assert found.reliability_chance == 1.0 and found.crps is None
 
 
 def test_what_was_thought_nearly_impossible_has_the_least_chance():
@@ -63,7 +63,6 @@ def test_scores_of_three_tests_are_those_by_hand():
     assert found.log_loss.value == pytest.approx(-math.log(0.9 * 0.8 * 0.4) / 3)
     assert found.brier.skill == pytest.approx(1.0 - found.brier.value / (2 / 9))
     assert found.scores.accuracy == pytest.approx(2 / 3)
-    assert [test.chance for test in found.surprising] == pytest.approx([0.4, 0.8, 0.9])
 
 
 def test_standard_errors_allow_for_tests_that_belong_together():
@@ -93,13 +92,12 @@ def test_the_ranked_probability_score_is_its_integral(points, observed):
 
 
 def test_the_score_of_a_known_block_with_a_measuring_error_is_that_of_a_normal_distribution():
-    one = Predicted(np.zeros(1), np.zeros(1, int), np.ones(1), np.full((1, 1), 0.1), math.inf, 0.0, 0.004)
-    ranks, within = one.standing(0)
+    one = Predicted(np.zeros(1), np.zeros(1, int), np.ones(1), np.full((1, 1), 0.1), 0.004)
+    points, within = one.standing(0)
     for observed in (0.09, 0.1, 0.103):
         z = (observed - 0.1) / 0.004
         normal = 0.004 * (z * (2 * stats.norm.cdf(z) - 1) + 2 * stats.norm.pdf(z) - 1 / math.sqrt(math.pi))
-        assert scores.crps(ranks.points, within, observed) == pytest.approx(normal, rel=2e-3)
-        assert np.mean(ranks.interval(observed)) == pytest.approx(stats.norm.cdf(z), abs=1e-3)
+        assert scores.crps(points, within, observed) == pytest.approx(normal, rel=2e-3)
 
 
 def test_a_peak_is_judged_among_the_blocks_that_stand_by_their_weights():
@@ -113,32 +111,12 @@ def test_a_peak_is_judged_among_the_blocks_that_stand_by_their_weights():
     found = rocking.validate([ShakeTest(motion, peak_rotation=first)], blocks, weights=weights)
     (test,) = found.tests
     effective = 64.0 / 26.0
-    assert test.blocks == pytest.approx(effective)
     assert test.probability == pytest.approx((effective * 0.5 + 0.5) / (effective + 1.0))
     assert test.crps == pytest.approx(0.25 * 0.25 * (first - second))
-    n = 0.5 * effective
-    assert (test.pit_lower, test.pit_upper) == pytest.approx((n * 0.25 / (n + 1.0), 1.0))
     assert (test.lower, test.median, test.upper) == (second, first, first)
 
 
 # Chances and bands
-
-
-def test_a_rank_is_in_one_interval_more_than_there_are_draws():
-    ranks = scores.Ranks.of(np.array([1.0, 2.0, 3.0]), np.full(3, 1 / 3), 3.0)
-    assert [ranks.interval(x) for x in (0.5, 1.5, 3.5)] == [
-        pytest.approx(pair) for pair in ((0.0, 0.25), (0.25, 0.5), (0.75, 1.0))
-    ]
-    assert ranks.edges == pytest.approx([0.0, 0.25, 0.5, 0.75, 1.0])
-    tied = scores.Ranks.of(np.array([0.0, 0.0, 3.0]), np.full(3, 1 / 3), 3.0)
-    assert tied.interval(0.0) == pytest.approx((0.0, 0.75)) and tied.edges == pytest.approx([0.0, 0.75, 1.0])
-    known = scores.Ranks.of(np.array([0.5]), np.ones(1), math.inf)
-    assert known.interval(0.5) == (0.0, 1.0) and known.interval(0.4) == (0.0, 0.0) and known.interval(0.6) == (1.0, 1.0)
-
-
-def test_an_interval_is_spread_evenly_over_bins():
-    spread = scores.spread_in_bins(np.array([0.0, 0.25, 0.3, 1.0]), np.array([1.0, 0.5, 0.3, 1.0]), 4)
-    assert spread.tolist() == [[0.25] * 4, [0, 1, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]]
 
 
 MOTIONS = [rocking.pulses.one_sine(1.0 + k, 1.0) for k in range(40)]
@@ -175,97 +153,37 @@ def chances_are_even(chances):
     return stats.kstest(chances, "uniform").pvalue > 0.01
 
 
-@pytest.mark.cases(fast=1)
-@pytest.mark.parametrize("scope", ["test", "specimen"])
 @pytest.mark.parametrize("sets", [12, pytest.param(200, marks=pytest.mark.slow)])
-def test_of_right_predictions_chances_are_even_and_bands_hold(monkeypatch, scope, sets):
+def test_of_right_predictions_chances_are_even_and_bands_hold(monkeypatch, sets):
     rng = np.random.default_rng(2)
-    found = [
-        seen_by(rng.lognormal(0.0, 0.4, 40 if scope == "test" else 1), rng, monkeypatch, one_block_in=scope)
-        for _ in range(sets)
-    ]
+    found = [seen_by(rng.lognormal(0.0, 0.4, 40), rng, monkeypatch) for _ in range(sets)]
     assert chances_are_even([one.reliability_chance for one in found])
-    assert chances_are_even([one.ranks_chance for one in found])
-    for name in ("reliability", "ranks"):
-        inside = [
-            each.band_lower - 1e-9 <= each.observed <= each.band_upper + 1e-9
-            for one in found
-            for each in getattr(one, name)
-        ]
-        assert len(inside) >= 8 * sets
-        assert np.mean(inside) > 0.85
-    if scope == "test":
-        for name in ("brier", "log_loss", "crps") if sets >= 200 else ():
-            each = [getattr(one, name) for one in found]
-            for value, error in (("value", "error"), ("skill", "skill_error")):
-                spread = np.std([getattr(score, value) for score in each])
-                # A jackknife errs to the safe side; most so for a quotient of means over some thirty peaks.
-                ratio = np.mean([getattr(score, error) for score in each]) / spread
-                assert 0.85 < ratio < (1.5 if (name, value) == ("crps", "skill") else 1.2), (name, value)
-        assert np.mean([one.coverage for one in found]) == pytest.approx(0.9, abs=0.05 if sets < 200 else 0.01)
+    inside = [
+        each.band_lower - 1e-9 <= each.observed <= each.band_upper + 1e-9 for one in found for each in one.reliability
+    ]
+    assert len(inside) >= 8 * sets
+    assert np.mean(inside) > 0.85
+    for name in ("brier", "log_loss", "crps") if sets >= 200 else ():
+        each = [getattr(one, name) for one in found]
+        for value, error in (("value", "error"), ("skill", "skill_error")):
+            spread = np.std([getattr(score, value) for score in each])
+            # A jackknife errs to the safe side; most so for a quotient of means over some thirty peaks.
+            ratio = np.mean([getattr(score, error) for score in each]) / spread
+            assert 0.85 < ratio < (1.5 if (name, value) == ("crps", "skill") else 1.2), (name, value)
 
 
-def test_one_specimen_in_all_tests_is_no_contradiction_but_the_same_population_in_each_is(monkeypatch):
-    rng = np.random.default_rng(3)
-    chances = {
-        scope: [
-            seen_by(np.exp(0.4 * sign), rng, monkeypatch, one_block_in=scope).ranks_chance
-            for sign in (-1.5, -1.0, 1.0, 1.5)
-        ]
-        for scope in ("test", "specimen")
-    }
-    assert max(chances["test"]) < 0.05 < min(chances["specimen"])
-
-
-@pytest.mark.parametrize("wrong", [0.6, 1.6])
+@pytest.mark.parametrize("wrong", [0.5, 2.0])
 def test_predictions_that_are_wrong_are_found_out(monkeypatch, wrong):
     rng = np.random.default_rng(4)
     found = seen_by(wrong * rng.lognormal(0.0, 0.4, 40), rng, monkeypatch)
-    assert found.ranks_chance < 0.05 and "not as if the predictions were right" in found.summary()
+    assert found.reliability_chance < 0.05 and "not as if the predictions were right" in found.summary()
 
 
-# Repetitions
-
-
-def test_repetitions_differ_as_counted_by_hand():
-    # Three of one motion, one of which stood; two of a nominal one that agree; one alone.
-    tests = [ShakeTest(STRONG, fell) for fell in (True, True, False)]
-    tests += [ShakeTest(WEAK.scaled(k), True, nominal="weak") for k in (1.0, 1.1)] + [ShakeTest(WEAK, False)]
-    found = rocking.validate(tests, left_out([0.5] * 6), simulations=4000)
-    seen = found.repeated_outcomes
-    assert (seen.sets, seen.tests) == (2, 5)
-    assert seen.observed == pytest.approx((2 * 2 * 1 / 3) / 3)
-    assert seen.expected == pytest.approx(0.5, abs=0.02)
-    assert math.isnan(seen.same_block) and found.repeated_peaks is None
-
-
-def test_one_block_repeats_itself_under_one_motion_and_a_population_does_not():
-    blocks = Blocks(2.0, [0.1, 0.8], 0.9)
-    tests = [ShakeTest(STRONG, True), ShakeTest(STRONG, False)]
-    seen = rocking.validate(tests, blocks).repeated_outcomes
-    assert (seen.observed, seen.same_block) == (1.0, 0.0) and seen.expected == pytest.approx(0.5, abs=0.03)
-    # A table that does not repeat its motion: both blocks overturn under one, and stand under the other.
-    other = [ShakeTest(STRONG, True, nominal="one"), ShakeTest(WEAK.scaled(0.1), False, nominal="one")]
-    assert rocking.validate(other, Blocks(2.0, [0.1, 0.1], 0.9)).repeated_outcomes.same_block == 1.0
-
-
-def test_peaks_of_repetitions_spread_as_by_hand():
-    blocks = Blocks([2.0, 2.2], [0.2, 0.22], 0.9)
-    motion = STRONG.scaled(0.4)
-    low, high = np.sort(rocking.simulate_many(blocks, motion).peak_rotation.values.ravel())
-    tests = [ShakeTest(motion, peak_rotation=peak) for peak in (0.05, 0.06, 0.07)]
-    seen = rocking.validate(tests, blocks, peak_error=0.001).repeated_peaks
-    assert seen.observed == pytest.approx(0.01)
-    assert seen.expected == pytest.approx(math.hypot(0.5 * (high - low), 0.001), rel=0.03)
-    assert seen.same_block == pytest.approx(0.001)
-
-
-def test_two_specimens_on_one_table_are_no_repetitions_but_belong_together():
+def test_two_specimens_on_one_table_belong_together():
     tests = [ShakeTest(motion, k == 0, specimen=name) for k, motion in enumerate((STRONG, WEAK)) for name in "ab"]
     found = rocking.validate(tests, {"a": BLOCK, "b": Blocks(2.0, [0.2, 0.1], 0.9)})
-    assert found.repeated_outcomes is None and found.brier.clusters == 2
+    assert found.brier.clusters == 2
     assert [test.specimen for test in found.tests] == ["a", "b", "a", "b"]
-    assert [math.isinf(test.blocks) for test in found.tests] == [True, False, True, False]
     assert "a: block from its parameters" in found.description
 
 
@@ -290,8 +208,6 @@ def test_a_calibration_says_of_tests_what_it_predicts(coarse):
         rocking.validate(tests, calibration, weights=[1.0])
     with pytest.raises(InvalidOption, match="of 4 tests, and 3 tests are given"):
         rocking.validate(tests[:3], validation)
-    with pytest.raises(InvalidOption, match="no blocks: leave one_block_in out"):
-        rocking.validate(tests, validation, one_block_in="specimen")
 
 
 def test_peaks_that_no_block_explains_are_those_of_the_specimens_that_have_blocks():
@@ -302,7 +218,7 @@ def test_peaks_that_no_block_explains_are_those_of_the_specimens_that_have_block
     both = rocking.validate(left + right, {"a": left_out([0.2, 0.3]), "b": BLOCK})
     assert rocking.validate(left, left_out([0.2, 0.3])).unexplained == 0
     assert both.unexplained == alone.unexplained == 1
-    assert [note for note in both.notes if "ranked" in note] == [note for note in alone.notes if "ranked" in note] != []
+    assert [note for note in both.notes if "scored" in note] == [note for note in alone.notes if "scored" in note] != []
 
 
 def test_a_known_block_is_certain_and_a_lapse_is_not():
@@ -325,7 +241,7 @@ def test_vertical_motion_and_weights_and_the_model_count():
     shares = np.array([0.25, 0.75]) @ simulated.overturned.transpose("block", "motion").values
     effective = 1.0 / (0.25**2 + 0.75**2)
     assert [test.probability for test in found.tests] == pytest.approx((effective * shares + 0.5) / (effective + 1.0))
-    assert found.repeated_outcomes is None  # motions that differ in the vertical component alone are two
+    assert found.brier.clusters == 2  # motions that differ in the vertical component alone are two
 
 
 def test_a_simulation_that_was_given_up_counts_as_half_overturned(monkeypatch):
@@ -373,7 +289,6 @@ def test_a_test_needs_a_motion():
         ({"weights": [1.0, 2.0]}, "weights must hold one number for each of 1 block"),
         ({"lapse": 0.7}, "lapse must be a number from 0 to 0.5"),
         ({"peak_error": math.nan}, "peak_error must be a number from 0 to 1"),
-        ({"one_block_in": "all"}, "one_block_in must be one of test, group, specimen"),
         ({"bins": 0}, "bins must be a whole number from 1"),
         ({"simulations": 3}, "simulations must be a whole number of at least 100"),
         ({"model": "rigid"}, "model must be one of nonlinear, linear"),
@@ -460,7 +375,7 @@ def test_the_command_writes_figure_tables_and_numbers(run, tmp_path, monkeypatch
     how = ("--width", "0.24", "--height", "1.1", "--peak-error", "0.1deg", "--lapse", "0.01")
     code, out, err = run("validate", table, *how, "--out", tmp_path / "out")
     assert (code, err) == (0, "") and "3 tests, 1 overturned, 2 measured peaks" in out
-    files = {"result.json", "tests.csv", "reliability.csv", "ranks.csv", "validation.png", "validation.pdf"}
+    files = {"result.json", "tests.csv", "validation.png", "validation.pdf"}
     assert {path.name for path in (tmp_path / "out").iterdir()} == files
     result = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
     direct = rocking.validate(
@@ -469,7 +384,7 @@ def test_the_command_writes_figure_tables_and_numbers(run, tmp_path, monkeypatch
     assert result["brier"]["value"] == pytest.approx(direct.brier.value)
     assert result["crps_rad"]["value"] == pytest.approx(direct.crps.value)
     rows = (tmp_path / "out" / "tests.csv").read_text("utf-8").splitlines()
-    assert rows[0].startswith("name,specimen,motion,overturned,probability,blocks,peak_rotation_rad,lower_rad")
+    assert rows[0].startswith("name,specimen,motion,overturned,probability,peak_rotation_rad,lower_rad")
     assert len(rows) == 4
 
 
@@ -486,26 +401,15 @@ def test_the_command_takes_the_ensemble_of_each_specimen(run, tmp_path):
     assert (code, err) == (0, "")
     found = json.loads(out)
     assert found["model"] == "linear" and "a: 2 blocks, weighted; b: 2 blocks, weighted" in found["description"]
-    assert [test["blocks"] for test in found["tests"]] == pytest.approx([1.6] * 3)
     code, _, err = run("validate", table, "--ensemble", tmp_path / "fits", "--width", "1")
     assert code == 2 and "leave --width out" in err
     code, _, err = run("validate", tmp_path / "tests.csv")
     assert code == 2 and "a block is needed" in err
 
 
-@pytest.mark.thorough
-def test_an_error_of_peaks_is_that_of_the_blocks_in_whatever_order_specimens_come():
-    rng = np.random.default_rng(0)
-    blocks = Blocks(3.0, np.exp(np.log(0.15) + 0.1 * rng.normal(size=50)), 0.9)
-    pulses = [rocking.pulses.one_sine(each, 1.0) for each in (1.6, 1.8, 2.5, 4.0, 4.5)]
-    peaks = [ShakeTest(each, peak_rotation=0.01 + 0.02 * k, specimen="a") for each in pulses[:2] for k in range(3)]
-    fell = [ShakeTest(each, overturned=k > 1, specimen="b") for k, each in enumerate(pulses)]
-    calibration = rocking.calibrate(pulses, [0, 0, 1, 1, 1], candidates=128, two_sided=False, p=3.0, restitution=0.9)
-    left_out = calibration.cross_validate(folds=2)
-    for tests in (peaks + fell, fell + peaks):
-        found = rocking.validate(tests, {"a": blocks, "b": left_out}, peak_error=0.01)
-        assert found.repeated_peaks.same_block == pytest.approx(0.01)
+def test_left_out_tests_and_weights_of_unknown_specimens_are_refused():
+    tests = of_outcomes([0, 1])
     with pytest.raises(InvalidOption, match="have their own lapse"):
-        rocking.validate(fell, left_out, lapse=0.3)
+        rocking.validate(tests, left_out([0.2, 0.3]), lapse=0.3)
     with pytest.raises(InvalidOption, match="weights have 'A', for which blocks have nothing"):
-        rocking.validate(peaks, {"a": blocks}, weights={"A": np.ones(50)})
+        rocking.validate(tests, {"": BLOCK}, weights={"A": np.ones(1)})

@@ -60,18 +60,6 @@ def test_the_frequency_limits_of_overturning_with_impact_are_those_of_dop853(scr
         assert rocking.simulate(block, pulse).overturned is falls
 
 
-def test_repetitions_on_the_small_table_differ_as_the_page_says(script, shared):
-    rows = [line.split("|") for line in (script.TABLES / "validation-repeated.txt").read_text("utf-8").splitlines()[2:]]
-    said = {(cells[1].strip(), cells[3].strip(), cells[4].strip()) for cells in rows}
-    found = set()
-    for series, chosen in script.small_series(shared / "shakebot" / "tests.csv").items():
-        tests = [rocking.ShakeTest(script.commanded(test), test["overturned"] == "1") for test in chosen]
-        rate = np.full((1, len(tests)), np.mean([test.overturned for test in tests]))
-        seen = rocking.validate(tests, rocking.analysis.Validation(rate, ())).repeated_outcomes
-        found.add((series, seen.sizes, f"{seen.observed:.2f}"))
-    assert len(found) == 2 and said == found
-
-
 def test_every_kind_of_body_is_judged_and_none_differs():
     from oracles.standing import KINDS
 

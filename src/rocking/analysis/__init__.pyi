@@ -12,7 +12,7 @@ from .risk import Rate, Risk
 from .spectrum import RockingSpectrum
 from .survey import Survey
 from .survival import Survival
-from .validation.result import JudgedTest, Repeatability, ShareInBin
+from .validation.result import JudgedTest, ShareInBin
 from .validation.scores import Score
 
 __all__ = [
@@ -31,7 +31,6 @@ __all__ = [
     "OverturningMap",
     "Probit",
     "Rate",
-    "Repeatability",
     "ResponseRose",
     "Risk",
     "RockingSpectrum",

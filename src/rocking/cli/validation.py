@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from rocking.analysis.input_tables import read_tests
-from rocking.analysis.validation.judging import Scope
 from rocking.analysis.validation.judging import validate as judged
 from rocking.analysis.validation.tested import ShakeTest
 from rocking.cli.body_options import EnsembleOptions, ensemble_of
@@ -23,7 +22,6 @@ def validate(
     *,
     lapse: float | None = None,
     peak_error: str = "0",
-    one_block_in: Scope = "test",
     bins: Annotated[int, WHOLE] = 10,
     seed: Annotated[int, WHOLE] = 0,
     block: Annotated[EnsembleOptions, BLOCK] = EnsembleOptions(),
@@ -35,9 +33,9 @@ def validate(
 
     TESTS is a CSV table with a row for each test: motion (a record file beside it, a shipped record, or a pulse), where
     wanted scale, vertical, channel, dt_s and units; overturned (1 or 0), peak_rotation_deg or peak_rotation_rad, or
-    both; and where wanted name, specimen, nominal (rows with the same are repetitions) and group (of what belongs
-    together). With --ensemble FOLDER each specimen is predicted by FOLDER/SPECIMEN/ensemble.csv, as rocking calibrate
-    writes them. --out holds validation.png, .pdf, tests.csv, reliability.csv, ranks.csv and result.json.
+    both; and where wanted name, specimen, nominal and group (rows with the same belong together). With --ensemble
+    FOLDER each specimen is predicted by FOLDER/SPECIMEN/ensemble.csv, as rocking calibrate writes them. --out holds
+    validation.png, .pdf, tests.csv and result.json.
 
     Parameters
     ----------
@@ -47,11 +45,8 @@ def validate(
         Chance that an outcome is not that of a rocking block at all; by default 0.
     peak_error
         Standard deviation of a measured peak, 0.1deg or 0.002 (rad).
-    one_block_in
-        In which tests the specimen is one and the same block of an ensemble: each has its own (test), or all that
-        belong together (group), or all (specimen) have one.
     bins
-        Bins of the reliability diagram and of ranks.
+        Bins of the reliability diagram.
     seed
         Seed of the simulations for bands and chances.
     """
@@ -63,7 +58,6 @@ def validate(
             **_blocks(rows, block, model),
             lapse=lapse,
             peak_error=deviation,
-            one_block_in=one_block_in,
             bins=bins,
             seed=seed,
         )

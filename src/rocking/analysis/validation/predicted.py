@@ -18,9 +18,8 @@ from numpy.typing import ArrayLike
 from rocking.analysis.calibration.evidence import blurred, expected_share
 from rocking.analysis.calibration.result import Calibration, Validation
 from rocking.analysis.levels import mean_one, note_missing, pooled, ratios_of
-from rocking.analysis.validation.scores import Ranks
 from rocking.analysis.validation.tested import Observed
-from rocking.arrays import Flags, Floats, Integers
+from rocking.arrays import Floats, Integers
 from rocking.body import Bodies, Body
 from rocking.constants import Model
 from rocking.ensemble import simulate_many
@@ -50,10 +49,6 @@ class Predicted:
         Weights of the blocks; n is 0 where probabilities are all that is known.
     peaks : ndarray, shape (n, m)
         Largest rotation, rad; infinite where the block overturns.
-    effective : float
-        Number of blocks that the shares come from, effectively; infinite of a block that is known.
-    lapse : float
-        Chance that an outcome is not that of a rocking block at all.
     deviation : float
         Standard deviation of a measured peak, rad.
     """
@@ -62,19 +57,12 @@ class Predicted:
     tests: Integers
     weights: Floats
     peaks: Floats
-    effective: float
-    lapse: float = 0.0
     deviation: float = 0.0
 
     @property
     def has_blocks(self) -> bool:
         """Whether more than probabilities is known."""
         return len(self.weights) > 0
-
-    @property
-    def overturned(self) -> Flags:
-        """Whether each block overturns in each test, shape (n, m)."""
-        return np.isinf(self.peaks)
 
     @cached_property
     def errors(self) -> Floats:
@@ -86,76 +74,13 @@ class Predicted:
         count = max(_ERRORS, _POINTS // max(len(self.weights), 1))
         return np.asarray(self.deviation * ndtri((np.arange(count) + 0.5) / count))
 
-    def points(self, k: int) -> tuple[Floats, Floats, Integers]:
-        """Measured peaks that are possible in test k, in order, their weights, and block and error of each."""
-        values = self._measured(self.peaks[:, k, None], self.errors).ravel()
-        order = np.argsort(values, kind="stable")
+    def standing(self, k: int) -> tuple[Floats, Floats] | None:
+        """Possible measured peaks of the blocks that stand in test k, in order, and their weights; None without any."""
+        values = np.maximum(self.peaks[:, k, None] + self.errors, 0.0).ravel()  # a size, whatever its error
         weights = np.repeat(self.weights / len(self.errors), len(self.errors))
-        return values[order], weights[order], order
-
-    def standing(self, k: int) -> tuple[Ranks, Floats] | None:
-        """Ranks among the peaks of blocks that stand in test k, and the weights of these; None where none stands."""
-        values, weights, _ = self.points(k)
-        stand = np.isfinite(values) & (weights > 0.0)
-        share = float(weights[stand].sum())
-        if share == 0.0:
-            return None
-        within = weights[stand] / share
-        return Ranks.of(values[stand], within, self.effective * share), within
-
-    def drawn_outcomes(self, labels: Integers | None, count: int, rng: np.random.Generator) -> Flags:
-        """Draw outcomes of the tests so many times, shape (count, m), one block for each label; without, for each test.
-
-        The chances are the probabilities: some outcomes are those of no block, as likely one as the other, and some
-        lapse.
-        """
-        shape = count, len(self.probabilities)
-        if labels is None or not self.has_blocks:
-            return np.asarray(rng.random(shape) < self.probabilities)
-        found = np.take_along_axis(self.overturned, self._drawn_blocks(labels, count, rng), axis=0)
-        if math.isfinite(self.effective):
-            unknown = rng.random(shape) < 1.0 / (self.effective + 1.0)
-            found = np.where(unknown, rng.random(shape) < 0.5, found)
-        return np.asarray(found ^ (rng.random(shape) < self.lapse))
-
-    def drawn_peaks(
-        self, k: int, blocks: Integers | None, count: int, rng: np.random.Generator
-    ) -> tuple[Floats, Floats, Floats]:
-        """Draw peaks of a test k that stands, and the intervals of their ranks: each of shape (count,).
-
-        From these blocks, or from any that stands in it; NaN where the block overturns.
-        """
-        found = self.standing(k)
-        if found is None:
-            nothing = np.full(count, math.nan)
-            return nothing, nothing, nothing
-        ranks, within = found
-        uniform = rng.random(count)
-        if blocks is None:
-            held = np.cumsum(within)
-            places = np.minimum(np.searchsorted(held, uniform * held[-1], "right"), len(held) - 1)
-            values = ranks.points[places]
-        else:
-            values = self._measured(self.peaks[blocks, k], rng.choice(self.errors, count))
-            places = np.minimum(np.searchsorted(ranks.points, values), len(ranks.points) - 1)
-            uniform = ranks.uniform_at(places, uniform)
-        low, high = ranks.intervals(uniform)
-        fell = ~np.isfinite(values)
-        return tuple(np.where(fell, math.nan, each) for each in (values, low, high))  # type: ignore[return-value]
-
-    def drawn_blocks(self, labels: Integers | None, count: int, rng: np.random.Generator) -> Integers | None:
-        """Draw a block for each label of the tests, shape (count, m); None without labels."""
-        return None if labels is None else self._drawn_blocks(labels, count, rng)
-
-    @staticmethod
-    def _measured(peaks: Floats, errors: Floats) -> Floats:
-        """Peaks as they are measured: a size is not below 0, whatever its error."""
-        return np.maximum(peaks + errors, 0.0)
-
-    def _drawn_blocks(self, labels: Integers, count: int, rng: np.random.Generator) -> Integers:
-        distinct, which = np.unique(labels, return_inverse=True)
-        drawn = rng.choice(len(self.weights), (count, len(distinct)), p=self.weights)
-        return np.asarray(drawn[:, which])
+        order = np.argsort(values, kind="stable")
+        order = order[np.isfinite(values[order]) & (weights[order] > 0.0)]
+        return (values[order], weights[order] / weights[order].sum()) if len(order) else None
 
 
 @dataclass(frozen=True)
@@ -265,7 +190,7 @@ def _simulated(
     lapse = 0.0 if lapse is None else lapse
     # A sum of weights may be a rounding above 1.
     probabilities = np.clip(blurred(expected, lapse), 0.0, 1.0)
-    return Predicted(probabilities, where, shares, peaks, effective, lapse, deviation)
+    return Predicted(probabilities, where, shares, peaks, deviation)
 
 
 def _left_out(source: Validation, weights: object, tests: Observed, where: Integers) -> Predicted:
@@ -278,7 +203,7 @@ def _left_out(source: Validation, weights: object, tests: Observed, where: Integ
             "{} must be those of the calibration, in their order",
             "tests",
         )
-    return Predicted(source.probabilities.mean(axis=0), where, np.empty(0), np.empty((0, count)), math.nan)
+    return Predicted(source.probabilities.mean(axis=0), where, np.empty(0), np.empty((0, count)))
 
 
 def _described(source: Calibration | Bodies | Body | Sequence[Body], weights: ArrayLike | None) -> str:

@@ -34,11 +34,11 @@ class ShakeTest:
     specimen : str
         Name of the specimen.
     nominal : str
-        What the table was told to do: tests of one specimen with the same text are repetitions. By default those whose
-        motions are the same to the last bit are.
+        Command of the table: tests with the same text belong together. By default those whose motions are the same to
+        the last bit do.
     group : str
         Tests that belong together otherwise, as those with one source motion at different scales: standard errors allow
-        for it. By default the repetitions do.
+        for it. By default those with one command do.
 
     Raises
     ------
@@ -93,13 +93,12 @@ class ShakeTest:
 class Observed:
     """Tests as arrays: outcomes, peaks (NaN where there is none), and whole numbers that are the same in one set.
 
-    A set of `specimens`; of `repetitions`, one specimen under one motion; of `clusters`, which belong together.
+    A set of `specimens`; of `clusters`, which belong together.
     """
 
     overturned: Flags
     peaks: Floats
     specimens: Integers
-    repetitions: Integers
     clusters: Integers
     names: tuple[str, ...]
     distinct: tuple[Motion, ...]
@@ -118,7 +117,6 @@ class Observed:
             overturned=np.array([test.overturned for test in tests], dtype=bool),
             peaks=np.array([math.nan if test.peak_rotation is None else test.peak_rotation for test in tests]),
             specimens=numbered(specimens),
-            repetitions=numbered([*zip(specimens, motions, strict=True)]),
             clusters=numbered(belonging),
             names=tuple(dict.fromkeys(specimens)),
             distinct=tuple(distinct),
