@@ -1107,18 +1107,11 @@ def commands_on_files(subject: str) -> Iterator[Item]:
                 yield str(path), path.read_text("utf-8")
 
 
-#: Public functions that are about to leave the package.
-LEAVING: Final = {
-    "compare_restitution", "median_gradient", "compare_schemes", "paper_figure", "safe_basin_erosion", "scheme_of",
-    "switch_branch", "uncertainty_exponent",
-}  # fmt: skip
-
-
 @group()
 def defaults() -> Iterator[Item]:
     """Arguments of public functions, and their defaults."""
     for place in (rocking, rocking.pulses, rocking.records, rocking.rules, dynamics, chattering, families):
-        for name in sorted(set(getattr(place, "__all__", vars(place))) - LEAVING):
+        for name in sorted(getattr(place, "__all__", vars(place))):
             function = getattr(place, name)
             if inspect.isfunction(function) and not name.startswith("_"):
                 parameters = inspect.signature(function).parameters.values()
