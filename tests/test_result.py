@@ -342,8 +342,8 @@ def test_levels_go_on_to_three_times_the_first_that_overturns_and_no_further():
 def test_columns_of_the_table_of_bands_do_not_touch():
     record = rocking.records.load("ridgecrest-clc-090")
     text = rocking.incremental_dynamic_analysis(BLOCK, [record, PULSE], tolerance=1e-2).summary()
-    rows = text.splitlines()[4:]
-    assert len(rows) == 2
+    *rows, undecided = text.splitlines()[4:]
+    assert undecided.startswith("note: undecided within 3e-6 of the motion: ")
     assert [row.split("  ")[0] for row in rows] == ["ridgecrest-clc-090", "one-sine"]
 
 

@@ -56,7 +56,7 @@ from .motion import Motion, pulses, records
 from .motion.description import Description, Origin
 from .motion.formats import read
 from .motion.scaling import Measure
-from .response import Gradient, Perturbed, Response, Sensitivity, gradient
+from .response import Gradient, Perturbed, Repeat, Response, Sensitivity, gradient
 from .result import DatasetResult, DrawnResult, Result, Row, TableResult
 from .simulation import simulate
 from .solid.solid import Solid
@@ -101,6 +101,7 @@ __all__ = [
     "Perturbed",
     "Product",
     "RandomRestitution",
+    "Repeat",
     "Response",
     "Restitution",
     "RestrainedBlock",

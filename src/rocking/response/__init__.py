@@ -3,7 +3,16 @@
 from rocking.response.answers import trail_of
 from rocking.response.derivatives import Gradient, gradient
 from rocking.response.export import active_span, drawing_times
-from rocking.response.perturbed import COUNT, PRECISION, RELATIVE, Perturbed, factors_near, percent, steps_within
+from rocking.response.perturbed import (
+    COUNT,
+    PRECISION,
+    RELATIVE,
+    Perturbed,
+    Repeat,
+    factors_near,
+    percent,
+    steps_within,
+)
 from rocking.response.response import Response
 from rocking.response.sensitivity import AMBIGUITY, QUANTITIES, Sensitivity
 from rocking.response.summary import in_brief, in_words, known_ratio, ratio_text
@@ -16,6 +25,7 @@ __all__ = [
     "RELATIVE",
     "Gradient",
     "Perturbed",
+    "Repeat",
     "Response",
     "Sensitivity",
     "active_span",
