@@ -157,8 +157,9 @@ def test_a_mean_rate_says_a_year_and_a_validation_says_how_often():
     fitted = rocking.fit_fragility([2.0, 3.0, 4.0], [1, 4, 7], trials=10)
     assert re.fullmatch(
         r"<Rate: overturning: \S+ a year \(\S+ to \S+\), once in \S+ years \(\S+ to \S+\)>",
-        repr(fitted.annual_rate(SITE).rates[0]),
+        repr(fitted.annual_rate(rocking.HazardCurve([0.5, 1.0, 8.0], [0.1, 0.01, 1e-5])).rates[0]),
     )
+    assert "overturning: < " in repr(fitted.annual_rate(SITE).rates[0])  # SITE ends where blocks begin to fall
     assert repr(RESULTS["validation"](None)).startswith("<Validation: 15 tests, each left out once: accuracy ")
 
 

@@ -6,8 +6,8 @@ import inspect
 from collections.abc import Callable
 from typing import Final
 
+from block_responses import figure_1, figure_4, figure_8, figure_9, figure_10, figure_11
 from figure import PaperFigure
-from responses import figure_1, figure_4, figure_8, figure_9, figure_10, figure_11
 from theory import figure_2, figure_3, figure_5, figure_6, figure_7
 
 from rocking.errors import InvalidOption
