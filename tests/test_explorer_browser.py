@@ -160,7 +160,7 @@ def test_the_first_page_shows_a_block_that_chatters(opened):
     ]
     assert rests == [f"{time:.9f}" for time in response.chattering["end"]]
     cells = page.page.locator("#sequences tbody tr:last-child td").all_text_contents()
-    assert cells[4] == "± 1.25 s" and cells[5].endswith(" ps")
+    assert cells[4] == "± 1.25 s" and cells[5].endswith(" ns")
     head = page.page.locator("#sequences th").all_text_contents()
     assert page.js("(({scrollWidth, clientWidth}) => scrollWidth <= clientWidth)(document.querySelector('.scroll'))")
     assert head[3:5] == ["Moves, if the motion changes by three millionths", "Bracket of the computation"]
