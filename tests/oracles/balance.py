@@ -79,7 +79,7 @@ def case(seed: int, number: int, model: str = "linear") -> Case:
     velocity = p * (reach - q * alpha) + (0.0 if model == "nonlinear" else rate)
     if kind == 0:
         rotation, velocity = held - q * alpha + (0.0 if model == "nonlinear" else rate / p), 0.0
-    if not (rotation > 0.0 or velocity > 0.0):
+    if not (0.0 < rotation < 1.5 or (rotation == 0.0 and velocity > 0.0)):  # no such start: upright, or fallen
         rotation, velocity = (1.0 - q) * alpha, 0.0
     return Case(model, p, alpha, e, q, tuple(breakpoints.tolist()), rows, float(rotation), float(velocity))
 
