@@ -44,7 +44,11 @@ def test_random_states_are_what_their_commands_print(explorer, run, seed, count)
         result = json.loads(out)
         # JSON has no number for what is not finite: it is none in a result, and a header is sent so, too.
         shown = json.loads(json.dumps({name: _finite(header[name]) for name in NUMBERS}))
-        assert shown == {name: result[called] for name, called in NUMBERS.items()}, texts
+        # The page rounds this number to the digits that are known, where these are fewer than it shows.
+        ratio = result["peak_over_slenderness"]
+        rounded = [ratio if ratio is None else float(f"{ratio:.{digits}g}") for digits in (1, 2, 3)]
+        assert shown.pop("peak_over_slenderness") in [ratio, *rounded], texts
+        assert shown == {name: result[called] for name, called in NUMBERS.items() if name in shown}, texts
         assert header["rests"] == sum(each["kind"] == "rest" for each in result["events"]), texts
         fates.add((header["overturned"], header["rests"] > 0, header["impacts"] > 0))
         judged += 1
