@@ -52,24 +52,6 @@ def test_the_examples_of_a_page_run_and_print_what_it_says(page, tmp_path, monke
     assert EXAMPLES["run"](page) == ""
 
 
-def test_an_example_that_prints_something_else_is_reported_with_its_line(tmp_path):
-    page = tmp_path / "page.md"
-    page.write_text("# A page\n\n```pycon\n>>> 1 + 1\n2\n```\n\n```pycon\n>>> 1 + 1\n3\n```\n", "utf-8")
-    assert "line 9" in EXAMPLES["run"](page)
-
-
-def test_every_figure_of_a_tutorial_is_drawn_by_the_page_itself():
-    shown = {}
-    for page in sorted((ROOT / "docs" / "tutorials").glob("*.md")):
-        text = page.read_text("utf-8")
-        images = re.findall(r"!\[[^]]*\]\(([^)]*)\)", text)
-        assert images == [f"../_static/tutorials/{name}" for name in re.findall(r'savefig\("([^"]*)"', text)], page
-        shown[page.stem] = [Path(image).name for image in images]
-    kept = {path.name for path in (ROOT / "docs" / "_static" / "tutorials").iterdir()}
-    assert {name for names in shown.values() for name in names} == kept
-    assert all(shown[name] for name in ("first-response", "risk", "chattering", "study", "calibration"))
-
-
 def known(chain: str) -> bool:
     """Whether a dotted name of the package leads to something."""
     found = rocking
@@ -133,12 +115,6 @@ def test_the_reference_of_commands_has_every_option_that_their_help_shows(tmp_pa
         assert shown <= set(re.findall(r"--[a-z][a-z-]*", pages[words[0]])), words
 
 
-def test_the_page_on_installation_names_every_part():
-    text = (ROOT / "docs" / "tutorials" / "install.md").read_text("utf-8")
-    named = set(re.findall(r"^\| `(\w+)` \|", text, re.MULTILINE))
-    assert named | {"test", "lint", "docs", "browser"} == set(PROJECT["optional-dependencies"])
-
-
 def test_the_reference_of_files_names_every_format_and_every_key_of_a_study():
     records = (ROOT / "docs" / "reference" / "records.md").read_text("utf-8")
     modules = (ROOT / "src" / "rocking" / "motion" / "formats").glob("*.py")
@@ -170,93 +146,6 @@ def test_every_public_name_is_in_the_reference():
     ]
     assert len(names) > 100
     assert missing == []
-
-
-def commands_on(page: str) -> set[str]:
-    """Commands in the consoles of a page."""
-    return set(re.findall(r"^\$ (?:.*[|&] )?rocking ([a-z]+)", (ROOT / page).read_text("utf-8"), re.MULTILINE))
-
-
-def test_every_command_is_shown_and_listed():
-    commands = {name for name in app if not name.startswith("-")}
-    assert len(commands) >= 15
-    assert commands_on("docs/howto/command-line.md") == commands
-    assert commands_on("README.md") <= commands
-    (listed,) = re.findall(r"`rocking (\w+(?: \| \w+){9,})`", (ROOT / "CHANGELOG.md").read_text("utf-8"))
-    assert set(listed.split(" | ")) == commands
-
-
-# The paper's equations and slips
-
-THEORY = ROOT / "docs" / "theory"
-CITATION = re.compile(r"\bEqs?\.? (\d+(?:(?:, (?:and |or )?| and | or | to )\d+)*)")
-
-
-def numbers(enumeration: str) -> set[int]:
-    """Read "6 to 9, 11 and 13"."""
-    found = set()
-    for part in re.split(r", (?:and |or )?| and | or ", enumeration):
-        first, _, last = part.partition(" to ")
-        found |= set(range(int(first), int(last or first) + 1))
-    return found
-
-
-def cited(text: str) -> set[int]:
-    return set().union(*(numbers(match[1]) for match in CITATION.finditer(text)))
-
-
-def equation_rows() -> list[tuple[set[int], set[int], str, str]]:
-    """Numbers of a row, those with a star, its page, and its remark."""
-    rows = []
-    for line in (THEORY / "equations.md").read_text("utf-8").splitlines():
-        cells = [cell.strip() for cell in line.strip("|").split("|")]
-        if cells[0][:1].isdigit():
-            starred = {int(number) for number in re.findall(r"(\d+)\*", cells[0])}
-            page = re.fullmatch(r"{doc}`([\w-]+)`", cells[1])
-            rows.append((numbers(cells[0].replace("*", "")), starred, page[1], cells[3]))
-    return rows
-
-
-def test_an_enumeration_of_equations_is_read():
-    assert cited("Eqs 6 to 8, 10 and 12; Eq. 20, where; (Eqs 57, 58, and 60)") == {6, 7, 8, 10, 12, 20, 57, 58, 60}
-    assert cited("{eq}`sine-eq65` and the paper's Fig. 5, 3") == set()
-
-
-def paragraphs_of(page: str) -> list[str]:
-    """Paragraphs of a page of the theory, each in one line."""
-    return [" ".join(each.split()) for each in (THEORY / f"{page}.md").read_text("utf-8").split("\n\n")]
-
-
-def test_every_equation_of_the_paper_is_derived_on_the_page_that_is_named_or_not_needed():
-    rows = equation_rows()
-    assert sorted(number for row in rows for number in row[0]) == list(range(1, 78))
-    for found, _, page, _ in rows:
-        # What a page says that it covers is not yet covered.
-        derived = [each for each in paragraphs_of(page) if not each.startswith("*Covers")]
-        assert found <= cited("\n".join(derived)), page
-
-
-def test_what_a_page_says_that_it_covers_is_on_it():
-    covered = {}
-    for page in THEORY.glob("*.md"):
-        paragraphs = paragraphs_of(page.stem)
-        for said in (each for each in paragraphs if each.startswith("*Covers")):
-            covered[page.stem] = cited(said)
-            assert covered[page.stem] <= cited("\n".join(each for each in paragraphs if each != said)), page
-    assert set().union(*covered.values()) == set(range(1, 78))
-
-
-def test_the_equations_with_a_star_are_those_with_a_slip_and_every_slip_has_a_check():
-    _, *entries = re.split(r"^## ", (THEORY / "errata.md").read_text("utf-8"), flags=re.MULTILINE)
-    assert len(entries) > 20
-    for entry in entries:
-        assert EXAMPLE.search(entry), entry
-        assert "*Printed:*" in entry, entry
-        assert "*Right" in entry, entry
-    slips = set().union(*(cited(entry.splitlines()[0]) for entry in entries))
-    starred = set().union(*(row[1] for row in equation_rows()))
-    assert starred <= slips
-    assert slips - starred <= {44}
 
 
 def test_every_command_that_the_pages_name_exists():
@@ -374,52 +263,6 @@ def test_on_a_package_index_the_readme_leads_to_nothing_that_is_not_there(hooks)
     hook.update(metadata)
     assert metadata == {"readme": {"content-type": "text/markdown", "text": shown}}
     assert PROJECT["dynamic"] == ["readme"]
-
-
-def test_the_readme_says_how_its_commands_are_found():
-    readme = (ROOT / "README.md").read_text("utf-8")
-    assert "source .venv/bin/activate" in readme.partition("$ rocking")[0]
-
-
-def test_the_page_and_the_help_say_how_far_an_ida_goes(capsys):
-    page = " ".join((ROOT / "docs" / "howto" / "fragility.md").read_text("utf-8").split())
-    assert "until all have overturned the block and on to three times that level" in page
-    main(["ida", "--help"])
-    assert "three times that by which every motion has overturned" in " ".join(capsys.readouterr().out.split())
-    block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
-    motions = [rocking.pulses.one_sine(1.0, frequency) for frequency in (0.5, 1.5)]
-    found = rocking.incremental_dynamic_analysis(block, motions, tolerance=1e-2)
-    by_which = float(found.overturning_level.max())
-    assert 3.0 / 1.05 <= float(found.level[-1]) / by_which <= 3.0 * 1.05**2
-
-
-def test_the_readme_tells_what_the_last_run_has_judged():
-    rows = [
-        [cell.strip() for cell in line.strip("|").split("|")]
-        for line in (ROOT / "docs" / "_tables" / "reliability-all.txt").read_text("utf-8").splitlines()[2:]
-    ]
-    judged = {row[0]: int(row[3]) for row in rows}
-    readme = (ROOT / "README.md").read_text("utf-8")
-    told = [
-        name
-        for name in (
-            "rotation, times and peak within the stated error",
-            "no event missed, none made up",
-            "rest inside its bracket, at a bounded cost",
-        )
-        if f"{judged[name]:,}" in readme
-    ]
-    assert len(told) == 3
-    events = (ROOT / "docs" / "_tables" / "reliability-events.txt").read_text("utf-8").splitlines()[2:]
-    undecided, silent = (sum(int(row.strip("|").split("|")[k]) for row in events) for k in (2, 3))
-    assert f"Another {undecided:,} cases cannot be decided" in readme
-    assert f"{silent:,} of these responses are wrong and not flagged" in readme
-    page = " ".join((ROOT / "docs" / "reliability.md").read_text("utf-8").split())
-    assert f"These are {silent:,} of the {undecided:,} undecided cases." in page
-    for name, specimens in (("shake-table", "160 left-out tests"), ("small-table", "83 and 135 tests")):
-        rows = (ROOT / "docs" / "_tables" / f"validation-{name}.txt").read_text("utf-8").splitlines()
-        first, second = (row.split("|")[-4].strip() for row in rows if "| rocking blocks |" in row)
-        assert f"{first} and {second} of {specimens}" in readme
 
 
 def test_the_outcome_of_the_museum_piece_depends_on_digits_as_the_pages_state():

@@ -1,39 +1,19 @@
 """The promises of docs/reliability.md at a small size, and the program that runs them."""
 
-import datetime
 import itertools
-import platform
-import re
-import shutil
-import subprocess
 import sys
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
-import verify
 from oracles import leapfrog, multiprecision
 from oracles.problem import Problem, linear_record
-from oracles.rounding import FUSED, PRODUCTS, of_library
-from promises import ALL, chattering, compile_cache, containment, cross_code, events, exact, interrupts, one_answer
-from promises.promise import Found, Promise
+from promises import chattering, compile_cache, containment, cross_code, events, exact, interrupts, one_answer
+from promises.promise import Found
 
-import rocking
 from rocking.kernels import compiled
 
 ROOT = Path(__file__).parents[1]
-
-
-def judge(part: int) -> Found:
-    """Judge a case that fails in part 2."""
-    found = Found(parts=1, cases=1, judged=1, worst=float(part))
-    if part == 2:
-        found.fail("two")
-    return found
-
-
-MADE_UP = Promise("made-up", "a promise made up", 4, 1, judge)
 
 
 @pytest.mark.thorough
@@ -56,18 +36,6 @@ def test_no_event_is_missed_and_none_is_made_up(monkeypatch, cases):
     assert found.worst <= 1.0
 
 
-def test_a_wrong_event_would_be_found(monkeypatch):
-    """What does not see the event at all, sees another or sees it late is told apart."""
-    asked = events.weight(np.random.default_rng(1))
-    (true,), (seen,) = asked.true, events.package(asked)[0]
-    assert [events._wrong(asked, times, limit=1.0) for times in ([], [seen], [seen, seen], [float(true) * 1.001])] == [
-        "missed",
-        "",
-        "spurious",
-        "off",
-    ]
-
-
 @pytest.mark.parametrize("cases", [3, pytest.param(15, marks=pytest.mark.thorough)])
 def test_every_rest_is_in_its_bracket_at_a_bounded_cost(monkeypatch, cases):
     monkeypatch.setattr(chattering, "CASES", cases)
@@ -88,22 +56,6 @@ def test_another_code_agrees_on_whole_analyses(monkeypatch):
     assert found.judged >= 55
     assert sum(found.notes[f"{row}: impacts"] for row in ("record, nonlinear", "noise, linear")) >= 1000
     assert found.worst <= 1.0
-
-
-@pytest.mark.parametrize(("change", "says"), [("peak", "peak"), ("overturned", "overturned")])
-def test_another_answer_of_another_code_would_be_found(monkeypatch, change, says):
-    """Whatever the other code says of blocks that stay, another peak, or another verdict, is told."""
-    monkeypatch.setattr(cross_code, "BLOCKS", 2)
-    blocks, shaking, model = cross_code.drawn(2)
-    still = cross_code.Shaking("noise", shaking.step, 1e-3 * shaking.across, shaking.up)
-    monkeypatch.setattr(cross_code, "drawn", lambda part: (blocks, still, model))
-    answer = {"overturned": False, "peak": 0.0, "impacts": 0, "rests": 0}
-    monkeypatch.setattr(leapfrog, "follow", lambda *given, **more: leapfrog.Outcome(**answer))
-    assert not cross_code.judge(2).told
-    answer[change] = {"peak": 1e-6, "overturned": True}[change]
-    found = cross_code.judge(2)
-    assert found.failures == 4  # two blocks, alone and in an ensemble
-    assert all(says in told for told in found.told)
 
 
 @pytest.mark.slow
@@ -144,85 +96,6 @@ def test_the_closed_form_of_a_rest_is_the_sum_of_its_impacts():
     assert abs(exact.rest(sides, 0.3, float(speed), 0) + time - exact.rest(sides, 0.3, 0.2, 1)) < 1e-30
 
 
-def test_parts_add_up_and_a_failure_is_told():
-    total = Found()
-    for part in range(4):
-        total.add(judge(part))
-    assert (total.parts, total.cases, total.failures, total.worst) == (4, 4, 1, 3.0)
-    assert MADE_UP.faults(total) == ["made-up: two"]
-
-
-def test_a_part_that_cannot_be_judged_does_not_stop_the_others(monkeypatch, tmp_path, capsys):
-    """With threads in the place of processes, which would not know what is made up here."""
-
-    def fails(part):
-        if part == 1:
-            raise TimeoutError("too late")
-        return judge(0)
-
-    monkeypatch.setattr(verify, "ALL", {"made-up": Promise("made-up", "a promise made up", 4, 1, fails)})
-    monkeypatch.setattr(verify, "ProcessPoolExecutor", lambda jobs, **given: ThreadPoolExecutor(jobs))
-    assert verify._judged({"made-up": [0, 1, 2]}, {"made-up": tmp_path}, 1) == 1
-    assert "made-up 1: not judged: TimeoutError: too late" in capsys.readouterr().out
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["0.json", "2.json"]
-    assert verify._parts(MADE_UP, "kept", tmp_path) == [0, 2]
-    assert verify._parts(MADE_UP, "full", tmp_path) == [0, 1, 2, 3]
-
-
-def test_a_run_of_some_promises_leaves_the_rows_of_the_others(tmp_path):
-    verify.write(
-        tmp_path, [ALL["soak"], ALL["reading"]], {"soak": Found(6, 12, 12, 0, 0.03, 297.0), "reading": Found()}
-    )
-    verify.write(tmp_path, [ALL["rounding"]], {"rounding": Found(1, 60, 60, 1, 0.5, 9.0)})
-    lines = (tmp_path / "reliability-all.txt").read_text("utf-8").splitlines()
-    today = datetime.date.today().isoformat()
-    assert len(lines) == 2 + len(ALL)
-    assert f"| {ALL['soak'].says} | 6 of 6 | 12 | 12 | 0 | 0.03 | 297 | {today} |" in lines
-    assert f"| {ALL['rounding'].says} | 1 of 2 | 60 | 60 | 1 | 0.5 | 9 | {today} |" in lines
-    assert sum("not judged yet" in line for line in lines) == len(ALL) - 2
-    assert not (tmp_path / "reliability-reading.txt").exists()
-    verify.write(tmp_path, [ALL["soak"]], {"soak": Found(6, 13, 13, 0, 0.03, 297.0)})
-    assert f"| {ALL['soak'].says} | 6 of 6 | 13 |" in (tmp_path / "reliability-all.txt").read_text("utf-8")
-
-
-def test_too_few_decided_cases_are_a_fault():
-    assert MADE_UP.faults(Found(cases=3, judged=2)) == ["made-up: only 2 of 3 cases were decided"]
-
-
-def test_the_page_tells_of_every_promise_and_shows_its_table():
-    page = (ROOT / "docs" / "reliability.md").read_text("utf-8")
-    tables = {f"reliability-{name}.txt" for name in ("all", "made", *(n for n, each in ALL.items() if each.table))}
-    assert set(re.findall(r"_tables/(reliability-\S+)", page)) == tables
-    for name in ALL:
-        assert f"`python stress/verify.py {name}`" in page
-    whole = (ROOT / "docs" / "_tables" / "reliability-all.txt").read_text("utf-8")
-    for promise in ALL.values():
-        assert f"| {promise.says} | " in whole
-
-
-def test_what_is_kept_is_known_by_its_sources(monkeypatch, tmp_path):
-    promise = ALL["containment"]
-    before = verify.key(promise)
-    assert before == verify.key(promise)
-    changed = tmp_path / "containment.py"
-    changed.write_text(Path(containment.__file__).read_text("utf-8") + "\n", "utf-8")
-    monkeypatch.setattr(containment, "__file__", str(changed))
-    assert verify.key(promise) != before
-
-
-def test_modules_beside_a_promise_count_and_layers_above_do_not(monkeypatch, tmp_path):
-    files = [file.name for file in verify._modules(ALL["chattering"].judge.__module__)]
-    assert files[0] == "chattering.py"
-    assert {"exact.py", "promise.py"} <= {*files}
-    package = Path(rocking.__file__).parent
-    page, kernel = package / "explorer" / "server.py", package / "kernels" / "march.py"
-    assert page.exists() and kernel.exists()
-    assert verify._counts(kernel, package, ALL["containment"])
-    assert not verify._counts(page, package, ALL["containment"])
-    assert verify._counts(page, package, ALL["serving"])
-    assert not verify._counts(package / "kernels" / "__pycache__" / "march.pyc", package, ALL["serving"])
-
-
 @pytest.mark.skipif(sys.platform != "linux", reason="memory and rights of processes are as on Linux")
 @pytest.mark.skipif(compiled.UNCOMPILED, reason="nothing is compiled")
 @pytest.mark.slow
@@ -235,20 +108,6 @@ def test_processes_that_compile_at_once_or_are_killed_leave_right_code(monkeypat
     assert found.notes["updates"] == 1
     assert found.notes["damaged files"] >= 3
     assert found.judged >= 2 * 6 + len(compile_cache.FOLDERS)
-
-
-@pytest.mark.skipif(platform.machine() != "x86_64" or sys.platform != "linux", reason="for processors of Intel's kind")
-def test_a_fused_operation_in_a_library_would_be_seen(tmp_path):
-    if not (shutil.which("cc") and shutil.which("objdump")):
-        pytest.skip("no C compiler or no objdump")
-    source, library = tmp_path / "a.c", tmp_path / "a.so"
-    source.write_text("double f(double a, double b, double c) { return a * b + c; }\n")
-    for contract, fused in (("fast", 1), ("off", 0)):
-        options = ["-O2", "-mfma", f"-ffp-contract={contract}", "-shared", "-fPIC", "-nostdlib"]
-        subprocess.run(["cc", *options, "-o", str(library), str(source)], check=True)
-        assembly = of_library(library)
-        assert len(FUSED.findall(assembly)) == fused
-        assert len(PRODUCTS.findall(assembly)) == 1 - fused
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="processor time of another process is read as on Linux")

@@ -1,22 +1,18 @@
 """Promises on files, the page's server, interrupts and full disks at a small size; and what they once found."""
 
 import io
-import itertools
-import random
 import sys
 
-import numpy as np
 import pytest
-from oracles import damaged_files, record_files, stated_records
-from promises import commands, full_disk, interrupts, reading, serving, soak
+from oracles import record_files
+from promises import commands, full_disk, interrupts, reading, serving
 from promises.promise import Found
 
 import rocking
 from rocking.analysis.input_tables import read_tests
-from rocking.errors import InvalidOption, OutputError, RockingError, UnreadableRecord
+from rocking.errors import InvalidOption, RockingError, UnreadableRecord
 from rocking.quantities import values
 from rocking.studies import read_study
-from rocking.tables import write_text
 
 
 @pytest.mark.parametrize("cases", [60, pytest.param(600, marks=pytest.mark.thorough)])
@@ -29,30 +25,6 @@ def test_a_damaged_file_is_refused_or_read_as_it_states(monkeypatch, cases):
     assert found.cases >= 100 + cases
     assert found.notes["compared"] >= cases // 20
     assert found.notes["refused"] >= cases // 2
-
-
-def test_what_a_sound_file_states_is_what_is_read():
-    judged = 0
-    for name in stated_records.READINGS:
-        given = {"dt": 0.01} if name == "column.txt" else {}
-        said = stated_records.stated(name, reading.records()[name])
-        if name.startswith("velocity") or name in ("nga.vt2", "nga.dt2"):
-            continue
-        assert said
-        for one, channel in zip(said, reading.read_record(name, reading.records()[name], given), strict=True):
-            assert not stated_records.contradiction(one, channel.acceleration, channel.dt, channel.times)
-            changed = np.array(channel.acceleration)
-            changed[3] *= 1.001
-            assert stated_records.contradiction(one, changed, channel.dt, channel.times)
-            assert stated_records.contradiction(one, changed[1:], channel.dt, channel.times)
-            judged += 1
-    assert judged >= 15
-
-
-def test_every_mishap_changes_files():
-    rng, files = random.Random(1), [*reading.records().values()]
-    for operation in damaged_files.OPERATIONS:
-        assert sum(operation(file, rng) != file for file in files) >= 3, operation.__doc__
 
 
 def lost(text, start, end):
@@ -121,34 +93,6 @@ def test_the_server_answers_as_its_table_says(monkeypatch):
     assert found.judged >= 60 + 8 * 3
 
 
-def test_the_table_of_the_server_names_every_kind_of_answer():
-    drawn = itertools.product(["GET", "POST"], serving.ROUTES, serving._HOSTS, serving._ORIGINS, serving._CARRIED)
-    answers = {serving.specified(*each) for each in drawn}
-    assert answers == {200, 403, 404, 405, 421, 422}
-    assert serving.specified("GET", "/", "evil.example:{}", None, None) == 421
-    assert serving.specified("GET", "/api/start", "localhost:{}", None, None) == 403
-    assert serving.specified("POST", "/api/start", "localhost:{}", "own", "Bearer {secret}") == 405
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="memory is looked at as Linux shows it")
-def test_memory_and_descriptors_that_grow_are_told(tmp_path):
-    kept, opened = [], []
-
-    def grows(_):
-        kept.append(np.ones(2**21))
-        opened.append((tmp_path / "file").open("w"))
-        return 1
-
-    found = Found()
-    soak._judge_rounds(found, "work", grows, "self", 8)
-    for file in opened:
-        file.close()
-    assert len(found.told) == 2
-    calm = Found()
-    soak._judge_rounds(calm, "work", lambda _: 1, "self", 8)
-    assert not calm.told and calm.judged == 2 and calm.notes["work"] == 8
-
-
 @pytest.mark.skipif(sys.platform != "linux", reason="processor time of another process is read as on Linux")
 @pytest.mark.slow
 def test_an_interrupt_ends_a_command_with_one_sentence(tmp_path):
@@ -163,37 +107,6 @@ def test_an_interrupt_ends_a_command_with_one_sentence(tmp_path):
     interrupts._judge_end(found, "records", one, folders[2] / "out", {})
     assert not found.told
     assert found.notes["interrupted"] == 1
-
-
-def test_an_end_that_is_not_as_promised_is_told(tmp_path):
-    (tmp_path / "result.json").write_text('{"half"')
-    (tmp_path / ".response.part.csv").write_text("")
-    found = Found()
-    one = interrupts.Ended(1, b"", b"Traceback\nKeyboardInterrupt\n", 9.0, 8.0)
-    interrupts._judge_end(found, "simulate", one, tmp_path, {"result.json": b"{}"})
-    assert found.failures == 4  # too late, a file left, one that does not open, and no sentence
-
-
-def test_whole_files_are_told_from_damaged_ones(tmp_path):
-    whole = {"a.json": b"{}", "a.csv": b"x,y\n1,2\n", "a.png": b"IEND\xaeB\x60\x82", "a.pdf": b"%%EOF\n"}
-    for name, content in whole.items():
-        (tmp_path / name).write_bytes(content)
-    assert commands.faults(tmp_path, whole) == []
-    for name, content in whole.items():
-        (tmp_path / name).write_bytes(content[: len(content) // 2])
-    assert len(commands.faults(tmp_path, whole)) == len(whole)
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="where a descriptor leads is read as on Linux")
-@pytest.mark.parametrize("kind", full_disk.KINDS)
-def test_a_full_disk_is_met_at_the_call_that_was_chosen(tmp_path, kind):
-    disk = full_disk.FullDisk(tmp_path, kind, 3 if kind == "open" else 2)  # a file is opened to flush it as well
-    with disk.in_place():
-        write_text(tmp_path / "first.txt", "one")
-        with pytest.raises(OutputError, match="No space left on device"):
-            write_text(tmp_path / "second.txt", "two")
-    assert disk.failed
-    assert [path.name for path in tmp_path.iterdir()] == ["first.txt"]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="where a descriptor leads is read as on Linux")
