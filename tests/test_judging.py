@@ -1,21 +1,15 @@
 """Predictions judged against tests: scores by closed forms and quadrature, chances that are even, tables."""
 
-import itertools
 import json
 import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy import stats
-from scipy.integrate import quad
 
 import rocking
 from rocking import Block, Blocks, InvalidMotion, InvalidOption, ShakeTest, UnreadableRecord, engine
 from rocking.analysis import Validation
-from rocking.analysis.validation import scores
-from rocking.analysis.validation.predicted import Predicted
 
 STRONG, WEAK = rocking.pulses.one_sine(6.0, 1.0), rocking.pulses.one_sine(1.0, 1.0)
 BLOCK = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
@@ -26,10 +20,10 @@ def left_out(probabilities):
     return Validation(np.atleast_2d(np.asarray(probabilities, dtype=float)), ())
 
 
-def of_outcomes(outcomes, **labels):
+def of_outcomes(outcomes):
     """Tests under one motion each, with these outcomes."""
     motions = [rocking.pulses.one_sine(1.0 + k, 1.0) for k in range(len(outcomes))]
-    return [ShakeTest(motion, bool(fell), **labels) for motion, fell in zip(motions, outcomes, strict=True)]
+    return [ShakeTest(motion, bool(fell)) for motion, fell in zip(motions, outcomes, strict=True)]
 
 
 # Scores
@@ -40,7 +34,7 @@ def test_perfect_predictions_score_zero_and_have_skill_one():
     found = rocking.validate(of_outcomes(outcomes), left_out(outcomes))
     for score in (found.brier, found.log_loss):
         assert (score.value, score.error, score.skill, score.skill_error) == (0.0, 0.0, 1.0, 0.0)
-    assert found.reliability_chance == 1.0 and found.crps is None
+    assert found.reliability_chance == 1.0
 
 
 def test_what_was_thought_nearly_impossible_has_the_least_chance():
@@ -78,44 +72,6 @@ def test_standard_errors_allow_for_tests_that_belong_together():
     assert (together.brier.tests, together.brier.clusters) == (8, 4)
 
 
-@given(st.lists(st.tuples(st.floats(0.0, 2.0), st.floats(0.05, 1.0)), min_size=1, max_size=6), st.floats(0.0, 2.0))
-def test_the_ranked_probability_score_is_its_integral(points, observed):
-    values, weights = np.array(sorted(points)).T
-    weights = weights / weights.sum()
-
-    def integrand(x):
-        return (float(weights[values <= x].sum()) - (x >= observed)) ** 2
-
-    ends = sorted({0.0, 2.0, observed, *values.tolist()})
-    integral = sum(quad(integrand, low, high)[0] for low, high in itertools.pairwise(ends))
-    assert scores.crps(values, weights, observed) == pytest.approx(integral, abs=1e-8)
-
-
-def test_the_score_of_a_known_block_with_a_measuring_error_is_that_of_a_normal_distribution():
-    one = Predicted(np.zeros(1), np.zeros(1, int), np.ones(1), np.full((1, 1), 0.1), 0.004)
-    points, within = one.standing(0)
-    for observed in (0.09, 0.1, 0.103):
-        z = (observed - 0.1) / 0.004
-        normal = 0.004 * (z * (2 * stats.norm.cdf(z) - 1) + 2 * stats.norm.pdf(z) - 1 / math.sqrt(math.pi))
-        assert scores.crps(points, within, observed) == pytest.approx(normal, rel=2e-3)
-
-
-def test_a_peak_is_judged_among_the_blocks_that_stand_by_their_weights():
-    blocks = Blocks(2.0, [0.2, 0.22, 0.05], 0.9)
-    weights = np.array([3.0, 1.0, 4.0])
-    motion = STRONG.scaled(0.4)
-    simulated = rocking.simulate_many(blocks, motion)
-    assert simulated.overturned.values.ravel().tolist() == [False, False, True]
-    first, second = simulated.peak_rotation.values.ravel()[:2]
-    assert second < first
-    found = rocking.validate([ShakeTest(motion, peak_rotation=first)], blocks, weights=weights)
-    (test,) = found.tests
-    effective = 64.0 / 26.0
-    assert test.probability == pytest.approx((effective * 0.5 + 0.5) / (effective + 1.0))
-    assert test.crps == pytest.approx(0.25 * 0.25 * (first - second))
-    assert (test.lower, test.median, test.upper) == (second, first, first)
-
-
 # Chances and bands
 
 
@@ -123,27 +79,20 @@ MOTIONS = [rocking.pulses.one_sine(1.0 + k, 1.0) for k in range(40)]
 STRENGTH = np.random.default_rng(1).uniform(0.2, 3.0, 40)
 
 
-def peaks_of(own):
-    """Peaks of blocks, shape (..., 40): where little drives them zero, and infinite where they overturn."""
-    drive = STRENGTH * own
-    return np.where(drive > 2.0, math.inf, np.where(drive < 0.4, 0.0, 0.05 * drive))
-
-
 def seen_by(own, rng, monkeypatch, **options):
-    """Validate tests with the peaks of blocks by 400 others of the population; what they do is not simulated here."""
-    observed, peaks = peaks_of(own), peaks_of(rng.lognormal(0.0, 0.4, (400, 1)))
-    tests = [ShakeTest(one, peak_rotation=peak) for one, peak in zip(MOTIONS, observed, strict=True)]
+    """Validate tests with the outcomes of blocks by 400 others of the population; these are not simulated here."""
+    fell = STRENGTH * rng.lognormal(0.0, 0.4, (400, 1)) > 2.0
+    tests = [ShakeTest(one, bool(outcome)) for one, outcome in zip(MOTIONS, STRENGTH * own > 2.0, strict=True)]
 
     def simulated(blocks, given, **_):
         import xarray as xr
 
         assert len(given) == len(MOTIONS)
-        fell = np.isinf(peaks)
-        variables = {"overturned": fell, "unfinished": np.zeros_like(fell), "peak_rotation": np.where(fell, 1.6, peaks)}
+        variables = {"overturned": fell, "unfinished": np.zeros_like(fell)}
         return xr.Dataset({name: (("block", "motion"), values) for name, values in variables.items()})
 
-    monkeypatch.setattr("rocking.analysis.validation.predicted.simulate_many", simulated)
-    blocks = Blocks(np.full(len(peaks), 2.0), 0.2, 0.9)
+    monkeypatch.setattr("rocking.analysis.validation.simulate_many", simulated)
+    blocks = Blocks(np.full(len(fell), 2.0), 0.2, 0.9)
     return rocking.validate(tests, blocks, simulations=200, seed=int(rng.integers(1 << 30)), **options)
 
 
@@ -163,13 +112,12 @@ def test_of_right_predictions_chances_are_even_and_bands_hold(monkeypatch, sets)
     ]
     assert len(inside) >= 8 * sets
     assert np.mean(inside) > 0.85
-    for name in ("brier", "log_loss", "crps") if sets >= 200 else ():
+    for name in ("brier", "log_loss") if sets >= 200 else ():
         each = [getattr(one, name) for one in found]
         for value, error in (("value", "error"), ("skill", "skill_error")):
             spread = np.std([getattr(score, value) for score in each])
-            # A jackknife errs to the safe side; most so for a quotient of means over some thirty peaks.
-            ratio = np.mean([getattr(score, error) for score in each]) / spread
-            assert 0.85 < ratio < (1.5 if (name, value) == ("crps", "skill") else 1.2), (name, value)
+            # A jackknife errs to the safe side.
+            assert 0.85 < np.mean([getattr(score, error) for score in each]) / spread < 1.2, (name, value)
 
 
 @pytest.mark.parametrize("wrong", [0.5, 2.0])
@@ -177,14 +125,6 @@ def test_predictions_that_are_wrong_are_found_out(monkeypatch, wrong):
     rng = np.random.default_rng(4)
     found = seen_by(wrong * rng.lognormal(0.0, 0.4, 40), rng, monkeypatch)
     assert found.reliability_chance < 0.05 and "not as if the predictions were right" in found.summary()
-
-
-def test_two_specimens_on_one_table_belong_together():
-    tests = [ShakeTest(motion, k == 0, specimen=name) for k, motion in enumerate((STRONG, WEAK)) for name in "ab"]
-    found = rocking.validate(tests, {"a": BLOCK, "b": Blocks(2.0, [0.2, 0.1], 0.9)})
-    assert found.brier.clusters == 2
-    assert [test.specimen for test in found.tests] == ["a", "b", "a", "b"]
-    assert "a: block from its parameters" in found.description
 
 
 # What predicts
@@ -208,17 +148,6 @@ def test_a_calibration_says_of_tests_what_it_predicts(coarse):
         rocking.validate(tests, calibration, weights=[1.0])
     with pytest.raises(InvalidOption, match="of 4 tests, and 3 tests are given"):
         rocking.validate(tests[:3], validation)
-
-
-def test_peaks_that_no_block_explains_are_those_of_the_specimens_that_have_blocks():
-    left = [ShakeTest(WEAK, False, specimen="a"), ShakeTest(WEAK, peak_rotation=0.05, specimen="a")]
-    # The block overturns in the strong motion, in which a peak was measured.
-    right = [ShakeTest(STRONG, peak_rotation=0.05, specimen="b"), ShakeTest(WEAK, peak_rotation=0.0, specimen="b")]
-    alone = rocking.validate(right, BLOCK)
-    both = rocking.validate(left + right, {"a": left_out([0.2, 0.3]), "b": BLOCK})
-    assert rocking.validate(left, left_out([0.2, 0.3])).unexplained == 0
-    assert both.unexplained == alone.unexplained == 1
-    assert [note for note in both.notes if "scored" in note] == [note for note in alone.notes if "scored" in note] != []
 
 
 def test_a_known_block_is_certain_and_a_lapse_is_not():
@@ -257,17 +186,12 @@ def test_a_simulation_that_was_given_up_counts_as_half_overturned(monkeypatch):
 @pytest.mark.parametrize(
     ("given", "sentence"),
     [
-        ({}, "a test needs what was observed: overturned, peak_rotation, or both"),
-        ({"peak_rotation": math.nan}, "a test needs what was observed"),
-        ({"overturned": True, "peak_rotation": 0.1}, "it overturned, and has a largest rotation of 0.1 rad"),
-        ({"overturned": False, "peak_rotation": math.inf}, "it did not overturn: a specimen that overturns"),
-        ({"peak_rotation": -0.1}, "from 0 to pi/2 rad, a size without a sign"),
-        ({"peak_rotation": 5.0}, r"give math.radians\(5\)"),
         ({"overturned": "yes"}, "overturned must be True or False, not 'yes'"),
+        ({"overturned": None}, "overturned must be True or False, not None"),
         ({"overturned": True, "group": 3}, "group must be text, not 3"),
     ],
 )
-def test_what_contradicts_itself_is_no_test(given, sentence):
+def test_what_is_no_outcome_is_no_test(given, sentence):
     with pytest.raises(InvalidOption, match=sentence):
         ShakeTest(STRONG, **given)
 
@@ -283,12 +207,8 @@ def test_a_test_needs_a_motion():
     [
         ({"tests": []}, "tests must hold at least one test"),
         ({"tests": [STRONG]}, "tests must hold tests"),
-        ({"blocks": {"other": BLOCK}}, "nothing for the specimen '' of the tests; they have 'other'"),
-        ({"blocks": {"": BLOCK}, "weights": [1.0]}, "must be a mapping like blocks"),
-        ({"weights": {"": [1.0]}}, "make both mappings by specimen"),
         ({"weights": [1.0, 2.0]}, "weights must hold one number for each of 1 block"),
         ({"lapse": 0.7}, "lapse must be a number from 0 to 0.5"),
-        ({"peak_error": math.nan}, "peak_error must be a number from 0 to 1"),
         ({"bins": 0}, "bins must be a whole number from 1"),
         ({"simulations": 3}, "simulations must be a whole number of at least 100"),
         ({"model": "rigid"}, "model must be one of nonlinear, linear"),
@@ -314,36 +234,34 @@ def test_a_table_of_tests_is_read_with_its_units_and_labels(tmp_path):
     samples = np.sin(2.0 * np.pi * times)
     (tmp_path / "one.txt").write_text("\n".join(f"{value:.6f}" for value in samples), "utf-8")
     rows = [
-        "motion,scale,dt_s,units,vertical,name,specimen,nominal,group,overturned,peak_rotation_deg,remark",
-        "one.txt,2,0.01,g,,first,a,N1,G1,no,3,",
-        "one.txt,-1,0.02,m/s2,,,b,,,1,,fell late",
-        "el-centro-meloland-270,0.5,,,el-centro-meloland-up,,,,,,2.5,",
-        '"one-sine:amplitude=0.2g,frequency=2Hz",,,,,,,,,,inf,',
+        "motion,scale,dt_s,units,vertical,name,group,overturned,remark",
+        "one.txt,2,0.01,g,,first,G1,no,",
+        "one.txt,-1,0.02,m/s2,,,,1,fell late",
+        "el-centro-meloland-270,0.5,,,el-centro-meloland-up,,,false,",
+        '"one-sine:amplitude=0.2g,frequency=2Hz",,,,,,,yes,',
     ]
-    first, second, third, fourth = rocking.read_tests(written(tmp_path / "tests.csv", "\n".join(rows)))
-    assert (first.name, first.specimen, first.nominal, first.group) == ("first", "a", "N1", "G1")
-    assert first.peak_rotation == pytest.approx(math.radians(3.0)) and first.overturned is False
+    tests = rocking.read_tests(written(tmp_path / "tests.csv", "\n".join(rows)))
+    first, second, third, fourth = tests
+    assert (first.name, first.group) == ("first", "G1")
+    assert [test.overturned for test in tests] == [False, True, False, True]
     peak = float(f"{samples.max():.6f}")
     assert first.motion.pga == pytest.approx(2.0 * 9.80665 * peak) and first.motion.step == pytest.approx(0.01)
     assert second.motion.pga == pytest.approx(peak) and second.motion.step == pytest.approx(0.02)
-    assert second.overturned is True and second.peak_rotation is None
     up = rocking.records.load("el-centro-meloland-up")
-    assert third.motion.vertical.pga == pytest.approx(0.5 * up.pga) and third.overturned is False
-    assert fourth.overturned is True and fourth.motion.pga == pytest.approx(0.2 * 9.80665)
+    assert third.motion.vertical.pga == pytest.approx(0.5 * up.pga)
+    assert fourth.motion.pga == pytest.approx(0.2 * 9.80665)
 
 
 @pytest.mark.parametrize(
     ("text", "line", "sentence"),
     [
         ("motion,fell\nx,1", 1, "the columns must be motion and overturned"),
-        ("motion,peak_rotation_deg,peak_rotation_rad\nx,1,1", 1, "the columns must be"),
+        ("motion,overturned,specimen\nridgecrest-clc-090,1,a\nridgecrest-clc-090,1,b", 1, "of 2 specimens: give each"),
         ("motion,overturned,overturned\nx,1,1", 1, "each once"),
         ("motion,overturned\nno-such-file.txt,1", 2, "no-such-file.txt"),
         ("motion,overturned\n,1", 2, "this is a folder; name one record file"),
-        ("motion,overturned\nridgecrest-clc-090,perhaps", 2, "'perhaps' is not 0 or 1, .*column overturned"),
-        ("motion,overturned\nridgecrest-clc-090,1\nridgecrest-clc-090,", 3, "a test needs what was observed"),
-        ("motion,peak_rotation_deg\nridgecrest-clc-090,1 deg", 2, "'1 deg' is not a number in the column peak_rot"),
-        ("motion,peak_rotation_rad\nridgecrest-clc-090,12", 2, "if it is in degrees"),
+        ("motion,overturned\nridgecrest-clc-090,perhaps", 2, "'perhaps' is not 0 or 1"),
+        ("motion,overturned\nridgecrest-clc-090,1\nridgecrest-clc-090,", 3, "'' is not 0 or 1"),
         ("motion,overturned,scale\nridgecrest-clc-090,1,inf", 2, "'inf' is not a number"),
         ("motion,overturned,dt_s\nridgecrest-clc-090,1,x", 2, "'x' is not a number"),
         ("motion,overturned,vertical\nridgecrest-clc-090,1,nothing", 2, "nothing"),
@@ -361,55 +279,25 @@ def test_a_table_that_is_not_there_is_said_to_be_missing(tmp_path):
         rocking.read_tests(tmp_path / "none.csv")
 
 
-TABLE = """motion,scale,specimen,overturned,peak_rotation_deg
-ridgecrest-clc-090,0.5,a,0,0.1
-ridgecrest-clc-090,0.5,a,0,0.2
-ridgecrest-clc-090,2,b,1,
-"""
-
-
 def test_the_command_writes_figure_tables_and_numbers(run, tmp_path, monkeypatch):
     # The figure is made, and not drawn: `test_figures.py` draws.
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda *given, **options: None)
-    table = written(tmp_path / "tests.csv", TABLE)
-    how = ("--width", "0.24", "--height", "1.1", "--peak-error", "0.1deg", "--lapse", "0.01")
-    code, out, err = run("validate", table, *how, "--out", tmp_path / "out")
-    assert (code, err) == (0, "") and "3 tests, 1 overturned, 2 measured peaks" in out
+    rows = "motion,scale,overturned", "ridgecrest-clc-090,0.5,0", "ridgecrest-clc-090,0.6,0", "ridgecrest-clc-090,2,1"
+    table, sizes = written(tmp_path / "tests.csv", "\n".join(rows)), ("--width", "0.24", "--height", "1.1")
+    code, out, err = run("validate", table, *sizes, "--lapse", "0.01", "--out", tmp_path / "out")
+    assert (code, err) == (0, "") and "3 tests, 1 overturned" in out
     files = {"result.json", "tests.csv", "validation.png", "validation.pdf"}
     assert {path.name for path in (tmp_path / "out").iterdir()} == files
     result = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
-    direct = rocking.validate(
-        rocking.read_tests(table), Block(width=0.24, height=1.1), peak_error=math.radians(0.1), lapse=0.01
-    )
+    direct = rocking.validate(rocking.read_tests(table), Block(width=0.24, height=1.1), lapse=0.01)
     assert result["brier"]["value"] == pytest.approx(direct.brier.value)
-    assert result["crps_rad"]["value"] == pytest.approx(direct.crps.value)
-    rows = (tmp_path / "out" / "tests.csv").read_text("utf-8").splitlines()
-    assert rows[0].startswith("name,specimen,motion,overturned,probability,peak_rotation_rad,lower_rad")
-    assert len(rows) == 4
-
-
-def test_the_command_takes_the_ensemble_of_each_specimen(run, tmp_path):
-    table = written(tmp_path / "tests.csv", TABLE)
-    header = (
-        "p_plus_rad_s,p_minus_rad_s,alpha_plus_rad,alpha_minus_rad,restitution_plus,restitution_minus,weight,model\n"
-    )
-    for name, alpha in (("a", 0.3), ("b", 0.1)):
-        (tmp_path / "fits" / name).mkdir(parents=True)
-        rows = "".join(f"2,2,{alpha + d},{alpha + d},0.9,0.9,{w},linear\n" for d, w in ((0.0, 0.25), (0.02, 0.75)))
-        written(tmp_path / "fits" / name / "ensemble.csv", header + rows)
-    code, out, err = run("validate", table, "--ensemble", tmp_path / "fits", "--json")
-    assert (code, err) == (0, "")
-    found = json.loads(out)
-    assert found["model"] == "linear" and "a: 2 blocks, weighted; b: 2 blocks, weighted" in found["description"]
-    code, _, err = run("validate", table, "--ensemble", tmp_path / "fits", "--width", "1")
-    assert code == 2 and "leave --width out" in err
-    code, _, err = run("validate", tmp_path / "tests.csv")
+    lines = (tmp_path / "out" / "tests.csv").read_text("utf-8").splitlines()
+    assert lines[0] == "name,motion,overturned,probability" and len(lines) == 4
+    code, _, err = run("validate", table)
     assert code == 2 and "a block is needed" in err
 
 
-def test_left_out_tests_and_weights_of_unknown_specimens_are_refused():
-    tests = of_outcomes([0, 1])
-    with pytest.raises(InvalidOption, match="have their own lapse"):
-        rocking.validate(tests, left_out([0.2, 0.3]), lapse=0.3)
-    with pytest.raises(InvalidOption, match="weights have 'A', for which blocks have nothing"):
-        rocking.validate(tests, {"": BLOCK}, weights={"A": np.ones(1)})
+def test_predictions_of_tests_that_were_left_out_take_no_lapse_and_no_weights():
+    for name, given in (("lapse", 0.3), ("weights", [1.0, 1.0])):
+        with pytest.raises(InvalidOption, match=f"take no {name}"):
+            rocking.validate(of_outcomes([0, 1]), left_out([0.2, 0.3]), **{name: given})

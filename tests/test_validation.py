@@ -5,11 +5,9 @@ import math
 import re
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import rocking
-from rocking.analysis.validation.scores import crps_of_all_alike, score_of
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -78,12 +76,3 @@ def test_every_table_of_the_page_exists():
     assert len(names) >= 7
     for name in names:
         assert (ROOT / "docs" / name).is_file()
-
-
-@pytest.mark.parametrize("count", range(2, 12))
-def test_peaks_that_are_all_alike_have_no_skill(count):
-    base = crps_of_all_alike(np.full(count, 0.05))
-    assert base(np.arange(count)) == 0.0
-    found = score_of(np.full(count, 0.01), base, np.arange(count))
-    assert math.isnan(found.skill)
-    assert math.isnan(found.skill_error)

@@ -14,9 +14,7 @@ from .analysis.input_tables import read_tests
 from .analysis.overturning import overturning_map
 from .analysis.spectrum import rocking_spectrum
 from .analysis.survey import survey
-from .analysis.validation.judging import validate
-from .analysis.validation.result import ModelValidation
-from .analysis.validation.tested import ShakeTest
+from .analysis.validation import ModelValidation, ShakeTest, validate
 from .block import (
     Block,
     Blocks,

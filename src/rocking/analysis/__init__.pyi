@@ -12,8 +12,7 @@ from .risk import Rate, Risk
 from .spectrum import RockingSpectrum
 from .survey import Survey
 from .survival import Survival
-from .validation.result import JudgedTest, ShareInBin
-from .validation.scores import Score
+from .validation import JudgedTest, Score, ShareInBin
 
 __all__ = [
     "Band",

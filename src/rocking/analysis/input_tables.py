@@ -14,7 +14,7 @@ import numpy as np
 from rocking import checks
 from rocking.analysis.hazard import HEADINGS, heading_of
 from rocking.analysis.levels import families_of
-from rocking.analysis.validation.tested import ShakeTest
+from rocking.analysis.validation import ShakeTest
 from rocking.arrays import Floats
 from rocking.block import Blocks
 from rocking.constants import Model
@@ -235,15 +235,10 @@ def _finite(text: str) -> float:
     return value
 
 
-#: Columns of what `read_tests` reads; others are left aside.
-_LABELS: Final = ("name", "specimen", "nominal", "group")
-_PEAKS: Final[Mapping[str, float]] = {"peak_rotation_rad": 1.0, "peak_rotation_deg": np.pi / 180.0}
-
-
 def read_tests(
     path: str | Path, *, channel: str | None = None, dt: float | None = None, units: str | None = None
 ) -> list[ShakeTest]:
-    r"""Read tests of specimens from a CSV table, one in each row.
+    r"""Read tests of a specimen from a CSV table, one in each row.
 
     Parameters
     ----------
@@ -251,9 +246,8 @@ def read_tests(
         Table with a header. Its column motion names a record file (relative to the table) or a shipped record, or is a
         pulse, as "one-sine:amplitude=0.2g,frequency=2Hz"; scale multiplies it; vertical names its vertical component, a
         file or a channel; channel, dt_s (step, s) and units are for files that do not say them. What was observed is in
-        overturned (1 or 0, yes or no, true or false) and in peak_rotation_rad or peak_rotation_deg (a size; inf where
-        it overturned, empty where it was not measured), one of them or both. The columns name, specimen, nominal and
-        group are those of `ShakeTest`. Columns of other names are left aside.
+        overturned (1 or 0, yes or no, true or false). The columns name and group are those of `ShakeTest`. Columns of
+        other names are left aside, but a column specimen must name one specimen throughout.
     channel : str, optional
         As for `rocking.read`, of rows that name none themselves.
     dt : float, optional
@@ -274,37 +268,25 @@ def read_tests(
     Examples
     --------
     >>> import pathlib, tempfile
-    >>> rows = "motion,scale,overturned,peak_rotation_deg", "ridgecrest-clc-090,0.5,0,1.5", "ridgecrest-clc-090,3,1,"
+    >>> rows = "motion,scale,overturned", "ridgecrest-clc-090,0.5,0", "ridgecrest-clc-090,3,1"
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     table = pathlib.Path(folder, "tests.csv")
     ...     _ = table.write_text("\n".join(rows))
     ...     read_tests(table)
-    [<ShakeTest: ridgecrest-clc-090, stood, peak 0.0261799 rad>, <ShakeTest: ridgecrest-clc-090, overturned>]
+    [<ShakeTest: ridgecrest-clc-090, stood>, <ShakeTest: ridgecrest-clc-090, overturned>]
     """
     table = read_table(checks.path(path, "path of a table", UnreadableRecord))
-    doubled = table.doubled(table.columns)
-    peaks = [name for name in _PEAKS if name in table.columns]
-    if "motion" not in table.columns or not ({"overturned", *peaks} & {*table.columns}) or len(peaks) > 1 or doubled:
-        raise table.error(
-            "the columns must be motion and overturned, peak_rotation_rad or peak_rotation_deg, or the first with one "
-            f"of these two, each once, not {','.join(table.columns)}"
-        )
+    if not {"motion", "overturned"} <= {*table.columns} or table.doubled(table.columns):
+        raise table.error(f"the columns must be motion and overturned, each once, not {','.join(table.columns)}")
+    specimens = dict.fromkeys(row.get("specimen") or "" for _, row in table.rows)
+    if len(specimens) > 1:
+        raise table.error(f"the tests are of {counted(len(specimens), 'specimen')}: give each a table of its own")
     motions = _motions_of(table, channel=channel, dt=dt, units=units)
-    tests = []
-    for motion, (line, row) in zip(motions, table.rows, strict=True):
-        fell, peak = row.get("overturned"), next((row[name] for name in peaks), "")
-        answer = None
-        if fell:
-            answer = table.convert(line, fell.lower(), _ANSWERS.__getitem__, f"{_YES_OR_NO} in the column overturned")
-        rotation = None
-        if peak:
-            rotation = _PEAKS[peaks[0]] * table.convert(line, peak, float, f"a number in the column {peaks[0]}")
-        labels = {name: row.get(name) or "" for name in _LABELS}
-        try:
-            tests.append(ShakeTest(motion, answer, rotation, **labels))
-        except RockingError as error:
-            raise table.error(error.message.template, *error.message.arguments, line=line, value=error.value) from error
-    return tests
+    names, groups = ([row.get(column) or "" for _, row in table.rows] for column in ("name", "group"))
+    return [
+        ShakeTest(motion, fell, name=name, group=group)
+        for motion, fell, name, group in zip(motions, table.answers("overturned"), names, groups, strict=True)
+    ]
 
 
 def read_observed(

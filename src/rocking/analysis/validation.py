@@ -1,0 +1,487 @@
+"""Predictions of tests on a shake table judged against what was observed: scores and reliability."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rocking import checks
+from rocking.analysis import labels
+from rocking.analysis.calibration.diagnostics import Scores, log_losses
+from rocking.analysis.calibration.evidence import blurred, expected_share
+from rocking.analysis.calibration.result import Calibration, Validation
+from rocking.analysis.levels import mean_one, note_missing, pooled
+from rocking.arrays import Flags, Floats, Integers
+from rocking.body import Bodies, Body
+from rocking.constants import Model
+from rocking.ensemble import simulate_many
+from rocking.errors import InvalidMotion, InvalidOption
+from rocking.motion.motion import Motion
+from rocking.motion.named import distinct_motions, numbered, one_motion
+from rocking.problem import bodies_of, slenderness_of
+from rocking.result import DrawnResult, TableResult
+from rocking.tables import as_written, counted, text_table
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: What can predict the tests of a specimen.
+Source = Calibration | Validation | Bodies | Body | Sequence[Body]
+
+#: A mean over some of the tests, whose positions are given.
+_Mean = Callable[[Integers], float]
+
+#: Shares of the simulations that lie below and above a band.
+_TAIL: Final = 0.05
+
+#: A chance below this is doubted in the summary.
+_DOUBTED: Final = 0.05
+
+
+@dataclass(frozen=True)
+class ShakeTest:
+    """One test: the motion that a specimen at rest was subjected to, and what was observed.
+
+    Parameters
+    ----------
+    motion : Motion
+        Motion of what the specimen stood on: measured, or else commanded.
+    overturned : bool
+        Whether it overturned.
+    name : str
+        Name of the test; by default that of the motion.
+    group : str
+        Tests that belong together, as those with one command or one source motion: standard errors allow for it. By
+        default those under the same motion do.
+
+    Raises
+    ------
+    InvalidMotion
+        If the motion is none.
+    InvalidOption
+        If the outcome is neither true nor false, or a label is not text.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> ShakeTest(rocking.pulses.one_sine(3.0, 1.0), False, name="first")
+    <ShakeTest: first, stood>
+    """
+
+    motion: Motion
+    overturned: bool
+    name: str = ""
+    group: str = ""
+
+    def __post_init__(self) -> None:
+        motion, fell = one_motion(self.motion), self.overturned
+        if motion is None:
+            raise InvalidMotion("a test needs the {} of what the specimen stood on, not None", "motion")
+        for label in ("name", "group"):
+            checks.text(getattr(self, label), label, InvalidOption)
+        if not isinstance(fell, (bool, int, np.bool_, np.integer)) or fell not in (0, 1):
+            raise InvalidOption(f"{{}} must be True or False, not {checks.shown(fell)}", "overturned", value=fell)
+        object.__setattr__(self, "overturned", bool(fell))
+        object.__setattr__(self, "name", self.name or motion.name)
+
+    def __repr__(self) -> str:
+        return f"<ShakeTest: {self.name}, {'overturned' if self.overturned else 'stood'}>"
+
+
+@dataclass(frozen=True)
+class JudgedTest:
+    """What was predicted of one test, and what was observed.
+
+    Attributes
+    ----------
+    name, motion : str
+        Names of the test and of the motion.
+    overturned : bool
+        Whether the specimen overturned.
+    probability : float
+        Predicted probability of that.
+    """
+
+    name: str
+    motion: str
+    overturned: bool
+    probability: float
+
+
+@dataclass(frozen=True)
+class Score:
+    """Mean score of predictions, the smaller the better, and how far it is known.
+
+    Attributes
+    ----------
+    value : float
+        Mean over the tests.
+    error : float
+        Its standard error; NaN where there is one cluster of tests only, or the score is infinite.
+    skill : float
+        1 less the score over that of the base rate of the same tests: 1 where predictions are perfect, 0 where the base
+        rate is as good. NaN where the base rate itself is perfect.
+    skill_error : float
+        Its standard error.
+    tests : int
+        Number of tests.
+    clusters : int
+        Number of clusters of tests that belong together.
+    """
+
+    value: float
+    error: float
+    skill: float
+    skill_error: float
+    tests: int
+    clusters: int
+
+
+@dataclass(frozen=True)
+class ShareInBin:
+    """A share of tests that was observed, and the band that it stays in where predictions are right.
+
+    Attributes
+    ----------
+    lower, upper : float
+        Ends of the bin.
+    tests : int
+        Number of tests that the share is of.
+    predicted : float
+        Predicted share.
+    observed : float
+        Observed share.
+    band_lower, band_upper : float
+        Ends of the central 90 % of the shares in simulations from the predictions (Broecker and Smith 2007).
+    """
+
+    lower: float
+    upper: float
+    tests: int
+    predicted: float
+    observed: float
+    band_lower: float
+    band_upper: float
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ModelValidation(DrawnResult, TableResult):
+    """Predictions judged against tests; from `validate`.
+
+    Its table has a row for each test. Its figure is the reliability diagram with consistency bands.
+
+    Attributes
+    ----------
+    tests : tuple of JudgedTest
+        Predictions and observations.
+    brier, log_loss : Score
+        Mean squared difference between probability and outcome; mean of -log of the probability of the outcome.
+    reliability : tuple of ShareInBin
+        Shares that overturned, in bins of the predicted probability that hold tests.
+    reliability_chance : float
+        Chance of a reliability term of the Brier score as large or larger where the predictions are right.
+    description, model : str
+        What predicted, and by which equation of motion.
+    """
+
+    TABLES = ("tests",)
+
+    tests: tuple[JudgedTest, ...]
+    brier: Score
+    log_loss: Score
+    reliability: tuple[ShareInBin, ...]
+    reliability_chance: float
+    description: str
+    model: str
+
+    @property
+    def scores(self) -> Scores:
+        """Accuracy, log loss and Brier score, as of a calibration."""
+        return Scores.of([test.probability for test in self.tests], [test.overturned for test in self.tests])
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is to be known before the scores are believed, a sentence each."""
+        notes = []
+        fell = sum(test.overturned for test in self.tests)
+        if fell in (0, len(self.tests)):
+            all_or_none = "all tests" if fell else "no test"
+            notes.append(f"{all_or_none} overturned the specimen: the base rate is perfect, and no skill is known")
+        if self.brier.clusters < 10:
+            few = counted(self.brier.clusters, "cluster")
+            notes.append(f"the tests belong to {few} only: standard errors are rough")
+        if math.isinf(self.log_loss.value):
+            notes.append("the log loss is infinite, as a certainty failed: give what is not known of the specimen")
+        return tuple(notes)
+
+    def _headline(self) -> str:
+        fell = sum(test.overturned for test in self.tests)
+        by = f", {self.model} model" if self.model else ""
+        return f"{self.description}{by}: {counted(len(self.tests), 'test')}, {fell} overturned"
+
+    def summary(self) -> str:
+        scores = [
+            [name, *_with_error(score.value, score.error), *_with_error(score.skill, score.skill_error)]
+            for name, score in (("Brier", self.brier), ("log loss", self.log_loss))
+        ]
+        doubt = "not " if self.reliability_chance < _DOUBTED else ""
+        parts = [
+            self._headline(),
+            "",
+            text_table(["score", "mean", "+-", "skill", "+-"], scores),
+            "",
+            f"reliability: {doubt}as if the predictions were right (p = {self.reliability_chance:.2g})",
+        ]
+        return "\n".join([*parts, *(f"note: {sentence}" for sentence in self.notes)])
+
+    def to_dict(self) -> dict[str, Any]:
+        return asdict(self) | {"notes": [*self.notes]}
+
+    def _frame(self, table: str) -> pd.DataFrame:
+        import pandas as pd
+
+        return pd.DataFrame([asdict(test) for test in self.tests])
+
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
+        from rocking.plot.validation import reliability_figure
+
+        columns = ("predicted", "observed", "band_lower", "band_upper")
+        return reliability_figure(
+            **{name: np.array([getattr(row, name) for row in self.reliability]) for name in columns},
+            title=title or as_written(self._headline()),
+            ax=ax,
+            figsize=figsize,
+        )
+
+
+def validate(
+    tests: Sequence[ShakeTest],
+    blocks: Source,
+    *,
+    weights: ArrayLike | None = None,
+    model: Model | None = None,
+    lapse: float | None = None,
+    bins: int = 10,
+    simulations: int = 2000,
+    seed: int = 0,
+    threads: int | None = None,
+    progress: bool | None = None,
+) -> ModelValidation:
+    """Judge what blocks predict of tests against what was observed in them.
+
+    Parameters
+    ----------
+    tests : sequence of ShakeTest
+        m tests; `read_tests` reads them from a table.
+    blocks : Block, Blocks, RestrainedBlock, sequence of one kind, Calibration or Validation
+        What predicts: one block that is taken as known; n of them, draws of what is not known of the specimen, or
+        differs from test to test; a calibration; or what its `cross_validate` said of the same tests, in the order of
+        the calibration, while they were left out.
+    weights : array_like, optional
+        How much each of several blocks counts; by default all alike.
+    model : {"nonlinear", "linear"}, optional
+        Equation of motion; by default that of a calibration, else the nonlinear one.
+    lapse : float, optional
+        Chance that an outcome is not that of a rocking block at all; by default that of a calibration, else 0.
+    bins : int
+        Bins of the reliability diagram, of equal width.
+    simulations : int
+        Draws from the predictions, for bands and their chance; each test has a block of its own.
+    seed : int
+        Seeds them.
+    threads : int, optional
+        As for `simulate_many`.
+    progress : bool, optional
+        As for `simulate_many`.
+
+    Returns
+    -------
+    ModelValidation
+        Scores with standard errors, reliability diagram, and each test.
+
+    Raises
+    ------
+    InvalidOption
+        If an argument is out of its range, or there is no test.
+
+    Notes
+    -----
+    The share of n blocks that overturn is itself uncertain; the probability is its mean by Jeffreys' prior, as in
+    `Calibration.predict`, where one block is not taken as known. Outcomes are scored by the Brier score and the
+    logarithmic one (Gneiting and Raftery 2007).
+
+    Standard errors are those of the jackknife that leaves out clusters: tests of one group, else of one motion. The
+    base rate that skill is against comes from the same tests, which favours it.
+
+    A consistency band holds the central 90 % of the shares in simulations from the predictions themselves (Broecker and
+    Smith 2007), here with these predictions and not with others drawn from them. The chance of reliability comes from
+    the same simulations.
+
+    References
+    ----------
+    Gneiting, T. and Raftery, A. E. (2007). Strictly proper scoring rules, prediction, and estimation. Journal of the
+    American Statistical Association 102, 359-378.
+
+    Broecker, J. and Smith, L. A. (2007). Increasing the reliability of reliability diagrams. Weather and Forecasting
+    22, 651-661.
+
+    Examples
+    --------
+    >>> import numpy as np, rocking
+    >>> rng = np.random.default_rng(0)
+    >>> specimens = rocking.Blocks(3.0, rng.lognormal(np.log(0.15), 0.1, 40), 0.9)
+    >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in np.linspace(1.5, 4.0, 40)]
+    >>> fell = rocking.simulate_many(specimens, pulses).overturned.values.diagonal()
+    >>> tests = [rocking.ShakeTest(pulse, one) for pulse, one in zip(pulses, fell)]
+    >>> population = rocking.Blocks(3.0, rng.lognormal(np.log(0.15), 0.1, 200), 0.9)
+    >>> found = rocking.validate(tests, population)
+    >>> found.brier.skill > 0.2, found.reliability_chance > 0.05
+    (True, True)
+    """
+    given = checks.several(tests, "tests", InvalidOption)
+    if not given:
+        raise InvalidOption("{} must hold at least one test", "tests", value=tests)
+    for test in given:
+        if not isinstance(test, ShakeTest):
+            raise InvalidOption(
+                f"{{}} must hold tests, ShakeTest(motion, overturned), not {checks.shown(test)}", "tests", value=test
+            )
+    checks.whole(bins, "bins", InvalidOption, 1, 1000)
+    checks.whole(simulations, "simulations", InvalidOption, 100)
+    rng = np.random.default_rng(checks.whole(seed, "seed", InvalidOption, 0))
+    if lapse is not None:
+        checks.within(lapse, "lapse", InvalidOption, 0.0, 0.5)
+    distinct, which = distinct_motions([test.motion for test in given])
+    observed = np.array([test.overturned for test in given], dtype=bool)
+    clusters = labels.numbered(
+        [("group", test.group) if test.group else ("motion", k) for test, k in zip(given, which, strict=True)]
+    )
+    description, how = "predictions of tests that were left out", ""
+    if isinstance(blocks, Validation):
+        probabilities = _left_out(blocks, len(given), weights, lapse)
+    else:
+        if isinstance(blocks, Calibration):
+            description, how = f"calibration, {counted(len(blocks.blocks), 'block')}", model or blocks.model
+        else:
+            description, how = pooled(blocks, weights), model or "nonlinear"
+        shares = _shares(blocks, distinct, weights, lapse, model=how, threads=threads, progress=progress)
+        probabilities = shares[which]
+    outcomes = rng.random((simulations, len(given))) < probabilities
+    places = np.minimum((probabilities * bins).astype(np.int64), bins - 1)
+    term = miscalibration(probabilities, np.vstack([observed, outcomes]), places)
+    # Sums of the same numbers in another order differ in their last digits.
+    larger = np.count_nonzero(term[1:] >= term[0] - 1e-9 * abs(term[0]))
+    rows = zip(numbered([test.name for test in given]), given, probabilities.tolist(), strict=True)
+    return ModelValidation(
+        tests=tuple(JudgedTest(name, test.motion.name, test.overturned, chance) for name, test, chance in rows),
+        brier=score_of((probabilities - observed) ** 2, observed, lambda share: share * (1.0 - share), clusters),
+        log_loss=score_of(log_losses(probabilities, observed), observed, _entropy, clusters),
+        reliability=tuple(_bin(k, bins, places == k, probabilities, observed, outcomes) for k in np.unique(places)),
+        reliability_chance=float((1.0 + larger) / (simulations + 1.0)),
+        description=description,
+        model=how,
+    )
+
+
+def _shares(
+    source: Calibration | Bodies | Body | Sequence[Body],
+    motions: Sequence[Motion],
+    weights: ArrayLike | None,
+    lapse: float | None,
+    **how: Any,
+) -> Floats:
+    """Probability that each motion is noted to overturn the specimen, from simulations of the blocks."""
+    if isinstance(source, Calibration):
+        if weights is not None:
+            raise InvalidOption("a calibration has {} of its own: leave them out", "weights")
+        bodies: Bodies = source.blocks
+        shares, effective = source.weights / source.weights.sum(), source.diagnostics.effective
+        lapse = source.lapse if lapse is None else lapse
+    else:
+        bodies = bodies_of(source)
+        slenderness_of(bodies)  # refused before the work
+        shares = mean_one(weights, len(bodies)) / len(bodies)
+        effective = math.inf if len(bodies) == 1 else 1.0 / float((shares**2).sum())
+    simulated = simulate_many(bodies, motions, **how)
+    fell, missing = (simulated[name].transpose("block", "motion").values for name in ("overturned", "unfinished"))
+    note_missing(missing)
+    share = shares @ np.where(missing, 0.5, fell.astype(np.float64))
+    expected = share if math.isinf(effective) else expected_share(share, effective)
+    # A sum of weights may be a rounding above 1.
+    return np.clip(blurred(expected, lapse or 0.0), 0.0, 1.0)
+
+
+def _left_out(source: Validation, count: int, weights: object, lapse: float | None) -> Floats:
+    """Probabilities of the tests of a calibration while they were left out."""
+    for name, given in (("weights", weights), ("lapse", lapse)):
+        if given is not None:
+            raise InvalidOption("predictions of tests that were left out take no {}: leave it out", name)
+    known = source.probabilities.shape[1]
+    if known != count:
+        raise InvalidOption(
+            f"the predictions are of {counted(known, 'test')}, and {counted(count, 'test')} are given: "
+            "{} must be those of the calibration, in their order",
+            "tests",
+        )
+    return np.asarray(source.probabilities.mean(axis=0))
+
+
+def score_of(each: Floats, observed: Flags, base: Callable[[float], float], clusters: Integers) -> Score:
+    """Mean of scores (m,), against the mean score `base` of the share that overturned, of which it is a function."""
+
+    def mean(chosen: Integers) -> float:
+        return float(each[chosen].mean())
+
+    def skill(chosen: Integers) -> float:
+        reference = base(float(observed[chosen].mean()))
+        return 1.0 - mean(chosen) / reference if reference > 0.0 else math.nan
+
+    errors, whole = [_jackknife(statistic, clusters) for statistic in (mean, skill)], np.arange(len(each))
+    return Score(mean(whole), errors[0], skill(whole), errors[1], len(each), len(np.unique(clusters)))
+
+
+def _jackknife(statistic: _Mean, clusters: Integers) -> float:
+    """Find the standard error of a statistic of tests, from what it is without each of the clusters."""
+    each = np.unique(clusters)
+    if len(each) < 2:
+        return math.nan
+    found = np.array([statistic(np.flatnonzero(clusters != label)) for label in each])
+    if not np.all(np.isfinite(found)):
+        return math.nan
+    return math.sqrt((len(each) - 1.0) / len(each) * float(((found - found.mean()) ** 2).sum()))
+
+
+def _entropy(share: float) -> float:
+    return -sum(part * math.log(part) for part in (share, 1.0 - share) if part > 0.0)
+
+
+def miscalibration(probabilities: Floats, observed: Flags, bins: Integers) -> Floats:
+    """Reliability term of the Brier score (Murphy 1973) of outcomes (s, m), with probabilities and bins (m,)."""
+    counts = np.bincount(bins)
+    member = (bins[:, None] == np.arange(len(counts))).astype(np.float64)
+    excess = (observed - probabilities) @ member
+    return np.asarray((excess**2 / np.maximum(counts, 1)).sum(axis=1) / len(bins))
+
+
+def _bin(k: int, bins: int, chosen: Flags, probabilities: Floats, observed: Flags, drawn: Flags) -> ShareInBin:
+    """Share of the tests in bin k, and the band of simulated shares: at most a tail of them lies beyond each end."""
+    band = np.quantile(drawn[:, chosen].mean(axis=1), (_TAIL, 1.0 - _TAIL), method="inverted_cdf").tolist()
+    shares = float(probabilities[chosen].mean()), float(observed[chosen].mean())
+    return ShareInBin(k / bins, (k + 1) / bins, int(chosen.sum()), *shares, *band)
+
+
+def _with_error(value: float, error: float) -> tuple[str, str]:
+    """Value and standard error as text, to two digits of the error."""
+    if not (math.isfinite(value) and math.isfinite(error)):
+        if math.isinf(value):
+            return ("infinite" if value > 0.0 else "-infinite"), "-"
+        return ("-" if math.isnan(value) else f"{value:.3g}"), "-"
+    digits = 3 if error == 0.0 else max(0, 1 - math.floor(math.log10(error)))
+    return f"{value:.{digits}f}", f"{error:.{digits}f}"

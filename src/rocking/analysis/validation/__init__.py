@@ -1,1 +1,0 @@
-"""Validation: what blocks predict of tests, judged against what was observed in them."""
