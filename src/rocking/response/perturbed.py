@@ -112,11 +112,6 @@ class Perturbed(TableResult):
         return _range([repeat.overturn_time for repeat in self.alike])
 
     @property
-    def last_rest_range(self) -> tuple[float, float]:
-        """Earliest and latest time of the last rest, s; NaN where a simulation does not end at rest."""
-        return _range([repeat.last_rest for repeat in self.repeats])
-
-    @property
     def event_ranges(self) -> Floats:
         """Earliest and latest time of each event at factor 1, s, shape (n, 2).
 
