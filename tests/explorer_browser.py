@@ -2,10 +2,7 @@
 
 import json
 import os
-import shlex
 import shutil
-import sys
-import tempfile
 import time
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,16 +12,10 @@ import pytest
 #: Set by `make browser`: then what is missing is a failure.
 REQUIRED = "ROCKING_BROWSER_REQUIRED" in os.environ
 
-#: Which browser drives the page, and the names that its program may have.
-BROWSER = os.environ.get("ROCKING_BROWSER", "chromium")
-_PROGRAMS = {
-    "chromium": ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome"),
-    "firefox": ("firefox-esr", "firefox"),
-    "webkit": ("WebKitWebDriver",),
-}
-_PACKAGES = {"chromium": "chromium", "firefox": "firefox-esr", "webkit": "webkit2gtk-driver xvfb"}
+#: Names that the program of the browser may have.
+_PROGRAMS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
 
-#: How many times slower than it is the processor of a page shall be; Chromium alone can be told.
+#: How many times slower than it is the processor of a page shall be.
 SLOWDOWN = float(os.environ.get("ROCKING_BROWSER_SLOWDOWN", "1"))
 
 _FLAGS = (
@@ -42,13 +33,8 @@ def missing(sentence):
 
 def program():
     """Path of the browser."""
-    if BROWSER not in _PROGRAMS:
-        pytest.fail(f"ROCKING_BROWSER is {BROWSER!r}; it may be {', '.join(_PROGRAMS)}")
-    for name in _PROGRAMS[BROWSER]:
-        found = shutil.which(name)
-        if found:
-            return found
-    return missing(f"no {BROWSER} was found: install it (on Debian: apt install {_PACKAGES[BROWSER]})")
+    found = next(filter(None, map(shutil.which, _PROGRAMS)), None)
+    return found or missing("no Chromium was found: install it (on Debian: apt install chromium)")
 
 
 @contextmanager
@@ -59,27 +45,9 @@ def launched():
     except ImportError:
         missing("playwright is not installed: pip install '.[browser]'")
     with sync_playwright() as player:
-        started = _launched(player)
+        started = player.chromium.launch(executable_path=program(), args=_chromium_flags())
         yield started
         started.close()
-
-
-def _launched(player):
-    """Start the browser; root has no sandbox in Chromium, and Firefox is driven as it was installed."""
-    if BROWSER == "firefox":
-        from playwright.sync_api import Locator, Page
-
-        typing(Locator)
-        typing(Page)
-        relay = Path(tempfile.mkdtemp()) / "firefox"
-        words = (sys.executable, Path(__file__).with_name("explorer_firefox.py"), program())
-        relay.write_text(f'#!/bin/sh\nexec {shlex.join(map(str, words))} "$@"\n', "utf-8")
-        relay.chmod(0o755)
-        light = {"layout.css.prefers-color-scheme.content-override": 1}
-        return player.firefox.launch(channel="moz-firefox", executable_path=relay, firefox_user_prefs=light)
-    if BROWSER == "webkit":
-        pytest.skip("Playwright drives no WebKit that comes from a distribution; see test_explorer_webkit.py")
-    return player.chromium.launch(executable_path=program(), args=_chromium_flags())
 
 
 def _chromium_flags():
@@ -96,27 +64,8 @@ def remembering(browser, folder):
 def slowed(page):
     """Return a page whose processor is as slow as the tests are to find it."""
     if SLOWDOWN > 1.0:
-        only_chromium("be slow")
         page.context.new_cdp_session(page).send("Emulation.setCPUThrottlingRate", {"rate": SLOWDOWN})
     return page
-
-
-def typing(locator):
-    """Let a class of Playwright fill fields by keys where else no `change` follows, as it does when a person types."""
-
-    def fill(here, *where_and_text):
-        *where, text = where_and_text
-        field = here.locator(*where) if where else here
-        field.press("Control+a")
-        field.press("Delete") if text == "" else field.press_sequentially(text)
-
-    locator.fill = fill
-
-
-def only_chromium(what):
-    """Leave a test out in a browser that cannot be told to do something."""
-    if BROWSER != "chromium":
-        pytest.skip(f"{BROWSER.capitalize()} cannot be told to {what}")
 
 
 def tool(path):

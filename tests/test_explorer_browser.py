@@ -15,13 +15,13 @@ import sys
 import threading
 from contextlib import contextmanager
 from pathlib import Path
-from urllib.parse import parse_qs, parse_qsl, urlencode, urlsplit
+from urllib.parse import parse_qs, parse_qsl, urlencode
 
 import explorer_addresses
 import numpy as np
 import pytest
 import trimesh
-from explorer_browser import BROWSER, Watched, launched, only_chromium, remembering, slowed, tool
+from explorer_browser import Watched, launched, remembering, slowed, tool
 from explorer_texts import in_english
 from PIL import Image
 
@@ -81,11 +81,7 @@ def new_page(browser, tmp_path_factory):
     contexts = {}
 
     def made(viewport, scheme, **options):
-        if scheme == "dark":
-            only_chromium("prefer dark colours")
-        if "is_mobile" in options:
-            only_chromium("be that of a phone")
-        if BROWSER == "chromium" and not options:
+        if not options:
             if "plain" not in contexts:
                 contexts["plain"] = remembering(browser, tmp_path_factory.mktemp("profile"))
             page = slowed(contexts["plain"].new_page())
@@ -161,9 +157,6 @@ def test_the_first_page_shows_a_block_that_chatters(opened):
     assert rests == [f"{time:.9f}" for time in response.chattering["end"]]
     cells = page.page.locator("#sequences tbody tr:last-child td").all_text_contents()
     assert cells[4] == "± 1.25 s" and cells[5].endswith(" ns")
-    head = page.page.locator("#sequences th").all_text_contents()
-    assert page.js("(({scrollWidth, clientWidth}) => scrollWidth <= clientWidth)(document.querySelector('.scroll'))")
-    assert head[3:5] == ["Moves, if the motion changes by three millionths", "Bracket of the computation"]
 
 
 def test_a_slider_changes_the_response(opened):
@@ -176,22 +169,6 @@ def test_a_slider_changes_the_response(opened):
     assert peak_shown(page) == pytest.approx(known_ratio(response), rel=2e-3)
     assert page.js("document.getElementById('pga').value") == level[:-1]
     assert page.js("document.getElementById('pga-slider').getAttribute('aria-valuetext')") == f"{level[:-1]} g"
-
-
-def test_a_number_may_be_typed_and_a_bad_one_is_answered_with_a_sentence(opened):
-    page = opened(STATUE, allowed=["422"])
-    width = page.page.locator("#width")
-    page.rested(lambda: (width.fill("0.3"), width.press("Enter")))
-    assert query_of(page)["width"] == "0.3"
-    assert "α = 15.3°" in page.text("#derived")
-    width.fill("-1")
-    width.press("Enter")
-    page.until("!document.getElementById('problem').hidden")
-    assert page.text("#problem").startswith("“Width” must be a positive number")
-    assert page.js(MARKED) == ["width"]
-    page.rested(lambda: (width.fill("0.24"), width.press("Enter")))
-    assert page.js("document.getElementById('problem').hidden")
-    assert page.js(MARKED) == []
 
 
 def test_a_field_takes_units_and_shows_the_number_in_its_own(opened):
@@ -229,19 +206,13 @@ def test_free_rocking_is_released_from_the_rotation_that_is_shown(opened):
     page.rested(lambda: page.page.select_option("#kind", "none"))
     start = page.page.locator("#initial_rotation")
     assert start.input_value() == "3" and query_of(page)["initial_rotation"] == "3deg"
+    response = rocking.simulate(rocking.Block(width=0.24, height=1.1), None, initial_rotation=math.radians(3.0))
+    assert peak_shown(page) == pytest.approx(known_ratio(response), rel=2e-3)
+    assert page.text("#command").startswith("The command line does not do this case")
     page.rested(lambda: (start.fill("0"), start.press("Enter")))
     assert "initial_rotation" not in query_of(page) and "nothing shakes it" in page.text("#verdict")
     page.rested(lambda: page.page.select_option("#kind", "record"))
     assert "initial_rotation" not in query_of(page) and start.is_hidden()
-
-
-def test_a_release_under_shaking_is_shown_and_stays(opened):
-    page = opened(SINE + "&initial_rotation=0.01&initial_velocity=-0.02")
-    assert page.page.locator("#initial_rotation").is_visible() and page.page.locator("#initial_velocity").is_visible()
-    slider = page.page.locator("#pulse-amplitude-slider")
-    page.rested(lambda: (slider.focus(), slider.press("ArrowRight")))
-    found = query_of(page)
-    assert (found["initial_rotation"], found["initial_velocity"]) == ("0.01", "-0.02")
 
 
 @pytest.mark.parametrize(
@@ -268,11 +239,6 @@ def test_tracks_end_where_the_other_fields_let_the_block_end(opened):
     assert query_of(page)["offset"] == "0.06" and page.js("document.getElementById('problem').hidden")
     first, here = page.js("['min', 'value'].map((name) => Number(document.getElementById('width-slider')[name]))")
     assert first == here > 0  # a narrower block has no centre of mass there
-    # They end there in whatever unit the number is shown.
-    page = opened("width=0.4&height=1&offset=0.05&motion=none&initial_rotation=3deg&length_in=in")
-    page.rested(lambda: page.page.press("#offset-slider", "End"))
-    assert page.page.locator("#problem").is_hidden() and page.page.input_value("#offset") == "3.937"
-    assert query_of(page)["offset"] == "0.1"
 
 
 def test_a_number_that_is_being_typed_stays_when_a_response_arrives(opened):
@@ -373,52 +339,6 @@ def test_ten_times_closer_again_and_again(opened):
     page.until("!new URLSearchParams(location.search).has('from')")
 
 
-#: What has moved by itself from the time on at which the page can be used: not soon after a click or a key, and more
-#: than what follows from another width of a plot's numbers. What is within a plot has no name.
-MOVED = """new Promise((done) => {
-  const name = (node) => node && (node.id || node.parentElement?.id || node.className || node.localName);
-  const moved = ({node, previousRect: before, currentRect: after}) => node && before.width && after.width
-    && (Math.abs(after.x - before.x) > 2 || Math.abs(after.y - before.y) > 2);
-  const found = [], ready = Number(document.body.dataset.ready);
-  new PerformanceObserver((list) => {
-    for (const {startTime, hadRecentInput, sources} of list.getEntries()) {
-      if (startTime > ready && !hadRecentInput) found.push(...sources.filter(moved).map(({node}) => name(node)));
-    }
-  }).observe({type: 'layout-shift', buffered: true});
-  setTimeout(() => done(found), 100);
-})"""
-
-
-@pytest.mark.parametrize("viewport", [DESK, pytest.param(PHONE, marks=MORE)])
-def test_nothing_moves_while_a_view_is_computed(opened, viewport):
-    only_chromium("tell what has moved")
-    page = opened(f"{STATUE}&points=24&levels=4&records={RECORDS}", viewport=viewport)
-    assert page.js(MOVED) == []
-    for view in ("map", "assessment"):
-        page.page.click(f"[data-view={view}]")
-        page.until(COMPUTED[view], timeout=120)
-        assert page.js(MOVED) == [], view
-    # What moves soon after a click is not counted there: what is said of the list has its place beforehand.
-    about = "(each) => each.offsetHeight - parseFloat(getComputedStyle(each).minHeight)"
-    assert page.js(f"({about})(document.getElementById('assessment-about'))") < 1.0
-    level = page.page.locator("#verdict + *").bounding_box()["y"]
-    page.page.goto(page.page.url.replace("pga=0.4g", "pga=0.9g"))
-    page.until(READY)
-    assert page.page.locator("#verdict + *").bounding_box()["y"] == level, "the verdict is shorter"
-
-
-@pytest.mark.parametrize("viewport", [DESK, pytest.param(PHONE, marks=MORE)])
-def test_nothing_moves_where_plots_are_drawn_once_they_are_seen(opened, viewport):
-    page = opened(STATUE, viewport=viewport)
-    top = "document.getElementById('deeper').getBoundingClientRect().top"
-    seen = "document.getElementById('phase-legend').scrollIntoView({block: 'center'})"
-    drawn, before = page.js(f"{seen}; [document.body.dataset.phases ?? '', {top}]")
-    assert drawn == ""
-    page.until("document.body.dataset.phases === '1'")
-    page.paused(100)
-    assert page.js(top) == pytest.approx(before, abs=1)
-
-
 def test_the_phase_plane_and_the_energy_are_drawn_where_they_are_seen(opened):
     page = opened(f"{STATUE}&from=231&to=235&at=232.5", viewport={"width": 1280, "height": 700})
     assert page.js("document.body.dataset.phases") is None
@@ -428,12 +348,6 @@ def test_the_phase_plane_and_the_energy_are_drawn_where_they_are_seen(opened):
     line = page.js(
         f"({MODELS}).filter((each) => each.name === 'phase-total').map((each) => Array.from(each.data.y))[0]"
     )
-    # Orange parts what overturns from what comes back, as the legend says.
-    orange = page.js("getComputedStyle(document.documentElement).getPropertyValue('--over').trim()")
-    dash = "String(each.line_dash?.value ?? each.line_dash)"
-    dashed = f"({MODELS}).filter((each) => {dash} === '7,3,2,3' && each.visible !== false)"
-    inks = page.js(f"{dashed}.map(({{line_color: each}}) => each.value ?? each)")
-    assert len(inks) >= 3 and set(inks) == {orange}
     times = np.linspace(231.0, 235.0, 4001)
     assert max(line) == pytest.approx(
         (response.kinetic_energy(times) + response.potential_energy(times)).max(), rel=1e-3
@@ -447,21 +361,6 @@ def test_the_phase_plane_and_the_energy_are_drawn_where_they_are_seen(opened):
     page.page.evaluate("scrollTo(0, 0)")
     page.rested(lambda: (slider.focus(), slider.press("ArrowRight")))
     assert page.js("document.body.dataset.phases") == "1"
-
-
-def test_the_mark_in_the_phase_plane_is_where_the_time_went_while_nobody_saw_it(opened):
-    page = opened(f"{STATUE}&from=231&to=235&at=232", viewport={"width": 1280, "height": 700})
-    page.page.locator("#phase-legend").scroll_into_view_if_needed()
-    page.until("document.body.dataset.phases === '1'")
-    page.js("scrollTo(0, 0)")
-    page.paused(200)
-    entered(page, "at", "232.5")
-    page.says("cursor", "At 232.500 s")
-    page.page.locator("#phase-legend").scroll_into_view_if_needed()
-    now = f"({MODELS}).find((each) => each.name === 'phase-now').data"
-    response = statue(0.4 * 9.80665)
-    expected = float(response.rotation(232.5)) / response.block.alpha
-    page.until(f"Math.abs({now}.x[0] - ({expected!r})) < 1e-4", "the mark is at the time", timeout=5.0)
 
 
 def test_a_time_is_read_by_mouse_by_keys_and_typed_and_the_block_follows(opened):
@@ -501,23 +400,6 @@ def test_a_time_is_read_by_mouse_by_keys_and_typed_and_the_block_follows(opened)
     read(235.0)
 
 
-def test_the_time_that_is_spoken_is_the_last_one_however_late_its_answer_comes(opened):
-    page = opened(f"{STATUE}&from=231&to=235&at=232.5")
-    said = "document.getElementById('said').textContent.startsWith('At 232.')"
-    read = "Number(document.getElementById('cursor').dataset.time)"
-    slider = page.page.locator("#at-slider")
-    page.until(f"Math.abs({read} - 232.5) < 1e-9")
-    slider.press("ArrowLeft")
-    page.until(f"{read} < 232.498")
-    with held(page, "**/api/at?*") as waiting:
-        slider.press("ArrowLeft")
-        asked(page, waiting)
-        page.paused(800)  # by now the time before would have been spoken
-        assert not page.js(said)
-    page.until(said)
-    assert page.text("#said").startswith("At 232.492 s")
-
-
 def test_keys_move_and_zoom_the_plots(opened):
     page = opened(f"{STATUE}&from=231&to=235")
     plots = page.page.locator("#histories")
@@ -530,85 +412,6 @@ def test_keys_move_and_zoom_the_plots(opened):
     page.until("new URLSearchParams(location.search).get('from') === '231.5'")
     plots.press("0")
     page.until("!new URLSearchParams(location.search).has('from')")
-
-
-@pytest.mark.parametrize(
-    ("more", "plots", "asks"),
-    [("", "#histories", "**/api/window?*"), ("&view=compare", "#compare-plots", "**/api/compare?*")],
-)
-def test_keys_go_on_from_the_window_that_is_asked_for(opened, more, plots, asks):
-    page = opened(f"{STATUE}&from=231&to=235{more}")
-    with held(page, asks) as waiting:
-        page.page.locator(plots).focus()
-        page.page.keyboard.press("+")
-        asked(page, waiting)
-        page.page.keyboard.press("ArrowRight")
-        page.page.keyboard.press("-")
-    page.until("new URLSearchParams(location.search).get('from') === '231.5'")
-
-
-WINDOW = (
-    "[new URLSearchParams(location.search).get('from'), new URLSearchParams(location.search).get('to')].map(Number)"
-)
-
-
-def windows(page, act):
-    """Do something, and wait until the plots show another window; return its ends."""
-    before = page.js("document.getElementById('histories').dataset.origin + document.body.dataset.drawn")
-    act()
-    page.until(f"document.getElementById('histories').dataset.origin + document.body.dataset.drawn !== {before!r}")
-    page.paused(250)
-    return page.js(WINDOW)
-
-
-def test_plots_are_zoomed_within_a_response_that_became_shorter(opened):
-    page = opened("width=0.4&height=1.1&motion=sine:amplitude%3D0.38g,frequency%3D2,cycles%3D60&from=0&to=30")
-    page.rested(lambda: entered(page, "width", "0.2"))
-    page.page.locator("#histories").focus()
-    low, high = windows(page, lambda: page.page.keyboard.press("+"))
-    assert 0.0 < low < high < 3.0
-    assert high - low == pytest.approx(2.0 * low, rel=1e-9)  # the middle half
-
-
-def test_a_key_after_the_one_for_where_it_moves_waits_for_that(opened):
-    page = opened(f"{STATUE}&from=240&to=250")
-    page.page.locator("#histories").focus()
-    page.rested(lambda: page.page.keyboard.press("0"))
-    slowly = windows(page, lambda: page.page.keyboard.press("+"))
-    page = opened(f"{STATUE}&from=240&to=250")
-    page.page.locator("#histories").focus()
-    with held(page, "**/api/case?*") as waiting:
-        page.page.keyboard.press("0")
-        asked(page, waiting)
-        page.page.keyboard.press("+")
-    page.until(f"JSON.stringify({WINDOW}) === {json.dumps(json.dumps(slowly, separators=(',', ':')))}")
-
-
-def test_deeper_goes_on_from_the_window_that_is_asked_for(opened):
-    page = opened(STATUE)
-    with held(page, "**/api/window?*") as waiting:
-        page.page.click("#deeper")
-        asked(page, waiting)
-        low, high = (float(parse_qs(urlsplit(waiting[0].request.url).query)[end][0]) for end in ("from", "to"))
-        page.page.click("#deeper")
-    page.until(f"![0, {low!r}].includes({WINDOW}[0])")
-    lower, upper = page.js(WINDOW)
-    assert upper - lower == pytest.approx(0.1 * (high - low), rel=1e-6)
-
-
-def test_the_phase_plane_is_that_of_the_window_to_which_somebody_went_back(opened):
-    page = opened(f"{STATUE}&from=231&to=239")
-    page.page.locator("#phase-plots").scroll_into_view_if_needed()
-    page.until("document.body.dataset.phases")
-    plots = page.page.locator("#histories")
-    with held(page, "**/api/phase?*") as waiting:
-        windows(page, lambda: plots.press("ArrowRight"))
-        asked(page, waiting)
-        assert windows(page, lambda: plots.press("ArrowLeft")) == [231.0, 239.0]
-        asks = []
-        page.page.on("request", lambda request: asks.append(request.url) if "/api/phase?" in request.url else None)
-    page.until("Number(document.body.dataset.phases) >= 3")
-    assert "from=231&to=239" in asks[-1]
 
 
 def test_dragging_across_a_plot_zooms_in(opened):
@@ -625,49 +428,6 @@ def test_dragging_across_a_plot_zooms_in(opened):
     page.says("cursor", "the block")
 
 
-def test_going_back_to_what_cannot_be_computed_marks_what_is_drawn_as_old(opened):
-    page = opened(STATUE, allowed=["Failed to load", "net::"])
-    page.rested(lambda: entered(page, "width", "0.3"))
-    page.until("location.search.includes('width=0.3')")
-    page.page.route("**/api/case?*", lambda route: route.abort())
-    page.page.go_back()
-    page.until("!document.getElementById('problem').hidden")
-    assert "old" in page.page.get_attribute("#main", "class").split() and page.page.locator("#old").is_visible()
-
-
-def test_going_back_over_a_change_of_units_changes_them_back(opened):
-    page = opened(STATUE)
-    with page.page.expect_event("load"):
-        page.page.select_option("#acceleration_in", "m/s2")
-    page.until(READY)
-    page.until("location.search.includes('acceleration_in')")
-    with page.page.expect_event("load"):
-        page.page.go_back()
-    page.until(READY)
-    page.paused(400)
-    assert "acceleration_in" not in page.page.url
-    assert page.page.locator("#pga").input_value().strip() in ("0.4", "0.40")
-
-
-def test_a_view_that_was_chosen_while_a_field_was_wrong_has_files_of_its_own(opened):
-    page = opened(f"view=map&{SINE}&points=24", allowed=["422"])
-    complete(page)
-    entered(page, "p", "-1")
-    page.until("!document.getElementById('problem').hidden")
-    page.page.click('[data-view="response"]')
-    page.until("document.getElementById('python').textContent.includes('rocking.simulate(')")
-    assert "chattering_map" not in page.text("#python")
-
-
-def test_the_address_has_the_window_that_is_drawn_also_beside_a_refused_value(opened):
-    page = opened(f"{STATUE}&from=231&to=239", allowed=["422"])
-    entered(page, "width", "-1")
-    page.until("!document.getElementById('problem').hidden")
-    page.page.click("[data-zoom=in]")
-    page.paused(400)
-    assert page.js(WINDOW) == [231.0, 239.0]
-
-
 def test_a_reading_is_of_the_case_and_of_the_time_that_are_shown(opened):
     page = opened(STATUE, allowed=["422"])
     problem = "!document.getElementById('problem').hidden"
@@ -679,7 +439,6 @@ def test_a_reading_is_of_the_case_and_of_the_time_that_are_shown(opened):
     page.says("cursor", "At 2.0")
     page.rested(lambda: page.page.select_option("#record", "ridgecrest-clc-090"))
     assert page.page.input_value("#at") == "" and page.text("#cursor").startswith("Click on the plots")
-    assert page.page.get_attribute("#at-slider", "aria-valuetext") is None
     # What the pointer asked for comes when it has left the plots.
     box = page.page.locator("#histories").bounding_box()
     with held(page, "**/api/at?*") as waiting:
@@ -689,50 +448,6 @@ def test_a_reading_is_of_the_case_and_of_the_time_that_are_shown(opened):
         page.paused(100)
     page.paused(300)
     assert page.text("#cursor").startswith("Click on the plots")
-    # A mistake in the settings is said before an older one of the reading.
-    entered(page, "at", "9999")
-    page.until(problem)
-    entered(page, "width", "-1")
-    page.until("document.getElementById('problem').textContent.includes('Width')")
-
-
-def test_what_never_moves_is_read_and_where_no_case_is_shown_nothing_is(opened, here):
-    page = opened("width=0.24&height=1.1&motion=none&view=block")
-    page.paused(300)
-    assert page.page.locator("#problem").is_hidden()
-    page.page.click("[data-view=response]")
-    page.says("cursor", "At 0.000 s the block stands on both corners")
-    page = opened(STATUE, allowed=["422"])
-    page.page.goto(here.link({"width": "-1", "height": "1.1"}))
-    page.until("document.body?.dataset.ready && !document.getElementById('problem').hidden")
-    entered(page, "at", "2")
-    page.page.click("[data-view=block]")
-    page.page.click("#to-uplift")
-    page.page.click("#play")
-    page.paused(200)
-    assert page.text("#problem").startswith("“Width”")
-
-
-def test_a_window_that_begins_after_the_response_is_given_up(opened):
-    page = opened(f"{STATUE}&from=240&to=250")
-    page.rested(lambda: entered(page, "pga", "1.2"))
-    assert "It overturns" in page.text("#verdict") and page.page.locator("#problem").is_hidden()
-    assert "from" not in query_of(page)
-    other = "view=compare&compare=motion&other.motion=ridgecrest-clc-090&other.pga=0.4g&from=100&to=150"
-    page = opened(f"{SINE}&{other}")
-    page.until("document.body.dataset.compared")
-    assert query_of(page)["from"] == "100"
-    page.rested(lambda: page.page.click("[data-view=response]"))
-    assert page.page.locator("#problem").is_hidden() and "from" not in query_of(page)
-
-
-def test_ratios_of_intervals_are_drawn_against_eta_squared(opened):
-    page = opened(STATUE)
-    response = statue(0.4 * 9.80665)
-    lines = page.js(f"""() => {MODELS}
-        .filter((each) => each.type === 'Title' && each.text).map((each) => each.text)""")
-    # Above the plot, where it covers no points.
-    assert lines == [f"line: η² = {response.block.restitution**2:.4g}"]
 
 
 def test_all_numbers_in_words(opened):
@@ -774,34 +489,6 @@ def test_a_pulse_of_an_address_is_read_as_the_package_reads_it(opened):
     page.rested(lambda: page.page.click("#map-open"))
     motion = query_of(page)["motion"]
     assert motion.startswith("sine:amplitude=") and motion.endswith(",cycles=5")
-
-
-def test_a_field_shows_what_is_computed_where_the_case_leaves_it_out(opened):
-    sine = "p=2&alpha=0.2&restitution=0.92&motion=sine:amplitude%3D2.02,frequency%3D0.63,cycles%3D2.5"
-    page = opened(sine)
-    page.rested(lambda: entered(page, "pulse-phase", "90"))
-    assert query_of(page)["motion"].endswith(",phase=90deg")
-    page.rested(page.page.go_back)
-    assert page.page.input_value("#pulse-phase") == "0" and "phase" not in page.text("#python")
-    page = opened("width=0.24&height=1.1&motion=ricker:amplitude%3D0.5g,frequency%3D2")
-    page.rested(lambda: page.page.select_option("#pulse-kind", "antisymmetric"))
-    page.rested(page.page.go_back)
-    assert page.page.input_value("#pulse-kind") == "symmetric" and "kind" not in page.text("#python")
-    page = opened(f"{STATUE}&chattering=velocity")
-    assert float(page.page.input_value("#velocity-limit")) == rocking.VelocityThreshold().threshold
-    assert "chattering='velocity'" in page.text("#python")
-
-
-def test_another_description_has_the_value_that_was_changed_before_it(opened):
-    page = opened(STATUE)
-    with held(page, "**/api/case?*") as waiting:
-        entered(page, "width", "0.3")
-        asked(page, waiting)
-        page.page.select_option("#shape", "parameters")
-        page.paused(300)
-    page.until("new URLSearchParams(location.search).has('alpha')")
-    alpha = quantities.angle(query_of(page)["alpha"], "alpha")
-    assert alpha == pytest.approx(rocking.Block(width=0.3, height=1.1).alpha, rel=1e-12)
 
 
 def test_a_block_by_its_parameters_with_two_sides(opened):
@@ -854,14 +541,6 @@ def test_a_record_is_scaled(opened):
             assert peak_shown(page) == pytest.approx(known_ratio(response), rel=2e-3)
 
 
-def test_a_block_is_released_from_a_rotation(opened):
-    page = opened(STATUE)
-    page.rested(lambda: page.page.select_option("#kind", "none"))
-    response = rocking.simulate(rocking.Block(width=0.24, height=1.1), None, initial_rotation=math.radians(3.0))
-    assert peak_shown(page) == pytest.approx(known_ratio(response), rel=2e-3)
-    assert page.text("#command").startswith("The command line does not do this case")
-
-
 def test_a_file_is_chosen_told_about_and_shown(opened, tmp_path):
     samples = rocking.records.load("el-centro-meloland-270").samples[1]
     file = tmp_path / "station 7.txt"
@@ -900,33 +579,6 @@ DROP = """async ([name, text]) => {
 HOSTILE = ["x<img src=x id=hostile onerror=alert(1)>", '"><style id=hostile>*{display:none}', "$$hostile{$$"]
 
 
-def test_a_step_and_a_tolerance_take_a_comma(opened, tmp_path):
-    page = opened(STATUE, allowed=["422"])
-    file = tmp_path / "nothing said.txt"
-    file.write_text("\n".join(str(0.1 * ((k * 7) % 11 - 5)) for k in range(300)), "utf-8")
-    page.page.set_input_files("#file", file)
-    page.page.locator(".missing button", has_text="m/s2: PGA").first.click()
-    # The question that is left has the keys.
-    assert page.js("document.activeElement.closest('.missing')?.textContent ?? ''") != ""
-    page.rested(lambda: entered(page, "dt", "0,02"))
-    assert query_of(page)["dt"] == "0.02" == page.page.input_value("#dt")
-    page = opened("mesh=statue&azimuth=90&motion=ridgecrest-clc-090&pga=0.4g")
-    page.page.click("#block-form details summary")
-    page.rested(lambda: entered(page, "tolerance", "0,001"))
-    assert query_of(page)["tolerance"] == "0.001"
-
-
-def test_a_folder_that_is_dropped_is_said_to_be_one(opened, tmp_path):
-    only_chromium("drop a folder")
-    page = opened(STATUE)
-    session = page.page.context.new_cdp_session(page.page)
-    data = {"items": [], "files": [str(tmp_path)], "dragOperationsMask": 1}
-    for kind in ("dragEnter", "dragOver", "drop"):
-        session.send("Input.dispatchDragEvent", {"type": kind, "x": 600, "y": 400, "data": data})
-    page.until("!document.getElementById('problem').hidden")
-    assert page.text("#problem") == f"{tmp_path.name} cannot be read: is it a folder, or gone?"
-
-
 @MORE
 def test_names_of_files_and_channels_are_shown_as_they_are_written(opened):
     page = opened(STATUE)
@@ -944,45 +596,6 @@ def test_names_of_files_and_channels_are_shown_as_they_are_written(opened):
             page.paused(150)
         assert page.js("document.getElementById('hostile')") is None
         page.rested(lambda: page.page.click("[data-view=response]"))
-
-
-@pytest.mark.parametrize("kind", [pytest.param("text/plain", marks=MORE), "text/uri-list"])
-def test_dragged_text_opens_nothing_and_leads_nowhere(opened, kind):
-    page = opened(STATUE)
-    before = (page.page.url, page.js("document.body.dataset.drawn"))
-    drag = """async (kind) => {
-      const given = new DataTransfer();
-      given.setData(kind, 'http://127.0.0.1:1/');
-      const told = [];
-      for (const name of ['dragenter', 'dragover', 'drop']) {
-        const event = new DragEvent(name, {dataTransfer: given, bubbles: true, cancelable: true});
-        document.querySelector('main').dispatchEvent(event);
-        told.push(event.defaultPrevented, document.getElementById('dropping').hidden);
-      }
-      return told;
-    }"""
-    assert page.js(drag, kind) == [False, True, True, True, True, True]
-    title = page.page.locator("#chattering-title")
-    title.select_text()
-    title.drag_to(page.page.locator("#verdict"))
-    page.paused(200)
-    assert (page.page.url, page.js("document.body.dataset.drawn")) == before
-    assert page.js("document.getElementById('dropping').hidden && document.getElementById('problem').hidden")
-
-
-def test_every_view_and_every_case_has_a_title_of_its_own(opened):
-    page = opened(f"{SINE}&points=8&sweep_points=8")
-    titles = []
-    for view in VIEWS:
-        page.page.click(f"[data-view={view}]")
-        page.until(f"document.title.startsWith({view.capitalize()!r})")
-        titles.append(page.page.title())
-    page.page.click("[data-view=response]")
-    page.rested(lambda: page.page.select_option("#kind", "none"))
-    page.until("document.title.includes('no ground motion')")
-    titles.append(page.page.title())
-    assert titles[0] == "Response: p = 2 rad/s, α = 11.5°, sine 0.206 g – rocking explorer"
-    assert len({*titles}) == len(VIEWS) + 1
 
 
 def test_a_file_of_several_channels_is_dropped(opened):
@@ -1024,7 +637,6 @@ INK = """() => { const {data} = document.getElementById('stage').getContext('2d'
 
 
 def test_a_body_is_seen_from_above_and_turned(opened, explorer):
-    only_chromium("click at a part of a pixel")
     page = opened(MESH, allowed=["willReadFrequently"])
     page.until(PLAN, "the plan is drawn")
     assert "Towards 30°" in page.text("#derived") and "Towards 210°" in page.text("#derived")
@@ -1074,29 +686,7 @@ def test_a_mesh_is_dropped_read_otherwise_and_opened_again_by_its_link(opened, e
     assert query_of(page)["mesh"] == link["mesh"]
 
 
-@pytest.mark.parametrize(
-    ("viewport", "scheme"), [pytest.param(DESK, "dark", marks=MORE), (PHONE, "light")], ids=["desk", "phone"]
-)
-def test_a_body_has_no_barrier_and_is_compared_with_itself_turned(opened, viewport, scheme):
-    axe = tool("axe-core/axe.min.js").read_text("utf-8")
-    page = opened(f"{MESH}&view=block", viewport, scheme, bypass_csp=True)
-    page.js(axe + "; 1")
-    page.until(PLAN, "the plan is drawn")
-    if viewport is PHONE:
-        page.page.click("#to-settings")
-    page.page.click("summary:has-text('How the mesh is read')")
-    found = page.js("axe.run(document, {resultTypes: ['violations']})")
-    assert [(each["id"], [node["target"] for node in each["nodes"]][:4]) for each in found["violations"]] == []
-    assert page.js("document.documentElement.scrollWidth") <= viewport["width"]
-    if viewport is PHONE:
-        page.page.click("#to-settings")
-    page.page.click("[data-view=compare]")
-    page.page.select_option("#compare-with", "block")
-    page.until("new URLSearchParams(location.search).get('other.azimuth') === '120'")
-    assert page.text("#compare-verdict").startswith("The other: ")
-
-
-def test_a_record_shakes_upwards_as_well(opened, tmp_path):
+def test_a_record_shakes_upwards_as_well(opened):
     page = opened(STATUE, allowed=["422"])
     assert "vertical" not in page.text("#legend")
     page.rested(lambda: page.page.select_option("#vertical", "ridgecrest-clc-up"))
@@ -1108,40 +698,8 @@ def test_a_record_shakes_upwards_as_well(opened, tmp_path):
     assert "vertical acceleration (ridgecrest-clc-up" in page.text("#legend")
     assert "--vertical ridgecrest-clc-up" in page.text("#command")
     assert "with_vertical(rocking.records.load('ridgecrest-clc-up'))" in page.text("#python")
-    file = tmp_path / "up.txt"
-    file.write_text("\n".join(f"{value:.17g}" for value in upwards.samples[1]), "utf-8")
-    with page.page.expect_file_chooser() as chooser:
-        page.page.click("#choose-vertical")
-    chooser.value.set_files(file)
-    page.until("getComputedStyle(document.getElementById('units').parentElement).display !== 'none'")
-    page.page.locator("#dt").fill("0.01")
-    page.page.locator("#dt").press("Enter")
-    page.rested(lambda: page.page.select_option("#units", "m/s2"))
-    assert query_of(page)["vertical"].startswith("file:")
-    assert peak_shown(page) == pytest.approx(known_ratio(response), abs=6e-4)
     page.rested(lambda: page.page.select_option("#record", "ridgecrest-clc-360"))
     assert "vertical" not in query_of(page)
-
-
-def test_a_mistake_in_a_map_or_in_a_comparison_is_marked_there_and_gone_with_the_view(opened):
-    page = opened(f"view=map&{SINE}&points=8", allowed=["422"])
-    complete(page)
-    assert page.page.input_value("#map-points") == "8"  # also where the field does not offer it
-    end = page.page.locator("#map-x-to")
-    end.fill("nothing")
-    end.press("Enter")
-    page.until("!document.getElementById('problem').hidden")
-    assert page.text("#problem")
-    page.page.click("[data-view=compare]")
-    page.until("document.body.dataset.compared && document.getElementById('problem').hidden")
-    before = page.js("Number(document.body.dataset.compared)")
-    page.page.select_option("#compare-with", "block")
-    page.until(f"Number(document.body.dataset.compared) > {before} && document.getElementById('other-p')")
-    other = page.page.locator("#other-p")
-    other.fill("-1")
-    other.press("Enter")
-    page.until("!document.getElementById('problem').hidden")
-    assert page.js(MARKED) == ["other-p"]
 
 
 def test_a_broken_file_is_answered_with_a_sentence(opened):
@@ -1150,26 +708,9 @@ def test_a_broken_file_is_answered_with_a_sentence(opened):
     page.until("!document.getElementById('problem').hidden")
     assert page.text("#problem").startswith("broken.at2")
     assert page.text("#verdict").startswith("It stays up")
-    # The case that is shown is the one that was asked for; the sentence stays until the next file.
     assert page.page.locator("#old").is_hidden() and page.js(GREY) == []
-    page.rested(lambda: entered(page, "width", "0.3"))
-    assert page.page.locator("#problem").is_visible()
     page.rested(lambda: page.js(DROP, ["whole.csv", ROWS]))
     page.until("document.getElementById('problem').hidden")
-
-
-def test_what_cannot_be_saved_or_printed_is_said_until_it_can_and_greys_nothing(opened):
-    page = opened(STATUE, allowed=["ERR_FAILED"])
-    page.js("window.print = () => { document.body.dataset.printed = '1'; }; 1")
-    for path, button in (("export", "#exports button"), ("summary", "#print")):
-        page.page.route(f"**/api/{path}?*", lambda route: route.abort())
-        page.page.locator(button).first.click()
-        page.until("!document.getElementById('problem').hidden")
-        assert page.text("#problem").startswith("The explorer does not answer")
-        assert page.page.locator("#old").is_hidden() and page.js(GREY) == []
-        page.page.unroute(f"**/api/{path}?*")
-        page.page.locator(button).first.click()
-        page.until("document.getElementById('problem').hidden")
 
 
 # Ways out
@@ -1193,62 +734,6 @@ def test_the_copied_command_and_the_script_have_the_same_peak(opened, tmp_path):
     peak = json.loads(ran.stdout)["peak_rotation_rad"]
     assert float(printed.splitlines()[-1]) == peak
     assert peak_shown(page) == pytest.approx(json.loads(ran.stdout)["peak_over_slenderness"], rel=2e-3)
-
-
-@MORE
-def test_random_states_show_what_their_commands_print(opened, here, run):
-    page, draw, judged = opened(STATUE), random.Random(27), 0
-    for _ in range(10):
-        texts = explorer_addresses.sound(draw)
-        page.page.goto(here.link(texts))
-        page.until(READY, texts)
-        asked = "import('/page/api.js').then(({payload}) => payload('/api/case', %s)).then(({header}) => header)"
-        header = page.js(asked % "Object.fromEntries(new URLSearchParams(location.search))")
-        page.page.click("#in-words summary")
-        page.until("document.querySelectorAll('#words tr').length > 5")
-        words = (
-            "Array.from(document.querySelectorAll('#words tr'), (row) => Array.from(row.cells, (e) => e.textContent))"
-        )
-        command = shlex.split(page.until("document.getElementById('command').textContent"))
-        found = run(*command[1:], "--json", "--quiet")
-        assert found[0] == 0 and found[2] == "", texts
-        result = json.loads(found[1])
-        assert result["peak_rotation_rad"] == header["peak_rotation"], texts
-        # What is read on the page, to the digits that it shows.
-        peak, rests, impacts = page.page.locator("#figures dd").all_text_contents()[:3]
-        assert peak.startswith("overturns") == result["overturned"] == ("overturns" in page.text("#verdict")), texts
-        if not result["overturned"]:
-            assert float(f"{result['peak_over_slenderness']:.3g}") == peak_shown(page), texts
-        assert int(re.match(r"[\d,]+", impacts)[0].replace(",", "")) == result["impacts_resolved"], texts
-        assert int(rests.split()[0]) == sum(each["kind"] == "rest" for each in result["events"]), texts
-        assert page.text("#verdict") == in_english(header["verdict"]), texts
-        printed = " ".join(run(*command[1:])[1].split())
-        # A mesh is written as its pivots, so that its block is called otherwise.
-        rows = page.js(words)[1 if "mesh" in texts else 0 :]
-        assert printed.endswith(" ".join(" ".join(row).strip() for row in rows)), texts
-        judged += 1
-    assert judged == 10
-
-
-@MORE
-def test_every_file_can_be_taken_away(opened):
-    only_chromium("hand over what it has saved")
-    page = opened(f"{SINE}&from=0.5&to=2")
-    files = page.page.locator("#exports button")
-    starts = {
-        "svg": b"<?xml",
-        "png": b"\x89PNG",
-        "csv": b"time_s,rotation_rad",
-        "events.csv": b"time_s,kind",
-        "impacts.csv": b"time_s,side",
-        "nc": b"\x89HDF",
-    }
-    assert files.count() == len(starts)
-    for k, (form, start) in enumerate(starts.items()):
-        with page.page.expect_download() as download:
-            files.nth(k).click()
-        assert download.value.suggested_filename == f"rocking-response.{form}"
-        assert Path(download.value.path()).read_bytes().startswith(start)
 
 
 # The block
@@ -1383,62 +868,6 @@ def test_a_small_response_is_shown_where_the_pointer_lies_still(opened, explorer
     case = read_case(dict(parse_qsl(SINE)), explorer.uploads)
     verdict = explorer.case(maps.texts_at(maps.grid_of(case, grid), x, y)).header["verdict"]
     assert page.text("#map-small p").startswith(in_english(verdict))
-    plots = page.page.locator("#map")
-    plots.focus()
-    plots.press("Escape")
-    assert small.is_hidden()
-    before = len(asked)
-    plots.press("ArrowRight")
-    small.wait_for(state="visible", timeout=20_000)
-    page.until("document.getElementById('said').textContent.startsWith('It ')")
-    assert len(asked) == before + 1
-
-
-def test_a_map_that_has_changed_shows_nothing_of_the_one_before(opened):
-    page = opened(f"{SINE}&view=map&points=12")
-    complete(page)
-    page.page.focus("#map")
-    page.page.keyboard.press("ArrowUp")
-    page.page.locator("#map-small").wait_for(state="visible")
-    # Another case: what the keys pointed at is gone, and until a part is computed nothing is known.
-    page.js("""new MutationObserver((_, seen) => {
-      document.body.dataset.seen = (document.body.dataset.seen ?? "") + document.getElementById("map-at").textContent;
-    }).observe(document.getElementById("map-at"), {childList: true, characterData: true, subtree: true})""")
-    entered(page, "restitution", "0.6")
-    page.until("location.search.includes('restitution=0.6')")
-    complete(page)
-    assert page.page.locator("#map-small").is_hidden() and ": ." not in page.js("document.body.dataset.seen")
-    # Another axis, closer, and back in the browser's history: there is nothing to zoom out to.
-    first = query_of(page)
-    page.page.select_option("#map-x", "p")
-    page.until("location.search.includes('x=p&')")
-    page.page.focus("#map")
-    page.page.keyboard.press("+")
-    page.until("location.search.includes('x_from')")
-    while query_of(page).get("x") == "p":
-        page.page.go_back()
-        page.paused(200)
-    complete(page)
-    assert query_of(page) == first and page.page.locator("#map-out").is_disabled()
-    # Another motion has another axis to the right, with its own ends.
-    page.page.focus("#map")
-    page.page.keyboard.press("+")
-    page.until("location.search.includes('x_from')")
-    page.page.select_option("#kind", "record")
-    page.until("location.search.includes('x=p&')")
-    assert not {"x_from", "x_to"} & query_of(page).keys()
-
-
-def test_a_map_says_what_is_other_than_in_the_case(opened):
-    page = opened(f"{SINE}&view=map&points=9&initial_rotation=1deg")
-    complete(page)
-    assert page.text("#map-notes").startswith("Every point begins at rest")
-    page.page.click("text=Response")
-    page.page.fill("[data-argument=initial_rotation]", "0")
-    page.page.keyboard.press("Tab")
-    page.page.click("text=Map")
-    complete(page)
-    assert page.page.locator("#map-notes").is_hidden()
 
 
 def test_a_map_has_the_units_of_the_page_and_its_address_those_of_the_axes(opened):
@@ -1463,7 +892,6 @@ def test_a_map_has_the_units_of_the_page_and_its_address_those_of_the_axes(opene
 
 
 def test_a_map_is_taken_away_and_computed_again(opened, tmp_path):
-    only_chromium("hand over what it has saved")
     page = opened(f"view=map&{SINE}&points=8&x=omega&x_from=1&x_to=4&y=a&y_from=1&y_to=8&quantity=mode")
     complete(page)
     assert page.text("#python-title") == "This map as Python"
@@ -1497,20 +925,6 @@ def test_a_map_is_taken_away_and_computed_again(opened, tmp_path):
     page.until("document.getElementById('python-title').textContent === 'This case as Python'")
 
 
-@pytest.mark.parametrize("scheme", [pytest.param("light", marks=MORE), "dark"])
-def test_the_key_of_a_curve_is_drawn_as_the_curve(opened, scheme):
-    page = opened(f"view=map&{SINE}&points=8", scheme=scheme)
-    complete(page)
-    keys = "Array.from(document.querySelectorAll('#map-legend .on-map'), (each) => getComputedStyle(each))"
-    exact, fitted = page.js(f"{keys}.map(({{background: each}}) => each)")
-    assert page.js(f"{keys}.map((each) => [each.height, each.borderTopStyle])") == [["6px", "none"]] * 2
-    inks = f"{MODELS}.filter((each) => each.type === 'Line').map((each) => each.line_color.value ?? each.line_color)"
-    assert set(page.js(inks)) == {"#10243e", "#ffffff"}
-    for each in (exact, fitted):
-        assert all(part in each for part in ("repeating-linear-gradient", "rgb(16, 36, 62)", "rgb(255, 255, 255)"))
-    assert "rgb(255, 255, 255) 11px" in fitted and page.text("#map-legend").endswith("Eq. 76")
-
-
 def test_a_map_of_a_record_opens_on_the_final_fate_and_hatches_what_falls_later(opened, explorer):
     page = opened("view=map&width=0.24&height=1.1&motion=el-centro-meloland-270&points=40&y_from=0.1&y_to=2")
     page.until("document.body.dataset.map === 'complete'", timeout=120)
@@ -1531,17 +945,6 @@ def test_a_map_of_a_record_opens_on_the_final_fate_and_hatches_what_falls_later(
     assert "End of the first rocking" in page.text("#map-quantity option:checked")
     (later,) = re.findall(r"hatched: overturns later, ([\d.]+) %", page.text("#map-legend"))
     assert float(later) == pytest.approx(100 * (falls & ~at_once).mean(), rel=0.05) and float(later) > 1.0
-
-
-def test_a_map_of_a_record_offers_a_sine_whose_critical_amplitude_is_known(opened):
-    for more, gravity in (("", 9.80665), ("&gravity=1.62", 1.62)):
-        page = opened(f"view=map&{STATUE}&points=8{more}")
-        page.page.click("#map-sine")
-        page.says("map-legend", "exact critical amplitude")
-        found = query_of(page)
-        amplitude = quantities.acceleration(found["motion"].removeprefix("sine:amplitude=").split(",")[0], "amplitude")
-        assert amplitude == pytest.approx(1.03 * gravity * 0.24 / 1.1, rel=1e-3)
-        assert found.get("gravity", "") == more.removeprefix("&gravity=")
 
 
 def test_a_study_opens_as_a_map(browser, opened, tmp_path_factory):
@@ -1572,16 +975,7 @@ def test_a_study_opens_as_a_map(browser, opened, tmp_path_factory):
     page.until("!location.search.includes('scale_index')")
     page.says("map-legend", shares)
     assert scale.input_value() == "0"
-    # What is printed is of the study, and not of a case that nobody chose.
-    page.js("window.print = () => { document.body.dataset.printed = '1'; }; 1")
-    page.page.click("#print")
-    page.until("document.body.dataset.printed")
-    head = page.text("#print-head")
-    assert (
-        head.startswith("Studymuseum: ") and "scale 0.203943 g" in head and "ridgecrest" not in head.split("Address")[0]
-    )
-    assert page.text("#print-summary") == ""
-    # A rectangle of its cells is shown larger, and left again; a response is shown where the pointer lies still.
+    # A rectangle of its cells is shown larger, and left again.
     ends = f"({MODELS}).filter((each) => each.type === 'Figure').map((each) => [each.x_range.start, each.x_range.end])"
     (whole,) = page.js(ends)
     box = page.page.locator("#map").bounding_box()
@@ -1593,9 +987,6 @@ def test_a_study_opens_as_a_map(browser, opened, tmp_path_factory):
     page.until("!document.getElementById('map-out').disabled")
     ((low, high),) = page.js(ends)
     assert whole[0] < low < high < whole[1]
-    page.page.mouse.move(x + 40, y + 40)
-    page.page.locator("#map-small").wait_for(state="visible", timeout=20_000)
-    assert page.text("#map-small p").startswith("It ")
     page.page.click("#map-out")
     assert page.js(ends) == [whole] and page.page.locator("#map-out").is_disabled()
     page.rested(lambda: page.page.click("#map-open"))
@@ -1641,76 +1032,14 @@ def test_uneven_cells_of_a_study_lie_where_their_values_do(opened, tmp_path_fact
     running.server.should_exit = True
 
 
-@pytest.mark.parametrize(
-    ("query", "field", "done"),
-    [
-        (f"view=map&{SINE}&points=8&x=omega&x_to=4", "map-x-to", "map"),
-        pytest.param(f"view=periodic&{SINE}&sweep_points=12&sweep_to=4", "sweep_to", "sweep", marks=MORE),
-        pytest.param(f"view=assessment&{STATUE}&levels=4&records={RECORDS}", "levels", "assessment", marks=MORE),
-    ],
-)
-def test_the_way_back_shows_the_number_that_was_there_before_also_where_the_keys_are(opened, query, field, done):
-    page = opened(query)
-    shown, name = f"document.getElementById('{field}').value", field.replace("map-", "").replace("-", "_")
-    page.until(f"document.body.dataset.{done} === 'complete' && {shown} === '4'")
-    entered(page, field, "5")
-    page.until(f"new URLSearchParams(location.search).get('{name}') === '5'")
+def test_the_way_back_shows_the_number_that_was_there_before_also_where_the_keys_are(opened):
+    page = opened(f"view=map&{SINE}&points=8&x=omega&x_to=4")
+    shown = "document.getElementById('map-x-to').value"
+    page.until(f"document.body.dataset.map === 'complete' && {shown} === '4'")
+    entered(page, "map-x-to", "5")
+    page.until(f"{AT}('x_to') === '5'")
     page.page.go_back()
-    page.until(f"new URLSearchParams(location.search).get('{name}') === '4' && {shown} === '4'", timeout=10.0)
-
-
-def test_a_map_is_zoomed_from_the_ends_that_are_asked_for(opened):
-    page = opened(f"view=map&{SINE}&points=24&x=omega&x_from=1&x_to=5&y=a&y_from=1&y_to=1.1")
-    complete(page)
-    page.page.focus("#map")
-    with held(page, "**/api/map?*") as waiting:
-        page.page.keyboard.press("+")
-        asked(page, waiting)
-        page.page.keyboard.press("+")
-        page.paused(100)
-        low, high = (float(page.page.input_value(f"#map-x-{end}")) for end in ("from", "to"))
-        assert high - low == pytest.approx(1.0, rel=0.01)
-        page.page.keyboard.press("-")
-        low, high = (float(page.page.input_value(f"#map-x-{end}")) for end in ("from", "to"))
-        assert high - low == pytest.approx(2.0, rel=0.01)
-    complete(page)
-
-
-def test_a_point_of_a_map_is_of_the_axes_that_are_drawn(opened):
-    page = opened(f"view=map&{SINE}&points=24&x=omega&x_from=1&x_to=5&y=a&y_from=1&y_to=1.1", allowed=["422"])
-    complete(page)
-    asks = []
-    page.page.on("request", lambda request: asks.append(request.url) if "/api/map/" in request.url else None)
-    with held(page, "**/api/map?*") as waiting:
-        page.page.select_option("#map-y", "restitution")
-        asked(page, waiting)
-        page.page.focus("#map")
-        page.page.keyboard.press("Enter")
-        page.until("!location.search.includes('view=map')")
-    (ask,) = [parse_qs(urlsplit(each).query) for each in asks if "/point?" in each]
-    assert ask["y"] == ["a"] and 1.0 <= float(ask["at_y"][0]) <= 1.1
-    assert page.page.locator("#problem").is_hidden()
-    # What the pointer asks for while a map gives way to another is of neither.
-    page = opened(f"view=map&{SINE}&points=24&x=omega&x_from=1&x_to=5&y=a&y_from=1&y_to=1.1")
-    complete(page)
-    box = page.page.locator("#map").bounding_box()
-    page.page.focus("#map")
-    # What is wrong with one point greys no map, and is not said of the next point.
-    page.allowed = ["ERR_FAILED"]
-    page.page.route("**/api/map/response?*", lambda route: route.abort())
-    page.page.keyboard.press("ArrowRight")
-    page.until("!document.getElementById('problem').hidden")
-    assert page.js(GREY) == []
-    page.page.unroute("**/api/map/response?*")
-    page.page.keyboard.press("ArrowRight")
-    page.until("!document.getElementById('map-small').hidden")
-    assert page.page.locator("#problem").is_hidden()
-    for k in range(4):
-        page.page.keyboard.press("+")
-        page.page.mouse.move(box["x"] + 200 + 30 * k, box["y"] + 120)
-        complete(page)
-        page.paused(200)
-        assert page.page.locator("#problem").is_hidden()
+    page.until(f"{AT}('x_to') === '4' && {shown} === '4'", timeout=10.0)
 
 
 # Periodic motion
@@ -1753,9 +1082,6 @@ def test_a_click_on_a_diagram_opens_the_case_at_that_amplitude(opened):
     start = (float(found["initial_rotation"]), float(found["initial_velocity"]))
     rock = rocking.dynamics.stroboscopic_map(block, rocking.pulses.sine(float(numbers["amplitude"]), 2.0, cycles=1))
     assert rock(start, 2) == pytest.approx(start, abs=1e-6)
-    shown = page.js(f"""() => {MODELS}
-        .filter((each) => each.type === 'Scatter' && each.size.value === 8).length""")
-    assert shown == 1
     page.page.click("[data-view=response]")
     page.until("document.getElementById('python-title').textContent === 'This case as Python'")
     assert query_of(page)["initial_rotation"] == found["initial_rotation"]
@@ -1781,25 +1107,7 @@ def test_a_diagram_is_read_by_keys_and_swept_over_the_frequency(opened):
     assert "case, np.linspace(0.5, 8.0, 100), (0.0, 0.0)" in page.text("#python")
 
 
-@MORE
-def test_points_beside_each_other_read_otherwise(opened):
-    ends = "from=2&{0}_to=2.004"
-    for query, done, field, said in (
-        (f"view=map&{SINE}&points=8&x=omega&y=a&y_{ends.format('y')}", "map", "map", "map-at"),
-        (f"view=periodic&{SINE}&sweep_points=12&sweep_{ends.format('sweep')}", "sweep", "diagram", "sweep-at"),
-    ):
-        page = opened(query)
-        page.until(f"document.body.dataset.{done} === 'complete'")
-        page.page.focus(f"#{field}")
-        read = set()
-        for _ in range(3):
-            page.page.keyboard.press("ArrowUp" if field == "map" else "ArrowRight")
-            read.add(re.findall(r"2\.\d+", page.text(f"#{said}"))[0])
-        assert len(read) == 3
-
-
 def test_a_diagram_is_taken_away_and_computed_again(opened, tmp_path):
-    only_chromium("hand over what it has saved")
     page = periodic(opened, f"{CASCADE}&sweep_points=100&sweep_from=1&sweep_to=7.2")
     assert page.text("#python-title") == "This diagram as Python"
     saved = {}
@@ -1827,44 +1135,6 @@ def test_a_diagram_is_taken_away_and_computed_again(opened, tmp_path):
     assert page.text("#command").startswith("rocking bifurcation --pulse sine:frequency=2.0 --along amplitude:")
 
 
-def test_files_are_those_of_what_is_shown_also_after_a_refusal(opened):
-    only_chromium("hand over what it has saved")
-
-    def saved(page, label):
-        with page.page.expect_download(timeout=20_000) as download:
-            page.page.click(f"#exports button:text-is('{label}')")
-        return Path(download.value.path()).read_bytes()
-
-    page = opened(f"{STATUE}&view=assessment&levels=4&records={RECORDS}", allowed=["422"])
-    page.until("document.body.dataset.assessment === 'complete'")
-    labels = ("Curve, CSV", "Records, CSV")
-    files = [saved(page, label) for label in labels]
-    entered(page, "friction", "-1")
-    page.until("!document.getElementById('problem').hidden")
-    assert [saved(page, label) for label in labels] == files
-    assert files[1].count(b"\n") == 4
-    page = periodic(opened, f"{CASCADE}&sweep_points=12", allowed=["422"])
-    numbers = saved(page, "Numbers, CSV")
-    entered(page, "sweep_to", "-5")
-    page.until("!document.getElementById('problem').hidden")
-    assert saved(page, "Numbers, CSV") == numbers
-    # An end that is emptied is the one that is drawn by default.
-    entered(page, "sweep_to", "")
-    page.until("document.getElementById('problem').hidden && document.getElementById('sweep_to').value")
-
-
-def test_a_mistake_in_a_sweep_is_marked_there(opened):
-    page = periodic(opened, f"{CASCADE}&sweep_points=24", allowed=["422"])
-    assert page.page.input_value("#sweep_points") == "24"
-    end = page.page.locator("#sweep_to")
-    end.fill("nothing")
-    end.press("Enter")
-    page.until("!document.getElementById('problem').hidden")
-    assert page.js(MARKED) == ["sweep_to"]
-    page.page.click("[data-view=response]")
-    page.until("document.getElementById('problem').hidden")
-
-
 def test_a_record_is_answered_with_the_nearest_sine(opened):
     page = opened(f"view=periodic&{STATUE}&sweep_points=24")
     page.says("orbit-verdict", "needs a sine")
@@ -1875,38 +1145,6 @@ def test_a_record_is_answered_with_the_nearest_sine(opened):
     assert "pga" not in found and found["width"] == "0.24"
     page.until("document.body.dataset.sweep === 'complete'")
     assert page.page.locator("#save").is_visible()
-    # A record that is chosen while the sine's answer is on its way has no diagram, and none is asked for in its place.
-    page.allowed = ["422"]
-    with held(page, "**/api/orbit?*") as waiting:
-        entered(page, "width", "0.25")
-        asked(page, waiting)
-        page.page.select_option("#kind", "record")
-    page.until("document.getElementById('orbit-offer').checkVisibility()")
-    page.paused(500)
-    assert page.page.locator("#problem").is_hidden()
-
-
-def test_a_point_of_a_diagram_is_of_the_sweep_that_is_drawn(opened):
-    page = periodic(opened, f"{CASCADE}&sweep_from=2&sweep_to=5&sweep_points=20")
-    with held(page, "**/api/orbit?*") as waiting:
-        page.page.select_option("#sweep", "omega")
-        asked(page, waiting)
-        page.page.focus("#diagram")
-        with page.page.expect_request("**/api/sweep/point?*") as opening:
-            page.page.keyboard.press("Enter")
-    ask = parse_qs(urlsplit(opening.value.url).query)
-    assert "sweep" not in ask or ask["sweep"] == ["a"]
-    assert 2.0 <= float(ask["at"][0]) <= 5.0
-
-
-def test_a_diagram_is_of_the_sign_of_the_sine(opened):
-    leaning = "width=0.3&height=1.5&offset=0.03&motion=sine:amplitude%3D0.25g,frequency%3D1.5,cycles%3D2.5,phase%3D0deg"
-    page = periodic(opened, f"{leaning}&sweep_points=8&sweep_from=1&sweep_to=4")
-    assert "phase=" not in page.text("#python")
-    page.js("document.body.dataset.sweep = 'waits'")
-    entered(page, "pulse-amplitude", "-0.25")
-    page.until("document.body.dataset.sweep === 'complete'", "another diagram is complete")
-    assert "phase=3.14159" in page.text("#python") and "phase=3.14159" in page.text("#command")
 
 
 def amplitude_in_code(page):
@@ -1930,31 +1168,7 @@ def test_the_code_and_the_mark_of_a_diagram_are_of_the_case_that_is_shown(opened
     assert swept == []  # the diagram is the same all the while
 
 
-@MORE
-def test_a_diagram_that_begins_when_another_case_is_shown_has_the_code_of_that(opened):
-    page = periodic(opened, f"{CASCADE},phase%3D0deg&sweep_points=8&sweep_from=1&sweep_to=3")
-    page.js("document.body.dataset.sweep = 'waits'")
-    with held(page, "**/api/sweep?*") as waiting:
-        entered(page, "sweep_to", "4")
-        asked(page, waiting)
-        settles(page, lambda: entered(page, "pulse-amplitude", "0.5"))
-    page.until("document.body.dataset.sweep === 'complete'")
-    assert amplitude_in_code(page) == pytest.approx(0.5 * 1.1 / 0.24, rel=1e-12)
-
-
 # Comparing
-
-
-def test_a_comparison_is_there_after_going_back(opened):
-    page = opened(STATUE)
-    page.page.click('[data-view="compare"]')
-    page.until("document.body.dataset.compared")
-    page.until("location.search.includes('view=compare')")
-    page.page.go_back()
-    page.until("!location.search.includes('view=compare')")
-    page.page.click('[data-view="compare"]')
-    page.page.locator("#compare-plots").wait_for(state="visible", timeout=20_000)
-    page.until("location.search.includes('other.chattering')")
 
 
 def test_a_thresholds_wrong_answer_is_seen(opened):
@@ -1964,20 +1178,6 @@ def test_a_thresholds_wrong_answer_is_seen(opened):
     assert max(first["y"]) > 2.0 * max(second["y"])
     assert "7 by the treatment" in page.text("#compare-verdict")
     assert page.text("#compare-verdict").startswith("The other (Velocity threshold, 0.05 pα): It stays up")
-
-
-def test_a_threshold_is_compared_with_the_certificate(opened):
-    page = opened(f"view=compare&{STATUE}&chattering=velocity%3D0.05")
-    page.until("document.body.dataset.compared")
-    page.page.select_option("#other-treatment", "certified")
-    page.says("compare-verdict", "The other (Proof)")
-    assert query_of(page)["other.chattering"] == "certified"
-    assert page.page.locator("#compare-plots").is_visible()
-    first, second = plotted(page, "first", "compare-plots"), plotted(page, "second", "compare-plots")
-    assert max(second["y"]) > 2.0 * max(first["y"])
-    # The case's own texts leave out what is the default.
-    page.rested(lambda: page.page.select_option("#treatment", "certified"))
-    assert "chattering" not in query_of(page)
 
 
 @pytest.mark.parametrize("what", ["block", "motion"])
@@ -2013,56 +1213,6 @@ def test_the_other_block_is_half_as_large_again_whatever_lengths_are_shown_in(op
     assert {name: found[f"other.{name}"] for name in size} == size
 
 
-def test_a_comparison_with_a_pinned_case_shows_that_or_nothing(opened):
-    page = opened(f"{STATUE}&view=compare")
-    page.until("document.body.dataset.compared")
-    page.page.select_option("#compare-with", "case")
-    page.until("new URLSearchParams(location.search).get('compare') === 'case'")
-    for name in ("#compare-verdict", "#compare-plots", "#compare-legend", "#exports button"):
-        assert page.page.locator(name).first.is_hidden()
-    page.page.click("#pin")
-    page.page.fill("#pin-name", "mine")
-    page.page.click("#pin")
-    page.says("compare-verdict", "The other (mine)")
-    assert page.page.locator("#compare-plots").is_visible()
-    page.page.click(".chip .remove")
-
-
-def test_a_comparison_is_saved_as_it_was_asked_for(opened):
-    page = opened(f"{STATUE}&view=compare")
-    page.until("document.body.dataset.compared")
-    with held(page, "**/api/compare?*") as waiting:
-        entered(page, "other-velocity-limit", "0.02")
-        asked(page, waiting)
-        entered(page, "other-velocity-limit", "0.09")
-        waiting[0].continue_()
-        asked(page, waiting, 2)
-        page.says("compare-verdict", "Velocity threshold, 0.02 pα")
-        with page.page.expect_request("**/api/compare/table?*") as asking:
-            page.page.click("text=Both, histories, CSV")
-    ask = parse_qs(urlsplit(asking.value.url).query)
-    assert ask["other.chattering"] == ["velocity=0.02"] and "0.02" in ask["second"][0]
-
-
-@MORE
-def test_a_comparison_is_named_by_the_pinned_case_that_it_is_of(opened):
-    page = opened(STATUE)
-    texts = {"width": "0.24", "height": "1.1", "motion": "ridgecrest-clc-090"}
-    pinned = [{"name": f"pinned at {level}", "texts": {**texts, "pga": level}} for level in ("0.3g", "0.2g", "0.1g")]
-    page.js("(pinned) => localStorage.setItem('rocking-snapshots', JSON.stringify(pinned))", pinned)
-    page.page.goto(page.page.url + "&view=compare&compare=case")
-    page.until("document.body.dataset.compared")
-    with held(page, "**/api/compare?*") as waiting:
-        page.page.select_option("#other-case", "1")
-        asked(page, waiting)
-        page.page.select_option("#other-case", "2")
-        waiting[0].continue_()
-        asked(page, waiting, 2)
-        page.says("compare-verdict", "The other (pinned at 0.2g)")
-    page.says("compare-verdict", "The other (pinned at 0.1g)")
-    page.js("localStorage.removeItem('rocking-snapshots')")
-
-
 def test_the_other_block_stays_when_it_is_described_otherwise_whatever_the_gravity(opened):
     query = STATUE.replace("0.4g", "0.1g")
     page = opened(f"{query}&gravity=1.62&view=compare&compare=block&other.width=0.36&other.height=1.65")
@@ -2072,38 +1222,6 @@ def test_the_other_block_stays_when_it_is_described_otherwise_whatever_the_gravi
         page.until(f"new URLSearchParams(location.search).has('other.{name}')")
     found = query_of(page)
     assert [float(found[f"other.{name}"]) for name in ("width", "height")] == pytest.approx([0.36, 1.65], rel=1e-9)
-
-
-def test_a_late_answer_of_a_view_that_was_left_changes_nothing(opened):
-    page = opened(SINE)
-    for view, pattern in (("compare", "**/api/compare?*"), ("periodic", "**/api/orbit?*")):
-        with held(page, pattern) as waiting:
-            page.page.click(f"[data-view={view}]")
-            asked(page, waiting)
-            page.rested(lambda: page.page.click("[data-view=response]"))
-            before = [page.text("#python-title"), page.page.locator("#exports button").all_text_contents()]
-        page.paused(500)
-        assert [page.text("#python-title"), page.page.locator("#exports button").all_text_contents()] == before
-        assert len(before[1]) == 6 and page.js("document.body.dataset.sweep") is None
-
-
-@MORE
-def test_a_late_slice_of_a_study_changes_nothing_in_another_view(opened, tmp_path):
-    blocks = rocking.Blocks.grid(p=[2.0, 3.0], alpha=[0.1, 0.2], restitution=[0.9])
-    motion = rocking.records.load("el-centro-meloland-270")
-    rocking.study(tmp_path / "late", blocks, motion, levels=[2.0, 4.0], measure="pga").run(progress=False)
-    running = served(Explorer(), {"view": "map"}, StudyView(tmp_path / "late"))
-    running.run_in_background()
-    page = opened(server=running)
-    complete(page)
-    with held(page, "**/api/study?*") as waiting:
-        page.page.locator("#study-tools label", has_text="scale").locator("select").select_option("1")
-        asked(page, waiting)
-        page.rested(lambda: page.page.click("[data-view=response]"))
-    page.paused(500)
-    assert page.text("#python-title") == "This case as Python"
-    assert page.page.locator("#exports button").count() == 6
-    running.server.should_exit = True
 
 
 # Records, assessment, units, paper
@@ -2167,32 +1285,6 @@ def emptied(explorer):
         explorer.uploads.remove(key)
 
 
-def test_vertical_components_that_are_asked_for_before_the_list_is_there_leave_the_ticks(opened, explorer):
-    emptied(explorer)
-    page = opened(f"{STATUE}&view=response&records={RECORDS}")
-    with held(page, "**/api/list*") as waiting:
-        page.page.click('[data-view="records"]')
-        asked(page, waiting)
-        page.page.check("#records-vertical")
-    page.until(LISTED)
-    page.until("new URLSearchParams(location.search).get('records')?.includes('vertical=')")
-    assert query_of(page)["records"].count("motion=") == 3
-
-
-def test_an_assessment_that_was_left_while_its_list_came_begins_anew(opened, explorer):
-    emptied(explorer)
-    page = opened(f"{STATUE}&levels=3")
-    with page.page.expect_response("**/api/list*"), held(page, "**/api/list*") as waiting:
-        page.page.click('[data-view="assessment"]')
-        asked(page, waiting)
-        page.page.click('[data-view="response"]')
-        page.page.locator("#view-response").wait_for(state="visible")
-    page.paused(200)
-    page.page.click('[data-view="assessment"]')
-    page.until("document.body.dataset.assessment === 'complete'", "the assessment is complete", timeout=120.0)
-    assert page.text("#assessment-verdict")
-
-
 def test_what_is_ticked_is_what_the_address_says_and_what_is_assessed(opened, explorer):
     emptied(explorer)
     page = opened(f"{STATUE}&view=records&levels=3", allowed=["422"])
@@ -2201,12 +1293,7 @@ def test_what_is_ticked_is_what_the_address_says_and_what_is_assessed(opened, ex
     ticked = "Array.from(document.querySelectorAll('#records-table input'), (each) => each.checked)"
     before = page.js(ticked)
     boxes.nth(0).set_checked(not before[0])
-    one_ = query_of(page)["records"]
-    boxes.nth(1).set_checked(not before[1])
-    assert query_of(page)["records"] != one_
-    page.page.go_back()
-    page.until(f"new URLSearchParams(location.search).get('records') === {one_!r}")
-    page.until(f"JSON.stringify({ticked}) === {json.dumps(json.dumps([not before[0], *before[1:]]).replace(' ', ''))}")
+    assert query_of(page)["records"]
     page.page.go_back()
     page.until("!new URLSearchParams(location.search).has('records')")
     page.until(f"JSON.stringify({ticked}) === {json.dumps(json.dumps(before).replace(' ', ''))}")
@@ -2230,66 +1317,12 @@ def test_a_file_that_is_taken_out_is_no_longer_assessed(opened, explorer):
     for k, name in enumerate(names):
         boxes.nth(k).set_checked(name in ("a.csv", "b.csv"))
     assert query_of(page)["records"].count("file") == 2
-    button = page.page.locator("tr.station button").first
-    button.focus()
-    button.press("Enter")
+    page.page.locator("tr.station button").first.click()
     page.until(f"{LISTED} === {len(names) - 1}")
     assert query_of(page)["records"].count("file") == 1
-    assert page.js("document.activeElement.textContent") == "Take out"  # of the next file
     page.page.click("#records-assess")
     page.until("document.body.dataset.assessment === 'complete'")
     assert page.text("#assessment-about").startswith("1 record of the list")
-
-
-def test_what_is_wrong_with_dropped_files_is_said_and_the_next_are_read(opened, explorer):
-    emptied(explorer)
-    page = opened(STATUE, allowed=["422", "ERR_FAILED"])
-    with held(page, "**/api/list*") as waiting:
-        page.page.click("[data-view=records]")
-        asked(page, waiting)
-        page.page.fill("#records-search", "el")  # before there is a list
-        page.page.fill("#records-search", "")
-        page.js(
-            """() => { const carried = new DataTransfer();
-              for (const [name, text] of [["good.csv", "0.1\\n0.2\\n"], ["bad.csv", "no"], ["worse.csv", "nothing"]])
-                carried.items.add(new File([text], name));
-              window.dispatchEvent(new DragEvent("drop", {dataTransfer: carried, cancelable: true})); }"""
-        )
-        page.says("problem", "worse.csv")
-    page.until("document.body.dataset.added")
-    page.paused(300)
-    assert page.page.locator("#problem").is_visible() and "bad.csv" in page.text("#problem")
-    # One file that is dropped on the list is in it.
-    before = page.js(LISTED)
-    page.rested(lambda: page.js(DROP, ["single.csv", ROWS]))
-    page.until(f"{LISTED} === {before + 1}")
-    # The list does not come, and the next file is read all the same.
-    page.page.route("**/api/list*", lambda route: route.abort())
-    count = page.js("Number(document.body.dataset.added)")
-    page.js(
-        """([text]) => { const carried = new DataTransfer();
-          for (const k of [1, 2]) carried.items.add(new File([`${text}1.00,0.${k}\\n`], `${k}.csv`));
-          window.dispatchEvent(new DragEvent("drop", {dataTransfer: carried, cancelable: true})); }""",
-        [ROWS],
-    )
-    page.until(f"Number(document.body.dataset.added) > {count}")
-    assert page.text("#problem").startswith("The explorer does not answer")
-    page.page.unroute("**/api/list*")
-    page.rested(lambda: page.js(DROP, ["last.csv", f"{ROWS}1.00,0.3\n"]))
-    page.until("document.getElementById('said').textContent.includes('last.csv')")
-
-
-def test_a_record_that_is_chosen_where_nothing_shook_the_block_shakes_it_from_rest(opened):
-    page = opened("width=0.24&height=1.1&motion=none&initial_rotation=3deg&view=records")
-    page.until("document.querySelector('[data-record^=el-centro]')")
-    page.rested(lambda: page.page.click("[data-record='el-centro-meloland-270#']"))
-    found = query_of(page)
-    assert found["motion"] == "el-centro-meloland-270" and "initial_rotation" not in found
-
-
-def test_an_entry_of_the_list_without_a_motion_is_left_out(opened):
-    page = opened(f"{STATUE}&records=dt%3D0.01")
-    assert not page.js("document.body.inert")
 
 
 def test_an_assessment_is_the_packages_fragility_and_stops_when_the_reader_goes(opened):
@@ -2322,13 +1355,6 @@ def test_an_assessment_is_the_packages_fragility_and_stops_when_the_reader_goes(
     page.page.click("[data-view=response]")
     page.paused(500)
     assert page.js("document.body.dataset.assessed") == done and not page.page.is_visible("#problem")
-
-
-def test_an_assessment_says_that_a_case_overturns_as_it_is_apart_from_its_margin(opened):
-    query = {"view": "assessment", "records": "motion=el-centro-meloland-270", "levels": "2", "level_from": "0.2g"}
-    page = opened(f"{STATUE.replace('0.4g', '2g')}&{urlencode({**query, 'level_to': '0.9g'})}")
-    page.until("document.body.dataset.assessment === 'complete'", "the assessment is complete")
-    page.says("assessment-figures", "overturns first at 0.514 g; it overturns as it is")
 
 
 def test_units_are_chosen_once_and_in_the_address(opened):
@@ -2366,42 +1392,8 @@ def test_every_sentence_and_axis_has_the_units_that_are_chosen(opened):
         page.says("orbit-about", start)
 
 
-def test_a_g_is_the_same_whatever_gravity_a_block_has(opened):
-    sine = "motion=sine:amplitude%3D0.1g,frequency%3D0.5,cycles%3D2"
-    page = opened(f"p=1&alpha=0.2&restitution=0.9&gravity=1.62&{sine}")
-    assert f"lifts above {1.62 * math.tan(0.2) / 9.80665:.3g} g" in page.text("#derived")
-    assert "sine 0.1 g" in page.page.title()
-    assert max(plotted(page, "first-ground")["y"]) == pytest.approx(0.1, rel=1e-6)
-
-
-@pytest.mark.parametrize("width", [320, 390, 1280])
-def test_no_word_of_a_command_is_broken_that_fits_in_a_line(opened, width):
-    query = f"{STATUE}&model=linear&initial_rotation=-0.01&initial_velocity=0.05&chattering=velocity%3D0.02"
-    page = opened(query, {"width": width, "height": 800})
-    broken = """() => {
-      const command = document.getElementById('command'), walker = document.createTreeWalker(command, 4), found = [];
-      let count = 0;
-      for (let node = walker.nextNode(); node; node = walker.nextNode()) {
-        for (const {0: word, index} of node.data.matchAll(/\\S+/g)) {
-          const range = document.createRange();
-          range.setStart(node, index);
-          range.setEnd(node, index + word.length);
-          count += 1;
-          if (new Set(Array.from(range.getClientRects(), ({top}) => top)).size > 1) found.push(word);
-        }
-      }
-      return [count, found];
-    }"""
-    count, found = page.js(broken)
-    assert count >= 14 and found == []
-    copied = page.js("getSelection().selectAllChildren(document.getElementById('command')), String(getSelection())")
-    assert copied.strip() == page.text("#command")
-    assert shlex.split(copied)[:2] == ["rocking", "simulate"] and "--initial-velocity" in shlex.split(copied)
-
-
 @pytest.mark.parametrize("scheme", [pytest.param("light", marks=MORE), "dark"])
 def test_a_plain_case_is_printed_on_one_light_page_without_controls(opened, scheme):
-    only_chromium("show what is printed")
     page = opened(STATUE, scheme=scheme)
     page.js("window.print = () => { document.body.dataset.printed = '1'; }; 1")
     page.page.click("#print")
@@ -2420,35 +1412,6 @@ def test_a_plain_case_is_printed_on_one_light_page_without_controls(opened, sche
     page.page.emulate_media(media="screen")
     page.js("window.dispatchEvent(new Event('afterprint'))")
     assert (page.js(figure) == "#ffffff") == (scheme == "light")
-
-
-@pytest.mark.cases(fast=1)
-@pytest.mark.parametrize(
-    ("view", "query"),
-    [
-        ("assessment", f"{STATUE}&view=assessment&levels=6&records={RECORDS}"),
-        ("block", f"{STATUE}&view=block"),
-        ("compare", f"{SINE}&view=compare"),
-        ("periodic", f"{SINE}&view=periodic&sweep_points=24"),
-    ],
-)
-def test_a_view_is_printed_on_one_page_with_its_keys(opened, view, query):
-    only_chromium("show what is printed")
-    page = opened(query, {"width": 1440, "height": 900})
-    page.until(COMPUTED.get(view, "true"), "the view is complete")
-    page.js("window.print = () => { document.body.dataset.printed = '1'; }; 1")
-    page.page.click("#print")
-    page.until("document.body.dataset.printed", "the page is ready to be printed")
-    if view == "assessment":
-        assert "levels=6" in page.text("#print-head") and "records=" not in page.text("#print-head")
-    if view == "block":  # it is drawn for paper: shrunk, its letters would be smaller than those of the page
-        stage = "document.getElementById('stage')"
-        drawn = page.js(f"[{stage}.clientHeight, {stage}.height, {stage}.width - 3 * {stage}.clientWidth]")
-        assert drawn == [185, 555, 0]
-    assert len(re.findall(rb"/Type\s*/Page\b", page.page.pdf(prefer_css_page_size=True))) == 1
-    page.page.emulate_media(media="print")
-    keys = "Array.from(document.querySelectorAll('.key'), (each) => getComputedStyle(each).printColorAdjust)"
-    assert set(page.js(keys)) == {"exact"}
 
 
 # People
@@ -2527,62 +1490,6 @@ def test_no_view_has_a_barrier(opened, viewport, scheme):
     assert len(judged) == len(views) + 4
 
 
-@MORE
-def test_a_browser_whose_language_is_none_writes_numbers_as_the_page_does(opened):
-    page = opened(STATUE)
-    page.page.add_init_script("Object.defineProperty(Navigator.prototype, 'language', {get: () => 'C'})")
-    page.page.reload()
-    page.until(READY)
-    assert page.js("navigator.language") == "C" and page.text("#figures div:first-child dd").startswith("0.265")
-
-
-def test_the_page_follows_the_systems_colours(opened):
-    only_chromium("prefer other colours")
-    page = opened(STATUE)
-    fill = f"{MODELS}.find((each) => each.type === 'Figure').background_fill_color"
-    light = page.js(fill)
-    page.page.emulate_media(color_scheme="dark")
-    page.until(f"{fill} !== {light!r}")
-
-
-def test_everything_can_be_reached_by_keyboard(opened):
-    page = opened(STATUE)
-    reached = set()
-    for _ in range(70):
-        page.page.keyboard.press("Tab")
-        reached.add(
-            page.js(
-                "(({id, dataset}) => id || dataset.view || dataset.zoom || dataset.copy || '')(document.activeElement)"
-            )
-        )
-    assert {
-        "response",
-        "block",
-        "map",
-        "periodic",
-        "compare",
-        "width",
-        "width-slider",
-        "kind",
-        "record",
-        "model",
-        "treatment",
-        "histories",
-        "deeper",
-        "python",
-        "command",
-    } <= reached
-
-
-def test_explanations_open_where_they_stand(opened):
-    page = opened(STATUE)
-    page.page.click("[aria-label='What is chattering?']")
-    assert "accumulation point" in page.text("#chattering-words")
-    assert page.page.locator("#chattering-words").is_visible()
-    page.page.click("[aria-label='What is Width?']")
-    assert page.page.get_by_text("Full width 2b of a rectangular block.").is_visible()
-
-
 def test_a_finger_scrolls_the_page_over_the_plots(opened):
     page = opened(STATUE, PHONE, has_touch=True, is_mobile=True)
     assert page.js(f"{MODELS}.filter((each) => each.type === 'BoxZoomTool').length") == 0
@@ -2590,26 +1497,6 @@ def test_a_finger_scrolls_the_page_over_the_plots(opened):
 
 
 FOCUSED = "document.activeElement.id"
-
-
-def test_space_plays_from_the_stage_alone_and_a_map_hands_its_focus_on(opened):
-    page = opened(f"view=block&{STATUE}")
-    playing = "document.getElementById('play').textContent === 'Pause'"
-    page.page.focus("#slow")
-    page.page.keyboard.press("Space")
-    assert not page.js(playing) and not page.page.locator("#slow").is_checked()
-    page.page.focus("#stage-frame")
-    page.page.keyboard.press("Space")
-    assert page.js(playing)
-    assert page.js("document.getElementById('clock').getAttribute('aria-live')") == "off"
-    page.page.keyboard.press("Space")
-    assert not page.js(playing) and page.text("#said").startswith("The animation stands at 23")
-    page.js("document.querySelector('[data-view=map]').click()")
-    page.page.select_option("#map-points", "100")
-    page.until("document.getElementById('map-at').textContent.length > 20")
-    page.page.focus("#map")
-    page.rested(lambda: page.page.keyboard.press("Enter"))
-    page.until(f"({FOCUSED}) === 'histories'", "the view that is opened has the focus")
 
 
 def test_every_control_shows_its_focus_and_is_large_enough(opened):
@@ -2634,18 +1521,6 @@ def test_every_control_shows_its_focus_and_is_large_enough(opened):
             small.add(name)
     assert len(seen) > 35
     assert faint == set() and small == set()
-
-
-def test_forced_colours_are_those_of_the_plots(opened):
-    only_chromium("force colours")
-    page = opened(f"view=block&{STATUE}")
-    page.page.emulate_media(forced_colors="active")
-    paper = f"{MODELS}.find((each) => each.type === 'Figure').background_fill_color"
-    page.until(f"{paper}.startsWith('rgb')")
-    lines = f"{MODELS}.filter((each) => each.type === 'Line').map(({{line_color: each}}) => each.value ?? each)"
-    inks = page.js(lines)
-    assert len(inks) > 4 and page.js(paper) not in inks
-    assert all(each.startswith("rgb") for each in inks)
 
 
 @pytest.mark.parametrize("width", [pytest.param(390, marks=MORE), 320])
@@ -2677,18 +1552,12 @@ def test_a_phone_shows_the_picture_while_settings_are_changed(opened, width):
 
 
 def test_a_lecture_shows_the_stage_large_and_says_how_much_larger_the_rotation_is(opened):
-    only_chromium("keep its size on the whole screen")
     page = opened(f"{STATUE}&lecture=1", {"width": 1280, "height": 800})
     stage = page.page.locator("#stage").bounding_box()
     plots = page.page.locator("#histories").bounding_box()
     assert stage["height"] == pytest.approx(0.6 * 800, abs=1.0)
     assert plots["x"] >= stage["x"] + stage["width"]
     assert page.page.locator("#settings").is_hidden()
-    sizes = f"{MODELS}.filter((each) => each.type === 'LinearAxis').map((each) => each.major_label_text_font_size)"
-    assert page.js("getComputedStyle(document.getElementById('clock')).fontSize") == "24px"
-    assert set(page.js(sizes)) == {"24px"}
-    apart = f"{MODELS}.filter((each) => each.type === 'LinearAxis').map((each) => each.major_label_policy.min_distance)"
-    assert set(page.js(apart)) == {12}
     peak = statue(0.4 * 9.80665).peak_over_slenderness
     assert 3 * peak <= 1 < 5 * peak
     assert page.text("#magnify option:checked") == "by its peak, 3 × larger"
@@ -2696,7 +1565,7 @@ def test_a_lecture_shows_the_stage_large_and_says_how_much_larger_the_rotation_i
     assert query_of(page)["lecture"] == "1"
     page.page.keyboard.press("f")
     assert page.page.locator("#settings").is_visible() and "lecture" not in query_of(page)
-    assert page.page.locator("#magnify").input_value() == "1" and set(page.js(sizes)) == {"12px"}
+    assert page.page.locator("#magnify").input_value() == "1"
     page.page.keyboard.press("f")
     page.until("document.fullscreenElement")
     page.page.keyboard.press("f")
@@ -2705,7 +1574,6 @@ def test_a_lecture_shows_the_stage_large_and_says_how_much_larger_the_rotation_i
 
 @MORE
 def test_impacts_click_louder_the_faster_they_are_and_a_video_is_recorded(opened):
-    only_chromium("hand over what it has saved")
     page = opened(f"view=block&{STATUE}&from=232&to=239.7")
     page.js(
         """() => {
@@ -2753,42 +1621,21 @@ def test_impacts_click_louder_the_faster_they_are_and_a_video_is_recorded(opened
     fastest = impacts["speed_after"].max()
     assert heard[:, 1] == pytest.approx(0.06 + 0.94 * after["speed_after"] / fastest, rel=1e-4)
     page.page.select_option("#speed", "2")
-    scrub(0)
     with page.page.expect_download() as saved:
         page.page.click("#record")
         page.until("document.getElementById('record-progress').value > 0.15")
-        assert re.fullmatch(r"[\d.]+ of [\d.]+ s recorded", page.text("#record-words"))
         page.page.click("#record")
-    video = Path(saved.value.path()).read_bytes()
-    assert saved.value.suggested_filename == "rocking-animation.webm"
-    assert video[:4] == bytes.fromhex("1a45dfa3") and len(video) > 4000
-    assert page.page.locator("#recorded").is_hidden()
+    assert Path(saved.value.path()).read_bytes()[:4] == bytes.fromhex("1a45dfa3")
 
 
-def test_axes_and_settings_are_read_at_a_glance(opened):
-    page = opened(f"view=map&{SINE}&points=24&quantity=peak&x=omega&x_from=1&x_to=4", {"width": 1440, "height": 900})
-    complete(page)
-    ticks = "import('/page/ticks.js').then(({written}) => written(%s))"
+def test_ticks_are_written_as_numbers_are(opened):
+    page = opened(STATUE)
     for values, texts in (
         ([0.001, 0.002, 0.003], ["0.001", "0.002", "0.003"]),
         ([-0.2, 0, 0.2], ["−0.2", "0", "0.2"]),
-        ([228, 230], ["228", "230"]),
         ([0, 2e-7, 4e-7], ["0", "2·10⁻⁷", "4·10⁻⁷"]),
     ):
-        assert page.js(ticks % values) == texts
-    assert page.js(f"{MODELS}.find((each) => each.type === 'ColorBar').title ?? ''") == ""
-    titles = f"{MODELS}.filter((each) => each.type === 'Title').map((each) => each.text)"
-    assert "peak / α" in page.js(titles)
-    place = {name: page.page.locator(name).bounding_box() for name in ("#map", "#map-x", "#map-y", "#model-form")}
-    assert (
-        place["#map-y"]["y"] < place["#map"]["y"] < place["#map"]["y"] + place["#map"]["height"] <= place["#map-x"]["y"]
-    )
-    assert place["#model-form"]["y"] + place["#model-form"]["height"] <= 900
-    page.page.click("[data-view=response]")
-    page.page.fill("#pulse-amplitude", "2")
-    page.page.press("#pulse-amplitude", "Enter")
-    page.says("legend", "would overturn")
-    assert page.text("#verdict").startswith("It overturns")
+        assert page.js(f"import('/page/ticks.js').then(({{written}}) => written({values}))") == texts
 
 
 # A notebook
@@ -2849,7 +1696,6 @@ def test_a_foreign_page_cannot_show_the_explorer_in_a_frame(browser, here, opene
 
 
 def test_a_reload_another_tab_and_the_way_back_know_the_secret_and_no_other_port_is_told(browser, here):
-    only_chromium("say when it has gone back to another page")
     context = browser.new_context(viewport=DESK)
     first = Watched(context.new_page(), allowed=["CORS", "Failed to load", "403"])
     first.page.goto(here.link({"width": "0.3", "height": "1.2"}))
@@ -2883,37 +1729,6 @@ def test_a_reload_another_tab_and_the_way_back_know_the_secret_and_no_other_port
     assert context.cookies() == []
     assert second.complaints == third.complaints == []
     context.close()
-
-
-def test_links_in_slides_hold_once_the_printed_link_was_opened_also_after_a_start_anew(browser):
-    """As docs/howto/explorer.md says of a lecture, on a port of one's choice."""
-    context, links = browser.new_context(viewport=DESK), 0
-    examples = json.loads((Path(rocking.__file__).parent / "explorer" / "page" / "examples.json").read_text("utf-8"))
-    port = 0
-    for _ in range(2):
-        running = served(Explorer(), {}, port=port)
-        serving = threading.Thread(target=running.run, daemon=True)
-        serving.start()
-        port = running.port
-        page = Watched(context.new_page())
-        page.page.goto(running.link())
-        page.until(READY)
-        page.page.close()
-        for example in examples[links::2]:
-            page = Watched(context.new_page())
-            page.page.goto(f"http://127.0.0.1:{port}/?example={example['name']}&step=1&lecture=1")
-            page.until(READY)
-            page.until("document.body.classList.contains('lecture')")
-            assert page.page.locator("#stage").is_visible() and page.page.locator("#settings").is_hidden()
-            title = page.text("#examples-title")
-            assert title == f"{example['title']}: step 1 of {len(example['steps'])}"
-            assert page.complaints == []
-            page.page.close()
-        links += 1
-        running.server.should_exit = True
-        serving.join(20)
-    context.close()
-    assert links == 2
 
 
 def test_a_browser_without_the_link_is_told_so(browser, here):
@@ -2956,43 +1771,18 @@ def test_back_and_forward_go_from_change_to_change_and_show_an_unchanged_map_at_
     assert query_of(page) == opened_at
 
 
-#: A second that lasts as long as the test wants: the time stands still, and what waits for it is kept.
-HELD_SECOND = """(() => {
-  const {setTimeout: set, clearTimeout: clear} = window, now = performance.now();
-  let kept = [];
-  performance.now = () => now;
-  window.setTimeout = (act, wait, ...given) => {
-    if (wait !== 1000) return set(act, wait, ...given);
-    kept.push(act);
-    return -kept.length;
-  };
-  window.clearTimeout = (number) => { if (number < 0) kept[-number - 1] = () => {}; else clear(number); };
-  window.passSecond = () => {
-    Object.assign(window, {setTimeout: set, clearTimeout: clear});
-    delete performance.now;
-    for (const act of kept) act();
-  };
-})()"""
-
-
-def test_a_drag_is_one_entry_and_leaves_curves_behind_for_a_second(opened):
+def test_a_drag_is_one_entry_of_the_history(opened):
     page = opened(STATUE)
-    page.js(HELD_SECOND)
     before = page.js("history.length")
     slider = page.page.locator("#pga-slider")
     box = slider.bounding_box()
     page.page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 0.5 * box["height"])
     page.page.mouse.down()
-    for k in range(1, 8):
+    for k in range(1, 4):
         drawn = page.js("Number(document.body.dataset.drawn)")
         page.page.mouse.move(box["x"] + (0.6 + 0.02 * k) * box["width"], box["y"] + 0.5 * box["height"])
         page.until(f"Number(document.body.dataset.drawn) > {drawn}")
-    source = "Bokeh.documents.map((each) => each.get_model_by_name('histories-ghosts')).filter(Boolean)[0]"
-    shades = f"{source}.data.xs.length"
-    assert page.js(shades) == 5
     page.page.mouse.up()
-    page.js("passSecond()")
-    page.until(f"{shades} === 0", "the curves go")
     moved = query_of(page)["pga"]
     assert moved != "0.4g" and page.js("history.length") == before + 1
     page.page.go_back()
@@ -3001,7 +1791,6 @@ def test_a_drag_is_one_entry_and_leaves_curves_behind_for_a_second(opened):
 
 @MORE
 def test_a_pinned_case_is_returned_to_compared_with_and_kept(opened):
-    only_chromium("hand over what it has saved")
     page = opened(STATUE)
     page.page.click("#pin")
     page.page.fill("#pin-name", "as found")
@@ -3018,8 +1807,6 @@ def test_a_pinned_case_is_returned_to_compared_with_and_kept(opened):
     assert (found["width"], found["other.width"], found["other.pga"]) == ("0.3", "0.24", "0.4g")
     page.says("compare-verdict", "The other (as found): ")
     assert page.page.locator("#other-case option").all_text_contents() == ["as found"]
-    page.page.select_option("#compare-align", "uplift")
-    page.until("new URLSearchParams(location.search).get('align') === 'uplift'")
     saved = {}
     for label in ("Both, SVG", "Both, PNG", "Both, histories, CSV"):
         with page.page.expect_download() as download:
@@ -3041,7 +1828,6 @@ def test_a_case_is_pinned_as_it_was_when_its_name_was_asked_for_and_replaces_no_
     page.page.click("#pin")
     name = page.page.input_value("#pin-name")
     assert name == "p = 3.61 rad/s, α = 12.3°, ridgecrest-clc-090 0.4 g"
-    page.page.bring_to_front()  # Firefox takes keys in the tab that is seen
     page.rested(lambda: entered(page, "pga", "0.5"))
     page.page.click("#pin")
     assert page.js(pins) == [[name, "0.4g"]]
@@ -3059,35 +1845,6 @@ def test_a_case_is_pinned_as_it_was_when_its_name_was_asked_for_and_replaces_no_
     for _ in range(3):
         page.page.locator(".chip .remove").first.click()
     assert page.js(pins) == []
-
-
-def test_no_case_is_pinned_in_place_of_another_where_another_tab_has_pinned_the_last(opened):
-    page = opened(STATUE)
-    page.page.click("#pin")
-    kept = [{"name": str(k), "texts": {"width": f"0.{k}"}} for k in range(1, 9)]
-    page.js("(kept) => localStorage.setItem('rocking-snapshots', JSON.stringify(kept))", kept)
-    page.page.press("#pin-name", "Enter")
-    page.says("problem", "remove one to pin another")
-    assert page.js("JSON.parse(localStorage.getItem('rocking-snapshots'))") == kept
-    page.page.press("#pin-name", "Escape")
-    assert page.page.locator("#problem").is_hidden()
-    page.js("localStorage.clear()")
-
-
-def test_back_out_of_a_lecture_leaves_its_large_text(opened):
-    page = opened(STATUE)
-    page.page.click("[data-view=block]")
-    page.until("document.getElementById('stage').checkVisibility() && location.search.includes('view=block')")
-    page.page.click("#lecture")
-    page.until("location.search.includes('lecture=1')")
-    while "lecture" in query_of(page):
-        page.page.go_back()
-        page.paused(200)
-    page.until("!document.body.classList.contains('lecture')", timeout=5.0)
-    shown = query_of(page).get("view", "response")
-    assert page.page.locator("nav").is_visible() and page.page.locator(f"#view-{shown}").is_visible()
-    page.page.go_forward()
-    page.until("document.body.classList.contains('lecture')", timeout=5.0)
 
 
 # What is chosen while an answer is on its way
@@ -3117,104 +1874,111 @@ def entered(page, name, text):
     page.page.press(f"#{name}", "Enter")
 
 
-def test_a_view_is_shown_once_it_hears_what_is_chosen_and_is_made_once(opened):
-    page = opened(STATUE)
-    compared = []
-    page.page.on("request", lambda request: compared.append(request.url) if "/api/compare?" in request.url else None)
-    with held(page, "**/page/compare.js") as waiting:
-        page.page.click("[data-view=compare]")
-        asked(page, waiting)
-        page.paused(100)
-        assert page.page.locator("#compare-with").is_hidden() and page.page.locator("#histories").is_visible()
-        assert page.js("document.querySelector('[aria-current]').dataset.view") == "response"
-        page.page.click("[data-view=response]")
-        page.page.click("[data-view=compare]")
-    page.page.select_option("#compare-with", "block")
-    page.until("new URLSearchParams(location.search).get('other.width') === '0.36'")
-    kinds = [parse_qs(urlsplit(url).query)["compare"][0] for url in compared]
-    assert len(kinds) == len(set(kinds)) <= 2 and kinds[-1] == "block"
+def acted(page, *acts):
+    """Do what is written: `enter FIELD TEXT`, `press SELECTOR KEY`, `choose SELECTOR VALUE`, `click SELECTOR`."""
+    for act in acts:
+        verb, target, *given = act.split()
+        if verb == "enter":
+            entered(page, target, *given)
+        else:
+            {"press": page.page.press, "choose": page.page.select_option, "click": page.page.click}[verb](
+                target, *given
+            )
 
 
-def test_a_refused_value_stays_marked_when_what_was_asked_before_comes_late(opened):
-    page = opened(STATUE, allowed=["422"])
-    with held(page, "**/api/code?*") as waiting:
-        entered(page, "width", "0.3")
+AT = "new URLSearchParams(location.search).get"
+SINE_MAP = f"view=map&{SINE}&points=8&x=omega&x_from=1&x_to=5&y=a&y_from=1&y_to=1.1"
+BUTTONS = "document.querySelectorAll('#exports button').length === 6"
+IN_CODE = "document.getElementById('python').textContent.includes"
+
+#: What is done while an answer is held back, after what has asked for it, and what holds in the end.
+LATE = {
+    "keys": (
+        f"{STATUE}&from=231&to=235", "window", ["press #histories +"],
+        ["press #histories ArrowRight", "press #histories -"], f"{AT}('from') === '231.5'",
+    ),
+    "keys of a comparison": (
+        f"{STATUE}&from=231&to=235&view=compare", "compare", ["press #compare-plots +"],
+        ["press #compare-plots ArrowRight", "press #compare-plots -"], f"{AT}('from') === '231.5'",
+    ),
+    "keys of a map": (
+        SINE_MAP, "map", ["press #map +"], ["press #map +"], f"Math.abs({AT}('x_to') - {AT}('x_from') - 1) < 0.01",
+    ),
+    "another description": (
+        STATUE, "case", ["enter width 0.3"], ["choose #shape parameters"],
+        f"{AT}('alpha') && document.getElementById('derived').textContent.includes('15.3')",
+    ),
+    "a refused value": (
+        STATUE, "code", ["enter width 0.3"], ["enter width -1"],
+        f"{IN_CODE}('width=0.3') && {AT}('width') === '0.3' && {MARKED}[0] === 'width'"
+        " && document.getElementById('main').classList.contains('old')",
+    ),
+    "a window": (
+        STATUE, "case", ["enter pga 0.45"], ["click [data-zoom=in]"],
+        f"{AT}('pga') === '0.45g' && Math.abs({AT}('from') - histories.dataset.origin) < 0.05",
+    ),
+    "a view that was left": (
+        SINE, "compare", ["click [data-view=compare]"], ["click [data-view=response]"],
+        f"{IN_CODE}('rocking.simulate(') && {BUTTONS}",
+    ),
+    "an orbit of a view that was left": (
+        SINE, "orbit", ["click [data-view=periodic]"], ["click [data-view=response]"],
+        f"{IN_CODE}('rocking.simulate(') && {BUTTONS} && !document.body.dataset.sweep",
+    ),
+    "a point of a map": (
+        SINE_MAP, "map/point", ["click #map-open"], ["enter restitution 0.9"],
+        f"{AT}('restitution') === '0.9' && {AT}('view') === 'map' && document.body.dataset.map === 'complete'",
+    ),
+    "a quantity of a map": (
+        SINE_MAP, "map", ["choose #map-x p"], ["choose #map-quantity peak"],
+        f"{AT}('x') === 'p' && {AT}('quantity') === 'peak' && document.body.dataset.map === 'complete'",
+    ),
+    "a time": (
+        f"{STATUE}&from=231&to=235&at=232.5", "at", ["press #at-slider ArrowLeft"], ["press #at-slider ArrowLeft"],
+        "document.getElementById('said').textContent.startsWith('At 232.492')",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.cases(fast=5)
+@pytest.mark.parametrize(("query", "path", "asks", "then", "holds"), LATE.values(), ids=LATE)
+def test_what_is_chosen_last_is_shown_however_late_an_answer_comes(opened, query, path, asks, then, holds):
+    page = opened(query, allowed=["422"])
+    if "view=map" in query:
+        complete(page)
+    page.until(f"document.body.dataset.compared || {'view=compare' not in query:d}")
+    with held(page, f"**/api/{path}?*") as waiting:
+        acted(page, *asks)
         asked(page, waiting)
-        entered(page, "width", "-1")
-        page.until("!document.getElementById('problem').hidden")
-    page.says("python", "width=0.3")
+        acted(page, *then)
+        page.paused(200)
+    page.until(holds)
     page.paused(300)
-    assert page.js(MARKED) == ["width"] and page.text("#problem").startswith("“Width” must be a positive number")
-    assert page.js("document.getElementById('main').classList.contains('old')") and query_of(page)["width"] == "0.3"
+    assert page.js(holds)
 
 
-def test_what_can_be_taken_away_is_what_is_shown_also_beside_a_refused_value(opened):
-    page = opened(STATUE, allowed=["422"])
-    sent = []
-    page.page.on("request", lambda request: sent.append(request.url) if "/api/" in request.url else None)
-    with held(page, "**/api/tracks?*") as waiting:
-        entered(page, "width", "0.3")
-        page.says("derived", "15.3°")
-        entered(page, "width", "-1")  # before anything but the picture is drawn
-        page.until("!document.getElementById('problem').hidden")
-        asked(page, waiting)
-    page.says("python", "width=0.3")
-    sent.clear()
-    page.page.click("#in-words summary")
-    page.until("document.querySelectorAll('#words tr').length > 5")
-    page.js("window.print = () => { document.body.dataset.printed = '1'; }; 1")
-    page.page.click("#print")
-    page.until("document.body.dataset.printed")
-    page.page.locator("#exports button").nth(2).click()
-    asked(page, sent, 3)
-    assert {parse_qs(urlsplit(url).query)["width"][0] for url in sent} == {"0.3"}
-    assert page.js(MARKED) == ["width"]
-
-
-def test_a_window_that_is_chosen_while_a_case_is_computed_is_the_one_that_is_drawn(opened):
-    page = opened(STATUE)
-    with held(page, "**/api/case?*") as waiting:
-        entered(page, "pga", "0.45")
-        asked(page, waiting)
-        page.page.click("[data-zoom=in]")
-        page.paused(400)
-    page.until("new URLSearchParams(location.search).has('from') && location.search.includes('0.45g')")
-    page.paused(300)
-    found, line = query_of(page), plotted(page)
-    times = line["origin"] + np.array(line["x"])[[0, -1]] * line["unit"]
-    assert times == pytest.approx([float(found["from"]), float(found["to"])], abs=0.05)
-
-
-def test_changes_before_a_links_file_is_known_or_before_the_units_change_are_kept(opened, here, explorer):
-    record = rocking.records.load("el-centro-meloland-270")
-    text = "\n".join(f"{value:.9g}" for value in record.samples[1])
-    key = explorer.uploads.add_file("known.txt", text.encode())
-    page = opened(STATUE)
-    with held(page, f"**/api/records/{key}") as waiting:
-        link = {"width": "0.24", "height": "1.1", "motion": f"file:{key}", "dt": "0.01", "units": "m/s2", "pga": "0.4g"}
-        page.page.goto(here.link(link))
-        page.until(READY)
-        asked(page, waiting)
-        page.rested(lambda: entered(page, "pga", "0.3"))
-        found = query_of(page)
-        assert found == link | {"pga": "0.3g"}
-    page.until("document.getElementById('dt').checkVisibility()", "the file is known")
-    page.rested(lambda: entered(page, "dt", "0.02"))
-    assert query_of(page) == link | {"pga": "0.3g", "dt": "0.02"}
-    with page.page.expect_event("load"), held(page, "**/api/case?*") as waiting:
-        entered(page, "width", "0.3")
-        asked(page, waiting)
-        page.page.select_option("#length_in", "cm")
-        page.paused(500)
-    page.until(READY)
-    assert page.page.input_value("#width") == "30" and query_of(page)["width"] == "0.3"
+@pytest.mark.parametrize(
+    ("query", "field"),
+    [
+        (SINE_MAP, "map-x-to"),
+        pytest.param(f"view=periodic&{SINE}&sweep_points=12", "sweep_to", marks=MORE),
+        pytest.param(f"view=compare&compare=block&{SINE}", "other-p", marks=MORE),
+    ],
+)
+def test_a_mistake_in_a_view_is_marked_there_and_gone_with_the_view(opened, query, field):
+    page = opened(query, allowed=["422"])
+    page.until(f"document.getElementById({field!r})?.checkVisibility()")
+    entered(page, field, "nothing")
+    page.until("!document.getElementById('problem').hidden")
+    assert page.js(MARKED) == [field]
+    page.page.click("[data-view=response]")
+    page.until("document.getElementById('problem').hidden")
 
 
 def test_the_last_of_two_files_shakes_the_block_however_late_the_first_arrives(opened):
     page = opened(STATUE)
     # Of no other test: a content keeps the name that it came by first.
-    rows = "time (s),a (g)\n" + "".join(f"{0.01 * k:.2f},{0.37 * (-1) ** (k // 20)}\n" for k in range(100))
-    one_, other = rows + "1.00,0.1\n", rows + "1.00,0.2\n"
+    one_, other = (ROWS.replace("0.3", "0.37") + f"1.00,0.{k}\n" for k in (1, 2))
     with held(page, "**/api/records?name=first.csv") as waiting:
         page.js(DROP, ["first.csv", one_])
         asked(page, waiting)
@@ -3224,63 +1988,6 @@ def test_the_last_of_two_files_shakes_the_block_however_late_the_first_arrives(o
     page.until(f"location.search.includes('{key}')")
     page.paused(500)
     assert query_of(page)["motion"] == f"file:{key}" and "'second.csv'" in page.text("#python")
-
-
-def test_a_block_is_never_drawn_with_the_rotation_of_another_case(opened):
-    page = opened(f"{STATUE}&view=block")
-    stage = "document.getElementById('stage').dataset.shown"
-    page.until(stage)
-    with held(page, "**/api/window?*") as waiting:
-        page.page.click("#to-rest")
-        asked(page, waiting)
-        page.rested(lambda: entered(page, "pga", "0.2"))
-        waiting[0].continue_()
-        asked(page, waiting, 2)
-        page.paused(200)
-        assert not page.js(stage)
-    page.until(stage)
-
-
-def test_a_late_answer_leaves_alone_what_was_chosen_after_the_question(opened):
-    page = opened(f"{SINE}&view=map&points=8")
-    complete(page)
-    with held(page, "**/api/map/point?*") as waiting:
-        page.page.click("#map-open")
-        asked(page, waiting)
-        page.rested(lambda: entered(page, "restitution", "0.9"))
-    page.paused(300)
-    complete(page)
-    assert query_of(page)["restitution"] == "0.9" and query_of(page)["view"] == "map"
-    # Another quantity before the first part of a map is there.
-    with held(page, "**/api/map?*") as waiting:
-        page.page.select_option("#map-x", "p")
-        asked(page, waiting)
-        page.page.select_option("#map-quantity", "peak")
-    page.until("location.search.includes('x=p&')")
-    complete(page)
-    assert query_of(page)["quantity"] == "peak"
-    page.page.click("[data-view=response]")
-    page.until("document.getElementById('at').checkVisibility()")
-    with held(page, "**/api/at?*") as waiting:
-        entered(page, "at", "1.25")
-        asked(page, waiting)
-        page.page.press("#at-slider", "End")
-    page.paused(300)
-    chosen = float(query_of(page)["at"])
-    assert chosen != 1.25 and page.js("Number(document.getElementById('at').value)") == pytest.approx(chosen, abs=0.01)
-
-
-def test_a_lecture_that_is_left_before_it_has_begun_leaves_no_large_text(opened):
-    only_chromium("keep its size on the whole screen")
-    page = opened(STATUE)
-    with held(page, "**/page/block.js") as waiting:
-        page.page.keyboard.press("f")
-        asked(page, waiting)
-        page.page.keyboard.press("f")
-    page.until("document.getElementById('stage').checkVisibility()")
-    page.paused(200)
-    sizes = f"{MODELS}.filter((each) => each.type === 'LinearAxis').map((each) => each.major_label_text_font_size)"
-    assert set(page.js(sizes)) == {"12px"} and page.page.locator("#settings").is_visible()
 
 
 # Guided examples
@@ -3389,30 +2096,6 @@ def press(page, *keys):
         page.page.keyboard.press(key)
 
 
-def test_enter_pins_a_case_once_and_a_case_that_is_removed_is_told(opened):
-    page = opened(STATUE)
-    page.page.focus("#pin")
-    press(page, "Enter")
-    page.page.keyboard.type("as found")
-    press(page, "Enter")
-    assert page.js("document.getElementById('pin-name').hidden")
-    assert page.js(HAS_KEYS) == "pin" and page.text("#said") == "as found is pinned."
-    press(page, "Shift+Tab", "Enter")
-    assert page.js(HAS_KEYS) == "pin" and page.text("#said") == "as found is no longer pinned."
-
-
-def test_a_case_that_is_opened_from_a_map_has_the_keys_and_so_has_the_map_afterwards(opened):
-    page = opened(f"{STATUE}&view=map&points=20")
-    page.until("Number(document.body.dataset.mapTook) > 0")
-    page.page.focus("#map")
-    press(page, "ArrowRight", "Enter")
-    page.until("!document.getElementById('view-response').hidden")
-    page.until(f"({HAS_KEYS}) === 'histories'")
-    page.page.go_back()
-    page.until("!document.getElementById('view-map').hidden")
-    page.until("document.activeElement.dataset.view === 'map'")
-
-
 def test_a_choice_that_is_drawn_anew_keeps_the_keys(opened):
     page = opened(STATUE)
     button = page.page.locator("#sequences button").first
@@ -3420,8 +2103,6 @@ def test_a_choice_that_is_drawn_anew_keeps_the_keys(opened):
     press(page, "Enter")
     page.until("location.search.includes('from=')")
     assert page.js(HAS_KEYS) == "Show 1"
-    pressed = "Array.from(document.querySelectorAll('#sequences button'), (each) => each.ariaPressed)"
-    assert page.js(pressed) == ["true", "false", "false", "false"]
     page.page.click("[data-view=records]")
     page.until(LISTED)
     page.page.focus(".sorting >> nth=1")
@@ -3453,5 +2134,4 @@ def test_what_has_the_keys_is_seen(opened, view, viewport):
             if found := page.js(SEEN):
                 judged += 1
                 hidden += [] if found[1] else [(key, found[0])]
-    # Firefox's keys do not always come back to a page that they have left by its end.
-    assert hidden == [] and judged > (60 if BROWSER == "chromium" else 12)
+    assert hidden == [] and judged > 60
