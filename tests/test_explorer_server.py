@@ -4,13 +4,11 @@ import io
 import json
 import math
 import os
-import random
 import re
 import socket
 import struct
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 import tracemalloc
@@ -32,7 +30,7 @@ from rocking.explorer.core import Explorer
 from rocking.explorer.launch import served
 from rocking.explorer.server import App
 from rocking.explorer.studies import StudyView
-from rocking.explorer.uploads import LARGEST, MOST, UploadStore
+from rocking.explorer.uploads import LARGEST, UploadStore
 from rocking.threads import AHEAD, cores
 
 PORT = 8123
@@ -202,15 +200,19 @@ def test_a_comparison_takes_what_is_other_under_a_prefix(page):
     assert {"first_rotation", "second_rotation"} <= arrays.keys()
 
 
-@pytest.mark.parametrize(
-    "form",
-    ["csv", *(pytest.param(x, marks=pytest.mark.thorough) for x in ("svg", "png", "events.csv", "impacts.csv", "nc"))],
-)
-def test_every_export_is_a_download(page, form):
-    answer = page.get("/api/export", params={**SINE, "form": form})
-    assert answer.status_code == 200
+FORMS = {
+    "csv": b"time_s,rotation_rad", "events.csv": b"time_s,kind,side", "impacts.csv": b"time_s,side",
+    "nc": b"\x89HDF", "svg": b"<?xml", "png": b"\x89PNG",
+}  # fmt: skip
+
+
+@pytest.mark.cases(fast=3)
+@pytest.mark.parametrize(("form", "start"), FORMS.items())
+def test_every_export_is_a_download_of_its_kind(page, form, start):
+    texts = {**SINE, "model": "linear", "motion": "one-sine:amplitude=2.5,frequency=1"}
+    answer = page.get("/api/export", params={**texts, "form": form})
+    assert answer.status_code == 200 and answer.content.startswith(start)
     assert answer.headers["content-disposition"] == f"attachment; filename=rocking-response.{form}"
-    assert len(answer.content) > 200
 
 
 def test_the_page_has_a_policy_with_a_nonce_of_its_own(page):
@@ -298,20 +300,6 @@ def test_a_record_is_uploaded_told_about_and_simulated(page):
     assert page.get(f"/api/records/{found['key']}", params={"dt": "0.01", "units": "g"}).json()["missing"] == []
 
 
-def test_an_address_of_a_block_alone_is_mapped_under_the_motion_that_is_shown(page):
-    point = {"p": "2", "alpha": "0.2", "x": "p", "y": "pga", "at_x": "2", "at_y": "0.5"}
-    texts = page.get("/api/map/point", params=point).json()
-    assert texts["motion"] == "ridgecrest-clc-090"
-    assert page.get("/api/map/response", params=point).status_code == 200
-
-
-def test_what_no_field_of_the_page_is_called_is_not_said(page):
-    for path, words in (("sweep", "needs a sine"), ("map", "something that shakes the block")):
-        answer = page.get(f"/api/{path}", params={"p": "2", "alpha": "0.2", "motion": "none"})
-        assert answer.json()["argument"] == "motion" and words in answer.json()["problem"]
-        assert "“Record”" not in answer.json()["problem"]
-
-
 @pytest.mark.thorough
 def test_a_list_of_records_is_assessed_part_by_part_and_a_file_taken_out(page):
     key = page.post("/api/records", params={"name": "b_ns.txt"}, content=b"0\n1\n-1\n0\n" * 99).json()["key"]
@@ -334,14 +322,6 @@ def test_a_list_of_records_is_assessed_part_by_part_and_a_file_taken_out(page):
     assert forgotten.status_code == 200 and forgotten.headers["cache-control"] == "no-store"
     assert page.get(f"/api/records/{key}").status_code == 422
     assert page.request("DELETE", f"/api/records/{key}").status_code == 422
-
-
-@pytest.mark.parametrize("name", ["nga.at2", "single.v2c", "two.v1", "two.v2", "knet.ns", "esm.asc", "even.smc"])
-def test_files_of_many_formats_are_taken(page, name):
-    content = (Path(__file__).parent / "data" / "formats" / name).read_bytes()
-    answer = page.post("/api/records", params={"name": name}, content=content)
-    assert answer.status_code == 200, answer.text
-    assert answer.json()["channels"]
 
 
 def test_a_body_that_is_too_large_is_refused_before_and_while_it_comes(page):
@@ -399,14 +379,6 @@ def test_reading_a_file_takes_little_more_memory_than_the_file(data, words):
     assert peak < 20 * len(data) + 60 * 2**20
 
 
-def test_a_file_that_is_refused_for_its_length_is_not_read_by_its_key_either():
-    store = UploadStore()
-    key = store.add_file("x", b"0\n" * 501_000)
-    peak, words = memory_of(lambda: store.read(key, None, 0.01, "g"))
-    assert "501000 samples; at most 500000 are shown here" in words
-    assert peak < 30 * 2**20
-
-
 def test_a_compressed_record_is_refused_before_it_is_unpacked(monkeypatch):
     obspy = pytest.importorskip("obspy")
     packed, quiet = io.BytesIO(), np.zeros(400_000, dtype=np.int32)
@@ -424,169 +396,18 @@ def test_a_compressed_record_is_refused_before_it_is_unpacked(monkeypatch):
 @pytest.mark.parametrize(
     "path",
     [
-        "/page/../server.py",
-        "/page/..%2fserver.py",
-        "/page/%2e%2e/server.py",
-        "/page//etc/passwd",
-        "/page/index.html",
-        "/library/../bokeh.js",
-        "/library/..%5c..%5cx.js",
-        "/page/main.js%00",
-        "/page/.",
-        "/page/main.js/",
-        "/page//evil.example/",
-        "/page/",
-        "/api/records/..%2f..%2fetc%2fpasswd",
-        "//etc/passwd",
-        "/file:///etc/passwd",
+        "/page/../server.py", "/page/..%2fserver.py", "/page/%2e%2e/server.py", "/page//etc/passwd", "/page/index.html",
+        "/page/.", "/page/", "/page/main.js%00", "/page/main.js/", "/page//evil.example/", "/library/../bokeh.js",
+        "/library/..%5c..%5cx.js", "//etc/passwd", "/api/records/..%2f..%2fetc%2fpasswd", "/file:///etc/passwd",
     ],
-)
+)  # fmt: skip
 def test_no_path_leads_anywhere_else(page, path):
     answer = page.get(path)
     assert answer.status_code in (404, 405, 422), answer.text
-    assert "import" not in answer.text
-    assert "root:" not in answer.text
+    assert "import" not in answer.text and "root:" not in answer.text
 
 
 # Hostile
-
-
-def malformed(rng):
-    """One file that is none: cut, damaged, or noise."""
-    kind = rng.randrange(6)
-    if kind == 0:
-        return rng.randbytes(rng.randrange(2000))
-    folder = Path(__file__).parent / "data" / "formats"
-    data = bytearray((rng.choice(sorted(folder.iterdir()))).read_bytes())
-    if kind == 1:
-        return bytes(data[: rng.randrange(len(data))])
-    if kind == 2:
-        for _ in range(rng.randrange(1, 40)):
-            data[rng.randrange(len(data))] = rng.randrange(256)
-        return bytes(data)
-    if kind == 3:
-        start = rng.randrange(len(data))
-        return bytes(data[:start] + data[start:] * rng.randrange(2, 5))
-    if kind == 4:
-        return b"\x80\x04\x95" + rng.randbytes(100) + b"cos\nsystem\n(S'touch x'\ntR."
-    return ("\n".join(rng.choice(["nan", "inf", "1e999", "-", "0x1", "1" * 400, "1.0"]) for _ in range(50))).encode()
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize(
-    "count", [60, pytest.param(200, marks=pytest.mark.thorough), pytest.param(1000, marks=pytest.mark.slow)]
-)
-def test_malformed_files_links_and_headers_are_refused_in_words(page, explorer, tmp_path, monkeypatch, count):
-    rng = random.Random(7)
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "private"))
-    (tmp_path / "private").mkdir()
-    monkeypatch.chdir(tmp_path)
-    names = ["x", "../x", "/etc/cron.d/x", "C:\\x", "a" * 5000, "\x00", "é" * 50, "<script>", "x\r\nset-cookie: a=b"]
-    values = [
-        "",
-        "nan",
-        "-inf",
-        "1e999",
-        "0",
-        "-1",
-        "9" * 200,
-        "../../etc/passwd",
-        "{}",
-        "%00",
-        "1,2,3",
-        "sine:amplitude=1e300,frequency=1,cycles=1",
-        "sine:" + "a=1," * 50,
-        "given:x",
-        "file:" + "f" * 24,
-        "1deg",
-        "motion=none;motion=file:x",
-        "motion=ridgecrest-clc-090&vertical=x",
-        "key=x&units=furlong",
-        "velocity=-1",
-        "ricker:amplitude=1,frequency=1e9,kind=x",
-    ]
-    paths = [
-        "/api/case",
-        "/api/window",
-        "/api/summary",
-        "/api/compare",
-        "/api/map",
-        "/api/map/point",
-        "/api/export",
-        "/api/study",
-        "/api/records/x",
-        "/api/list",
-        "/api/assessment",
-    ]
-    keys = [
-        *STATUE,
-        "p",
-        "alpha",
-        "restitution",
-        "model",
-        "chattering",
-        "duration",
-        "from",
-        "to",
-        "points",
-        "x",
-        "y",
-        "form",
-        "at_x",
-        "at_y",
-        "initial_rotation",
-        "other.width",
-        "records",
-        "answers",
-        "levels",
-    ]
-    statuses = set()
-    for _ in range(count // 3):
-        answer = page.post("/api/records", params={"name": rng.choice(names)}, content=malformed(rng))
-        statuses.add(answer.status_code)
-        if answer.status_code == 422:
-            assert str(tmp_path) not in answer.text
-            assert set(answer.json()) == {"problem", "argument"}
-    for _ in range(count // 3):
-        texts = dict(STATUE) if rng.random() < 0.5 else {}
-        texts |= {rng.choice(keys): rng.choice(values) for _ in range(rng.randrange(1, 4))}
-        answer = page.get(rng.choice(paths), params=texts)
-        statuses.add(answer.status_code)
-    for _ in range(count // 3):
-        headers = {
-            rng.choice(
-                [
-                    "range",
-                    "accept",
-                    "cookie",
-                    "x-forwarded-host",
-                    "content-length",
-                    "if-none-match",
-                    "transfer-encoding",
-                    "upgrade",
-                    "content-type",
-                ]
-            ): rng.choice(
-                [
-                    "",
-                    "bytes=0-99999999999",
-                    "*/*;q=-1",
-                    "a=b; " * 500,
-                    "evil.example",
-                    "-5",
-                    "1e9",
-                    "websocket",
-                    "multipart/form-data",
-                ]
-            )
-        }
-        answer = page.get("/api/start", headers=headers)
-        statuses.add(answer.status_code)
-    assert statuses <= {200, 303, 400, 403, 404, 405, 413, 422}, statuses
-    assert 200 in statuses and 422 in statuses
-    assert len(explorer.uploads._files) <= MOST
-    assert len(explorer._kept) <= 48
-    assert sorted(path.name for path in tmp_path.rglob("*")) == ["private"]
 
 
 @pytest.mark.thorough
@@ -698,6 +519,11 @@ ATTACKS = [
     (b"TRACE /api/start " + KNOWN + b"\r\n", 405),
     (b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n", 421),
     (b"GET / HTTP/1.0\r\n\r\n", 421),
+    (b"GET / HTTP/1.1\r\n\r\n", 400),
+    (b"GET / HTTP/1.1\r\nHost: evil.example\r\nHost: 127.0.0.1\r\n\r\n", 400),
+    (b"CONNECT evil.example:80 HTTP/1.1\r\nHost: evil.example:80\r\n\r\n", 421),
+    (b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n" + b"x: y\r\n" * 20000 + b"\r\n", 421),
+    (b"\x00\x01\x02\x03\r\n\r\n", 400),
 ]
 
 
@@ -723,26 +549,6 @@ def test_nothing_listens_beyond_this_machine(running):
                 found.append((local.split(":")[0] == here, int(local.split(":")[1], 16)))
     assert (True, running.port) in found
     assert all(loopback for loopback, _ in found)
-
-
-@pytest.mark.parametrize(
-    "raw",
-    [
-        b"GET / HTTP/1.1\r\n\r\n",
-        b"GET / HTTP/1.1\r\nHost: evil.example\r\nHost: 127.0.0.1\r\n\r\n",
-        b"POST /api/records HTTP/1.1\r\nHost: evil.example\r\nOrigin: http://evil.example\r\ncontent-length: 0\r\n\r\n",
-        b"GET http://evil.example/ HTTP/1.1\r\nHost: evil.example\r\n\r\n",
-        b"CONNECT evil.example:80 HTTP/1.1\r\nHost: evil.example:80\r\n\r\n",
-        b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n" + b"x: y\r\n" * 20000 + b"\r\n",
-        b"\x00\x01\x02\x03\r\n\r\n",
-        b"GET /" + b"a" * 100_000 + b" HTTP/1.1\r\nHost: x\r\n\r\n",
-    ],
-)
-def test_raw_requests_that_are_none_are_refused(running, raw):
-    with socket.create_connection(("127.0.0.1", running.port), timeout=60) as connection:
-        connection.sendall(raw)
-        answer = connection.recv(4096)
-    assert re.match(rb"HTTP/1\.1 (400|403|421|431)", answer), answer[:60]
 
 
 # Connections that ask for nothing
@@ -877,24 +683,18 @@ def test_the_command_prints_one_line_and_listens_here_alone():
         (("ridgecrest-cls-090",), "did you mean ridgecrest-clc-090"),
         (("--port", "70000"), "from 0 to 65535"),
         (("--address", "0.0.0.0"), "every address"),
-        (("--address", "0"), "every address"),
         (("--address", "0x0"), "every address"),
         (("--address", "::ffff:0.0.0.0"), "every address"),
-        (("--address", ""), "every address"),
+        (("tests",), "this folder holds no study; name one record, and drop the other files on the page"),
         (("--address", "192.0.2.1"), "cannot be used"),
         (("sine:amplitude=1",), "needs frequency and cycles"),
     ],
 )
-def test_the_command_refuses_with_one_line(run, arguments, words):
+def test_the_command_refuses_with_one_line(run, arguments, words, monkeypatch):
+    monkeypatch.chdir(Path(__file__).parents[1])
     code, out, err = run("explore", "--no-open", *arguments)
     assert (code, out) == (2, "")
     assert words in err.splitlines()[-1]
-
-
-def test_a_folder_without_a_study_is_refused(run, tmp_path):
-    code, out, err = run("explore", "--no-open", tmp_path)
-    assert (code, out) == (2, "")
-    assert "this folder holds no study; name one record, and drop the other files on the page" in err
 
 
 def test_a_missing_package_is_named(run, monkeypatch):
@@ -902,13 +702,6 @@ def test_a_missing_package_is_named(run, monkeypatch):
     code, _, err = run("explore", "--no-open")
     assert code == 2
     assert "pip install '.[explorer]' in the source folder" in err
-
-
-@pytest.mark.thorough
-def test_the_library_is_found_without_importing_it():
-    assert (server.library_folder() / "bokeh.min.js").is_file()
-    code = "import sys; from rocking.explorer import server; server.library_folder(); print('bokeh' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"
 
 
 def test_a_port_that_is_taken_is_said_so():
