@@ -8,7 +8,7 @@ import pytest
 from explorer_texts import in_english
 
 import rocking
-from rocking.explorer.assessment import as_python, assessment_of, described, parts
+from rocking.explorer.assessment import assessment_of, described, parts
 from rocking.explorer.inputs import read_case
 from rocking.explorer.uploads import UploadStore
 
@@ -121,25 +121,6 @@ def test_the_margin_is_the_lowest_band_of_an_incremental_dynamic_analysis(width,
     assert levels[1] / levels[0] == pytest.approx(1.0 + note["values"]["step"] / 100.0)
 
 
-def test_a_block_that_no_level_overturns_has_no_margin_up_to_the_highest_level_looked_at():
-    case = {"width": "2", "height": "8", "motion": "half-sine:amplitude=1g,frequency=3000"}
-    margin = last(assessed(case, **FEW)).header["margin"]
-    block, motion = rocking.Block(width=2.0, height=8.0), rocking.pulses.half_sine(9.80665, 3000.0)
-    assert margin["factor"] is None and margin["pga"] > 400.0 * block.uplift_thresholds()[0]
-    assert not rocking.simulate(block, motion.scaled_to(margin["pga"])).overturned
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize(("motion", "scale"), [("el-centro-meloland-270", "2000"), ("ridgecrest-clc-090", "1e12")])
-def test_the_margin_of_a_motion_however_strong_is_next_to_what_does_not_overturn(motion, scale):
-    case = {**STATUE, "motion": motion, "scale": scale}
-    margin = last(assessed(case, **FEW)).header["margin"]
-    block, shaken = rocking.Block(width=0.24, height=1.1), rocking.records.load(motion) * float(scale)
-    assert margin["factor"] < 1.0 / 256.0
-    assert rocking.simulate(block, shaken * margin["factor"]).overturned
-    assert not rocking.simulate(block, shaken * (margin["factor"] * (1.0 - 1e-6))).overturned
-
-
 @pytest.mark.thorough
 def test_the_margin_has_the_treatment_of_the_case():
     treated = {**STATUE, "motion": "ridgecrest-clc-090", "chattering": "velocity=0.5"}
@@ -150,18 +131,6 @@ def test_the_margin_has_the_treatment_of_the_case():
     assert found != pytest.approx(plain, rel=1e-3)
     assert rocking.simulate(block, motion * found, chattering="velocity=0.5").overturned
     assert not rocking.simulate(block, motion * (found * (1.0 - 1e-6)), chattering="velocity=0.5").overturned
-
-
-def test_motions_of_the_program_are_variables_of_the_script():
-    store = UploadStore()
-    motions = [rocking.Motion.from_samples(np.sin(np.arange(400) / k), 0.02, name=f"own {k}") for k in (8.0, 9.0)]
-    records = ";".join(f"motion=given:{store.add_motion(motion)}" for motion in motions)
-    found = assessment_of(read_case(STATUE, store), {"records": records, **LEVELS}, store)
-    lines = as_python(found).splitlines()
-    names = [line.partition(" = ...  # ") for line in lines if "the motion that this page was opened with" in line]
-    assert [name for _, _, name in names] == [f"own {k}: the motion that this page was opened with" for k in (8.0, 9.0)]
-    assert [f"    {name}," for name, _, _ in names] == lines[lines.index("motions = [") + 1 :][:2]
-    assert len({name for name, _, _ in names}) == 2
 
 
 @pytest.mark.thorough
@@ -194,8 +163,3 @@ def test_levels_go_from_where_a_record_lifts_the_block_to_where_most_overturn_it
 def test_what_cannot_be_assessed_is_refused_in_a_sentence(texts, words):
     with pytest.raises(rocking.RockingError, match=words):
         last(assessed(STATUE, **texts))
-
-
-def test_a_block_that_hardly_comes_to_rest_is_refused_whatever_the_duration_of_the_case():
-    with pytest.raises(rocking.RockingError, match="hardly comes to rest: lower it"):
-        assessed({**STATUE, "restitution": "1", "duration": "10"}, records=PLAIN, **LEVELS)

@@ -1,6 +1,5 @@
 """The list of records: what belongs to one station, what is known of each, how many files are kept."""
 
-import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -203,26 +202,6 @@ def test_a_file_that_finds_no_room_is_refused_until_one_is_taken_out(monkeypatch
     monkeypatch.setattr(uploads, "ALL", store.usage()["bytes"] + 10)
     with pytest.raises(UnreadableRecord, match="cannot be kept"):
         store.add_file("4.txt", samples(4).encode())
-
-
-@pytest.mark.slow
-def test_forty_records_of_three_components_are_kept_and_few_motions_of_them_in_memory(monkeypatch):
-    store, count = UploadStore(), 100
-    monkeypatch.setattr(uploads, "READ", 20 * count)
-    for station in range(40):
-        for part, direction in enumerate(("ns", "ew", "ud")):
-            store.add_file(f"s{station}_{direction}.txt", samples(3 * station + part, count).encode())
-    found = groups_of(store, [{"key": key, "dt": "0.01", "units": "g"} for key in store.kept()])
-    assert len(found) == 40 and all(len(group["rows"]) == 3 for group in found)
-    rows = [row["texts"] for group in found for row in group["rows"]]
-    read_motion(rows[0], store)
-    tracemalloc.start()
-    for texts in rows[1:60]:
-        read_motion(texts, store)
-    held = tracemalloc.get_traced_memory()[0]
-    tracemalloc.stop()
-    assert sum(len(motion.breakpoints) for motion in store._read.values()) <= 20 * count
-    assert len(store._read) == 20 and held < 200 * uploads.READ
 
 
 def test_new_files_take_none_out_and_of_what_was_read_what_was_used_longest_ago_goes_first(monkeypatch):

@@ -1,7 +1,6 @@
 """Colours of the explorer's page: marks stand out against what is beside them, and orange means overturning."""
 
 import colorsys
-import itertools
 import re
 from pathlib import Path
 
@@ -76,23 +75,6 @@ def test_colours_of_the_page_stand_out(scheme, kind, least):
     assert {pair: each for pair, each in faint.items() if each < least} == {}
 
 
-def test_neighbours_on_a_map_differ_or_a_line_parts_them():
-    lines, judged = constant("LINES"), 0
-    for name in ("OUTCOMES", "MODES", "VERDICTS"):
-        inks = constant(name) if name != "VERDICTS" else [*constant(name), *constant("OUTCOMES")[4:]]
-        for first, second in itertools.combinations(inks, 2):
-            judged += 1
-            parted = any(min(contrast(line, first), contrast(line, second)) >= 3.0 for line in lines)
-            assert contrast(first, second) >= 3.0 or parted, (name, first, second)
-    assert judged >= 36
-    dark, light = constant("STRIPES")
-    hatched = [each for each in constant("OUTCOMES") if not is_orange(each)]
-    assert len(hatched) == 5
-    for ink in hatched:
-        assert contrast(dark if luminance(ink) > 0.3 else light, ink) >= 3.0, ink
-    assert contrast(*constant("MARK")) >= 3.0
-
-
 def test_orange_means_overturning_and_nothing_else():
     for scheme, colours in palettes().items():
         assert [name for name, ink in colours.items() if is_orange(ink)] == ["over"], scheme
@@ -103,9 +85,3 @@ def test_orange_means_overturning_and_nothing_else():
         assert is_orange(ink) == text.startswith("overturns"), text
     assert [is_orange(ink) for ink in constant("OUTCOMES")] == [False] * 4 + [True, False]
     assert not any(map(is_orange, constant("RAMP")[:-1]))
-
-
-def test_colours_stand_in_one_place():
-    others = [file for file in sorted(PAGE.glob("*.js")) if file.name != "outcomes.js"]
-    assert len(others) >= 12
-    assert [file.name for file in others if HEX.search(file.read_text("utf-8"))] == []

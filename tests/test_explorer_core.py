@@ -21,7 +21,7 @@ from rocking.explorer import maps, readings, windows
 from rocking.explorer.code import case_as_command, case_as_python, map_as_command, map_as_python
 from rocking.explorer.core import Explorer
 from rocking.explorer.inputs import read_case, texts_of
-from rocking.explorer.motions import arguments_of, pulse_as_text, pulse_of, texts_of_motion
+from rocking.explorer.motions import pulse_as_text, pulse_of, texts_of_motion
 from rocking.explorer.parameters import DEFAULT
 from rocking.explorer.parameters import PULSES as OFFERED
 from rocking.explorer.payload import pack
@@ -567,15 +567,6 @@ def test_another_motion_begins_as_its_own_texts_say(explorer):
     for other in ({"width": "0.3", "height": "1.1"}, {"initial_rotation": "2deg"}):
         second = explorer.compare(size | released, other).header["cases"][1]
         assert second["peak_rotation"] == explorer.show(size | released | other).response.peak_rotation
-
-
-def test_a_comparison_goes_on_until_the_later_of_both_ends(explorer):
-    later = {**SINE, "motion": "sine:amplitude=2.02,frequency=0.1,cycles=2.5"}
-    for one, other in ((SINE, later), (later, SINE)):
-        header = explorer.compare(one, other, align="uplift", whole=True).header
-        first, second = (explorer.show(texts).response for texts in (one, other))
-        assert header["shift"] == first.events["time"][0] - second.events["time"][0] != 0.0
-        assert header["duration"] == max(first.duration, second.duration + header["shift"])
 
 
 def test_what_is_kept_is_bounded_by_the_motions_too_and_forgotten_with_their_file(monkeypatch):
@@ -1126,21 +1117,6 @@ def test_another_case_is_compared_with_as_a_whole(explorer):
     ]
     with pytest.raises(InvalidOption, match="align"):
         explorer.compare(texts, STATUE, align="toString")
-
-
-def test_a_pulse_is_read_as_tolerantly_as_the_package_does(explorer, run):
-    strict = {**SINE, "motion": "sine:amplitude=0.3g,frequency=1,cycles=2.5,phase=90deg"}
-    loose = {**SINE, "motion": "sine: amplitude = 0.3g, frequency=1Hz, cycles=2.5 , phase=90 deg,"}
-    axes = {"x": "omega", "x_from": "1", "x_to": "5", "y": "a"}
-    (one, found), (other, same) = (_mapped(texts, axes) for texts in (strict, loose))
-    assert all(np.array_equal(found[name], same[name], equal_nan=True) for name in found)
-    motions = [arguments_of(maps.texts_at(each, 2.0, 1.5)["motion"]) for each in (one, other)]
-    assert motions[0] == motions[1]
-    assert map_as_command(one) == map_as_command(other) and map_as_python(one, "peak") == map_as_python(other, "peak")
-    code, out, _ = run(*shlex.split(map_as_command(other))[1:], "--tolerance", "0.1", "--json", "--quiet")
-    assert code == 0 and np.array_equal(np.array(json.loads(out)["mode"]), same["mode"])
-    peaks = {explorer.show(texts).response.peak_rotation for texts in (strict, loose)}
-    assert len(peaks) == 1
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ import runpy
 import shlex
 import struct
 import sys
-import threading
 
 import numpy as np
 import pytest
@@ -16,13 +15,12 @@ from explorer_texts import in_english
 
 import rocking
 from rocking.errors import InvalidBlock, InvalidOption, RockingError, UnreadableRecord
-from rocking.explorer import apart, maps, meshes
+from rocking.explorer import apart, meshes
 from rocking.explorer.authentication import RequestAuthentication
-from rocking.explorer.code import case_as_command, case_as_python, map_as_command, map_as_python, sweep_as_command
+from rocking.explorer.code import case_as_command, case_as_python
 from rocking.explorer.core import Explorer
 from rocking.explorer.inputs import read_case
 from rocking.explorer.server import App
-from rocking.explorer.sweeps import sweep_of
 from rocking.explorer.uploads import LARGEST, MOST, UploadStore
 from rocking.solid.reading import SHIPPED
 
@@ -180,25 +178,6 @@ def test_a_mesh_that_is_refused_is_not_kept_and_the_oldest_gives_way(here, monke
         explorer.take_mesh("0.stl", content(box()))
 
 
-def test_a_body_that_is_known_does_not_wait_for_a_file_that_is_read(monkeypatch):
-    store, going, free = UploadStore(), threading.Event(), threading.Event()
-    known = read_case(STATUE, store).block
-
-    def slow(name, data, options):
-        going.set()
-        assert free.wait(30.0)
-        return apart.made_here("statue", options)
-
-    monkeypatch.setattr(meshes, "made_apart", slow)
-    key = store.add_mesh("box.stl", content(box()))
-    reader = threading.Thread(target=lambda: read_case({**STATUE, "mesh": f"file:{key}"}, store))
-    reader.start()
-    assert going.wait(30.0)
-    assert read_case({**STATUE, "pga": "0.5g"}, store).block.sides == known.sides
-    free.set()
-    reader.join()
-
-
 def gltf(**changed):
     """A glTF file in which all is inside, or that names, claims or nests something else."""
     whole = {
@@ -313,37 +292,6 @@ def test_what_reads_meshes_may_be_missing(here, monkeypatch):
         Explorer().take_mesh("box.stl", content(box()))
 
 
-@pytest.mark.slow
-def test_maps_and_sweeps_of_a_mesh_are_of_its_block(run, tmp_path):
-    store = UploadStore()
-    sine = {**STATUE, "motion": "sine:amplitude=0.5g,frequency=1,cycles=2.5"}
-    del sine["pga"]
-    case = read_case(sine, store)
-    with pytest.raises(InvalidOption, match="not over 'alpha'; the slenderness of a mesh follows from its azimuth"):
-        maps.grid_of(case, {"x": "alpha", "y": "a"})
-    for x in ("omega", "p"):
-        grid = maps.grid_of(case, {"x": x, "y": "a", "points": "8"})
-        texts = maps.texts_at(grid, float(grid.x.values[3]), float(grid.y.values[5]))
-        point = read_case(texts, store).block
-        assert [side.alpha for side in point.sides] == pytest.approx([side.alpha for side in case.block.sides])
-        assert [side.restitution for side in point.sides] == [side.restitution for side in case.block.sides]
-        assert ("mesh" in texts) == (x == "omega")
-    grid = maps.grid_of(case, {"x": "omega", "y": "a", "points": "8", "x_to": "6", "y_to": "3"})
-    found = {
-        point: values for part in maps.parts(grid) for point, values in zip(part.points, part.values.T, strict=True)
-    }
-    (tmp_path / "map.py").write_text(map_as_python(grid, "mode"), "utf-8")
-    modes = runpy.run_path(str(tmp_path / "map.py"))["found"].ravel()
-    assert sorted(found) == list(range(64))
-    mapped = np.array([found[k][3] for k in range(64)])
-    assert np.array_equal(mapped, modes)
-    assert len(np.unique(modes)) > 3
-    for command in (map_as_command(grid), sweep_as_command(sweep_of(case, {"sweep": "a", "sweep_points": "8"}))):
-        assert "--pivots" in command and "--mesh" not in command and "--azimuth" not in command
-    code, _, err = run(*shlex.split(map_as_command(grid))[1:], "--quiet")
-    assert (code, err) == (0, "")
-
-
 @pytest.fixture(scope="module")
 def page():
     with clients() as portal:
@@ -396,15 +344,3 @@ def test_no_text_of_a_mesh_fails_otherwise_than_by_a_sentence(seed):
             assert "\n" not in str(error)
             answered += 1
     assert answered >= 25
-
-
-def test_a_body_is_read_once_as_long_as_it_is_kept(monkeypatch):
-    read, bodies = [], meshes.MeshStore(lambda key: None)
-    monkeypatch.setattr(meshes, "_KEPT", 2)
-    monkeypatch.setattr(
-        meshes, "_read", lambda name, upload, given: read.append(given["gravity"]) or InvalidBlock("no")
-    )
-    for gravity in (1.0, 2.0, 2.0, 1.0, 3.0, 1.0):
-        with pytest.raises(InvalidBlock):
-            bodies.body("statue", {}, None, gravity)
-    assert read == [1.0, 2.0, 3.0, 1.0]

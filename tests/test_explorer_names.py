@@ -93,21 +93,6 @@ def test_a_channel_named_like_an_option_is_none(run, tmp_path, monkeypatch):
     assert json.loads(out)["peak_rotation_rad"] == case.simulate().peak_rotation
 
 
-@pytest.mark.thorough
-@pytest.mark.parametrize("name", ["$$", "$\\frac{$", "a$b$c{", "\\$x$"])
-def test_a_dollar_in_a_channels_name_begins_no_formula(name):
-    text = f"time (s), {name} (g), other (g)\n" + "".join(
-        f"{0.01 * k:.2f}, {0.3 * (-1) ** (k // 20)}, 0\n" for k in range(50)
-    )
-    explorer = Explorer()
-    key = explorer.uploads.add_file("x.csv", text.encode())
-    label = explorer.uploads.contents(key)["channels"][0]["name"]
-    assert "$" in label
-    drawn = explorer.export({**BLOCK, "motion": f"file:{key}", "channel": "1"}, "svg").decode()
-    (title,) = [line for line in drawn.splitlines() if "<!--" in line and " under " in line]
-    assert f"under {label.replace('--', '- -')}" in title.replace("&amp;", "&")
-
-
 def test_the_name_of_a_motion_ends_no_comment():
     explorer = Explorer()
     motion = rocking.Motion.from_samples(np.sin(np.arange(50.0)), dt=0.02, name="x\nimport os\rimport sys\x0cy")

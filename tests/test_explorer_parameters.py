@@ -7,14 +7,9 @@ import pytest
 from rocking import quantities
 from rocking.errors import InvalidOption
 from rocking.explorer.parameters import (
-    DEFAULT,
-    MAP,
     PARAMETERS,
     PULSES,
-    SCALINGS,
-    SHAPES,
     field_label,
-    names_of,
     specification,
 )
 from rocking.explorer.phrases import english
@@ -45,10 +40,6 @@ def test_every_slider_starts_within_its_ends():
     assert judged >= 14
 
 
-def test_a_direction_goes_once_round():
-    assert (PARAMETERS["azimuth"].low, PARAMETERS["azimuth"].high) == (0.0, 360.0)
-
-
 def test_every_text_of_a_case_is_an_option_of_the_command_line(run):
     for command, options, floor in (
         ("simulate", PARAMETERS.keys() - NO_OPTIONS - OF_MESHES, 20),
@@ -57,14 +48,6 @@ def test_every_text_of_a_case_is_an_option_of_the_command_line(run):
         _, shown, _ = run(command, "--help")
         assert len(options) >= floor
         assert [name for name in options if f"--{name.replace('_', '-')}" not in shown] == []
-
-
-def test_shapes_and_scalings_are_made_of_parameters_of_their_forms():
-    described = {name for shape in SHAPES for name in (*shape.needed, *shape.optional)}
-    assert described == {*names_of("block")} - {"restitution"}
-    assert {*SCALINGS} <= {*names_of("motion")}
-    assert DEFAULT.keys() <= PARAMETERS.keys()
-    assert not MAP.keys() & PARAMETERS.keys()
 
 
 @pytest.mark.parametrize("name", PULSES)
@@ -114,15 +97,6 @@ def test_a_parameter_of_a_pulse_is_called_as_that_pulse_has_it():
             judged += 1
     assert judged >= 20
     assert field_label("amplitude") == "amplitude"  # of the acceleration, or of the velocity
-
-
-def test_the_page_is_given_every_parameter_with_its_label():
-    given = specification()["parameters"]
-    assert [each["name"] for each in given] == [*PARAMETERS]
-    assert all(english()[f"field.{each['text']}"] for each in given)
-    assert {each["name"]: each["suffix"] for each in given if each["suffix"]} == {
-        "alpha": "deg", "pga": "g", "sa": "g", "initial_rotation": "deg",
-    }  # fmt: skip
 
 
 def test_what_the_page_shows_where_a_text_names_nothing_is_what_the_package_takes():

@@ -123,24 +123,6 @@ def test_an_overturning_is_told_with_its_period(amplitude, frequency, eta):
     assert not len(found.arrays["x"])
 
 
-def test_an_overturning_after_hundreds_of_periods_is_drawn_from_shortly_before():
-    # Just beyond the end of the cascade a block moves without a period for long, and falls in the end.
-    late = []
-    for amplitude in (17.345, 17.35, 17.355, 17.36):
-        found = orbit(case_of(sine(amplitude), initial_rotation="0.1", initial_velocity="1.06"))
-        late.append(int(re.fullmatch(r"It overturns in period (\d+)\.", in_english(found.header["sentence"]))[1]))
-        assert 1.45 < np.abs(found.arrays["rotation"][-1]) < 1.55
-        assert 2 <= len(found.arrays["before"]) <= 2 * LONGEST
-    assert sum(each > 128 for each in late) >= 2
-
-
-def test_a_sine_that_does_not_lift_leaves_the_block_at_rest():
-    assert in_english(orbit(case_of(sine(1.0))).header["sentence"]) == "It stays at rest: the sine never lifts it."
-    assert in_english(orbit(case_of(sine(1.0), initial_rotation="0.1")).header["sentence"]).startswith(
-        "It stays at rest"
-    )
-
-
 def test_a_case_without_a_period_is_said_to_have_none():
     case = case_of(sine(15.847), initial_rotation="0.0359", initial_velocity="1.216")
     found = orbit(case)
@@ -314,11 +296,3 @@ def test_a_part_of_a_sweep_is_sent_with_rotations_over_slenderness():
 def test_a_sweep_that_is_none_is_refused(motion, asked, words):
     with pytest.raises(InvalidOption, match=words):
         sweep_of(case_of(motion), asked)
-
-
-def test_a_sweep_that_is_not_read_on_stops():
-    found = parts(sweep_of(case_of(sine(3.0)), {"sweep_points": "400"}))
-    next(found)
-    found.close()
-    with pytest.raises(StopIteration):
-        next(found)

@@ -9,9 +9,8 @@ import pytest
 from explorer_texts import in_english
 
 import rocking
-from rocking.errors import InvalidOption
 from rocking.explorer.core import Explorer
-from rocking.explorer.parameters import ASSESSMENT, MAP, PARAMETERS, READING, SWEEP, field_label, specification
+from rocking.explorer.parameters import ASSESSMENT, MAP, PARAMETERS, READING, SWEEP, specification
 from rocking.explorer.phrases import english, filled, preferred
 from rocking.explorer.server import App
 
@@ -135,13 +134,6 @@ def test_every_parameter_has_its_text_and_no_text_is_of_none():
     assert set(names) <= TEXTS.keys() and len(names) >= 25
 
 
-def test_forms_of_a_text_end_with_one_for_all_other_counts():
-    judged = [text for text in TEXTS.values() if isinstance(text, dict)]
-    assert len(judged) >= 10
-    for text in judged:
-        assert "other" in text and all(each.isdigit() or each in ("one", "other") for each in text)
-
-
 @pytest.mark.parametrize(
     ("count", "expected"), [(1, "comes to rest once"), (2, "comes to rest twice"), (7, "comes to rest 7 times")]
 )
@@ -177,10 +169,3 @@ def test_a_page_in_another_language_falls_back_to_english_for_what_is_not_transl
     german = app._page("de")
     assert '<html lang="de">' in german and ">Karte<" in german and ">Compare<" in german
     assert ">Map<" in app._page("en")
-
-
-def test_a_message_calls_a_field_as_the_page_does():
-    texts = {**TEXTS, "field.width": "Breite"}
-    with pytest.raises(InvalidOption) as caught:
-        raise InvalidOption("{} must be positive", "width")
-    assert caught.value.text(lambda name: field_label(name, "", texts)) == "“Breite” must be positive"
