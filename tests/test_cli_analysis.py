@@ -14,7 +14,6 @@ from rocking import fragility, incremental_dynamic_analysis, overturning_map, qu
 from rocking.analysis import Band
 from rocking.analysis.calibration.diagnostics import Scores
 from rocking.cli import calibrate as calibrating
-from rocking.cli import fragility as fitting
 from rocking.tables import to_json
 
 RECORD = "el-centro-meloland-270"
@@ -42,17 +41,6 @@ def undrawn(run, monkeypatch):
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda *given, **options: None)
 
 
-@pytest.mark.usefixtures("undrawn")
-def test_spectrum_prints_fractiles_and_writes_what_it_says(run, tmp_path):
-    arguments = ["--alpha", "0.2", "--size", "0.5,1,2", "--restitution", "0.9", "--against", "size", "--out", tmp_path]
-    code, out, _ = run("spectrum", RECORD, *arguments)
-    assert code == 0
-    assert "restitution 0.9" in out
-    names = {"fractiles.csv", "peaks.csv", "spectrum.nc", "spectrum.pdf", "spectrum.png"}
-    assert {path.name for path in tmp_path.iterdir()} == names | {"result.json"}
-    assert all(path.name in out for path in tmp_path.iterdir())
-
-
 @pytest.mark.thorough
 def test_map_json_is_the_map(run):
     arguments = ["--alpha", "0.2", "--restitution", "0.9", "--amplitudes", "0.5:8:16", "--frequencies", "2,5", "--json"]
@@ -65,17 +53,6 @@ def test_map_json_is_the_map(run):
     assert result["mode"] == dataset.mode.values.tolist()
     assert [row["boundary_amplitude"] for row in result["boundaries"]] == dataset.boundary_amplitude.values.tolist()
     assert result["modes"]["0"] == "overturns without impact"
-
-
-@pytest.mark.thorough
-def test_map_prints_shares_and_writes_what_it_says(run, tmp_path):
-    arguments = ["--amplitudes", "0.5:8:9", "--frequencies", "2:5:4", "--out", tmp_path]
-    code, out, _ = run("map", "ricker", "--kind", "antisymmetric", *SIZES, *arguments)
-    assert code == 0
-    for words in ("no uplift", "rocks", "lowest amplitude that overturns"):
-        assert words in out
-    names = {"boundaries.csv", "modes.csv", "map.nc", "map.pdf", "map.png"}
-    assert {path.name for path in tmp_path.iterdir()} == names | {"result.json"}
 
 
 def test_ida_json_is_the_analysis(run):
@@ -110,15 +87,6 @@ def test_ida_prints_bands_and_writes_what_it_says(run, tmp_path):
     assert "none of them lifts" not in out
 
 
-def test_a_fragility_of_a_symmetric_block_says_that_both_polarities_count_once(run):
-    stripes = [RECORD, OTHER, "ridgecrest-clc-090", *SIZES, "--measure", "pgv", "--levels", "0.4:1.2:9"]
-    once = run("fragility", *stripes)[1]
-    both = run("fragility", *stripes, "--polarity", "both")[1]
-    words = ", one polarity, since a symmetric block does the same in both"
-    assert once and words in both
-    assert both.replace(words, "") == once
-
-
 STRIPES = ["--measure", "pgv", "--levels", "0.4:1.2:9", "--polarity", "both"]
 
 
@@ -135,73 +103,6 @@ def test_fragility_json_is_the_fit(run):
     )
     assert result["curves"] == json.loads(to_json(fitted.to_dict()))["curves"]
     assert result["measure"] == {"name": "pgv", "units": "m/s"}
-
-
-@pytest.mark.thorough
-def test_fragility_prints_a_table_and_writes_what_it_says(run, tmp_path):
-    arguments = ["--limits", "half=0.5,overturning", "--taxonomy", "statue", "--out", tmp_path]
-    code, out, _ = run("fragility", RECORD, OTHER, "ridgecrest-clc-090", *SIZES, *STRIPES, *arguments)
-    assert code == 0
-    assert "overturning" in out
-    assert "half" in out
-    names = {"fragility-continuous.xml", "fragility-discrete.xml", "fragility.csv", "fragility.pdf", "fragility.png"}
-    names |= {"outcomes.csv"}
-    assert {path.name for path in tmp_path.iterdir()} == names | {"result.json"}
-    assert 'id="statue"' in (tmp_path / "fragility-continuous.xml").read_text("utf-8")
-
-
-@pytest.mark.cases(fast=12)
-@pytest.mark.parametrize(
-    ("arguments", "word"),
-    [
-        (["spectrum", RECORD, "--alpha", "0.2"], "one of --p"),
-        (["spectrum", RECORD, "--alpha", "0.2", "--size", "1s"], "--size takes a length as 0.2, 0.2m or 20cm"),
-        (["spectrum", "--alpha", "0.2", "--p", "2"], "record"),
-        (["spectrum", RECORD, "--alpha", "high", "--p", "2"], "--alpha"),
-        (["spectrum", RECORD, "--alpha", "0.2", "--p", "1:2"], "--p"),
-        (["spectrum", RECORD, "--alpha", "0.2", "--p", "1:2:3:4"], "--p"),
-        (["spectrum", RECORD, "--alpha", "0.2", "--p", "0:2:3:log"], "positive"),
-        (["spectrum", RECORD, "--alpha", "0.2", "--p", "1:2:1"], "COUNT"),
-        (["spectrum", RECORD, "--alpha", "0.2", "--p", "1:2:9999999"], "COUNT"),
-        (["spectrum", RECORD, "--alpha", "0.2", "--p", "nan"], "--p must be positive"),
-        (["spectrum", "nowhere.AT2", "--alpha", "0.2", "--p", "2"], "nowhere.AT2"),
-        (["spectrum", RECORD, "--p", "2"], "alpha"),
-        (["spectrum", RECORD, "--alpha", "0.2", "--p", "2", "--chattering", "hope"], "hope"),
-        (["map", "square", "--alpha", "0.2"], "square"),
-        (["map", "sine", "--alpha", "0.2"], "cycles"),
-        (["map", "half-sine"], "--alpha"),
-        (["map", "half-sine", "--alpha", "0.2", "--amplitudes", "2,1"], "increase"),
-        (["map", "half-sine", "--alpha", "0.2", "--restitution", "1"], "restitution"),
-        (["map", "half-sine", "--alpha", "0.2", "--tolerance", "2"], "tolerance"),
-        (["ida", RECORD, "--p", "2"], "--alpha"),
-        (["ida", RECORD, *SIZES, "--measure", "pgd"], "pgd"),
-        (["ida", RECORD, *SIZES, "--measure", "sa"], "period"),
-        (["ida", RECORD, *SIZES, "--levels", "2g,1g"], "increase"),
-        (["ida", *SIZES], "record"),
-        (["fragility", RECORD, *SIZES], "overturning"),
-        (["fragility", RECORD, *SIZES, "--limits", "half"], "--limits"),
-        (["fragility", RECORD, *SIZES, "--limits", "half=much"], "--limits half"),
-        (["fragility", RECORD, *SIZES, "--bootstrap", "-4"], "--bootstrap must be a whole number"),
-        (["fragility", RECORD, *SIZES, "--bootstrap", "5"], "samples as 5 do not reach"),
-        (["fragility", RECORD, *SIZES, "--confidence", "90"], "confidence"),
-    ],
-)
-def test_a_mistake_is_one_line_and_exit_2(run, arguments, word):
-    code, out, err = run(*arguments)
-    assert (code, out) == (2, "")
-    assert err.count("\n") == 1
-    assert word.lower() in err.lower()
-
-
-@pytest.mark.parametrize("command", ["spectrum", "map", "ida", "fragility"])
-def test_a_folder_that_cannot_be_written_to_is_refused_before_work(run, tmp_path, command):
-    blocked = tmp_path / "file"
-    blocked.write_text("")
-    what = "half-sine" if command == "map" else RECORD
-    block = ["--alpha", "0.2", "--p", "2"] if command == "spectrum" else SIZES
-    code, out, err = run(command, what, *block, "--out", blocked / "results")
-    assert (code, out) == (2, "")
-    assert "--out" in err
 
 
 @pytest.fixture
@@ -240,13 +141,6 @@ def test_what_is_wrong_with_what_is_given_is_said_before_the_work(run, tmp_path,
 
 
 @pytest.mark.usefixtures("no_work")
-def test_a_motion_of_zeros_among_others_is_refused_before_the_rules_are_checked():
-    motions = [rocking.records.load(RECORD), rocking.Motion.from_samples(np.zeros(100), 0.01)]
-    with pytest.raises(rocking.InvalidMotion, match="zero"):
-        rocking.rules.check(rocking.Block(width=0.24, height=1.1), motions)
-
-
-@pytest.mark.usefixtures("no_work")
 @pytest.mark.parametrize("specimens", [False, True])
 def test_more_folds_than_groups_are_refused_before_the_calibration(run, outcomes_table, specimens):
     if specimens:
@@ -256,13 +150,6 @@ def test_more_folds_than_groups_are_refused_before_the_calibration(run, outcomes
     code, _, err = run("calibrate", outcomes_table, *CALIBRATED, "--folds", "6" if specimens else "40")
     assert code == 2
     assert "--folds must be a whole number" in err and ("specimen B" in err) == specimens
-
-
-@pytest.mark.thorough
-def test_a_spectrum_of_many_curves_is_written_with_its_figure(run, tmp_path):
-    code, _, err = run("spectrum", RECORD, "--alpha", "0.1:0.4:6", "--p", "2,3", "--out", tmp_path)
-    assert (code, err) == (0, "")
-    assert {"spectrum.png", "spectrum.pdf", "result.json"} <= {path.name for path in tmp_path.iterdir()}
 
 
 @pytest.mark.thorough
@@ -313,19 +200,6 @@ def test_a_figure_that_is_refused_takes_nothing_else_away(run, tmp_path, monkeyp
     assert "result.json" in out
 
 
-@pytest.mark.thorough
-def test_the_help_of_every_command_names_its_options(run):
-    for command, option in (
-        ("spectrum", "--alpha"),
-        ("map", "--cycles"),
-        ("ida", "--levels"),
-        ("fragility", "--limits"),
-    ):
-        code, out, _ = run(command, "--help")
-        assert code == 0
-        assert option in out
-
-
 @pytest.fixture(scope="module")
 def outcomes_text():
     block = rocking.Block.from_parameters(p=3.0, alpha=0.15, restitution=0.9)
@@ -365,17 +239,6 @@ def test_calibrate_json_is_the_calibration(run, outcomes_table):
     assert list(result["predicted"].values()) == pytest.approx(predicted.tolist(), rel=1e-12)
 
 
-@pytest.mark.thorough
-@pytest.mark.usefixtures("coarse", "undrawn")
-def test_calibrate_prints_the_diagnostics_and_writes_what_it_says(run, outcomes_table, tmp_path):
-    code, out, _ = run("calibrate", outcomes_table, *CALIBRATED, "--out", tmp_path / "out")
-    assert code == 0
-    assert "2 independent runs, R-hat at most" in out
-    written = {path.name for path in (tmp_path / "out").iterdir()}
-    assert written == {"calibration.png", "calibration.pdf", "result.json", "ensemble.csv"}
-    assert len((tmp_path / "out" / "ensemble.csv").read_text().splitlines()) > 10
-
-
 @pytest.mark.parametrize("folds", [0, 2])
 def test_every_specimen_is_said_with_its_own_numbers(run, outcomes_table, tmp_path, monkeypatch, folds):
     def calibrated(motions, overturned, **how):
@@ -402,40 +265,6 @@ def test_every_specimen_is_said_with_its_own_numbers(run, outcomes_table, tmp_pa
     text = run(*arguments)[1]
     assert all(f"specimen {name}\n{count} of 10 fell" in text for name, count in zip("AB", fell, strict=True))
     assert text.count("left-out motions: ") == text.count("(2 folds)") == folds
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("coarse")
-def test_several_specimens_are_calibrated_each_by_itself(run, outcomes_table, tmp_path, monkeypatch):
-    header, *rows = outcomes_table.read_text().splitlines()
-    flipped = [",".join((*row.split(",")[:2], "1" if k > 4 else "0", row.split(",")[3])) for k, row in enumerate(rows)]
-    both = tmp_path / "both.csv"
-    mixed = [row + f",{name}" for pair in zip(rows, flipped, strict=True) for row, name in zip(pair, "AB", strict=True)]
-    both.write_text("\n".join([header + ",specimen", *mixed]))
-    # Those of the two are made once, and then shown again as text.
-    with monkeypatch.context() as patched:
-        made, calibrated = {}, calibrating.calibrated
-
-        def once(motions, overturned, **how):
-            if (which := tuple(overturned)) not in made:
-                made[which] = calibrated(motions, overturned, **how)
-            return made[which]
-
-        patched.setattr(calibrating, "calibrated", once)
-        code, out, err = run("calibrate", both, *CALIBRATED, "--folds", "2", "--out", tmp_path / "out", "--json")
-        text = run("calibrate", both, *CALIBRATED)[1]
-    assert (code, err) == (0, "")
-    assert "specimen A\n20 motions" in text
-    found = json.loads(out)["specimens"]
-    outcomes_table.write_text("\n".join([header, *flipped]))
-    alone = json.loads(run("calibrate", outcomes_table, *CALIBRATED, "--folds", "2", "--json")[1])
-    assert list(found) == ["A", "B"]
-    assert found["B"] == alone
-    assert found["A"]["estimates"] != alone["estimates"]
-    for name in "AB":
-        written = {path.name for path in (tmp_path / "out" / name).iterdir()}
-        assert written == {"calibration.png", "calibration.pdf", "result.json", "ensemble.csv"}
-        assert json.loads((tmp_path / "out" / name / "result.json").read_text()) == found[name]
 
 
 def test_a_specimen_that_cannot_be_calibrated_is_named_before_any_work(run, outcomes_table, tmp_path):
@@ -467,37 +296,6 @@ def test_calibrate_refuses_a_mistake_in_one_line(run, outcomes_table, change, wo
     code, _, err = run("calibrate", outcomes_table, *CALIBRATED, *change)
     assert code == 2
     assert words in err and len(err.splitlines()) == 1
-
-
-@pytest.mark.thorough
-def test_the_outcomes_of_a_fragility_name_their_block_and_the_unit_of_their_intensity(run, tmp_path):
-    records = [name for name in rocking.records.names() if not name.endswith("up")]
-    sizes = ["--width", "0.3", "--height", "1.5"]
-    code, out, _ = run("fragility", *records, *sizes, "--levels", "0.1g:1.2g:12", "--out", tmp_path, "--json")
-    assert code == 0
-    assert json.loads(out)["block"] == "rectangular block, 0.3 m x 1.5 m"
-    header = (tmp_path / "outcomes.csv").read_text().splitlines()[0].split(",")
-    assert "pga_m_s2" in header
-    assert "intensity" not in header
-
-
-@pytest.mark.cases(fast=1)
-@pytest.mark.parametrize(("width", "height"), [("0.6", "2.1"), ("1.1", "2.0")])
-def test_the_table_of_many_records_says_no_more_than_is_known(run, tmp_path, width, height):
-    """What is ambiguous alone is so in a table, and a peak has no more digits there."""
-    path = tmp_path / "long.csv"
-    times = 0.02 * np.arange(2001)
-    shaking = 0.45 * np.sin(2.1 * times) + 0.2 * np.sin(13.0 * times + 0.3) + 0.1 * np.sin(37.0 * times)
-    path.write_text("time (s),a (g)\n" + "".join(f"{t:.2f},{a:.4f}\n" for t, a in zip(times, shaking, strict=True)))
-    block = ["--width", width, "--height", height]
-    alone = run("simulate", path, *block)[1]
-    many = run("simulate", path, "el-centro-meloland-270", *block, "--out", tmp_path / "out")[1]
-    row = next(line for line in many.splitlines() if str(path) in line)
-    assert ("AMBIGUOUS" in alone) == ("AMBIGUOUS" in row)
-    peak = next(line for line in alone.splitlines() if line.startswith("peak rotation"))
-    known = "infinite" if "has fallen" in peak else peak.split(", ")[-1].split()[0]
-    assert known in row.split()
-    assert "ambiguous" in (tmp_path / "out" / "summary.csv").read_text().splitlines()[0]
 
 
 @pytest.mark.cases(fast=1)
@@ -571,24 +369,6 @@ def test_an_ensemble_goes_without_a_restitution(run, tmp_path, command):
     assert "leave --restitution out" in err
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["--limits", "half=0.5,half=0.7"], "has half twice"),
-        (["--limits", "=0.5"], "gives a rotation the name ''"),
-        (["--limits", "overturning=0.5"], "gives a rotation the name 'overturning'"),
-        (["--site", "2"], "--site is for a curve of --hazard"),
-        (["--years", "100"], "--years is for a curve of --hazard"),
-        (["--seed", "1.5"], "--seed takes a whole number, not '1.5'"),
-        (["--bootstrap", "0x10"], "--bootstrap takes a whole number"),
-    ],
-)
-def test_what_a_fragility_would_pass_over_is_refused(run, arguments, said):
-    code, _, err = run("fragility", RECORD, *SIZES, *arguments)
-    assert code == 2
-    assert said in err
-
-
 def test_records_of_a_fragility_belong_together_by_station_or_by_labels(run):
     names = [name for name in rocking.records.names() if not name.endswith("up")]
     motions = [rocking.records.load(name) for name in names]
@@ -607,22 +387,6 @@ def test_records_of_a_fragility_belong_together_by_station_or_by_labels(run):
     assert code == 2 and "--clusters must hold 6 labels" in err
 
 
-@pytest.mark.thorough
-def test_records_of_a_comparison_of_measures_belong_together_by_station(run):
-    names = [name for name in rocking.records.names() if not name.endswith("up")]
-    measures = ["measures", *names, *SIZES, "--periods", "1"]
-    code, _, err = run(*measures)
-    assert code == 0 and "--clusters may be station, which joins them" in err
-    code, out, err = run(*measures, "--clusters", "station", "--json")
-    assert (code, err) == (0, "")
-    motions = [rocking.records.load(name) for name in names]
-    expected = rocking.compare_measures(
-        rocking.Block(width=0.24, height=1.1), motions, periods=[1.0], clusters="station"
-    )
-    assert json.loads(out)["measures"] == json.loads(to_json(expected.to_dict()))["measures"]
-    assert "6 motions in 3 clusters" in expected.summary()
-
-
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -637,30 +401,3 @@ def test_a_free_history_goes_without_what_is_said_of_motions(run, tmp_path, argu
     code, _, err = run("calibrate", history, *arguments)
     assert code == 2
     assert said in err
-
-
-def test_outcomes_go_without_what_is_said_of_motions_to_predict(run, outcomes_table):
-    code, _, err = run("calibrate", outcomes_table, "--scale", "3")
-    assert code == 2
-    assert "--scale is for the motions of --predict or --pulse" in err
-
-
-@pytest.mark.thorough
-def test_standing_is_about_overturning_in_whatever_order_the_limits_come(run, monkeypatch):
-    common = [
-        "fragility",
-        RECORD,
-        "ridgecrest-clc-090",
-        *SIZES,
-        "--levels",
-        "0.1g:1g:19",
-        "--standing",
-        "1000",
-        "--json",
-    ]
-    for limits in ("overturning,half=0.5", "half=0.5,overturning"):
-        code, out, _ = run(*common, "--limits", limits)
-        assert code == 0 and json.loads(out)["survival"]["limit_state"] == "overturning"
-    monkeypatch.setattr(fitting, "run", None)  # it is refused before anything is simulated
-    code, _, err = run(*common, "--limits", "half=0.5,most=0.8")
-    assert code == 2 and "--standing is about overturning, or about one limit, not half and most" in err

@@ -2,8 +2,6 @@
 
 import json
 
-import pytest
-
 from rocking.chattering import (
     asymptotic_table,
     chattering_time,
@@ -70,24 +68,6 @@ def test_without_loss_at_impacts_nothing_rests(run):
     assert json.loads(run("chatter", 1.03, 2, 1, "--json")[1])["series"]["error"] is None
 
 
-@pytest.mark.thorough
-@pytest.mark.parametrize(
-    "sequence",
-    [
-        (1.03, 2, 0.92),
-        *(pytest.param(x, marks=pytest.mark.thorough) for x in ((1.5, 2, 0.92), (1.03, 2, 1), (1, 2, 0.9))),
-    ],
-)
-def test_chatter_draws_the_sequence_whatever_becomes_of_it(run, tmp_path, sequence):
-    code, out, _ = run("chatter", *sequence, "--out", tmp_path)
-    assert code == 0
-    names = {"chatter.pdf", "chatter.png", "impacts.csv", "result.json"} | (
-        {"cycles.csv"} if sequence[2] < 1 else set()
-    )
-    assert {path.name for path in tmp_path.iterdir()} == names
-    assert all(name in out for name in names)
-
-
 def test_at_the_threshold_there_is_nothing_to_wait_for(run):
     result = json.loads(run("chatter", 1, 2, 0.92, "--json")[1])
     assert result["complete"] is True
@@ -109,37 +89,3 @@ def test_critical_says_where_an_approximation_does_not_hold(run):
     assert out.count("none here: it holds for fewer omega and eta") == 3
     amplitudes = json.loads(run("critical", 20, 0.92, "--json")[1])["critical_amplitude"]
     assert [name for name, value in amplitudes.items() if value is None] == ["eq76", "eq77", "approximation"]
-
-
-def test_critical_prints_how_far_the_fits_are_off(run):
-    out = run("critical", 2, 0.92)[1]
-    assert "1.03801554\n" in out
-    assert "Eq. 76" in out
-    assert "off by -6.92e-04" in out
-
-
-@pytest.mark.parametrize(
-    ("arguments", "word"),
-    [
-        (["chatter", 0.9, 2, 0.92], "lift off"),
-        (["chatter", "nan", 2, 0.92], "finite"),
-        (["chatter", 1.03, 0, 0.92], "omega"),
-        (["chatter", 1.03, -2, 0.92], "omega"),
-        (["chatter", 1.03, 2, 0], "eta"),
-        (["chatter", 1.03, 2, 1.2], "eta"),
-        (["chatter", 1.03, 2, "high"], "eta"),
-        (["chatter", 1.03, 2], "eta"),
-        (["chatter", 1.03, 2, 0.92, "--order", 0], "order"),
-        (["chatter", 1.03, 2, 0.92, "--resolved", 0], "resolved"),
-        (["chatter", 1.03, 2, 1, "--table"], "eta"),
-        (["critical", 2, "inf"], "eta"),
-        (["critical", 2], "eta"),
-        (["critical", 2, 0.92, "--method", "exact"], "--method"),
-    ],
-)
-def test_a_mistake_is_one_line_and_exit_2(run, arguments, word):
-    code, out, err = run(*arguments)
-    assert (code, out) == (2, "")
-    assert err.count("\n") == 1
-    assert err.startswith("rocking: ")
-    assert word.lower() in err.lower()

@@ -1,8 +1,6 @@
 """`rocking bifurcation` and `rocking basin`: the public functions' numbers, their files, one line for every mistake."""
 
 import json
-import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,15 +25,6 @@ def test_basin_json_is_the_basins(run):
     assert result["complete"] is True and result["basin_entropy"] == found.entropy[0]
 
 
-@pytest.mark.thorough
-def test_basin_prints_shares_and_writes_what_it_says(run, tmp_path):
-    grid = ["--positions", "-0.2:0.2:4", "--velocities", "-0.4:0.4:4"]
-    code, out, _ = run("basin", *SINE, *BLOCK, *grid, "--out", tmp_path)
-    assert code == 0 and "overturns to side -" in out
-    tables = {"attractors.csv", "outcomes.csv", "orbits.csv"}
-    assert {path.name for path in tmp_path.iterdir()} == tables | {"basin.nc", "basin.pdf", "basin.png", "result.json"}
-
-
 @pytest.mark.parametrize(
     ("pulse", "along", "parameter"),
     [
@@ -56,15 +45,6 @@ def test_bifurcation_json_is_the_diagram(run, pulse, along, parameter):
         result["value"], [0.02, 0.1], kept=8,
     )  # fmt: skip
     assert result["period"] == found.period.values.tolist() and result["impacts"] == found.impacts.values.tolist()
-
-
-@pytest.mark.thorough
-def test_bifurcation_writes_what_it_says(run, tmp_path):
-    arguments = ["--pulse", "sine:frequency=1.2", "--along", "amplitude:1:3:4", "--kept", "4", "--out", tmp_path]
-    code, out, _ = run("bifurcation", *arguments, *BLOCK)
-    assert code == 0 and "up: " in out
-    names = {f"bifurcation.{kind}" for kind in ("nc", "pdf", "png")} | {"states.csv", "orbits.csv", "result.json"}
-    assert {path.name for path in tmp_path.iterdir()} == names
 
 
 @pytest.mark.thorough
@@ -96,33 +76,3 @@ def test_every_body_has_a_basin_and_a_diagram(run, options, body):
         lambda value: (body, pulses.sine(value, 1.3, cycles=1)), [2.0, 3.0], [0.01, 0.0], direction="both", kept=8
     )
     assert json.loads(out)["period"] == found.period.values.tolist()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["bifurcation", *SINE, "--along", "amplitude"], "--along takes a parameter of the pulse with its values"),
-        (["bifurcation", *SINE, "--along", "amplitude:1:2"], "--along takes numbers, 1,2,5, or a range"),
-        (["bifurcation", *SINE, "--along", "height:1:2:3"], "the pulse sine has no height"),
-        (["bifurcation", *SINE, "--along", "amplitude:3,2"], "--along must be increasing finite numbers"),
-        (["bifurcation", "--pulse", "sine:frequency=1", "--along", "phase:0:1:3"], "the pulse sine needs amplitude"),
-        (["bifurcation", *SINE, "--along", "phase:0:1:3", "--start", "0.1"], "--start takes a coordinate and a veloc"),
-        (["basin", *SINE, "--positions", "0.1,0"], "--positions must be increasing"),
-        (["basin", *SINE, "--velocities", "1,0"], "--velocities must be increasing"),
-        (["basin", "--pulse", "sine:amplitude=1kg,frequency=1"], "amplitude of a sine pulse takes an acceleration"),
-    ],
-)
-def test_a_mistake_gets_one_line_with_the_options_in_it(run, arguments, words):
-    code, _, err = run(*arguments, *BLOCK)
-    assert code == 2 and words in err and err.count("\n") == 1
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("page", ["bifurcation", "command-line"])
-def test_the_command_of_the_documentation_draws_bifurcations(run, page):
-    """The example of a diagram is one in which something happens: doublings, chaos, and overturning."""
-    text = (Path(__file__).parents[1] / "docs" / "howto" / f"{page}.md").read_text("utf-8")
-    (command,) = re.findall(r"^\$ rocking (bifurcation .*) --out results$", text, re.MULTILINE)
-    code, out, _ = run(*command.split(), "--json")
-    assert code == 0
-    assert {*np.ravel(json.loads(out)["period"])} >= {1, 2, 4, 0, -1}

@@ -69,43 +69,6 @@ def test_the_table_has_the_impacts_of_the_orbits(restitution, said):
     assert commands._text([orbit]).splitlines()[-1].split()[:3] == ["1", "1", said]
 
 
-BLOCK = ("--width", 0.8, "--height", 2.0, "--model", "linear", "--pulse", "sine:amplitude=0.05,frequency=5Hz")
-
-MISTAKES = [
-    (("--ball", 0.5, "--width", 1.0), "leave --width out"),
-    (("--oscillator", "frequency=1"), "--oscillator needs restitution"),
-    (("--oscillator", "frequency=1,mass=3"), "--oscillator takes NAME=VALUE"),
-    (("--ball", 0.5, "--along", "phase:0:1"), "--along takes a parameter"),
-    ((*BLOCK, "--along", "amplitude:0.04:0.06", "--orbit", 9), "--orbit must be from 1 to 3"),
-    (("--ball", 0.5, "--along", "amplitude:13:16"), "12"),
-    (("--ball", 0.5, "--period", 0), "--period"),
-    (("--ball", 0.5, "--along", "amplitude:16:9"), "a lower value to a higher one"),
-    (("--width", 0.5, "--height", 3.0, "--mass", 9, "--tendon", "stiffness=9,strength=5"), "a tendon that yields"),
-    ((), "a block is needed"),
-]
-MORE = [
-    (("--ball", 0.5, "--oscillator", "frequency=1", "--restitution", 0.5), "leave --oscillator and --restitution"),
-    (("--ball", 0.5, "--along", ":1:2"), "--along takes a parameter"),
-    (("--pendulum", "p=many,gap=1,restitution=0.5"), "--pendulum"),
-    (("--ball", 0.5, "--along", "amplitude:1"), "--along takes a parameter"),
-    (("--ball", 0.5, "--along", "amplitude:9:16", "--orbit", 9), "--orbit must be from 1 to 3"),
-    (("--ball", 0.5, "--orbit", 1), "--along"),
-    (("--ball", 0.5, "--spring", 9.0), "leave --spring out"),
-    (("--width", 0.5, "--height", 3.0, "--spring", 9.0), "needs its --mass"),
-]
-
-
-@pytest.mark.cases(fast=6)
-@pytest.mark.parametrize(
-    ("arguments", "words"), [*MISTAKES, *(pytest.param(*each, marks=pytest.mark.thorough) for each in MORE)]
-)
-def test_a_mistake_is_one_line(run, arguments, words):
-    pulse = () if "--pulse" in arguments else ("--pulse", SINE)
-    code, out, err = run("orbits", *pulse, *arguments)
-    assert (code, out) == (2, "")
-    assert words in err and len(err.splitlines()) == 1
-
-
 SIZES = ("--width", 0.5, "--height", 3.0, "--mass", 4000)
 COLUMN = Block(width=0.5, height=3.0, mass=4e3)
 

@@ -5,7 +5,6 @@ import io
 import json
 import os
 import re
-import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -15,7 +14,7 @@ import pytest
 
 import rocking
 from rocking import quantities
-from rocking.cli import app, main, wording
+from rocking.cli import main
 from rocking.errors import InvalidOption
 from rocking.motion.named import expanded
 from rocking.motion.scaling import Measure
@@ -75,26 +74,6 @@ def test_records_are_scaled_to_a_target_by_every_command(monkeypatch, run, comma
     options = {"spectrum": ["--alpha", "0.2", "--p", "2"]}.get(command, BLOCK)
     run(command, RECORD, *options, option, value)
     assert (pytest.approx(seen[0][0]), seen[0][1]) == target
-
-
-def test_one_target_at_most(run):
-    code, _, err = run("simulate", RECORD, *BLOCK, "--pga", "0.5g", "--scale", "2")
-    assert code == 2
-    assert "--scale and --pga" in err
-    assert "0.4g@1.0" in run("simulate", RECORD, *BLOCK, "--sa", "0.4g")[2]
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [("0.5g", 0.5 * GRAVITY), ("4.9m/s2", 4.9), ("4.9 m/s^2", 4.9), ("490 gal", 4.9), ("-1", -1.0)],
-)
-def test_accelerations_may_have_a_unit(text, expected):
-    assert quantities.acceleration(text, "--pga") == pytest.approx(expected, rel=1e-15)
-
-
-@pytest.mark.parametrize(("text", "expected"), [("12deg", np.radians(12.0)), ("0.2", 0.2), ("0.2 rad", 0.2)])
-def test_angles_may_have_a_unit(text, expected):
-    assert quantities.angle(text, "--alpha") == pytest.approx(expected, rel=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -189,18 +168,6 @@ def test_the_table_is_written_and_each_record_only_on_request(run, folder, tmp_p
     assert "--out" in run("simulate", folder, *BLOCK, "--each")[2]
 
 
-@pytest.mark.thorough
-def test_the_phase_plane_and_the_energy_are_drawn_on_request(run, tmp_path):
-    assert run("simulate", "el-centro-meloland-270", *BLOCK, "--energy", "--out", tmp_path)[0] == 0
-    drawn = {path.name for path in tmp_path.glob("*.png")}
-    assert drawn == {"response.png", "phase-plane.png", "energy.png"}
-
-
-def test_an_energy_is_drawn_of_one_record_into_a_folder(run, folder, tmp_path):
-    assert "--energy writes files" in run("simulate", "el-centro-meloland-270", *BLOCK, "--energy")[2]
-    assert "of several records give --each" in run("simulate", folder, *BLOCK, "--energy", "--out", tmp_path / "b")[2]
-
-
 def test_the_table_is_a_workbook_where_openpyxl_is_installed(run, folder, tmp_path):
     openpyxl = pytest.importorskip("openpyxl")
     assert run("simulate", folder, *BLOCK, "--out", tmp_path)[0] == 0
@@ -263,43 +230,12 @@ def test_a_record_is_read_from_standard_input(run, folder, monkeypatch):
     assert run("records", "-")[1].startswith("standard input: PEER AT2")
 
 
-def test_records_shows_a_shipped_record_by_its_name(run):
-    code, out, _ = run("records", RECORD, "--json")
-    assert code == 0
-    (entry,) = json.loads(out)["records"]
-    assert entry["name"] == RECORD
-
-
-@pytest.mark.parametrize(
-    ("arguments", "suggestion"),
-    [
-        (["simulat"], "did you mean simulate?"),
-        (["simulate", "ridgecrest-clc-91", *BLOCK], "did you mean ridgecrest-clc-090?"),
-        (["simulate", RECORD, "--restituton", "0.9"], "did you mean --restitution?"),
-        (["simulate", RECORD, "--hieght", "0.9"], "did you mean --height?"),
-    ],
-)
-def test_what_is_close_is_suggested(run, arguments, suggestion):
-    code, _, err = run(*arguments)
-    assert code == 2
-    assert suggestion in err
-    assert err.count("\n") == 1
-
-
 def test_a_file_and_a_channel_that_are_close_are_suggested(run, folder):
     assert f"did you mean {folder / 'r1.AT2'}?" in run("simulate", folder / "r1.AT", *BLOCK)[2]
     two = Path(__file__).parent / "data" / "formats" / "two.v1"
     name = json.loads(run("records", two, "--json")[1])["channels"][0]["name"]
     assert f"did you mean {name!r}?" in run("simulate", two, *BLOCK, "--channel", f"{name}g")[2]
     assert len(json.loads(run("records", two, "--channel", name, "--json")[1])["channels"]) == 1
-
-
-@pytest.mark.parametrize("option", ["--pgd", "--p0", "--velocity", "--ph", "--rotation", "--mass", "--a"])
-def test_no_suggestion_leads_to_another_quantity(run, option):
-    code, _, err = run("simulate", RECORD, option, "0.4")
-    assert code == 2
-    assert option in err
-    assert "mean" not in err
 
 
 def test_errors_name_options(run, tmp_path):
@@ -322,24 +258,6 @@ def test_the_version_is_shown(run, option):
     assert run(option)[1].strip() == rocking.__version__
 
 
-def test_completion_can_be_installed(run):
-    assert "--install-completion" in run("--help")[1]
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["map", "half-sine", "--alpha", "0.2", "--amplitudes", "1:9:100000", "--frequencies", "1:9:100000"],
-        ["spectrum", RECORD, "--alpha", "0.1:0.3:10000", "--p", "1:9:10000"],
-    ],
-)
-def test_a_grid_that_is_too_large_is_one_sentence(run, arguments):
-    code, _, err = run(*arguments)
-    assert code == 2
-    assert "can be computed: take fewer" in err
-    assert err.count("\n") == 1
-
-
 def test_a_failed_command_leaves_no_folder_that_it_made(run, tmp_path):
     assert run("simulate", "nowhere.AT2", *BLOCK, "--out", tmp_path / "new" / "results")[0] == 2
     assert not (tmp_path / "new").exists()
@@ -354,24 +272,6 @@ def test_what_the_locale_cannot_encode_is_shown_as_question_marks(monkeypatch):
     with pytest.raises(SystemExit):
         main(["records", "Łódź.txt"])
     assert b"rocking: ??d?.txt" in stderr.buffer.getvalue()
-
-
-@pytest.mark.thorough
-def test_an_ascii_locale_is_no_error(tmp_path):
-    record = tmp_path / "Kraków.txt"
-    record.write_text("".join(f"{0.01 * k:.2f} {np.sin(k):.4f}\n" for k in range(9)), "utf-8")
-    environment = {**os.environ, "LC_ALL": "C", "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
-    program = (
-        "import sys\nfrom rocking.cli import main\nrecord = sys.argv[1]\n"
-        "for arguments in (['records', record, '--units', 'g'], ['records', 'Łódź.txt'], ['simulate', '--help']):\n"
-        "    try:\n        main(arguments)\n    except SystemExit as stop:\n        print('ended', stop.code)\n"
-    )
-    (tmp_path / "program.py").write_text(program, "utf-8")
-    command = [sys.executable, str(tmp_path / "program.py"), str(record)]
-    done = subprocess.run(command, capture_output=True, env=environment, check=True)
-    assert b"Traceback" not in done.stderr, done.stderr
-    assert done.stdout.count(b"ended 2") == 1
-    assert b"Usage: rocking simulate" in done.stdout
 
 
 @pytest.mark.parametrize(
@@ -436,21 +336,6 @@ def test_a_channel_is_for_those_of_several_files_that_hold_several(run, folder):
     # Each file that holds several must have it, and so must a file alone.
     assert "no channel 'NS'; give one of 1 '90 Deg', 2 'Up'" in run("simulate", folder, *BLOCK, "--channel", "NS")[2]
     assert "no channel 'NS'" in run("simulate", folder / "r0.AT2", *BLOCK, "--channel", "NS")[2]
-
-
-def test_why_files_of_a_folder_are_refused_is_said_in_options(run, tmp_path):
-    for k in range(7):
-        (tmp_path / f"r{k}.csv").write_text("".join(f"{0.01 * n},{0.1 * (-1) ** n}\n" for n in range(300)))
-    code, out, err = run("records", tmp_path)
-    assert code == 2 and "units=" not in out and out.count("give --units as one of") == 7
-    assert err.startswith("rocking: 7 of 7 files cannot be read: ") and err.endswith(
-        f"{tmp_path / 'r4.csv'} and 2 more\n"
-    )
-    uneven = tmp_path / "r0.csv"
-    uneven.write_text("".join(f"{0.01 * n + 0.003 * (n % 2)},{0.1 * (-1) ** n}\n" for n in range(300)))
-    code, out, _ = run("records", uneven, "--units", "g")
-    assert code == 0 and "uneven" in out and "None" not in out
-    assert json.loads(run("records", uneven, "--units", "g", "--json")[1])["channels"][0]["step_s"] is None
 
 
 def test_a_folder_is_listed_although_some_files_cannot_be_read(run, folder):
@@ -599,43 +484,6 @@ def test_notes_go_to_those_who_want_them(capsys):
     with notes_for("nobody"):
         note("silence")
     assert capsys.readouterr().err == "rocking: note: two lines\n"
-
-
-@pytest.mark.thorough
-def test_every_command_in_the_documentation_has_the_options_that_it_shows():
-    root = Path(__file__).resolve().parents[1]
-    pages = [root / "README.md", *sorted((root / "docs").rglob("*.md"))]
-    commands = [
-        line for page in pages for line in re.findall(r"^\$ (?:.*\| )?rocking (.*)$", page.read_text("utf-8"), re.M)
-    ]
-    assert len(commands) > 20
-    for line in commands:
-        arguments = shlex.split(line, comments=True)
-        command, bound, _ = app.parse_args(arguments, exit_on_error=False, print_error=False)
-        wording.refuse_unknown_options(bound.args, app, arguments)
-        assert command is not None
-
-
-def test_a_history_s_motion_may_be_scaled(run, tmp_path):
-    table = tmp_path / "history.csv"
-    table.write_text("time_s,rotation_rad\n" + "".join(f"{0.05 * k},{0.01 * np.cos(k)}\n" for k in range(40)))
-    code, _, err = run("calibrate", table, "--motion", RECORD, "--scale", "2", "--pgv", "1")
-    assert code == 2
-    assert "--scale and --pgv" in err
-
-
-@pytest.mark.thorough
-def test_a_calibration_draws_what_it_found(run, tmp_path):
-    table, out = tmp_path / "history.csv", tmp_path / "out"
-    block = rocking.Block.from_parameters(p=2.5, alpha=0.2, restitution=0.9)
-    times = np.arange(0.0, 3.0, 0.05)
-    rotation = rocking.simulate(block, None, initial_rotation=0.1, duration=3.0).rotation(times)
-    rotation += 1e-4 * np.random.default_rng(1).normal(size=times.size)
-    rows = (f"{time},{angle}\n" for time, angle in zip(times, rotation, strict=True))
-    table.write_text("time_s,rotation_rad\n" + "".join(rows))
-    known = ["--p", "2.5", "--alpha", "0.2", "--initial-rotation", "0.1"]
-    assert run("calibrate", table, *known, "--out", out)[0] == 0
-    assert {path.name for path in out.iterdir()} == {"calibration.png", "calibration.pdf", "result.json"}
 
 
 @pytest.mark.thorough

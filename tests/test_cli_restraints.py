@@ -57,31 +57,6 @@ def test_ida_and_fragility_take_restraints(run):
     assert json.loads(out)["curves"][0]["median"] == pytest.approx(truth.curves[0].median)
 
 
-@pytest.mark.cases(fast=4)
-@pytest.mark.parametrize(
-    ("options", "says"),
-    [
-        (["--tendon", "stiffnes=1"], "--tendon takes NAME=VALUE with stiffness, prestress, offset, strength"),
-        (["--tendon", "prestress=1"], "--tendon needs stiffness"),
-        (["--load", "mass=1,height=2,follows=maybe"], "--load takes follows=yes or follows=no, not 'maybe'"),
-        (["--tendon", "stiffness=1e6,stiffness=2"], "--tendon gives stiffness twice, in 'stiffness=1e6,stiffness=2'"),
-        (["--tendon", "stiffness=-1"], "--tendon: stiffness of a tendon must be at least 0 N/m, not -1"),
-        (["--tendon", "stiffness=1e6,offset=9"], "a tendon at offset = 9 m is beyond the pivot"),
-        (["--load", "mass=1e5,height=4,offset=1"], "give a load less mass, or less offset"),
-        (["--spring", "-1"], "--spring: stiffness must be a positive number, in N m/rad, not -1"),
-        (["--one-sided", "--restitution", "0.4,0.5"], "--restitution of a block that rocks one way is one number"),
-        (["--lean", "40deg"], "whose --lean is 0.698132 rad falls"),
-        (["--thrust", "force=9e4,height=4"], "does not stand"),
-        (["--p", "2"], "belong to different descriptions"),
-    ],
-)
-def test_a_mistake_in_restraints_is_told_in_one_line(run, options, says):
-    code, _, err = run("simulate", *PULSE, *SIZES, *options)
-    assert code != 0
-    assert says in err
-    assert err.count("\n") == 1
-
-
 def test_restraints_need_a_mass_and_an_ensemble_has_blocks_of_its_own(run, tmp_path):
     code, _, err = run("simulate", *PULSE, "--p", "2", "--alpha", "0.2", "--spring", "5")
     assert code != 0
