@@ -22,7 +22,6 @@ import math
 import re
 import sys
 import tempfile
-import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from fractions import Fraction
 from pathlib import Path
@@ -43,21 +42,11 @@ Item = tuple[str, Any]
 
 
 class Group(NamedTuple):
-    """Results with one digest.
-
-    Attributes
-    ----------
-    items : callable
-        Makes the results, each with a label.
-    digits : int or None
-        Significant digits to which numbers are rounded before they are compared; None: all bits.
-    fast : bool
-        Whether the fast tests compare it.
-    """
+    """What makes results with one digest, each with a label; the digits of their numbers, or None for all bits."""
 
     items: Callable[[], Iterable[Item]]
     digits: int | None
-    fast: bool
+    fast: bool  # whether the fast tests compare it
 
 
 GROUPS: dict[str, Group] = {}
@@ -135,9 +124,8 @@ def rounded_text(text: str, digits: int) -> str:
     """Round the numbers of a text that have more digits."""
 
     def shorter(match: re.Match[str]) -> str:
-        return (
-            rounded(float(match[0]), digits) if len(re.sub(r"e.*|\D", "", match[0]).lstrip("0")) > digits else match[0]
-        )
+        is_long = len(re.sub(r"e.*|\D", "", match[0]).lstrip("0")) > digits
+        return rounded(float(match[0]), digits) if is_long else match[0]
 
     return re.sub(r"-?\d+(\.\d+(e[+-]?\d+)?|e[+-]?\d+)", shorter, text)
 
@@ -203,16 +191,11 @@ def digest(name: str) -> tuple[str, int]:
 
 def spread(count: int, *ranges: tuple[float, float]) -> list[tuple[float, ...]]:
     """Points that fill ranges evenly (a Halton sequence), of a few digits each."""
+    bases = list(zip(ranges, (2, 3, 5, 7, 11, 13), strict=False))
     return [
-        tuple(
-            float(f"{low + (high - low) * halton(k + 1, base):.5g}")
-            for (low, high), base in zip(ranges, PRIMES, strict=False)
-        )
+        tuple(float(f"{low + (high - low) * halton(k + 1, base):.5g}") for (low, high), base in bases)
         for k in range(count)
     ]
-
-
-PRIMES: Final = (2, 3, 5, 7, 11, 13)
 
 
 def halton(k: int, base: int) -> float:
@@ -274,6 +257,7 @@ def under(bodies: Iterable[Any], motions: Iterable[rocking.Motion], **options: A
 MODELS: Final = ("nonlinear", "linear")
 RECTANGLES: Final = [rocking.Block(width=w, height=h) for w, h in spread(6, (0.15, 0.8), (0.8, 3.0))]
 STATUE: Final = rocking.Block(width=0.24, height=1.1)
+WALL: Final = rocking.Block.one_sided(width=0.5, height=4.0, restitution=0.4)
 SLENDER: Final = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.92)
 UNEVEN: Final = [
     rocking.Block.from_pivots((0.2, 0.15), 0.6, 0.4),
@@ -293,11 +277,10 @@ def rectangles(model: str) -> Iterator[Item]:
 @group(model=MODELS)
 def parameters(model: str) -> Iterator[Item]:
     for p, alpha, e in spread(14, (1.0, 8.0), (0.05, 0.4), (0.4, 0.98)):
-        block = rocking.Block.from_parameters(p=p, alpha=alpha, restitution=e)
-        yield from under(
-            [block], [lobes(1.5 * G * alpha, 0.15 * p * k, 1.0, -1.0, 0.5) for k in (1, 2, 3)], model=model
-        )
-        yield from under([block], [record("ridgecrest-tow2-360", 900, 1500).scaled_to(1.6 * G * alpha)], model=model)
+        blocks = [rocking.Block.from_parameters(p=p, alpha=alpha, restitution=e)]
+        weak = [lobes(1.5 * G * alpha, 0.15 * p * k, 1.0, -1.0, 0.5) for k in (1, 2, 3)]
+        yield from under(blocks, weak, model=model)
+        yield from under(blocks, [record("ridgecrest-tow2-360", 900, 1500).scaled_to(1.6 * G * alpha)], model=model)
 
 
 @group(model=MODELS)
@@ -308,7 +291,7 @@ def two_sided(model: str) -> Iterator[Item]:
 @group(model=MODELS)
 def one_sided(model: str) -> Iterator[Item]:
     walls = [
-        rocking.Block.one_sided(width=0.5, height=4.0, restitution=0.4),
+        WALL,
         rocking.Block.one_sided(width=0.3, height=2.0, lean=0.02),
         rocking.Block.one_sided(width=0.4, height=2.5, lean=-0.01, restitution=0.6),
     ]
@@ -382,18 +365,10 @@ def treatments(treatment: str) -> Iterator[Item]:
 @group()
 def chattering_brackets() -> Iterator[Item]:
     """Bounds on the times of rest, of free blocks, walls, restrained blocks and bodies between stops."""
-    bodies = [
-        STATUE,
-        SLENDER,
-        UNEVEN[0],
-        rocking.Block.one_sided(width=0.5, height=4.0, restitution=0.4),
-        HELD["spring"][0],
-    ]
-    for label, response in under(bodies, [*shaking(), *scaled(0.6)]):
+    bodies = [STATUE, SLENDER, UNEVEN[0], WALL, HELD["spring"][0]]
+    between_stops = ((f"{kind}: {label}", response) for kind in BETWEEN for label, response in moved(kind))
+    for label, response in (*under(bodies, [*shaking(), *scaled(0.6)]), *between_stops):
         yield label, {name: response.chattering[name] for name in ("lower", "upper")}
-    for kind in BETWEEN:
-        for label, response in moved(kind):
-            yield f"{kind}: {label}", {name: response.chattering[name] for name in ("lower", "upper")}
 
 
 # Responses of restrained blocks
@@ -404,21 +379,13 @@ LOPSIDED: Final = rocking.Block.from_pivots((0.3, 0.12), 0.9, 0.5, restitution=(
 
 def held(*restraints: Any, **options: Any) -> list[Any]:
     """A column and a lopsided body with the same restraints, the latter's smaller as it is lighter."""
-    lighter = [
-        dataclasses.replace(
-            each,
-            **{
-                field.name: 0.2 * getattr(each, field.name)
-                for field in dataclasses.fields(each)
-                if field.name not in ("offset", "height", "follows")
-            },
-        )
-        for each in restraints
-    ]
-    return [
-        rocking.RestrainedBlock(COLUMN, *restraints, **options),
-        rocking.RestrainedBlock(LOPSIDED, *lighter, **options),
-    ]
+
+    def lighter(each: Any) -> Any:
+        names = {field.name for field in dataclasses.fields(each)} - {"offset", "height", "follows"}
+        return dataclasses.replace(each, **{name: 0.2 * getattr(each, name) for name in names})
+
+    bodies = ((COLUMN, restraints), (LOPSIDED, map(lighter, restraints)))
+    return [rocking.RestrainedBlock(block, *forces, **options) for block, forces in bodies]
 
 
 HELD: Final = {
@@ -502,10 +469,8 @@ def sensitivities() -> Iterator[Item]:
             yield "peak", response.sensitivity.peak
             yield "rotation", response.sensitivity.rotation(np.arange(8) * 0.1)
             found = rocking.gradient(response)
-            yield (
-                "gradient",
-                [found.value, found.coefficients[:60], found.vertical, found.initial_rotation, found.reason],
-            )
+            numbers = [found.value, found.coefficients[:60], found.vertical, found.initial_rotation, found.reason]
+            yield "gradient", numbers
 
 
 @group(digits=6)
@@ -517,10 +482,6 @@ def perturbed() -> Iterator[Item]:
 
 # Ensembles
 
-OUTCOMES: Final = (
-    "overturned", "peak_rotation", "peak_time", "impacts", "uplifts", "rests", "time_at_rest", "complete_chattering",
-    "stalled", "unfinished", "stopped",
-)  # fmt: skip
 GRID: Final = rocking.Blocks.grid(p=[1.5, 3.0, 5.0], alpha=[0.1, 0.2, 0.3], restitution=[0.85, 0.93])
 ENSEMBLES: Final = {
     "levels": (GRID, {"levels": [1.0, 2.5, 6.0], "measure": "pga", "polarity": "both"}),
@@ -532,18 +493,15 @@ ENSEMBLES: Final = {
     "two-sided": (UNEVEN, {"levels": [0.4, 1.0], "measure": "pgv"}),
     "restrained": ([*HELD["tendon"], *HELD["damper"], *HELD["yielding"]], {"levels": [1.0, 2.0]}),
     "laws": (
-        [rocking.RestrainedBlock(STATUE, restitution=rocking.RandomRestitution(0.8, 0.95, s)) for s in range(4)],
-        {},
+        [rocking.RestrainedBlock(STATUE, restitution=rocking.RandomRestitution(0.8, 0.95, s)) for s in range(4)], {},
     ),
-}
+}  # fmt: skip
 
 
 @group(kind=tuple(ENSEMBLES))
 def ensembles(kind: str) -> Iterator[Item]:
     bodies, options = ENSEMBLES[kind]
-    motions = shaking()
-    if "vertical" not in kind:
-        motions.append(record().with_vertical(record("el-centro-meloland-up", 350, 1100)))
+    motions = [*shaking(), record().with_vertical(record("el-centro-meloland-up", 350, 1100))]
     if options.get("measure"):
         motions = [motion for motion in motions if motion.pgv > 0.0]
     data = rocking.simulate_many(bodies, motions, progress=False, **options)
@@ -632,8 +590,7 @@ def spectra() -> Iterator[Item]:
     yield from of_result(rocking.rocking_spectrum(blocks, suite(), **QUIET))
     weighted = rocking.rocking_spectrum([STATUE, SLENDER], suite(), size=[0.5, 1.0, 2.0], weights=[1, 2], **QUIET)
     yield from of_result(weighted)
-    walls = [rocking.Block.one_sided(width=0.5, height=4.0, restitution=0.4)]
-    yield from of_result(rocking.rocking_spectrum(walls, suite(), size=[1.0, 2.0], model="linear", **QUIET))
+    yield from of_result(rocking.rocking_spectrum([WALL], suite(), size=[1.0, 2.0], model="linear", **QUIET))
 
 
 @group(digits=6)
@@ -772,12 +729,10 @@ PERIODIC: Final = {
     "block": (SLENDER, FORCING, ([-0.1, 0.02, 0.1], [-0.2, 0.0, 0.3])),
     "ball": (dynamics.BouncingBall(0.8), TABLE, ([0.05, 0.1, 0.3], [0.1, 0.5, 1.0])),
     "oscillator": (
-        dynamics.ImpactOscillator(1.0, 0.8, damping_ratio=0.05),
-        TABLE,
-        ([0.01, 0.1, 0.2], [-0.5, 0.0, 0.5]),
+        dynamics.ImpactOscillator(1.0, 0.8, damping_ratio=0.05), TABLE, ([0.01, 0.1, 0.2], [-0.5, 0.0, 0.5]),
     ),
     "pendulum": (dynamics.InvertedPendulum(3.0, 0.3, 0.7), TABLE.scaled(0.3), ([-0.2, 0.0, 0.2], [-0.5, 0.1, 0.5])),
-}
+}  # fmt: skip
 
 
 @group()
@@ -899,7 +854,7 @@ def kinds_of_summary() -> Iterator[tuple[str, Any]]:
     yield "free-overturns", rocking.simulate(STATUE, record().scaled(3.0))
     yield "free-still", rocking.simulate(STATUE, record().scaled(0.1))
     yield "two-sided", rocking.simulate(UNEVEN[0], record())
-    yield "wall", rocking.simulate(rocking.Block.one_sided(width=0.5, height=4.0, restitution=0.4), record())
+    yield "wall", rocking.simulate(WALL, record())
     yield "vertical", rocking.simulate(STATUE, record().with_vertical(record("el-centro-meloland-up", 350, 1100)))
     yield "threshold", rocking.simulate(STATUE, lobes(4.0, 0.8), chattering="velocity=0.001", model="linear")
 
@@ -1088,13 +1043,8 @@ ON_FILES: Final = {
 @group(digits=6, fast=False, subject=tuple(ON_FILES))
 def commands_on_files(subject: str) -> Iterator[Item]:
     """What commands print of files, and the tables that they write."""
-    texts = {
-        "observed.csv": OBSERVED,
-        "rates.csv": RATES,
-        "tests.csv": TESTS,
-        "shaken.csv": SHAKEN,
-        "study.toml": STUDY,
-    }
+    texts = {"observed": OBSERVED, "rates": RATES, "tests": TESTS, "shaken": SHAKEN}
+    texts = {"study.toml": STUDY} | {f"{name}.csv": text for name, text in texts.items()}
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         for name, text in texts.items():
             Path(name).write_text(text, encoding="utf-8")
@@ -1137,19 +1087,16 @@ def studies() -> Iterator[Item]:
         yield "verified", study.verify(recompute=1, progress=False)
         for critical in (None, "overturning"):
             yield "table", saved(study.to_csv, critical=critical, progress=False)
-            yield (
-                "numbers",
-                re.sub(r'"program": "[^"]*",?', "", saved(study.to_json, critical=critical, progress=False)),
-            )
+            numbers = saved(study.to_json, critical=critical, progress=False)
+            yield "numbers", re.sub(r'"program": "[^"]*",?', "", numbers)
 
 
 # The file of digests
 
 
-def written() -> dict[str, list[Any]]:
+def written() -> Any:
     """Read the digests of the file: for each group its digest, and how many single responses are in it."""
-    found: dict[str, list[Any]] = json.loads(FILE.read_text("utf-8"))
-    return found
+    return json.loads(FILE.read_text("utf-8"))
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -1159,25 +1106,18 @@ def main(arguments: list[str] | None = None) -> int:
     how.add_argument("--compare", action="store_true", help="print the groups that differ; the exit status is 1 then")
     how.add_argument("--write", action="store_true", help="write the digests of these groups anew")
     how.add_argument("--items", action="store_true", help="print a digest for each item, to compare two versions")
-    parser.add_argument("--times", action="store_true", help="print the processor time of each group")
     parser.add_argument("groups", nargs="*", metavar="GROUP", help="by default all")
     options = parser.parse_args(arguments)
     chosen = options.groups or [*GROUPS]
     if unknown := sorted(set(chosen) - set(GROUPS)):
         parser.error(f"{', '.join(unknown)} is no group; the groups are {', '.join(GROUPS)}")
+    for name in chosen if options.items else ():
+        for k, (label, value) in enumerate(GROUPS[name].items()):
+            print(name, k, hashlib.sha256(b"\0".join(encoded(value, GROUPS[name].digits))).hexdigest()[:12], label)
     if options.items:
-        for name in chosen:
-            for k, (label, value) in enumerate(GROUPS[name].items()):
-                parts = b"\0".join(encoded(value, GROUPS[name].digits))
-                print(name, k, hashlib.sha256(parts).hexdigest()[:12], label)
         return 0
     known = written() if FILE.exists() else {}
-    found = {}
-    for name in chosen:
-        start = time.process_time()
-        found[name] = [*digest(name)]
-        if options.times:
-            print(f"{time.process_time() - start:7.2f} s  {found[name][1]:4d} responses  {name}", flush=True)
+    found = {name: [*digest(name)] for name in chosen}
     differ = [name for name in chosen if known.get(name) != found[name]]
     if not options.groups:
         differ += sorted(set(known) - set(found))
@@ -1186,9 +1126,7 @@ def main(arguments: list[str] | None = None) -> int:
         rows = ",\n".join(f"  {json.dumps(name)}: {json.dumps(entry)}" for name, entry in kept.items())
         FILE.write_text(f"{{\n{rows}\n}}\n", encoding="utf-8")
     for name in differ:
-        print(
-            f"differs: {name}" if name in known and name in found else f"{'new' if name in found else 'gone'}: {name}"
-        )
+        print(f"{'new' if name not in known else 'differs' if name in found else 'gone'}: {name}")
     print(f"{len(differ)} of {len(chosen)} groups differ" + (f"; {FILE.name} was written" if options.write else ""))
     return bool(differ) and not options.write
 

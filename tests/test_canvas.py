@@ -1,7 +1,5 @@
 """Who knows of a figure: nobody where nobody can look at it, pyplot and notebooks where somebody can."""
 
-import os
-import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 
@@ -25,22 +23,6 @@ def draw(**options):
 CHOICES = ("DISPLAY", "WAYLAND_DISPLAY", "MPLBACKEND")
 
 
-def printed(script: str, **environment: str) -> str:
-    """Output of a fresh interpreter, with no display and no backend but those given."""
-    clean = {name: value for name, value in os.environ.items() if name not in CHOICES}
-    command = [sys.executable, "-W", "error", "-c", DRAW + script]
-    done = subprocess.run(command, env=clean | environment, capture_output=True, text=True, check=True)
-    return done.stdout.strip()
-
-
-@pytest.mark.thorough
-@pytest.mark.skipif(sys.platform != "linux", reason="other systems say nothing of a display in the environment")
-@pytest.mark.parametrize("name", ["DISPLAY", pytest.param("WAYLAND_DISPLAY", marks=pytest.mark.thorough)])
-def test_pyplot_is_loaded_where_there_is_a_display_and_not_before(name):
-    script = "draw(); print('matplotlib.pyplot' in sys.modules)"
-    assert printed(f"{script}; import os; os.environ['{name}'] = ':987'; {script}") == "False\nTrue"
-
-
 def test_pyplot_knows_the_figures_of_those_who_use_it_and_is_not_loaded_for_a_backend_without_windows(monkeypatch):
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.setenv(name, ":987")
@@ -60,17 +42,6 @@ def test_pyplot_knows_nothing_of_a_figure_of_another_thread():
     with ThreadPoolExecutor(1) as pool:
         pool.submit(drawn).result()
     assert plt.get_fignums() == []
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(sys.platform != "linux", reason="other systems say nothing of a display in the environment")
-def test_the_command_line_writes_its_figures_without_windows(tmp_path):
-    seen = tmp_path / "seen.csv"
-    seen.write_text("pga_g,overturned\n1,0\n2,0\n3,1\n2.5,0\n2.2,1\n4,1\n")
-    command = ["fragility", "--outcomes", str(seen), "--out", str(tmp_path / "out")]
-    script = f"from rocking.cli import main; main({command}); print('matplotlib.pyplot' in sys.modules)"
-    assert printed(script, DISPLAY=":987").endswith("False")
-    assert [*tmp_path.glob("out/*.png")]
 
 
 def images(*cells: str) -> list[int]:
@@ -125,14 +96,3 @@ def test_axes_of_the_caller_keep_their_figure_and_its_style():
     assert ax.xaxis.label.get_size() == size
     part = Figure().subfigures()
     assert drawn(ax=part.subplots()) is part.figure
-
-
-def test_a_figure_keeps_its_style_when_it_is_drawn_later():
-    figure = drawn()
-    figure.draw_without_rendering()
-    assert {label.get_size() for label in figure.axes[0].get_xticklabels()} == {8.0}
-
-
-def test_a_title_has_no_more_digits_than_anybody_reads():
-    figure = drawn(title="alpha = 0.21481540040165858, e = 0.30000000000000004, 3.25 s, 1.23456789e-07")
-    assert figure.get_suptitle() == "alpha = 0.2148, e = 0.3, 3.25 s, 1.235e-07"

@@ -1,6 +1,5 @@
 """Every example of the gallery ends in the numbers that are written here, draws one figure, and is in the gallery."""
 
-import ast
 import importlib
 import re
 import runpy
@@ -75,15 +74,3 @@ def test_every_example_has_numbers_and_a_place_in_the_gallery():
         r'"(\w+)"', "".join(re.findall(r"^GALLERY.*$", (ROOT / "docs/conf.py").read_text("utf-8"), re.M))
     )
     assert sorted(listed) == sorted(EXAMPLES) == sorted(NUMBERS)
-
-
-def test_the_paper_takes_forty_lines():
-    text = EXAMPLES["paper"].read_text("utf-8")
-    docstrings = [
-        node
-        for node in ast.walk(ast.parse(text))
-        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
-    ]
-    prose = {line for node in docstrings for line in range(node.lineno, node.end_lineno + 1)}
-    code = [k for k, line in enumerate(text.splitlines(), 1) if line and not line.startswith("#") and k not in prose]
-    assert len(code) <= 40

@@ -304,13 +304,6 @@ def test_no_text_leaves_the_figure(kind, width, dpi):
     assert not any("9318234567890123" in text for text, _ in boxes)
 
 
-def test_a_title_of_one_long_word_is_broken_where_the_figure_ends():
-    figure = fragility_of(title="/data/" + "a-record-of-a-station-" * 8 + "090.csv", figsize=(COLUMN, 2.8))
-    FigureCanvasAgg(figure).draw()
-    (box,) = [box for text, box in shown_boxes(figure) if text.startswith("/data/")]
-    assert box.x0 >= figure.bbox.x0 and box.x1 <= figure.bbox.x1
-
-
 @pytest.mark.cases(fast=9)
 @pytest.mark.parametrize("kind", FIGURES)
 def test_axes_of_the_caller_take_the_main_panel(kind):
@@ -327,29 +320,6 @@ def entries(figure):
     return [text.get_text() for text in figure.legends[0].get_texts()]
 
 
-def test_a_spectrum_of_two_motions_names_them_and_has_no_fractiles():
-    figure = spectrum_of(2)
-    assert len(figure.axes[0].lines) == 2
-    assert not figure.axes[0].texts
-    assert entries(figure) == ["α = 0", *RECORDS[:2]]
-
-
-def test_the_fractiles_of_a_spectrum_are_told_apart_by_their_widths():
-    figure = spectrum_of(6)
-    crosses = "beyond: overturns"
-    assert entries(figure) == ["α = 0", "each of 6 motions", "median", "16, 84 % of the motions are below", crosses]
-    widths = [handle.get_linewidth() for handle in figure.legends[0].legend_handles[2:4]]
-    lines = [line for line in figure.axes[0].lines if line.get_linestyle() != "None"]
-    assert [line.get_linewidth() for line in lines[-3:]] == [widths[1], widths[0], widths[1]]
-    assert not figure.axes[0].texts
-    assert entries(spectrum_of(6, 3))[3:] == ["each of 6 motions", "median", crosses]
-    assert entries(spectrum_of(6, fractiles=[0.45, 0.75, 0.9]))[2:] == [
-        "45 % of the motions are below",
-        "75, 90 % of the motions are below",
-        crosses,
-    ]
-
-
 def test_where_blocks_overturn_the_lines_of_a_spectrum_end_in_crosses():
     x = np.arange(1.0, 8.0)
     peaks = np.array([[0.1, 0.2, np.inf, 0.4, np.inf, 0.6, 0.7]])
@@ -360,49 +330,6 @@ def test_where_blocks_overturn_the_lines_of_a_spectrum_end_in_crosses():
     assert entries(figure) == ["beyond: overturns"]
     standing = curve._replace(singles=0.0 * np.nan_to_num(peaks, posinf=0.0))
     assert not spectrum_figure(x=x, curves=[standing], fractiles=[0.5], motions=["a"], x_label="p").legends
-
-
-@pytest.mark.cases(fast=1)
-@pytest.mark.parametrize("count", [1, 3, *(pytest.param(n, marks=pytest.mark.thorough) for n in (2, 15, 200))])
-def test_impacts_are_counted_by_whole_numbers(count):
-    figure = intervals_figure(intervals=0.8 ** np.arange(1.0, count + 1.0), eta=0.9)
-    figure.draw_without_rendering()
-    assert len(figure.axes) == 2
-    for panel in figure.axes:
-        low, high = panel.get_xlim()
-        assert low < 1.0 and high > count
-        assert all(tick == round(tick) for tick in panel.get_xticks() if low <= tick <= high)
-
-
-@pytest.mark.cases(fast=1)
-@pytest.mark.parametrize(("ends", "numbers"), [((1.0, 6.0), "1 1.5 2 3 4 5 6"), ((0.3, 60.0), "0.5 1 2 5 10 20 50")])
-def test_sizes_are_numbered_over_less_than_a_decade_and_over_more(ends, numbers):
-    x = np.geomspace(*ends, 5)
-    curve = SpectrumCurves("α", np.ones((1, 5)), np.ones((1, 5)), np.zeros(5))
-    figure = spectrum_figure(x=x, curves=[curve], fractiles=[0.5], motions=["a"], x_label="p")
-    figure.draw_without_rendering()
-    low, high = figure.axes[1].get_xlim()
-    written = [
-        tick.label1.get_text() for tick in figure.axes[1].xaxis.get_major_ticks() if low <= tick.get_loc() <= high
-    ]
-    assert " ".join(written) == numbers
-
-
-def test_few_scaled_motions_are_named_and_many_are_a_family_with_fractiles():
-    few, many = ida_of(4), ida_of(12)
-    assert entries(few)[:4] == [f"{k + 1}: {name}" for k, name in enumerate(RECORDS[:4])]
-    assert [text.get_text() for text in few.axes[1].get_xticklabels()] == ["1", "2", "3", "4"]
-    assert entries(ida_of(1))[0] == RECORDS[0] and not ida_of(1).axes[1].get_xticks().size
-    assert len({line.get_color() for line in few.axes[0].lines}) == 4
-    assert entries(many)[0] == "each motion"
-    shares = [text for text in entries(many) if "suffices" in text]
-    assert shares == [f"level that suffices for {share} % of them" for share in (16, 50, 84)]
-    assert not many.axes[0].texts  # beside curves that lie close they would name the wrong ones
-    drawn = {line.get_label(): line for line in many.axes[0].lines}
-    assert len({str(drawn[f"{share} %"]._dash_pattern) for share in (16, 50, 84)}) == 3
-    assert [text.get_text() for text in many.axes[1].get_xticklabels()] == RECORDS
-    for figure in (few, many):
-        assert {text.partition(":")[0] for text in entries(figure)} >= {"dot", "kink", "strip"}
 
 
 def test_the_cross_of_a_fall_is_on_the_curve_where_that_leaves_the_frame():
@@ -433,40 +360,6 @@ def test_the_lowest_level_that_reaches_a_peak_is_on_the_curve_before_it_turns_ba
     np.testing.assert_allclose(levels_reaching(standing, np.array([0.65, 0.7])), [5.0, np.inf])
     always = motion._replace(bands=np.array([[1.0, 5.0]]))
     np.testing.assert_allclose(levels_reaching(always, np.array([0.1, 0.9])), [1.0, 1.0])
-
-
-def test_the_frame_of_an_ida_ends_with_the_levels_or_above_what_stands_with_arrows():
-    motions = scaled(3)
-    stands = max(motion.levels[np.isfinite(motion.peak)].max() for motion in motions)
-    last = motions[0].levels[-1]
-    assert last > 1.5 * stands
-    figure = ida_of(3)
-    assert figure.axes[0].get_ylim()[1] == 1.5 * stands
-    assert [line.get_xdata()[0] for line in figure.axes[1].lines if line.get_marker() == "^"] == [0, 1, 2]
-    cut = [motion._replace(levels=motion.levels[:28], peak=motion.peak[:28]) for motion in motions]
-    ends = [motion._replace(bands=np.array([[motion.bands[0, 0], motion.levels[-1]]])) for motion in cut]
-    whole = ida_figure(motions=ends, level_label="PGA")
-    assert whole.axes[0].get_ylim()[1] == motions[0].levels[27] < 1.5 * stands
-    assert not [line for line in whole.axes[1].lines if line.get_marker() == "^"]
-    assert entries(figure)[-1] == "strip: levels that overturn (arrow: and above)"
-    assert entries(whole)[-1] == "strip: levels that overturn"
-
-
-def test_long_names_of_few_strips_are_written_in_lines():
-    motions = [motion._replace(label=f"Pacoima Dam (upper left abut) {k}") for k, motion in enumerate(scaled(6))]
-    names = [text.get_text() for text in ida_figure(motions=motions, level_label="PGA").axes[1].get_xticklabels()]
-    assert names[0] == "Pacoima Dam (upper\nleft abut) 0"
-    many = [motion._replace(label="Pacoima Dam (upper left abut)") for motion in scaled(12)]
-    assert "\n" not in ida_figure(motions=many, level_label="PGA").axes[1].get_xticklabels()[0].get_text()
-
-
-@pytest.mark.thorough
-def test_the_thinnest_band_of_an_ida_has_ends_that_are_seen():
-    motion = scaled(1)[0]._replace(bands=np.array([[3.0, 3.0000001]]))
-    strips = ida_figure(motions=[motion], level_label="PGA").axes[1]
-    (ends,) = [line for line in strips.lines if line.get_marker() == "_"]
-    np.testing.assert_allclose(ends.get_ydata(), 3.0, rtol=1e-6)
-    assert ends.get_markeredgewidth() >= 0.8
 
 
 def test_the_intervals_of_a_sequence_are_drawn_with_the_limit_of_their_ratios():
@@ -529,8 +422,3 @@ def test_dollars_in_names_begin_no_formula():
         assert not [text for text in texts if re.search(r"[a-z]_[a-z]{2}", text)], kind
         seen += any("\\$" in text for text in texts)
     assert seen >= 4
-    assert "damping ratio = 0.05" in as_title(figures["diagram"])
-
-
-def as_title(figure):
-    return " ".join(figure._suptitle.get_text().split())

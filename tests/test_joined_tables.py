@@ -77,18 +77,6 @@ def test_the_tables_of_all_commands_join_by_record_and_by_motion(run, folder, tm
         assert [*result["skipped"]] == [str(folder / "notes.txt")], command
 
 
-@pytest.mark.thorough
-def test_a_motion_is_named_by_its_file_on_screen_and_in_the_files_of_each(run, folder, tmp_path):
-    (folder / "notes.txt").unlink()
-    code, text, _ = run("ida", folder, *SIZES, "--tolerance", "1e-2")
-    assert code == 0 and "#" not in text
-    assert all(str(folder / f"{stem}.AT2") in text for stem in ("NIS000", "NIS090", "copy090"))
-    assert run("simulate", folder, *SIZES, "--each", "--out", tmp_path / "out")[0] == 0
-    for stem in ("NIS000", "NIS090", "copy090"):
-        motion = json.loads((tmp_path / "out" / stem / "result.json").read_text())["motion"]
-        assert motion["record"] == str(folder / f"{stem}.AT2")
-
-
 def test_a_table_of_many_records_names_block_friction_and_what_was_skipped(run, folder, tmp_path):
     out = tmp_path / "out"
     code, text, _ = run("simulate", folder, *SIZES, "--keep-going", "--friction", "0.3", "--out", out)
@@ -121,25 +109,6 @@ def test_the_tables_of_one_block_name_the_vertical_components(run, tmp_path):
         assert {row["vertical"] for row in rows["records"]} == {vertical}
     assert run("check", *names, *SIZES, "--rules", "west", "--out", tmp_path / "none")[0] == 0
     assert "vertical" not in table(tmp_path / "none" / "check.csv")
-
-
-def test_a_study_from_a_file_notes_a_vertical_component_that_looks_like_a_mistake(run, tmp_path):
-    file = tmp_path / "study.toml"
-    assert run("study", "new", file)[0] == 0
-    file.write_text(
-        """
-[blocks]
-p = [2.0]
-alpha = [0.2]
-
-[motions]
-records = ["el-centro-meloland-270"]
-vertical = "ridgecrest-clc-up"
-"""
-    )
-    code, _, err = run("study", "create", file, tmp_path / "study")
-    assert code == 0
-    assert "rocking: note: el-centro-meloland-270: the vertical motion is of the station 'CI.CLC" in err
 
 
 def test_a_block_that_overturns_has_no_largest_rotation_in_any_table(tmp_path):

@@ -28,10 +28,6 @@ def cells(tmp_path_factory):
     return notebook.cells
 
 
-def test_there_are_twenty_tasks_and_more(cells):
-    assert len(cells) > 20
-
-
 def test_every_figure_appears_once(cells):
     drawn = [cell for cell in cells if re.search(r"\.plot\(.*\)$", cell.source)]
     assert len(drawn) >= 7
@@ -52,13 +48,3 @@ def test_no_cell_warns_or_prints_to_stderr(cells):
     for cell in cells:
         assert not [output for output in cell.outputs if output.get("name") == "stderr"], cell.source
     assert sum(bool(cell.outputs) for cell in cells) >= 10
-
-
-def test_plain_text_of_every_result_is_short(cells):
-    judged = 0
-    for cell in cells:
-        for output in cell.outputs:
-            if output.output_type == "execute_result" and "simulate_many" not in cell.source:
-                assert len(output["data"]["text/plain"]) < 1500, cell.source
-                judged += 1
-    assert judged >= 10

@@ -1,7 +1,6 @@
 """What is written to files is whole, or not there; what was there before stays where the new one cannot be written."""
 
 import contextlib
-import json
 import os
 import sys
 from collections.abc import Iterator
@@ -11,12 +10,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.figure import Figure
-from matplotlib.image import imread
 
 import rocking
 from rocking import tables
 from rocking.analysis.survey import folder_names, survey
-from rocking.cli.output import write_results
 from rocking.result import DatasetResult
 from rocking.studies.results import FORMATS
 from rocking.tables import whole_file, write_figure
@@ -109,27 +106,6 @@ def test_a_table_of_many_records_is_whole_or_not_there(response, tmp_path):
     assert not [*tmp_path.iterdir()]
 
 
-@pytest.mark.thorough
-@pytest.mark.parametrize(
-    ("too_large", "tables"), [pytest.param("response.csv", 0, marks=pytest.mark.thorough), ("response.png", 3)]
-)
-def test_a_command_that_meets_a_full_disk_leaves_no_result_that_looks_whole(run, tmp_path, too_large, tables):
-    """Files that are written before the one that does not fit may be there; result.json, the last, is not."""
-    whole, out = tmp_path / "whole", tmp_path / "out"
-    command = ["simulate", RECORD, "--width", "0.24", "--height", "1.1", "--out"]
-    assert run(*command, whole)[0] == 0
-    assert json.loads((whole / "result.json").read_text("utf-8"))["overturned"] is True
-    with full_disk((whole / too_large).stat().st_size - 1):
-        code, _, err = run(*command, out)
-    assert code == 2
-    assert err.startswith("rocking: ") and "cannot be written: File too large" in err and len(err.splitlines()) == 1
-    left = {file.name: file.read_bytes() for file in out.iterdir()} if out.exists() else {}
-    assert not {"result.json", too_large} & left.keys()
-    found = {name: content for name, content in left.items() if name.endswith(".csv")}
-    assert len(found) == tables
-    assert found == {name: (whole / name).read_bytes() for name in found}
-
-
 def test_a_write_that_fails_in_the_middle_leaves_what_was_there(tmp_path, monkeypatch):
     file = tmp_path / "table.csv"
     file.write_text("old")
@@ -168,15 +144,6 @@ def test_a_link_is_kept_and_a_file_keeps_its_rights_and_a_device_is_written_to(t
     assert (tmp_path / "fresh.csv").stat().st_mode & 0o777 == 0o644
     with pytest.raises(rocking.OutputError, match="there is no folder"), whole_file(tmp_path / "none" / "a.csv"):
         pass
-
-
-@pytest.mark.thorough
-def test_figures_of_a_command_have_the_size_and_resolution_of_a_page(tmp_path: Path) -> None:
-    figure = Figure(figsize=(3.0, 2.0))
-    write_results(tmp_path, figures={"one": lambda: figure}, result={"answer": 1.5})
-    assert imread(tmp_path / "one.png").shape[:2] == (320, 480)  # 160 dots per inch
-    assert b"/MediaBox [ 0 0 216 144 ]" in (tmp_path / "one.pdf").read_bytes()
-    assert json.loads((tmp_path / "result.json").read_text("utf-8")) == {"answer": 1.5}
 
 
 def test_records_of_one_name_have_a_folder_each() -> None:

@@ -1,7 +1,6 @@
 """The paper's figures: the numbers that it states, the data behind each, and files that say the same."""
 
 import importlib.util
-import inspect
 import math
 import subprocess
 import sys
@@ -113,33 +112,6 @@ def test_eq_76_is_worst_at_the_corner(figures):
     assert (corner.paper, corner.here) == (pytest.approx(1.0935, abs=1e-5), pytest.approx(1.082087, abs=1e-6))
 
 
-def test_of_other_parameters_nothing_is_said_to_stand_in_the_paper_that_does_not(figures):
-    judged = 0
-    for number in FIGURES:
-        given = {name: PARAMETERS[name] for name in accepted(number)}
-        for statement in (paper_figure(number, **given) if given else figures[number]).statements:
-            line = f"{statement.claim}: {statement}"
-            assert "(paper" not in line and "not given" not in line
-            if isinstance(statement.paper, float) and number not in (4, 6):
-                assert statement.formula.startswith("Eq. ") and " in the paper" not in line
-                judged += 1
-    assert judged >= 9
-
-
-@pytest.mark.parametrize(
-    ("a", "omega", "eta", "beginning", "end"),
-    [
-        (1.03, 2.0, 0.92, "first rest, s before that of certified", '"properly" in the paper, 0.0213 here'),
-        (1.07, 2.0, 0.8, "first rest, s before that of certified", "0.0901"),
-        (1.06, 2.0, 0.92, "first rest, beside that of certified", "neither rests"),
-        (1.0386, 4.0, 0.92, "first rest, beside that of certified", "only chattering threshold rests"),
-    ],
-)
-def test_figure_10_says_which_response_rests_first(a, omega, eta, beginning, end):
-    rest = stated(paper_figure(10, a=a, omega=omega, eta=eta), f"chattering threshold: {beginning}")
-    assert str(rest) == end
-
-
 # The data
 
 
@@ -210,36 +182,6 @@ def test_no_label_leaves_the_figure(figures, number, drawing):
         assert box.y1 <= drawn.bbox.y1 + 1.0
 
 
-LABELS = {
-    "certified",
-    "chattering threshold (Eq. 65)",
-    r"$VelTol/(p\alpha) = 5\cdot 10^{-10}$",
-    r"$VelTol/(p\alpha) = 5\cdot 10^{-2}$",
-}
-
-
-@pytest.mark.parametrize("number", [9, *(pytest.param(number, marks=pytest.mark.thorough) for number in (10, 11))])
-def test_histories_are_drawn_as_they_are_computed(figures, number):
-    figure = figures[number]
-    axes = figure.draw().axes[0]
-    history = figure.tables["history"]
-    drawn = [line.get_xydata().T for line in axes.lines if line.get_label() in LABELS]
-    columns = [name for name in history if name.startswith("rotation_over_alpha")]
-    for (time, rotation), name in zip(drawn, columns, strict=True):
-        np.testing.assert_array_equal(time, history["time_over_period"])
-        np.testing.assert_allclose(rotation, 1e3 * history[name], rtol=1e-14)
-    assert "$10^{3}$" in axes.get_ylabel()
-
-
-# Other parameters than the paper's
-
-PARAMETERS = {"a": 1.02, "omega": 3.0, "eta": 0.8, "p": 2.5, "alpha": 0.3}
-
-
-def accepted(number):
-    return [name for name in inspect.signature(FIGURES[number]).parameters if name in PARAMETERS]
-
-
 def test_size_and_slenderness_scale_seconds_and_radians_alone(figures):
     other = paper_figure(9, p=2.5, alpha=0.3).tables["history"]
     history = figures[9].tables["history"]
@@ -279,18 +221,7 @@ def test_the_tables_of_the_pages_are_those_that_the_script_makes():
     assert {name: on_page.get(name) for name in made} == made
 
 
-def test_every_table_and_image_of_the_two_pages_exists():
-    for page in ("paper.md", "chattering-maps.md"):
-        text = (ROOT / "docs" / page).read_text("utf-8")
-        named = [line.split(" ")[1] for line in text.splitlines() if line.startswith("```{include}")]
-        named += [part.split(")")[0] for part in text.split("](")[1:] if part.startswith("_static")]
-        assert named
-        for name in named:
-            file = ROOT / "docs" / name
-            assert file.is_file()
-            assert file.stat().st_size < 150_000
-
-
+@pytest.mark.thorough
 def test_the_script_draws_one_figure_for_other_parameters_and_refuses_what_it_does_not_depend_on(tmp_path):
     script = [sys.executable, str(ROOT / "examples" / "paper")]
     done = subprocess.run([*script, "5", "--eta", "0.8", "--omega", "3", "--out", tmp_path], capture_output=True)
@@ -299,7 +230,5 @@ def test_the_script_draws_one_figure_for_other_parameters_and_refuses_what_it_do
     assert said.startswith("Fig. 5: chattering time against amplitude; omega = 3, eta = 0.8\n")
     assert f"critical amplitude a_cr: {critical_amplitude(3.0, 0.8):.7g}\n" in said
     assert {path.name for path in tmp_path.iterdir()} == {"figure-5.pdf", "figure-5.png", "figure-5-durations.csv"}
-    for wrong, sentence in ((["5", "--p", "2"], "does not depend on p"), (["12"], "Figs 1 to 11")):
-        refused = subprocess.run([*script, *wrong, "--out", tmp_path], capture_output=True)
-        assert refused.returncode == 1 and sentence in refused.stderr.decode()
-        assert refused.stderr.count(b"\n") == 1
+    refused = subprocess.run([*script, "5", "--p", "2", "--out", tmp_path], capture_output=True)
+    assert refused.returncode == 1 and "does not depend on p" in refused.stderr.decode()

@@ -5,9 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
-from rocking import Block, records, simulate
 from rocking.plot.response import DrawnSequence, response_figure
 
 NO_TIMES = np.array([])
@@ -82,14 +80,6 @@ def test_the_angles_of_tipping_are_drawn_where_they_are_in_the_frame():
     assert "tipping, θ = ±α" not in legend_of(figure_of())
 
 
-def test_a_part_of_a_response_says_that_it_is_one():
-    time = np.linspace(229.0, 241.0, 1001)
-    part = figure_of(time=time, motion_time=time, duration=318.7)
-    assert part.axes[1].get_xlabel() == "time (s); shown: 229–241 s of 319 s"
-    assert figure_of(duration=10.0).axes[1].get_xlabel() == "time (s)"
-    assert figure_of(duration=11.0).axes[1].get_xlabel() == "time (s); shown: 0–10 s of 11 s"
-
-
 def test_what_is_not_drawn_is_not_in_the_legend():
     assert legend_of(figure_of()) == [
         "at rest",
@@ -101,15 +91,6 @@ def test_what_is_not_drawn_is_not_in_the_legend():
     outside = {"impact_times": np.array([12.0]), "uplift_times": np.array([11.0]), "rest_intervals": [[11.0, 12.0]]}
     quiet = figure_of(motion_acceleration_g=np.full(1001, 0.1), **{k: np.array(v) for k, v in outside.items()})
     assert legend_of(quiet) == ["uplift thresholds"]
-
-
-def test_axes_of_the_caller_take_the_rotation_alone():
-    mine = Figure()
-    ax = mine.subplots()
-    assert figure_of(ax=ax) is mine
-    assert mine.axes == [ax]
-    assert labelled(ax, "_rotation").get_xdata().size == 1001
-    assert "at rest" in [text.get_text() for text in ax.get_legend().get_texts()]
 
 
 def test_side_plus_is_uplifted_by_a_negative_acceleration():
@@ -150,13 +131,6 @@ def test_the_fall_of_an_overturned_block_is_marked_where_its_curve_leaves_the_fr
     assert "overturned at 9.750 s" in legend_of(figure)
 
 
-def test_a_fall_that_stays_in_the_frame_is_marked_at_its_end():
-    time = np.linspace(0.0, 10.0, 1001)
-    figure = figure_of(rotation=0.157 * time, slenderness=(1.2, 1.2), overturn_time=10.0)
-    mark = labelled(figure.axes[0], "overturned at 10.000 s")
-    np.testing.assert_allclose([mark.get_xdata()[0], mark.get_ydata()[0]], [10.0, 1.57 / 1.2])
-
-
 def test_the_zoom_shows_every_interval_against_the_time_to_rest():
     times = bouncing_times(9.8, 0.5, 0.8, 60)
     zoom = figure_of(chattering=DrawnSequence(times, 9.8 - 1e-9, 9.8 + 1e-9)).axes[2]
@@ -167,38 +141,6 @@ def test_the_zoom_shows_every_interval_against_the_time_to_rest():
     assert zoom.get_xscale() == zoom.get_yscale() == "log"
     assert "9.800000" in zoom.get_title(loc="left")
     assert len(figure_of().axes) == 2
-
-
-@pytest.mark.thorough
-def test_the_zoom_says_how_far_the_rest_is_known_before_the_bracket_of_the_computation():
-    response = simulate(Block(width=0.24, height=1.1), records.load("ridgecrest-clc-090"))
-    zoom = response.plot(longest_sequence=True).axes[2]
-    near = response.perturbed()
-    assert zoom.get_title(loc="left") == "A: at rest at 239.917\N{NO-BREAK SPACE}s"
-    first, second = zoom.texts[0].get_text().replace("\n", " ").split("; ")
-    assert first == f"± {near.event_spreads[-1]:.0e} s in all 5 motions within 3e-6"
-    assert second.startswith("bracket of the computation ")
-
-
-@pytest.mark.thorough
-def test_a_narrow_figure_has_the_sequence_below_and_a_wide_one_beside():
-    sequence = DrawnSequence(bouncing_times(9.8, 0.5, 0.8, 60), 9.8 - 1e-9, 9.8 + 1e-9)
-    boxes = []
-    for width in (3.4, 7.0):
-        figure = figure_of(chattering=sequence, figsize=(width, 5.0))
-        figure.get_layout_engine().execute(figure)
-        boxes.append([axes.get_position() for axes in figure.axes])
-    (_, motion, zoom), (_, beside, other) = boxes
-    assert zoom.y1 < motion.y0
-    assert beside.x1 < other.x0
-    assert other.width < 0.25
-
-
-def test_impacts_closer_than_the_spacing_of_times_are_left_out_of_the_zoom():
-    times = bouncing_times(9.8, 0.5, 0.5, 80)
-    zoom = figure_of(chattering=DrawnSequence(times, 9.8, 9.8)).axes[2]
-    assert np.all(zoom.lines[0].get_ydata() > 0.0)
-    assert zoom.lines[0].get_xdata().size < 60
 
 
 @pytest.mark.cases(fast=1, thorough=7)
@@ -218,52 +160,3 @@ def test_every_response_is_drawn_to_every_format_without_a_warning(changes, exte
     buffer = io.BytesIO()
     figure_of(**changes).savefig(buffer, format=extension)
     assert buffer.tell() > 5000
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("extension", [pytest.param("pdf", marks=pytest.mark.thorough), "svg"])
-def test_the_fullest_response_is_drawn_in_vectors_without_a_warning(unarranged, extension):
-    sequence = DrawnSequence(bouncing_times(9.8, 0.5, 0.8, 60), 9.8 - 1e-9, 9.8 + 1e-9)
-    buffer = io.BytesIO()
-    figure_of(chattering=sequence).savefig(buffer, format=extension)
-    assert buffer.tell() > 5000
-
-
-@pytest.mark.parametrize(
-    "sequence",
-    [DrawnSequence(np.array([9.0]), 9.1, 9.2), DrawnSequence(np.array([9.0, 9.5]), np.nan, np.nan)],
-    ids=["one impact", "rest not bracketed"],
-)
-def test_without_a_bracketed_sequence_the_panels_fill_the_figure(sequence):
-    assert len(figure_of(chattering=sequence).axes) == 2
-
-
-@pytest.mark.thorough
-def test_no_text_covers_another_text():
-    sequence = DrawnSequence(bouncing_times(9.8, 0.5, 0.8, 60), 9.8 - 1e-9, 9.8 + 1e-9)
-    figure = figure_of(chattering=sequence, overturn_time=9.9)
-    figure.savefig(io.BytesIO(), format="png")
-    boxes = [figure._suptitle.get_window_extent()]
-    for axes in figure.axes:
-        titles = [axes.title, axes._left_title, axes.xaxis.label, axes.yaxis.label]
-        boxes += [text.get_window_extent() for text in titles if text.get_text()]
-    boxes.append(figure.legends[0].get_window_extent())
-    assert len(boxes) >= 8
-    for number, box in enumerate(boxes):
-        assert not any(box.overlaps(other) for other in boxes[:number])
-        assert figure.bbox.x0 <= box.x0 and box.x1 <= figure.bbox.x1
-
-
-def words_in(axes):
-    return [text.get_text() for text in axes.texts]
-
-
-def test_two_different_sides_are_named_with_their_scales():
-    rotation, motion = figure_of().axes
-    assert words_in(rotation) == ["side +: 1 is 11.5°", "side −: 1 is 14.3°"]
-    assert words_in(motion) == ["lifts to side −", "lifts to side +"]
-    above, below = motion.texts
-    assert (above.xy[1], below.xy[1]) == (0.25, -0.2)
-    assert words_in(figure_of(units="rad").axes[0]) == ["side +", "side −"]
-    equal = figure_of(slenderness=(0.2, 0.2))
-    assert not any(words_in(axes) for axes in equal.axes)

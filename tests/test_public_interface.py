@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from public_names import callables, faults, public_members, unreachable
+from public_names import callables, unreachable
 
 import rocking
 
@@ -131,28 +131,9 @@ def test_what_is_written_to_a_file_is_called_to_format(name: str) -> None:
         assert names[0] == "path"
 
 
-def test_what_writes_several_files_is_called_write_and_takes_their_folder() -> None:
-    writers = [name for name in FUNCTIONS if name.endswith(".write")]
-    assert writers
-    for name in writers:
-        assert list(parameters_of(FUNCTIONS[name])) == ["folder"]
-
-
 @pytest.mark.parametrize("name", [name for name in FUNCTIONS if name.endswith(".plot")])
 def test_every_figure_takes_axes_a_title_and_a_size(name: str) -> None:
     assert {"ax", "title", "figsize"} <= {*parameters_of(FUNCTIONS[name])}
-
-
-@pytest.mark.thorough  # `make lint` asks the same
-def test_public_docstrings_are_complete(monkeypatch: pytest.MonkeyPatch) -> None:
-    from numpydoc import validate
-
-    # numpydoc reads a docstring anew for each of its sections, and every module for exceptions, which there are not.
-    titles = property(functools.cache(validate.Validator.section_titles.fget))
-    monkeypatch.setattr(validate.Validator, "section_titles", titles)
-    monkeypatch.setattr(validate, "extract_ignore_validation_comments", lambda *given: {})
-    assert len(public_members()) > 200
-    assert faults() == []
 
 
 @pytest.mark.thorough

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
-from matplotlib.colors import to_rgb
 
 from rocking.plot.boundaries import Stack, meeting, runs
 from rocking.plot.maps import regions_figure
@@ -68,21 +67,6 @@ def test_a_lobe_ends_in_a_tip_between_its_last_column_and_the_next():
     np.testing.assert_allclose(right, [0.0, 8.0, 10.0])
 
 
-def test_the_tip_of_a_lobe_keeps_its_place_between_its_neighbours():
-    left, _ = meeting(stack(-1, 2.0, 1, 4.0, -1, 6.0, 0), stack(-1, 8.0, 0))
-    np.testing.assert_allclose(left, [0.0, 3.5, 3.5, 7.0, 10.0])
-
-
-def test_each_lobe_ends_in_a_tip_of_its_own():
-    left, _ = meeting(stack(-1, 1.0, 1, 2.0, -1, 5.0, 2, 7.0, -1), stack(-1))
-    np.testing.assert_allclose(left, [0.0, 1.5, 1.5, 6.0, 6.0, 10.0])
-
-
-def test_a_lobe_within_a_lobe_ends_with_it():
-    left, _ = meeting(stack(-1, 1.0, 1, 2.0, 2, 5.0, 1, 7.0, -1), stack(-1))
-    np.testing.assert_allclose(left, [0.0, 4.0, 4.0, 4.0, 4.0, 10.0])
-
-
 def test_the_lobe_that_goes_on_is_the_nearer_one():
     left, right = meeting(stack(-1, 1.0, 1, 2.0, -1, 6.0, 1, 8.0, -1), stack(-1, 6.5, 1, 8.5, -1))
     np.testing.assert_allclose(left[3:5], right[1:3])
@@ -94,12 +78,6 @@ def test_a_region_between_two_others_begins_at_the_boundary_between_them():
     left, right = meeting(stack(-1, 5.0, 0), stack(-1, 4.0, 2, 7.0, 0))
     np.testing.assert_allclose(left, [0.0, 5.25, 10.0])
     np.testing.assert_allclose(right, [0.0, 5.25, 5.25, 10.0])
-
-
-def test_a_region_at_the_edge_of_the_frame_ends_there():
-    left, right = meeting(stack(-3, 2.0, -1, 9.0, 0), stack(-1))
-    np.testing.assert_allclose(left, [0.0, 0.0, 10.0, 10.0])
-    np.testing.assert_allclose(right, [0.0, 10.0])
 
 
 def test_regions_in_each_other_s_place_meet_at_an_upright_line():
@@ -114,12 +92,6 @@ def test_a_region_that_both_sides_have_goes_on_where_its_neighbours_change():
     left, right = meeting(stack(-3, 2.0, -2, 3.0, -1, 8.0, 0), stack(-3, 2.0, -1, 8.0, 1, 9.0, 0))
     np.testing.assert_allclose(left, [0.0, 2.25, 2.25, 8.25, 10.0])
     np.testing.assert_allclose(right, [0.0, 2.25, 8.25, 8.25, 10.0])
-
-
-def test_lobes_apart_from_each_other_are_not_joined():
-    left, right = meeting(stack(-1, 2.0, 1, 4.0, -1), stack(-1, 6.0, 2, 8.0, -1))
-    np.testing.assert_allclose(left, [0.0, 3.0, 3.0, 10.0])
-    np.testing.assert_allclose(right, [0.0, 7.0, 7.0, 10.0])
 
 
 def test_a_boundary_leaves_the_frame_straight():
@@ -158,43 +130,3 @@ def test_the_legend_names_what_can_be_seen_and_nothing_else():
     many = map_of([stack(-3, 3.0, 4, 5.0, 7)] * 2)
     assert entries(many) == ["no uplift", "overturns after 4 or more"]
     assert entries(map_of([stack(-3, 3.0, 7)] * 2)) == ["no uplift", "overturns after 7"]
-
-
-def test_regions_are_told_apart_in_grey():
-    figure = map_of([stack(-3, 1.0, -2, 2.0, -1, 3.0, 0, 4.0, 1, 5.0, 2, 6.0, 3, 7.0, 4)] * 2)
-    handles = figure.legends[0].get_patches()
-    grey = [float(np.dot((0.299, 0.587, 0.114), to_rgb(handle.get_facecolor()))) for handle in handles]
-    hatches = [handle.get_hatch() or "" for handle in handles]
-    assert len(set(hatches[4:])) == 4
-    for hatch in set(hatches):
-        alike = sorted(value for value, other in zip(grey, hatches, strict=True) if other == hatch)
-        assert np.all(np.diff(alike) > 0.08)
-
-
-def lines_of(figure):
-    *_, lines = figure.axes[0].collections
-    return lines.get_segments()
-
-
-def test_a_strip_has_no_lines_around_it_that_would_hide_it_and_its_name_says_so():
-    thin = map_of([stack(-3, 5.0, -2, 5.05, -1, 8.0, 0)] * 3)
-    assert [line[0, 1] for line in lines_of(thin)] == [8.0]
-    assert entries(thin) == ["no uplift", "rests (a strip)", "rocks", "overturns after 0"]
-    thick = map_of([stack(-3, 5.0, -2, 6.0, -1, 8.0, 0)] * 3)
-    assert [line[0, 1] for line in lines_of(thick)] == [5.0, 6.0, 8.0]
-    assert entries(thick) == ["no uplift", "rests", "rocks", "overturns after 0"]
-
-
-def test_a_speck_makes_no_mark_and_no_gap_in_the_boundary_that_it_lies_on():
-    columns = [stack(-3, 5.0, 0), stack(-3, 5.0, -2, 5.0001, 0), stack(-3, 5.0, 0)]
-    figure = map_of(columns)
-    np.testing.assert_allclose([line[[0, -1], 0] for line in lines_of(figure)], [[0.0, 0.5], [0.5, 1.5], [1.5, 2.0]])
-    assert entries(figure) == ["no uplift", "overturns after 0"]
-    edged = [shape for shape in figure.axes[0].collections[:-1] if np.max(shape.get_linewidth()) > 0.0]
-    assert to_rgb("#5d7da6") not in [tuple(shape.get_facecolor()[0][:3]) for shape in edged]
-
-
-def test_of_blocks_that_stay_those_that_rest_are_drawn_darkest():
-    handles = map_of([stack(-3, 2.0, -2, 5.0, -1)] * 2).legends[0].get_patches()
-    none, rests, rocks = (sum(to_rgb(handle.get_facecolor())) for handle in handles)
-    assert rests < rocks - 0.5 < none

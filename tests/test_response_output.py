@@ -11,13 +11,12 @@ import pytest
 import xarray as xr
 
 import rocking
-from rocking import Block, InvalidOption, OutputError, dynamics, simulate
+from rocking import Block, InvalidOption, OutputError, simulate
 from rocking.analysis.rules.check import Check
 from rocking.analysis.survey import survey
 from rocking.explorer.facts import verdict
 from rocking.kernels import state
 from rocking.response import QUANTITIES, history, sensitivity, summary
-from rocking.response.contact import Contact
 from rocking.response.summary import known_ratio, time_text
 from rocking.tables import named
 
@@ -48,14 +47,6 @@ def ambiguous():
     return simulate(Block(half_width=0.12, half_height=0.75), rocking.records.load("ridgecrest-clc-090"))
 
 
-def test_a_response_and_its_sensitivity_show_themselves_in_one_short_line(shaken, fallen):
-    for shown in (repr(shaken), repr(fallen), repr(shaken.sensitivity)):
-        assert len(shown) < 250 and "\n" not in shown
-        assert not re.search(r"\d\.\d{7}", shown)
-    assert f"peak {shaken.peak_over_slenderness:.3g} of the slenderness" in repr(shaken)
-    assert "overturns at" in repr(fallen)
-
-
 def test_a_notebook_shows_the_rotation_with_its_peak_in_the_colour_of_the_text(shaken, fallen):
     for response in (shaken, fallen, simulate(Block(half_width=0.2, half_height=1.0), None)):
         page = response._repr_html_()
@@ -65,15 +56,6 @@ def test_a_notebook_shows_the_rotation_with_its_peak_in_the_colour_of_the_text(s
     extreme = np.max(np.abs([float(text) for text in re.findall(r">(-?[\d.]+)</text>", shaken._repr_html_())[:2]]))
     assert extreme == pytest.approx(shaken.peak_over_slenderness, rel=2e-3)
     assert f">{fallen.overturn_time:.4g} s</text>" in fallen._repr_html_()
-
-
-def test_what_takes_a_pass_along_the_response_is_found_once(monkeypatch):
-    response = simulate(Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
-    first = response.to_dict()
-    monkeypatch.setattr(Contact, "extremes", None)
-    monkeypatch.setattr(Contact, "first", None)
-    assert response.to_dict() == first
-    assert f"{response.required_friction:.4f}" in response.summary()
 
 
 def test_a_summary_and_a_dictionary_pass_once_along_the_response_for_each_quantity(monkeypatch):
@@ -113,13 +95,6 @@ def test_a_summary_is_its_rows(shaken):
     assert [*shaken.to_dict(0.5)] == [named(row.name, row.unit) for row in shaken.facts(0.5)]
 
 
-def test_a_response_of_a_million_impacts_shows_itself_at_once(shaken, monkeypatch):
-    """A sensitivity is a pass along all steps."""
-    monkeypatch.setattr(sensitivity, "vary", None)
-    assert "rocks" in repr(shaken)
-    assert "rocks" in shaken._repr_html_()
-
-
 @pytest.mark.parametrize(
     ("below", "above", "text"),
     [
@@ -141,20 +116,6 @@ def test_a_time_has_the_digits_that_repeated_simulations_leave(below, above, tex
 @pytest.mark.parametrize("unknown", [math.inf, math.nan])
 def test_an_infinite_change_leaves_no_digit_that_is_shown_as_known(unknown):
     assert summary.digits_of(0.123, unknown) == 1
-
-
-def test_a_sensitivity_that_there_is_not_is_kept_by_its_error(shaken):
-    with pytest.raises(InvalidOption, match=r"of must be among motion, .*, not 'mass'") as refused:
-        shaken.sensitivity.rotation(0.0, of=["mass"])
-    assert (refused.value.argument, refused.value.value) == ("of", "mass")
-
-
-def test_a_summary_says_whether_the_motion_goes_on(shaken, record):
-    end = record.duration
-    stopped = simulate(shaken.block, record, duration=6.0)
-    assert stopped.stopped and f"; the motion goes on to {end:.6g} s" in stopped.summary()
-    released = simulate(shaken.block, None, initial_rotation=0.15, duration=0.2)
-    assert released.stopped and "the motion goes on" not in released.summary() + shaken.summary()
 
 
 def test_each_sensitivity_is_one_pass_when_asked_for_and_a_share_of_nothing_is_none(shaken, monkeypatch):
@@ -182,19 +143,6 @@ def test_a_motion_changed_by_a_millionth_keeps_the_digits_that_are_shown():
         assert kind == same
         decimals = len(time.partition(".")[2])
         assert abs(float(time) - float(nudged_time)) <= 1.01 * 10.0**-decimals
-
-
-def test_a_summary_says_what_was_resolved_and_until_when_forces_count(shaken, fallen):
-    assert f"impacts resolved    {len(shaken.impacts)}" in shaken.summary()
-    assert "until it tips" not in shaken.summary()
-    assert f"until it tips at {fallen.tipping_time:.4f} s" in fallen.summary()
-
-
-def test_an_ambiguous_response_says_what_is_affected_and_what_to_do(ambiguous, shaken):
-    assert ambiguous.ambiguities == ("events",)
-    assert shaken.ambiguities == ()
-    assert "AMBIGUOUS: one unit in the last place of the input changes times of events" in ambiguous.summary()
-    assert "AMBIGUOUS" not in shaken.summary()
 
 
 def test_the_dictionary_is_plain_and_names_its_units(shaken, fallen):
@@ -266,14 +214,6 @@ def test_rotations_are_drawn_in_the_unit_that_is_asked_for(shaken, units, factor
     assert units in axes.get_ylabel() or (units == "deg" and "°" in axes.get_ylabel())
 
 
-def test_a_part_of_a_response_is_told_from_the_whole_below_its_axis(shaken):
-    start, end = 1.0, 3.0
-    assert shaken.plot(window=(start, end)).axes[-1].get_xlabel() == (
-        f"time (s); shown: 1.0–3.0 s of {shaken.duration:.1f} s"
-    )
-    assert shaken.plot(window=(0.0, shaken.duration)).axes[-1].get_xlabel() == "time (s)"
-
-
 def test_the_phase_plane_has_the_states_of_the_response_and_its_name(shaken):
     axes = shaken.plot_phase_plane().axes[0]
     rotation, velocity = max((line.get_data() for line in axes.lines), key=lambda data: len(data[0]))
@@ -292,14 +232,6 @@ def test_the_phase_plane_has_the_states_of_the_response_and_its_name(shaken):
         for start in (struck, struck + 0.01)
     ]
     assert [any("uplift" in label for label in each) for each in labels] == [True, False]
-
-
-def test_a_response_draws_its_rotation_into_axes_of_the_caller(shaken):
-    axes = shaken.plot().axes[0]
-    ax = type(axes.figure)().subplots()
-    assert shaken.plot(ax) is ax.figure
-    assert ax.figure.axes == [ax]
-    assert len(ax.lines) == len(axes.lines)
 
 
 def test_a_window_is_all_that_is_drawn(shaken):
@@ -379,26 +311,6 @@ def test_the_time_of_a_peak_is_as_uncertain_as_its_swing():
     decimals = len(summary.peak_time_text(one).partition(".")[2].removesuffix(" s"))
     moved = 0.01 * abs(other.peak_time - one.peak_time)
     assert moved < 10.0**-decimals
-
-
-def test_a_stop_that_is_not_reached_changes_no_digit_of_the_time_of_a_peak():
-    motion = rocking.pulses.sine(2.0, 0.5, cycles=4)
-    free = dynamics.simulate(dynamics.ImpactOscillator(1.0, 0.8, stop=0.01), motion)
-    for above in (1e-5, 1e-3):
-        body = dynamics.ImpactOscillator(1.0, 0.8, stop=0.01, second_stop=free.peak_rotation + above)
-        held = dynamics.simulate(body, motion)
-        assert held.peak_time == free.peak_time
-        assert summary.peak_time_text(held) == summary.peak_time_text(free)
-
-
-def test_the_time_of_a_peak_just_short_of_a_fall_has_fewer_digits():
-    """There a millionth of the motion moves it by milliseconds, so that a fourth decimal would be wrong."""
-    motion = rocking.records.load("el-centro-meloland-270").scaled(1.0673813104946)
-    block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
-    one, other = (simulate(block, motion.scaled(factor)) for factor in (1.0, 1.0 - 1e-6))
-    assert 1e-3 < abs(other.peak_time - one.peak_time) < 1e-2
-    low, high = map(float, re.fullmatch(r"(\d+\.\d{3}) to (\d+\.\d{3}) s", summary.peak_time_text(one)).groups())
-    assert low - 0.0005 <= one.peak_time <= high + 0.0005
 
 
 def test_a_g_is_the_standard_one_whatever_gravity_the_block_has():

@@ -8,18 +8,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import xarray as xr
 from matplotlib.figure import Figure
 from public_names import public_names
-from test_output_files import full_disk
 
 import rocking
-from rocking import chattering, dynamics, engine
+from rocking import dynamics, engine
 from rocking.analysis.calibration.result import overturned_under
 from rocking.chattering import chattering_map, critical_amplitude_nonlinear, families
 from rocking.progress import Progress
 from rocking.result import DatasetResult
-from rocking.tables import counted, write_netcdf
+from rocking.tables import counted
 
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
 PULSE = rocking.pulses.one_sine(6.0, 1.0)
@@ -137,12 +135,6 @@ def test_a_map_of_chattering_calls_what_was_given_up_unproven():
     assert found.outcome.values.tolist() == [[5]]
 
 
-def test_an_ensemble_marks_what_was_given_up_and_keeps_the_rest(monkeypatch):
-    monkeypatch.setattr(engine, "BUDGET", 0)
-    dataset = rocking.simulate_many([BLOCK, RESTLESS], PULSE.scaled(0.4))
-    assert dataset.unfinished.values.tolist() == [[False, True]]
-
-
 @pytest.fixture(scope="module")
 def bars():
     """Of every progress bar that ended what it is of, what was done, and of how much."""
@@ -210,14 +202,6 @@ def test_every_bar_comes_to_its_end(results, bars):
     assert {"mapping", "simulating", "refining", "basins", "fitting"} <= {what for what, *_ in bars}
     assert len(bars) > 12
     assert [each for each in bars if not each[1] == each[2] > 0] == []
-
-
-def test_a_result_shows_itself_in_a_line(results):
-    for name, found in results.items():
-        assert repr(found).startswith(f"<{name}: ")
-        assert len(repr(found)) < 400
-        assert found.summary().splitlines()[0] in repr(found)
-        assert name in found._repr_html_()
 
 
 @pytest.mark.parametrize("written", [3, pytest.param(11, marks=pytest.mark.thorough)])
@@ -339,14 +323,6 @@ def test_levels_go_on_to_three_times_the_first_that_overturns_and_no_further():
     assert float(found.level[-2]) < last <= float(found.level[-1])
 
 
-def test_columns_of_the_table_of_bands_do_not_touch():
-    record = rocking.records.load("ridgecrest-clc-090")
-    text = rocking.incremental_dynamic_analysis(BLOCK, [record, PULSE], tolerance=1e-2).summary()
-    *rows, undecided = text.splitlines()[4:]
-    assert undecided.startswith("note: undecided within 3e-6 of the motion: ")
-    assert [row.split("  ")[0] for row in rows] == ["ridgecrest-clc-090", "one-sine"]
-
-
 def test_a_fragility_keeps_every_simulation_for_an_audit(tmp_path):
     levels = [1.0, 2.0, 3.0, 4.0, 6.0]
     motions = [rocking.pulses.one_sine(1.0, f) for f in (0.5, 0.8, 1.2, 2.0)]
@@ -374,37 +350,6 @@ def test_the_nonlinear_critical_amplitude_is_not_read_off_an_unfinished_simulati
     found = critical_amplitude_nonlinear(2.0, [0.9, 0.99999], 0.2)
     assert found[0] == whole
     assert np.isnan(found[1])
-
-
-def _sine() -> rocking.Motion:
-    return rocking.pulses.sine(1.03 * 0.2 * 9.80665, 0.6, cycles=2)
-
-
-@pytest.mark.parametrize(
-    "find",
-    [
-        lambda: chattering.sequence(1.03, 2.0, 0.92),
-        lambda: chattering.sequence(1.2, 2.0, 0.92),
-        lambda: chattering.chattering_report(1.03, 2.0, 0.92),
-        lambda: chattering.critical_report(2.0, 0.92),
-        lambda: chattering.chattering_episodes(rocking.simulate(BLOCK, _sine())),
-        lambda: chattering.series_diagnosis(1.01, 2.0, 0.92),
-    ],
-)
-def test_whatever_is_returned_shows_itself_in_a_few_lines(find):
-    found = find()
-    assert type(found).__name__ in repr(found)
-    assert len(repr(found)) < 400
-    assert repr(found).count("\n") < 4
-
-
-def test_why_a_file_cannot_be_written_is_said_without_the_library_s_internals(tmp_path):
-    path, dataset = tmp_path / "large.nc", xr.Dataset({"numbers": ("x", np.random.default_rng(1).random(100_000))})
-    with full_disk(200_000), pytest.raises(rocking.OutputError) as caught:
-        write_netcdf(path, dataset)
-    said = f"{path}: cannot be written: File too large; nothing of it was kept; choose another place"
-    assert str(caught.value) == said
-    assert not path.exists()
 
 
 #: Dimensions that not all variables have, though none is of all values together: what holds along with each label.

@@ -96,17 +96,6 @@ def test_no_registry_is_named_and_the_projects_address_stands_in_one_place() -> 
     assert [path.name for path, text in read.items() if address.partition("//")[2] in text] == ["pyproject.toml"]
 
 
-def test_make_installs_every_package_without_which_tests_are_skipped() -> None:
-    """Else these tests would be skipped on every machine, and hold nothing."""
-    texts = [path.read_text("utf-8") for path in sorted((ROOT / "tests").rglob("*.py"))]
-    asked = {name.partition(".")[0] for text in texts for name in re.findall(r"importorskip\(\s*\"([\w.]+)\"", text)}
-    (extras,) = re.findall(r"^\.venv/\.all: EXTRAS := \[(.*)\]", MAKEFILE, re.MULTILINE)
-    chosen = [PROJECT["dependencies"], *(PROJECT["optional-dependencies"][each] for each in extras.split(","))]
-    installed = {re.split(r"[\[<>=~! ;]", each)[0].replace("-", "_").lower() for some in chosen for each in some}
-    assert len(asked) >= 10
-    assert asked - {"resource"} <= installed  # of Python itself, on POSIX
-
-
 def test_advice_to_install_a_part_names_one_that_the_source_has() -> None:
     """The project is on no package index: parts are installed from its source."""
     sources = {path: path.read_text("utf-8") for path in sorted((ROOT / "src").rglob("*.py"))}
