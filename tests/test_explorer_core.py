@@ -569,6 +569,15 @@ def test_another_motion_begins_as_its_own_texts_say(explorer):
         assert second["peak_rotation"] == explorer.show(size | released | other).response.peak_rotation
 
 
+def test_a_comparison_goes_on_until_the_later_of_both_ends(explorer):
+    later = {**SINE, "motion": "sine:amplitude=2.02,frequency=0.1,cycles=2.5"}
+    for one, other in ((SINE, later), (later, SINE)):
+        header = explorer.compare(one, other, align="uplift", whole=True).header
+        first, second = (explorer.show(texts).response for texts in (one, other))
+        assert header["shift"] == first.events["time"][0] - second.events["time"][0] != 0.0
+        assert header["duration"] == max(first.duration, second.duration + header["shift"])
+
+
 def test_what_is_kept_is_bounded_by_the_motions_too_and_forgotten_with_their_file(monkeypatch):
     explorer = Explorer()
     monkeypatch.setattr("rocking.explorer.core._KEPT_ROWS", 100_000)
