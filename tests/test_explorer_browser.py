@@ -1936,6 +1936,10 @@ LATE = {
         SINE_MAP, "map/point", ["click #map-open"], ["enter restitution 0.9"],
         f"{AT}('restitution') === '0.9' && {AT}('view') === 'map' && document.body.dataset.map === 'complete'",
     ),
+    "a point of the map before": (
+        SINE_MAP, "map", ["choose #map-y restitution"], ["press #map Enter"],
+        f"!{AT}('view') && document.getElementById('problem').hidden",
+    ),
     "a quantity of a map": (
         SINE_MAP, "map", ["choose #map-x p"], ["choose #map-quantity peak"],
         f"{AT}('x') === 'p' && {AT}('quantity') === 'peak' && document.body.dataset.map === 'complete'",
@@ -1947,7 +1951,7 @@ LATE = {
 }  # fmt: skip
 
 
-@pytest.mark.cases(fast=5)
+@pytest.mark.cases(fast=5, thorough=12)
 @pytest.mark.parametrize(("query", "path", "asks", "then", "holds"), LATE.values(), ids=LATE)
 def test_what_is_chosen_last_is_shown_however_late_an_answer_comes(opened, query, path, asks, then, holds):
     page = opened(query, allowed=["422"])
