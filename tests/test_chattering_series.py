@@ -3,8 +3,8 @@
 import mpmath
 import numpy as np
 import pytest
-from oracles.sine_chattering import settle
-from oracles.slow_sine import _Arc
+from flint import arb, ctx
+from oracles.sine_chattering import BITS, first_impacts, rest_time
 
 from rocking import chattering
 from rocking.chattering import expansions
@@ -42,17 +42,14 @@ def test_leading_coefficient_is_that_of_the_paper():
 @pytest.mark.parametrize(("omega", "eta"), [(2.0, 0.92), (0.6, 0.7), (8.0, 0.5)])
 @pytest.mark.parametrize("terms", [1, 2, 3, 4])
 def test_the_error_rises_by_one_order_per_term(omega, eta, terms):
-    """Log-log slope k + 1/2 for k terms; the exact time from ball arithmetic, in differences too small for doubles."""
+    """Log-log slope k + 1/2 for k terms; the exact time in 120 digits, in differences too small for doubles."""
     coefficients = chattering.series_coefficients(omega, eta, order=12)
     radius = float(chattering.series_diagnosis(1.0, omega, eta).radius)
     eps = radius * np.array([2.0**-8, 2.0**-7])
-    exact = [settle(1.0 + e, omega, eta, width=1e-24).time.mid() for e in eps]
+    exact = [rest_time(1.0 + e, omega, eta, little=1e-14) for e in eps]
     partial = [float(sum(c * ((1.0 + e) - 1.0) ** k for k, c in enumerate(coefficients[:terms]))) for e in eps]
-    with mpmath.workdps(30):
-        errors = [
-            float(mpmath.mpf(x.str(30, radius=False)) - mpmath.sqrt(mpmath.mpf(1.0 + e) - 1) * mpmath.mpf(p))
-            for x, e, p in zip(exact, eps, partial, strict=True)
-        ]
+    with ctx.workprec(BITS):
+        errors = [float(x - (arb(1.0 + e) - 1).sqrt() * p) for x, e, p in zip(exact, eps, partial, strict=True)]
     assert np.log2(errors[1] / errors[0]) == pytest.approx(terms + 0.5, abs=0.05)
 
 
@@ -61,18 +58,17 @@ def test_the_error_rises_by_one_order_per_term(omega, eta, terms):
 def test_without_a_speed_after_impacts_only_the_first_arc_is_left(omega, eta):
     a = 1.01
     with mpmath.workdps(40):
-        amplitude, frequency = mpmath.mpf(a), mpmath.mpf(omega)
-        arc = _Arc(amplitude, frequency, mpmath.asin(1 / amplitude), mpmath.mpf(0), -1)
-        exact = mpmath.findroot(arc.height, 4 * mpmath.sqrt(2 * (amplitude - 1)) / frequency)
+        frequency = mpmath.mpf(omega)
+        exact = first_impacts(a, omega, eta, 1)[0][0]
         # Their terms in eps^(1/2) and eps^(3/2), as in the paper's Eq. 32 with its correction.
         second = mpmath.sqrt(2) / frequency * (1 - mpmath.mpf(32) / 15 * (frequency**2 - 1) / frequency**2)
     found = [chattering.chattering_time(a, omega, eta, method="series", order=order) for order in (4, 20)]
-    assert found == pytest.approx([float(exact)] * 2, rel=1e-5 if omega < 1.0 else 1e-8)
-    assert found[1] == pytest.approx(float(exact), rel=1e-8 if omega < 1.0 else 1e-15)
+    assert found == pytest.approx([exact] * 2, rel=1e-5 if omega < 1.0 else 1e-8)
+    assert found[1] == pytest.approx(exact, rel=1e-8 if omega < 1.0 else 1e-15)
     coefficients = chattering.series_coefficients(omega, eta, order=2)
     assert coefficients == pytest.approx([4.0 * 2.0**0.5 / omega, float(second)], rel=1e-14)
     report = chattering.chattering_report(a, omega, eta)
-    assert report.values["chattering_time"]["exact"] == pytest.approx(float(exact), rel=1e-15)
+    assert report.values["chattering_time"]["exact"] == pytest.approx(exact, rel=1e-15)
     assert report.values["series"]["error"] < (1e-4 if omega < 1.0 else 1e-9)
 
 
