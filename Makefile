@@ -23,7 +23,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: help demo wheel quick test test-all browser browser-all slow verify mutants lowest latest .bounds-lowest .bounds-latest doctest lint types \
-    docs bench coverage branches audit sbom review try-install clean distclean
+    docs bench coverage audit sbom review try-install clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -116,9 +116,6 @@ coverage: .venv/.all ## run the tests, and say which lines none of them reaches 
 
 try-install: wheel ## install the wheel into empty environments, with each extra alone, and simulate there
 	$(BIN)/python scripts/try_install.py dist/rocking-*.whl --compiled --extras
-
-branches: .venv/.all ## ask for 95 % of the branches of kernels (uncompiled), store, readers and authentication (20 minutes)
-	$(BIN)/python stress/branches.py $(if $(PART),"$(PART)")
 
 audit: .venv-upkeep/.installed ## compare the pinned versions with the weaknesses that are known (asks the network)
 	.venv-upkeep/bin/pip-audit --strict --requirement constraints.txt --no-deps --disable-pip

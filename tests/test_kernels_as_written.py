@@ -1,7 +1,6 @@
 """Compiled kernels answer what their Python says: of every kind of body, law, treatment and question a small case.
 
-Another process computes the same with compilation the other way round. `make branches` runs these without compilation,
-so that what they reach of the kernels counts.
+Another process computes the same with compilation the other way round.
 """
 
 from __future__ import annotations
