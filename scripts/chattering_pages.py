@@ -11,6 +11,7 @@ import warnings
 from pathlib import Path
 
 import numpy as np
+from pages import markdown
 
 import rocking
 from rocking.chattering import chattering_time, critical_amplitude, families
@@ -313,18 +314,6 @@ def with_theory(figure, omega):
     axes.plot(omega, critical_amplitude(omega, 0.92), color="#b0390c", linewidth=1.4, linestyle=(0, (4, 2)))
     axes.annotate("$a_{cr}$ of the sine", (omega[-1], 1.0345), ha="right", va="top", color="#b0390c", fontsize=8)
     return figure
-
-
-def markdown(heading, rows):
-    """Write a table as Markdown; columns of numbers to the right, the others to the left."""
-    columns = zip(*rows, strict=True)
-    lines = [heading, ["---:" if all(is_number(cell) for cell in column) else "---" for column in columns], *rows]
-    return "".join("| " + " | ".join(str(cell) for cell in line) + " |\n" for line in lines)
-
-
-def is_number(cell):
-    """Whether a cell is empty or starts like a number."""
-    return str(cell)[:1] in "+-0123456789"
 
 
 if __name__ == "__main__":

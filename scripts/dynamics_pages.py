@@ -1,6 +1,6 @@
-"""Make the tables and figures of published impact dynamics in docs/theory/orbits.md and docs/howto/bifurcation.md.
+"""Make the tables and figures of published impact dynamics in docs/theory/orbits.md.
 
-Run ``python scripts/dynamics_pages.py`` from the repository's root (two minutes); tests compare what it computes with
+Run ``python scripts/dynamics_pages.py`` from the repository's root (a minute); tests compare what it computes with
 closed forms.
 """
 
@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from pages import markdown
 
 import rocking
 from rocking import dynamics
@@ -27,30 +27,16 @@ HOGAN_BLOCK = rocking.Block.from_parameters(p=1.0, alpha=0.1, restitution=0.925)
 HOGAN_RATIO = 3.0
 ORBITS = {1: "one period", 3: "three periods"}
 
-#: Height over width of the blocks that are compared, their frequency parameter, and the forcing frequency over that.
-SLENDERNESSES = (2.0, 3.0, 5.0, 8.0)
-P, RATIO = 2.0, 5.0
-#: Where the resultant of the contact acts, as a share of the half-width: at the corner as Housner has it, or nearer.
-CONTACTS = {1.0: "at the corner", 0.7: "at 0.7 of the half-width"}
-#: Amplitude over that of uplift at which basins and exponents are found, and amplitudes of the diagrams.
-LEVEL = 2.0
-LEVELS = np.linspace(1.02, 5.4, 220)
-
-#: Restitutions of the oscillators that stick.
-RESTITUTIONS = (0.5, 0.8, 0.9)
-
 
 def main() -> None:
     """Write all tables and images."""
     TABLES.mkdir(exist_ok=True)
     branches = hogan_branches()
-    rows = restitution_rows()
-    tables = {"orbits-slender.txt": hogan_table(branches), "restitution-orbits.txt": restitution_table(rows)}
+    tables = {"orbits-slender.txt": hogan_table(branches)}
     for name, text in tables.items():
         (TABLES / name).write_text(text, encoding="utf-8")
     figures = {
         "orbits-slender.png": hogan_figure(branches),
-        "restitution-orbits.png": restitution_figure(rows),
         "sticking.png": sticking_figure(),
     }
     for name, figure in figures.items():
@@ -161,108 +147,6 @@ def hogan_figure(branches):
     return drawn
 
 
-# --- another restitution ----------------------------------------------------------------------------------------
-
-
-def restitution_of(slenderness, contact):
-    """Restitution of a rectangle that turns about points at a share of its half-width while it changes its side."""
-    share = math.sin(math.atan(1.0 / slenderness)) ** 2
-    return (4.0 - 3.0 * share * (1.0 + contact**2)) / (4.0 - 3.0 * share * (1.0 - contact**2))
-
-
-def restitution_rows():
-    """Compare blocks with both restitutions: numbers by slenderness and contact."""
-    return {
-        (slenderness, contact): compared(slenderness, contact) for slenderness in SLENDERNESSES for contact in CONTACTS
-    }
-
-
-def compared(slenderness, contact):
-    """Numbers of one block."""
-    restitution = restitution_of(slenderness, contact)
-    block = rocking.Block.from_parameters(p=P, alpha=math.atan(1.0 / slenderness), restitution=restitution)
-    family = shaken(block, RATIO, "nonlinear")
-    (rest,) = (each for each in dynamics.periodic_orbits(*family(1.002), starts=[[0.0, 0.0]]) if each.rests)
-    lost = values_of(dynamics.continue_orbit(rest, family, 1.002, (0.9, 2.0)))["loss of complete chattering"]
-    whole = next(each for each in stable_orbits(family, 1.0, 1, "nonlinear") if each.symmetric)
-    branch = dynamics.continue_orbit(whole, family, 1.0, (0.005, 32.0), step=0.02)
-    # Orbits with two impacts a period settle by the restitution squared in each.
-    transient = math.ceil(-20.0 / math.log(restitution))
-    diagram = dynamics.bifurcation_diagram(family, LEVELS, [0.0, 0.0], direction="afresh", transient=transient).data
-    period, theta = diagram.period.values[0, :, 0], np.linspace(-block.alpha, block.alpha, 61)
-    body, sine = family(LEVEL)
-    found = dynamics.basins(body, sine, theta, P * theta, progress=False)
-    shares = zip(found.attractor.values, found.share.values, strict=True)
-    exponents = []
-    for level in LEVELS[period != -1][::8]:
-        body, sine = family(level)
-        exponents.append(dynamics.lyapunov_exponents(body, sine, [0.0, 0.0], 2000, transient=transient).largest)
-    return {
-        "restitution": restitution,
-        "lost": lost,
-        **values_of(branch),
-        "overturns": LEVELS[period == -1][0],
-        "other": np.mean(period[period != -1] != 1),
-        "stays": sum(float(share) for name, share in shares if "overturns" not in name),
-        "exponent": np.nanmax(exponents),
-    }
-
-
-def restitution_table(rows):
-    """Numbers as Markdown."""
-    lines = []
-    for (slenderness, contact), row in rows.items():
-        lines.append((
-            f"{slenderness:g}", CONTACTS[contact], f"{row['restitution']:.4f}", f"{row['fold']:.4f}",
-            f"{row['lost']:.5f}", f"{row['symmetry breaking']:.2f}", f"{row['overturns']:.2f}",
-            f"{100.0 * row['other']:.0f}", f"{100.0 * row['stays']:.1f}", f"{row['exponent']:.3f}",
-        ))  # fmt: skip
-    head = (
-        "height over width", "contact", "restitution", "orbits begin", "chattering lost", "symmetry lost",
-        "overturns from rest", "longer periods, %", "stays, %", "largest exponent",
-    )  # fmt: skip
-    return markdown(head, lines)
-
-
-def restitution_figure(rows):
-    """Amplitudes, and shares of states that stay, against the slenderness."""
-    with figure_for(None, (7.4, 3.2)) as drawn:
-        left, right = drawn.subplots(1, 2)
-        looks: dict[float, dict[str, Any]] = {
-            1.0: {"linestyle": "-"},
-            0.7: {"linestyle": (0, (4, 2)), "markerfacecolor": "white"},
-        }
-        marks = {"fold": ("orbits begin", "o", INK), "overturns": ("overturns from rest", "s", ABOVE)}
-        for contact, look in looks.items():
-            of = [rows[slenderness, contact] for slenderness in SLENDERNESSES]
-            for key, (name, mark, color) in marks.items():
-                left.plot(
-                    SLENDERNESSES,
-                    [row[key] for row in of],
-                    mark,
-                    color=color,
-                    markersize=4.5,
-                    label=f"{name}, contact {CONTACTS[contact]}",
-                    **look,
-                )
-            left.plot(
-                SLENDERNESSES,
-                [row["lost"] - 1.0 for row in of],
-                "D",
-                color=CURVES[2]["color"],
-                markersize=4.5,
-                label=f"chattering lost, less 1, contact {CONTACTS[contact]}",
-                **look,
-            )
-            right.plot(SLENDERNESSES, [100.0 * row["stays"] for row in of], "o", color=INK, markersize=4.5, **look)
-        left.set_yscale("log")
-        right.set_ylim(0.0, None)
-        add_labels(left, "height over width", "acceleration over that of uplift")
-        add_labels(right, "height over width", "states that never overturn (%)")
-        add_legend(drawn, None, handles_of(left))
-    return drawn
-
-
 # --- an oscillator that sticks ----------------------------------------------------------------------------------
 
 
@@ -317,12 +201,6 @@ def sticking_figure():
         add_labels(beyond, "frequency beyond the boundary", "impacts in a period")
         add_legend(drawn, None, handles_of(rests))
     return drawn
-
-
-def markdown(heading, rows):
-    """Write a table as Markdown, numbers to the right."""
-    lines = [heading, ("---", *["---:"] * (len(heading) - 1)), *rows]
-    return "".join("| " + " | ".join(str(cell) for cell in line) + " |\n" for line in lines)
 
 
 if __name__ == "__main__":

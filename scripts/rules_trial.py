@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from pages import markdown
 
 import rocking
 from rocking import rules
@@ -178,12 +179,6 @@ def figure(ratios, capacities):
         add_labels(axes, "overturning PGA by the rule over the simulated one", "share of blocks and records")
         add_legend(drawn, None, handles_of(axes))
     return drawn
-
-
-def markdown(heading, rows):
-    """Write a table as Markdown, numbers to the right."""
-    lines = [heading, ("---", *["---:"] * (len(heading) - 1)), *rows]
-    return "".join("| " + " | ".join(str(cell) for cell in line) + " |\n" for line in lines)
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pages import markdown
 
 import rocking
 from rocking import overturning_map
@@ -278,18 +279,6 @@ def score_row(specimen, name, one):
 def below(difference):
     """Power of ten that a difference is below, 1e-11 at least: what is less depends on the machine."""
     return f"below 1e{max(-11, math.ceil(math.log10(max(difference, 1e-300)) + 1e-9))}"
-
-
-def markdown(heading, rows):
-    """Write a table as Markdown; columns of numbers to the right, the others to the left."""
-    columns = zip(*rows, strict=True)
-    lines = [heading, ["---:" if all(is_number(cell) for cell in column) else "---" for column in columns], *rows]
-    return "".join("| " + " | ".join(str(cell) for cell in line) + " |\n" for line in lines)
-
-
-def is_number(cell):
-    """Whether a cell is empty or starts like a number."""
-    return str(cell)[:1] in "+-0123456789"
 
 
 if __name__ == "__main__":

@@ -1,6 +1,5 @@
 """Published results of impact dynamics, redrawn: orbits of a slender block, an oscillator that sticks to its stop."""
 
-import importlib.util
 import math
 from pathlib import Path
 from typing import NamedTuple
@@ -278,14 +277,6 @@ def test_courses_lead_from_one_balance_to_the_other_from_the_heteroclinic_amplit
 ROOT = Path(__file__).parents[1]
 
 
-@pytest.fixture(scope="module")
-def script():
-    specification = importlib.util.spec_from_file_location("dynamics_pages", ROOT / "scripts" / "dynamics_pages.py")
-    module = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(module)
-    return module
-
-
 def rows_of(table):
     lines = (ROOT / "docs" / "_tables" / table).read_text("utf-8").splitlines()[2:]
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
@@ -299,32 +290,3 @@ def test_the_table_of_a_slender_block_holds_the_closed_forms():
         breaking = exact.amplitude(exact.breaking)
         wanted = exact.amplitude(exact.fold), breaking, breaking, exact.flip[0]
         assert [float(cell) for cell in row[1:]] == pytest.approx([each / unit for each in wanted], abs=1e-10)
-
-
-@pytest.mark.parametrize("every", [7, pytest.param(1, marks=pytest.mark.thorough)])
-def test_the_table_of_restitutions_holds_what_blocks_do(script, every):
-    """Just below where chattering is lost a block that has rested forgets that, above it does not; and it overturns."""
-    rows = rows_of("restitution-orbits.txt")
-    contacts = {words: contact for contact, words in script.CONTACTS.items()}
-    judged = 0
-    for slenderness, words, restitution, begins, lost, _, overturns, *_ in rows[::every]:
-        contact, factor = contacts[words], float(restitution)
-        exact = script.restitution_of(float(slenderness), contact)
-        assert factor == pytest.approx(exact, abs=5e-5)
-        block = rocking.Block.from_parameters(p=script.P, alpha=math.atan(1.0 / float(slenderness)), restitution=exact)
-        family = script.shaken(block, script.RATIO, "nonlinear")
-        for change, forgets in ((-1e-5, True), (1e-5, False)):
-            strobe = dynamics.stroboscopic_map(*family(float(lost) + change))
-            _, derivative = strobe.derivative(strobe([0.0, 0.0]))
-            assert np.any(derivative) != forgets
-        (level,) = script.LEVELS[np.abs(script.LEVELS - float(overturns)) < 5e-3]
-        assert np.isnan(dynamics.stroboscopic_map(*family(level))([0.0, 0.0], 2500)).all()
-        assert float(begins) < 1.0 < float(lost)
-        judged += 1
-    assert judged == {7: 2, 1: 8}[every] and len(rows) == 8
-
-
-@pytest.mark.slow
-def test_a_row_of_the_table_of_restitutions_is_what_the_script_makes(script):
-    row = script.restitution_table({(8.0, 0.7): script.compared(8.0, 0.7)}).splitlines()[2]
-    assert row in (ROOT / "docs" / "_tables" / "restitution-orbits.txt").read_text("utf-8").splitlines()

@@ -1,14 +1,13 @@
 """Rules of thumb: their formulas against simulations, quadrature and the forms in which they are printed."""
 
-import importlib.util
 import json
 import math
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+import rules_trial
 from scipy.integrate import quad
 
 import rocking
@@ -235,25 +234,16 @@ def test_a_check_of_unequal_sides_says_that_reversed_motions_differ():
     assert equal.to_dict()["notes"] == []
 
 
-@pytest.fixture(scope="module")
-def script():
-    path = Path(__file__).resolve().parents[1] / "scripts" / "rules_trial.py"
-    specification = importlib.util.spec_from_file_location("rules_trial", path)
-    module = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(module)
-    return module
-
-
-def test_white_noise_at_housners_ratio_does_not_overturn_one_block_in_two(script):
+def test_white_noise_at_housners_ratio_does_not_overturn_one_block_in_two():
     """Of fourteen fair coins three heads or fewer have a probability of 0.03, and eleven or more as well."""
-    at_one, at_one_and_a_half, at_two = script.overturned_by_noise(range(14)).sum(axis=0)[:, 0]
+    at_one, at_one_and_a_half, at_two = rules_trial.overturned_by_noise(range(14)).sum(axis=0)[:, 0]
     assert at_one == 0 < at_one_and_a_half < 11 <= at_two
 
 
 @pytest.mark.slow
-def test_the_table_of_white_noises_is_that_which_the_script_makes(script):
-    made = script.noise_table(script.overturned_by_noise(range(script.NOISES)))
-    kept = (script.TABLES / "rules-noise.txt").read_text("utf-8")
+def test_the_table_of_white_noises_is_that_which_the_script_makes():
+    made = rules_trial.noise_table(rules_trial.overturned_by_noise(range(rules_trial.NOISES)))
+    kept = (rules_trial.TABLES / "rules-noise.txt").read_text("utf-8")
     assert NUMBER.sub("#", made) == NUMBER.sub("#", kept)
     # Some responses are ambiguous: the last digit of another platform may let another noise overturn the block.
     for now, before in zip(NUMBER.findall(made), NUMBER.findall(kept), strict=True):
@@ -261,13 +251,13 @@ def test_the_table_of_white_noises_is_that_which_the_script_makes(script):
 
 
 @pytest.mark.slow
-def test_the_tables_of_the_trial_are_those_that_the_script_makes(script):
-    blocks, motions = script.all_blocks(), script.all_motions()
-    ratios = script.ratings(blocks, motions)
-    verdicts = script.verdict_table(blocks, motions, ratios, script.simulated_verdicts(blocks, motions))
-    capacities = script.capacity_table(ratios, script.simulated_capacities(blocks, motions))
+def test_the_tables_of_the_trial_are_those_that_the_script_makes():
+    blocks, motions = rules_trial.all_blocks(), rules_trial.all_motions()
+    ratios = rules_trial.ratings(blocks, motions)
+    verdicts = rules_trial.verdict_table(blocks, motions, ratios, rules_trial.simulated_verdicts(blocks, motions))
+    capacities = rules_trial.capacity_table(ratios, rules_trial.simulated_capacities(blocks, motions))
     for name, made, share in (("verdicts", verdicts, 0.11), ("capacities", capacities, 0.021)):
-        kept = (script.TABLES / f"rules-{name}.txt").read_text("utf-8")
+        kept = (rules_trial.TABLES / f"rules-{name}.txt").read_text("utf-8")
         assert NUMBER.sub("#", made) == NUMBER.sub("#", kept)
         # Of 7,200 responses 248 are ambiguous: the last digit of another platform may let a few more fall.
         numbers = [*zip(NUMBER.findall(made), NUMBER.findall(kept), strict=True)]
