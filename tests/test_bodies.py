@@ -1,113 +1,25 @@
-"""A body of another kind than a block, a ball that bounces on a moving table, goes through all above the kernels."""
+"""Bodies of another kind than blocks go through all above the kernels."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-from typing import ClassVar
-
-import numpy as np
 import pytest
-from kernel_records import one_sided
 
 import rocking
-from rocking import InvalidBlock, InvalidMotion, InvalidOption, Motion, checks, dynamics, simulate, simulate_many
-from rocking.body import KINDS, Bodies, Body, Coordinate
+from rocking import InvalidBlock, InvalidMotion, InvalidOption, Motion, dynamics, simulate, simulate_many
+from rocking.body import Bodies, Body
 from rocking.constants import STANDARD_GRAVITY
-from rocking.engine import Setup, Task, simulate_each, simulate_tasks
-from rocking.kernels import state
-from rocking.treatment import Certified, VelocityThreshold
+from rocking.engine import Setup, Task, simulate_tasks
+from rocking.treatment import Certified
 
 G = 9.81
 
 
-@dataclass(frozen=True)
-class Side:
-    restitution: float
-
-    def __str__(self) -> str:
-        return f"restitution = {self.restitution:.5g}"
-
-
-@dataclass(frozen=True)
-class Ball:
-    e: float
-    gravity: float = G
-    coordinate: ClassVar[Coordinate] = Coordinate("height", "velocity", "acceleration", "m")
-    balance: ClassVar[tuple[float, float]] = (math.inf, math.inf)
-    stops: ClassVar[tuple[float, float]] = (0.0, 0.0)
-    contact: ClassVar[None] = None
-
-    @property
-    def description(self) -> str:
-        return "ball on a table"
-
-    @property
-    def sides(self) -> tuple[Side]:
-        return (Side(self.e),)
-
-    def uplift_thresholds(self, model="nonlinear"):
-        return self.gravity, math.inf
-
-    def alone(self) -> Balls:
-        return Balls.of([self])
-
-
-@dataclass(frozen=True, eq=False)
-class Balls:
-    restitution: np.ndarray
-    gravity: float = G
-    kind: ClassVar[str] = "balls"
-    is_symmetric: ClassVar[bool] = True
-
-    @classmethod
-    def of(cls, bodies):
-        return cls(np.array([[ball.e, ball.e] for ball in bodies]), bodies[0].gravity)
-
-    def __len__(self):
-        return len(self.restitution)
-
-    def __getitem__(self, index):
-        return Ball(float(self.restitution[index, 0]), self.gravity)
-
-    def select(self, index):
-        return Balls(self.restitution[index], self.gravity)
-
-    @property
-    def stops(self):
-        return np.zeros((len(self), 2))
-
-    def parameters(self):
-        return {"restitution": (self.restitution, "1")}
-
-    def speed_limits(self, share):
-        return np.full((len(self), 2), share)
-
-    def kernel_records(self, model, limits):
-        checks.one_of(model, "model", InvalidOption, ["linear"])
-        made = state.records(len(self), state.BLOCK)
-        for k, e in enumerate(self.restitution[:, 0]):
-            made[k] = one_sided(0.0, self.gravity, 1.0, e)
-        made["limit"] = limits
-        return made
-
-
-BALLS = Balls(np.repeat([[0.3], [0.6], [0.9]], 2, axis=1))
-
-
-@pytest.fixture(autouse=True)
-def known_kind(monkeypatch):
-    monkeypatch.setitem(KINDS, Balls.kind, Balls)
-
-
-def table(amplitude=15.0):
-    """A table that throws the ball: it goes down faster than the ball falls."""
-    return rocking.pulses.one_sine(amplitude, 2.0)
+BALL = dynamics.BouncingBall(0.6, gravity=G)
 
 
 def test_balls_and_blocks_are_bodies():
     block = rocking.Block(width=0.4, height=2.0)
-    for body in (BALLS[0], block):
+    for body in (BALL, block):
         assert isinstance(body, Body) and isinstance(body.alone(), Bodies)
         assert not isinstance(body, Bodies) and not isinstance(body.alone(), Body)
     for other in (0.4, "block", rocking.Block, [block]):
@@ -136,89 +48,32 @@ def test_a_body_on_a_line_takes_no_vertical_component(simulated):
             simulated(body, motion.with_vertical(rocking.pulses.one_sine(5.0, 1.0)))
 
 
-@pytest.mark.parametrize("e", [0.3, 0.9])
-def test_a_ball_that_falls_stops_bouncing_at_zenos_time(e):
-    u = 0.2
-    found = simulate(Ball(e), None, model="linear", initial_rotation=u)
-    first = math.sqrt(2.0 * u / G)
-    rest = first * (1.0 + 2.0 * e / (1.0 - e))
-    assert found.impacts["time"][0] == pytest.approx(first, rel=1e-14)
-    assert found.events["kind"].tolist() == ["rest"]
-    assert found.events["time"][0] == pytest.approx(rest, rel=1e-12)
-    assert found.states(0.5 * first) == pytest.approx([u - G * first**2 / 8.0, -0.5 * G * first, -G])
-    assert (found.peak_rotation, found.overturned, found.moves_at_end) == (u, False, False)
-    # Twice as far off the table, everything takes longer by sqrt(2): half of it for each unit of the initial height.
-    assert found.sensitivity.events["initial_rotation"][0] == pytest.approx(0.5 * rest, rel=1e-9)
-
-
 def test_the_response_of_a_ball_is_told_in_its_own_words():
-    found = simulate(BALLS[1], table(), model="linear")
+    found = simulate(BALL, rocking.pulses.one_sine(15.0, 2.0), model="linear")
     text, values = found.summary(), found.to_dict()
-    assert text.startswith("body                ball on a table\nparameters          restitution = 0.6\n")
-    assert f"uplift above        {G / STANDARD_GRAVITY:.4f} g\n" in text and "peak height         " in text
+    assert text.startswith("body                bouncing ball\nparameters          restitution = 0.6, gravity = 9.81")
+    assert f"uplift above        {G / STANDARD_GRAVITY:.4f} g\n" in text and "peak position       " in text
     assert "friction" not in text and "slenderness" not in text
-    assert values["peak_height_m"] == found.peak_rotation > 0.0
-    assert values["block"] == {"description": "ball on a table", "restitution": [0.6, 0.6], "gravity_m_s2": G}
+    assert values["peak_position_m"] == found.peak_rotation > 0.0
     assert not {"required_friction", "peak_over_slenderness"} & set(values)
-    assert list(found.to_dataframe(dt=0.01).columns) == ["height_m", "velocity_m_s", "ground_acceleration_m_s2"]
-    assert found.to_xarray()["height"].attrs["units"] == "m"
-    assert "ball on a table under one-sine: moves" in repr(found) and "height (m)" in found._repr_html_()
-    figure = found.plot(title="thrown")
-    assert [axes.get_ylabel() for axes in figure.axes] == ["height (m)", "ground\nacceleration (g)"]
-    assert figure.get_suptitle() == "thrown"
-    with pytest.raises(InvalidOption, match="forces of the ground are not known of this body: ball on a table"):
+    assert list(found.to_dataframe(dt=0.01).columns) == ["position_m", "velocity_m_s", "ground_acceleration_m_s2"]
+    assert found.to_xarray()["position"].attrs["units"] == "m"
+    assert [axes.get_ylabel() for axes in found.plot().axes] == ["position (m)", "ground\nacceleration (g)"]
+    with pytest.raises(InvalidOption, match="forces of the ground are not known of this body: bouncing ball"):
         found.normal_force(0.1)
     with pytest.raises(InvalidOption, match="known of blocks alone"):
         _ = found.block
 
 
 def test_what_a_ball_cannot_do_is_refused():
-    with pytest.raises(InvalidOption, match="model must be one of linear"):
-        simulate(Ball(0.5), None)
+    with pytest.raises(InvalidOption, match='give model "linear"'):
+        simulate(BALL, None)
     with pytest.raises(InvalidOption, match="in front of the body's stop, not"):
-        simulate(Ball(0.5), None, model="linear", initial_rotation=-0.1)
+        simulate(BALL, None, model="linear", initial_rotation=-0.1)
     with pytest.raises(InvalidOption, match='chattering "time" is for symmetric blocks'):
-        simulate(Ball(0.5), rocking.pulses.sine(15.0, 1.0, cycles=2), model="linear", chattering="time")
+        simulate(BALL, rocking.pulses.sine(15.0, 1.0, cycles=2), model="linear", chattering="time")
     with pytest.raises(InvalidOption, match="never comes to rest"):
-        simulate(Ball(1.0), None, model="linear", initial_rotation=0.1)
-
-
-@pytest.mark.parametrize("how", [Certified(), VelocityThreshold(1e-6)])
-def test_the_engine_plays_balls_as_simulate_does(how):
-    motions = [table(), rocking.Motion.from_samples(table().acceleration(np.arange(0.0, 0.6, 0.01)), 0.01)]
-    judged = 0
-    for motion in motions:
-        ((task, outcomes),) = simulate_tasks(Setup(BALLS, "linear", how), [Task(slice(0, 3), motion, 1.1)], threads=1)
-        assert task.motion is motion
-        for ball, outcome in zip(map(BALLS.__getitem__, range(3)), outcomes, strict=True):
-            alone = simulate(ball, motion.scaled(1.1), model="linear", chattering=how)
-            assert outcome["peak_rotation"] == pytest.approx(alone.peak_rotation, rel=1e-12) and outcome["uplifts"] > 0
-            assert outcome["impacts"] == len(alone.impacts)
-            assert outcome["last_rest"] == pytest.approx(alone.events["time"][-1], abs=1e-11)
-            judged += 1
-    assert judged == 6
-
-
-def test_an_ensemble_of_balls_is_labelled_by_its_parameters():
-    result = simulate_many(BALLS, table(), model="linear", levels=[0.5, 1.0])
-    assert result.sizes == {"motion": 1, "scale": 2, "block": 3}
-    assert result.restitution.values.tolist() == [0.3, 0.6, 0.9]
-    assert not np.any(result.peak_rotation.sel(scale=0.5))  # 0.76 g does not lift them
-    assert np.all(result.peak_rotation.sel(scale=1.0) > 0.0)
-    one = simulate_many(BALLS[2], table(), model="linear")
-    assert float(one.peak_rotation[0, 0]) == float(result.peak_rotation[0, 1, 2])
-    (found,) = simulate_each(Setup(BALLS, "linear", Certified()), table(), np.ones(3), threads=1)
-    assert found[1]["peak_rotation"].tolist() == result.peak_rotation[0, 1].values.tolist()
-
-
-def test_a_study_of_balls_keeps_its_inputs_and_takes_them_up_again(tmp_path):
-    folder = tmp_path / "balls"
-    study = rocking.study(folder, BALLS, table(), model="linear", levels=[0.5, 1.0], unit_blocks=512)
-    study.run(threads=1)
-    again = rocking.study(folder)
-    assert isinstance(again.product.bodies, Balls)
-    expected = simulate_many(BALLS, table(), model="linear", levels=[0.5, 1.0])
-    assert again.results().peak_rotation.values.tolist() == expected.peak_rotation.values.tolist()
+        simulate(dynamics.BouncingBall(1.0), None, model="linear", initial_rotation=0.1)
 
 
 def test_a_rest_that_the_ground_ends_at_once_passes_on_what_shifts_it():

@@ -1,8 +1,6 @@
 """Bodies between stops against an independent integration with events, closed forms, and wrong input."""
 
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -105,42 +103,6 @@ def test_impacts_are_those_of_an_independent_integration(seeds):
         impacts += len(known)
     assert impacts > 5 * len(seeds) and ends > len(seeds) // 2
     assert between >= len(seeds) // 5 and len(seeds) // 14 <= reached < between
-
-
-def rest_by_following(body, acceleration, speed):
-    """Time of rest of a body at its lower stop that leaves it with a speed under a constant push, in 30 digits."""
-    import mpmath as mp
-
-    stiffness, damping, pull, low, _ = (mp.mpf(each) for each in body.law)
-    a, e = mp.mpf(acceleration), mp.mpf(body.restitution)
-    with mp.workdps(40):
-        split = mp.sqrt(mp.mpc(damping**2 / 4 + stiffness))
-        roots = -damping / 2 + split, -damping / 2 - split
-        balance = (pull + a) / stiffness - low  # u'' = stiffness (u - balance) - damping u'
-        time, v = mp.mpf(0), mp.mpf(speed)
-
-        def position(t, v):
-            r, s = roots
-            first = (v + s * balance) / (r - s)  # u = balance + A e^(rt) + B e^(st), u(0) = 0, u'(0) = v
-            return mp.re(balance + first * mp.exp(r * t) + (-balance - first) * mp.exp(s * t))
-
-        while v > mp.mpf(10) ** -18:
-            g = stiffness * balance
-            t = mp.findroot(lambda t, v=v: position(t, v) / t, 2 * v / g)
-            after = -mp.diff(lambda t, v=v: position(t, v), t)
-            time, v = time + t, e * after
-        return float(time + 2 * v / (g * (1 - e)))
-
-
-@pytest.mark.parametrize("damping", [0.0, 0.05, 0.4])
-def test_an_oscillator_pressed_against_its_stop_rests_within_its_bracket(damping):
-    body = dynamics.ImpactOscillator(0.8, 0.7, damping_ratio=damping, stop=-0.2)
-    found = dynamics.simulate(body, None, initial_velocity=0.3)
-    expected = rest_by_following(body, 0.0, 0.3)
-    (sequence,) = found.chattering
-    assert sequence["lower"] - 1e-15 <= expected <= sequence["upper"] + 1e-15
-    assert sequence["upper"] - sequence["lower"] < 2e-12
-    assert found.events["time"][-1] == pytest.approx(expected, abs=1e-12)
 
 
 def test_a_body_rests_at_the_stop_where_it_came_to_rest():
@@ -282,32 +244,6 @@ def test_positions_are_right_between_the_proof_and_the_rest():
         time += flight
         judged += time > found.impacts["time"][-1]
     assert judged > 40
-
-
-@pytest.mark.thorough
-def test_a_study_of_oscillators_is_taken_up_again_by_another_program(tmp_path):
-    bodies = dynamics.LinearBodies([dynamics.ImpactOscillator(1.0, e, stop=-0.01) for e in (0.3, 0.6, 0.9)])
-    motion = rocking.pulses.one_sine(15.0, 2.0)
-    study = rocking.study(tmp_path / "study", bodies, motion, model="linear", levels=[0.5, 1.0])
-    study.run(threads=1)
-    command = (
-        "import sys, rocking; study = rocking.study(sys.argv[1]);"
-        "print(study.product.bodies[1], study.results().peak_rotation.values.tolist())"
-    )
-    told = subprocess.run(
-        [sys.executable, "-c", command, str(tmp_path / "study")], capture_output=True, text=True, check=True
-    ).stdout
-    expected = rocking.simulate_many(bodies, motion, model="linear", levels=[0.5, 1.0]).peak_rotation.values
-    assert told == f"{bodies[1]} {expected.tolist()}\n"
-    assert expected.min() < expected.max()
-
-
-@pytest.mark.parametrize("body", [dynamics.BouncingBall(0.5), dynamics.ImpactOscillator(1.0, 0.5, stop=-0.1)], ids=repr)
-def test_what_cannot_overturn_is_not_said_to_rock(body):
-    motion = pulses.sine(15.0, 2.0, cycles=4)
-    assert "comes to rest in 5 of 5 motions" in dynamics.simulate(body, motion).summary()
-    assert "still moving at" in dynamics.simulate(body, motion, duration=1.9).summary()
-    assert "does not move" in dynamics.simulate(body, motion.scaled(1e-3)).summary()
 
 
 @pytest.mark.parametrize("restitution", [0.0, 1e-200, 1e-100])

@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 from numpy.random import default_rng
-from scipy.integrate import solve_ivp
 
 from rocking import Block, InvalidMotion, InvalidOption, dynamics, pulses
 from rocking.dynamics import basin_grid
@@ -86,88 +85,6 @@ def test_a_state_goes_where_plain_iteration_takes_it(seeds, cells):
     judged, wrong, ambiguous = found.sum(axis=0)
     assert judged > 0.7 * cells**2 * len(seeds)
     assert wrong == ambiguous <= judged / 1000
-
-
-def arc(block, push, side, span, start):
-    """Time and state at the end of an arc of the nonlinear block by DOP853, and which event ended it: 0, 1 or None."""
-    p, alpha, g = block.p, block.alpha, block.gravity
-
-    def rates(t, y):
-        lean = alpha - side * y[0]
-        return [y[1], -p * p * (side * math.sin(lean) + push(t) / g * math.cos(lean))]
-
-    def impact(t, y):
-        return side * y[0]
-
-    def over(t, y):
-        return abs(y[0]) - 0.5 * math.pi
-
-    impact.terminal, impact.direction, over.terminal = True, -1, True
-    found = solve_ivp(rates, span, start, "DOP853", rtol=1e-11, atol=1e-13, events=[impact, over])
-    return found.t[-1], found.y[:, -1], next((k for k in (0, 1) if len(found.t_events[k])), None)
-
-
-def integrated(block, push, period, state, periods, orbits):
-    """What becomes of a state: the sign of the side it overturns to, 2 + the number of an orbit, or None.
-
-    It has reached an orbit, given by its points, when it is within 1e-5 of one of them at the start of a period.
-    """
-    time, at, side = 0.0, np.array(state), math.copysign(1.0, state[0] or state[1])
-    for n in range(1, periods + 1):
-        while time < n * period:
-            time, at, event = arc(block, push, side, (time, n * period), at)
-            if event == 1:
-                return int(side)
-            if event == 0:
-                at, side = np.array([0.0, block.restitution * at[1]]), -side
-                if abs(at[1]) < 1e-4:
-                    return None
-        for k, orbit in enumerate(orbits):
-            if np.abs(orbit - at).max(axis=1).min() < 1e-5:
-                return k + 2
-    return None
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize(
-    "count",
-    [2, pytest.param(5, marks=pytest.mark.thorough), *(pytest.param(n, marks=pytest.mark.slow) for n in (40, 100))],
-)
-def test_cells_drawn_at_random_go_where_an_integration_by_scipy_goes(count):
-    block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.8)
-    shaking = pulses.sine(2.4, 1.2, cycles=1)
-    x, v = np.linspace(-0.2, 0.2, 400), np.linspace(-0.4, 0.4, 400)
-    rng = default_rng(7)
-    strobe = dynamics.stroboscopic_map(block, shaking)
-    known = dynamics.basins(block, shaking, x[::40], v[::40])
-    orbits = [
-        np.stack([known.orbit_coordinate.values[k], known.orbit_velocity.values[k]], axis=-1)
-        for k in range(known.sizes["attractor"])
-        if known.period.values[k] > 0
-    ]
-    orbits = [orbit[np.isfinite(orbit[:, 0])] for orbit in orbits]
-    assert [len(orbit) for orbit in orbits] == [1, 3]
-
-    def push(time):
-        return 2.4 * math.sin(2.0 * math.pi * 1.2 * time)
-
-    judged = ambiguous = 0
-    for position, velocity in zip(rng.choice(x, count), rng.choice(v, count), strict=True):
-        cell = dynamics.basins(block, shaking, [position], [velocity])
-        name = str(cell.attractor.values[int(cell.outcome.values[0, 0])])
-        wanted = {
-            "overturns to side +": 1,
-            "overturns to side -": -1,
-            "period 1, 2 impacts": 2,
-            "period 3, 2 impacts": 3,
-        }
-        found = integrated(block, push, 1.0 / 1.2, (position, velocity), 200, orbits)
-        if found != wanted[name]:  # then a change by 1e-9 decides
-            near = np.array([position, velocity]) + 1e-9 * rng.normal(size=(60, 2))
-            assert len(set(strobe.followed(near, 200)[1].tolist())) > 1
-            ambiguous += 1
-        judged += 1
-    assert judged == count and ambiguous <= count / 50
 
 
 @pytest.mark.thorough

@@ -68,38 +68,6 @@ def test_an_orbit_that_comes_to_touch_its_stop_once_more_ends_at_grazing(step):
     assert np.max(np.abs(end.orbit.multipliers)) > 2.0  # none is near 1
 
 
-@pytest.mark.slow
-def test_a_mass_that_just_touches_its_stop_does_not_double_its_period_there():
-    """Without impacts its multipliers are exp(+-2 pi i/2.2) up to the touch; a trial point beyond it counted as one."""
-
-    def family(amplitude):
-        return oscillator(0.3), pulses.sine(amplitude, 1.1 / math.pi, cycles=1)
-
-    (orbit,) = (each for each in dynamics.periodic_orbits(*family(1.0), starts=16) if each.impacts == 0.0)
-    branch = dynamics.continue_orbit(orbit, family, 1.0, (-3.0, 5.0), step=0.2)
-    assert [each.kind for each in branch.bifurcations] == ["grazing", "grazing"]
-    assert [each.value for each in branch.bifurcations] == pytest.approx([-1.152, 1.152], abs=1e-9)
-
-
-@pytest.mark.slow
-def test_long_steps_do_not_lead_from_one_branch_to_another():
-    """Over a wide range a step is as long as two orbits of this block are apart; it was said to cross a branch."""
-    block = Block.from_parameters(p=1.65, alpha=0.292, restitution=0.901)
-
-    def family(amplitude):
-        return block, pulses.sine(amplitude, 2.91, cycles=1)
-
-    found = dynamics.periodic_orbits(*family(2.02), starts=64)
-    stable = next(each for each in found if each.is_stable and each.impacts)
-    branch = dynamics.continue_orbit(stable, family, 2.02, (0.001, 30.0), step=0.1)
-    assert branch.ends == ("grazing", "limit of the parameter")
-    assert [each.kind for each in branch.bifurcations] == ["grazing", "fold"]
-    (fold,) = (each.value for each in branch.bifurcations if each.kind == "fold")
-    beyond = np.argmin(branch.values)  # on one side of the fold every orbit is stable, on the other none
-    assert not branch.is_stable[: beyond - 1].any() and branch.is_stable[beyond + 1 :].all()
-    assert branch.values.min() >= fold and len(branch) >= 20
-
-
 @pytest.mark.thorough
 def test_a_flip_is_a_branch_point_where_the_motion_is_given_twice():
     """Orbits of twice the sine's period have that of the motion: they cross the branch that goes on.
@@ -110,18 +78,6 @@ def test_a_flip_is_a_branch_point_where_the_motion_is_given_twice():
     (crossing,) = branch.bifurcations
     assert crossing.kind == "branch point" and crossing.value == pytest.approx(EXACT.flip, abs=4e-9)
     assert np.array_equal(branch.is_stable, branch.values < EXACT.flip)
-
-
-@pytest.mark.slow
-def test_a_branch_that_comes_back_is_followed_round_once():
-    """Where the level has a maximum, the two orbits meet at a fold on either side of it."""
-    branch = branch_of(lambda q: table(EXACT.fold + 0.09 - q * q), 0.1, (-0.6, 0.6))
-    assert branch.ends == ("where it began", "where it began")
-    assert sorted(each.value for each in branch.bifurcations) == pytest.approx([-0.3, 0.3], abs=1e-10)
-    assert {each.kind for each in branch.bifurcations} == {"fold"}
-    signs = np.sign(np.diff(branch.values))
-    assert np.sum(signs[1:] != signs[:-1]) in (2, 3)
-    assert np.abs(branch.values).max() == pytest.approx(0.3, abs=0.01) and np.any(branch.is_stable)
 
 
 @pytest.mark.thorough
@@ -140,36 +96,6 @@ def test_where_an_impact_vanishes_is_extrapolated_from_orbits_that_have_it():
     exact = 0.1 * (9.0 + 4.0 * math.pi**2)
     assert end.value == pytest.approx(exact, abs=1e-8)
     assert end.bracket[0] - 1e-8 < exact < end.bracket[1] + 1e-8
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("limits", [(16.0, 16.1), pytest.param((16.0, 16.2), marks=pytest.mark.thorough)])
-def test_an_orbit_whose_slowest_impact_is_always_slow_does_not_end_before_that_vanishes(limits):
-    """Of seven impacts in a period the last leave little; two ranges, whose steps differ, lead to one end."""
-
-    def family(amplitude):
-        return BALL, pulses.sine(amplitude, TABLE, cycles=1)
-
-    found = dynamics.periodic_orbits(*family(16.0), starts=[[0.01063715, 0.12317385]])
-    (orbit,) = (each for each in found if each.impacts == 7.0)
-    assert orbit.response.impacts["speed_before"].min() < 2e-3 * G / TABLE
-    branch = dynamics.continue_orbit(orbit, family, 16.0, limits, step=0.2)
-    assert branch.ends == ("limit of the parameter", "grazing")
-    (end,) = branch.bifurcations
-    assert end.value == pytest.approx(16.0930799, abs=1e-6)
-    judged = 0
-    for value, state in zip(branch.values, branch.states, strict=True):
-        strobe = dynamics.stroboscopic_map(*family(value))
-        after, _, impacts = strobe.followed(state)
-        assert after == pytest.approx(state, abs=1e-9) and impacts == 7
-        judged += value > 16.05
-    assert judged >= 5 and branch.values.max() < end.value
-    # The slowest speed is nearly a straight line in the parameter: its last two values say where it vanishes.
-    (less, more), speeds = (
-        branch.values[-2:],
-        [branch.orbit(k).response.impacts["speed_before"].min() for k in (-2, -1)],
-    )
-    assert more + (more - less) * speeds[1] / (speeds[0] - speeds[1]) == pytest.approx(end.value, abs=2e-4)
 
 
 @pytest.mark.thorough
@@ -193,61 +119,10 @@ def test_a_branch_reaches_limits_beyond_which_there_is_no_body():
         assert branch.multipliers[k].sum().real == pytest.approx(ball.trace(level, stable=True), abs=1e-9)
 
 
-@pytest.mark.thorough
-@pytest.mark.parametrize(
-    ("limits", "step"),
-    [
-        ((12.0, 13.0), 0.5),
-        pytest.param((12.0, 13.0), 0.1, marks=pytest.mark.thorough),
-        pytest.param((11.0, 12.0), 0.1, marks=pytest.mark.thorough),
-    ],
-)
-def test_an_orbit_at_a_limit_of_the_parameter_is_written_once(limits, step):
-    def family(amplitude):
-        return BALL, pulses.sine(amplitude, TABLE, cycles=1)
-
-    found = dynamics.periodic_orbits(*family(12.0), starts=64)
-    start = next(each for each in found if each.is_stable and each.impacts == 1.0)
-    branch = dynamics.continue_orbit(start, family, 12.0, limits, step=step)
-    assert branch.ends == ("limit of the parameter", "limit of the parameter")
-    assert (branch.values[0], branch.values[-1]) == limits
-    assert np.all(np.diff(branch.values) > 1e-6)
-
-
-@pytest.mark.slow
-def test_two_orbits_near_each_other_are_not_where_the_branch_began():
-    """Beyond a fold the branch comes back to the same values, near its first point but the other way."""
-    branch = branch_of(table, EXACT.fold + 0.01, (1.0, 1.6))
-    assert branch.ends == ("limit of the parameter", "limit of the parameter")
-    assert [each.kind for each in branch.bifurcations].count("fold") == 1
-
-
 def test_no_more_points_than_asked_for():
     start = next(each for each in dynamics.periodic_orbits(*table(1.2), starts=64) if each.is_stable)
     branch = dynamics.continue_orbit(start, table, 1.2, (1.0, 1.6), most=4)
     assert len(branch) == 7 and branch.ends == ("too many points", "too many points")
-
-
-@pytest.mark.slow
-def test_a_branch_is_lost_where_the_family_has_no_body():
-    branch = branch_of(
-        lambda e: (dynamics.BouncingBall(e, gravity=G), pulses.sine(0.4 * G, TABLE, cycles=1)), 0.85, (0.7, 1.2)
-    )
-    assert branch.ends == ("lost", "lost") and 1.0 - 1e-6 < branch.values.max() <= 1.0
-    # Both orbits go there from where 0.4 is the level of the fold.
-    (fold,) = branch.bifurcations
-    assert closed_orbits.Ball(fold.value, 1).fold == pytest.approx(0.4, abs=1e-10)
-
-
-@pytest.mark.thorough
-def test_a_ball_that_never_moves_does_not_graze_where_the_family_has_no_body():
-    def family(e):
-        return dynamics.BouncingBall(e, gravity=G), pulses.sine(5.0, TABLE, cycles=1)
-
-    (rests,) = dynamics.periodic_orbits(*family(0.5), starts=[[0.0, 0.0]])
-    branch = dynamics.continue_orbit(rests, family, 0.5, (0.3, 1.5))
-    assert branch.ends == ("limit of the parameter", "lost") and branch.bifurcations == ()
-    assert 1.0 - 1e-6 < branch.values.max() <= 1.0
 
 
 def test_a_branch_beyond_which_nothing_can_be_followed_is_lost_and_does_not_overturn():

@@ -1,20 +1,15 @@
 """Periodic orbits and branches of them, against closed forms, 40 digits, and independent simulations."""
 
 import functools
-import json
 import math
 import tracemalloc
 
-import mpmath as mp
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
-from oracles import closed_orbits, exact_arcs
+from oracles import closed_orbits
 
-from rocking import Block, InvalidMotion, InvalidOption, Motion, dynamics, pulses, records
+from rocking import Block, InvalidMotion, InvalidOption, dynamics, pulses, records
 from rocking.chattering import critical_amplitude
-from rocking.dynamics.orbits import sizes_of
-from rocking.dynamics.repeated import scale_of
 from rocking.dynamics.symmetry import distances
 
 G = 10.0
@@ -59,29 +54,6 @@ def test_every_orbit_comes_back_and_none_is_there_twice(found):
                 if one.period == other.period:
                     assert all(np.max(np.abs(state - one.state)) > 1e-9 for state in other.states)
     assert judged >= 30
-
-
-@pytest.mark.slow
-def test_multipliers_and_impacts_are_those_of_forty_digits(found):
-    judged = 0
-    for name, orbits in found.items():
-        if name == "nonlinear block":
-            continue
-        body, motion, _ = CASES[name]
-        is_block = isinstance(body, Block)
-        law = (2.0, 0.2, 0.8) if is_block else (body.law, body.restitution)
-        gravity = body.gravity if is_block else None
-        sine = exact_arcs.Sine(*motion)
-        for orbit in [each for each in orbits if not each.rests and abs(each.multipliers[0]) < 30.0][:3]:
-            end, impacts = exact_arcs.followed(law, sine, orbit.state, orbit.period, gravity)
-            assert [float(each) for each in end] == pytest.approx(orbit.state, abs=1e-12)
-            assert impacts == orbit.impacts
-            change = exact_arcs.derivative(law, sine, orbit.state, orbit.period, gravity)
-            total, product = change[0, 0] + change[1, 1], mp.det(change)
-            assert complex(orbit.multipliers.sum()) == pytest.approx(float(total), rel=1e-10, abs=1e-10)
-            assert complex(orbit.multipliers.prod()) == pytest.approx(float(product), rel=1e-9, abs=1e-12)
-            judged += 1
-    assert judged >= 10
 
 
 def test_areas_shrink_by_restitution_and_damping_alone(found):
@@ -274,26 +246,6 @@ def test_a_linear_block_that_hits_once_every_half_period_loses_stability_where_h
     assert judged == 2
 
 
-@pytest.mark.slow
-def test_symmetric_orbits_do_not_hang_on_where_a_motion_has_its_breakpoints():
-    """Those that lie on a straight line change nothing, also where half a period after one there is none."""
-    block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.85)
-    corners, heights = [0.0, 0.25, 0.5, 0.75, 1.0], [0.0, 1.0, 0.0, -1.0, 0.0]
-    times = np.sort([*corners, 0.02, 0.05, 0.09, 0.12, 0.16, 0.2, 0.3, 0.34, 0.37, 0.42, 0.46])
-    unit = np.interp(times, corners, heights)
-
-    def family(amplitude):
-        return block, Motion.from_points(times, amplitude * unit)
-
-    found = dynamics.periodic_orbits(*family(6.0), model="linear", starts=48)
-    orbit = next(each for each in found if each.symmetric and each.impacts)
-    branch = dynamics.continue_orbit(orbit, family, 6.0, (5.4, 7.2)).to_dataframe()
-    assert len(branch) > 8
-    for value, *state in branch.iloc[:, :3].to_numpy():
-        after = dynamics.stroboscopic_map(*family(value), model="linear")(state)
-        assert after == pytest.approx(state, abs=1e-8)
-
-
 def test_grazing_is_found_from_both_sides():
     """The linear response touches the stop at a known amplitude; orbits with an impact begin there, too."""
     body = dynamics.ImpactOscillator(1.0, 0.8, damping_ratio=0.05, stop=0.01)
@@ -315,21 +267,6 @@ def test_grazing_is_found_from_both_sides():
             assert "grazing" in branch.ends
             judged += 1
     assert judged == 2
-
-
-@pytest.mark.slow
-def test_orbits_with_an_impact_more_begin_where_those_with_one_less_end():
-    family = table_of(dynamics.BouncingBall(0.5, gravity=G))
-    found = {}
-    for orbit in dynamics.periodic_orbits(*family(1.6)):
-        if orbit.impacts in (1.0, 2.0) and orbit.multipliers[0].real > 0.0:
-            branch = dynamics.continue_orbit(orbit, family, 1.6, (1.0, 3.0))
-            found[orbit.impacts] = [(each.kind, each.value) for each in branch.bifurcations]
-    # A multiplier changes its sign through infinity there: no bifurcation of another name is found.
-    assert sorted(kind for kind, _ in found[1.0]) == ["flip", "fold", "grazing"]
-    assert sorted(kind for kind, _ in found[2.0]) == ["flip", "fold", "grazing", "grazing"]
-    once, twice = (max(value for kind, value in found[k] if kind == "grazing") for k in (1.0, 2.0))
-    assert once == pytest.approx(twice, abs=1e-9)
 
 
 @pytest.mark.slow
@@ -404,32 +341,6 @@ def test_points_of_a_branch_are_orbits_and_stability_changes_at_its_bifurcations
         branch.orbit(len(branch))
 
 
-@pytest.mark.thorough
-def test_results_are_written_and_drawn(branch, tmp_path):
-    orbit = branch.orbit(3)
-    for found in (orbit, branch):
-        for table in found.TABLES:
-            found.to_csv(tmp_path / "table.csv", table)
-            rows = (tmp_path / "table.csv").read_text().splitlines()
-            assert len(rows) == len(found.to_dataframe(table)) + 1 > 1
-        found.to_json(tmp_path / "result.json")
-        assert json.loads((tmp_path / "result.json").read_text())["period"] == 1
-        figure = Figure()
-        ax, other = figure.subplots(1, 2)
-        assert found.plot(ax) is figure and ax.has_data() and not other.has_data()
-        assert found.plot(figsize=(3.4, 2.7)).get_size_inches().tolist() == [3.4, 2.7]
-        assert repr(found).startswith(f"<{type(found).__name__}: ")
-        assert found.summary()
-    # A figure goes through the state at the start of every period, and as finely in a long orbit as in a short one.
-    times = orbit.to_dataframe("histories")["time_s"].to_numpy()
-    assert np.max(np.diff(times)) == pytest.approx(orbit.duration / orbit.period / 400.0, rel=1e-12)
-    drawn = {line.get_label(): line for line in branch.plot().axes[0].lines}
-    assert drawn.keys() == {"stable", "unstable", "fold", "flip"}
-    assert len({drawn[kind].get_marker() for kind in ("fold", "flip")}) == 2
-    header = branch.to_dataframe("points").columns.tolist()
-    assert header[:4] == ["level", "position_m", "velocity_m_s", "peak_m"]
-
-
 def test_an_orbit_near_which_nothing_grows_or_shrinks_is_neutral():
     """Without damping and impacts the multipliers of the forced motion are exp(+-2 pi i/1.3)."""
     oscillator = dynamics.ImpactOscillator(1.0, 0.8, stop=1.0)
@@ -463,14 +374,6 @@ def test_orbits_of_a_ball_that_loses_nothing_are_never_stable():
         assert orbit.multipliers[0].imag != 0.0
         assert np.abs(orbit.multipliers) == pytest.approx([1.0, 1.0], abs=1e-9)
         assert not orbit.is_stable and "neutral" in orbit.summary()
-
-
-@pytest.mark.parametrize("off", [1e-9, 3e-8])
-def test_a_double_multiplier_of_one_is_neutral_however_rounding_parts_it(off):
-    pair = np.array([[1.0 + off, 1.0 / (1.0 + off)], [0.5, 0.4], [1.0 + 1e-8, 0.25], [1.0 - 1e-8, 0.25]], dtype=complex)
-    sizes = sizes_of(pair)
-    assert np.array_equal(sizes[0], [1.0, 1.0])
-    assert np.array_equal(sizes[1:], np.abs(pair[1:]))  # what loses area is told as it is
 
 
 @pytest.mark.thorough
@@ -525,35 +428,6 @@ def test_a_branch_is_refused_in_one_sentence(branch, changes, words):
     with pytest.raises(InvalidOption, match=words) as caught:
         dynamics.continue_orbit(orbit, family, given.pop("value"), given.pop("limits"), **given)
     assert "\n" not in str(caught.value)
-
-
-@pytest.mark.thorough
-def test_long_orbits_in_chaos_come_back_or_are_left_out():
-    ball, table = dynamics.BouncingBall(0.8, gravity=10.0), pulses.sine(40.0, 5.0, cycles=1)
-    strobe = dynamics.stroboscopic_map(ball, table)
-    orbits = dynamics.periodic_orbits(ball, table, period=16, starts=60)
-    away = [np.max(np.abs(strobe(each.state, each.period) - each.state) / scale_of(strobe)) for each in orbits]
-    assert len(orbits) > 5 and max(away) < 1e-5
-
-
-@pytest.mark.thorough
-def test_a_family_that_loses_its_mirror_image_is_followed_as_orbits():
-    block, times = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9), np.linspace(0.0, 1.0 / 1.2, 401)
-
-    def family(second):
-        wave = 3.5 * np.sin(2.4 * np.pi * times) + second * np.cos(4.8 * np.pi * times)
-        return block, Motion.from_samples(wave, times[1])
-
-    (symmetric, *_) = (
-        each for each in dynamics.periodic_orbits(*family(0.0), starts=100) if each.symmetric and not each.rests
-    )
-    branch = dynamics.continue_orbit(symmetric, family, 0.0, (-0.1, 0.1))
-    away = []
-    for value, state in zip(branch.values, branch.states, strict=True):
-        strobe = dynamics.stroboscopic_map(*family(float(value)))
-        away.append(np.max(np.abs(strobe(state, symmetric.period) - state)))
-    assert len(away) > 5 and max(away) < 1e-9
-    assert (branch.values.min(), branch.values.max()) == (-0.1, 0.1)
 
 
 def test_distances_in_a_period_are_those_of_all_pairs() -> None:

@@ -148,38 +148,6 @@ def test_beyond_that_boundary_attractors_come_in_a_cascade_with_one_impact_more_
     assert impacts == list(range(10, 22))
 
 
-@pytest.mark.parametrize(
-    ("frequency", "tilted"),
-    [pytest.param(1.6, 1.0, marks=pytest.mark.slow), pytest.param(2.5, -1.0, marks=pytest.mark.slow)],
-)
-def test_speeds_of_orbits_with_one_impact_are_half_an_ellipse_over_the_place_of_the_stop(frequency, tilted):
-    """As F. Dux found (1992): centred on the origin, and tilted to one side below the frequency 2, to the other above.
-
-    The lower branch is unstable, and meets the upper one, which is stable there, in a fold.
-    """
-    exact = closed_orbits.Oscillator(UNIT, 0.8, 0.0, 1.0, frequency * UNIT)
-
-    motion = forcing(frequency)
-
-    def family(sigma):
-        return oscillator(0.8, sigma), motion
-
-    (orbit,) = (each for each in dynamics.periodic_orbits(*family(0.0)) if each.impacts == 1.0)
-    branch = dynamics.continue_orbit(orbit, family, 0.0, (-5.0, 5.0), step=0.3)
-    chosen = np.arange(0, len(branch), 2)
-    speeds = np.array([branch.orbit(k).response.impacts["speed_after"][0] for k in chosen])
-    places, share = branch.values[chosen], speeds / exact.beta
-    ellipse = ((places + share) ** 2 + (exact.gamma * share) ** 2) * (1.0 - frequency**2) ** 2
-    assert len(chosen) >= 15 and ellipse == pytest.approx(1.0, abs=1e-9)
-    (fold,) = (each for each in branch.bifurcations if each.kind == "fold")
-    assert fold.value == pytest.approx(tilted * math.hypot(1.0, 1.0 / exact.gamma) / abs(1.0 - frequency**2), rel=1e-9)
-    # Away from the fold, the upper branch has the higher speed at the same place of the stop.
-    beyond = (tilted * places > 0.6 * abs(fold.value)) & (tilted * places < 0.99 * abs(fold.value))
-    lower = speeds < fold.orbit.response.impacts["speed_after"][0] * places / fold.value
-    assert np.sum(beyond & lower) >= 3 and np.sum(beyond & ~lower) >= 3
-    assert np.array_equal(branch.is_stable[chosen][beyond], ~lower[beyond])
-
-
 # --- Hogan's orbits of a slender block --------------------------------------------------------------------------
 
 P, ALPHA = 1.0, 0.1

@@ -1,7 +1,5 @@
 """Ensembles: the same answers as one simulation at a time, in every dimension of the product."""
 
-import os
-import signal
 import subprocess
 import sys
 import threading
@@ -25,8 +23,6 @@ from rocking import (
 )
 from rocking.threads import Cancellation
 
-ULP = 2.0**-52
-
 
 @pytest.fixture(scope="module")
 def records():
@@ -40,66 +36,6 @@ def random_blocks(count, seed, *, two_sided=False):
     return Blocks(
         p=rng.uniform(1.0, 7.0, shape), alpha=rng.uniform(0.06, 0.4, shape), restitution=rng.uniform(0.7, 0.98, shape)
     )
-
-
-def is_known(response, model, block, motion):
-    """Whether one ulp of the motion leaves this response alone (the tolerance of agreement presumes it)."""
-    if response.ambiguous:
-        return False
-    nudged = simulate(block, motion.scaled(1.0 + ULP), model=model)
-    change = abs(nudged.peak_rotation - response.peak_rotation)
-    return nudged.overturned == response.overturned and change <= 1e-10 * response.peak_rotation
-
-
-def disagreements(blocks, motions, model, pairs):
-    """Pairs (motion, block) in which ensemble and single simulation differ though the response is known.
-
-    At least nine of ten pairs agree or are known, and at least half of all blocks lift off.
-    """
-    result = simulate_many(blocks, motions, model=model)
-    found, unknown, lifted = [], 0, 0
-    for m, b in pairs:
-        response, cell = simulate(blocks[b], motions[m], model=model), result.isel(motion=m, block=b)
-        rests = int(np.sum(response.events["kind"] == "rest"))
-        uplifts = int(np.sum(response.events["kind"] == "uplift"))
-        lifted += uplifts > 0
-        same = (
-            response.overturned == bool(cell.overturned)
-            and (uplifts, rests) == (int(cell.uplifts), int(cell.rests))
-            and abs(response.peak_rotation - float(cell.peak_rotation)) <= 1e-9 * response.peak_rotation
-        )
-        if not same and is_known(response, model, blocks[b], motions[m]):
-            found.append((m, b, response.peak_rotation, float(cell.peak_rotation)))
-        elif not same:
-            unknown += 1
-    assert unknown <= 0.1 * len(pairs)
-    assert lifted >= 0.5 * len(pairs)
-    return found
-
-
-@pytest.mark.parametrize("model", ["linear", "nonlinear"])
-@pytest.mark.parametrize("two_sided", [False, True])
-def test_lanes_agree_with_single_simulations(records, model, two_sided):
-    blocks = random_blocks(40, 1, two_sided=two_sided)
-    pairs = [(m, b) for m in range(len(records)) for b in range(0, 40, 2)]
-    assert disagreements(blocks, records, model, pairs) == []
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("model", ["linear", "nonlinear"])
-def test_lanes_agree_on_two_thousand_pairs(records, model):
-    blocks = random_blocks(700, 2, two_sided=True)
-    rng = np.random.default_rng(3)
-    pairs = list(zip(rng.integers(0, 3, 2000).tolist(), rng.integers(0, 700, 2000).tolist(), strict=True))
-    assert disagreements(blocks, records, model, pairs) == []
-
-
-@pytest.mark.parametrize("model", ["linear", "nonlinear"])
-def test_pulses_agree_with_single_simulations(model):
-    motions = [rocking.pulses.one_sine(3.0, 0.8), rocking.pulses.ricker(4.0, 1.2), rocking.pulses.rectangular(3.0, 0.4)]
-    blocks = random_blocks(30, 4)
-    pairs = [(m, b) for m in range(3) for b in range(30)]
-    assert disagreements(blocks, motions, model, pairs) == []
 
 
 def test_counts_and_times_are_those_of_the_response(records):
@@ -131,19 +67,6 @@ def test_times_of_uplift_and_rest_are_those_of_the_response(records):
     assert rested >= 4
 
 
-def test_reversing_the_motion_mirrors_the_blocks(records):
-    blocks = random_blocks(70, 6, two_sided=True)
-    mirrored = Blocks(blocks.p[:, ::-1], blocks.alpha[:, ::-1], blocks.restitution[:, ::-1])
-    both = simulate_many(blocks, records[0], polarity="both")
-    assert list(both.polarity.values) == ["+", "-"]
-    flipped = simulate_many(mirrored, records[0])
-    assert np.array_equal(both.peak_rotation.sel(polarity="-").values, flipped.peak_rotation.values)
-    assert np.array_equal(
-        both.peak_rotation.sel(polarity="-").values,
-        simulate_many(blocks, records[0], polarity="-").peak_rotation.values,
-    )
-
-
 def test_scales_are_those_of_the_motion(records):
     blocks = random_blocks(10, 7)
     for measure, values in (
@@ -159,12 +82,6 @@ def test_scales_are_those_of_the_motion(records):
             scaled = records[m].scaled_to(values[s], measure)
             alone = simulate_many(blocks, scaled)
             assert np.array_equal(result.peak_rotation[m, s], alone.peak_rotation[0])
-
-
-def test_threads_do_not_change_the_answers(records):
-    blocks = random_blocks(1300, 8)
-    one, many = (simulate_many(blocks, records[1], model="linear", threads=n) for n in (1, 3))
-    assert one.equals(many)
 
 
 def test_a_stop_inside_a_sample_is_kept_to(records):
@@ -235,50 +152,6 @@ def test_nothing_to_simulate_is_refused(records):
         simulate_many([], records[0])
     with pytest.raises(InvalidOption, match="give duration to say when to stop"):
         simulate_many(Blocks(p=[1.0, 2.0], alpha=0.1, restitution=[0.9, 1.0]), records[0])
-
-
-LONG = """
-import signal, numpy as np, rocking
-from rocking import engine
-signal.signal(signal.SIGINT, signal.default_int_handler)  # what runs in the background may have none
-simulate_task, begun = engine.simulate_task, []
-
-def noted(setup, task, cancelled):
-    begun.append(cancelled.asked)
-    if len(begun) == 4:
-        print("begun", flush=True)
-    return simulate_task(setup, task, cancelled)
-
-engine.simulate_task = noted
-blocks = rocking.Blocks(p=np.linspace(1, 6, 20_000), alpha=0.2, restitution=0.9)
-motion = rocking.records.load("ridgecrest-tow2-090")
-try:
-    rocking.simulate_many(blocks, motion, levels=np.linspace(0.5, 3.0, 300), threads=2)  # minutes
-except KeyboardInterrupt:
-    print(len(begun), sum(begun), 300 * len([*engine.parts_of(len(blocks), motion)]), flush=True)
-    raise
-"""
-
-
-@pytest.mark.thorough  # `test_ends.py` interrupts another one
-@pytest.mark.skipif(os.name == "nt", reason="signals are sent the POSIX way")
-def test_an_interrupt_returns_at_once(records):
-    """As the tasks count that are begun after it, however slow the machine is."""
-    simulate_many(
-        Block(half_width=0.2, half_height=1.0), records[2]
-    )  # so that the other process finds the kernels compiled
-    command = [sys.executable, "-c", LONG]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        try:
-            assert process.stdout.readline() == "begun\n"
-            process.send_signal(signal.SIGINT)
-            out, err = process.communicate()
-        finally:
-            process.kill()
-    assert "KeyboardInterrupt" in err
-    begun, late, tasks = map(int, out.split())
-    assert begun < tasks
-    assert late <= 2  # one for each thread, on its way when the interrupt came
 
 
 def test_an_interrupt_reaches_the_tasks_in_hand(monkeypatch):

@@ -1,20 +1,10 @@
-"""Whatever bytes a record file holds, the readers answer with channels or with one sentence, quickly.
+"""Whatever bytes a record file holds, the readers answer with channels or with one sentence, quickly."""
 
-A short version runs in the suite. The long one is a program:
-
-    python tests/test_formats_fuzz.py --inputs 1000000
-"""
-
-import argparse
 import functools
 import itertools
-import random
 import re
-import resource
 import sys
 import time
-import traceback
-import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -27,7 +17,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 from oracles import record_files as written
 
 from rocking.errors import RockingError
-from rocking.motion.formats import channels, identify, read, source, through_obspy
+from rocking.motion.formats import channels, identify, read
 
 RECORDS = Path(__file__).resolve().parents[2] / "shared" / "records"
 
@@ -264,49 +254,3 @@ def test_time_grows_no_faster_than_the_file(place: Path) -> None:
             start = time.process_time()
             attempt(place, {"units": "g", "dt": 0.01})
             assert time.process_time() - start < 5.0, (unit, title)
-
-
-def main() -> int:
-    """Run the long version and print what it did; the number of failures is the exit status."""
-    parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("--inputs", type=int, default=1_000_000)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--seconds", type=float, default=3600.0, help="stop after this time")
-    parser.add_argument("--obspy", action="store_true", help="let ObsPy try what no other reader takes (slow)")
-    parser.add_argument("--keep", type=Path, default=Path("fuzz-failures"), help="folder for inputs that fail")
-    arguments = parser.parse_args()
-    resource.setrlimit(resource.RLIMIT_AS, (4 * 2**30, 4 * 2**30))
-    warnings.simplefilter("error")
-    if not arguments.obspy:
-        through_obspy.installed = lambda: False
-    chance, known = random.Random(arguments.seed), seeds()
-    content, done, accepted, failures = b"", 0, 0, 0
-    # Straight from memory: opening files takes most of the time, and is not what varies.
-    source._content = lambda name: content
-    slowest, begin = 0.0, time.monotonic()
-    while done < arguments.inputs and time.monotonic() - begin < arguments.seconds:
-        operations = [
-            (chance.randrange(len(MUTATIONS)), chance.random(), chance.random(), chance.randrange(10_000))
-            for _ in range(chance.choice((1, 1, 1, 2, 2, 3, 5)))
-        ]
-        content = mutated(chance.choice(known), chance.choice(known), operations)
-        start = time.process_time()
-        try:
-            accepted += attempt(Path("record.dat"), chance.choice(REQUESTS))
-        except Exception:
-            failures += 1
-            arguments.keep.mkdir(exist_ok=True)
-            (arguments.keep / f"{arguments.seed}-{done}.dat").write_bytes(content)
-            traceback.print_exc()
-        slowest = max(slowest, time.process_time() - start)
-        done += 1
-    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    print(
-        f"{done} inputs in {time.monotonic() - begin:.0f} s: {accepted} accepted, {failures} failures; "
-        f"slowest {slowest:.2f} s of processor time, largest memory {memory:.0f} MiB"
-    )
-    return min(failures, 1)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

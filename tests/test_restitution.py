@@ -6,27 +6,20 @@ import math
 import numpy as np
 import pytest
 from kernel_records import rocking_block
-from oracles.restrained import Held, compared
 
 import rocking
 from rocking import (
     Block,
-    Damper,
     FallingRestitution,
     InvalidBlock,
     InvalidOption,
     RandomRestitution,
     RestrainedBlock,
-    Tendon,
-    VelocityThreshold,
     dynamics,
     impact_restitution,
     one_sided_restitution,
 )
-from rocking.block import RestrainedBlocks, housner_restitution
-from rocking.kernels import compiled
-from rocking.kernels import march as march_module
-from rocking.kernels.interpreted import Interpreted
+from rocking.block import housner_restitution
 from rocking.kernels.restitution import factor, uniform
 
 COLUMN = Block(width=0.4, height=2.0, mass=2000.0)
@@ -138,90 +131,7 @@ def test_draws_are_even_between_their_bounds():
     assert abs(np.corrcoef(draws[1:], draws[:-1])[0, 1]) < 0.06
 
 
-# ---- Laws: against an integration ----
-
-
-def drawn(seed, motion_over_threshold=(0.05, 1.2)):
-    """A body with a law, for the package and for the oracle, a motion, a start."""
-    rng = np.random.default_rng(seed)
-    size = 10.0 ** rng.uniform(-0.5, 0.7)
-    distances = tuple((size * rng.uniform(0.1, 0.4, 2)).tolist())
-    height, gyration, mass = size, size * rng.uniform(0.5, 0.9), 1000.0
-    block = Block.from_pivots(distances, height, gyration, mass=mass, gravity=9.81, restitution=0.5)
-    largest = rng.uniform(0.6, 0.95, 2)
-    least = largest * rng.uniform(0.4, 0.99, 2)
-    body = Held(distances, height, gyration, mass, 9.81, (0.0, 0.0), seed % 5 == 0)
-    natural = block.sides[0].p * block.sides[0].alpha
-    if seed % 2:
-        slope = rng.uniform(0.1, 2.0, 2) * (largest - least) / natural
-        law = FallingRestitution(tuple(largest), tuple(slope), tuple(least))
-        body.law = lambda j, speed, _: max(least[j], largest[j] - slope[j] * speed)
-    else:
-        law = RandomRestitution(tuple(least), tuple(largest), seed)
-        body.law = lambda j, _, number: least[j] + (largest[j] - least[j]) * uniform(seed, number)
-    restraints = []
-    if seed % 3 == 0:
-        stiffness, prestress = mass * 9.81 / size * rng.uniform(0.1, 2.0), 0.2 * mass * 9.81
-        body.tendons.append((stiffness, prestress, 0.0))
-        restraints.append(Tendon(stiffness, prestress))
-    if seed % 7 == 0:
-        body.damper = mass * 9.81 * size * 0.01
-        restraints.append(Damper(body.damper))
-    ours = RestrainedBlock(block, *restraints, one_sided=body.one_sided, restitution=law)
-    low, high = motion_over_threshold
-    pga = min(ours.uplift_thresholds()) * 10.0 ** rng.uniform(low, high)
-    motion = rocking.pulses.sine(pga, 10.0 ** rng.uniform(-0.7, 0.5), cycles=3, phase=rng.uniform(0.0, 6.0))
-    return ours, body, motion, 0.3 * min(*ours.balance, 0.5)
-
-
-@pytest.mark.parametrize(
-    ("seeds", "least"), [([8, 13, 35], 12), pytest.param([13, 14, 17, 35], 20, marks=pytest.mark.thorough)]
-)
-def test_impacts_are_those_of_an_integration(seeds, least):
-    assert compared(drawn, seeds)[0] >= least
-
-
-@pytest.mark.slow
-def test_impacts_are_those_of_an_integration_over_wide_ranges():
-    assert compared(drawn, range(120))[0] >= 180
-
-
 # ---- Proofs ----
-
-
-def rests(seeds, model):
-    """Judge cases; returns how many rests without a proof are within a bracket that is wide, and proven narrow ones."""
-    judged = narrow = 0
-    for seed in seeds:
-        ours, _, motion, start = drawn(seed, (-0.4, -0.05))
-        options = {"initial_rotation": start, "model": model}
-        wide = rocking.simulate(ours, motion, chattering=rocking.Certified(10.0 ** -(2 + seed % 4)), **options)
-        if wide.overturned or not len(wide.chattering):
-            continue
-        stepped = rocking.simulate(ours, motion, chattering=VelocityThreshold(1e-13), **options)
-        end = stepped.events["time"][stepped.events["kind"] == "rest"][0]
-        first = wide.chattering[0]
-        assert first["lower"] - 1e-11 <= end <= first["upper"] + 1e-11, seed
-        judged += 1
-        fine = rocking.simulate(ours, motion, **options).chattering[0]
-        assert first["lower"] <= fine["lower"] <= fine["upper"] <= first["upper"], seed
-        narrow += fine["upper"] - fine["lower"] <= 1e-10
-    return judged, narrow
-
-
-@pytest.mark.parametrize("model", ["linear", "nonlinear"])
-@pytest.mark.parametrize("count", [12, pytest.param(40, marks=pytest.mark.thorough)])
-def test_rests_are_within_what_is_proven(model, count):
-    judged, narrow = rests(range(count), model)
-    assert judged >= 0.75 * count
-    assert narrow == judged
-
-
-@pytest.mark.slow
-def test_rests_are_within_what_is_proven_over_wide_ranges():
-    judged, narrow = map(sum, zip(*(rests(range(40, 240), model) for model in ("linear", "nonlinear")), strict=True))
-    assert judged >= 300
-    assert narrow == judged
 
 
 def test_a_restitution_that_may_be_one_on_both_sides_proves_nothing():
@@ -245,41 +155,6 @@ def test_bounds_that_meet_are_a_constant():
 # ---- The same bits, however they are computed ----
 
 
-def test_many_are_those_one_by_one_in_any_order():
-    bodies = [drawn(seed)[0] for seed in range(16)]
-    motions = [rocking.pulses.one_sine(4.0, 1.2), rocking.pulses.one_sine(6.0, 0.8)]
-    found = [rocking.simulate_many(bodies, motions, threads=n) for n in (1, 2)]
-    turned = rocking.simulate_many(bodies[::-1], motions)
-    assert found[0].equals(found[1])
-    many, judged = RestrainedBlocks.of(bodies), 0
-    peaks, backwards = (each["peak_rotation"].values.reshape(2, 16).T for each in (found[0], turned))
-    for k in range(16):
-        for m, motion in enumerate(motions):
-            alone = [rocking.simulate(one, motion).peak_rotation for one in (bodies[k], many[k])]
-            assert {float(peaks[k, m]), float(backwards[15 - k, m])} == set(alone), (k, m)
-            judged += 1
-    assert judged == 32
-    again = RestrainedBlocks(**{name: values for name, (values, _) in many.parameters().items()}, gravity=9.81)
-    records = [each.kernel_records("linear", np.zeros((16, 2))) for each in (again, many)]
-    assert np.array_equal(*records)
-
-
-@pytest.mark.skipif(compiled.UNCOMPILED, reason="nothing is compiled")
-def test_python_reads_the_same_bits(monkeypatch):
-    judged = 0
-    for seed in (13, 14, 17, 28):
-        ours, _, motion, start = drawn(seed)
-        found = []
-        for interpreted in (False, True):
-            monkeypatch.setattr(compiled.Kernel, "is_at_hand", not interpreted)
-            monkeypatch.setattr(march_module, "_interpreted", Interpreted(march_module.march, 10**9))
-            response = rocking.simulate(ours, motion, initial_rotation=start, duration=1.0)
-            found.append(response.impacts.tobytes() + response.chattering.tobytes())
-            judged += len(response.impacts)
-        assert found[0] == found[1], seed
-    assert judged >= 10
-
-
 def test_seeds_make_bodies_that_differ_and_one_seed_the_same():
     made = [RestrainedBlock(COLUMN, restitution=RandomRestitution(0.8, 0.95, seed)) for seed in (1, 1, 2)]
     rates = []
@@ -291,24 +166,6 @@ def test_seeds_make_bodies_that_differ_and_one_seed_the_same():
 
 
 # ---- Derivatives ----
-
-
-def test_derivatives_are_those_of_finite_differences():
-    judged = 0
-    for seed in range(60):
-        ours, _, motion, start = drawn(seed, (0.05, 0.4))
-        found = rocking.simulate(ours, motion, initial_rotation=start, duration=motion.end)
-        late = found.peak_time > found.impacts["time"][0] if len(found.impacts) else False
-        if found.overturned or found.ambiguous or not late or not found.peak_time < 0.99 * motion.end:
-            continue
-        peaks = [
-            rocking.simulate(ours, motion * f, initial_rotation=start, duration=motion.end).peak_rotation
-            for f in (1.0 - 1e-6, 1.0 + 1e-6)
-        ]
-        slope = (peaks[1] - peaks[0]) / 2e-6
-        assert found.sensitivity.peak["motion"][0] == pytest.approx(slope, rel=2e-4, abs=1e-8), seed
-        judged += 1
-    assert judged >= 10
 
 
 def test_maps_of_a_restitution_that_falls_have_the_derivatives_of_finite_differences():

@@ -5,37 +5,19 @@ import json
 import math
 import pickle
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
-from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 
 import rocking
 from rocking import InvalidMotion, InvalidOption, Motion
-from rocking.block import Blocks
-from rocking.chattering.families import SimulationInput
-from rocking.chattering.maps import chattering_map
-from rocking.explorer.inputs import read_case, texts_of
-from rocking.explorer.maps import grid_of, parts
-from rocking.explorer.uploads import UploadStore
-from rocking.kernels import state
-from rocking.kernels.certificate import arc_bounds, bounds_on_motion, prove_rest, side_bounds
 from rocking.motion.description import Origin
 from rocking.motion.exceedance import exceedances, lifting_factors
 from rocking.motion.named import named_motion
 from rocking.plausibility import vertical_notes
-from rocking.problem import ground_of, rules_of
-from rocking.tables import plain
-from rocking.treatment import treatment
 
 G = 9.80665
 MODELS = ("linear", "nonlinear")
-
-quick = settings(deadline=None, max_examples=25)
 
 
 def wave(amplitude: float, seed: int, dt: float = 0.02, count: int = 200) -> Motion:
@@ -65,168 +47,6 @@ def test_a_constant_vertical_acceleration_is_another_gravity(model: str, lift: f
     assert one.impacts["time"] == pytest.approx(two.impacts["time"], rel=1e-11)
     assert one.impacts["speed_before"] == pytest.approx(two.impacts["speed_before"], rel=1e-8)
     assert one.peak_rotation == pytest.approx(two.peak_rotation, rel=1e-10)
-
-
-def integrated(block: rocking.Block, motion: Motion, model: str, end: float) -> tuple[list[float], float, float]:
-    """Times of impacts by DOP853, an event each, restarted at the breakpoints; the rotation at the end and the peak."""
-    alpha, p, e = block.sides[0].alpha, block.p, block.restitution
-
-    def rate(t: float, y: np.ndarray, sign: float, left: float, span: float) -> tuple[float, float]:
-        at = min(max(t, left), left + span)  # within the piece
-        a, w = motion.acceleration(at) / G, 1.0 + motion.vertical.acceleration(at) / G
-        if model == "linear":
-            return y[1], p * p * (w * (y[0] - sign * alpha) - a)
-        return y[1], -p * p * (w * math.sin(sign * alpha - y[0]) + a * math.cos(sign * alpha - y[0]))
-
-    threshold = alpha if model == "linear" else math.tan(alpha)
-
-    def margin(t: Any) -> Any:
-        return threshold * (1.0 + motion.vertical.acceleration(t) / G) - abs(motion.acceleration(t)) / G
-
-    grid = np.linspace(0.0, end, 40001)
-    first = int(np.flatnonzero(margin(grid) < 0.0)[0])
-    t = brentq(margin, grid[first - 1], grid[first], xtol=1e-14)
-    sign = -math.copysign(1.0, motion.acceleration(t))
-    state = np.array([0.0, 0.0])
-    impacts: list[float] = []
-
-    def impact(t: float, y: np.ndarray, sign: float, *_: float) -> float:
-        return sign * y[0]
-
-    def summit(t: float, y: np.ndarray, *_: float) -> float:
-        return y[1]
-
-    impact.terminal, impact.direction = True, -1.0
-    peak = 0.0
-    corners = motion.breakpoints
-    while t < end - 1e-12:
-        k = int(np.searchsorted(corners, t + 1e-12, side="right"))
-        stop = min(end, float(corners[k]) if k < len(corners) else end)
-        found = solve_ivp(
-            rate, (t, stop), state, "DOP853", events=(impact, summit), rtol=1e-12, atol=1e-15,
-            args=(sign, t, stop - t),
-        )  # fmt: skip
-        t, state = float(found.t[-1]), found.y[:, -1]
-        peak = max(peak, abs(float(state[0])), *(abs(float(at[0])) for at in found.y_events[1]))
-        if found.status == 1:
-            impacts.append(t)
-            state = np.array([0.0, e * state[1]])
-            sign = -sign
-    return impacts, float(state[0]), peak
-
-
-@pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.thorough)])
-def test_a_response_agrees_with_another_integrator(model: str, seed: int) -> None:
-    motion = wave(2.5, seed).with_vertical(wave(2.0, seed + 100))
-    block = block_for(2.5, 0.18)
-    response = rocking.simulate(block, motion, model=model, duration=2.5)
-    impacts, rotation, peak = integrated(block, motion, model, 2.5)
-    assert len(response.impacts) == len(impacts) > 0
-    assert response.impacts["time"] == pytest.approx(impacts, abs=1e-8)
-    assert response.rotation(2.5) == pytest.approx(rotation, abs=1e-9)
-    together = rocking.simulate_many(rocking.Blocks.of([block]), motion, model=model, duration=2.5)
-    assert int(together.impacts.item()) == len(impacts)
-    assert together.peak_rotation.item() == pytest.approx(peak, abs=1e-9)
-
-
-def problem_of(block: rocking.Block, motion: Motion, model: str) -> tuple[object, ...]:
-    """Ground, block and rules as kernels take them."""
-    blocks = Blocks.of([block])
-    rules = rules_of(blocks, model, treatment("certified"), None, record=True)
-    return ground_of(motion, block.gravity), blocks.kernel_records(model, np.zeros((1, 2)))[0], rules
-
-
-@st.composite
-def weighings(draw: st.DrawFn) -> tuple[rocking.Block, Motion, str, float, float]:
-    """Block, motion, model, speed after an impact at time 0, and a window in which the weight changes much."""
-    model, e = draw(st.sampled_from(MODELS)), draw(st.floats(0.3, 0.9))
-    p, alpha = 10.0 ** draw(st.floats(0.0, 1.0)), draw(st.floats(0.05, 1.0))
-    block = block_for(p, alpha, e)
-    restoring = p * p * (alpha if model == "linear" else math.sin(alpha))
-    v = 10.0 ** draw(st.floats(-3.0, -0.4)) * restoring / p
-    window = 3.0 * v / restoring * (1.0 + e) / (1.0 - e * e)
-    change, push = draw(st.floats(-0.6, 0.9)), draw(st.floats(-0.3, 0.3)) * math.tan(alpha)
-    vertical = Motion([0.0, 2.0 * window], [[0.0, change * G / window]])
-    return block, Motion([0.0, 2.0 * window], [[push * G, 0.0]]).with_vertical(vertical), model, v, window
-
-
-@quick
-@given(weighings())
-def test_the_time_of_rest_lies_in_the_bracket_from_the_first_impact(
-    case: tuple[rocking.Block, Motion, str, float, float],
-) -> None:
-    block, motion, model, v, _ = case
-    ground, body, rules = problem_of(block, motion, model)
-    start = state.record(state.STATE, v=v)
-    proof = prove_rest(ground, body, rules, state.new_scratch(), start)
-    assume(proof.upper >= 0.0)
-    how = rocking.Certified(1e-14)
-    response = rocking.simulate(block, motion, model=model, initial_velocity=v, chattering=how)
-    first = response.chattering[0]
-    rounding = 1e-14 + 4e-15 * first["end"]
-    assert proof.lower <= first["upper"] + rounding
-    assert first["lower"] <= proof.upper + rounding
-
-
-@quick
-@given(weighings())
-def test_bounds_on_an_arc_hold_its_duration_and_its_impact(
-    case: tuple[rocking.Block, Motion, str, float, float],
-) -> None:
-    block, motion, model, v, window = case
-    ground, body, rules = problem_of(block, motion, model)
-    scratch, start = state.new_scratch(), state.record(state.STATE, v=v)
-    bounds = side_bounds(body, rules, 0, bounds_on_motion(ground, body, start, window, scratch))
-    change, shortest, longest = arc_bounds(v, bounds)
-    assume(longest <= window)
-    response = rocking.simulate(block, motion, model=model, initial_velocity=v, duration=1.01 * longest)
-    impact = response.impacts[0]
-    assert shortest * (1.0 - 1e-14) <= impact["time"] <= longest * (1.0 + 1e-14)
-    assert abs((impact["speed_before"] / v) ** 2 - 1.0) <= change + 1e-13
-
-
-def test_a_change_of_weight_alone_changes_the_speed_of_an_arc_as_much_as_is_allowed_for() -> None:
-    """With no horizontal motion at all, the bound must come from the vertical one."""
-    block = block_for(4.0, 0.3)
-    motion = Motion([0.0, 1.0], [[0.0, 0.0]]).with_vertical(Motion([0.0, 1.0], [[0.0, 8.0 * G]]))
-    ground, body, rules = problem_of(block, motion, "linear")
-    v = 0.1
-    start = state.record(state.STATE, v=v)
-    bounds = side_bounds(body, rules, 0, bounds_on_motion(ground, body, start, 0.05, state.new_scratch()))
-    impact = rocking.simulate(block, motion, model="linear", initial_velocity=v, duration=0.05).impacts[0]
-    change, _, longest = arc_bounds(v, bounds)
-    assert longest <= 0.05
-    assert 0.05 < (impact["speed_before"] / v) ** 2 - 1.0 <= change
-
-
-def test_uplift_is_where_the_push_first_passes_the_threshold_times_the_weight() -> None:
-    judged = 0
-
-    @quick
-    @given(st.integers(0, 10_000), st.floats(0.05, 0.6), st.integers(1, 5))
-    def judge(seed: int, alpha: float, degree: int) -> None:
-        nonlocal judged
-        random = np.random.default_rng(seed)
-        corners = np.cumsum([0.0, *random.uniform(0.1, 1.0, 6)])
-        push = Motion(corners, random.normal(size=(6, 2)) * 0.7 * alpha * G)
-        lift = Motion(np.cumsum([0.0, *random.uniform(0.2, 1.3, 5)]), random.normal(size=(5, degree)) * 0.3 * G)
-        motion = push.with_vertical(lift)
-        response = rocking.simulate(block_for(3.0, alpha), motion, model="linear", duration=float(corners[-1]))
-        times = np.linspace(0.0, corners[-1], 20_001)[:-1]
-        margin = alpha * (1.0 + lift.acceleration(times) / G) - np.abs(push.acceleration(times)) / G
-        beyond = np.flatnonzero(margin < 0.0)
-        if not len(beyond):
-            assert len(response.events) == 0
-            return
-        judged += 1
-        uplift = response.events["time"][0]
-        assert uplift <= times[beyond[0]] + 1e-12
-        before = (times < uplift - 1e-9) & (margin < -1e-9)
-        assert not np.any(before)
-
-    judge()
-    assert judged >= 10
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -273,15 +93,6 @@ def test_a_block_at_rest_leaves_the_ground_where_its_weight_is_gone() -> None:
     motion = Motion([0.0, 2.0], [[0.0, 0.0]]).with_vertical(Motion([0.0, 2.0], [[0.0, -G]]))
     response = rocking.simulate(rocking.Block(half_width=0.2, half_height=1.0), motion)
     assert response.lift_off_time == pytest.approx(1.0, abs=1e-9)
-
-
-def test_ensembles_agree_with_single_simulations() -> None:
-    blocks = rocking.Blocks.grid(p=np.linspace(1.5, 5.0, 6), alpha=np.linspace(0.1, 0.3, 5), restitution=0.9)
-    motion = wave(3.0, 7).with_vertical(wave(2.0, 8))
-    for polarity, sign in (("+", 1.0), ("-", -1.0)):
-        many = rocking.simulate_many(blocks, motion, polarity=polarity)
-        each = [rocking.simulate(block, motion.scaled(sign)).peak_rotation for block in blocks]
-        assert many.peak_rotation.to_numpy().ravel() == pytest.approx(each, rel=1e-11)
 
 
 def test_the_vertical_component_goes_with_the_motion() -> None:
@@ -431,70 +242,10 @@ def test_a_motion_that_lifts_no_block_at_any_level_is_told() -> None:
         rocking.incremental_dynamic_analysis(block_for(2.0, 0.2, 0.5), heavy)
 
 
-@pytest.mark.thorough
-@pytest.mark.parametrize("points", ["8", pytest.param("16", marks=pytest.mark.thorough)])
-def test_a_map_on_the_page_tells_chattering_as_its_points_do_with_a_vertical_component(points: str) -> None:
-    uploads = UploadStore()
-    key = uploads.add_motion(wave(20.0, 2).with_vertical(wave(40.0, 3)))
-    case = read_case({"p": "2", "alpha": "0.2", "restitution": "0.5", "motion": f"given:{key}"}, uploads)
-    axes = {"x": "p", "x_from": "1", "x_to": "6", "y": "pga", "y_from": "0.1", "y_to": "0.3", "points": points}
-    grid = grid_of(case, axes)
-    found = np.empty(grid.x.values.size * grid.y.values.size)
-    for part in parts(grid, threads=1):
-        found[part.points] = part.values[0]
-
-    def at(p: float, pga: float) -> SimulationInput:
-        return SimulationInput(block_for(p, 0.2, 0.5), case.motion.scaled_to(pga * G), case.model)
-
-    singly = chattering_map(at, {"p": grid.x.values, "pga": grid.y.values}).outcome.values
-    assert np.array_equal(found.reshape(grid.shape), singly.T)
-    assert len(np.unique(singly)) == 3
-
-
-def test_a_page_of_a_response_shows_its_vertical_component_too() -> None:
-    """Neither a pulse's nor a shipped record's name says it, and two motions may differ in nothing else."""
-    uploads, block = UploadStore(), block_for(2.0, 0.2)
-    pulse, record = rocking.pulses.one_sine(4.0, 1.0), rocking.records.load("el-centro-meloland-270")
-    for horizontal in (pulse, record):
-        for vertical in (wave(3.0, 1), wave(3.0, 2)):
-            response = rocking.simulate(block, horizontal.with_vertical(vertical))
-            shown = read_case(texts_of(response, uploads), uploads).simulate()
-            assert shown.peak_rotation == response.peak_rotation
-            assert shown.impacts["time"].tolist() == response.impacts["time"].tolist()
-
-
 def test_the_asymptotic_time_is_for_horizontal_motions() -> None:
     motion = rocking.pulses.sine(2.2, 1.0, cycles=3).with_vertical(wave(1.0, 1))
     with pytest.raises(InvalidOption, match="no vertical motion"):
         rocking.simulate(block_for(2.0, 0.2), motion, chattering="time")
-
-
-def test_certified_rests_hold_what_all_impacts_give() -> None:
-    """A rest proven early lies where the impacts, followed on until time stalls, accumulate."""
-    judged = []
-
-    @quick
-    @given(
-        st.integers(0, 10_000), st.sampled_from(MODELS), st.floats(1.0, 6.0), st.floats(0.08, 0.4), st.floats(0.5, 0.95)
-    )
-    def holds(seed: int, model: str, p: float, alpha: float, e: float) -> None:
-        motion = wave(6.0 * alpha, seed).with_vertical(wave(3.0, seed + 1))
-        block = block_for(p, alpha, e)
-        early = rocking.simulate(block, motion, model=model, chattering=rocking.Certified(tolerance=1e-4))
-        late = rocking.simulate(block, motion, model=model, chattering=rocking.Certified(tolerance=1e-13))
-        if early.overturned:
-            return
-        for first, second in zip(early.chattering, late.chattering, strict=False):
-            if not math.isfinite(first["lower"]):
-                break
-            if abs(first["lower"] - second["lower"]) > 1e-3:  # another rest, once the first ones differ by rounding
-                break
-            assert first["lower"] - 1e-12 <= second["upper"]
-            assert second["lower"] <= first["upper"] + 1e-12
-            judged.append(seed)
-
-    holds()
-    assert len(judged) >= 20
 
 
 @pytest.mark.parametrize("seconds", [1.0, 2.5])
@@ -508,21 +259,6 @@ def test_a_duration_within_the_vertical_component_leaves_the_verdict_open(second
     over = rocking.simulate(block, motion, duration=3.0)
     assert not over.stopped
     assert not bool(rocking.simulate_many(rocking.Blocks.of([block]), motion, duration=3.0).stopped.item())
-
-
-@pytest.mark.parametrize("count", [40, pytest.param(200, marks=pytest.mark.thorough)])
-@pytest.mark.parametrize("model", MODELS)
-def test_without_a_push_a_two_sided_block_lifts_off_to_side_plus(model: str, count: int) -> None:
-    """As the documentation says, whatever rounding makes of the two instants at which its thresholds vanish."""
-    random, flat, sides = np.random.default_rng(0), Motion.from_samples([0.0, 0.0], 1.0), []
-    for _ in range(count):
-        times = [0.0, random.uniform(0.05, 0.3), 0.4 + random.uniform(0.0, 0.2), 0.8]
-        lift = Motion.from_points(times, [0.0, -G * random.uniform(1.01, 3.0), random.uniform(-0.2, 2.0), 0.0])
-        block = rocking.Block.from_parameters(
-            p=tuple(random.uniform(1.0, 3.0, 2)), alpha=tuple(random.uniform(0.1, 0.4, 2)), restitution=0.8
-        )
-        sides.append(int(rocking.simulate(block, flat.with_vertical(lift), model=model).events["side"][0]))
-    assert sides == [1] * count
 
 
 @pytest.mark.parametrize("push", [1e-15, -1e-15])
@@ -545,17 +281,6 @@ def test_a_push_that_only_rounding_makes_is_no_push_and_calls_the_side_ambiguous
     assert found.events["side"][0] == known.events["side"][0] and found.events["time"][0] == 0.0
     assert (found.near_ties, known.near_ties) == (1, 0)
     assert found.ambiguous
-
-
-@pytest.mark.parametrize("model", MODELS)
-def test_a_push_as_small_as_rounding_acts_from_the_uplift_on(model: str) -> None:
-    """The weight is zero at the uplift, at 0.1 s, and jumps at 0.2 s: the rotation is the same just before the jump."""
-    lift = Motion([0.0, 0.1, 0.2], [[0.0, -10.0 * G], [-G, -5.0 * G]])
-    motion = Motion([0.0, 1.0], [[-1e-15 * G]]).with_vertical(lift)
-    response = rocking.simulate(block_for(7.0, 0.33), motion, model=model)
-    assert response.events["time"][0] == pytest.approx(0.1, rel=1e-15)
-    before, after = response.states(np.array([np.nextafter(0.2, 0.0), 0.2]))
-    assert before[:2] == pytest.approx(after[:2], rel=2e-15, abs=0.0)
 
 
 def test_a_touch_without_speed_is_no_impact_and_calls_itself_ambiguous() -> None:
@@ -675,30 +400,6 @@ def test_components_that_last_very_different_times_are_noted() -> None:
     assert vertical_notes(el_centro().with_vertical(part)) == (
         "the horizontal motion lasts 56.93 s, the vertical one 20 s: do both start at the same time?",
     )
-
-
-@pytest.mark.thorough
-def test_tables_of_many_records_name_the_vertical_components(tmp_path: Path) -> None:
-    alone = rocking.records.load("el-centro-meloland-360")
-    motions = [el_centro(), alone]
-    names = ["el-centro-meloland-up", ""]
-    block = rocking.Block(width=0.24, height=1.1)
-    spectrum = rocking.rocking_spectrum(rocking.Blocks.grid(alpha=[0.2], p=[2.0, 3.0]), motions)
-    ida = rocking.incremental_dynamic_analysis(block, motions, tolerance=1e-2)
-    measures = rocking.compare_measures(block, motions, tolerance=1e-2)
-    for found, table in ((spectrum, "peaks"), (ida, "levels"), (measures, "intensities")):
-        rows = found.to_dataframe(table)
-        assert list(dict.fromkeys(rows[rows.motion == "el-centro-meloland-270"].vertical)) == names[:1]
-        assert list(dict.fromkeys(rows[rows.motion == "el-centro-meloland-360"].vertical)) == names[1:]
-        assert "el-centro-meloland-up" in json.dumps(plain(found.to_dict()))
-    assert set(ida.to_dataframe("bands").vertical) == set(names)
-    assert "el-centro-meloland-270 with vertical el-centro-meloland-up" in ida.summary()
-    curve = rocking.fragility(block, motions, levels=np.linspace(2.0, 3.6, 33))
-    assert set(curve.outcomes.vertical) == set(names)
-    curve.to_nrml(tmp_path / "f.xml")
-    assert "noDamageLimit" not in (tmp_path / "f.xml").read_text("utf-8")
-    spectrum = rocking.rocking_spectrum(rocking.Blocks.grid(alpha=[0.2], p=[2.0]), alone)
-    assert "vertical" not in spectrum.to_dataframe("peaks")
 
 
 def test_a_jump_beyond_one_threshold_lifts_off_though_the_other_is_only_reached() -> None:

@@ -8,11 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-
-import rocking
 
 #: Speeds after an impact below which the arcs are too short for the integrator's events.
 SLOWEST = 2e-2
@@ -200,28 +197,3 @@ def lifted(body, pushes, start, end):
             j = sides[0]
             return (float(time) if beyond(time, j) > 0.0 else brentq(beyond, time, time + step, (j,), xtol=1e-14)), j
     return end, 0
-
-
-def compared(drawn, seeds):
-    """Judge what is drawn for seeds; returns how many impacts, peaks and overturnings were."""
-    impacts = peaks = overturned = 0
-    for seed in seeds:
-        ours, body, motion, start = drawn(seed)
-        times, speeds, peak, ended = integrated(body, motion, motion.end, start, 0.0, 0)
-        found = rocking.simulate(ours, motion, duration=motion.end, initial_rotation=start)
-        if found.ambiguous:
-            continue
-        count = min(len(times), len(found.impacts))
-        assert count == len(times), seed
-        growth = np.cumprod(1.0 / np.array([0.3, *speeds][:count]))  # slow impacts multiply the error of their times
-        for k in range(count):
-            hit, allowed = found.impacts[k], 1e-9 * max(1.0, growth[k]) ** 0.5
-            assert hit["time"] == pytest.approx(times[k], abs=allowed), (seed, k)
-            assert hit["speed_before"] == pytest.approx(speeds[k], rel=1e-7, abs=1e-7), (seed, k)
-            impacts += 1
-        assert found.overturned == (ended == "overturned") or ended == "chatters", seed
-        overturned += found.overturned
-        if ended == "over":
-            assert found.peak_rotation == pytest.approx(peak, rel=1e-8), seed
-            peaks += 1
-    return impacts, peaks, overturned

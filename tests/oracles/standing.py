@@ -338,22 +338,26 @@ class Judged:
     different: list[str] = field(default_factory=list)
 
 
+def case(kind: str, seed: int, number: int) -> tuple[RestrainedBlock, Held, Motion, float, float]:
+    """Draw a body of a kind, for the package and for the integration, a sine, the end and an initial rotation."""
+    rng = np.random.default_rng([seed, KINDS.index(kind), number, 1])
+    ours, held = body(kind, rng)
+    plus, rate = ours.uplift_thresholds()[0], ours.sides[0].p
+    frequency, cycles = rate / between(rng, 0.4, 4.0), int(rng.integers(1, 4))
+    motion = rocking.pulses.sine(plus * between(rng, 1.05, 4.0), frequency, cycles=cycles, phase=rng.uniform(0, 6))
+    if number % 3 == 0:
+        up = rocking.pulses.sine(rng.uniform(0.5, 6.0), frequency * rng.uniform(1.0, 3.0), cycles=cycles)
+        motion = motion.with_vertical(up)
+    tendon = ours._tendon[0]
+    near = min(0.3 * min(*ours.balance, 0.5), 0.1, 0.8 * tendon.yields / max(tendon.opening, 1e-9))
+    return ours, held, motion, 1.2 * motion.end + 0.5, near if number % 2 else 0.0
+
+
 def single_and_integrated(kind: str, seed: int, cases: int) -> Judged:
     """Compare verdicts, and peaks of bodies that stand, with DOP853 restarted at impacts, rests and breakpoints."""
     found = Judged()
     for number in range(cases):
-        rng = np.random.default_rng([seed, KINDS.index(kind), number, 1])
-        ours, held = body(kind, rng)
-        plus, rate = ours.uplift_thresholds()[0], ours.sides[0].p
-        frequency, cycles = rate / between(rng, 0.4, 4.0), int(rng.integers(1, 4))
-        motion = rocking.pulses.sine(plus * between(rng, 1.05, 4.0), frequency, cycles=cycles, phase=rng.uniform(0, 6))
-        if number % 3 == 0:
-            up = rocking.pulses.sine(rng.uniform(0.5, 6.0), frequency * rng.uniform(1.0, 3.0), cycles=cycles)
-            motion = motion.with_vertical(up)
-        end = 1.2 * motion.end + 0.5
-        tendon = ours._tendon[0]
-        near = min(0.3 * min(*ours.balance, 0.5), 0.1, 0.8 * tendon.yields / max(tendon.opening, 1e-9))
-        start = near if number % 2 else 0.0
+        ours, held, motion, end, start = case(kind, seed, number)
 
         def simulated(factor: float = 1.0, ours=ours, motion=motion, end=end, start=start) -> rocking.Response:
             shaken = motion if factor == 1.0 else motion.scaled(factor)
