@@ -201,10 +201,3 @@ def test_nothing_is_shaken_more_than_a_motion_may_be(level):
 def test_a_period_that_says_nothing_is_refused(period):
     with pytest.raises(InvalidMotion, match="a period above a million times the duration"):
         MOTION.spectral_acceleration(period)
-
-
-def test_forces_outside_the_response_are_not_numbers():
-    response = rocking.simulate(BLOCK, MOTION)
-    for time in (-1.0, np.nan, np.inf, 1e300):
-        assert np.isnan(response.friction_demand(time))
-        assert np.isnan(response.normal_force(time))

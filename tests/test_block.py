@@ -1,8 +1,6 @@
 """Blocks: parameters from sizes, pivots and frames; thresholds; what cannot stand."""
 
 import math
-import re
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -204,35 +202,6 @@ def test_numbers_of_any_real_type_are_numbers(kind):
     blocks = Blocks(p=kind(2), alpha=[kind(1)], restitution=kind(1), gravity=kind(10))
     assert blocks.gravity == 10.0
     assert blocks[0] == block
-
-
-def test_a_block_shows_itself_in_one_short_line():
-    assert repr(Block(width=0.24, height=1.1)) == (
-        "<Block: rectangular block, 0.24 m x 1.1 m; p = 3.6146 rad/s, alpha = 0.21482 rad, restitution = 0.93184>"
-    )
-    two_sided = repr(Block.from_parameters((2.0 / 3.0, 1.0), 0.2, 0.9))
-    assert "side +: p = 0.66667 rad/s" in two_sided and "side -: p = 1 rad/s" in two_sided
-    blocks = Blocks.grid(p=[1.0 / 3.0, 2.0], alpha=[0.1], restitution=[0.9])
-    assert repr(blocks) == "<Blocks: 2; p from 0.33333 to 2 rad/s, alpha 0.1 rad, restitution 0.9>"
-
-
-@pytest.mark.parametrize(
-    ("block", "corners"),
-    [
-        (Block(half_width=0.2, half_height=1.0), [(0.0, 0.0), (0.4, 0.0), (0.4, 2.0), (0.0, 2.0)]),
-        (Block.from_pivots((0.2, 0.15), 0.7, 0.4), [(0.0, 0.0), (0.35, 0.0), (0.15, 0.7)]),
-    ],
-)
-def test_a_notebook_shows_the_block_to_scale_on_the_ground_in_the_colour_of_the_text(block, corners):
-    page = block._repr_html_()
-    ElementTree.fromstring(page)
-    assert "currentColor" in page and "#" not in page
-    points, floor = (
-        np.array([[float(number) for number in point.split(",")] for point in re.search(form, page)[1].split()])
-        for form in (r'<polygon points="([^"]*)"', r'<polyline points="([^"]*)"')
-    )
-    drawn = np.column_stack([points[:, 0] - points[0, 0], floor[0, 1] - points[:, 1]])
-    np.testing.assert_allclose(drawn, 120.0 / np.max(corners) * np.array(corners), atol=0.11)
 
 
 @pytest.mark.parametrize("distances", [(0.3, 0.5), (0.5, 0.3)])

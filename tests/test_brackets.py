@@ -33,15 +33,6 @@ def test_a_bracket_holds_the_rest_of_a_block_that_starts_next_to_its_balance(mod
     assert judged >= (40 if model == "linear" else 6)
 
 
-@pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize("side", SIDES)
-def test_both_sides_have_the_same_bracket(side: float, model: str) -> None:
-    block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
-    found = [simulate(block, None, model=model, initial_rotation=each * 0.2 * (1.0 - 1e-6)) for each in (1.0, side)]
-    assert found[0].chattering.tobytes() == found[1].chattering.tobytes()
-    assert 1e-11 < np.ptp(found[0].chattering[["lower", "upper"]].tolist()) < 1e-7
-
-
 def test_a_bracket_is_without_end_where_rounding_moves_the_rest_as_far_as_the_block_lingers() -> None:
     """And the response is ambiguous; a rest is still one that is proven."""
     block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)

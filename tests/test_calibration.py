@@ -1,7 +1,5 @@
 """Calibration: hidden blocks are found again from outcomes and from histories, and what they will do is predicted."""
 
-import csv
-import inspect
 import math
 from dataclasses import replace
 
@@ -14,7 +12,7 @@ import rocking
 from rocking.analysis.calibration import evidence as population
 from rocking.analysis.calibration import search as searching
 from rocking.analysis.calibration.diagnostics import Scores, bounds_reached
-from rocking.analysis.calibration.evidence import WIDENED, Candidates, Evidence
+from rocking.analysis.calibration.evidence import Candidates, Evidence
 from rocking.analysis.calibration.history import HistoryCalibration
 from rocking.analysis.calibration.result import group_labels
 from rocking.analysis.calibration.search import AGREEMENT, Problem, posterior, r_hat, search
@@ -117,13 +115,6 @@ def test_the_hidden_block_lies_within_the_estimates(found):
     assert found.estimates["alpha_plus"].upper < found.estimates["alpha_minus"].upper
 
 
-@pytest.mark.slow
-def test_a_full_search_finds_and_predicts_it_too(shaken, unseen):
-    found = rocking.calibrate(*shaken, candidates=512, model="linear")
-    test_what_a_hidden_block_will_do_is_predicted(found, unseen)
-    test_the_hidden_block_lies_within_the_estimates(found)
-
-
 def test_the_ensemble_predicts_what_its_blocks_do(found, unseen):
     motions = unseen[0][:6]
     fallen = np.array([outcomes(motions, block) for block in found.blocks])
@@ -175,14 +166,6 @@ def test_a_group_is_left_out_as_a_whole(coarse):
     # Twins differ by the order of single-precision sums.
     np.testing.assert_allclose(first, second, rtol=1e-6)
     assert len(np.unique(np.round(first, 6))) > 2  # each test has a probability of its own, and not that of its part
-
-
-@pytest.mark.slow
-def test_random_outcomes_are_not_predicted_with_confidence():
-    motions = bursts(60, seed=7)
-    overturned = np.random.default_rng(0).random(60) < 0.5
-    found = rocking.calibrate(motions, overturned, candidates=1024, model="linear")
-    assert found.cross_validate(folds=6).scores.log_loss < 1.5 * math.log(2.0)
 
 
 @pytest.mark.slow
@@ -257,49 +240,12 @@ def test_one_unknown_angle_is_found_from_forty_tests(coarse):
     assert not found.diagnostics.notes
 
 
-def test_a_posterior_that_reaches_a_bound_is_told_with_the_mend(coarse, shaken):
-    tests = shaken[0][:10], shaken[1][:10]
-    found = rocking.calibrate(*tests, candidates=256, p=(1.0, 2.5), two_sided=False, model="linear")
-    ends = {(one.name, one.end) for one in found.diagnostics.bounds_reached}
-    assert ("p", "upper") in ends
-    assert "p reaches its upper bound of 2.5 rad/s" in found.summary()
-    assert "set that of p to 5" in found.summary()
-    assert found.to_dict()["diagnostics"]["notes"] == list(found.diagnostics.notes)
-
-
 def test_runs_that_agree_are_told_from_those_that_do_not():
     rng = np.random.default_rng(0)
     same = rng.standard_normal((2, 400))
     assert r_hat(same) < 1.02
     assert r_hat(same + np.array([[0.0], [1.0]])) > 1.15  # about sqrt(1 + 1/2/(2 + 1/2))
     assert r_hat(np.exp(same)) == pytest.approx(r_hat(same), abs=0.01)
-
-
-@pytest.mark.slow
-def test_any_seed_finds_the_p_that_the_mesh_of_a_rock_tells(shared):
-    """136 tests at the threshold of overturning; the mesh says 10.56 and 10.82 rad/s, about either axis."""
-    with (shared / "shakebot" / "tests.csv").open(newline="", encoding="utf-8") as file:
-        tests = [test for test in csv.DictReader(file) if test["set"] == "pbr0"]
-    motions = [
-        rocking.pulses.one_cosine(float(test["pga_g"]) * 9.81, 0.5 / math.pi / float(test["pgv_over_pga_s"]))
-        for test in tests
-    ]
-    overturned = [test["overturned"] == "1" for test in tests]
-    for seed in (0, 1, 2):
-        found = rocking.calibrate(
-            motions, overturned, seed=seed, p=(3.0, 40.0), alpha=(0.005, 0.6), candidates=4096, model="linear"
-        )
-        estimate = found.estimates["p"]
-        assert estimate.lower < 10.7 < estimate.upper
-        assert 9.5 < estimate.median < 12.5
-        assert found.diagnostics.effective > 100
-
-
-def test_few_candidates_are_told(coarse):
-    motions = bursts(16, seed=9)
-    found = rocking.calibrate(motions, outcomes(motions), candidates=128, model="linear")
-    assert found.diagnostics.effective < 20.0
-    assert any("can tell what a typical population does" in note for note in found.diagnostics.notes)
 
 
 def test_the_summary_has_every_parameter_and_the_scores(found):
@@ -431,24 +377,6 @@ def test_the_posterior_is_that_of_brute_force(threshold_evidence):
 
 
 @pytest.mark.thorough
-def test_where_candidates_are_does_not_change_the_posterior(threshold_evidence):
-    """A guide in the wrong place adds candidates there; the posterior stays what it was."""
-    evidence, thresholds = threshold_evidence
-    candidates, rng = evidence.candidates, np.random.default_rng(4)
-    guide = np.array([[math.log(1.2), math.log(0.3), math.log(0.6), *np.log([0.2, 0.3, 0.2])]])
-    points = population.drawn(guide, WIDENED, 2000, rng)
-    points = points[candidates.space.contains(points)]
-    more = candidates.joined((2000, guide), points, (points[:, 1:2] < thresholds).astype(np.float32))
-    first = posterior(evidence, 512, 4, np.random.default_rng(0))
-    second = posterior(Evidence(more, evidence.observed, evidence.lapse), 512, 4, np.random.default_rng(1))
-    apart = np.abs(first.mean(axis=0) - second.mean(axis=0)) / first.std(axis=0)
-    assert np.all(apart < 0.35)
-    weights = np.exp(more.log_weights)
-    expected = np.exp(candidates.log_weights) @ candidates.points / np.exp(candidates.log_weights).sum()
-    assert np.abs(weights @ more.points / weights.sum() - expected).max() < 0.02
-
-
-@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("candidates", "goes_on", "populations"),
     [
@@ -533,18 +461,6 @@ def test_the_number_of_threads_changes_no_bit(threshold_evidence):
     found = [replace(evidence, threads=threads).probabilities(populations) for threads in (1, 2, 5)]
     np.testing.assert_array_equal(found[0], found[1])
     np.testing.assert_array_equal(found[0], found[2])
-
-
-def test_both_calibrations_share_names_order_and_defaults_of_their_arguments():
-    outcomes, history = (
-        {name: one.default for name, one in inspect.signature(function).parameters.items() if name != "motion"}
-        for function in (rocking.calibrate, rocking.calibrate_history)
-    )
-    shared = [name for name in outcomes if name in history]
-    assert shared == [name for name in history if name in outcomes]
-    assert shared == ["model", "p", "alpha", "restitution", "two_sided", "seed", "progress"]
-    for name in shared:
-        assert name == "two_sided" or outcomes[name] == history[name]
 
 
 def test_one_candidate_predicts_no_certainty(threshold_evidence):
@@ -715,16 +631,6 @@ def test_a_calibration_draws_what_was_measured_and_what_it_predicts(found, told)
     assert found.plot(figsize=(3.4, 4.0)).get_size_inches().tolist() == [3.4, 4.0]
 
 
-def test_a_history_is_drawn_with_the_block_that_explains_it(sure):
-    figure = sure.plot()
-    drawn = {line.get_label(): line for line in figure.axes[0].lines}
-    np.testing.assert_allclose(drawn["measured"].get_ydata(), released(), rtol=1e-12)
-    time, fitted = drawn["fitted"].get_data()
-    np.testing.assert_array_equal(fitted, sure.response.rotation(time))
-    np.testing.assert_array_equal(figure.axes[1].lines[0].get_ydata(), sure.residuals)
-    assert figure.get_suptitle().startswith("restitution = 0.8")
-
-
 def test_what_is_known_is_kept(sure, mirrored):
     assert (sure.block.p, sure.block.alpha) == (2.5, 0.2)
     assert set(sure.estimates) == {"restitution"}
@@ -789,33 +695,6 @@ def test_a_mistaken_history_is_refused(change, word):
     arguments = {"times": TIMES, "rotation": released()} | change
     with pytest.raises(rocking.InvalidOption, match=word):
         rocking.calibrate_history(**arguments)
-
-
-@pytest.mark.thorough
-def test_fragility_and_spectrum_take_the_weights_and_the_model_of_the_calibration(found, unseen):
-    motions = unseen[0][:4]
-    levels = np.array([1.0, 2.0, 3.0, 4.5, 6.0, 8.0])
-    fitted = found.fragility(motions, levels=levels)
-    assert fitted.model == "linear"
-    assert "weighted" in fitted.description
-    assert "linear model" in fitted.description
-    outcomes = fitted.outcomes
-    seen = outcomes[np.isclose(outcomes.pga_m_s2, 3.0)]
-    shares = [np.average(one.overturned, weights=one.weight) for _, one in seen.groupby("motion", sort=False)]
-    # What is predicted for each motion is that share, allowing for few candidates and for a lapse.
-    effective = found.diagnostics.effective
-    expected = (effective * np.array(shares) + 0.5) / (effective + 1.0)
-    scaled = [motion.scaled_to(3.0) for motion in motions]
-    assert found.predict(scaled) == pytest.approx(found.lapse + (1.0 - 2.0 * found.lapse) * expected, abs=1e-6)
-    nonlinear = found.fragility(motions, levels=levels, model="nonlinear")
-    assert "nonlinear model" in nonlinear.description
-    assert nonlinear.curves[0].median != fitted.curves[0].median
-    spectrum = found.spectrum(scaled)
-    assert spectrum.data.model == "linear"
-    assert float(spectrum.overturned_share[12]) == pytest.approx(np.mean(shares), abs=1e-12)
-    # A larger body of the same shape overturns more seldom.
-    assert float(spectrum.overturned_share[0]) < float(spectrum.overturned_share[-1])
-    assert "weighted" in spectrum.summary()
 
 
 def test_an_ensemble_is_read_as_it_was_written(found, tmp_path):

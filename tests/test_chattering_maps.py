@@ -1,6 +1,5 @@
 """Where chattering is complete under any motion: maps, exceedances of the thresholds, and episodes of a response."""
 
-import io
 import math
 
 import numpy as np
@@ -120,21 +119,6 @@ def test_a_weight_that_falls_lifts_a_block_whose_motion_does_not_reach_the_thres
     assert outcome_of(motion.with_vertical(falling)) is not Outcome.NO_UPLIFT
 
 
-def test_the_title_of_a_map_says_what_is_the_same_all_over_it():
-    sine = chattering_map(families.sine(BLOCK, model="linear"), {"a": [0.9, 1.03], "omega": [1.0, 2.0]})
-    assert sine.plot().get_suptitle() == (
-        "end of the first rocking under sine, alpha = 0.2 rad, restitution = 0.92, linear model"
-    )
-    assert sine.plot(title="mine").get_suptitle() == "mine"
-    slenderness = chattering_map(
-        lambda a, alpha: families.sine(rocking.Block.from_parameters(2.0, alpha, 0.9))(a, 2.0),
-        {"a": [0.9, 1.03], "alpha": [0.1, 0.2]},
-    )
-    assert (
-        slenderness.plot().get_suptitle() == "end of the first rocking under sine, restitution = 0.9, nonlinear model"
-    )
-
-
 def test_what_overturns_after_its_first_rocking_is_counted_and_hatched():
     record = rocking.records.load("el-centro-meloland-270")
 
@@ -222,19 +206,6 @@ def test_a_map_is_the_same_in_one_thread_and_in_several():
     assert one.data.identical(several.data)
     with pytest.raises(rocking.InvalidOption, match="threads"):
         chattering_map(families.sine(BLOCK), parameters, threads=0)
-
-
-@pytest.mark.thorough
-def test_a_map_is_drawn_with_the_outcomes_that_it_has():
-    dataset = chattering_map(families.sine(BLOCK, model="linear"), {"a": [0.9, 1.03, 1.05], "omega": [1.0, 2.0]})
-    figure = dataset.plot(labels={"a": "amplitude"}, title="A map")
-    (axes,) = figure.axes
-    assert (axes.get_ylabel(), axes.get_xlabel()) == ("amplitude", "omega")
-    there = sorted({Outcome(value).name.lower().replace("_", " ") for value in dataset.outcome.values.ravel()})
-    assert sorted(text.get_text() for text in figure.legends[0].get_texts()) == there
-    assert "complete" in there
-    assert "unproven" not in there
-    figure.savefig(io.BytesIO(), format="pdf")
 
 
 # Families
@@ -351,13 +322,6 @@ def test_a_block_that_never_rests_amid_the_shaking_has_a_share_of_zero():
     assert zeros >= 20
 
 
-def test_a_delay_changes_no_episode():
-    record = rocking.records.load("ridgecrest-clc-090").processed(trim=(228.0, 245.0))
-    first, second = (chattering_episodes(rocking.simulate(STATUE, m)) for m in (record, record.delayed(3.0)))
-    np.testing.assert_allclose(second.episodes["duration"], first.episodes["duration"], atol=1e-9)
-    assert second.share_at_rest == pytest.approx(first.share_at_rest, abs=1e-9)
-
-
 def test_shaking_ends_when_the_block_has_overturned():
     response = rocking.simulate(
         rocking.Block(half_width=0.05, half_height=0.25), rocking.records.load("ridgecrest-clc-360")
@@ -382,14 +346,6 @@ def test_free_rocking_is_one_episode_without_shaking():
     assert math.isnan(found.share_at_rest)
     assert not found.amid_shaking.any()
     assert "never passes a threshold" in str(found)
-
-
-def test_a_simulation_that_ends_before_the_motion_passes_a_threshold_sees_no_shaking():
-    motion = rocking.pulses.sine(1.5 * THRESHOLD, 0.2, cycles=2)
-    (passes, _), *_ = exceedances(motion, (THRESHOLD, THRESHOLD), BLOCK.gravity)
-    found = chattering_episodes(rocking.simulate(BLOCK, motion, model="linear", duration=0.9 * passes))
-    assert all(map(math.isnan, found.shaking)) and found.at_rest == 0.0
-    assert "nan" not in str(found) and "never passes a threshold" in str(found)
 
 
 def test_a_motion_that_lifts_nothing_has_no_episode():

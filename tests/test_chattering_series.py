@@ -126,15 +126,3 @@ def test_where_double_precision_does_not_resolve_the_series_the_rest_is_told(unr
     assert "not known: double precision does not resolve enough terms" in report.summary()
     with pytest.raises(InvalidOption, match="order must be a whole number from 1 to 34"):
         chattering.chattering_report(1.03, 2.0, 0.9, order=38)
-
-
-def test_advice_names_no_lower_order_where_there_is_none(unresolved):
-    with pytest.raises(InvalidOption, match="precision: take a higher omega"):
-        chattering.series_diagnosis(1.03, 2.0, 0.9, order=1)
-    with pytest.raises(InvalidOption, match="lower the order, or take a higher omega"):
-        chattering.series_coefficients(2.0, 0.9, order=16)
-
-
-def test_a_small_radius_is_told_with_its_digits():
-    told = chattering.chattering_report(1.01, 1.0, 0.99).summary()
-    assert "worthless: it converges for a - 1 up to 0.00" in told

@@ -1,10 +1,5 @@
 """The exact chattering time: against references, 120 digits, another path, and itself."""
 
-import json
-import os
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -159,16 +154,6 @@ def test_weak_shaking_approaches_the_square_root_law():
     assert time * [0.5, 2.0, 9.0] / np.sqrt((1.0 + eps) - 1.0) == pytest.approx(EPS_SERIES_C1, rel=1e-6)
 
 
-def test_the_curve_has_vertical_tangents_at_both_ends():
-    """The paper's two asymptotes of Fig. 5: slopes grow like distance^-1/2 at a = 1, distance^-0.4 at a_cr."""
-    critical = float(chattering.critical_amplitude(2.0, 0.92))
-    distance = np.array([1e-10, 1e-8])
-    start = chattering.chattering_time(1.0 + distance, 2.0, 0.92)
-    assert np.log(start[1] / start[0]) / np.log(100.0) == pytest.approx(0.5, abs=1e-3)
-    end = np.pi / 2.0 - chattering.chattering_time(critical - distance, 2.0, 0.92)
-    assert np.log(end[1] / end[0]) / np.log(100.0) == pytest.approx(0.600, abs=2e-3)
-
-
 def test_edges_of_the_definition():
     times = chattering.chattering_time([0.5, 1.0, 1.03, 1.05, 1e300], 2.0, 0.92)
     assert np.isnan(times[[0, 3, 4]]).all() and times[1] == 0.0 and times[2] > 0.0
@@ -235,35 +220,3 @@ def test_unusable_parameters_are_refused_in_one_sentence(given_parameters, messa
 def test_unusable_options_are_refused(options):
     with pytest.raises(InvalidOption, match="must be"):
         chattering.chattering_time(1.03, 2.0, 0.92, **options)
-
-
-UNCOMPILED = """
-import json
-from rocking import chattering as c
-answers = [
-    *c.chattering_time([1.03, 1.05, 1.3, 1.035], [2.0, 2.0, 0.2, 2.0], [0.92, 0.92, 0.5, 1e-3]),
-    c.chattering_time(1.03, 2.0, 0.9, method="semianalytical"),
-    c.chattering_time(1.03, 2.0, 0.9, method="asymptotic"),
-    c.critical_amplitude(2.0, 0.5),
-    *c.series_coefficients(2.0, 0.8, order=3),
-    c.sequence(1.03, 2.0, 0.8).lower,
-]
-print(json.dumps([float(answer) for answer in answers]))
-"""
-
-
-@pytest.mark.thorough
-def test_kernels_give_the_same_answers_uncompiled():
-    plain, compiled = (
-        json.loads(
-            subprocess.run(
-                [sys.executable, "-W", "error", "-c", UNCOMPILED],
-                env=os.environ | {"NUMBA_DISABLE_JIT": switch},
-                capture_output=True,
-                text=True,
-                check=True,
-            ).stdout
-        )
-        for switch in ("1", "0")
-    )
-    assert plain == pytest.approx(compiled, rel=1e-12, nan_ok=True)

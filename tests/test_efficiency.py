@@ -1,11 +1,9 @@
 """Efficiency of intensity measures: against closed forms of pulses and a sample of known dispersion."""
 
-import json
 import math
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 from scipy.stats import chi2
 
 import rocking
@@ -121,37 +119,6 @@ def test_reversed_motions_count_where_the_sides_of_a_block_differ(slendernesses)
     assert (np.ptp(logarithms.reshape(2, 3), axis=0).max() > 0.01) == (len(counts) == 6)
 
 
-@pytest.mark.thorough
-def test_the_command_prints_and_writes_the_comparison(run, tmp_path, monkeypatch):
-    monkeypatch.setattr(Figure, "savefig", lambda figure, file, **options: file.write(b"not drawn"))
-    pulses = ["--pulse", "half-sine:amplitude=1,frequency=1Hz", "--pulse", "half-sine:amplitude=1,frequency=2Hz"]
-    sizes = ["--width", "0.24", "--height", "1.1", "--periods", "0.5,2"]
-    code, out, err = run("measures", *pulses, *sizes, "--out", tmp_path)
-    assert (code, err) == (0, "")
-    assert "intensities at which 2 motions overturn" in out and "SA(0.5 s)" in out
-    names = {"measures.csv", "intensities.csv", "measures.nc", "measures.pdf", "measures.png", "result.json"}
-    assert {path.name for path in tmp_path.iterdir()} == names
-    rows = json.loads((tmp_path / "result.json").read_text("utf-8"))["measures"]
-    first = rows[0]["intensity"]
-    assert rows[0]["dispersion"] == pytest.approx(abs(math.log(first[0][0] / first[1][0])) / math.sqrt(2.0))
-    header = (tmp_path / "measures.csv").read_text("utf-8").splitlines()[0]
-    assert header.startswith("measure,unit,median_intensity,dispersion,")
-
-
-@pytest.mark.thorough
-def test_a_block_of_weight_two_counts_as_two_blocks():
-    motions = [rocking.pulses.one_sine(1.0, f) for f in (0.5, 1.1)]
-    a, b = (rocking.Block.from_parameters(p=p, alpha=0.2, restitution=0.9) for p in (1.5, 3.0))
-    twice, weighted, alike = (
-        compare_measures(blocks, motions, periods=[1.0], weights=weights, tolerance=1e-2)
-        for blocks, weights in (([a, a, b], None), ([a, b], [2.0, 1.0]), ([a, b], None))
-    )
-    for name in ("median_intensity", "dispersion", "dispersion_of_all"):
-        assert weighted[name].values == pytest.approx(twice[name].values, rel=1e-9)
-        assert weighted[name].values != pytest.approx(alike[name].values, rel=1e-3)
-    assert "2 blocks, weighted" in weighted.summary()
-
-
 def test_dispersions_of_several_blocks_are_written_out_sums(monkeypatch):
     """Weights 3 and 1, and a motion that does not overturn the second block: every sum written out."""
     blocks = [rocking.Block.from_parameters(p=p, alpha=0.2, restitution=0.9) for p in (1.5, 3.0)]
@@ -189,36 +156,6 @@ def test_dispersions_of_several_blocks_are_written_out_sums(monkeypatch):
     assert "left out: 1 pair of block and motion" in found.summary()
 
 
-@pytest.mark.thorough
-def test_copies_of_a_block_scatter_as_the_block_does():
-    """Blocks share the motions: five copies are no larger sample."""
-    motions = [rocking.pulses.one_sine(1.0, f) for f in (0.5, 0.8, 1.1)]
-    block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
-    alone, many = (compare_measures(blocks, motions, periods=[1.0], tolerance=1e-2) for blocks in (block, [block] * 5))
-    for name in ("dispersion", "dispersion_low", "dispersion_high", "dispersion_of_all"):
-        assert many[name].values == pytest.approx(alone[name].values, rel=1e-12)
-
-
-@pytest.mark.thorough
-def test_a_block_of_no_weight_changes_nothing_and_need_not_overturn(monkeypatch):
-    motions = [rocking.pulses.one_sine(1.0, f) for f in (0.5, 0.8, 1.1)]
-    a, b = (rocking.Block.from_parameters(p=p, alpha=0.2, restitution=0.9) for p in (1.5, 3.0))
-    alone = compare_measures(a, motions, periods=[1.0], tolerance=1e-2)
-    search, searched = efficiency.incremental_dynamic_analysis, []
-    for stands in (1, 2, 3):
-
-        def standing(*given, **options):
-            searched[:] = searched or [search(*given, **options)]
-            searched[0].overturning_level[{"motion": slice(stands), "block": 1}] = math.nan  # noqa: B023
-            return searched[0]
-
-        monkeypatch.setattr(efficiency, "incremental_dynamic_analysis", standing)
-        found = compare_measures([a, b], motions, periods=[1.0], weights=[1.0, 0.0], tolerance=1e-2)
-        assert int(np.isnan(found.intensity.values[0]).sum()) == stands
-        for name in ("median_intensity", "dispersion", "dispersion_low", "dispersion_high", "dispersion_of_all"):
-            assert found[name].values == pytest.approx(alone[name].values, rel=1e-12)
-
-
 def test_spectral_accelerations_of_other_damping_than_5_percent_have_another_name():
     pulses = [rocking.pulses.one_sine(1.0, f) for f in (0.5, 0.8)]
     block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
@@ -227,16 +164,6 @@ def test_spectral_accelerations_of_other_damping_than_5_percent_have_another_nam
         assert found.to_dict()["measures"][2]["measure"] == name
         assert name in found.summary()
         assert found.to_dict()["damping"] == damping
-
-
-@pytest.mark.thorough
-def test_the_figure_has_the_order_of_the_table():
-    motions = [rocking.pulses.one_sine(1.0, f) for f in (0.4, 0.7, 1.0, 1.4)]
-    found = compare_measures(rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9), motions)
-    drawn = [label.get_text() for label in found.plot().axes[0].get_yticklabels()]
-    rows = found.summary().splitlines()[3:]
-    assert len(drawn) == found.sizes["measure"] == 7
-    assert all(row.startswith(name) for row, name in zip(rows, drawn, strict=True))
 
 
 @pytest.mark.thorough

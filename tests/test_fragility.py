@@ -295,18 +295,6 @@ def test_the_covariance_of_close_intensities_is_that_of_wide_ones(apart):
     assert np.all(np.linalg.eigvalsh(wide.covariance) > 0.0)
 
 
-@pytest.mark.parametrize("count", [1, 2])
-def test_one_or_two_clusters_bound_nothing_by_the_bootstrap_either(count):
-    intensity, exceeded = outcomes(2, 60)
-    clusters = np.arange(60) % count
-    fitted = fit_fragility(intensity, exceeded, clusters=clusters, band=Band("bootstrap", samples=200))
-    curve = fitted.curves[0]
-    assert not curve.bounded and curve.median_interval == (0.0, math.inf)
-    assert "give 3 or more" in " ".join(fitted.notes)
-    rate = fitted.annual_rate(rocking.HazardCurve([1.0, 9.0], [1e-2, 1e-4])).rate("overturning")
-    assert rate.interval[0] < 1e-3 * rate.annual_rate and math.isinf(rate.interval[1])
-
-
 def test_the_bootstrap_draws_counted_outcomes_one_by_one():
     intensity, exceeded, trials = np.array([2.0, 3.0, 4.0, 5.0]), np.array([1, 4, 7, 10]), 10
     band = Band("bootstrap", samples=4000)
@@ -712,15 +700,6 @@ def test_motions_of_one_label_count_together_as_their_outcomes_do():
     assert "2 clusters cannot tell how far clusters differ" in " ".join(two.notes)
 
 
-def test_motions_are_of_one_cluster_by_label_or_as_multiples_perhaps_through_others():
-    one, other, third, fourth = PULSES[:4]
-    given = [one, other, third, one.scaled(2.0), fourth, fourth]
-    assert clusters_of(given, ["a", "b", "b", "b", None, ""]).tolist() == [0, 0, 0, 0, 1, 1]
-    assert clusters_of(given).tolist() == families_of(given).tolist() == [0, 1, 2, 0, 3, 3]
-    with pytest.raises(rocking.InvalidOption, match=r"clusters must hold 13 labels, .* one for each motion"):
-        fragility(BLOCK, PULSES, levels=[2.0, 4.0], clusters=["a", "b"])
-
-
 def test_components_of_one_station_are_one_cluster_where_that_is_asked_for_and_noted_where_not(capsys):
     named = [rocking.records.load(name) for name in ("el-centro-meloland-270", "ridgecrest-clc-090")]
     beside = rocking.records.load("el-centro-meloland-360").scaled(2.0)
@@ -769,50 +748,6 @@ def test_motions_that_are_scaled_to_one_level_are_at_one_intensity(level):
     assert len({motion.pga for motion in motions}) > 1
     with pytest.raises(rocking.Unfitted, match="all outcomes are at one intensity"):
         fragility(block, motions)
-
-
-def test_stripes_that_rounding_spreads_are_stripes():
-    levels = np.repeat([1.0, 2.0, 3.0, 4.0, 5.0, 6.0], 10)
-    fell = np.concatenate([np.arange(10) < count for count in (1, 2, 4, 6, 8, 9)])
-    rng = np.random.default_rng(0)
-    spread = levels * (1.0 + 2.0**-52 * rng.integers(-1, 2, levels.size))
-    one, other = (fit_fragility(each, fell).curves[0] for each in (levels, spread))
-    assert (other.goodness.freedom, one.goodness.freedom) == (4, 4)
-    assert other.goodness.p_value == pytest.approx(one.goodness.p_value, rel=1e-9)
-    assert other.median == pytest.approx(one.median, rel=1e-9)
-
-
-def test_a_draw_of_the_data_themselves_is_half_below_them():
-    """With three motions a fifth of the draws are; their fits differ from the fit in the last digits."""
-    motions = np.repeat([0, 1, 2], 5)
-    levels = np.tile([1.0, 2.0, 3.0, 4.0, 5.0], 3)
-    fell = levels >= np.repeat([3.0, 2.0, 4.0], 5)
-    curve = fit_fragility(levels, fell, clusters=motions, band=Band("bootstrap", samples=2000)).curves[0]
-    values = curve._uncertainty.fits
-    estimate = curve.fitted
-    near = np.abs(values.slope - estimate.slope[0]) < 1e-9 * estimate.slope[0]
-    assert 0.1 < near.mean() < 0.35
-    assert curve.dispersion_interval[0] < 1e-6 < curve.dispersion < curve.dispersion_interval[1]
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("overlap", [1e-3, 1e-4, 1e-5])
-def test_steep_curves_have_the_ends_of_their_profile_likelihood(overlap):
-    z = np.array([0.0, 0.2, 0.5, 0.5 + overlap, 0.5 + 2.0 * overlap, 0.5 + 3.0 * overlap, 0.8, 1.0])
-    fell = np.array([0, 0, 0, 1, 0, 1, 1, 1])
-    curve = fit_fragility(np.exp(z), fell).curves[0]
-
-    def lost(dispersion):
-        def minus(at):
-            score = (z - at) / dispersion
-            return -float(np.sum(np.where(fell, stats.norm.logcdf(score), stats.norm.logsf(score))))
-
-        return min(minimize(lambda x: minus(x[0]), [start], method="Nelder-Mead").fun for start in (0.4, 0.5, 0.6))
-
-    most = min(lost(each) for each in np.geomspace(0.1 * overlap, 1.0, 60))
-    end = curve.dispersion_interval[1]
-    assert end == pytest.approx(0.4676, abs=2e-3)
-    assert lost(end) - most == pytest.approx(0.5 * stats.chi2.ppf(0.9, 1), rel=5e-3)
 
 
 def test_labels_of_pandas_that_are_missing_are_on_their_own_and_masked_outcomes_are_refused():

@@ -153,17 +153,6 @@ def test_given_levels_that_begin_or_end_in_a_band_leave_it_open():
     assert np.isnan(safe.overturning_level.values).all()
 
 
-@pytest.mark.thorough
-def test_the_larger_of_two_similar_blocks_is_safer_under_records():
-    names = ("el-centro-meloland-270", "el-centro-meloland-360", "ridgecrest-tow2-090")
-    motions = [rocking.records.load(name) for name in names]
-    blocks = Blocks(p=[1.5, 3.0], alpha=0.2, restitution=0.9)
-    levels = np.geomspace(1.0, 40.0, 40)
-    dataset = incremental_dynamic_analysis(blocks, motions, measure="pga_ratio", levels=levels, tolerance=1e-3)
-    large, small = dataset.overturning_level.values.T
-    assert np.all(large > small)
-
-
 def test_the_figure_shows_peaks_and_bands(analysis):
     _, dataset = analysis
     curves, strip = dataset.plot(block=1).axes
@@ -223,25 +212,6 @@ def test_levels_of_a_spectral_acceleration_say_its_period_and_damping():
     assert about["measure"] == "spectral acceleration at 1 s, damping 0.02"
     assert "spectral acceleration at 1 s, damping 0.02 (g) that overturns" in found.summary()
     assert "damping" not in incremental_dynamic_analysis(BLOCK, PULSE, levels=[3.0, 9.0]).to_dict()
-
-
-@pytest.mark.thorough
-def test_the_ends_of_bands_are_those_of_simulations_where_restitution_is_drawn():
-    """How many impacts are followed decides what is drawn next, so a treatment of its own would move the ends."""
-    first, second = rocking.pulses.sine(4.0, 1.5, cycles=3), rocking.pulses.sine(4.5, 1.2, cycles=4)
-    values = np.zeros(1400)
-    for start, pulse in ((0, first), (800, second)):
-        t = 0.01 * np.arange(int(pulse.duration / 0.01))
-        values[start : start + t.size] = pulse.acceleration(t)
-    motion = rocking.Motion.from_samples(values, 0.01)
-    ends = []
-    for seed in range(4):
-        restitution = rocking.RandomRestitution(0.5, 0.95, seed=seed)
-        body = rocking.RestrainedBlock(rocking.Block(width=0.3, height=1.2), restitution=restitution)
-        found = incremental_dynamic_analysis(body, motion, levels=np.geomspace(2.5, 14.0, 30))
-        ends += [(body, level) for band in found.bands() for level in band if not math.isnan(level)]
-    assert len(ends) >= 6
-    assert all(both_verdicts_are_near(body, motion, level, "pga") for body, level in ends)
 
 
 @pytest.mark.cases(fast=1)

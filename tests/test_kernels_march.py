@@ -209,26 +209,6 @@ def test_recording_or_not_gives_the_same_bits(nonlinear: bool, columns: int) -> 
                 assert kept.at[name] == state_alone.at[name], name
 
 
-@pytest.mark.parametrize("nonlinear", [False, True])
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_the_mirrored_motion_mirrors_the_march_bit_for_bit(nonlinear: bool, sign: float) -> None:
-    pairs = {"p": (2.0, 2.6), "alpha": (0.15, 0.12), "e": (0.9, 0.8)}
-    mirrored = {name: pair[::-1] for name, pair in pairs.items()}
-    for seed in range(4):
-        ground = record(seed)
-        one = run(ground, nonlinear=nonlinear, velocity=sign * 0.01, **pairs)
-        opposite = with_rows(ground, -ground.pieces[:-1, 2:])
-        other = run(opposite, nonlinear=nonlinear, velocity=-sign * 0.01, **mirrored)
-        expected = one.nodes.copy()
-        expected["side"] = np.where(one.nodes["side"] == state.AT_REST, state.AT_REST, 1 - one.nodes["side"])
-        assert_array_equal(other.nodes, expected)
-        for name in ("impacts", "events"):
-            expected = getattr(one, name).copy()
-            expected["side"] *= -1
-            assert_array_equal(getattr(other, name), expected)
-        assert_array_equal(one.sequences, other.sequences)
-
-
 # ---- Rest and uplift ----
 
 
@@ -365,13 +345,6 @@ def test_other_treatments_end_a_sequence_at_their_threshold(treatment: int, limi
 
 
 # ---- States that rounding could break ----
-
-
-@pytest.mark.parametrize("rotation", [1e-300, 1e-20, 1e-17, 1e-15])
-def test_a_rotation_lost_in_rounding_does_not_hide_the_impact(rotation: float) -> None:
-    found, expected = run(NO_GROUND, rotation=rotation, velocity=0.1), run(NO_GROUND, velocity=0.1)
-    assert len(found.impacts) == len(expected.impacts)
-    assert found.impacts["time"] == pytest.approx(expected.impacts["time"], abs=1e-12)
 
 
 def test_an_impact_on_a_breakpoint_is_struck_once_and_with_full_speed() -> None:

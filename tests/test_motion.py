@@ -1,14 +1,11 @@
 """Laws of the piecewise polynomial ground motion."""
 
 import pickle
-import re
 import subprocess
 import sys
 from dataclasses import replace
 from fractions import Fraction
-from xml.etree import ElementTree
 
-import matplotlib.figure
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -456,42 +453,6 @@ def test_what_is_no_text_and_no_number_is_refused(made):
     assert "\n" not in str(caught.value)
 
 
-def test_a_motion_shows_itself_in_one_short_line():
-    motion = Motion.from_samples(np.sin(np.arange(10_000.0)) / 3.0, 0.005, name="ramp")
-    assert repr(motion) == "<Motion: ramp, 49.995 s in steps of 0.005 s, peak 0.33333 m/s^2 (0.03399 g)>"
-    assert repr(motion.scaled(2.0)).endswith("; scaled by 2>")
-    pulse = pulses.sine(1.0 / 3.0, 2.0, cycles=1)
-    assert repr(pulse.description) == "<Description: sine, amplitude 0.33333, frequency 2, cycles 1, phase 0>"
-    assert "0.3333333" not in (pulse + pulse).description.text
-
-
-def test_a_notebook_shows_the_motion_with_its_peaks_in_the_colour_of_the_text():
-    samples = np.zeros(20_000)
-    samples[12_345] = -4.9033
-    page = Motion.from_samples(samples, 0.01, name="spike <&>")._repr_html_()
-    ElementTree.fromstring(page)
-    assert "spike &lt;&amp;&gt;" in page
-    assert "currentColor" in page and "#" not in page
-    line = max(re.findall(r'points="([^"]*)"', page), key=len).split()
-    heights = [float(point.split(",")[1]) for point in line]
-    assert len(line) <= 400
-    assert heights.index(max(heights)) == pytest.approx(len(line) * 12_345 / 20_000, abs=3)
-    assert "-0.5" in page
-    assert ">0</text>" in page and ">200 s</text>" in page
-    assert [line[0].split(",")[0], line[-1].split(",")[0]] == ["56.0", "470.0"]
-
-
-def test_a_motion_draws_itself_into_given_axes():
-    figure = matplotlib.figure.Figure()
-    one, other = figure.subplots(2)
-    motion = pulses.sine(9.80665, 1.0, cycles=1)
-    assert motion.plot(ax=other) is figure
-    assert not one.lines
-    drawn = other.lines[-1].get_xydata()
-    assert np.max(drawn[:, 1]) == pytest.approx(1.0, abs=1e-3)
-    assert " ".join(motion.plot().axes[0].get_ylabel().split()) == "ground acceleration (g)"
-
-
 def test_motions_import_without_slow_libraries():
     code = (
         "import sys; import rocking.motion.motion, rocking.motion.pulses, rocking.motion.records as r;"
@@ -594,12 +555,3 @@ def test_a_reversed_record_points_the_other_way():
     times = np.linspace(0.0, 20.0, 501)
     assert turned.acceleration(times) == pytest.approx(east.acceleration(times), abs=1e-12)
     assert not turned.description.origin.reversed
-
-
-def test_a_drawing_shows_jumps_where_they_are():
-    twice = pulses.rectangular(4.0, 1.0) + pulses.rectangular(-8.0, 0.5)
-    times = twice.drawing_times(-1.0, 3.0)
-    drawn = np.interp([0.25, 0.499999, 0.500001, 0.999999, 1.000001, 2.0], times, twice.acceleration(times))
-    assert drawn == pytest.approx([-4.0, -4.0, 4.0, 4.0, 0.0, 0.0], abs=1e-12)
-    even = Motion.from_samples([0.0, 1.0, -2.0, 1.0], 0.5)
-    assert even.drawing_times(0.0, 2.0).tolist() == [0.0, 0.5, 1.0, 1.5, np.nextafter(1.5, 2.0), 2.0]

@@ -139,20 +139,3 @@ def test_other_commands_take_pulses_too(run):
     assert "sine" in out
     code, _, err = run("ida", "--pulse", "one-sine:amplitude=1,frequency=2", *BLOCK, "--levels", "0.3g,0.5g")
     assert (code, err) == (0, "")
-
-
-def test_a_history_is_calibrated_under_a_pulse(run, tmp_path, coarse):
-    block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
-    response = rocking.simulate(block, named_pulse("one-sine:amplitude=0.3g,frequency=1"), duration=3.0)
-    time = np.linspace(0.0, 3.0, 301)
-    table = tmp_path / "history.csv"
-    rows = [f"{t:.12g},{r:.12g}" for t, r in zip(time, response.rotation(time), strict=True)]
-    table.write_text("\n".join(["time_s,rotation_rad", *rows]))
-    pulse = "one-sine:amplitude=0.3g,frequency=1Hz"
-    known = ("--p", 2, "--alpha", 0.2, "--restitution", "0.8,0.95")
-    code, out, err = run("calibrate", table, "--pulse", pulse, *known, "--json")
-    assert (code, err) == (0, "")
-    assert json.loads(out)["estimates"]["restitution"]["value"] == pytest.approx(0.9, abs=1e-3)
-    code, _, err = run("calibrate", table, "--pulse", pulse, "--pulse", SINE, "--p", 2, "--alpha", 0.2)
-    assert (code, err.count("\n")) == (2, 1)
-    assert "one --pulse" in err

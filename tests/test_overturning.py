@@ -82,15 +82,6 @@ def test_a_second_region_overturns_after_one_impact_with_safety_above_it():
     ]
 
 
-@pytest.mark.cases(fast=1)
-@pytest.mark.parametrize("pulse", ["half-sine", "one-cosine", "one-sine"])
-def test_the_larger_of_two_similar_blocks_is_safer(pulse):
-    # A larger block has a smaller p, so the same pulse has a larger ratio to it.
-    ratios = np.linspace(1.5, 4.0, 6)
-    dataset = overturning_map(BLOCK, pulse, amplitudes=np.linspace(0.5, 14.0, 28), frequencies=ratios)
-    assert np.all(np.diff(dataset.overturning_amplitude) > 0.0)
-
-
 def test_boundaries_separate_what_simulate_says():
     dataset = overturning_map(BLOCK, "one-sine", amplitudes=[0.5, 2.0, 4.0, 7.0, 10.0], frequencies=[4.5])
     motion = rocking.pulses.one_sine(1.0, 4.5 * 2.0 / (2.0 * math.pi))
@@ -138,17 +129,6 @@ def test_a_block_that_overturns_after_a_rest_is_told_so():
     assert "3 or less" in dataset.summary()
     (legend,) = dataset.plot().legends
     assert [text.get_text() for text in legend.get_texts()] == [mode_name(-4)]
-
-
-@pytest.mark.thorough
-def test_only_ratios_count():
-    larger = rocking.Block.from_parameters(p=0.7, alpha=0.2, restitution=0.9)
-    maps = [
-        overturning_map(block, "one-cosine", amplitudes=np.linspace(0.5, 8.0, 9), frequencies=[1.0, 3.0])
-        for block in (BLOCK, larger)
-    ]
-    np.testing.assert_array_equal(maps[0].mode, maps[1].mode)
-    np.testing.assert_allclose(maps[0].boundary_amplitude, maps[1].boundary_amplitude, rtol=3e-9)
 
 
 def test_a_mirrored_two_sided_block_under_a_mirrored_pulse():
@@ -322,12 +302,6 @@ def test_a_pulse_with_a_vertical_component_overturns_where_single_simulations_sa
             assert response.overturned == falls
 
 
-def test_a_map_is_the_same_in_one_thread_and_in_several():
-    grid = {"amplitudes": [0.5, 2.0, 6.0], "frequencies": [1.0, 4.0], "tolerance": 1e-4}
-    one, several = (overturning_map(BLOCK, "one-sine", threads=count, **grid) for count in (1, 3))
-    assert one.data.identical(several.data)
-
-
 def test_the_summary_tells_none_from_already_the_first():
     block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     low = rocking.overturning_map(block, "one-sine", amplitudes=[0.5, 1.5], frequencies=[5.0]).summary()
@@ -342,17 +316,6 @@ def test_every_family_of_pulses_is_mapped_by_name_or_known_to_need_a_function() 
     page = (Path(__file__).parent.parent / "docs" / "howto" / "overturning-map.md").read_text("utf-8")
     for text in (overturning_map.__doc__ or "", page):
         assert all(name in text for name in PULSES)
-
-
-@pytest.mark.parametrize(("amplitudes", "frequencies"), [([1.5, 2.0, 5.0], [3.0]), ([2.0], [2.0, 3.0]), ([2.0], [3.0])])
-def test_a_map_of_one_column_or_one_row_is_drawn(amplitudes, frequencies):
-    block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
-    axes = overturning_map(block, "half-sine", amplitudes=amplitudes, frequencies=frequencies).plot().axes[0]
-    corners = np.vstack([path.vertices for shape in axes.collections for path in shape.get_paths()])
-    # What is drawn fills the frame.
-    assert corners.min(axis=0).tolist() == [axes.get_xlim()[0], axes.get_ylim()[0]]
-    assert corners.max(axis=0).tolist() == [axes.get_xlim()[1], axes.get_ylim()[1]]
-    assert (np.ptp(corners, axis=0) > 0.0).all()
 
 
 def test_a_function_of_samples_at_a_constant_step_is_of_one_shape():

@@ -51,19 +51,6 @@ def test_derivatives_in_an_ensemble_are_those_of_its_responses_to_the_bit(model:
     assert counts["known"] >= 12
 
 
-@pytest.mark.cases(fast=0, thorough=1)
-@pytest.mark.parametrize("model", ["linear", "nonlinear"])
-def test_derivatives_in_larger_ensembles_are_those_of_their_responses_to_the_bit(model: str) -> None:
-    shaken = [record(3), rocking.pulses.ricker(3.0, 1.0), record(4).with_vertical(record(5, 30))]
-    counts = judged(blocks(90, 2), shaken, [1.0], model=model)  # more bodies than go together
-    assert counts["known"] >= 100
-    laws = [rocking.FallingRestitution(0.95, 0.3, 0.5), rocking.RandomRestitution(0.6, 0.95, seed=3)]
-    bodies = rocking.RestrainedBlocks.of(
-        [rocking.RestrainedBlock(rocking.Block(width=0.4, height=2.0), restitution=law) for law in laws]
-    )
-    assert judged(bodies, [record(3)], [0.8, 1.0, 1.2], model=model, chattering="bypass")["known"] >= 4
-
-
 def test_derivatives_of_restrained_blocks_are_those_of_their_responses() -> None:
     bodies = [drawn(seed)[0] for seed in (1, 2, 3, 4)]
     many = rocking.RestrainedBlocks.of(bodies)
@@ -92,19 +79,6 @@ def test_derivatives_between_stops_are_those_of_the_responses_by_the_start_too()
                 known += 1
     assert known >= 4
     assert beyond >= 1
-
-
-def test_a_peak_is_predicted_by_its_derivatives() -> None:
-    """By all four at once: 0.01 % more of each changes the peak as their sum says."""
-    many, motion, share = blocks(12, 5), record(7), 1e-4
-    found = simulate_many(many, motion, derivatives=True)
-    more = Blocks(**{name: getattr(many, name) * (1.0 + share) for name in ("p", "alpha", "restitution")})
-    changed = simulate_many(more, motion * (1.0 + share))
-    known = ~found.overturned.values[0] & ~changed.overturned.values[0] & (found.peak_rotation.values[0] > 0.0)
-    together = sum(found[f"peak_by_{name}"].values[0] for name in NAMES)
-    actual = (changed.peak_rotation - found.peak_rotation).values[0]
-    assert np.count_nonzero(known) >= 4
-    assert actual[known] == pytest.approx(share * together[known], rel=0.02, abs=1e-9)
 
 
 def test_where_rounding_decides_on_a_touch_there_is_no_derivative() -> None:

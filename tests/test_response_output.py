@@ -264,25 +264,6 @@ def test_unknown_units_and_times_that_are_no_numbers_are_refused(shaken):
             evaluate("1.0")
 
 
-def test_no_time_beside_another_has_more_digits_than_it():
-    """A rectangular pulse takes the block just over its balance: the times of tipping and falling are not known."""
-    amplitude, block = 3.0, Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
-    critical = math.acosh(1.0 + 0.5 / (amplitude * (amplitude - 1.0))) / 2.0  # Housner (1963)
-    pulse = rocking.pulses.rectangular(amplitude * 9.80665 * 0.2, critical * (1.0 + 1e-11))
-    response = simulate(block, pulse, model="linear")
-    assert response.overturned
-    lines = response.summary().splitlines()
-    assert "undecided: overturns in 3 of 5 motions within 3e-6, at 8 to 14 s; AMBIGUOUS" in lines[-2]
-    assert re.search(r"^peak rotation +1.5708 rad at 8 to 14 s", "\n".join(lines), re.MULTILINE)
-    assert re.fullmatch(r"about \d s", summary.tipping_text(response))
-    (row,) = survey(block, {"pulse": pulse}, model="linear").rows()
-    assert row["ambiguous"] and not row["decided"]
-    assert row["verdict"] == "undecided: overturns in 3 of 5 (3e-6), 6 of 11 (0.1 %), AMBIGUOUS"
-    known = simulate(block, rocking.pulses.rectangular(amplitude * 9.80665 * 0.2, 1.2 * critical), model="linear")
-    assert re.fullmatch(r"\d+\.\d{3,4} s", summary.peak_time_text(known))
-    assert re.fullmatch(r"\d+\.\d{3,4} s", summary.tipping_text(known))
-
-
 @pytest.mark.parametrize(
     ("below", "shown"),
     [

@@ -90,21 +90,6 @@ def test_a_vertical_motion_changes_the_weight_that_lifts_a_tied_block_and_not_it
     assert thresholds[0] < 0.9
 
 
-@pytest.mark.thorough
-def test_measures_are_compared_by_the_levels_of_incremental_analyses():
-    motions = PULSES[:3]
-    found = rocking.compare_measures(FACADE, motions, periods=[1.0], tolerance=1e-3)
-    pga = found.data.intensity.values[0, :, 0]
-    assert np.all(np.isfinite(pga))
-    for motion, level in zip(motions, pga.tolist(), strict=True):
-        below, above = (
-            rocking.simulate(FACADE, motion.scaled(f * level / motion.pga)).overturned for f in (0.999, 1.001)
-        )
-        assert (below, above) == (False, True)
-    in_units = found.data.intensity.sel(measure="PGA / uplift acceleration").values[:, 0]
-    np.testing.assert_allclose(in_units, pga / FACADE.uplift_thresholds()[0], rtol=1e-12)
-
-
 def test_a_spectrum_makes_restraints_larger_with_their_block():
     def body(size, *, mass=2e3):
         """The same body at another size, with forces that keep their ratio to the weight."""

@@ -383,16 +383,6 @@ def test_a_part_has_no_numbers_of_the_whole(results, of_several):
             results[name].select(**{dimension: results[name].data[dimension].values[0]})
 
 
-@pytest.mark.thorough
-def test_a_part_of_an_overturning_map_has_the_boundaries_within_it():
-    whole = rocking.overturning_map(BLOCK, "one-sine", amplitudes=np.arange(1.0, 9.0), frequencies=[2.0, 3.0, 4.0])
-    part = whole.select(frequency=[2.0, 4.0], amplitude=[3.0, 5.0, 7.0])
-    kept = [each for each in whole.to_dict()["boundaries"] if each["boundary_frequency"] != 3.0]
-    kept = [each for each in kept if 3.0 < each["boundary_amplitude"] <= 7.0]
-    assert part.to_dict()["boundaries"] == kept and 0 < len(kept) < len(whole.to_dict()["boundaries"])
-    assert len(part.plot().axes) == 1
-
-
 def test_names_are_no_html():
     motion = replace(PULSE, name="A&B <b>PGA<0.3</b>")
     blocks = rocking.Blocks.grid(p=[1.0, 2.0], alpha=[0.2], restitution=[0.9])

@@ -142,53 +142,6 @@ def test_steep_hazards_and_flat_fragilities_have_the_rate_and_the_intensities_of
     assert found.below > 0.99
 
 
-@pytest.mark.parametrize("ends", [(1.0, 1.0001), (5.0, 5.5), (0.01, 0.011)])
-def test_shares_far_out_in_either_tail_keep_their_digits(ends: tuple[float, float]) -> None:
-    hazard = HazardCurve(np.linspace(*ends, 4), [1e-2, 8e-3, 1e-3, 1e-7])
-    fitted = fragility_with(1.0, 0.05)
-    found = fitted.annual_rate(hazard).rates[0]
-    with mpmath.workdps(600):
-        parts = closed_parts(fitted.curves[0], hazard)
-        total = mpmath.fsum(parts)
-        assert found.annual_rate == pytest.approx(float(total), rel=1e-9)
-        first, last = (product(fitted.curves[0], hazard, float(x)) for x in hazard.intensity[[0, -1]])
-        assert found.below == pytest.approx(float((parts[0] - first) / total), rel=1e-9, abs=1e-300)
-        assert found.above == pytest.approx(float((parts[-1] + last) / total), rel=1e-9, abs=1e-300)
-        for share, intensity in zip((0.16, 0.5, 0.84), found.intensities, strict=True):
-            up_to = mpmath.fsum(closed_parts(fitted.curves[0], hazard, intensity))
-            up_to -= product(fitted.curves[0], hazard, intensity)
-            assert float(up_to / total) == pytest.approx(share, abs=1e-9)
-
-
-def closed_parts(curve: object, hazard: HazardCurve, until: float = math.inf) -> list[mpmath.mpf]:
-    """Rates from each segment, up to an intensity, each by its own closed form."""
-    a, b = (mpmath.mpf(float(value[0])) for value in curve.fitted)
-    x, rate = ([mpmath.log(mpmath.mpf(float(value))) for value in values] for values in (hazard.intensity, hazard.rate))
-    k = [(rate[i] - rate[i + 1]) / (x[i + 1] - x[i]) for i in range(len(x) - 1)]
-    c = [rate[i] + k[i] * x[i] for i in range(len(k))]
-    ends = [-mpmath.inf, *x, mpmath.inf]
-    stop = mpmath.log(mpmath.mpf(until)) if until < math.inf else mpmath.inf
-    parts = []
-    for i, (low, high) in enumerate(itertools.pairwise(ends)):
-        j = min(max(i - 1, 0), len(k) - 1)
-        last = min(high, stop)
-        if last <= low:
-            break
-        chance = mpmath.ncdf(a + b * last + k[j] / b) - mpmath.ncdf(a + b * low + k[j] / b)
-        parts.append(mpmath.exp(c[j] + k[j] * a / b + (k[j] / b) ** 2 / 2) * chance)
-    return parts
-
-
-def product(curve: object, hazard: HazardCurve, intensity: float) -> mpmath.mpf:
-    """Probability at an intensity times the rate of reaching it, on the line between points or on its extension."""
-    a, b = (mpmath.mpf(float(value[0])) for value in curve.fitted)
-    x, rate = ([mpmath.log(mpmath.mpf(float(value))) for value in values] for values in (hazard.intensity, hazard.rate))
-    at = mpmath.log(mpmath.mpf(intensity))
-    i = max(sum(each <= at for each in x[1:-1]), 0)
-    line = rate[i] + (rate[i + 1] - rate[i]) * (at - x[i]) / (x[i + 1] - x[i])
-    return mpmath.exp(line) * mpmath.ncdf(a + b * at)
-
-
 def test_a_steep_fragility_is_exceeded_as_often_as_its_median() -> None:
     hazard = HazardCurve([1.0, 2.0, 4.0, 8.0], [1e-2, 3e-3, 4e-4, 2e-5])
     rate = fragility_with(3.0, 0.01).annual_rate(hazard).rates[0]
@@ -329,22 +282,6 @@ def test_a_missing_file_and_another_measure_are_refused(tmp_path: Path) -> None:
         HazardCurve([0.1, 1.0], [1e-2, 1e-3], "pga_ratio")
 
 
-@pytest.mark.thorough
-def test_the_command_gives_annual_rates(run, tmp_path: Path) -> None:
-    site = tmp_path / "site.csv"
-    site.write_text("pga_g,annual_rate\n0.05,0.05\n0.2,0.005\n1.0,0.00005\n")
-    records = [name for name in rocking.records.names() if not name.endswith("up")]
-    options = ["--width", "0.3", "--height", "1.5", "--levels", "0.1g:1.2g:12", "--hazard", site, "--years", "100"]
-    code, out, _ = run("fragility", *records, *options, "--out", tmp_path / "out")
-    assert code == 0
-    assert "probability in 100 years" in out
-    written = json.loads((tmp_path / "out" / "result.json").read_text())["risk"]
-    rate = written["rates"][0]["annual_rate"]
-    assert written["rates"][0]["probability"] == pytest.approx(-math.expm1(-100.0 * rate))
-    assert (tmp_path / "out" / "risk.png").stat().st_size > 10_000
-    assert run("fragility", *records, *options, "--years", "-1")[0] == 2
-
-
 def test_a_table_from_a_spreadsheet_with_semicolons_and_decimal_commas_is_read(tmp_path: Path) -> None:
     path = tmp_path / "site.csv"
     path.write_bytes("PGA (m/s^2);Annual rate\r\n0,5;0,05\r\n1,0;0,02\r\n".encode("utf-8-sig"))
@@ -382,32 +319,12 @@ def test_a_hazard_curve_that_looks_as_if_in_per_cent_of_g_is_noted(run, tmp_path
     assert "even the weakest motions of the hazard curve have 98.0665 m/s^2 (10 g)" in notes
 
 
-def test_an_interval_that_ends_beyond_the_hazard_curve_is_told() -> None:
-    few = rocking.fit_fragility([2.0, 3.0, 4.0, 5.0, 6.0, 7.0], [0, 0, 1, 0, 1, 1], trials=1)
-    steep = rocking.HazardCurve([1.0, 2.0, 4.0, 8.0], [1e-2, 3e-3, 5e-4, 5e-5])
-    risk = few.annual_rate(steep)
-    assert steep.rate[0] < risk.rates[0].interval[1] < math.inf
-    assert "it comes from weaker motions, to which the first line of the curve is extended" in risk.summary()
-    many = rocking.fit_fragility([2.0, 4.0, 8.0], [1, 4, 9], trials=10)
-    assert "is extended" not in many.annual_rate(steep).summary()
-
-
 @pytest.mark.parametrize("site", [1, -1, float("nan"), "x"])
 def test_a_table_has_one_site_only(tmp_path: Path, site: int) -> None:
     path = tmp_path / "site.csv"
     path.write_text("pga_g,annual_rate\n0.1,0.9\n0.2,0.5\n")
     with pytest.raises(InvalidOption, match="site"):
         HazardCurve.read(path, site=site)
-
-
-def test_a_return_period_has_the_digits_that_its_interval_leaves() -> None:
-    fitted = rocking.fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10)
-    risk = fitted.annual_rate(HazardCurve([0.5, 1.0, 2.0, 4.0, 8.0], [5e-2, 2e-2, 6e-3, 1.2e-3, 1.5e-4]))
-    one = risk.rates[0]
-    assert one.return_interval == (1.0 / one.interval[1], 1.0 / one.interval[0])
-    assert re.fullmatch(r"once in \d\d0 years \(\d\d0 to \d\d0\)", one.in_words())
-    assert one.in_words() in repr(one)
-    assert "peak ground acceleration (g) below which 16, 50, 84 % of the rate arises" in risk.summary()
 
 
 def test_the_figure_has_the_hazard_curve_and_the_shares_of_the_rate_on_axes_of_their_own() -> None:
@@ -419,12 +336,6 @@ def test_the_figure_has_the_hazard_curve_and_the_shares_of_the_rate_on_axes_of_t
     line = below.lines[0]
     assert np.trapezoid(line.get_ydata(), np.log(line.get_xdata())) == pytest.approx(1.0, abs=2e-3)
     assert any(risk.rates[0].in_words() in text.get_text() for text in figure.legends[0].get_texts())
-
-
-def test_figures_of_the_steepest_hazards_are_drawn() -> None:
-    risk = flat_fragility(3.0).annual_rate(HazardCurve([1.0, 1.5], [1e-2, 1e-2 * 1.5**-30.0]))
-    assert risk.plot().axes
-    assert "99" in risk.summary() or "100 %" in risk.summary()
 
 
 def test_survival_is_what_the_rate_and_the_curve_say() -> None:
@@ -519,27 +430,6 @@ def test_blocks_that_always_or_never_fall_or_at_once_have_their_part_in_the_mean
     assert found == pytest.approx(np.mean(np.exp(-100.0 * np.array(rates))), rel=1e-4)
 
 
-@pytest.mark.parametrize("hazard", [None, HazardCurve([0.5, 1.0, 2.0, 4.0, 8.0], [5e-2, 2e-2, 6e-3, 1.2e-3, 1.5e-4])])
-def test_no_text_goes_beyond_the_hazard_curve(hazard: HazardCurve | None) -> None:
-    """A curve that hardly rises: its own numbers are rates of a million a year and intensities of 1e12 g."""
-    flat = rocking.fit_fragility([1.0, 2.0, 3.0, 4.0], [470, 480, 485, 495], trials=1000, measure="pga")
-    stood = flat.survival(10_000.0, hazard)
-    texts = [stood.summary(), repr(stood)]
-    if hazard is not None:
-        risk = flat.annual_rate(hazard)
-        assert risk.rates[0].annual_rate > 10.0
-        texts += [risk.summary(), repr(risk), repr(risk.rates[0]), risk.rates[0].in_words()]
-        assert "once in < 20 years" in risk.summary() + repr(risk)
-        assert "> 0.05" in risk.summary()
-        assert "> 0.05" in stood.summary()
-        assert "< 0.00015" in stood.summary()
-    assert stood.intensity[-1] > 1e6
-    assert "some intensity above" in repr(stood)
-    for text in texts:
-        assert not re.search(r"e[+]\d\d", text), text
-        assert not re.search(r"(?:once in|years\)).*\de-0[2-9]", text), text
-
-
 def test_a_rate_from_above_the_hazard_curve_has_a_bound_and_no_estimate() -> None:
     strong = fragility_with(40.0, 0.3)
     site = HazardCurve([0.5, 1.0, 2.0, 4.0, 8.0], [5e-2, 2e-2, 6e-3, 1.2e-3, 1.5e-4])
@@ -549,22 +439,6 @@ def test_a_rate_from_above_the_hazard_curve_has_a_bound_and_no_estimate() -> Non
     assert "once in > 6700 years" in rate.in_words()
     # Were every motion above the last point to exceed the limit, the rate would be this.
     assert rate.bounds[0] == pytest.approx((1.0 - rate.above) * rate.annual_rate + 1.5e-4)
-
-
-def test_a_row_of_a_survival_never_denies_what_the_last_line_says() -> None:
-    """The bound of each row is above the probability of the whole, which is what every motion adds to."""
-    hazard = HazardCurve([0.5, 1.0, 2.0, 4.0, 8.0], [5e-2, 2e-2, 6e-3, 1.2e-3, 1.5e-4])
-    compared = 0
-    for median in (1.0, 2.0, 3.0, 5.0):
-        for dispersion in (0.2, 0.5, 1.0):
-            for years in (100.0, 1000.0, 10_000.0):
-                found = fragility_with(median, dispersion).survival(years, hazard)
-                header, *rows = found.summary().splitlines()[4:10]
-                assert header.endswith("survival at most")
-                for row in rows:
-                    assert float(row.split()[-1]) >= 0.99 * found.probability
-                    compared += 1
-    assert compared == 180
 
 
 @pytest.mark.parametrize(("a", "b"), [(-1.0, 1.5), (2.0, 0.7), (-6.0, 9.0), (20.0, 2.0), (-20.0, 1.0)])
@@ -590,17 +464,6 @@ def test_a_curve_that_does_not_rise_is_the_limit_of_flat_ones(a: float) -> None:
         rates, standing = _log_rate_within(flat, hazard)[:, 0], _log_standing(flat, hazard, 1000.0)[:, 0]
     assert np.exp(rates) == pytest.approx(chance * (1e-3 - 1e-5), rel=1e-6, abs=1e-21)
     assert np.exp(standing) == pytest.approx(1.0 - chance + chance * math.exp(-1.0), rel=1e-6)
-
-
-def test_motions_beyond_the_hazard_curve_contradict_nothing() -> None:
-    fitted = fragility_with(0.53 * G, 0.5)
-    found = fitted.survival(10_000.0, HazardCurve([0.005 * G, 0.05 * G], [5e-2, 1e-2]))
-    assert found.interval[1] < 0.05
-    assert found.most_probable > 0.99
-    assert not found.contradicts
-    assert "100 % of the rate is from above the hazard curve" in found.summary()
-    assert "< 0.01 " in found.summary()
-    assert found.to_dict()["share_above_hazard_curve"] > 0.99
 
 
 @pytest.mark.parametrize("drawn", [False, pytest.param(True, marks=pytest.mark.thorough)])
@@ -703,30 +566,6 @@ def test_rows_belong_together_by_motion_and_by_group_and_not_without_a_label(tmp
     assert len({*found.tolist()}) == 3 and found[1] == found[3]
 
 
-@pytest.mark.thorough
-def test_an_ensemble_has_its_weights_and_its_model_on_the_command_line(run, tmp_path: Path) -> None:
-    table = tmp_path / "ensemble.csv"
-    table.write_text(
-        "p_plus_rad_s,p_minus_rad_s,alpha_plus_rad,alpha_minus_rad,restitution_plus,restitution_minus,weight,model\n"
-        "1.5,1.5,0.2,0.22,0.9,0.9,0.75,linear\n3,3,0.2,0.2,0.9,0.9,0.25,linear\n"
-    )
-    records = [name for name in rocking.records.names() if not name.endswith("up")]
-    given = ["fragility", *records, "--levels", "1:12:12", "--ensemble", table]
-    code, out, _ = run(*given, "--json")
-    assert code == 0
-    blocks = rocking.Blocks([[1.5, 1.5], [3.0, 3.0]], [[0.2, 0.22], [0.2, 0.2]], [[0.9, 0.9], [0.9, 0.9]])
-    motions = [rocking.records.load(name) for name in records]
-    options = {"levels": np.linspace(1.0, 12.0, 12), "weights": [0.75, 0.25]}
-    expected = {model: rocking.fragility(blocks, motions, model=model, **options) for model in ("linear", "nonlinear")}
-    found = json.loads(out)
-    assert found["curves"][0]["median"] == pytest.approx(expected["linear"].curves[0].median)
-    said = json.loads(run(*given, "--model", "nonlinear", "--json")[1])
-    assert said["curves"][0]["median"] == pytest.approx(expected["nonlinear"].curves[0].median)
-    assert "leave --p out" in run(*given, "--p", "3")[2]
-    assert "2 blocks, weighted" in run("spectrum", *records[:2], "--ensemble", table)[1]
-    assert "2 blocks, weighted" in run("measures", *records[:2], "--ensemble", table)[1]
-
-
 @pytest.mark.parametrize("heading", ["PGA (g),pga_g,overturned", "pga_g,overturned,Overturned"])
 def test_two_columns_of_one_name_are_refused(heading: str, tmp_path: Path) -> None:
     path = tmp_path / "seen.csv"
@@ -755,12 +594,6 @@ def test_per_cent_in_a_heading_are_not_passed_over(tmp_path):
     path.write_text("PGA (g),annual rate (%)\n0.1,1\n0.4,0.01\n")
     with pytest.raises(InvalidOption, match=r"annual_rate and one of .*, not PGA \(g\), annual rate \(%\)"):
         HazardCurve.read(path)
-
-
-def test_the_figure_of_a_survival_has_a_range_however_wide_the_curve():
-    for fell in ([500, 500, 500, 501], [499, 500, 500, 501]):
-        figure = rocking.fit_fragility([1, 2, 3, 4], fell, trials=1000).survival(100).plot()
-        assert figure.axes
 
 
 @pytest.mark.parametrize(

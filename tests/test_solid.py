@@ -12,14 +12,11 @@ import numpy as np
 import pytest
 import trimesh
 from scipy.integrate import quad
-from scipy.optimize import linprog
-from scipy.spatial import ConvexHull, HalfspaceIntersection
 from scipy.spatial.transform import Rotation
 
 import rocking
 from rocking import Block, InvalidBlock, InvalidOption, Solid
 from rocking.solid.moments import moments
-from rocking.solid.overlap import overlaps
 from rocking.solid.reading import _NothingElse, upright
 from rocking.solid.repair import agreeing, closed, is_closed, joined, shells_of
 
@@ -350,41 +347,6 @@ def test_what_two_boxes_have_in_common_is_said_once_and_exactly(at, sizes, commo
             f"{names} overlap in at least {common:.3g} m^3, which is counted twice: make one surface of the two, cut "
             "one out of the other, or, if one is a cavity, turn its normals inwards"
         )
-
-
-@pytest.mark.parametrize("pairs", [1, pytest.param(30, marks=pytest.mark.slow)])
-def test_what_is_proven_in_common_is_never_more_than_there_is(pairs):
-    rng, shares = np.random.default_rng(3), []
-    for _ in range(pairs):
-        half, middles = rng.uniform(0.2, 0.5, (2, 3)), rng.uniform(-0.2, 0.2, (2, 3))
-        turns = Rotation.random(2, random_state=rng).as_matrix()
-        meshes, planes = [], []
-        for k in range(2):
-            mesh = trimesh.creation.box(2.0 * half[k])
-            mesh.vertices = mesh.vertices @ turns[k].T + middles[k]
-            meshes.append(closed(joined(np.asarray(mesh.vertices), np.asarray(mesh.faces))))
-            normals = np.vstack([turns[k].T, -turns[k].T])
-            planes.append(np.column_stack([normals, -np.tile(half[k], 2) - normals @ middles[k]]))
-        exact = convex_volume(np.vstack(planes))
-        found = overlaps(["one", "other"], meshes)
-        proven = float(found[0].partition("at least ")[2].partition(" ")[0]) if found else 0.0
-        assert proven <= exact * (1.0 + 1e-9)
-        shares.append(proven / exact)
-    assert len(shares) == pairs and min(shares) > 0.2
-
-
-def convex_volume(planes):
-    """Volume between planes, by linear programming for a place inside and the hull of the corners."""
-    normals, off = planes[:, :3], planes[:, 3]
-    place = linprog([0, 0, 0, -1], np.column_stack([normals, np.ones(len(off))]), -off, bounds=[(None, None)] * 4)
-    return ConvexHull(HalfspaceIntersection(planes, place.x[:3]).intersections).volume
-
-
-def test_three_pairs_are_named_and_the_others_counted():
-    towers = {f"t{k}": box((1.0, 0.5, 1.0), at=(0.9 * k, 0.0)) for k in range(6)}
-    (note,) = Solid.from_mesh(scene(**towers)).notes
-    assert note.count("overlap in at least 0.05 m^3") == 3
-    assert ", and so do 2 more pairs, which is counted twice: " in note
 
 
 def test_faces_that_are_none_or_come_twice_are_left_out():
@@ -760,45 +722,6 @@ def test_a_piece_that_is_turned_inside_out_and_touches_the_rest_is_none_of_its_c
     assert found.repairs == ("1 separate surface turned inside out",)
     upright = Solid.from_mesh(trimesh.util.concatenate([_box((2, 2, 4), (0, 0, 2)), _box(size, at)]))
     assert found.volume == pytest.approx(upright.volume, rel=1e-12)
-
-
-@pytest.mark.parametrize("at", [(0.75, 0.75, 3.75), (0.75, 0.75, 2.0)])
-def test_a_cavity_that_touches_the_surface_at_corners_or_edges_is_one(at):
-    size = (0.5, 0.5, 0.5) if at[2] > 3.0 else (0.5, 0.5, 4.0)
-    found = Solid.from_mesh(trimesh.util.concatenate([_box((2, 2, 4), (0, 0, 2)), _box(size, at, inverted=True)]))
-    assert found.volume == pytest.approx(16.0 - np.prod(size), rel=1e-12)
-
-
-def test_a_small_part_of_a_large_body_has_an_inside():
-    whole = trimesh.Scene()
-    for name, mesh in (
-        ("temple", _box((8, 8, 20), (0, 0, 10))),
-        ("clamp", _box((0.02, 0.02, 0.015), (0, 0, 20.0075))),
-    ):
-        whole.add_geometry(mesh, node_name=name, geom_name=name)
-    found = Solid.from_mesh(whole, density={"temple": 2000.0, "clamp": 7000.0})
-    assert found.volume == pytest.approx(1280.000006, rel=1e-12)
-
-
-@pytest.mark.parametrize("noise", [0.0, 1e-12, 1e-10, 1e-9])
-def test_corners_that_are_near_each_other_are_one_wherever_they_lie(noise):
-    mesh = trimesh.creation.cylinder(radius=0.3, height=2.0, sections=200)
-    corners, faces = mesh.vertices[mesh.faces].reshape(-1, 3), np.arange(3 * len(mesh.faces)).reshape(-1, 3)
-    corners = corners + np.random.default_rng(0).uniform(-noise, noise, corners.shape)
-    found = Solid.from_mesh(trimesh.Trimesh(corners, faces, process=False))
-    assert found.repairs == ()
-    assert found.volume == pytest.approx(mesh.volume, rel=1e-7)
-
-
-@pytest.mark.parametrize("up", [[2e-6, 0, -1], [1.5e-6, -1e-6, -1], [1e-9, 0, -1], [1, 0, -1e-9], [1e-200, 0, -1]])
-def test_an_axis_that_points_nearly_down_is_turned_up_exactly(up):
-    turned = upright(up)
-    np.testing.assert_allclose(turned @ turned.T, np.eye(3), rtol=0.0, atol=1e-15)
-    np.testing.assert_allclose(turned @ (np.array(up) / np.linalg.norm(up)), [0.0, 0.0, 1.0], rtol=0.0, atol=1e-15)
-
-
-def test_an_azimuth_that_is_nearly_a_whole_turn_is_north():
-    assert Solid.from_mesh("statue").rose([0.0, -1e-15, 360.0, 90.0]).data.azimuth.values.tolist() == [0.0, 90.0]
 
 
 def test_open_pieces_that_share_an_edge_are_one_surface_and_closed_ones_are_not():
