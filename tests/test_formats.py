@@ -981,6 +981,8 @@ def test_foreign_files_are_said_to_be_text_or_binary(file: Callable[[bytes], Pat
 def test_files_of_other_kinds_are_told_what_to_do_with(begin: bytes, what: str, file: Callable[[bytes], Path]) -> None:
     message = complaint(file(begin + bytes(64)))
     assert what in message and ".[formats]" not in message
+    usc = "Uncorrected accelerogram 20990101_000000_ABCD_20 Some Institute\nSite ABCD  42 00 00S  172 00 00E\n"
+    assert "layout of GeoNet or USC" in complaint(file(usc + "Number of points  60    Duration 0.30 s\n"))
     assert "V3 file of spectra" in complaint(file(b"Response and Fourier Amplitude Spectra\n1 2 3\n"))
 
 
@@ -1197,3 +1199,8 @@ def test_a_number_for_a_missing_value_is_found_among_far_smaller_ones(mark: floa
 @pytest.mark.parametrize("value", [9.0, 9.9999, 99.99999, 98.0, 999999999.0, 32766.0])
 def test_a_large_number_that_stands_for_nothing_is_a_value(value: float) -> None:
     assert gap_at(np.array([0.1, value, 0.2])) is None
+
+
+def test_a_knet_header_cut_short_is_refused(file: Callable[[str], Path]) -> None:
+    lines = (written.FOLDER / "knet.ns").read_text().splitlines(keepends=True)
+    assert "ends within its header" in complaint(file("".join(lines[:15])))

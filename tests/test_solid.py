@@ -12,11 +12,14 @@ import numpy as np
 import pytest
 import trimesh
 from scipy.integrate import quad
+from scipy.optimize import linprog
+from scipy.spatial import ConvexHull, HalfspaceIntersection
 from scipy.spatial.transform import Rotation
 
 import rocking
 from rocking import Block, InvalidBlock, InvalidOption, Solid
 from rocking.solid.moments import moments
+from rocking.solid.overlap import overlaps
 from rocking.solid.reading import _NothingElse, upright
 from rocking.solid.repair import agreeing, closed, is_closed, joined, shells_of
 
@@ -613,6 +616,7 @@ def test_azimuths_are_numbers(azimuths):
         ("points.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
          "property float z\nend_header\n0 0 0\n", "holds no faces"),
         ("nothing.obj", "# nothing\n", "holds no faces"),
+        ("empty.obj", "", "this file is empty"),
         ("text.stl", "hello", "holds no faces"),
         ("text.ply", "hello", "cannot be read: "),
         ("text.glb", "hello", "cannot be read: "),
@@ -730,3 +734,31 @@ def test_open_pieces_that_share_an_edge_are_one_surface_and_closed_ones_are_not(
     tetrahedron = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
     other = np.array([[0, 5, 1], [0, 1, 6], [1, 5, 6], [0, 6, 5]])
     assert shells_of(np.vstack([tetrahedron, other])).tolist() == [0, 0, 0, 0, 1, 1, 1, 1]
+
+
+@pytest.mark.parametrize("pairs", [1, pytest.param(30, marks=pytest.mark.slow)])
+def test_what_is_proven_in_common_is_never_more_than_there_is(pairs):
+    rng, shares = np.random.default_rng(3), []
+    for _ in range(pairs):
+        half, middles = rng.uniform(0.2, 0.5, (2, 3)), rng.uniform(-0.2, 0.2, (2, 3))
+        turns = Rotation.random(2, random_state=rng).as_matrix()
+        meshes, planes = [], []
+        for k in range(2):
+            mesh = trimesh.creation.box(2.0 * half[k])
+            mesh.vertices = mesh.vertices @ turns[k].T + middles[k]
+            meshes.append(closed(joined(np.asarray(mesh.vertices), np.asarray(mesh.faces))))
+            normals = np.vstack([turns[k].T, -turns[k].T])
+            planes.append(np.column_stack([normals, -np.tile(half[k], 2) - normals @ middles[k]]))
+        exact = convex_volume(np.vstack(planes))
+        found = overlaps(["one", "other"], meshes)
+        proven = float(found[0].partition("at least ")[2].partition(" ")[0]) if found else 0.0
+        assert proven <= exact * (1.0 + 1e-9)
+        shares.append(proven / exact)
+    assert len(shares) == pairs and min(shares) > 0.2
+
+
+def convex_volume(planes):
+    """Volume between planes, by linear programming for a place inside and the hull of the corners."""
+    normals, off = planes[:, :3], planes[:, 3]
+    place = linprog([0, 0, 0, -1], np.column_stack([normals, np.ones(len(off))]), -off, bounds=[(None, None)] * 4)
+    return ConvexHull(HalfspaceIntersection(planes, place.x[:3]).intersections).volume

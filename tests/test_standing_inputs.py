@@ -21,6 +21,7 @@ from rocking import (
     Tendon,
     Thrust,
 )
+from rocking.plausibility import density_notes, restraint_notes
 
 WALL = Block(width=0.5, height=4.0, mass=5e3)
 PULSE = rocking.pulses.one_sine(2.0, 1.0)
@@ -161,3 +162,22 @@ def test_what_cannot_be_meant_is_refused_in_one_sentence(case):
     assert words in said
     assert "\n" not in said and not said.endswith(".")
     assert not about or about in said
+
+
+def test_units_that_may_be_mistaken_are_noted():
+    (note,) = Solid.from_mesh(box(1000.0)).notes
+    assert note == "the body is 1800 m high: are its coordinates in metres?"
+    (note,) = Solid.from_mesh(box(), density=2.7).notes
+    assert "2.7 kg/m^3" in note and note.endswith("is it in kg/m^3?")
+    assert density_notes([2700.0, 500.0, None]) == ()
+    usual = held(Tendon(2e8, prestress=1e5), Thrust(9.0, 4.0), Load(9.0, 4.0), Spring(1e6))
+    assert restraint_notes(usual, 4.0) == ()
+    for restraint, words in (
+        (Thrust(0.9, 4000.0), "a thrust is at a height of 4000 m, above the top of the block, 4 m"),
+        (Load(9.0, 5.0), "a load is at a height of 5 m, above the top of the block, 4 m"),
+        (Tendon(2e11), "times the weight or more: are forces in N, and masses in kg?"),
+        (Tendon(2e11, strength=2e9), "times the weight or more: are forces in N, and masses in kg?"),
+        (Spring(1e12), "times the weight or more: are forces in N, and masses in kg?"),
+    ):
+        (note,) = restraint_notes(held(restraint), 4.0)
+        assert words in note
