@@ -9,19 +9,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from mpmath import MPContext
 
 import rocking
 from oracles import multiprecision
 from oracles.problem import Problem
 
-mp = MPContext()
-mp.dps = 40
 GRAVITY = 9.80665
-LOOKS = 32
-"""Looks per arc and piece for the first impact."""
-NOTHING = mp.mpf(10) ** -13
-"""Speed over p alpha from which the impacts that are left are a geometric series to a share of its square."""
 
 
 @dataclass(frozen=True)
