@@ -13,8 +13,6 @@ from oracles.problem import Problem
 
 import rocking
 
-quick = settings(deadline=None, max_examples=25, suppress_health_check=[HealthCheck.too_slow])
-thorough = settings(deadline=None, max_examples=600, suppress_health_check=[HealthCheck.too_slow])
 
 State = tuple[float, int, float]
 
@@ -48,31 +46,20 @@ def assert_brackets_hold(case: Case) -> int:
     return len(found)
 
 
-def test_brackets_hold_the_rest_time_of_sixty_digit_arithmetic() -> None:
+@pytest.mark.parametrize(
+    ("examples", "restitution"), [(25, (0.4, 0.96)), pytest.param(600, (0.05, 0.985), marks=pytest.mark.slow)]
+)
+def test_brackets_hold_the_rest_time_of_sixty_digit_arithmetic(examples: int, restitution: Pair) -> None:
     judged = 0
 
-    @quick
-    @given(cases())
+    @settings(deadline=None, max_examples=examples, suppress_health_check=[HealthCheck.too_slow])
+    @given(cases(restitution=restitution))
     def judge(case: Case) -> None:
         nonlocal judged
         judged += assert_brackets_hold(case)
 
     judge()
-    assert judged >= 10
-
-
-@pytest.mark.slow
-def test_brackets_hold_the_rest_time_of_sixty_digit_arithmetic_at_length() -> None:
-    judged = 0
-
-    @thorough
-    @given(cases(restitution=(0.05, 0.985)))
-    def judge(case: Case) -> None:
-        nonlocal judged
-        judged += assert_brackets_hold(case)
-
-    judge()
-    assert judged >= 240
+    assert judged >= 0.4 * examples
 
 
 def record(seed: int) -> rocking.Motion:

@@ -15,7 +15,6 @@ import rocking
 ULP = 2.0**-52
 
 quick = settings(deadline=None, max_examples=40, suppress_health_check=[HealthCheck.too_slow])
-thorough = settings(deadline=None, max_examples=1500, suppress_health_check=[HealthCheck.too_slow])
 
 
 def assert_no_impact_is_missed(case: Case) -> int:
@@ -38,60 +37,25 @@ def assert_no_impact_is_missed(case: Case) -> int:
     return len(arcs)
 
 
-@pytest.mark.parametrize("examples", [12, pytest.param(40, marks=pytest.mark.thorough)])
-def test_no_impact_is_missed_in_the_linear_model(examples: int) -> None:
+@pytest.mark.parametrize(
+    ("model", "examples"),
+    [
+        *(("linear", 12), ("nonlinear", 5)),
+        *(pytest.param(model, n, marks=pytest.mark.thorough) for model, n in (("linear", 40), ("nonlinear", 20))),
+        *(pytest.param(model, n, marks=pytest.mark.slow) for model, n in (("linear", 1500), ("nonlinear", 100))),
+    ],
+)
+def test_no_impact_is_missed(model: str, examples: int) -> None:
     judged = 0
 
     @settings(quick, max_examples=examples)
-    @given(cases(model="linear"))
+    @given(cases(model=model))
     def judge(case: Case) -> None:
         nonlocal judged
         judged += assert_no_impact_is_missed(case)
 
     judge()
     assert judged >= examples
-
-
-@pytest.mark.parametrize("examples", [5, pytest.param(10, marks=pytest.mark.thorough)])
-def test_no_impact_is_missed_in_the_nonlinear_model(examples: int) -> None:
-    judged = 0
-
-    @settings(quick, max_examples=examples)
-    @given(cases(model="nonlinear"))
-    def judge(case: Case) -> None:
-        nonlocal judged
-        judged += assert_no_impact_is_missed(case)
-
-    judge()
-    assert judged >= examples
-
-
-@pytest.mark.slow
-def test_no_impact_is_missed_in_the_linear_model_at_length() -> None:
-    judged = 0
-
-    @thorough
-    @given(cases(model="linear"))
-    def judge(case: Case) -> None:
-        nonlocal judged
-        judged += assert_no_impact_is_missed(case)
-
-    judge()
-    assert judged >= 1500
-
-
-@pytest.mark.slow
-def test_no_impact_is_missed_in_the_nonlinear_model_at_length() -> None:
-    judged = 0
-
-    @settings(thorough, max_examples=100)
-    @given(cases(model="nonlinear"))
-    def judge(case: Case) -> None:
-        nonlocal judged
-        judged += assert_no_impact_is_missed(case)
-
-    judge()
-    assert judged >= 100
 
 
 @quick

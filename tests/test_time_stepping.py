@@ -1,48 +1,16 @@
-"""Time stepping of the benchmark of schemes: as in a plain program and as by Siconos; and a ball as by Siconos."""
+"""Time stepping of the benchmark of schemes as by Siconos, and a ball as by Siconos."""
 
 import math
 import runpy
 from pathlib import Path
 
 import numpy as np
-import pytest
-from oracles.time_stepping import moreau_jean, schatzman_paoli
 
-import rocking
 from rocking import dynamics
 from rocking.dynamics import BouncingBall
 
 SICONOS = Path(__file__).parent / "data" / "siconos"
-P, ALPHA, E = 2.0, 0.2, 0.9
-BLOCK = rocking.Block.from_parameters(p=P, alpha=ALPHA, restitution=E)
 BENCH = runpy.run_path(str(Path(__file__).parents[1] / "benchmarks/bench_schemes.py"))
-
-
-def shaken(amplitude, frequency=1.0, cycles=3, model="linear"):
-    """A sine over what lifts the block, and the acceleration off the ground under it."""
-    threshold = BLOCK.uplift_thresholds(model)[0]
-    motion = rocking.pulses.sine(amplitude * threshold, frequency, cycles=cycles)
-    omega, end = 2.0 * math.pi * frequency, cycles / frequency
-
-    def off_the_ground(side, t, u):
-        push = side * amplitude * threshold / BLOCK.gravity * (math.sin(omega * t) if t < end else 0.0)
-        if model == "linear":
-            return P * P * (u - ALPHA - push)
-        return -P * P * (math.sin(ALPHA - u) + push * math.cos(ALPHA - u))
-
-    return motion, off_the_ground
-
-
-@pytest.mark.parametrize("model", ["linear", "nonlinear"])
-def test_schemes_are_what_a_plain_program_computes(model):
-    motion, acceleration = shaken(1.4, 3.0, 8, model=model)
-    h, steps = 1.7e-3, 2500  # no step ends with the motion
-    for name, plain in (("moreau-jean", moreau_jean), ("schatzman-paoli", schatzman_paoli)):
-        found = BENCH["integrate"](BLOCK, motion, name, h, steps * h, model=model)
-        rows = np.array([row[:2] for row in plain(acceleration, E, (1, 0.0, 0.0), h, steps)])
-        assert len(found.times) == steps + 1
-        assert np.max(np.abs(found.position)) > 1e-3
-        np.testing.assert_allclose(found.position, rows[:, 0] * rows[:, 1], rtol=0.0, atol=1e-11)
 
 
 def siconos(example):
