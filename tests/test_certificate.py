@@ -13,7 +13,6 @@ from oracles.problem import Problem
 
 import rocking
 
-
 State = tuple[float, int, float]
 
 
