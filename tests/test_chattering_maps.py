@@ -222,6 +222,11 @@ def test_the_amplitude_of_a_family_is_over_the_model_s_threshold(family, model):
     assert case.motion.pga == pytest.approx(1.3 * min(BLOCK.uplift_thresholds(model)), rel=1e-9)
 
 
+def test_the_frequency_of_a_family_is_over_the_smaller_p():
+    block = rocking.Block.from_parameters(p=(3.0, 2.0), alpha=0.2, restitution=0.9)
+    assert families.sine(block, cycles=1)(1.3, 3.0).motion.duration == pytest.approx(2.0 * math.pi / (3.0 * 2.0))
+
+
 def test_a_near_fault_pulse_has_the_amplitude_asked_for():
     case = families.mavroeidis_papageorgiou(BLOCK, phase=0.4, gamma=2.0)(1.2, 3.0)
     assert case.motion.pga == pytest.approx(1.2 * BLOCK.minimum_acceleration, rel=1e-9)

@@ -222,7 +222,7 @@ def test_a_wall_too_stocky_for_angular_momentum_rocks_one_way_with_a_restitution
     with pytest.raises(InvalidBlock, match=r"too stocky to rock that way; .*give restitution a value in \(0, 1\]"):
         Block.one_sided(width=3.0, height=2.0)
     wall = Block.one_sided(width=3.0, height=2.0, restitution=restitution)
-    assert wall.is_one_sided and wall.sides[0].restitution == 0.4
+    assert wall.is_one_sided and wall.sides[0].restitution == 0.4 and wall.balance[1] == math.inf
     assert wall.sides[0].alpha == pytest.approx(math.atan(1.5), rel=1e-15)
     for wrong, says in ((1.2, "restitution must be in"), ((0.4, 0.5), "is one number, not a pair")):
         with pytest.raises(InvalidBlock, match=says):
