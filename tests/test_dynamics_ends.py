@@ -212,3 +212,15 @@ def test_a_branch_ends_where_its_orbits_overturn():
         )  # fmt: skip
         falls.append(int(response.events["side"][-1]) if response.overturned else 0)
     assert falls == [-1, 0, 1]
+
+
+@pytest.mark.slow
+def test_a_branch_that_comes_back_is_followed_round_once():
+    """Where the level has a maximum, the two orbits meet at a fold on either side of it."""
+    branch = branch_of(lambda q: table(EXACT.fold + 0.09 - q * q), 0.1, (-0.6, 0.6))
+    assert branch.ends == ("where it began", "where it began")
+    assert sorted(each.value for each in branch.bifurcations) == pytest.approx([-0.3, 0.3], abs=1e-10)
+    assert {each.kind for each in branch.bifurcations} == {"fold"}
+    signs = np.sign(np.diff(branch.values))
+    assert np.sum(signs[1:] != signs[:-1]) in (2, 3)
+    assert np.abs(branch.values).max() == pytest.approx(0.3, abs=0.01) and np.any(branch.is_stable)
