@@ -3,7 +3,6 @@
 import math
 from pathlib import Path
 
-import pytest
 import validation
 
 import rocking
