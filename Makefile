@@ -15,25 +15,26 @@ LIMITED := -o faulthandler_timeout=400
 QUICKLY := -m $(FAST) --hypothesis-profile=few $(LIMITED)
 # Something of every library that the package needs, for other versions than those that are pinned; `make lowest EVERY_PART=tests` runs all.
 EVERY_PART := $(addprefix tests/test_,reference.py result.py plot.py cli.py response.py chattering_maps.py processing.py explorer_server.py first_response.py)
-# What the oldest numba compiles; all else uses the compiled kernels of the wheel.
-COMPILED := tests/test_reference.py tests/test_ensemble.py::test_lanes_agree_with_single_simulations
+# What the compiled kernels are built from.
+SOURCES := $(shell find src/rocking/kernels compiling -name '*.py') hatch_build.py
 
 # Tests start hundreds of processes: without its compiled modules Python takes seconds to import what each of them needs.
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help demo wheel quick test test-all browser browser-all slow verify mutants lowest latest .bounds-lowest .bounds-latest doctest lint types \
+.PHONY: help demo kernels wheel quick test test-all browser browser-all slow verify mutants lowest latest .bounds-lowest .bounds-latest doctest lint types \
     docs bench coverage audit sbom review try-install clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 demo: .venv/.base ## simulate a block under a shipped record; writes out/museum.png
-	@echo "Simulating a museum piece, 0.24 m by 1.10 m, under the Ridgecrest record of 2019 (half a minute the first time) ..."
+	@echo "Simulating a museum piece, 0.24 m by 1.10 m, under the Ridgecrest record of 2019 ..."
 	@$(BIN)/python examples museum
 
-wheel: .venv/.all ## build a wheel for this platform, with kernels compiled beforehand, into dist
-	$(BIN)/python scripts/ship_kernels.py
+kernels: $(firstword $(wildcard .venv/.all) .venv/.base) ## compile the kernels again if they have changed; other targets do so, too
+
+wheel: .venv/.all ## build a wheel for this platform into dist
 	@rm -f dist/rocking-*.whl
 	$(BIN)/python -m pip wheel --disable-pip-version-check -q --no-deps --wheel-dir dist .
 
@@ -65,14 +66,12 @@ mutants: .venv/.all ## ask of the tests whether they see small mistakes, 30 in e
 	$(BIN)/python stress/mutants.py $(if $(PART),"$(PART)")
 
 lowest: .bounds-lowest ## run a test of every part with the oldest versions that pyproject.toml allows
-	@# Workers beside each other would compile the same.
-	ROCKING_SHIPPED=0 $(PYTEST:$(BIN)/%=.venv-lowest/bin/%) -n 0 $(QUICKLY) $(COMPILED)
 
 latest: .bounds-latest ## the same with the versions of the day
 
 .bounds-lowest .bounds-latest: .bounds-%: wheel .venv-%/.installed
 	.venv-$*/bin/python -m pip install --disable-pip-version-check -qq --no-deps --force-reinstall dist/rocking-*.whl
-	ROCKING_LIBRARY_REQUIRED=1 $(PYTEST:$(BIN)/%=.venv-$*/bin/%) $(QUICKLY) $(EVERY_PART)
+	$(PYTEST:$(BIN)/%=.venv-$*/bin/%) $(QUICKLY) $(EVERY_PART)
 
 .lowest.txt: pyproject.toml scripts/lowest_versions.py
 	$(PYTHON) scripts/lowest_versions.py > $@
@@ -108,14 +107,14 @@ docs: .venv/.all ## build the documentation into docs/_build/html; a warning is 
 bench: .venv/.all ## run the benchmarks
 	@for script in benchmarks/bench_*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
 
-coverage: .venv/.all ## run the tests, and say which lines none of them reaches (kernels are compiled: not counted)
+coverage: .venv/.all ## run the tests, and say which lines none of them reaches (kernels are compiled and not counted)
 	$(BIN)/coverage erase
 	$(PYTEST:$(BIN)/python=$(BIN)/coverage run) -m $(FAST)
 	$(BIN)/coverage combine -q
 	$(BIN)/coverage report
 
 try-install: wheel ## install the wheel into empty environments, with each extra alone, and simulate there
-	$(BIN)/python scripts/try_install.py dist/rocking-*.whl --compiled --extras
+	$(BIN)/python scripts/try_install.py dist/rocking-*.whl --extras
 
 audit: .venv-upkeep/.installed ## compare the pinned versions with the weaknesses that are known (asks the network)
 	.venv-upkeep/bin/pip-audit --strict --requirement constraints.txt --no-deps --disable-pip
@@ -133,7 +132,7 @@ clean: ## remove what the other targets made, but not the environment
 	find src tests benchmarks examples docs -name __pycache__ -type d -prune -exec rm -rf {} +
 
 distclean: clean ## remove the environment, too
-	rm -rf .venv .venv-lowest .venv-latest .venv-upkeep .lowest.txt .page-tools
+	rm -rf .venv .venv-lowest .venv-latest .venv-upkeep .lowest.txt .page-tools src/rocking/kernels/built
 
 # What looks after the project itself; apart, since their requirements are none of the package's.
 .venv-upkeep/.installed: WHAT = $(UPKEEP_TOOLS) "repo-review[cli]"
@@ -149,18 +148,20 @@ distclean: clean ## remove the environment, too
 	@! command -v npm >/dev/null || npm install --prefix .page-tools --no-save --silent --no-audit --no-fund $(PAGE_TOOLS)
 	@touch $@
 
-# A stamp per set of packages: installing again is needed only when the versions or the project's table change.
+# A stamp per set of packages: installing again is needed only when the versions, the project's table or the
+# kernels change: the installation compiles them.
 .venv/.base .venv/.all: WHAT = -c constraints.txt -e ".$(EXTRAS)"
 .venv/.base: EXTRAS :=
 .venv/.all: EXTRAS := [formats,excel,explorer,browser,cluster,objects,parquet,mesh,test,lint,docs]
-.venv/.base .venv/.all: pyproject.toml constraints.txt | .venv/bin/uv
+.venv/.base .venv/.all: pyproject.toml constraints.txt $(SOURCES) | .venv/bin/uv
 	@echo "Installing rocking$(EXTRAS) into .venv (a minute or two the first time) ..."
 	@$(INSTALL)
 	@touch $@
 
 # uv installs the same packages in a fifth of the time, and shares them among environments; pip does where uv cannot (it
-# has no build for the system, or only pip is told of the index). Neither compiles: to compile all takes longer than that.
-INSTALL = $(BIN)/uv pip install --quiet --system-certs --python $(@D)/bin/python $(WHAT) 2>/dev/null || \
+# has no build for the system, or only pip is told of the index), and shows the errors of a build. Neither compiles the
+# modules of Python: to compile all takes longer than that.
+INSTALL = $(BIN)/uv pip install --quiet --system-certs --reinstall-package rocking --python $(@D)/bin/python $(WHAT) 2>/dev/null || \
     $(@D)/bin/python -m pip install --disable-pip-version-check -qq --no-compile $(WHAT)
 
 .venv/bin/uv: | .venv/bin/python

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import re
 import runpy
+import subprocess
 from pathlib import Path
 from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 from hatchling.metadata.plugin.interface import MetadataHookInterface
-from packaging.tags import platform_tags
 
 #: A picture on a line of its own, and a link, where what they lead to is a file of the project.
 _PICTURE = re.compile(r"^!\[[^\]]*\]\((?!https?:)[^)]*\)\n+", re.MULTILINE)
@@ -45,28 +44,27 @@ class ReadmeHook(MetadataHookInterface):
 
 
 class KernelsHook(BuildHookInterface[Any]):
-    """Puts libraries of kernels into the wheel where `scripts/ship_kernels.py` has made them; it compiles nothing."""
+    """Builds the libraries of compiled kernels, into the source tree, and puts them into the wheel."""
 
     PLUGIN_NAME = "custom"
 
+    def dependencies(self) -> list[str]:
+        """List the packages that compile, where something must be compiled."""
+        requirements: list[str] = self._libraries()["dependencies"]()
+        return requirements
+
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Name the files and the platform. Versions of Python and numba do not matter to the libraries."""
-        folder = Path(self.root) / "build" / "shipped"
-        if version != "standard" or self.target_name != "wheel" or not (folder / "manifest.json").exists():
-            return
-        manifest = json.loads((folder / "manifest.json").read_text("utf-8"))
-        # Another platform's, where machines share the tree: pip would make a wheel that it refuses to install.
-        if manifest["platform"] not in platform_tags():
-            return
-        # Python would leave them aside, and have numba compile: a wheel for every platform says as much.
-        kernels = Path(self.root) / "src" / "rocking" / "kernels"
-        if manifest["sources"] != runpy.run_path(str(kernels / "sources.py"))["sources"](kernels):
-            self.app.display_warning(
-                f"{folder} holds kernels that were made from other sources: the wheel holds none. To renew them run "
-                "scripts/ship_kernels.py"
-            )
-            return
+        """Build the libraries, name the platform and, but for an editable installation, list the files."""
+        libraries = self._libraries()
+        try:
+            files = libraries["build"]()
+        except (libraries["BuildError"], subprocess.CalledProcessError) as error:
+            self.app.abort(f"the kernels of rocking could not be compiled: {error}")
         build_data["pure_python"] = False
-        build_data["tag"] = f"py3-none-{manifest['platform']}"
-        for name in ("manifest.json", *manifest["libraries"]):
-            build_data["force_include"][str(folder / name)] = f"rocking/kernels/shipped/{name}"
+        build_data["tag"] = f"py3-none-{libraries['tag']()}"
+        if version == "standard":
+            for file in files:
+                build_data["force_include"][str(file)] = str(file.relative_to(Path(self.root) / "src"))
+
+    def _libraries(self) -> dict[str, Any]:
+        return runpy.run_path(str(Path(self.root) / "compiling" / "libraries.py"))

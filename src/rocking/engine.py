@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from rocking.arrays import Flags, Floats, Integers
 from rocking.block.single import ROTATION
 from rocking.body import Bodies
-from rocking.compiling import SIMULATIONS, announce
 from rocking.constants import Model
 from rocking.errors import InvalidMotion, Unfinished
 from rocking.kernels import lanes, state
@@ -123,7 +122,6 @@ def simulate_tasks(
     What becomes of a body depends on the body and its motion alone, bit for bit, whatever shares its task. An
     interrupt leaves the rest undone.
     """
-    announce(SIMULATIONS)
     if executor is not None:
         yield from _in_flight(setup, tasks, executor, AHEAD * cores())
         return

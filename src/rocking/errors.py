@@ -203,6 +203,10 @@ class DamagedStudy(StudyError):
         return f"{self.text()}: the study's verify(repair=True) computes it again"
 
 
+class KernelsError(RockingError):
+    """The compiled kernels are missing or damaged, or were built from other sources."""
+
+
 class OutsideFit(UserWarning):
     """A fitted formula was asked for values beyond those it was fitted to."""
 

@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 
 from rocking.arrays import Floats
 from rocking.body import Bodies, Body
-from rocking.compiling import SIMULATIONS, announce
 from rocking.constants import Model
 from rocking.engine import SLICE, check_components, slices
 from rocking.errors import InvalidOption
 from rocking.kernels import state
-from rocking.kernels.march import follow
+from rocking.kernels.march import march
 from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
 from rocking.motion.named import one_motion
@@ -113,7 +112,6 @@ def response_to(
 
     A ``factor`` scales the motion and the initial state; the response keeps the motion as it is.
     """
-    announce(SIMULATIONS)
     how, alone, motion = treatment(chattering), one_body(block).alone(), one_motion(motion)
     check_components(alone, motion)
     rules = rules_of(alone, model, how, duration, record=True)
@@ -168,10 +166,10 @@ def marched(trail: Trail, start: state.Record) -> tuple[int, state.Records]:
     ending: int = state.Ending.PAUSED
     for _ in range(slices(ground)):
         start["budget"] = SLICE
-        ending = follow(ground, block, rules, table, scratch, start)
+        ending = march(ground, block, rules, table, scratch, start)
         while ending == state.Ending.FULL:
             table = state.grown(table)
-            ending = follow(ground, block, rules, table, scratch, start)
+            ending = march(ground, block, rules, table, scratch, start)
         if ending != state.Ending.PAUSED:
             return ending, table
     start["end"] = table["node"]["time"][start["nodes"] - 1]

@@ -17,7 +17,6 @@ from rocking.bisection import bisected
 from rocking.block import Block
 from rocking.chattering.coefficients import COEFFICIENTS
 from rocking.chattering.parameters import broadcast, checked_frequency, checked_restitution, checked_slenderness
-from rocking.compiling import AMPLITUDES, announce
 from rocking.engine import require_finished
 from rocking.errors import InvalidOption, Unfinished
 from rocking.kernels.sine.sequence import critical_amplitudes, fitted_amplitudes
@@ -89,7 +88,6 @@ def critical_amplitude(omega: ArrayLike, eta: ArrayLike, *, method: str = "exact
     >>> round(float(critical_amplitude(2.0, 0.92, method="eq77")), 6)
     1.037899
     """
-    announce(AMPLITUDES)
     methods: dict[str, Callable[[Floats, Floats], Floats]] = {
         "exact": _exact,
         "eq76": partial(_fitted, "eq76"),

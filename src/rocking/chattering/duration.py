@@ -21,7 +21,6 @@ from rocking.chattering.parameters import (
     lifting_amplitude,
     single,
 )
-from rocking.compiling import SEQUENCES, announce
 from rocking.errors import InvalidOption
 from rocking.kernels.sine import Verdict
 from rocking.kernels.sine.arc import first_impact
@@ -123,7 +122,6 @@ def chattering_time(
     >>> round(float(chattering_time(1.01, 2.0, 0.92, method="asymptotic")), 6)
     0.573426
     """
-    announce(SEQUENCES)
     order = checks.whole(order, "order", InvalidOption, 1, HIGHEST_ORDER)
     if resolved is not None:
         resolved = checks.whole(resolved, "resolved", InvalidOption, 1, 1_000_000)
@@ -227,7 +225,6 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
     >>> bool(chattering.lower <= chattering.time <= chattering.upper)
     True
     """
-    announce(SEQUENCES)
     amplitude, frequency, restitution = _single_case(a, omega, eta)
     if checks.finite(tolerance, "tolerance", InvalidOption) < 1e-15:
         raise InvalidOption(f"{{}} must be at least 1e-15 and finite, not {tolerance!r}", "tolerance", value=tolerance)

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.body import Body
-from rocking.compiling import SIMULATIONS, announce
 from rocking.constants import Model
 from rocking.dynamics.repeated import TOGETHER, Repeated, parts_of
 from rocking.errors import InvalidOption
@@ -215,7 +214,6 @@ class StroboscopicMap(Repeated):
         return self._known(made).reshape(given.shape)
 
     def _iterate(self, made: state.Records, periods: int, rows: Floats) -> None:
-        announce(SIMULATIONS)
         setting = self._setting()
         impacts = np.zeros(len(made), dtype=np.int64)
 
@@ -226,7 +224,6 @@ class StroboscopicMap(Repeated):
             pass
 
     def _differentiate(self, made: state.Records) -> Floats:
-        announce(SIMULATIONS)
         change = np.empty((len(made), 2, 2))
         differentiate(*self._marching(), made, change)
         return change
@@ -234,7 +231,6 @@ class StroboscopicMap(Repeated):
     def _stretches(self, given: Floats, before: int, count: int) -> tuple[Floats, int, Fate]:
         """Logarithms of the stretches of a frame in each of some periods, after others; impacts in them; the fate."""
         _, made = self._states(given[None])
-        announce(SIMULATIONS)
         marching = self._marching()
         frame = np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]])
         logs, impacts = np.full((before + count, 2), np.nan), 0

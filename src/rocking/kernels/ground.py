@@ -11,7 +11,6 @@ import numpy as np
 
 from rocking.arrays import Floats, Integers
 from rocking.kernels.compiled import inlined, kernel, shared
-from rocking.kernels.interpreted import Interpreted
 
 #: Relative allowance for rounding in bounds.
 ROUNDING = 2.0**-48
@@ -65,11 +64,8 @@ def ground_of(
     pieces = np.zeros((len(coefficients) + 1, _FIRST + columns * len(components)))
     stretches = np.zeros((-(-len(pieces) // STRETCH), len(components), len(Window._fields)))
     ground = Ground(pieces, stretches, error * unit, columns, _FIRST)
-    work = sum(component.size for component in components)
-    write = _interpreted_fill if _interpreted_fill.work() > work else fill
-    _interpreted_fill.spend(work)
     for k, component in enumerate(components):
-        write(breakpoints, component, unit, ground._replace(first=_FIRST + k * columns), np.zeros(columns))
+        fill(breakpoints, component, unit, ground._replace(first=_FIRST + k * columns), np.zeros(columns))
     return ground
 
 
@@ -103,11 +99,6 @@ def fill(breakpoints: Floats, coefficients: Floats, unit: float, ground: Ground,
         before = stretch_bounds(ground, k // STRETCH)
         low, high = min(before.low, piece.low), max(before.high, piece.high)
         set_stretch(ground, k // STRETCH, Window(low, high, max(before.slope, piece.slope), before.jumps + jumps))
-
-
-#: Coefficients of motions in one process that Python writes: half a second's work, which is what compiling takes,
-#: and numba takes longer to import.
-_interpreted_fill: Final = Interpreted(fill, 200_000)
 
 
 @inlined

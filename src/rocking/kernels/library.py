@@ -1,222 +1,213 @@
-"""Kernels that came compiled with the package: libraries of native functions, called without numba.
+"""Call kernels in the library that was built with the package.
 
-`scripts/ship_kernels.py` makes a library for each level of the processor, and a manifest: the hash of the sources that
-it was made from, and the types of each function's arguments. A function takes the address of its arguments, packed into
-eight bytes each: numbers; the address of a record; the address of an array and its shape; a tuple's members.
+The build makes a library for each level of the processor and a manifest: what it was built from, and the types of each
+kernel's arguments. A kernel in the library takes the address of its arguments, packed into eight bytes each: numbers,
+the address of a record, the address of an array and its shape, and the members of a tuple.
 """
 
 import ctypes
 import functools
 import hashlib
 import json
-import os
 import struct
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from rocking.kernels.sources import sources
+from rocking.errors import KernelsError
+from rocking.kernels.sources import code_hash, text_hash
 
-#: Where libraries and manifest lie.
-FOLDER: Final = Path(__file__).parent / "shipped"
+#: Where the build puts the libraries and the manifest.
+FOLDER: Final = Path(__file__).parent / "built"
 
-Manifest = dict[str, Any]
+_ADVICE: Final = "run make kernels in the source tree, or install rocking again"
 
-
-class OtherTypes(TypeError):
-    """Arguments are of types that the library has no function for."""
-
-
-class _Library:
-    """A library and its manifest."""
-
-    def __init__(self, name: str, manifest: Manifest) -> None:
-        # The system loads half a library without a word, and ends the process when something is called.
-        if hashlib.sha256((FOLDER / name).read_bytes()).hexdigest() != manifest["libraries"][name]:
-            raise ValueError(f"{name} is not the file that the manifest describes")
-        self.name, self.manifest = name, manifest
-        self.handle = ctypes.CDLL(str(FOLDER / name))
+#: Appends an argument to a list as it is packed; a TypeError or ValueError for an argument of another type.
+Taker = Callable[[Any, list[Any]], None]
 
 
-class _Unused(Exception):
-    """Why no library is used, in words."""
+class Library(NamedTuple):
+    """An open library."""
+
+    name: str
+    handle: ctypes.CDLL
+    kernels: dict[str, Any]
 
 
 @functools.cache
-def _search() -> _Library | str:
-    """Open the library of the highest level that this processor has, or say why none is used."""
-    try:
-        return _fitting()
-    except _Unused as why:
-        return str(why)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as damage:
-        return f"the libraries that came with the package are damaged ({damage})"
+def opened() -> Library:
+    """Open the library of the highest level that this processor has.
 
-
-def _fitting() -> _Library:
-    if os.environ.get("ROCKING_SHIPPED", "1") == "0":
-        raise _Unused("ROCKING_SHIPPED=0 leaves libraries aside")
-    if not (FOLDER / "manifest.json").exists():
-        raise _Unused("no library came with this installation")
-    manifest = json.loads((FOLDER / "manifest.json").read_text("utf-8"))
-    if manifest["sources"] != sources(Path(__file__).parent):
-        raise _Unused("the libraries that came with the package were made from other sources")
-    lowest, *higher = manifest["libraries"]
-    found = _Library(lowest, manifest)
-    best = higher[: found.handle.rocking_level()][-1:]
-    return _Library(best[0], manifest) if best else found
-
-
-def opened() -> _Library | None:
-    """Return the library that serves this process; None if there is none that fits."""
-    found = _search()
-    return None if isinstance(found, str) else found
-
-
-def state() -> str:
-    """Name the library that serves this process, or say why there is none."""
-    found = _search()
-    return found if isinstance(found, str) else f"library {found.name}"
-
-
-def function(name: str) -> Callable[..., Any] | None:
-    """Return what calls a kernel's functions in the library; None if there are none.
-
-    What is returned raises `OtherTypes` for arguments that no function takes.
+    Raises
+    ------
+    KernelsError
+        Where there is none, it is damaged, or it was built from other sources.
     """
-    library = opened()
-    if library is None:
-        return None
+    built = manifest()
     try:
-        variants = [_variant(getattr(library.handle, one["symbol"]), one) for one in library.manifest["kernels"][name]]
-    except (AttributeError, KeyError, TypeError):  # no such kernel, or a damaged manifest
-        return None
-    if len(variants) == 1:
-        return variants[0]
-
-    def call(*arguments: Any) -> Any:
-        for variant in variants:
-            try:
-                return variant(*arguments)
-            except OtherTypes:
-                continue
-        raise OtherTypes
-
-    return call
+        lowest = built["libraries"][0]
+        level = _open(lowest).rocking_level()
+        best = [each for each in built["libraries"] if each["level"] <= level][-1]
+        return Library(best["file"], _open(best), built["kernels"])
+    except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
+        raise KernelsError(f"the compiled kernels in {FOLDER} cannot be opened ({error}); {_ADVICE}") from error
 
 
-def _variant(code: Any, types: dict[str, Any]) -> Callable[..., Any]:
-    """Return what calls one function: for arguments of certain types."""
-    takers = [_taker(kind) for kind in types["arguments"]]
-    pack = struct.Struct("=" + "".join(_format(kind) for kind in types["arguments"])).pack
-    returned = struct.Struct("=" + "".join(_format(kind) for kind in types["returns"]))
-    several = len(types["returns"]) > 1
+@functools.cache
+def manifest() -> dict[str, Any]:
+    """Read the manifest of libraries that were built from the sources of this process.
+
+    Raises
+    ------
+    KernelsError
+        Where there is none, or they were built from other sources.
+    """
+    try:
+        built: dict[str, Any] = json.loads((FOLDER / "manifest.json").read_text("utf-8"))
+        current = built["text"] == text_hash(FOLDER.parent) or built["made"]["code"] == code_hash(FOLDER.parent)
+    except (OSError, ValueError, LookupError, TypeError) as error:
+        raise KernelsError(f"there are no compiled kernels in {FOLDER}; {_ADVICE}") from error
+    if not current:
+        raise KernelsError(f"the sources in {FOLDER.parent} have changed since the kernels were compiled; {_ADVICE}")
+    return built
+
+
+def _open(described: dict[str, Any]) -> ctypes.CDLL:
+    path = FOLDER / described["file"]
+    # The system opens half a library without an error, and ends the process when a function is called.
+    if hashlib.sha256(path.read_bytes()).hexdigest() != described["sha256"]:
+        raise ValueError(f"{path.name} is not the file that was built")
+    return ctypes.CDLL(str(path))
+
+
+class Kernel:
+    """A function in the library, which is opened at the first call."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        functools.update_wrapper(self, function)
+
+    @functools.cached_property
+    def native(self) -> Callable[..., Any]:
+        """The function that packs arguments and calls the library."""
+        name = f"{self.__module__.removeprefix(f'{__package__}.')}.{self.__name__}"
+        return _caller(name, opened())
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call the function; a `TypeError` for arguments of other types than it was compiled for."""
+        return self.native(*arguments)
+
+
+def _caller(name: str, library: Library) -> Callable[..., Any]:
+    kernel = library.kernels[name]
+    code = getattr(library.handle, kernel["symbol"])
+    takers = [_taker(kind) for kind in kernel["arguments"]]
+    pack = struct.Struct("=" + "".join(map(_format, kernel["arguments"]))).pack
+    returned = struct.Struct("=" + "".join(map(_format, kernel["returns"])))
+    several = len(kernel["returns"]) > 1
     code.restype = None
-    if len(types["returns"]) == 1:
-        code.restype = {"int": ctypes.c_int64, "float": ctypes.c_double}[types["returns"][0]]
+    if len(kernel["returns"]) == 1:
+        code.restype = {"int": ctypes.c_int64, "float": ctypes.c_double}[kernel["returns"][0]]
     code.argtypes = [ctypes.c_char_p, ctypes.c_char_p]
 
     def call(*arguments: Any) -> Any:
-        if len(arguments) != len(takers):
-            raise OtherTypes
         packed: list[Any] = []
-        for take, argument in zip(takers, arguments, strict=True):
-            take(argument, packed)
+        try:
+            for take, argument in zip(takers, arguments, strict=True):
+                take(argument, packed)
+            data = pack(*packed)
+        except (TypeError, ValueError, struct.error) as error:
+            raise TypeError(f"{name} is not compiled for these arguments: {error}") from error
         if not several:
-            return code(pack(*packed), None)
+            return code(data, None)
         answer = ctypes.create_string_buffer(returned.size)
-        code(pack(*packed), answer)
+        code(data, answer)
         return returned.unpack(answer.raw)
 
     return call
 
 
 def _format(kind: Any) -> str:
-    """Format of an argument as `struct` knows it: eight bytes for each number or address."""
+    """Format of an argument for `struct`: eight bytes for each number or address."""
     if isinstance(kind, str):
         return {"int": "q", "bool": "q", "float": "d"}[kind]
     if "tuple" in kind:
-        return "".join(_format(each) for each in kind["tuple"])
+        return "".join(map(_format, kind["tuple"]))
     return "q" + "q" * int(kind.get("dimensions", 0))
 
 
-def _taker(kind: Any) -> Callable[[Any, list[Any]], None]:
-    """Return what appends an argument of a kind to a list, as it is packed, or raises `OtherTypes`."""
+def _taker(kind: Any) -> Taker:
     if isinstance(kind, str):
-        return {"int": _take_integer, "bool": _take_truth, "float": _take_number}[kind]
+        return _take_truth if kind == "bool" else _take_number
     if "tuple" in kind:
         return _tuple_taker([_taker(each) for each in kind["tuple"]])
     return _array_taker(kind) if "dimensions" in kind else _record_taker(kind)
 
 
-def _take_integer(value: Any, packed: list[Any]) -> None:
-    if not isinstance(value, (int, np.integer)):
-        raise OtherTypes
+def _take_number(value: Any, packed: list[Any]) -> None:
     packed.append(value)
 
 
 def _take_truth(value: Any, packed: list[Any]) -> None:
     if not isinstance(value, (bool, np.bool_)):
-        raise OtherTypes
+        raise TypeError(f"{value!r} is neither True nor False")
     packed.append(bool(value))
 
 
-def _take_number(value: Any, packed: list[Any]) -> None:
-    if not isinstance(value, float):
-        raise OtherTypes
-    packed.append(value)
-
-
-def _tuple_taker(takers: Sequence[Callable[[Any, list[Any]], None]]) -> Callable[[Any, list[Any]], None]:
+def _tuple_taker(takers: Sequence[Taker]) -> Taker:
     def take(value: Any, packed: list[Any]) -> None:
-        if not isinstance(value, tuple) or len(value) != len(takers):
-            raise OtherTypes
         for taker, member in zip(takers, value, strict=True):
             taker(member, packed)
 
     return take
 
 
-def _array_taker(kind: dict[str, Any]) -> Callable[[Any, list[Any]], None]:
-    known: list[Any] = [None]
-    expected, dimensions, written, aligned = kind["items"], kind["dimensions"], not kind["readonly"], kind["aligned"]
+def _array_taker(kind: dict[str, Any]) -> Taker:
+    check = _layout_check(kind["items"])
+    dimensions, written, aligned = kind["dimensions"], not kind["readonly"], kind["aligned"]
 
     def take(value: Any, packed: list[Any]) -> None:
-        if type(value) is not np.ndarray or value.ndim != dimensions:
-            raise OtherTypes
+        if not isinstance(value, np.ndarray) or value.ndim != dimensions:
+            raise TypeError(f"an array of {dimensions} dimensions is required, not {type(value).__name__}")
         flags = value.flags
         if not (flags.c_contiguous and (flags.aligned or not aligned) and (flags.writeable or not written)):
-            raise OtherTypes
-        if value.dtype is not known[0]:
-            if layout(value.dtype) != expected:
-                raise OtherTypes
-            known[0] = value.dtype
+            raise TypeError("an array is not contiguous, not aligned or read-only")
+        check(value.dtype)
         packed.append(value.ctypes.data)
         packed.extend(value.shape)
 
     return take
 
 
-def _record_taker(kind: dict[str, Any]) -> Callable[[Any, list[Any]], None]:
-    known: list[Any] = [None]
-    expected = kind["record"]
+def _record_taker(kind: dict[str, Any]) -> Taker:
+    check = _layout_check(kind["record"])
 
     def take(value: Any, packed: list[Any]) -> None:
-        if type(value) is not np.void:
-            raise OtherTypes
-        if value.dtype is not known[0]:
-            if layout(value.dtype) != expected:
-                raise OtherTypes
-            known[0] = value.dtype
+        if not isinstance(value, np.void):
+            raise TypeError(f"a record is required, not {type(value).__name__}")
+        check(value.dtype)
         packed.append(np.frombuffer(value, np.uint8).ctypes.data)
 
     return take
 
 
+def _layout_check(expected: Any) -> Callable[[np.dtype[Any]], None]:
+    """Return a check of types, which compares the layout of another type than the last one only."""
+    known: np.dtype[Any] | None = None
+
+    def check(kind: np.dtype[Any]) -> None:
+        nonlocal known
+        if kind is not known:
+            if layout(kind) != expected:
+                raise TypeError(f"items of type {kind} are laid out otherwise")
+            known = kind
+
+    return check
+
+
 def layout(kind: np.dtype[Any]) -> Any:
-    """Describe a type of array items or records for the manifest: names, places and types of all fields.
+    """Describe a type of array items or records for the manifest: names, offsets and types of all fields.
 
     Examples
     --------

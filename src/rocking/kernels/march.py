@@ -1,7 +1,7 @@
 """The whole response of one block to one motion: rest, uplift, arc, impact, and so on to the end."""
 
 import math
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +10,6 @@ from rocking.kernels.certificate import unproven
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.events import StepEnd, advance, apply_impact, first_root, raise_peak
 from rocking.kernels.ground import Ground, has_vertical, is_straight, last_piece, length_of, start_of
-from rocking.kernels.interpreted import Interpreted
 from rocking.kernels.leaning import leaning_at
 from rocking.kernels.rest import (
     ULP,
@@ -77,31 +76,6 @@ def take_up(ground: Ground, block: Record, rules: Record, state: Record) -> None
         stretched = elongation_at(block, rules.nonlinear, state.side, state.u) - block.yields
         state.plastic = max(state.plastic, stretched)
     adopt(block, state.law, state.plastic)
-
-
-#: Turns of marches in one process that Python takes (two seconds' work or three, where compiling takes ten), and how
-#: many at once, so that threads share them.
-_interpreted: Final = Interpreted(march, 15_000)
-_PORTION: Final = 500
-
-
-def follow(ground: Ground, block: Record, rules: Record, table: Records, scratch: Record, state: Record) -> int:
-    """`march`, whose first turns Python takes where it is not compiled: most responses end before a compiler would."""
-    while (turns := min(_interpreted.work(), _PORTION, int(state["budget"]))) > 0:
-        before, later = state.copy(), int(state["budget"]) - turns
-        state["budget"] = turns
-        try:
-            ending = int(_interpreted(ground, block, rules, table, scratch, state))
-        except (ArithmeticError, ValueError):
-            _interpreted.spend(_interpreted.work())
-            for name in before.dtype.names:
-                state[name] = before[name]
-            break
-        _interpreted.spend(turns - int(state["budget"]))
-        state["budget"] += later
-        if ending != Ending.PAUSED or not later:
-            return ending
-    return march(ground, block, rules, table, scratch, state)
 
 
 @inlined

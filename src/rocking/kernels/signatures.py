@@ -1,4 +1,4 @@
-"""The types for which kernels are compiled before they are called: in the background, or for a library."""
+"""The types for which kernels are compiled."""
 
 import importlib
 from typing import Any
@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from rocking.kernels import ground, state
-from rocking.kernels.compiled import Kernel
 from rocking.kernels.lanes import pool_of
 from rocking.kernels.periodic import TRAP, Setting
 from rocking.kernels.sine import lanes, sequence
@@ -14,22 +13,12 @@ from rocking.kernels.trace import Trail
 
 
 def named(name: str) -> Any:
-    """Return a kernel by its name: module and function, as `signatures` has it."""
+    """Return a kernel by its name in `signatures`: module and function."""
     module, _, function = name.rpartition(".")
     return getattr(importlib.import_module(f"rocking.kernels.{module}"), function)
 
 
-def prepare(*names: str) -> None:
-    """Compile kernels that have no machine code at hand; none is called."""
-    every = signatures()
-    for name in names:
-        kernel = named(name)
-        if isinstance(kernel, Kernel):
-            for arguments in every[name]:
-                kernel.prepare(*arguments)
-
-
-def signatures() -> dict[str, list[tuple[Any, ...]]]:
+def signatures() -> dict[str, tuple[Any, ...]]:
     """Return arguments as Python passes them to each kernel, by its name: of them only the types count."""
 
     def reals(*shape: int, kind: Any = np.float64) -> Any:
@@ -53,35 +42,33 @@ def signatures() -> dict[str, list[tuple[Any, ...]]]:
     statuses = reals(1, kind=np.int8)
     shares = (reals(1, 1, kind=np.float32), reals(1, 1, kind=np.float32), reals(1, 1, kind=np.float32), singles)
     return {
-        "march.march": [(seen, block, rules, table, scratch, states[0])],
-        "trace.trace": [(trail, scratch, given(), count, reals(1, 3))],
-        "trace.vary": [(trail, scratch, state.record(state.VARIATION), 0, given(), reals(), reals(), reals())],
-        "adjoint.adjoint": [(trail, scratch, state.record(state.VARIATION), 0, 0.0, reals(3), reals(2, 2))],
-        "adjoint.of_ending": [(trail, scratch, 0, reals(3), reals(2, 2))],
-        "periodic.iterate": [(setting, scratch, states, 1, reals(1, 1, 3), count)],
-        "periodic.settle": [(setting, scratch, states, 1, reals(1, TRAP), count, count)],
-        "periodic.differentiate": [(trail, scratch, state.record(state.VARIATION), table, states, reals(1, 2, 2))],
-        "periodic.stretch": [
-            (trail, scratch, state.record(state.VARIATION), table, states[0], reals(3, 2), reals(1, 2))
-        ],
-        "periodic.to_next_impact": [(trail, scratch, state.record(state.VARIATION), table, states, reals(1, 2, 2))],
-        "uplift.note_complete": [(seen, blocks, states, scratch, flags)],
-        "uplift.next_uplifts": [(trail, scratch, reals())],
-        "ground.fill": [(given(3), given(2, 2), 1.0, seen, reals())],
-        "lanes.run_lanes": [(seen, rules, scratch, pool, 0)],
-        "lanes.march_each": [(seen, rules, scratch, pool)],
-        "oscillator.peak_displacements": [(given(3), given(2, 2), given(), 0.05, reals(), reals())],
-        "sine.eq65.eq65_time": [(1.0, 1.0, 1.0)],
-        "sine.eq65.eq65_sums": [(1.0,)],
-        "sine.eq65.eq65_terms": [(1.0, reals(), reals())],
-        "sine.series.series_arcs": [(reals(1, 1), True, 1.0, 1.0, reals(1, 1), reals(1, 1), reals(1, 1, 1))],
-        "sine.sequence.fitted_amplitudes": [(given(), given(), True, reals())],
-        "population.shares": [(*shares, reals(1, 1, kind=np.float32), reals())],
-        "population.log_density": [(reals(1, 1), reals(1, 1), reals(), reals())],
-        "sine.arc.first_impact": [(1.0, 1.0)],
-        "sine.lanes.rest_phases": [(sequences, count, np.zeros(1, lanes.GROUP), lanes.Answers(reals(), statuses))],
-        "sine.sequence.rest_phase": [(1.0, 1.0, 1.0)],
-        "sine.sequence.resolve": [(1.0, 1.0, 1.0, 1.0, np.zeros(1, sequence.IMPACT))],
-        "sine.sequence.semianalytical_phases": [(sequences, count, reals(), statuses)],
-        "sine.sequence.critical_amplitudes": [(given(), given(), reals())],
+        "march.march": (seen, block, rules, table, scratch, states[0]),
+        "trace.trace": (trail, scratch, given(), count, reals(1, 3)),
+        "trace.vary": (trail, scratch, state.record(state.VARIATION), 0, given(), reals(), reals(), reals()),
+        "adjoint.adjoint": (trail, scratch, state.record(state.VARIATION), 0, 0.0, reals(3), reals(2, 2)),
+        "adjoint.of_ending": (trail, scratch, 0, reals(3), reals(2, 2)),
+        "periodic.iterate": (setting, scratch, states, 1, reals(1, 1, 3), count),
+        "periodic.settle": (setting, scratch, states, 1, reals(1, TRAP), count, count),
+        "periodic.differentiate": (trail, scratch, state.record(state.VARIATION), table, states, reals(1, 2, 2)),
+        "periodic.stretch": (trail, scratch, state.record(state.VARIATION), table, states[0], reals(3, 2), reals(1, 2)),
+        "periodic.to_next_impact": (trail, scratch, state.record(state.VARIATION), table, states, reals(1, 2, 2)),
+        "uplift.note_complete": (seen, blocks, states, scratch, flags),
+        "uplift.next_uplifts": (trail, scratch, reals()),
+        "ground.fill": (given(3), given(2, 2), 1.0, seen, reals()),
+        "lanes.run_lanes": (seen, rules, scratch, pool, 0),
+        "lanes.march_each": (seen, rules, scratch, pool),
+        "oscillator.peak_displacements": (given(3), given(2, 2), given(), 0.05, reals(), reals()),
+        "sine.eq65.eq65_time": (1.0, 1.0, 1.0),
+        "sine.eq65.eq65_sums": (1.0,),
+        "sine.eq65.eq65_terms": (1.0, reals(), reals()),
+        "sine.series.series_arcs": (reals(1, 1), True, 1.0, 1.0, reals(1, 1), reals(1, 1), reals(1, 1, 1)),
+        "sine.sequence.fitted_amplitudes": (given(), given(), True, reals()),
+        "population.shares": (*shares, reals(1, 1, kind=np.float32), reals()),
+        "population.log_density": (reals(1, 1), reals(1, 1), reals(), reals()),
+        "sine.arc.first_impact": (1.0, 1.0),
+        "sine.lanes.rest_phases": (sequences, count, np.zeros(1, lanes.GROUP), lanes.Answers(reals(), statuses)),
+        "sine.sequence.rest_phase": (1.0, 1.0, 1.0),
+        "sine.sequence.resolve": (1.0, 1.0, 1.0, 1.0, np.zeros(1, sequence.IMPACT)),
+        "sine.sequence.semianalytical_phases": (sequences, count, reals(), statuses),
+        "sine.sequence.critical_amplitudes": (given(), given(), reals()),
     }

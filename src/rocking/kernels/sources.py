@@ -1,12 +1,32 @@
-"""What kernels were compiled from. This imports the standard library alone, for a build of the package runs it, too."""
+"""Hashes of the kernels' sources. The build of the package runs this file alone: it imports the standard library only."""
 
+import ast
 import hashlib
+from collections.abc import Callable
 from pathlib import Path
 
 
-def sources(folder: Path) -> str:
-    """Hash of all kernels' sources."""
+def text_hash(folder: Path) -> str:
+    """Hash the text of all kernels."""
+    return _hash(folder, lambda text: text)
+
+
+def code_hash(folder: Path) -> str:
+    """Hash the code of all kernels without comments and docstrings; takes longer than `text_hash`."""
+    return _hash(folder, _code)
+
+
+def _hash(folder: Path, content: Callable[[bytes], bytes]) -> str:
     digest = hashlib.sha256()
     for source in sorted(folder.rglob("*.py")):
-        digest.update(str(source.relative_to(folder)).encode() + b"\0" + source.read_bytes() + b"\0")
+        name = source.relative_to(folder).as_posix()
+        digest.update(name.encode() + b"\0" + content(source.read_bytes()) + b"\0")
     return digest.hexdigest()[:16]
+
+
+def _code(text: bytes) -> bytes:
+    tree = ast.parse(text)
+    for node in ast.walk(tree):
+        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)) and ast.get_docstring(node, clean=False):
+            del node.body[0]
+    return ast.dump(tree).encode()

@@ -13,7 +13,7 @@ from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.adjoint import Ends, adjoint, of_ending
-from rocking.kernels.march import follow
+from rocking.kernels.march import march
 from rocking.kernels.state import Records
 from rocking.kernels.trace import Trail, own
 from rocking.motion import piecewise
@@ -262,7 +262,7 @@ def _ties_before(trail: Trail, instant: float) -> bool:
         start[name] = first[name]
     start["peak"] = first["u"]
     rules["stop"], rules["endless"], rules["record"] = math.nextafter(instant, math.inf), False, False
-    follow(trail.ground, own(trail).block, rules, state.new_table(0), state.new_scratch(), start)
+    march(trail.ground, own(trail).block, rules, state.new_table(0), state.new_scratch(), start)
     return bool(start["near_ties"] > 0)
 
 

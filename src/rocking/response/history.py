@@ -14,7 +14,7 @@ from rocking.arrays import Flags, Floats, Integers
 from rocking.bisection import bisected
 from rocking.errors import InvalidOption
 from rocking.kernels import state
-from rocking.kernels.march import follow
+from rocking.kernels.march import march
 from rocking.kernels.state import Records
 from rocking.kernels.trace import Trail, own, trace
 
@@ -176,7 +176,7 @@ def with_all_impacts(trail: Trail, *, cut: bool) -> Trail:
         body["limit"] = np.maximum(slowest, _LEAST_SHARE * start["v"])
         start["peak"] = math.inf  # nobody asks for the highest rotation; weight presses down where a rest is proven
         rules["stop"] = nodes["time"][row + 1] if row + 1 < len(nodes) else trail.rules["stop"]
-        while follow(trail.ground, body, rules, table, scratch, start) == state.Ending.FULL:
+        while march(trail.ground, body, rules, table, scratch, start) == state.Ending.FULL:
             table = state.grown(table)
         found = table["node"][1 : start["nodes"]]
         parts += [nodes[done : row + 1], found[(found["side"] >= 0) & (found["time"] < rules["stop"])]]

@@ -27,7 +27,6 @@ from types import FrameType
 from typing import Any, Final
 
 from rocking import checks
-from rocking.compiling import SIMULATIONS, announce
 from rocking.errors import InvalidOption, RockingError, StudyError, install
 from rocking.progress import Progress, note
 from rocking.studies.store import UnitArray
@@ -140,7 +139,6 @@ def run(
     `failing` gets the name of each unit that cannot be computed, and why, as it happens. A StudyError is raised if the
     workers are gone.
     """
-    announce(SIMULATIONS)
     start = time.monotonic()
     missing = list(job.missing())
     units = simulations = 0

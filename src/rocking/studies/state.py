@@ -14,7 +14,6 @@ from typing import Any, Final
 import numpy as np
 
 from rocking import checks
-from rocking.compiling import SIMULATIONS, announce
 from rocking.errors import InvalidOption, StudyError
 from rocking.progress import Progress
 from rocking.studies.place import Place, this_process
@@ -170,7 +169,6 @@ def verified(store: Store, recompute: int, repair: bool, seed: int, progress: bo
     checks.whole(recompute, "recompute", InvalidOption, 0)
     if recompute or repair:
         store.check_program()
-        announce(SIMULATIONS)
     place, log, arrays = store.place, Log(store.place), arrays_of(store)
     metadata = {name: data for array in arrays for name, data in array.metadata.items()}
     wrong = [name for name, data in metadata.items() if place.get(name) != data]

@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 
 from rocking import checks
 from rocking.arrays import Floats, Integers
-from rocking.compiling import SIMULATIONS, announce
 from rocking.constants import VERSION
 from rocking.engine import Setup, Task, simulate_task
 from rocking.ensemble import Product
@@ -161,7 +160,6 @@ def fitting_unit(product: Product) -> tuple[int, int, int, int]:
     some = product.bodies.select(np.linspace(0, count - 1, min(count, _GROUP)).astype(np.int64))
     motion = max(product.motions, key=lambda one: len(one.coefficients))
     factors = np.array([[[product.scales.factors(motion).max()]]])
-    announce(SIMULATIONS)
     setup = Setup(some, product.model, product.treatment, product.duration)
     work = GridWork(setup=setup, motions=(motion,), factors=factors, unit=(1, 1, 1, len(some)), outcomes=OUTCOMES)
     compute(work)  # compiles
