@@ -97,7 +97,7 @@ lint: .venv/.all ## ruff (rules and format), the import contracts, public docstr
 
 types: .venv/.all ## mypy: strictly for the package, and whether what stands beside it still fits
 	$(BIN)/mypy
-	$(BIN)/mypy benchmarks scripts stress docs/howto
+	$(BIN)/mypy benchmarks compiling scripts stress docs/howto
 	$(BIN)/mypy examples --exclude examples/paper/
 	$(BIN)/mypy examples/paper
 

@@ -5,7 +5,6 @@ Usage: python benchmarks/bench_ensemble.py
 A block-step is one block through one sample of the record, whether it rocks, rests or has fallen. Times are processor
 times of one core in one run. The Runge-Kutta loop is what one writes with numba in an afternoon: one step per sample,
 an impact where the rotation has changed sign at the end of a step, rest below a velocity threshold.
-The share of lanes is that of block-steps in which a block sits in a lane; in the others it rests, waits or has fallen.
 """
 
 import math
@@ -21,9 +20,6 @@ import numpy as np
 import rocking
 from rocking.constants import Model
 from rocking.kernels import lanes, state
-from rocking.kernels.ground import Ground, last_piece
-from rocking.kernels.lane_steps import WIDTH, step_linear
-from rocking.kernels.state import Record
 from rocking.problem import ground_of, rules_of
 from rocking.treatment import Certified
 
@@ -52,9 +48,6 @@ def main() -> None:
             report(model, motion, acceleration, blocks, steps)
         print()
     report_vertical(blocks)
-    smooth, limit = arithmetic()
-    print(f"quiet linear step: {smooth:.2f} ns per block")
-    print(f"its {OPERATIONS} operations at the measured peak: {limit:.2f} ns")
 
 
 def report(model: Model, motion: rocking.Motion, acceleration: np.ndarray, blocks: rocking.Blocks, steps: int) -> None:
@@ -65,10 +58,8 @@ def report(model: Model, motion: rocking.Motion, acceleration: np.ndarray, block
     arguments = (acceleration, motion.step, blocks.p[:, 0].copy(), blocks.alpha[:, 0].copy(), 0.9, nonlinear)
     plain = shortest(lambda: runge_kutta(*arguments)) / steps
     baseline = scipy_time(model, acceleration, motion, blocks) / (len(acceleration) - 1)
-    share = lane_steps(model, motion, blocks) / steps
     print(
-        f"\n{model}: {float(result.impacts.mean()):.0f} impacts per block, {float(result.overturned.mean()):.0%} fall, "
-        f"{share:.1%} of the steps in lanes"
+        f"\n{model}: {float(result.impacts.mean()):.0f} impacts per block, {float(result.overturned.mean()):.0%} fall"
     )
     print(f"  lanes         {1e9 * own:10.2f} ns per block-step  {1.0 / own:9.3g} per second and core")
     print(f"  Runge-Kutta   {1e9 * plain:10.2f} ns                {plain / own:9.2f} times the lanes' time")
@@ -181,67 +172,6 @@ def runge_kutta(
                 break
         peaks[k] = peak
     return peaks
-
-
-def lane_steps(model: Model, motion: rocking.Motion, blocks: rocking.Blocks) -> int:
-    """Block-steps in which a block sits in a lane."""
-    how = Certified()
-    ground = ground_of(motion, blocks.gravity)
-    bodies = blocks.kernel_records(model, how.limits(blocks, motion, model))
-    states = state.new_states(len(blocks), state.TO_THE_END)
-    assert motion.step is not None, "lanes take even samples"
-    width = motion.step * float(blocks.p.max())
-    substeps = math.ceil(width / lanes.LONGEST_SUBSTEP) if model == "nonlinear" else 0
-    whole = lanes.pool_of(bodies, states, len(motion.coefficients), motion.step, substeps)
-    return count_lane_steps(
-        ground, rules_of(blocks, model, how, None, record=False), state.new_scratch(), whole, substeps
-    )
-
-
-@numba.njit(error_model="numpy")
-def count_lane_steps(ground: Ground, rules: Record, scratch: Record, whole: lanes.Pool, substeps: int) -> int:
-    """Lanes taken over all samples: the loop of `lanes.run_lanes`, counting."""
-    count = 0
-    for piece in range(last_piece(ground)):
-        count += whole.counts.active
-        lanes.step_groups(ground, rules, scratch, whole, piece, substeps)
-        lanes.compact(whole)
-        lanes.admit_waiting(ground, rules, scratch, whole, piece)
-    return count
-
-
-#: Multiplications, additions, comparisons and selections of one lane in `step_linear`.
-OPERATIONS = 47
-
-
-def arithmetic() -> tuple[float, float]:
-    """Time of a quiet linear step per lane, and the time its operations take at this core's measured rate, ns."""
-    bodies, states = state.records(WIDTH, state.BLOCK), state.new_states(WIDTH, 0)
-    groups = lanes.pool_of(bodies, states, 1, 0.01, 0).groups
-    groups["u"] = 0.5
-    calls = 20_000
-    smooth = shortest(lambda: quiet_steps(groups, calls)) / (calls * WIDTH)
-    work = np.full(64, 1.0)
-    rate = shortest(lambda: multiply_add(work, 200_000)) / (200_000 * 64 * 2)
-    return 1e9 * smooth, 1e9 * rate * OPERATIONS
-
-
-@numba.njit(error_model="numpy")
-def quiet_steps(groups: state.Records, calls: int) -> int:
-    """Many quiet steps of the same lanes."""
-    busy = 0
-    for _ in range(calls):
-        busy += step_linear(groups[0], (0.1, 10.0), 0.01, 0.0, 1.5)
-    return busy
-
-
-@numba.njit
-def multiply_add(work: np.ndarray, calls: int) -> float:
-    """Independent multiplications and additions, as many as the core can do."""
-    for _ in range(calls):
-        for k in range(64):
-            work[k] = work[k] * 0.999999 + 1e-6
-    return work[0]
 
 
 if __name__ == "__main__":

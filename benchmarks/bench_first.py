@@ -1,16 +1,14 @@
-"""What a new process takes until its first answer: with the libraries of a wheel, a warm cache, and nothing compiled.
+"""Time until the first result of a new process.
 
-Usage: python benchmarks/bench_first.py        # with the Python of an environment that the wheel is installed in
+Usage: python benchmarks/bench_first.py
 
 Processor time of the process, s; least of some runs in turn.
 """
 
-import os
 import subprocess
 import sys
-import tempfile
 
-from rocking.kernels import library
+from rocking.kernels import compiled
 
 RECORD = "el-centro-meloland-270"
 BLOCKS = "rocking.Blocks(p=np.repeat(np.linspace(1, 5, 100), 100), alpha=np.tile(np.linspace(0.1, 0.4, 100), 100))"
@@ -22,6 +20,10 @@ ANSWERS = {
     ),
     "10,000 blocks, linear": f"rocking.simulate_many({BLOCKS}, rocking.records.load('{RECORD}'), model='linear')",
     "10,000 blocks, nonlinear": f"rocking.simulate_many({BLOCKS}, rocking.records.load('{RECORD}'))",
+    "fragility": (
+        f"rocking.fragility({BLOCKS}, [rocking.records.load('{RECORD}'), rocking.records.load('ridgecrest-clc-090')], "
+        "levels=[2.0, 4.0, 8.0, 16.0], progress=False)"
+    ),
     "chattering time": "rocking.chattering.chattering_time(1.05, 3.0, 0.9)",
     "chattering report": "rocking.chattering.chattering_report(1.05, 3.0, 0.9)",
 }
@@ -29,30 +31,15 @@ REPEATS = 3
 
 
 def main() -> None:
-    print(library.state())
-    print(f"{'processor time, s':26s} {'library':>9s} {'warm':>9s} {'cold':>9s}")
+    print(f"processor time, s; {compiled.state()}")
     for name, code in ANSWERS.items():
-        with tempfile.TemporaryDirectory() as warm:
-            spent(code, ROCKING_SHIPPED="0", NUMBA_CACHE_DIR=warm)
-            rows = []
-            for _ in range(REPEATS):
-                with tempfile.TemporaryDirectory() as cold:
-                    rows.append(
-                        (
-                            spent(code) if library.opened() else float("nan"),
-                            spent(code, ROCKING_SHIPPED="0", NUMBA_CACHE_DIR=warm),
-                            spent(code, ROCKING_SHIPPED="0", NUMBA_CACHE_DIR=cold),
-                        )
-                    )
-        print(f"{name:26s}" + "".join(f" {min(times):9.2f}" for times in zip(*rows, strict=True)))
+        print(f"{name:26s} {min(spent(code) for _ in range(REPEATS)):9.2f}")
 
 
-def spent(code: str, **environment: str) -> float:
+def spent(code: str) -> float:
     """Processor time of a process that computes something."""
     script = f"import time\nimport numpy as np\nimport rocking\n{code}\nprint(time.process_time())"
-    done = subprocess.run(
-        [sys.executable, "-c", script], check=True, capture_output=True, text=True, env=os.environ | environment
-    )
+    done = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
     return float(done.stdout.split()[-1])
 
 

@@ -1,8 +1,8 @@
 """Build the libraries of compiled kernels for this platform; `hatch_build.py` calls this when the package is built.
 
-numba translates the kernels into LLVM's language in two processes, and all of them are optimised together for each level
-of the processor (`lowering.py`). Here the results are linked, and a manifest describes them. This imports the standard
-library alone, because the packages that compile are installed only where something must be compiled.
+numba translates the kernels into LLVM's language in two processes, and all of them are optimised together for each
+level of the processor (`lowering.py`). Here the results are linked, and a manifest describes them. This imports the
+standard library alone, because the packages that compile are installed only where something must be compiled.
 """
 
 from __future__ import annotations
@@ -71,8 +71,8 @@ def dependencies() -> list[str]:
 def build() -> list[Path]:
     """Build the libraries and the manifest, unless they are current, and return their paths.
 
-    Builds of one source tree wait for each other. Each library has a name of its own, and the manifest is replaced last,
-    so that a process that starts meanwhile opens files that belong together.
+    Builds of one source tree wait for each other. Each library has a name of its own, and the manifest is replaced
+    last, so that a process that starts meanwhile opens files that belong together.
     """
     OUT.mkdir(exist_ok=True)
     with _alone():
@@ -193,15 +193,16 @@ def _linker() -> tuple[list[str], list[str]]:
     if zig:
         return [*zig, "cc", "-shared", *MACOS], ["-lm"]
     raise BuildError(
-        "neither a C compiler nor ziglang was found to link them; install a C compiler such as gcc or clang (the variable "
-        "CC may name it), or a wheel of rocking for this platform"
+        "neither a C compiler nor ziglang was found to link them; install a C compiler such as gcc or clang (the "
+        "variable CC may name it), or a wheel of rocking for this platform"
     )
 
 
 def _loaded(name: str) -> str:
     """Path of a library of the system, which this process opens."""
     ctypes.CDLL(name)
-    return next(line.split()[-1] for line in Path("/proc/self/maps").read_text().splitlines() if line.endswith("/" + name))
+    lines = Path("/proc/self/maps").read_text("utf-8").splitlines()
+    return next(line.split()[-1] for line in lines if line.endswith(f"/{name}"))
 
 
 def tag() -> str:

@@ -28,7 +28,9 @@ from typing import Any
 import llvmlite.binding as llvm
 import numba
 import numba.np.numpy_support as support
+from libraries import LEVELS, MACHINE
 from numba import types
+from numba.core.bytecode import FunctionIdentity
 from numba.core.codegen import AOTCPUCodegen, CodeLibrary, JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_lock import global_compiler_lock
@@ -38,16 +40,14 @@ from numba.core.typed_passes import NativeLowering
 from numba.core.types.misc import unliteral
 from numba.extending import register_model
 
-from libraries import LEVELS, MACHINE
-from numba.core.bytecode import FunctionIdentity
 from rocking.kernels import compiled
 from rocking.kernels.library import layout
 
 #: Modules of the kernels that one process translates; a second one translates the others, which takes about as long.
 MARCHES = ("march", "lanes", "periodic")
 
-#: A function that every library has: the number of the highest level of the processor. It asks by the instructions cpuid
-#: and xgetbv, because the operating system must save the registers of AVX2 and AVX-512, too.
+#: A function that every library has: the number of the highest level of the processor. It executes the instructions
+#: cpuid and xgetbv: the operating system must save the registers of AVX2 and AVX-512, too.
 LEVEL = "define i64 @rocking_level() {\n  ret i64 0\n}\n"
 if MACHINE == "x86_64":
     CPUID = '{ i32, i32, i32, i32 } asm sideeffect "cpuid", "={ax},={bx},={cx},={dx},{ax},{cx}"'

@@ -60,7 +60,7 @@ PARTS = {
 }
 
 #: How kernels come to be compiled, which a run without compilation shows nothing of.
-NOT_JUDGED = ("compiled.py", "compiler.py", "interpreted.py", "kept.py", "library.py", "signatures.py", "sources.py")
+NOT_JUDGED = ("compiled.py", "library.py", "signatures.py", "sources.py")
 
 #: Share of the mutants of a part that tests must see.
 WANTED = 0.85
@@ -98,8 +98,7 @@ class Tree:
                 if (ROOT / name).is_file():
                     (copy / name).parent.mkdir(parents=True, exist_ok=True)
                     shutil.copy2(ROOT / name, copy / name)
-            if (shipped := ROOT / "src/rocking/kernels/shipped").exists():
-                (copy / "src/rocking/kernels/shipped").symlink_to(shipped.resolve())
+            (copy / "src/rocking/kernels/built").symlink_to(ROOT / "src/rocking/kernels/built")
         sources = sorted((ROOT / "src").rglob("*.py"))
         self.sources = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()
 
@@ -269,6 +268,8 @@ def _tried(copy: Path, place: Path, mutant: Mutant | None, names: list[str], lim
     if uncompiled:
         os.environ["NUMBA_DISABLE_JIT"] = "1"
         options += ["-W", "ignore::RuntimeWarning"]
+    elif mutant and "kernels" in mutant.path.parts:
+        os.environ["ROCKING_JIT"] = "1"
     import pytest
 
     recorder, began = Recorder(), time.process_time()

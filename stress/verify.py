@@ -79,7 +79,7 @@ def _parts(promise: Promise, size: str, folder: Path) -> list[int]:
 def key(promise: Promise) -> str:
     """Hash of all that an answer hangs on: files of package, oracles and promise, and versions."""
     package = Path(rocking.__file__).parent
-    files = [*_modules(promise.judge.__module__), ROOT / "scripts" / "ship_kernels.py"]
+    files = [*_modules(promise.judge.__module__), *sorted((ROOT / "compiling").glob("*.py"))]
     files += sorted((ROOT / "tests" / "oracles").rglob("*.py"))
     files += [file for file in sorted(package.rglob("*")) if file.is_file() and _counts(file, package, promise)]
     total = hashlib.sha256(" ".join([sys.version, platform.machine(), *map(_version, LIBRARIES)]).encode())
@@ -104,7 +104,7 @@ def _counts(file: Path, package: Path, promise: Promise) -> bool:
     """Whether a file of the package is a source, and of a part that the promise hangs on."""
     within = file.relative_to(package)
     above = any(within.is_relative_to(each) for each in promise.above)
-    return not above and not {"__pycache__", "shipped"} & {*within.parts}
+    return not above and not {"__pycache__", "built"} & {*within.parts}
 
 
 def _version(library: str) -> str:

@@ -16,7 +16,10 @@ from pathlib import Path
 from typing import Any
 
 import hypothesis
+import numpy as np
 import pytest
+
+from rocking.kernels import state
 
 # The same examples on every run, and few; `pytest --hypothesis-profile=default` draws new ones, and more. None of them
 # is judged by the clock: on a busy machine all is slow.
@@ -196,7 +199,7 @@ def unarranged(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def run(unarranged: None, capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
-    """Run the command line: exit code, output, and errors but for the word that kernels are being compiled."""
+    """Run the command line: exit code, output, and errors."""
     from rocking.cli import main
 
     def call(*arguments: object) -> tuple[int, str, str]:
@@ -206,8 +209,7 @@ def run(unarranged: None, capsys: pytest.CaptureFixture[str]) -> Callable[..., t
         except SystemExit as stop:
             code = int(stop.code or 0)
         captured = capsys.readouterr()
-        said = [line for line in captured.err.splitlines(keepends=True) if "note: compiling" not in line]
-        return code, captured.out, "".join(said)
+        return code, captured.out, captured.err
 
     return call
 
@@ -226,3 +228,11 @@ def reference() -> dict[str, Any]:
     path = Path(__file__).parent / "data" / "reference.json"
     values: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     return values
+
+
+@pytest.fixture(scope="module")
+def parts_run_by_python() -> Iterator[None]:
+    """Let Python run the parts of kernels, which only kernels call elsewhere; kernels themselves stay compiled."""
+    with pytest.MonkeyPatch.context() as patch, np.errstate(all="ignore"):
+        patch.setattr(state, "UNCOMPILED", True)
+        yield

@@ -968,9 +968,8 @@ def printed(command: str) -> list[Any]:
             main(command.split())
         except SystemExit as stop:
             code = int(stop.code or 0)
-    messages = [line for line in err.getvalue().splitlines() if "note: compiling" not in line]
     text = re.sub(r'"program": "[^"]*"', "", out.getvalue())
-    return [code, re.sub(r" in \S+ s \(\S+ a second\)", "", text), messages]
+    return [code, re.sub(r" in \S+ s \(\S+ a second\)", "", text), err.getvalue().splitlines()]
 
 
 @group(digits=6, fast=False, subject=("analyses", "mesh"))

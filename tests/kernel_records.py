@@ -5,10 +5,10 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from numba import config
 from oracles.problem import Problem
 
 from rocking.kernels import state
+from rocking.kernels.compiled import UNCOMPILED
 from rocking.kernels.ground import Ground
 from rocking.kernels.ground import ground_of as laid_out
 from rocking.kernels.state import Record
@@ -17,7 +17,7 @@ GRAVITY = 9.80665
 ULP = 2.0**-52
 PLUS, MINUS = 0, 1
 
-long_uncompiled = pytest.mark.skipif(bool(config.DISABLE_JIT), reason="takes long without compilation")
+long_uncompiled = pytest.mark.skipif(UNCOMPILED, reason="takes long without compilation")
 
 Pair = tuple[float, float]
 

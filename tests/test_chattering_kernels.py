@@ -12,6 +12,8 @@ from rocking.kernels.sine.arc import State, arc, basis
 from rocking.kernels.sine.sequence import remaining_phase, rest_phase
 from rocking.kernels.sine.series import PowerSeries, remaining_series
 
+pytestmark = pytest.mark.usefixtures("parts_run_by_python")
+
 
 def exact_basis(t, delta):
     """Definitions of E and W in fifty digits, over the factor that a long arc's are scaled by."""

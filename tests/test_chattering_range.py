@@ -10,6 +10,8 @@ from oracles.sine_chattering import BITS, rest_time
 from rocking import chattering
 from rocking.kernels.sine.sequence import distance_exponent
 
+pytestmark = pytest.mark.usefixtures("parts_run_by_python")
+
 #: Shares of a_cr - 1, some close to either side of one.
 SHARES = (1e-3, 0.4, 0.95, 1.003)
 

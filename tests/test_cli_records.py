@@ -433,50 +433,6 @@ def test_a_fit_used_beyond_its_range_is_one_line(run, monkeypatch):
     assert run("critical", 2, 0.9, "--quiet")[2].splitlines() == ["rocking: enough"]
 
 
-@pytest.mark.thorough
-def test_compiling_is_said_once_for_each_work_and_not_where_it_is_short():
-    program = (
-        "import time\n"
-        "from numba import njit\n"
-        "from rocking import compiling, progress\n"
-        "compiling._watch_compiler()\n"
-        "def compiled(seconds, patience):\n"
-        "    compiling._PATIENCE = patience\n"
-        "    compiling.announce(seconds)\n"
-        "    njit(lambda x: x + 1)(1)\n"
-        "with progress.notes_for('everybody'):\n"
-        "    for seconds, patience in ((7, 1e9), (7, 0.0), (7, 0.0), (9, 1e9), (9, 0.0), (7, 0.0)):\n"
-        "        compiled(seconds, patience)\n"
-    )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert re.findall(r"note: compiling.* up to (\d) s", done.stderr) == ["7", "9"]
-
-
-# The kernels are compiled for it; what is announced, and how often, is tested above.
-@pytest.mark.slow
-def test_a_cold_cache_is_announced_by_the_command_line(tmp_path):
-    command = [sys.executable, "-c", "from rocking.cli import main; main(['critical', '2', '0.9'])"]
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "ROCKING_SHIPPED": "0"}
-    for expected in (1, 0):
-        done = subprocess.run(command, capture_output=True, text=True, env=environment, check=True)
-        assert done.stderr.count("note: compiling") == expected
-
-
-@pytest.mark.slow
-def test_a_cold_cache_is_announced_by_a_study(tmp_path):
-    file, place = str(tmp_path / "few.toml"), str(tmp_path / "few")
-    Path(file).write_text('[motions]\nrecords = ["el-centro-meloland-270"]\n[blocks]\np = 2.0\nalpha = 0.2\n', "utf-8")
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "ROCKING_SHIPPED": "0"}
-    counts = []
-    for command in (["create", file, place], ["run", place]):
-        program = f"from rocking.cli import main; main({['study', *command]})"
-        done = subprocess.run(
-            [sys.executable, "-c", program], capture_output=True, text=True, env=environment, check=True
-        )
-        counts.append(done.stderr.count("note: compiling"))
-    assert counts == [1, 0]  # a pilot, at creation, compiles
-
-
 def test_notes_go_to_those_who_want_them(capsys):
     note("a terminal is not watching")
     with notes_for("everybody"):

@@ -1,6 +1,7 @@
 """The documentation keeps its word: examples run, names exist, pages load nothing from the network."""
 
 import importlib
+import importlib.util
 import inspect
 import json
 import re
@@ -8,17 +9,16 @@ import runpy
 import shlex
 import shutil
 import sys
+import sysconfig
 import tomllib
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 from cyclopts import CycloptsError
-from packaging.tags import platform_tags
 
 import rocking
 from rocking.cli import app, main, wording
-from rocking.kernels.sources import sources
 from rocking.studies.file.tables import SCHEMA
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -218,37 +218,47 @@ def hooks(monkeypatch):
     return runpy.run_path(str(ROOT / "hatch_build.py"))
 
 
-def test_a_wheel_holds_the_kernels_that_were_compiled_for_it_and_else_none(hooks, tmp_path):
+def test_the_build_uses_the_compiler_of_the_tests_and_installs_none_where_kernels_are_current(hooks):
+    libraries = runpy.run_path(str(ROOT / "compiling" / "libraries.py"))
+    pinned = (ROOT / "constraints.txt").read_text("utf-8").splitlines()
+    assert {each.partition("==")[0] for each in libraries["REQUIREMENTS"]} > {"numba", "llvmlite", "numpy"}
+    assert {*libraries["REQUIREMENTS"]} <= {*pinned}
     hook = hooks["KernelsHook"]()
-    hook.root, hook.target_name = str(tmp_path), "wheel"
-    hook.initialize("standard", build := {"force_include": {}})
-    assert build == {"force_include": {}}
-    folder = tmp_path / "build" / "shipped"
-    folder.mkdir(parents=True)
-    here = next(platform_tags())
-    kernels = tmp_path / "src" / "rocking" / "kernels"
-    kernels.mkdir(parents=True)
-    shutil.copy(ROOT / kernels.relative_to(tmp_path) / "sources.py", kernels)
-    (kernels / "arc.py").write_text("x = 1\n", "utf-8")
-    manifest = {"platform": here, "sources": sources(kernels), "libraries": {"kernels-x86-64.so": "0" * 64}}
-    for version, platform in (("editable", here), ("standard", "manylinux_2_99_riscv64")):
-        (folder / "manifest.json").write_text(json.dumps(manifest | {"platform": platform}), "utf-8")
-        hook.initialize(version, build)
-        assert build == {"force_include": {}}
-    (folder / "manifest.json").write_text(json.dumps(manifest), "utf-8")
-    (kernels / "arc.py").write_text("x = 2\n", "utf-8")
-    hook.app, said = SimpleNamespace(display_warning=lambda text: said.append(text)), []
-    hook.initialize("standard", build)
-    assert build == {"force_include": {}}
-    assert [str(folder) in text and "other sources" in text for text in said] == [True]
-    (kernels / "arc.py").write_text("x = 1\n", "utf-8")
-    hook.initialize("standard", build)
-    assert len(said) == 1
-    assert (build["pure_python"], build["tag"]) == (False, f"py3-none-{here}")
-    assert sorted(build["force_include"].values()) == [
-        "rocking/kernels/shipped/kernels-x86-64.so",
-        "rocking/kernels/shipped/manifest.json",
-    ]
+    hook.root, hook.target_name = str(ROOT), "wheel"
+    assert hook.dependencies() == []
+
+
+def test_a_wheel_holds_the_kernels_and_an_editable_installation_finds_them_in_the_source_tree(hooks):
+    hook = hooks["KernelsHook"]()
+    hook.root, hook.target_name = str(ROOT), "wheel"
+    manifest = json.loads((ROOT / "src/rocking/kernels/built/manifest.json").read_text("utf-8"))
+    names = ["manifest.json", *(each["file"] for each in manifest["libraries"])]
+    for version, expected in (("editable", []), ("standard", [f"rocking/kernels/built/{name}" for name in names])):
+        hook.initialize(version, build := {"force_include": {}})
+        assert [*build["force_include"].values()] == expected
+        assert build["pure_python"] is False
+        assert build["tag"] == f"py3-none-{sysconfig.get_platform().replace('-', '_').replace('.', '_')}"
+
+
+def test_a_build_that_fails_ends_in_a_sentence(hooks, monkeypatch):
+    class Ended(Exception):
+        pass
+
+    def abort(text):
+        raise Ended(text)
+
+    libraries = runpy.run_path(str(ROOT / "compiling" / "libraries.py"))
+
+    def build():
+        monkeypatch.setitem(libraries["_linker"].__globals__, "_c_compiler", list)
+        monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+        libraries["_linker"]()
+
+    hook = hooks["KernelsHook"]()
+    hook.root, hook.app = str(ROOT), SimpleNamespace(abort=abort)
+    hook._libraries = lambda: libraries | {"build": build}
+    with pytest.raises(Ended, match="neither a C compiler nor ziglang was found to link them; install a C compiler"):
+        hook.initialize("standard", {})
 
 
 def test_on_a_package_index_the_readme_leads_to_nothing_that_is_not_there(hooks):

@@ -13,6 +13,8 @@ from rocking.kernels.recurrences import linear_coefficients
 from rocking.kernels.state import ORDER, Record, new_scratch
 from rocking.kernels.truncation import NEGLIGIBLE, shortened_linear
 
+pytestmark = pytest.mark.usefixtures("parts_run_by_python")
+
 ULP = 2.0**-52
 
 quick = settings(deadline=None, max_examples=40)

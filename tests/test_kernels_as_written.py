@@ -21,9 +21,7 @@ from oracles import standing
 import rocking
 from rocking import Block, Motion, chattering, dynamics, gradient, pulses, simulate, simulate_many
 from rocking.chattering import families
-from rocking.kernels import march
 from rocking.kernels.compiled import UNCOMPILED
-from rocking.kernels.interpreted import Interpreted
 
 # Compiled kernels wait here for two minutes of Python.
 pytestmark = [] if UNCOMPILED else [pytest.mark.slow]
@@ -280,27 +278,6 @@ def elsewhere(name: str, model: str) -> list[float]:
     code = f"import json, {__name__} as cases; print(json.dumps([*map(float, cases.{name}({model!r}))]))"
     command = [sys.executable, "-W", "ignore", "-c", code]
     return json.loads(subprocess.run(command, env=environment, stdout=-1, text=True, check=True).stdout)
-
-
-@pytest.mark.parametrize("fails", [False, True])
-def test_what_python_follows_in_turns_is_the_whole(monkeypatch: pytest.MonkeyPatch, fails: bool) -> None:
-    class Some(Interpreted):
-        def work(self) -> int:
-            return max(self._left, 0)
-
-        def __call__(self, *arguments: Any) -> Any:
-            found = super().__call__(*arguments)
-            if fails and self._left < 20:
-                raise ZeroDivisionError
-            return found
-
-    motion = shaken(4.0, seconds=0.4)
-    whole = list(told(simulate(STATUE, motion)))
-    some = Some(march.march, 25)
-    monkeypatch.setattr(march, "_interpreted", some)
-    monkeypatch.setattr(march, "_PORTION", 6)
-    assert list(told(simulate(STATUE, motion))) == whole
-    assert some.work() == 0
 
 
 @pytest.mark.parametrize("model", MODELS)

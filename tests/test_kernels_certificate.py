@@ -38,6 +38,8 @@ from rocking.kernels.certificate import (
 from rocking.kernels.ground import Window, bounds_over, local_series, vertical_of
 from rocking.kernels.state import new_scratch
 
+pytestmark = pytest.mark.usefixtures("parts_run_by_python")
+
 #: Limits that no motion passes.
 ANYTHING = (-math.inf, math.inf)
 

@@ -27,6 +27,8 @@ from rocking.kernels.ground import (
 from rocking.kernels.ground import ground_of as laid_out
 from rocking.kernels.state import new_scratch
 
+pytestmark = pytest.mark.usefixtures("parts_run_by_python")
+
 #: Limits that no motion passes.
 ANYTHING = (-math.inf, math.inf)
 

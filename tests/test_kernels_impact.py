@@ -14,6 +14,8 @@ from rocking.kernels.arc import expand
 from rocking.kernels.events import advance, apply_impact
 from rocking.kernels.state import Outcome, new_scratch
 
+pytestmark = pytest.mark.usefixtures("parts_run_by_python")
+
 QUARTER_TURN = 0.5 * math.pi
 
 quick = settings(deadline=None, max_examples=50)

@@ -28,6 +28,8 @@ from rocking.kernels.lanes import (
 from rocking.kernels.recurrences import Line
 from rocking.kernels.state import Record, Records, new_scratch
 
+pytestmark = pytest.mark.usefixtures("parts_run_by_python")
+
 mp = mpmath.mp.clone()
 mp.dps = 60
 

@@ -1,10 +1,11 @@
-"""Kernels from a library that was compiled beforehand: the same answers, or none where anything does not fit."""
+"""Compiled kernels: they are called for the right types only, and a library that does not fit is refused."""
 
 import importlib
-import importlib.util
 import json
+import os
 import pkgutil
 import shutil
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,90 +15,43 @@ import numpy as np
 import pytest
 
 import rocking.kernels
-from rocking.kernels import compiled, library
+from rocking.errors import KernelsError
+from rocking.kernels import compiled, library, sources
 from rocking.kernels.signatures import signatures
-
-SCRIPT = Path(__file__).resolve().parent.parent / "scripts" / "ship_kernels.py"
-NAMES = ("sine.eq65.eq65_time", "sine.eq65.eq65_sums", "sine.sequence.fitted_amplitudes")
+from rocking.kernels.sine.sequence import fitted_amplitudes
 
 pytestmark = pytest.mark.skipif(compiled.UNCOMPILED, reason="nothing is compiled")
 
 
-def script() -> Any:
-    spec = importlib.util.spec_from_file_location("ship_kernels", SCRIPT)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-@pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A library of a few small kernels for this machine."""
-    if shutil.which("cc") is None or sys.platform == "win32":
-        pytest.skip("no C compiler links a library here")
-    folder, module = tmp_path_factory.mktemp("shipped"), script()
-    levels = module.LEVELS[module.platform.machine().lower()]
-    files = [library.FOLDER / f"kernels-{level}{module.SUFFIX}" for level in levels]
-    # What `make` has made of these sources by the same script holds those kernels as well.
-    if module.is_made(library.FOLDER, module.origin(levels, []), files):
-        return library.FOLDER
-    module.ship(folder, levels[:1], NAMES)
-    return folder
+@pytest.fixture
+def built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A copy of the libraries and the manifest, where the package looks for them."""
+    folder = shutil.copytree(library.FOLDER, tmp_path / "built")
+    monkeypatch.setattr(library, "FOLDER", folder)
+    for each in (library.opened, library.manifest):
+        each.cache_clear()
+    yield folder
+    for each in (library.opened, library.manifest):
+        each.cache_clear()
 
 
 @pytest.fixture
-def shipped(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A copy of it, where the package looks for one."""
-    folder = tmp_path / "shipped"
-    shutil.copytree(made, folder)
-    monkeypatch.setattr(library, "FOLDER", folder)
-    monkeypatch.delenv("ROCKING_SHIPPED", raising=False)
-    library._search.cache_clear()
-    yield folder
-    library._search.cache_clear()
-
-
-def both(name: str) -> tuple[Any, Any]:
-    """What calls the library's function, and what numba compiles."""
-    module, _, function = name.rpartition(".")
-    kernel = getattr(importlib.import_module(f"rocking.kernels.{module}"), function)
-    native = library.function(f"rocking.kernels.{name}")
-    assert native is not None
-    return native, kernel.compiled
+def kernels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, built: Path) -> Path:
+    """A copy of the sources, which the package compares with those that were compiled."""
+    folder = tmp_path / "kernels"
+    shutil.copytree(library.SOURCES, folder, ignore=shutil.ignore_patterns("__pycache__", "built"))
+    monkeypatch.setattr(library, "SOURCES", folder)
+    return folder
 
 
 def test_every_kernel_that_python_calls_is_listed_once() -> None:
     found = set()
     for info in pkgutil.walk_packages(rocking.kernels.__path__, "rocking.kernels."):
-        if info.name.endswith("compiler"):
-            continue
         for name, value in vars(importlib.import_module(info.name)).items():
-            if isinstance(value, compiled.Kernel) and value.py_func.__module__ == info.name:
+            if isinstance(value, library.Kernel) and value.__module__ == info.name:
                 found.add(f"{info.name.removeprefix('rocking.kernels.')}.{name}")
     assert len(found) >= 20
-    assert {*signatures()} == found
-
-
-@pytest.mark.slow
-def test_numbers_and_tuples_are_those_of_numba(shipped: Path) -> None:
-    random = np.random.default_rng(4)
-    time, reference = both("sine.eq65.eq65_time")
-    sums, sums_reference = both("sine.eq65.eq65_sums")
-    for a, omega, eta in random.uniform((1.0, 0.1, 0.3), (3.0, 9.0, 0.99), (200, 3)).tolist():
-        assert np.array_equal(time(a, omega, eta), reference(a, omega, eta), equal_nan=True)
-        assert sums(eta) == sums_reference(eta)
-
-
-def test_arrays_are_read_and_written_as_by_numba(shipped: Path) -> None:
-    random = np.random.default_rng(5)
-    native, reference = both("sine.sequence.fitted_amplitudes")
-    omega, eta = random.uniform(0.5, 8.0, 50), random.uniform(0.4, 0.95, 50)
-    found, expected = np.zeros(50), np.zeros(50)
-    native(omega, eta, True, found)
-    reference(omega, eta, True, expected)
-    assert np.array_equal(found, expected)
-    assert np.ptp(found) > 0.0
+    assert {*signatures()} == found == {*library.opened().kernels}
 
 
 @pytest.mark.parametrize(
@@ -110,25 +64,27 @@ def test_arrays_are_read_and_written_as_by_numba(shipped: Path) -> None:
         lambda omega, eta, with_, out: (omega.tolist(), eta, with_, out),
         lambda omega, eta, with_, out: (omega, eta, with_, np.broadcast_to(out, out.shape)),
         lambda omega, eta, with_, out: (omega, eta, with_),
+        lambda omega, eta, with_, out: (omega, eta, with_, out, out),
         lambda omega, eta, with_, out: (omega.astype(">f8"), eta, with_, out),
     ],
-    ids=["single", "strided", "two dimensions", "integer", "list", "read-only", "too few", "byte order"],
+    ids=["single", "strided", "two dimensions", "integer", "list", "read-only", "too few", "too many", "byte order"],
 )
-def test_arguments_of_other_types_are_left_to_numba(shipped: Path, change: Any) -> None:
-    native, _ = both("sine.sequence.fitted_amplitudes")
-    with pytest.raises(library.OtherTypes):
-        native(*change(np.ones(4), np.full(4, 0.9), True, np.zeros(4)))
+def test_arguments_of_other_types_are_refused(change: Any) -> None:
+    arguments = np.ones(4), np.full(4, 0.9), True, np.zeros(4)
+    with pytest.raises(TypeError, match="fitted_amplitudes is not compiled for these arguments"):
+        fitted_amplitudes(*change(*arguments))
+    fitted_amplitudes(*arguments)
+    assert np.all(arguments[-1] > 1.0)
 
 
-def test_what_is_only_read_may_be_read_only(shipped: Path) -> None:
-    native, _ = both("sine.sequence.fitted_amplitudes")
+def test_what_is_only_read_may_be_read_only() -> None:
     omega, eta, out = np.ones(4), np.full(4, 0.9), np.zeros(4)
     omega.flags.writeable = False
-    native(omega, eta, True, out)
+    fitted_amplitudes(omega, eta, True, out)
     assert np.all(out > 1.0)
 
 
-def test_records_of_another_layout_are_not_taken_for_the_same(shipped: Path) -> None:
+def test_records_of_another_layout_are_not_taken_for_the_same() -> None:
     kind = np.dtype([("u", "f8"), ("v", "f8")])
     take = library._taker({"record": library.layout(kind)})
     packed: list[Any] = []
@@ -136,60 +92,93 @@ def test_records_of_another_layout_are_not_taken_for_the_same(shipped: Path) -> 
     take(np.zeros(1, np.dtype(kind.descr))[0], packed)
     assert len(packed) == 2
     for other in ([("u", "f8"), ("v", "i8")], [("v", "f8"), ("u", "f8")], [("u", "f8"), ("v", "f8"), ("w", "f8")]):
-        with pytest.raises(library.OtherTypes):
+        with pytest.raises(TypeError):
             take(np.zeros(1, np.dtype(other))[0], packed)
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        lambda kernels: {},
-        lambda kernels: None,
-        lambda kernels: {name: [each | {"symbol": "none"} for each in several] for name, several in kernels.items()},
-        lambda kernels: {
-            name: [each | {"arguments": ["text"]} for each in several] for name, several in kernels.items()
-        },
-        lambda kernels: {name: [{"symbol": several[0]["symbol"]}] for name, several in kernels.items()},
-    ],
-    ids=["nothing", "null", "symbol", "types", "no types"],
-)
-def test_a_kernel_that_a_manifest_describes_wrongly_is_left_to_numba(shipped: Path, change: Any) -> None:
-    manifest = shipped / "manifest.json"
-    content = json.loads(manifest.read_text("utf-8"))
-    manifest.write_text(json.dumps(content | {"kernels": change(content["kernels"])}), "utf-8")
-    assert library.opened() is not None
-    assert library.function("rocking.kernels.sine.eq65.eq65_time") is None
+def test_numbers_are_converted_only_without_loss() -> None:
+    kernel = library._caller("sine.eq65.eq65_sums", library.opened())
+    assert kernel(np.float64(0.5)) == kernel(0.5)
+    for wrong in ("0.5", None, 1j):
+        with pytest.raises(TypeError):
+            kernel(wrong)
 
 
 def damage(name: str, folder: Path) -> None:
     manifest = folder / "manifest.json"
     content = json.loads(manifest.read_text("utf-8"))
-    if name == "stale":
-        manifest.write_text(json.dumps(content | {"sources": "0" * 16}), "utf-8")
-    elif name == "no manifest":
+    if name == "no manifest":
         manifest.unlink()
     elif name == "half a manifest":
         manifest.write_text(manifest.read_text("utf-8")[:100], "utf-8")
     elif name == "another manifest":
         manifest.write_text("[1, 2]", "utf-8")
-    elif name == "no library":
-        (folder / next(iter(content["libraries"]))).unlink()
-    elif name == "half a library":
-        path = folder / next(iter(content["libraries"]))
-        path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    for each in content["libraries"]:
+        path = folder / each["file"]
+        if name == "no library":
+            path.unlink()
+        elif name == "half a library":
+            path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
 
 
-@pytest.mark.parametrize(
-    "name", ["stale", "no manifest", "half a manifest", "another manifest", "no library", "half a library"]
-)
-def test_a_library_that_does_not_fit_is_not_used(shipped: Path, name: str) -> None:
-    damage(name, shipped)
-    assert library.opened() is None
-    assert library.function("rocking.kernels.sine.eq65.eq65_time") is None
+@pytest.mark.parametrize("name", ["no manifest", "half a manifest", "another manifest", "no library", "half a library"])
+def test_a_library_that_is_damaged_is_refused_in_a_sentence(built: Path, name: str) -> None:
+    damage(name, built)
+    with pytest.raises(KernelsError, match=r"compiled kernels in .*; run make kernels"):
+        library.opened()
 
 
-def test_the_long_way_is_chosen_by_a_variable(shipped: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert library.opened() is not None
-    monkeypatch.setenv("ROCKING_SHIPPED", "0")
-    library._search.cache_clear()
-    assert library.opened() is None
+def test_changed_sources_are_refused_and_reworded_ones_are_not(kernels: Path) -> None:
+    text, code = sources.text_hash(kernels), sources.code_hash(kernels)
+    file = kernels / "arc.py"
+    before = file.read_text("utf-8")
+    file.write_text(before.replace('"""', '"""Reworded. ', 1) + "# A comment.\n", "utf-8")
+    assert (sources.text_hash(kernels) != text, sources.code_hash(kernels)) == (True, code)
+    library.opened()
+    file.write_text(before + "x = 1\n", "utf-8")
+    for each in (library.opened, library.manifest):
+        each.cache_clear()
+    with pytest.raises(KernelsError, match="have changed since the kernels were compiled; run make kernels"):
+        library.opened()
+    file.write_text(before, "utf-8")
+    file.rename(kernels / "renamed.py")
+    assert sources.code_hash(kernels) != code
+
+
+def test_a_processor_has_the_library_of_its_highest_level(built: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    best = library.manifest()["libraries"][-1]
+    assert library.opened().name == best["file"]
+    if Path("/proc/cpuinfo").exists() and best["level"]:
+        flags = set(Path("/proc/cpuinfo").read_text("utf-8").partition("flags")[2].partition("\n")[0].split())
+        third = {"avx2", "bmi1", "bmi2", "f16c", "fma", "movbe"} <= flags and bool({"abm", "lzcnt"} & flags)
+        fourth = third and {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"} <= flags
+        assert library.opened().handle.rocking_level() == third + fourth
+    manifest = json.loads((built / "manifest.json").read_text("utf-8"))
+    manifest["libraries"][-1]["level"] = 99
+    (built / "manifest.json").write_text(json.dumps(manifest), "utf-8")
+    for each in (library.opened, library.manifest):
+        each.cache_clear()
+    if len(manifest["libraries"]) == 1:
+        pytest.skip("this machine has one level only")
+    assert library.opened().name == manifest["libraries"][-2]["file"]
+
+
+PROGRAM = """
+import sys
+import rocking
+block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+response = rocking.simulate(block, None, model="linear", initial_rotation=0.02)
+print(response.impacts.tobytes().hex(), "numba" in sys.modules)
+"""
+
+
+@pytest.mark.slow
+def test_numba_compiles_the_same_where_it_is_asked_to() -> None:
+    answers = {}
+    for name, expected in (("0", "False"), ("1", "True")):
+        environment = {**os.environ, "ROCKING_JIT": name}
+        command = [sys.executable, "-c", PROGRAM]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        answers[name], with_numba = done.stdout.split()
+        assert with_numba == expected
+    assert len({*answers.values()}) == 1

@@ -14,6 +14,8 @@ from rocking.kernels.ground import Ground
 from rocking.kernels.state import Record, new_scratch
 from rocking.kernels.uplift import next_uplift
 
+pytestmark = pytest.mark.usefixtures("parts_run_by_python")
+
 G = 9.81
 
 mp = mpmath.mp.clone()

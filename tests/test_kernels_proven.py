@@ -13,6 +13,8 @@ from rocking.kernels.ground import Ground
 from rocking.kernels.rest import pass_proven_impacts
 from rocking.kernels.state import PROVEN_PER_ITERATION, Record, has_space
 
+pytestmark = pytest.mark.usefixtures("parts_run_by_python")
+
 
 def one_by_one(ground: Ground) -> Ground:
     """The same motion as a parabola without curvature, which takes the long way."""

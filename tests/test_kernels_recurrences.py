@@ -24,6 +24,8 @@ from rocking.kernels.recurrences import (
 from rocking.kernels.state import ORDER, Record, new_scratch
 from rocking.kernels.trace import Quantity, Trail, expand_variation
 
+pytestmark = pytest.mark.usefixtures("parts_run_by_python")
+
 Start = tuple[float, float]
 Series = list[float]
 Form = Callable[[System, Start, Line, Line], Series]

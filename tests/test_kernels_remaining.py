@@ -12,6 +12,8 @@ from oracles.problem import Problem
 from rocking.kernels.remaining import Restoring, deviation, ratio, refined_bracket, remaining_time
 from rocking.kernels.rest import LARGEST_BETA, LARGEST_GAMMA, proven_arc
 
+pytestmark = pytest.mark.usefixtures("parts_run_by_python")
+
 GRAVITY = 9.80665
 FOREVER = 1e9
 

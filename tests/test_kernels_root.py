@@ -15,6 +15,8 @@ from rocking.kernels import events
 from rocking.kernels.compiled import UNCOMPILED
 from rocking.kernels.events import curvature_bound, first_root
 
+pytestmark = pytest.mark.usefixtures("parts_run_by_python")
+
 quick = settings(deadline=None, max_examples=80)
 
 

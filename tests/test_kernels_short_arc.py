@@ -19,6 +19,8 @@ from rocking.kernels.recurrences import Line
 from rocking.kernels.short_arc import short_step
 from rocking.kernels.state import Outcome, Record, new_scratch
 
+pytestmark = pytest.mark.usefixtures("parts_run_by_python")
+
 quick = settings(deadline=None, max_examples=80)
 weights = pytest.mark.parametrize("weighted", [False, True], ids=["at rest", "weighted"])
 models = pytest.mark.parametrize("nonlinear", [False, True], ids=["linear", "nonlinear"])

@@ -18,8 +18,8 @@ from rocking.treatment import Certified
 
 TESTS = Path(__file__).parent
 
-#: Tests of how kernels are compiled.
-COMPILATION = ("test_kernels_compiled.py", "test_kernels_parts.py", Path(__file__).name)
+#: Tests of compiled kernels.
+COMPILATION = ("test_kernels_library.py", "test_kernels_rounding.py", Path(__file__).name)
 
 
 @pytest.mark.slow

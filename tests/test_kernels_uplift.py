@@ -15,6 +15,8 @@ from rocking.kernels.ground import Ground
 from rocking.kernels.state import AT_REST, new_scratch
 from rocking.kernels.uplift import next_uplift
 
+pytestmark = pytest.mark.usefixtures("parts_run_by_python")
+
 quick = settings(deadline=None, max_examples=100)
 
 

@@ -17,6 +17,8 @@ from rocking.kernels.arc import restoring
 from rocking.kernels.state import Record
 from rocking.kernels.trace import Quantity, Trail, rest_shift
 
+pytestmark = pytest.mark.usefixtures("parts_run_by_python")
+
 
 def node_of(side: int, u: float, v: float, time: float = 0.0) -> Record:
     return state.record(state.NODE_ROW, time=time, piece=0, offset=time, side=side, u=u, v=v)

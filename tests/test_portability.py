@@ -13,7 +13,6 @@ import pytest
 
 from rocking import threads
 from rocking.explorer import apart, background, launch
-from rocking.kernels import compiled
 from rocking.plot import canvas
 from rocking.studies import place
 
@@ -40,7 +39,7 @@ WORDS = re.compile(rf"\bimport ({'|'.join(MODULES)})\b|\b({'|'.join(MODULES_WITH
 def test_every_place_that_depends_on_the_system_is_on_the_page() -> None:
     assert len(TEXTS) > 200
     places = {name for name, text in TEXTS.items() if WORDS.search(text)}
-    assert {"explorer/apart.py", "studies/place.py", "kernels/compiled.py", "threads.py"} <= places
+    assert {"explorer/apart.py", "studies/place.py", "threads.py"} <= places
     shown = {name for name in places if f"`{name}`" in PAGE or f"`{name.removesuffix('.py')}." in PAGE}
     assert places - shown == set()
 
@@ -130,16 +129,6 @@ def test_on_windows_no_other_server_may_share_the_port(
     monkeypatch.setattr(sys, "platform", system)
     with launch._bound("127.0.0.1", 0) as listening:
         assert bool(listening.getsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR)) == reused
-
-
-def test_windows_has_its_own_place_for_compiled_kernels(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
-    monkeypatch.setenv("LOCALAPPDATA", str(tmp_path / "local"))
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
-    monkeypatch.delattr(os, "getuid")
-    _, users, temporary = compiled._parents()
-    assert users == tmp_path / "local" / "rocking"
-    assert temporary.name == "rocking-cache"
 
 
 @pytest.mark.parametrize("system", ["darwin", "win32"])

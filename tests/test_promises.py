@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 from oracles import leapfrog, multiprecision
 from oracles.problem import Problem, linear_record
-from promises import chattering, compile_cache, containment, cross_code, events, exact, interrupts, one_answer
+from promises import chattering, containment, cross_code, events, exact, interrupts, one_answer
 from promises.promise import Found
-
-from rocking.kernels import compiled
 
 ROOT = Path(__file__).parents[1]
 
@@ -94,20 +92,6 @@ def test_the_closed_form_of_a_rest_is_the_sum_of_its_impacts():
     time, speed = next(itertools.islice(exact.impacts(sides, 0.3, 0.2, 1), 60, None))
     assert abs(exact.rest(sides, 0.3, 0.2, 1) - time) < 10.0 * speed
     assert abs(exact.rest(sides, 0.3, float(speed), 0) + time - exact.rest(sides, 0.3, 0.2, 1)) < 1e-30
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="memory and rights of processes are as on Linux")
-@pytest.mark.skipif(compiled.UNCOMPILED, reason="nothing is compiled")
-@pytest.mark.slow
-def test_processes_that_compile_at_once_or_are_killed_leave_right_code(monkeypatch):
-    monkeypatch.setattr(compile_cache, "ROUNDS", 2)
-    found = compile_cache.judge(0)
-    assert not found.told
-    assert found.notes["rounds"] == 2
-    assert found.notes["killed"] >= 1
-    assert found.notes["updates"] == 1
-    assert found.notes["damaged files"] >= 3
-    assert found.judged >= 2 * 6 + len(compile_cache.FOLDERS)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="processor time of another process is read as on Linux")

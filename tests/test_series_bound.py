@@ -11,6 +11,8 @@ from rocking.kernels import truncation
 from rocking.kernels.arc import ORDER, evaluate, expand
 from rocking.kernels.state import new_scratch
 
+pytestmark = pytest.mark.usefixtures("parts_run_by_python")
+
 # Terms after the sixtieth are at most 3e-5 of what a series leaves out, and mostly much less.
 CASES = pytest.mark.parametrize(
     ("cases", "terms"),

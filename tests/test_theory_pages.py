@@ -11,6 +11,8 @@ import rocking
 from rocking.chattering import critical_amplitude, sequence
 from rocking.kernels.sine.sequence import distance_exponent
 
+pytestmark = pytest.mark.usefixtures("parts_run_by_python")
+
 FREQUENCIES = st.floats(math.log(0.02), math.log(200.0)).map(math.exp)
 
 

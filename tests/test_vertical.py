@@ -16,6 +16,8 @@ from rocking.motion.exceedance import exceedances, lifting_factors
 from rocking.motion.named import named_motion
 from rocking.plausibility import vertical_notes
 
+pytestmark = pytest.mark.usefixtures("parts_run_by_python")
+
 G = 9.80665
 MODELS = ("linear", "nonlinear")
 

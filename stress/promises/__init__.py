@@ -2,7 +2,6 @@
 
 from promises import (
     chattering,
-    compile_cache,
     containment,
     cross_code,
     events,
@@ -22,7 +21,6 @@ _MODULES = (
     cross_code,
     one_answer,
     rounding,
-    compile_cache,
     reading,
     serving,
     soak,

@@ -2,8 +2,8 @@
 
 An ensemble of many blocks under a record is computed with 1, 2 and 7 threads, in batches of several sizes, and in
 shuffled order; as a study in units of several sizes, and some also by workers of dask.distributed. For one ensemble
-kernels are compiled anew, read from that cache, and taken from libraries as they come with the package. What is
-compared are digests of all outcomes, sorted as the blocks were given.
+kernels are compiled by numba in the process itself, and taken from the library of each level of the processor. Digests
+of all outcomes are compared, sorted as the blocks were given.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import runpy
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -22,16 +22,14 @@ import numpy as np
 
 import rocking
 from promises.promise import Found, Promise
+from rocking.kernels import library
 from rocking.studies.run import local_executor
 
 #: Blocks of an ensemble: three units of the smallest size of a study.
 BLOCKS = 1100
 
-#: Ensembles whose studies are run by workers, too, and the one for which kernels are compiled anew.
-BY_WORKERS, ANEW = (5, 15, 25), 7
-
-#: Kernels that an ensemble calls: a library of these serves it without numba.
-_KERNELS = ("lanes.run_lanes", "lanes.march_each", "march.march", "ground.fill", "uplift.note_complete")
+#: Ensembles whose studies are run by workers, too, and the one for which kernels come from elsewhere, too.
+BY_WORKERS, ELSEWHERE = (5, 15, 25), 7
 
 _PROGRAM = """
 import sys
@@ -41,8 +39,8 @@ if len(sys.argv) > 2:
     library.FOLDER = Path(sys.argv[2])
 from promises.one_answer import direct
 print(direct(int(sys.argv[1])))
-if len(sys.argv) > 2 and (library.opened() is None or "numba" in sys.modules):
-    sys.exit(f"the library does not serve: {library.state()}")
+if ("numba" in sys.modules) != (len(sys.argv) == 2):
+    sys.exit("numba compiles kernels with ROCKING_JIT=1, and otherwise is not imported")
 """
 
 _RECORDS = ("el-centro-meloland-270", "ridgecrest-clc-090")
@@ -106,33 +104,25 @@ def as_study(part: int, unit_blocks: int, workers: int = 0) -> str:
         return digest({str(name): values.values.reshape(-1) for name, values in made.results().data_vars.items()})
 
 
-def _apart(part: int, cache: Path, *library: str) -> str:
-    """Digest that a process of its own finds, with this cache, and with a library instead of numba if one is named."""
+def _apart(part: int, *library: Path) -> str:
+    """Digest from a process of its own, with the library in a folder or, if none is named, with numba."""
     path = os.pathsep.join(each for each in sys.path if each)
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(cache), "PYTHONPATH": path}
-    environment["ROCKING_SHIPPED"] = "1" if library else "0"
-    command = [sys.executable, "-c", _PROGRAM, str(part), *library]
+    environment = os.environ | {"PYTHONPATH": path, "ROCKING_JIT": "0" if library else "1"}
+    command = [sys.executable, "-c", _PROGRAM, str(part), *map(str, library)]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     return done.stdout.strip() if done.returncode == 0 else f"error: {done.stderr.strip()[-300:]}"
 
 
-def anew(part: int) -> Iterator[tuple[str, str]]:
-    """Digests with kernels compiled anew, read from that cache, and from the library of each level of processor."""
-    script = runpy.run_path(str(Path(__file__).resolve().parents[2] / "scripts" / "ship_kernels.py"))
-    with tempfile.TemporaryDirectory() as name:
-        cache, shipped = Path(name, "cache"), Path(name, "shipped")
-        yield "kernels compiled anew", _apart(part, cache)
-        yield "kernels read from the cache", _apart(part, cache)
-        shipped.mkdir()
-        levels = script["LEVELS"][script["platform"].machine().lower()]
-        command = [sys.executable, script["__file__"], "--out", str(shipped), *_KERNELS]
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-        manifest = json.loads((shipped / "manifest.json").read_text("utf-8"))
-        # A library of a level that this processor lacks cannot run here: the package itself chooses the highest.
-        for each in ([*manifest["libraries"]][:1], [*manifest["libraries"]]):
-            of_level = {**manifest, "libraries": {one: manifest["libraries"][one] for one in each}}
-            (shipped / "manifest.json").write_text(json.dumps(of_level), "utf-8")
-            yield f"libraries up to {levels[len(each) - 1]}", _apart(part, cache, str(shipped))
+def elsewhere(part: int) -> Iterator[tuple[str, str]]:
+    """Digests with kernels that numba compiles, and with the libraries up to each level that were built."""
+    yield "kernels compiled by numba", _apart(part)
+    manifest = library.manifest()
+    for count, highest in enumerate(manifest["libraries"], 1):
+        with tempfile.TemporaryDirectory() as name:
+            folder = shutil.copytree(library.FOLDER, Path(name, "built"))
+            lower = {**manifest, "libraries": manifest["libraries"][:count]}
+            (folder / "manifest.json").write_text(json.dumps(lower), "utf-8")
+            yield f"libraries up to level {highest['level']}", _apart(part, folder)
 
 
 WAYS: dict[str, Callable[[int], str]] = {
@@ -164,8 +154,8 @@ def _answers(part: int) -> Iterator[tuple[str, str]]:
         yield name, way(part)
     if part in BY_WORKERS:
         yield "a study by two workers", as_study(part, 512, workers=2)
-    if part == ANEW:
-        yield from anew(part)
+    if part == ELSEWHERE:
+        yield from elsewhere(part)
 
 
 def table(found: Found) -> str:

@@ -1,20 +1,17 @@
 """Every operation of the compiled code is rounded for itself: no fused product and sum, no fast-math, in any kernel.
 
-The first part looks at the code that numba makes of every kernel for this processor, and at LLVM's code before that.
-The second makes the libraries that come with a wheel, for each level of processors, and looks at the files.
+The program looks at LLVM's code of all kernels, and at the machine code that the build makes of it for each level of
+processors.
 """
 
 from __future__ import annotations
 
-import json
 import runpy
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 from typing import Final
 
-from oracles.rounding import FUSED, PRODUCTS, RELAXED, compiled_here, of_library
+from oracles.rounding import COMPILING, FUSED, PRODUCTS, RELAXED, optimised, translated
 
 from promises.promise import ABOVE_ENSEMBLES, Found, Promise
 from rocking.kernels.signatures import signatures
@@ -22,26 +19,17 @@ from rocking.kernels.signatures import signatures
 #: Products that a kernel has at least, on an average: with fewer the program would look at something else.
 _PRODUCTS: Final = 20
 
-_SCRIPT: Final = Path(__file__).resolve().parents[2] / "scripts" / "ship_kernels.py"
-
 
 def judge(part: int) -> Found:
-    """Look at the code of every kernel: what numba compiles here, or the libraries."""
+    """Look at the code of every kernel."""
     found = Found(parts=1)
-    if part == 0:
-        machine, middle = compiled_here([*signatures()])
-        _judge(found, "compiled by numba", machine)
+    with tempfile.TemporaryDirectory() as name:
+        middle = translated(Path(name))
         relaxed = RELAXED.findall(middle)
         if relaxed or middle.count("fmul double") < _PRODUCTS * len(signatures()):
             found.fail(f"LLVM's code: {middle.count('fmul double')} products; relaxed: {sorted({*relaxed})[:5]}")
-        return found
-    script = runpy.run_path(str(_SCRIPT))
-    levels = script["LEVELS"][script["platform"].machine().lower()]
-    with tempfile.TemporaryDirectory() as where:
-        subprocess.run([sys.executable, str(_SCRIPT), "--out", where], check=True, stdout=subprocess.DEVNULL)
-        libraries = json.loads(Path(where, "manifest.json").read_text("utf-8"))["libraries"]
-        for level, library in zip(levels, libraries, strict=True):
-            _judge(found, f"the library for {level}", of_library(Path(where, library)))
+        for level in runpy.run_path(str(COMPILING / "libraries.py"))["LEVELS"]:
+            _judge(found, f"the library for {level}", optimised(Path(name), level))
     return found
 
 
@@ -63,7 +51,7 @@ def table(found: Found) -> str:
 PROMISE = Promise(
     name="rounding",
     says="every operation of the compiled code is rounded for itself",
-    parts=2,
+    parts=1,
     small=1,
     judge=judge,
     table=table,

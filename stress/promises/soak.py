@@ -6,9 +6,7 @@ which what is kept for good (kernels, tables, imports) is made.
 
 from __future__ import annotations
 
-import json
 import statistics
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Final
@@ -80,18 +78,8 @@ def judge(part: int) -> Found:
         )
     else:
         with served() as running:
-            _wait_for_kernels(running)
             _judge_rounds(found, "openings", _openings(running), str(running.process.pid), rounds)
     return found
-
-
-def _wait_for_kernels(running: Running) -> None:
-    """Let a thread of the server compile or load all kernels, which it keeps for good."""
-    deadline = time.monotonic() + 600.0
-    while not json.loads(running.status("GET", "/api/start", running.own)[1])["compilation"]["done"]:
-        if time.monotonic() > deadline:
-            raise AssertionError("kernels are not compiled within ten minutes")
-        time.sleep(0.1)
 
 
 def _judge_rounds(found: Found, what: str, work: Callable[[int], int], process: str, rounds: int) -> None:

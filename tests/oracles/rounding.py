@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
-from collections.abc import Sequence
+import sys
 from pathlib import Path
 
-from rocking.kernels.signatures import named, signatures
+COMPILING = Path(__file__).resolve().parents[2] / "compiling"
 
 #: One rounding for a product and a sum, on processors of Intel's and of ARM's kind.
 FUSED = re.compile(r"\t(v?fn?m(?:add|sub|addsub|subadd)\w*|fml[as]\w*)\b")
@@ -19,22 +20,25 @@ RELAXED = re.compile(
 )
 
 
-def compiled_here(names: Sequence[str]) -> tuple[str, str]:
-    """Assembly of kernels for this processor, and LLVM's code that it is made of; from numba's cache where it is."""
-    from numba import typeof
-
-    machine, middle = [], []
-    for name in names:
-        kernel, (arguments, *_) = named(name), signatures()[name]
-        kernel.compiled.compile(tuple(map(typeof, arguments)))
-        for made in kernel.compiled.overloads.values():
-            module = made.library._get_module_for_linking()
-            machine.append(made.library.codegen._tm.emit_assembly(module))
-            middle.append(str(module))
-    return "\n".join(machine), "\n".join(middle)
+def translated(folder: Path) -> str:
+    """Code of all kernels in LLVM's language, not optimised yet, which the build leaves in a folder."""
+    for share in "01":
+        _step("lower", folder, share)
+    return "\n".join(path.read_text("utf-8") for path in folder.glob("*.ll"))
 
 
-def of_library(file: Path) -> str:
-    """Assembly of a library, as binutils' objdump reads it from the file."""
+def optimised(folder: Path, level: str) -> str:
+    """Assembly for a level of the processor of what `translated` has left in a folder."""
+    _step("optimise", folder, level)
+    return assembly(folder / f"{level}.o")
+
+
+def _step(*arguments: object) -> None:
+    environment = os.environ | {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "NUMBA_DISABLE_JIT": "0"}
+    subprocess.run([sys.executable, COMPILING / "lowering.py", *map(str, arguments)], env=environment, check=True)
+
+
+def assembly(file: Path) -> str:
+    """Assembly of a library or an object file, as binutils' objdump reads it."""
     command = ["objdump", "--disassemble", "--no-show-raw-insn", str(file)]
     return subprocess.run(command, check=True, capture_output=True, text=True).stdout

@@ -20,7 +20,7 @@ def version(*, verbose: bool = False) -> None:
     if not verbose:
         print(rocking.__version__)
         return
-    below = ", ".join(f"{name} {metadata.version(name)}" for name in ("numpy", "scipy", "numba", "llvmlite"))
+    below = ", ".join(f"{name} {metadata.version(name)}" for name in ("numpy", "scipy"))
     rows = {
         "rocking": rocking.__version__,
         "Python": f"{platform.python_version()} on {platform.platform()}",

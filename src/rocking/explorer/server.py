@@ -8,7 +8,6 @@ import math
 import secrets
 import struct
 from collections.abc import AsyncIterator, Awaitable, Callable, Generator, Mapping
-from contextlib import asynccontextmanager
 from dataclasses import asdict
 from functools import cached_property
 from importlib import metadata, resources, util
@@ -25,7 +24,7 @@ from starlette.routing import Route
 
 from rocking.errors import InvalidOption, RockingError
 from rocking.explorer import assessment, maps, periodic, readings, sweeps
-from rocking.explorer.background import Compilation, low_priority
+from rocking.explorer.background import low_priority
 from rocking.explorer.catalogue import entries_of, listing
 from rocking.explorer.code import map_as_code, sweep_as_code
 from rocking.explorer.core import EXPORTS, Explorer
@@ -157,7 +156,6 @@ class App:
         self.opening = dict(opening)
         self.study = study
         self.framed_by = framed_by
-        self.compilation = Compilation()
         self.files = page_files()
         self._pages: dict[str, str] = {}
         self.library = {name: (library_folder() / name).read_bytes() for name in LIBRARY}
@@ -205,14 +203,8 @@ class App:
                 Route("/api/records/{key}", self.forget, methods=["DELETE"]),
             ],
             exception_handlers={RockingError: self._refusal, Exception: _failure},
-            lifespan=self._lifespan,
         )
         self.asgi.router.redirect_slashes = False
-
-    @asynccontextmanager
-    async def _lifespan(self, _: Starlette) -> AsyncIterator[None]:
-        self.compilation.start()
-        yield
 
     async def page(self, request: Request) -> Response:
         """Return the page in the language of the browser, with a nonce of its own."""
@@ -274,13 +266,12 @@ class App:
         return await anyio.to_thread.run_sync(work, limiter=self._threads)
 
     def _start(self, _: Query) -> dict[str, Any]:
-        """Return the specification of the page, what it opens with, and how far the compiling has come."""
+        """Return the specification of the page and what it opens with."""
         return {
             **specification(),
             "axes": [asdict(axis) | {"label": phrase(f"axis.{axis.name}")} for axis in maps.AXES.values()],
             "opening": self.opening,
             "study": None if self.study is None else self.study.describe(),
-            "compilation": self.compilation.state(),
         }
 
     def _window(self, query: Query) -> Payload:

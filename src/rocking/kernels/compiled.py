@@ -23,8 +23,8 @@ UNCOMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 # - Fast-math is never switched on: the proofs rest on IEEE rounding, and every machine computes the same result.
 # - _nrt=False: kernels never allocate, so counting references to their array arguments (atomic operations, which take
 #   longer than a whole Taylor step) is switched off.
-# - forceinline is set for every function: otherwise numba adopts the value of the first caller, and one inlined function
-#   would inline everything that it calls, including whole marches.
+# - forceinline is set for every function: otherwise numba adopts the value of the first caller, and one inlined
+#   function would inline everything that it calls, including whole marches.
 _OPTIONS = {"error_model": "numpy", "_nrt": False}
 
 

@@ -5,7 +5,7 @@ of the vertical component, where there is one, after the horizontal ones. The la
 so that no function has to check whether the motion is over. Nothing here checks for NaN; it is passed on.
 """
 
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 

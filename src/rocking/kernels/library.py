@@ -19,8 +19,10 @@ import numpy as np
 from rocking.errors import KernelsError
 from rocking.kernels.sources import code_hash, text_hash
 
+SOURCES: Final = Path(__file__).parent
+
 #: Where the build puts the libraries and the manifest.
-FOLDER: Final = Path(__file__).parent / "built"
+FOLDER: Final = SOURCES / "built"
 
 _ADVICE: Final = "run make kernels in the source tree, or install rocking again"
 
@@ -66,11 +68,11 @@ def manifest() -> dict[str, Any]:
     """
     try:
         built: dict[str, Any] = json.loads((FOLDER / "manifest.json").read_text("utf-8"))
-        current = built["text"] == text_hash(FOLDER.parent) or built["made"]["code"] == code_hash(FOLDER.parent)
+        current = built["text"] == text_hash(SOURCES) or built["made"]["code"] == code_hash(SOURCES)
     except (OSError, ValueError, LookupError, TypeError) as error:
         raise KernelsError(f"there are no compiled kernels in {FOLDER}; {_ADVICE}") from error
     if not current:
-        raise KernelsError(f"the sources in {FOLDER.parent} have changed since the kernels were compiled; {_ADVICE}")
+        raise KernelsError(f"the sources in {SOURCES} have changed since the kernels were compiled; {_ADVICE}")
     return built
 
 

@@ -1,4 +1,4 @@
-"""Hashes of the kernels' sources. The build of the package runs this file alone: it imports the standard library only."""
+"""Hashes of the kernels' sources. The build runs this file alone, so it imports the standard library only."""
 
 import ast
 import hashlib

@@ -340,17 +340,6 @@ function showNotes(header) {
   one("notes").replaceChildren(...notes.map((/** @type {string} */ note) => make("li", {}, [note])));
 }
 
-/** Say that kernels are compiled, as long as they are. */
-async function watchCompilation() {
-  let {compilation} = specification;
-  while (!compilation.done) {
-    one("compiling").hidden = compilation.seconds < 3;
-    await new Promise((wake) => setTimeout(wake, 500));
-    try { ({compilation} = await json("/api/start", {})); } catch { return; }
-  }
-  one("compiling").hidden = true;
-}
-
 for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => { begin(); void go(/** @type {any} */ (button).dataset.view); });
 for (const button of document.querySelectorAll("[data-zoom]")) button.addEventListener("click", () => void histories.zoom(/** @type {any} */ (button).dataset.zoom));
 for (const button of document.querySelectorAll("button.what[aria-controls]")) {
@@ -391,7 +380,6 @@ window.addEventListener("popstate", revisit);
 await examples.arrive();
 showForms(state.texts);
 showFigures(null);
-void watchCompilation();
 await (state.lecture ? lecture.enter() : go(state.view));
 document.body.inert = false;
 if (keysAt) {
