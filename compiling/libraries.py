@@ -166,7 +166,7 @@ def _run(folder: Path, step: str, argument: str) -> None:
         # What numba compiles for its own use beside the kernels runs on every processor, too.
         "NUMBA_CPU_NAME": LEVELS[0],
         "NUMBA_CPU_FEATURES": "",
-        "PYTHONPATH": os.pathsep.join([str(ROOT / "src"), os.environ.get("PYTHONPATH", "")]),
+        "PYTHONPATH": os.pathsep.join(filter(None, [str(ROOT / "src"), os.environ.get("PYTHONPATH")])),
     }
     for name in ("NUMBA_DISABLE_JIT", "ROCKING_JIT"):
         environment.pop(name, None)
@@ -184,9 +184,9 @@ def _c_compiler() -> list[str]:
 def _linker() -> tuple[list[str], list[str]]:
     """Return the command that links a library, without its files, and the libraries that it needs."""
     zig = [] if importlib.util.find_spec("ziglang") is None else [sys.executable, "-m", "ziglang"]
-    gnu = sys.platform == "linux"
+    gnu = platform.libc_ver()[0] == "glibc"
     if compiler := _c_compiler():
-        strip = ["-Wl,--strip-all", "-Wl,-z,noexecstack"] if gnu else []
+        strip = ["-Wl,--strip-all", "-Wl,-z,noexecstack"] if sys.platform == "linux" else []
         return [*compiler, "-shared", *strip, *MACOS], ["-lm"]
     if zig and gnu:  # `zig cc` links its own sincos and memset, and last bits differ
         return [*zig, "ld.lld", "-shared", "-s", "-z", "noexecstack"], [_loaded("libm.so.6"), _loaded("libc.so.6")]

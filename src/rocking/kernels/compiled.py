@@ -44,7 +44,7 @@ def kernel(function: F) -> F:
         return function
     if compiler is None:
         return library.Kernel(function)  # type: ignore[return-value]
-    return compiler(function, nogil=True, forceinline=False, **_OPTIONS)  # type: ignore[no-any-return]
+    return compiler(function, nogil=True, forceinline=False, **_OPTIONS)
 
 
 def inlined(function: F) -> F:
@@ -60,7 +60,7 @@ def shared(function: F) -> F:
 def _part(function: F, *, forceinline: bool) -> F:
     if UNCOMPILED or compiler is None:
         return function
-    return compiler(function, forceinline=forceinline, **_OPTIONS)  # type: ignore[no-any-return]
+    return compiler(function, forceinline=forceinline, **_OPTIONS)
 
 
 def fingerprint() -> str:

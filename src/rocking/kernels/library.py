@@ -87,6 +87,8 @@ def _open(described: dict[str, Any]) -> ctypes.CDLL:
 class Kernel:
     """A function in the library, which is opened at the first call."""
 
+    __name__: str
+
     def __init__(self, function: Callable[..., Any]) -> None:
         functools.update_wrapper(self, function)
 
