@@ -20,8 +20,9 @@ ANSWERS = {
     ),
     "10,000 blocks, linear": f"rocking.simulate_many({BLOCKS}, rocking.records.load('{RECORD}'), model='linear')",
     "10,000 blocks, nonlinear": f"rocking.simulate_many({BLOCKS}, rocking.records.load('{RECORD}'))",
-    "fragility": (
-        f"rocking.fragility({BLOCKS}, [rocking.records.load('{RECORD}'), rocking.records.load('ridgecrest-clc-090')], "
+    "fragility, 3 blocks": (
+        "rocking.fragility(rocking.Blocks(p=[2.0, 3.0, 4.0], alpha=0.2), "
+        f"[rocking.records.load(name) for name in ('{RECORD}', 'ridgecrest-clc-090')], "
         "levels=[2.0, 4.0, 8.0, 16.0], progress=False)"
     ),
     "chattering time": "rocking.chattering.chattering_time(1.05, 3.0, 0.9)",
