@@ -1,11 +1,10 @@
-"""The one engine for many simulations: any tasks of bodies under a scaled motion, on any executor."""
+"""The one engine for many simulations: any tasks of bodies under a scaled motion, in threads."""
 
 from __future__ import annotations
 
-import functools
 import math
+import threading
 from collections.abc import Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from dataclasses import dataclass
 from typing import Final
 
@@ -26,7 +25,7 @@ from rocking.kernels.uplift import note_complete
 from rocking.motion.motion import Motion
 from rocking.problem import ground_of, highest, rules_of, set_start, step_of
 from rocking.tables import counted
-from rocking.threads import AHEAD, Cancellation, as_done, cores
+from rocking.threads import in_threads
 from rocking.treatment import Treatment
 
 #: What is kept of a simulation. ``unfinished``: it took more than its budget of steps; ``stopped``: the duration ended
@@ -102,32 +101,30 @@ class Task:
 
 
 def simulate_tasks(
-    setup: Setup, tasks: Iterable[Task], *, threads: int | None = None, executor: Executor | None = None
+    setup: Setup, tasks: Iterable[Task], *, threads: int | None = None
 ) -> Iterator[tuple[Task, NDArray[np.void]]]:
-    """Outcomes of every task, as they are finished: structured arrays (`OUTCOME`), one row a body.
+    """Outcomes of every task, in their order: structured arrays (`OUTCOME`), one row a body.
 
     Parameters
     ----------
     setup : Setup
         Bodies and rules.
     tasks : iterable of Task
-        Taken as they are needed, a few ahead of the results.
+        Taken as they are needed, some ahead of the results.
     threads : int, optional
         Number of threads; by default one for every core.
-    executor : concurrent.futures.Executor, optional
-        Who does the work instead: threads, processes or a cluster.
 
     Notes
     -----
     What becomes of a body depends on the body and its motion alone, bit for bit, whatever shares its task. An
     interrupt leaves the rest undone.
     """
-    if executor is not None:
-        yield from _in_flight(setup, tasks, executor, AHEAD * cores())
-        return
-    cancelled = Cancellation()
-    work = functools.partial(simulate_task, setup, cancelled=cancelled)
-    yield from as_done(work, tasks, threads or cores(), cancelled=cancelled)
+    cancelled = threading.Event()
+
+    def simulated(task: Task) -> tuple[Task, NDArray[np.void]]:
+        return task, simulate_task(setup, task, cancelled)
+
+    yield from in_threads(simulated, tasks, threads=threads, cancelled=cancelled)
 
 
 def parts_of(count: int, motion: Motion) -> Iterator[slice]:
@@ -171,21 +168,6 @@ def missing_text(missing: Flags | int) -> str:
     return f"{counted(count, 'simulation')} given up after too many steps: outcomes missing" * (count > 0)
 
 
-def _in_flight(
-    setup: Setup, tasks: Iterable[Task], executor: Executor, most: int
-) -> Iterator[tuple[Task, NDArray[np.void]]]:
-    """Keep a number of tasks with an executor, and give results as they come."""
-    pending: dict[Future[NDArray[np.void]], Task] = {}
-    for task in tasks:
-        pending[executor.submit(simulate_task, setup, task)] = task
-        if len(pending) >= most:
-            for future in wait(pending, return_when=FIRST_COMPLETED).done:
-                yield pending.pop(future), future.result()
-    while pending:
-        for future in wait(pending, return_when=FIRST_COMPLETED).done:
-            yield pending.pop(future), future.result()
-
-
 def check_components(bodies: Bodies, motion: Motion | None) -> None:
     """Check that a motion has no vertical component where bodies move along a line and not over the ground.
 
@@ -200,7 +182,7 @@ def check_components(bodies: Bodies, motion: Motion | None) -> None:
         )
 
 
-def simulate_task(setup: Setup, task: Task, cancelled: Cancellation | None = None) -> NDArray[np.void]:
+def simulate_task(setup: Setup, task: Task, cancelled: threading.Event | None = None) -> NDArray[np.void]:
     """Outcomes of one task; where it is ``cancelled`` on the way, of no use."""
     bodies = setup.bodies.select(task.bodies)
     check_components(bodies, task.motion)
@@ -212,7 +194,7 @@ def simulate_task(setup: Setup, task: Task, cancelled: Cancellation | None = Non
     set_start(states, records, bodies, *setup.start)
     step = step_of(task.motion)
     for chosen, substeps in _groups(ground, records, task.motion, setup.model):
-        if cancelled is not None and cancelled.asked:
+        if cancelled is not None and cancelled.is_set():
             break
         _march_together(ground, rules, (records, states), chosen, step, substeps)
     _march_on(ground, rules, records, states, cancelled)
@@ -267,14 +249,16 @@ def _march_together(
     states[chosen] = together.states
 
 
-def _march_on(ground: Ground, rules: Record, records: Records, states: Records, cancelled: Cancellation | None) -> None:
+def _march_on(
+    ground: Ground, rules: Record, records: Records, states: Records, cancelled: threading.Event | None
+) -> None:
     """Take those on that have used up their first slice of steps, until their budget is spent."""
     nothing, scratch = state.new_table(0), state.new_scratch()
     for k in np.flatnonzero(np.isin(states["ending"], (state.Ending.RUNNING, state.Ending.PAUSED))):
         one = states[k]
         one["until"] = state.TO_THE_END
         for _ in range(slices(ground)):
-            if cancelled is not None and cancelled.asked:
+            if cancelled is not None and cancelled.is_set():
                 return
             one["budget"] = SLICE
             one["ending"] = march(ground, records[k], rules, nothing, scratch, one)

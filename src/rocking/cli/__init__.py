@@ -8,12 +8,11 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final, NoReturn
+from typing import Final
 
 from cyclopts import App, CycloptsError
 
 from rocking.cli import wording
-from rocking.cli.interrupts import Interrupts
 from rocking.errors import INTERRUPTED, RockingError
 from rocking.progress import notes_for
 
@@ -67,22 +66,24 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")  # what the locale cannot encode is shown as question marks
     given = list(sys.argv[1:] if arguments is None else arguments)
-    with Interrupts() as interrupts:
-        try:
-            _run(given)
-        except KeyboardInterrupt:
-            _end_interrupted()
-        except BrokenPipeError:
-            # The reader of our output has gone; so must Python's own last flush.
-            _close_output()
-        except Exception as error:
-            if interrupts.asked:
-                _end_interrupted()
-            sentence = _sentence(error, given)
-            if not sentence:
-                raise
-            print(f"rocking: {sentence}", file=sys.stderr)
-            sys.exit(2)
+    try:
+        _run(given)
+        return
+    except KeyboardInterrupt:
+        pass
+    except BrokenPipeError:
+        # The reader of our output has gone; so must Python's own last flush.
+        _close_output()
+        return
+    except Exception as error:
+        sentence = _sentence(error, given)
+        if not sentence:
+            raise
+        print(f"rocking: {sentence}", file=sys.stderr)
+        sys.exit(2)
+    # Not within `except`: its traceback would keep the iterators whose threads end when they are closed.
+    print(INTERRUPTED, file=sys.stderr)
+    sys.exit(130)
 
 
 def _sentence(error: Exception, given: list[str]) -> str:
@@ -109,11 +110,6 @@ def _run(given: list[str]) -> None:
     with notes_for("nobody" if quiet else "everybody", wording.spelling_of(called)):
         command(*bound.args, **bound.kwargs)
     sys.stdout.flush()
-
-
-def _end_interrupted() -> NoReturn:
-    print(INTERRUPTED, file=sys.stderr)
-    sys.exit(130)
 
 
 def _close_output() -> None:

@@ -58,10 +58,10 @@ def explore(
 def _study(folder: Path) -> StudyView:
     """Study in a folder, to be shown as maps."""
     from rocking.explorer.studies import StudyView
-    from rocking.studies.place import place_of
+    from rocking.studies.folder import Folder
     from rocking.studies.store import exists
 
-    if not exists(place_of(folder)):
+    if not exists(Folder(folder)):
         sentence = "this folder holds no study; name one record, and drop the other files on the page"
         raise InvalidOption(sentence, path=str(folder))
     return StudyView(folder)

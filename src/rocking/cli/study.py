@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-from concurrent.futures import Executor
+import signal
+import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -11,16 +12,16 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 import rocking
-from rocking import checks
 from rocking.cli.options import WHOLE
 from rocking.cli.output import OUTPUT, PrintOptions, QuietOptions, output_folder, print_result, write_results
 from rocking.errors import InvalidOption, OutputError, StudyError
 from rocking.progress import note
+from rocking.studies.critical import StudyVerdict
 from rocking.studies.file import TEMPLATE, read_study
-from rocking.studies.place import place_of
-from rocking.studies.refine import StudyVerdict
-from rocking.studies.results import FORMATS, ReportPlan
-from rocking.studies.run import local_executor, scheduler_executor
+from rocking.studies.folder import Folder
+from rocking.studies.report import ReportPlan
+from rocking.studies.results import FORMATS
+from rocking.studies.run import scheduler_client
 from rocking.studies.study import Study, study_of
 from rocking.tables import counted, to_json, write_text
 
@@ -57,7 +58,7 @@ def create(
     file
         TOML file, as `rocking study new` writes one.
     folder
-        Where the study is kept: a folder, or the URL of an object store (s3://bucket/prefix).
+        Folder where the study is kept.
     unit_blocks
         Blocks of a unit, a multiple of 512, of one motion and scale; by default a unit takes about five seconds.
     """
@@ -70,39 +71,37 @@ def run(
     into: str | None = None,
     *,
     threads: Annotated[int | None, WHOLE] = None,
-    workers: Annotated[int | None, WHOLE] = None,
     scheduler: str | None = None,
+    part: str | None = None,
     output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
 ) -> None:
-    """Compute what is missing. Ctrl-C finishes the units in hand and stops; run it again to go on.
+    """Compute what is missing; after Ctrl-C, SIGTERM or anything else, run it again to go on.
 
     Parameters
     ----------
     folder
-        Where the study is kept; or its TOML file, from which it is created first.
+        Folder where the study is kept; or its TOML file, from which it is created first.
     into
-        With a file, where the study is kept; by default a folder beside the file, of its name without .toml.
+        With a file, the folder where the study is kept; by default one beside the file, of its name without .toml.
     threads
         Number of threads; by default one for every core.
-    workers
-        Number of processes instead, of one thread each (needs dask.distributed).
     scheduler
         Address of a scheduler of dask.distributed whose workers compute instead, as tcp://127.0.0.1:8786.
+    part
+        Compute a fixed share of the units only, as 3/10; shares may run at the same time, as an array of jobs.
     """
-    given = {"threads": threads, "workers": workers, "scheduler": scheduler}
-    chosen = [option for option, value in given.items() if value is not None]
-    if len(chosen) > 1:
-        raise InvalidOption(f"{' and '.join(['{}'] * len(chosen))} both say who computes; give one of them", *chosen)
+    if threads is not None and scheduler is not None:
+        raise InvalidOption("{} and {} both say who computes; give one of them", "threads", "scheduler")
     found = _opened(folder, into)
-    with _executor(workers, scheduler) as executor:
-        report = found.run(threads=threads, executor=executor)
+    with contextlib.nullcontext() if scheduler is None else scheduler_client(scheduler) as client:
+        report = found.run(threads=threads, executor=client, part=part)
     print(f"{report}\n{found.place}: {found.status}")
     if report.failed:
         raise StudyError(
             f"{counted(len(report.failed), 'unit')} failed, as runs.jsonl says; run the study again to try again"
         )
     if report.stopped:
-        raise KeyboardInterrupt
+        sys.exit(128 + signal.SIGTERM)
 
 
 @study.command
@@ -112,13 +111,12 @@ def status(folder: str, *, output: Annotated[PrintOptions, OUTPUT] = PrintOption
     Parameters
     ----------
     folder
-        Where the study is kept.
+        Folder where the study is kept.
     """
     state = rocking.study(folder).status
     running = None if state.running is None else asdict(state.running)
     about = {name: getattr(state, name) for name in ("done", "units", "simulations", "failed")}
-    about |= {"running": running, "refinement": None if state.refinement is None else asdict(state.refinement)}
-    print(to_json({"folder": folder, **about}) if output.as_json else f"{folder}: {state}")
+    print(to_json({"folder": folder, **about, "running": running}) if output.as_json else f"{folder}: {state}")
 
 
 @study.command
@@ -134,11 +132,11 @@ def verify(
     Parameters
     ----------
     folder
-        Where the study is kept.
+        Folder where the study is kept.
     recompute
         How many units, drawn at random, to compute again.
     repair
-        Compute damaged units again and store them, and write what else is damaged anew.
+        Compute damaged units again and store them.
     """
     found = rocking.study(folder)
     faults = found.verify(recompute, repair=repair)
@@ -146,7 +144,7 @@ def verify(
         print(fault)
     if faults and not repair:
         found_faults = f"{counted(len(faults), 'fault')} found"
-        raise StudyError(f"{found_faults}; {{}} corrects what can be computed or written again", "repair")
+        raise StudyError(f"{found_faults}; {{}} computes damaged units again", "repair")
     left = found.verify() if faults else []
     print(_sound(found, folder, len(faults) - len(left)))
     if left:
@@ -166,7 +164,7 @@ def export(
     Parameters
     ----------
     folder
-        Where the study is kept.
+        Folder where the study is kept.
     file
         NetCDF (.nc), or a table with a row for each simulation: CSV (.csv), JSON (.json), Parquet (.parquet) or a
         workbook (.xlsx); units are in the names of its columns.
@@ -189,13 +187,11 @@ def report(folder: str, out: Path | None = None, *, output: Annotated[PrintOptio
     Parameters
     ----------
     folder
-        Where the study is kept.
+        Folder where the study is kept.
     out
         Folder for what is made; by default the folder report in that of the study.
     """
     found = rocking.study(folder)
-    if out is None and "://" in folder:
-        raise InvalidOption("this is no folder for figures and tables: name one as well", path=folder)
     with output_folder(out or Path(folder) / "report", listed=not output.as_json) as target:
         made = found.report()
         for name, one in made.items():
@@ -219,16 +215,8 @@ def _created(file: Path, folder: str, unit_blocks: int | None) -> Study:
     described = read_study(file)
     for sentence in described.skipped:
         note(f"left out: {sentence}")
-    wanted = described.report or ReportPlan(), described.refine, described.outcomes
-    return study_of(place_of(folder), described.product, unit_blocks, *wanted, described.records)
-
-
-def _executor(workers: int | None, scheduler: str | None) -> contextlib.AbstractContextManager[Executor | None]:
-    if scheduler is not None:
-        return scheduler_executor(scheduler)
-    if workers is not None:
-        return local_executor(checks.whole(workers, "workers", InvalidOption, least=1))
-    return contextlib.nullcontext()
+    wanted = described.report or ReportPlan(), described.outcomes, described.records
+    return study_of(Folder(folder), described.product, unit_blocks, *wanted)
 
 
 def _sound(found: Study, folder: str, repaired: int) -> str:
@@ -238,7 +226,5 @@ def _sound(found: Study, folder: str, repaired: int) -> str:
     sound = f"{counted(state.done, 'unit')} {'is' if state.done == 1 else 'are'} sound"
     sound += f"; {counted(repaired, 'fault')} repaired" if repaired else ""
     if missing:
-        return (
-            f"{sound}; {missing} of {state.units} {'is' if missing == 1 else 'are'} missing: rocking study run {folder}"
-        )
-    return sound if state.complete else f"{sound}; the refinement is not complete: rocking study run {folder}"
+        sound += f"; {missing} of {state.units} {'is' if missing == 1 else 'are'} missing: rocking study run {folder}"
+    return sound

@@ -1,17 +1,15 @@
 from .file import TEMPLATE, StudyFile, read_study
 from .fragility import BlockFragilities
-from .refine import Refinement
-from .results import FragilityPlan, ReportPlan, SpectrumPlan
+from .report import FragilityPlan, ReportPlan, SpectrumPlan
 from .run import RunReport
 from .spectrum import StudySpectrum
-from .state import Running, Status
+from .status import Running, Status
 from .study import Study, study
 
 __all__ = [
     "TEMPLATE",
     "BlockFragilities",
     "FragilityPlan",
-    "Refinement",
     "ReportPlan",
     "RunReport",
     "Running",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -20,25 +21,18 @@ from rocking.ensemble import Polarity, Product, dataset_of, product_of
 from rocking.errors import InvalidOption
 from rocking.motion.named import Motions, names_of
 from rocking.motion.scaling import IntensityName, Measure, MeasureName
+from rocking.studies.critical import StudyVerdict, critical_scales
+from rocking.studies.folder import Folder
 from rocking.studies.fragility import BlockFragilities, block_fragilities, pooled_fragility
 from rocking.studies.inputs import OUTCOMES, chosen_outcomes
-from rocking.studies.place import Place, place_of
-from rocking.studies.refine import StudyVerdict, critical_scales, keep_plan, kept_plan, next_round, tolerances_of
-from rocking.studies.results import (
-    ReportPart,
-    ReportPlan,
-    WrittenToFiles,
-    keep_report,
-    kept_report,
-    lazy_outcome,
-    made_report,
-)
-from rocking.studies.run import RunReport, Stop, run
+from rocking.studies.report import ReportPart, ReportPlan, keep_report, kept_report, made_report
+from rocking.studies.results import lazy_outcome, write_table
+from rocking.studies.run import RunReport, run
 from rocking.studies.spectrum import FRACTILES, StudySpectrum, study_spectrum
-from rocking.studies.state import Log, Status, simulations_done, status_of, verified
+from rocking.studies.status import Status, log_run, status_of, verified
 from rocking.studies.store import Store, exists, require_free
 from rocking.studies.units import fitting_unit, width_of
-from rocking.tables import counted
+from rocking.tables import counted, write_netcdf
 from rocking.treatment import Treatment
 
 if TYPE_CHECKING:
@@ -49,13 +43,13 @@ _CHANGES = 1 << 16
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Study(WrittenToFiles):
+class Study:
     """Simulations of blocks, motions, scales and polarities, kept in a store; from `rocking.study`.
 
     Attributes
     ----------
     place : str
-        Folder or URL where it is kept.
+        Folder where it is kept.
     product : Product
         What is simulated.
     outcomes : tuple of str
@@ -68,8 +62,8 @@ class Study(WrittenToFiles):
 
     @property
     def place(self) -> str:
-        """Folder or URL where it is kept."""
-        return str(self._store.place)
+        """Folder where it is kept."""
+        return str(self._store.folder)
 
     @property
     def product(self) -> Product:
@@ -87,9 +81,14 @@ class Study(WrittenToFiles):
         return status_of(self._store)
 
     def run(
-        self, threads: int | None = None, executor: Executor | Any = None, *, progress: bool | None = None
+        self,
+        threads: int | None = None,
+        executor: Executor | Any = None,
+        *,
+        part: str | None = None,
+        progress: bool | None = None,
     ) -> RunReport:
-        """Compute every unit that is not done, and the rounds of the refinement after them.
+        """Compute every unit that is not done.
 
         Parameters
         ----------
@@ -97,19 +96,22 @@ class Study(WrittenToFiles):
             Number of threads; by default one for every core.
         executor : concurrent.futures.Executor or dask.distributed.Client, optional
             Processes, or the client of a cluster, whose workers compute instead; only this process writes.
+        part : str, optional
+            Compute a fixed share of the units only, as "3/10", the third of ten. Different shares may run at the same
+            time, on machines with a common file system; a run without a part then computes what is missing.
         progress : bool, optional
             Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
 
         Returns
         -------
         RunReport
-            What this run did. Ctrl-C and SIGTERM finish the units in hand first; a second one stops at once. Nothing
-            that was computed is lost either way.
+            What this run did. SIGTERM finishes the units in hand first; Ctrl-C ends the run at once. Nothing that was
+            stored is lost either way.
 
         Raises
         ------
         InvalidOption
-            If the number of threads is not a whole number from 1, or the executor is neither kind.
+            If the number of threads is not a whole number from 1, or the executor or the part is none.
         StudyError
             If the study is being run elsewhere, was made by another version, or the workers are gone.
         OutputError
@@ -127,28 +129,25 @@ class Study(WrittenToFiles):
         """
         if threads is not None:
             threads = checks.whole(threads, "threads", InvalidOption, least=1)
-        store, log, stop = self._store, Log(self._store.place), Stop()
+        number, count = (1, 1) if part is None else _part(part)
+        store, folder, lock = self._store, self._store.folder, "lock" if part is None else f"lock.{number}-{count}"
         store.check_program()
-        with stop.listening(), store.place.locked() as note:
-            log.add({"event": "start", "note": note, "done": simulations_done(store)})
+        with folder.locked(lock):
+            for name, data in store.metadata.items():
+                folder.keep(name, data)
+            share = [*itertools.islice(store.grid, number - 1, None, count)]
+            log_run(folder, lock, {"event": "start", "done": sum(map(store.grid.simulations, store.done()))})
 
             def failing(unit: str, why: str) -> None:
-                log.add({"event": "failed", "unit": unit, "why": why})
+                log_run(folder, lock, {"event": "failed", "unit": unit, "why": why})
 
-            options: dict[str, Any] = {"threads": threads, "executor": executor, "progress": progress}
             try:
-                report = run(store, stop=stop, failing=failing, **options)
-                tolerances = kept_plan(store)
-                while tolerances is not None and not (report.failed or report.stopped):
-                    now = next_round(store, tolerances)
-                    if now.is_last:
-                        break
-                    report += run(now, stop=stop, failing=failing, **options)
+                report = run(store, share, threads=threads, executor=executor, progress=progress, failing=failing)
             except BaseException as error:
-                log.add({"event": "end", "error": str(error) or type(error).__name__})
+                log_run(folder, lock, {"event": "end", "error": str(error) or type(error).__name__})
                 raise
             about = {"units": report.units, "seconds": report.seconds, "stopped": report.stopped}
-            log.add({"event": "end", **about, "done": simulations_done(store)})
+            log_run(folder, lock, {"event": "end", **about})
         return report
 
     def results(self) -> xr.Dataset:
@@ -203,7 +202,7 @@ class Study(WrittenToFiles):
         recompute : int
             How many units, drawn at random, to compute again.
         repair : bool
-            Whether to compute damaged units again and store them, and to write what else is damaged anew.
+            Whether to compute damaged units again and store them.
         seed : int
             Seed of the draw.
         progress : bool, optional
@@ -219,12 +218,6 @@ class Study(WrittenToFiles):
         StudyError
             If units are to be computed again and the study was made by another version, or what says what is computed
             is damaged.
-
-        Notes
-        -----
-        The log of the runs, ``runs.jsonl``, is not needed for any result. That it is cut is seen within a line, where
-        it has no run of units that are done, and after the end of a run; a log that ends within a run looks as after a
-        kill. What is lost of it stays lost: a repair keeps the lines that can be read, and says so in it.
 
         Examples
         --------
@@ -253,16 +246,15 @@ class Study(WrittenToFiles):
         xarray.Dataset
             Over ``change``, in order of motion, polarity, block and scale: low and high (scales, in the units of the
             measure), overturns or completes (whether the verdict holds at the higher one, and not at the lower one),
-            known (whether all verdicts on the way are, else the bracket stays wide: a simulation was given up or
-            stopped, or a rest is not proven); motion, polarity, block and its parameters as coordinates. A block that
+            known (whether all verdicts between them are: a simulation may have been given up or stopped, or a rest not
+            be proven); motion, polarity, block and its parameters as coordinates. A block that
             stands a stronger motion than one that overturns it has several. Brackets are neighbouring scales of the
-            study, or narrower where it was made with `refine`; where verdicts are not known at scales between two that
-            differ, the bracket is those two.
+            study; where verdicts are not known at scales between two that differ, the bracket is those two.
 
         Raises
         ------
         StudyError
-            If units are missing or damaged, or the refinement is not done.
+            If units are missing or damaged.
         InvalidOption
             If there is no such verdict, the study does not keep its outcomes, or has no two scales in increasing order.
 
@@ -447,6 +439,61 @@ class Study(WrittenToFiles):
         """
         return made_report(self._store, progress)
 
+    def to_netcdf(self, path: str | Path, *, critical: StudyVerdict | None = None) -> None:
+        """Write the results as `results` has them to a NetCDF file; parameters and errors as of `to_csv`."""
+        write_netcdf(path, self._results(critical)[0])
+
+    def to_csv(self, path: str | Path, *, critical: StudyVerdict | None = None, progress: bool | None = None) -> None:
+        """Write a row for each simulation as text, in columns named with their units.
+
+        Parameters
+        ----------
+        path : path
+            File to write.
+        critical : {"overturning", "complete_chattering"}, optional
+            Write the `critical_scales` of this verdict instead, a row for each change.
+        progress : bool, optional
+            Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
+
+        Raises
+        ------
+        OutputError
+            If the file cannot be written.
+        StudyError
+            If a unit is damaged, or units are missing for critical scales.
+        """
+        write_table("csv", path, *self._results(critical), progress)
+
+    def to_json(self, path: str | Path, *, critical: StudyVerdict | None = None, progress: bool | None = None) -> None:
+        """Write an object for each simulation as JSON; parameters and errors as of `to_csv`.
+
+        The keys are those of its columns, and NaN is null; attributes of the study and of its measure stand under
+        "study".
+        """
+        write_table("json", path, *self._results(critical), progress)
+
+    def to_parquet(
+        self, path: str | Path, *, critical: StudyVerdict | None = None, progress: bool | None = None
+    ) -> None:
+        """Write the table of `to_csv` as Parquet; parameters and errors as there.
+
+        Raises
+        ------
+        InvalidOption
+            If pyarrow is not installed.
+        """
+        write_table("parquet", path, *self._results(critical), progress)
+
+    def to_excel(self, path: str | Path, *, critical: StudyVerdict | None = None, progress: bool | None = None) -> None:
+        """Write the table of `to_csv` as a workbook (.xlsx); parameters and errors as there.
+
+        Raises
+        ------
+        InvalidOption
+            If openpyxl is not installed, or a sheet has too few rows.
+        """
+        write_table("excel", path, *self._results(critical), progress)
+
     def _results(self, critical: StudyVerdict | None) -> tuple[xr.Dataset, str, int]:
         if critical:
             return self.critical_scales(critical), "change", _CHANGES
@@ -469,7 +516,6 @@ def study(
     measure: MeasureName | Measure = "factor",
     polarity: Polarity = "+",
     duration: float | None = None,
-    refine: float | Mapping[str, float] | None = None,
     outcomes: Sequence[str] | None = None,
     unit_blocks: int | None = None,
 ) -> Study:
@@ -478,11 +524,10 @@ def study(
     Parameters
     ----------
     folder : path
-        Where the study is kept: a folder, or the URL of an object store as ``"s3://bucket/prefix"``, which
-        needs obstore.
+        Folder where the study is kept.
     blocks : Blocks, Block, RestrainedBlock or sequence of one kind, optional
         As for `simulate_many`; without blocks and motions, the study must be there, and needs no script nor any other
-        argument (but `refine`).
+        argument.
     motions : Motion, sequence of Motion, or mapping of str to Motion, optional
         As for `simulate_many`.
     model : {"nonlinear", "linear"}
@@ -497,11 +542,6 @@ def study(
         As for `simulate_many`.
     duration : float, optional
         As for `simulate_many`.
-    refine : float or mapping, optional
-        Once the scales (two or more, increasing) are computed, halve the gap between neighbours of which one overturns
-        a block and the other does not, until it is narrower than this, relative to the scale: `Study.critical_scales`.
-        ``{"complete_chattering": 1e-6}`` does so where one completes the first chattering and the other does not;
-        ``"overturning"`` may be named beside it. May be given later for a study that is there.
     outcomes : sequence of str, optional
         Names of what is kept of each simulation, of the variables that `simulate_many` returns; by default all.
         stalled, unfinished and stopped are always kept: they say which of the others are answers.
@@ -519,7 +559,7 @@ def study(
     StudyError
         If there is no study and no inputs are given, it holds other inputs or outcomes, or it is damaged.
     InvalidOption
-        If an argument is out of its range, or `outcomes` leaves out what `refine` needs.
+        If an argument is out of its range.
 
     Examples
     --------
@@ -533,7 +573,7 @@ def study(
     >>> study(folder).results().overturned.sel(scale=0.4).values.tolist()
     [[True, False, True, False]]
     """
-    place = place_of(folder)
+    where = Folder(folder)
     if blocks is None or motions is None:
         if blocks is not None or motions is not None:
             raise InvalidOption("a new study needs {} and {}; one that is there needs neither", "blocks", "motions")
@@ -547,12 +587,9 @@ def study(
             outcomes=outcomes,
             unit_blocks=unit_blocks,
         )
-        store = Store.open(place)
-        if refine is not None:
-            keep_plan(store, tolerances_of(store.product, refine, store.grid.outcomes))
-        return Study(store)
+        return Study(Store.open(where))
     product = product_of(blocks, motions, levels, measure, polarity, model, chattering, duration)
-    return study_of(place, product, unit_blocks, refine=refine, outcomes=chosen_outcomes(outcomes))
+    return study_of(where, product, unit_blocks, outcomes=chosen_outcomes(outcomes))
 
 
 def _refuse_inputs(**given: object) -> None:
@@ -569,24 +606,22 @@ def _refuse_inputs(**given: object) -> None:
 
 
 def study_of(
-    place: Place,
+    folder: Folder,
     product: Product,
     unit_blocks: int | None = None,
     plan: ReportPlan | None = None,
-    refine: float | Mapping[str, float] | None = None,
     outcomes: tuple[str, ...] = OUTCOMES,
     records: Sequence[str] = (),
 ) -> Study:
-    """Create the study of a product in a place, or open the one that is there and check its inputs.
+    """Create the study of a product in a folder, or open the one that is there and check its inputs.
 
     Units are of `unit_blocks` blocks of one motion, scale and polarity, or else from a pilot. `plan` (what is to be
     made of the results) and `records` (the name of the record of each motion, which results then have as well) take the
-    place of what was; `refine` may be given later; `outcomes` are from `chosen_outcomes`.
+    place of what was; `outcomes` are from `chosen_outcomes`.
     """
-    tolerances = None if refine is None else tolerances_of(product, refine, outcomes)
-    found = None if exists(place) else _created(place, product, unit_blocks, outcomes)
+    found = None if exists(folder) else _created(folder, product, unit_blocks, outcomes)
     if found is None:
-        found = Store.open(place)
+        found = Store.open(folder)
         found.check_inputs(product, outcomes)
         width, count = found.grid.unit[3], len(product.bodies)
         if unit_blocks is not None and min(width_of(unit_blocks), count) != min(width, count):
@@ -595,16 +630,26 @@ def study_of(
             )
     if any(records) or (records and found.records()):
         found.name_records(records)
-    if plan is not None and (plan != ReportPlan() or kept_report(found) is not None):
-        keep_report(found, plan)
-    if tolerances is not None:
-        keep_plan(found, tolerances)
+    if plan is not None and (plan != ReportPlan() or kept_report(folder) is not None):
+        keep_report(folder, plan)
     return Study(found)
 
 
-def _created(place: Place, product: Product, unit_blocks: int | None, outcomes: tuple[str, ...]) -> Store | None:
-    """Create the store of a study; None where somebody else has done so meanwhile."""
-    require_free(place)  # before the pilot, and before a lock is put beside the files of others
+def _created(folder: Folder, product: Product, unit_blocks: int | None, outcomes: tuple[str, ...]) -> Store | None:
+    """Create the store of a study; None where another process has done so meanwhile."""
+    require_free(folder)  # before the pilot, and before a lock is put beside the files of others
     unit = fitting_unit(product) if unit_blocks is None else (1, 1, 1, width_of(unit_blocks))
-    with place.locked():
-        return None if exists(place) else Store.create(place, product, unit, outcomes)
+    with folder.locked():
+        return None if exists(folder) else Store.create(folder, product, unit, outcomes)
+
+
+def _part(part: str) -> tuple[int, int]:
+    """Return the number of a part, and how many there are."""
+    number, slash, count = str(part).partition("/")
+    if not (slash and number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count)):
+        raise InvalidOption(
+            f"{{}} must be the number of a share of the units and of all shares, as 3/10; got {part}",
+            "part",
+            value=part,
+        )
+    return int(number), int(count)

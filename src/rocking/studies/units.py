@@ -7,28 +7,24 @@ import gzip
 import itertools
 import json
 import math
-import re
 import socket
+import threading
 import time
 import zlib
-from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rocking import checks
-from rocking.arrays import Floats, Integers
+from rocking.arrays import Floats
 from rocking.constants import VERSION
 from rocking.engine import Setup, Task, simulate_task
 from rocking.ensemble import Product
 from rocking.errors import InvalidOption, StudyError
 from rocking.kernels.compiled import fingerprint
 from rocking.motion.motion import Motion
-from rocking.studies.inputs import OUTCOMES
-from rocking.threads import Cancellation
 
 #: Units are multiples of so many blocks, which the engine takes through a motion together.
 _GROUP: Final = 512
@@ -47,12 +43,7 @@ _CACHED: Final = 4096
 #: What gzip writes first: no name, no time, an unknown system. Any other byte there is damage.
 _HEADER: Final = gzip.compress(b"", _LEVEL, mtime=0)[:10]
 
-_NAME: Final = re.compile(r"c\.0((?:\.\d+)+)", re.ASCII)
-
-#: Names of the axes of an array of units by their number: of a grid, and of simulations that are none.
-_DIMENSIONS: Final = {4: ("motion", "scale", "polarity", "block"), 1: ("point",)}
-
-#: Indices of a unit along the axes of its array.
+#: Index of a unit among the motions, scales, polarities and blocks.
 Key = tuple[int, ...]
 
 
@@ -67,7 +58,7 @@ class UnitGrid:
     Attributes
     ----------
     shape : tuple of int
-        Numbers of motions, scales, polarities and blocks; or, where the simulations are no grid, their number alone.
+        Numbers of motions, scales, polarities and blocks.
     unit : tuple of int
         How many a unit holds along each axis; the last one along an axis may hold fewer.
     outcomes : tuple of str
@@ -94,9 +85,6 @@ class UnitGrid:
     def __iter__(self) -> Iterator[Key]:
         """Give the keys of all units, the last axis first."""
         return itertools.product(*map(range, self.cells))
-
-    def __contains__(self, key: Key | None) -> bool:
-        return key is not None and len(key) == len(self.cells) and all(map(int.__lt__, key, self.cells))
 
     def ranges(self, key: Key) -> tuple[slice, ...]:
         """Range of a unit along each axis."""
@@ -126,21 +114,15 @@ class UnitGrid:
                 {"name": "bytes", "configuration": {"endian": "little"}},
                 {"name": "gzip", "configuration": {"level": _LEVEL}},
             ],
-            "dimension_names": ["outcome", *_DIMENSIONS[len(self.shape)]],
+            "dimension_names": ["outcome", "motion", "scale", "polarity", "block"],
             "attributes": {"outcomes": list(self.outcomes)},
         }
         return json.dumps(about, indent=2).encode()
 
 
 def name_of(key: Key) -> str:
-    """Name of a unit's object in the store."""
+    """Name of a unit's file in the store."""
     return "c.0." + ".".join(map(str, key))
-
-
-def key_of(name: str) -> Key | None:
-    """Key of a unit from the name of its object; None of any other object."""
-    found = _NAME.fullmatch(name)
-    return None if found is None else tuple(map(int, found[1][1:].split(".")))
 
 
 def width_of(unit_blocks: int) -> int:
@@ -159,12 +141,11 @@ def fitting_unit(product: Product) -> tuple[int, int, int, int]:
     motions, scales, polarities, count = product.shape
     some = product.bodies.select(np.linspace(0, count - 1, min(count, _GROUP)).astype(np.int64))
     motion = max(product.motions, key=lambda one: len(one.coefficients))
-    factors = np.array([[[product.scales.factors(motion).max()]]])
     setup = Setup(some, product.model, product.treatment, product.duration)
-    work = GridWork(setup=setup, motions=(motion,), factors=factors, unit=(1, 1, 1, len(some)), outcomes=OUTCOMES)
-    compute(work)  # compiles
+    task = Task(slice(None), motion, float(product.scales.factors(motion).max()))
+    simulate_task(setup, task)  # loads the kernels
     start = time.perf_counter()
-    compute(work)
+    simulate_task(setup, task)
     each = (time.perf_counter() - start) / len(some)
     most = min(_SECONDS / each, math.prod(product.shape) / _FEWEST, LARGEST)
     width = min(_GROUP * max(1, int(most) // _GROUP), count)
@@ -182,8 +163,8 @@ def program() -> str:
     return f"rocking {VERSION} (kernels {fingerprint()})"
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Work(ABC):
+@dataclass(frozen=True, eq=False)
+class Work:
     """All that a worker needs for a unit.
 
     Attributes
@@ -191,8 +172,8 @@ class Work(ABC):
     setup : Setup
         The unit's blocks, and how to compute.
     motions : tuple of Motion
-        What shakes them.
-    factors : ndarray
+        Its motions.
+    factors : ndarray, shape (motions, scales, polarities)
         Factors on the motions.
     unit : tuple of int
         What a full unit holds along each axis.
@@ -209,80 +190,25 @@ class Work(ABC):
     outcomes: tuple[str, ...]
     program: str = field(default_factory=program)
 
-    @property
-    @abstractmethod
-    def counts(self) -> tuple[int, ...]:
-        """What this unit holds along each axis."""
 
-    @abstractmethod
-    def parts(self) -> Iterator[tuple[tuple[Any, ...], Task]]:
-        """Give each task, and where its outcomes belong in the array of the unit."""
-
-    def values(self, cancelled: Cancellation | None) -> Floats:
-        """Simulate, and return the outcomes: NaN where the unit holds fewer simulations than a full one."""
-        shape = len(self.outcomes), *self.unit
-        values = np.empty(shape) if self.unit == self.counts else np.full(shape, np.nan)
-        for where, task in self.parts():
-            _fill(values[:, *where], self.outcomes, simulate_task(self.setup, task, cancelled))
-        return values
-
-
-class GridWork(Work):
-    """A cell of the grid: `factors` are of shape (motions, scales, polarities)."""
-
-    @property
-    def counts(self) -> tuple[int, ...]:
-        """Numbers of motions, scales, polarities and blocks."""
-        return *self.factors.shape, len(self.setup.bodies)
-
-    def parts(self) -> Iterator[tuple[tuple[Any, ...], Task]]:
-        """Give a task for each motion, scale and polarity, of all blocks."""
-        blocks = slice(0, len(self.setup.bodies))
-        for m, s, k in np.ndindex(self.factors.shape):
-            yield (m, s, k, blocks), Task(blocks, self.motions[m], float(self.factors[m, s, k]))
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class PointsWork(Work):
-    """Simulations that are no grid: n blocks of `setup` and as many factors; equal ones of a motion stand together.
-
-    Attributes
-    ----------
-    which : ndarray of int, shape (n,)
-        Which motion shakes each block.
-    """
-
-    which: Integers
-
-    @property
-    def counts(self) -> tuple[int, ...]:
-        """Number of simulations."""
-        return (len(self.factors),)
-
-    def parts(self) -> Iterator[tuple[tuple[Any, ...], Task]]:
-        """Give a task for each motion and factor."""
-        changes = np.flatnonzero((np.diff(self.which) != 0) | (np.diff(self.factors) != 0.0)) + 1
-        for start, end in itertools.pairwise([0, *changes.tolist(), len(self.factors)]):
-            some = slice(start, end)
-            yield (some,), Task(some, self.motions[self.which[start]], float(self.factors[start]))
-
-
-def compute(work: Work, cancelled: Cancellation | None = None) -> bytes:
+def compute(work: Work, cancelled: threading.Event | None = None) -> bytes:
     """Simulate a unit, wherever its inputs have been sent, and return its bytes; of no use where it is `cancelled`.
 
     A StudyError is raised if the program is another one here, whose bits may differ.
     """
     if work.program != program():
         raise StudyError(f"the worker on {socket.gethostname()} has {program()}, the study needs {work.program}")
-    return encoded(work.values(cancelled))
-
-
-def _fill(values: Floats, names: tuple[str, ...], outcomes: NDArray[np.void]) -> None:
-    """Write these outcomes of n simulations into an array, shape (names, n): as many at a time as a cache holds."""
-    for start in range(0, len(outcomes), _CACHED):
-        some = slice(start, start + _CACHED)
-        for one, name in zip(values, names, strict=True):
-            one[some] = outcomes[name][some]
+    # NaN where the unit holds fewer simulations than a full one.
+    values = np.full((len(work.outcomes), *work.unit), np.nan)
+    blocks = slice(0, len(work.setup.bodies))
+    for m, s, k in np.ndindex(work.factors.shape):
+        task = Task(blocks, work.motions[m], float(work.factors[m, s, k]))
+        outcomes = simulate_task(work.setup, task, cancelled)
+        for start in range(0, blocks.stop, _CACHED):
+            some = slice(start, min(start + _CACHED, blocks.stop))
+            for one, name in zip(values[:, m, s, k], work.outcomes, strict=True):
+                one[some] = outcomes[name][some]
+    return encoded(values)
 
 
 def encoded(values: Floats) -> bytes:

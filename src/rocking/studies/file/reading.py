@@ -18,8 +18,7 @@ from rocking.studies.file.blocks import blocks_of
 from rocking.studies.file.motions import motions_of
 from rocking.studies.file.tables import MEASURES, Tables
 from rocking.studies.inputs import OUTCOMES, chosen_outcomes
-from rocking.studies.refine import Tolerances, tolerances_of
-from rocking.studies.results import PLANS, ReportPlan, check_part
+from rocking.studies.report import PLANS, ReportPlan, check_part
 from rocking.treatment import treatment
 
 #: A file to start from, with comments.
@@ -38,8 +37,6 @@ class StudyFile:
         A sentence for each record that could not be read, where the file says to go on.
     report : ReportPlan or None
         What is to be made of the results.
-    refine : mapping or None
-        Tolerances to which scales are refined, by verdict.
     outcomes : tuple of str
         What is kept of each simulation.
     records : tuple of str
@@ -49,7 +46,6 @@ class StudyFile:
     product: Product
     skipped: tuple[str, ...]
     report: ReportPlan | None
-    refine: Tolerances | None = None
     outcomes: tuple[str, ...] = OUTCOMES
     records: tuple[str, ...] = ()
 
@@ -111,7 +107,7 @@ def _study(tables: Tables) -> StudyFile:
     with tables.located("simulation", "scales", "blocks"):
         product = Product(blocks, tuple(motions), scales, polarity, model, chattering, rules.get("duration"))
         kept = chosen_outcomes(rules.get("outcomes"))
-    report, refine = _report(tables, kept), given.get("refine")
+    report = _report(tables, kept)
     longest = max(motion.end for motion in motions)
     if report not in (None, ReportPlan()) and product.duration is not None and product.duration < longest:
         raise tables.wrong(
@@ -120,9 +116,7 @@ def _study(tables: Tables) -> StudyFile:
             f"{{}} ends before the longest motion, of {longest:g} s, and a report needs whole responses: leave it out",
             "duration",
         )
-    with tables.located("scales", key="refine"):
-        tolerances = None if refine is None else tolerances_of(product, refine, kept)
-    return StudyFile(product, tuple(skipped), report, tolerances, kept, tuple(names))
+    return StudyFile(product, tuple(skipped), report, kept, tuple(names))
 
 
 def _scales(tables: Tables) -> Scales:

@@ -15,7 +15,7 @@ from rocking import checks, quantities
 from rocking.arrays import Floats
 from rocking.block import Damper, Load, Restraint, Spring, Tendon, Thrust
 from rocking.errors import InvalidMotion, RockingError, StudyError, UnreadableRecord
-from rocking.studies.results import PLANS
+from rocking.studies.report import PLANS
 
 _Kept = TypeVar("_Kept", bound=RockingError)
 
@@ -79,7 +79,7 @@ SCHEMA: Final[Mapping[str, Mapping[str, _Kind]]] = {
         "skip_unreadable": _TRUTH,
         "pulses": _tables("motions.pulses"),
     },
-    "scales": {**dict.fromkeys((*MEASURES, "period", "damping", "refine"), _ANY), "polarity": _TEXT},
+    "scales": {**dict.fromkeys((*MEASURES, "period", "damping"), _ANY), "polarity": _TEXT},
     "simulation": {"model": _TEXT, "chattering": _TEXT, "duration": _ANY, "outcomes": _TEXTS},
     "report": dict.fromkeys(PLANS, _TABLE),
     **{f"report.{name}": {each.name: _ANY for each in dataclasses.fields(plan)} for name, plan in PLANS.items()},
