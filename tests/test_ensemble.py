@@ -21,7 +21,6 @@ from rocking import (
     simulate,
     simulate_many,
 )
-from rocking.threads import Cancellation
 
 
 @pytest.fixture(scope="module")
@@ -164,9 +163,9 @@ def test_an_interrupt_reaches_the_tasks_in_hand(monkeypatch):
     def held(setup, task, cancelled):
         begun.set()
         late = time.monotonic() + 20.0
-        while not cancelled.asked and time.monotonic() < late:
+        while not cancelled.is_set() and time.monotonic() < late:
             time.sleep(0.001)
-        told.append(cancelled.asked)
+        told.append(cancelled.is_set())
 
     def tasks():
         yield task
@@ -176,18 +175,18 @@ def test_an_interrupt_reaches_the_tasks_in_hand(monkeypatch):
     with monkeypatch.context() as patched:
         patched.setattr(engine, "simulate_task", held)
         with pytest.raises(KeyboardInterrupt):
-            [*engine.simulate_tasks(setup, tasks(), threads=1)]
+            [*engine.simulate_tasks(setup, tasks(), threads=2)]
     assert told == [True]
 
 
 def test_a_task_that_is_told_to_stop_follows_no_body_any_further(monkeypatch, records):
     setup, task = engine.Setup(random_blocks(3, 1), "linear", Certified()), engine.Task(slice(None), records[2])
-    marched, cancelled = [], Cancellation()
+    marched, cancelled = [], threading.Event()
     march = engine._march_together
     monkeypatch.setattr(engine, "_march_together", lambda *given: marched.append(march(*given)))
     engine.simulate_task(setup, task, cancelled)
     assert len(marched) >= 1
-    cancelled.asked = True
+    cancelled.set()
     marched.clear()
     engine.simulate_task(setup, task, cancelled)
     assert not marched

@@ -6,15 +6,12 @@ import importlib
 import itertools
 import json
 import os
-import re
 import shutil
 import signal
-import socket
 import subprocess
 import sys
-import threading
 import time
-from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -22,12 +19,11 @@ import pytest
 import xarray as xr
 
 import rocking
-from rocking.studies import place as places
+from rocking.studies import folder as folders
 from rocking.studies import units
 from rocking.studies.file import read_study
 from rocking.studies.inputs import OUTCOMES
-from rocking.studies.run import Stop
-from rocking.studies.units import DamagedUnit, UnitGrid, decoded, encoded, key_of, name_of
+from rocking.studies.units import DamagedUnit, UnitGrid, decoded, encoded, name_of
 
 BLOCKS = rocking.Blocks(p=np.linspace(1.0, 6.0, 1300), alpha=0.2, restitution=0.7)
 MOTIONS = [rocking.pulses.one_sine(4.0, frequency) for frequency in (0.5, 1.0, 2.0)]
@@ -41,7 +37,8 @@ motions = [rocking.pulses.one_sine(4.0, frequency) for frequency in (0.5, 1.0, 2
 scales = {"levels": [2.0, 4.0], "measure": "pga", "polarity": "both"}
 study = rocking.study(sys.argv[1], blocks, motions, **scales, model="linear", unit_blocks=512)
 print("ready", flush=True)
-study.run(threads=int(sys.argv[2]))
+report = study.run(threads=int(sys.argv[2]))
+print(report.stopped)
 """
 
 
@@ -53,7 +50,7 @@ def digest(folder):
     """Hash of all that a study is: inputs, description, every unit."""
     total = hashlib.sha256()
     for path in sorted(Path(folder).rglob("*")):
-        if path.is_file() and path.name not in ("lock", "runs.jsonl"):
+        if path.is_file() and not path.name.startswith(("lock", "runs.")):
             total.update(f"{path.relative_to(folder)}".encode() + path.read_bytes())
     return total.hexdigest()
 
@@ -101,7 +98,9 @@ def test_units_may_hold_several_motions_scales_and_polarities(reference, tmp_pat
         xr.testing.assert_identical(lazy.isel(part).load(), reference.isel(part))
     zarr = pytest.importorskip("zarr")
     array = zarr.open_group(tmp_path, mode="r")["result"]
-    np.testing.assert_array_equal(array[1], reference[OUTCOMES[1]].values.astype(float))
+    assert array.attrs["outcomes"] == [*OUTCOMES]
+    for k, name in enumerate(OUTCOMES):
+        np.testing.assert_array_equal(array[k], reference[name].values.astype(float))
     (tmp_path / "result" / name_of(keys[3])).unlink()
     found = rocking.study(tmp_path).results().load()
     np.testing.assert_array_equal(np.isnan(found.impacts.values), ~found.done.values)
@@ -127,17 +126,8 @@ def test_a_study_is_cut_into_some_dozens_of_units_whatever_it_is_long_of(tmp_pat
     assert stored < 2.5 * 64 * sum(sizes)
 
 
-def test_any_zarr_reader_opens_the_store(complete, reference):
-    zarr = pytest.importorskip("zarr")
-    array = zarr.open_group(complete, mode="r")["result"]
-    outcomes = array.attrs["outcomes"]
-    assert array.shape == (len(outcomes), 3, 2, 2, 1300)
-    for k, name in enumerate(outcomes):
-        np.testing.assert_array_equal(array[k], reference[name].values.astype(float))
-
-
-@pytest.mark.cases(fast=1)
-@pytest.mark.parametrize("how", ["two threads", "processes", "reversed order"])
+@pytest.mark.cases(fast=2)
+@pytest.mark.parametrize("how", ["two threads", "processes", "reversed order", "parts"])
 def test_whoever_computes_it_the_store_is_the_same_to_the_byte(complete, tmp_path, how, monkeypatch):
     study = made(tmp_path)
     if how == "two threads":
@@ -145,9 +135,14 @@ def test_whoever_computes_it_the_store_is_the_same_to_the_byte(complete, tmp_pat
     elif how == "processes":
         with ProcessPoolExecutor(2) as pool:
             study.run(executor=pool)
+    elif how == "parts":
+        counts = [study.run(part=part, threads=1).units for part in ("3/5", "1/5", "2/5", "5/5", "4/5")]
+        assert sum(counts) == study.status.units == 36 and max(counts) - min(counts) <= 1
+        assert study.run().units == 0
+        assert len(study.status.runs) == 12
     else:
-        keys = list(study._store.missing())
-        monkeypatch.setattr(type(study._store), "missing", lambda self: iter(keys[::-1]))
+        keys = list(study._store.grid)
+        monkeypatch.setattr(UnitGrid, "__iter__", lambda self: iter(keys[::-1]))
         study.run(threads=1)
     assert digest(tmp_path) == digest(complete)
 
@@ -202,107 +197,98 @@ def test_a_hundred_kills(complete, tmp_path):
         assert digest(folder) == digest(complete)
 
 
-def test_the_first_signal_finishes_what_is_in_hand(tmp_path, monkeypatch):
+def after_the_first_unit(monkeypatch, study, action):
+    """Do something each time that a unit is stored."""
+    put = study._store.put
+    monkeypatch.setattr(study._store, "put", lambda key, data: (put(key, data), action()))
+
+
+def test_sigterm_finishes_the_units_in_hand(complete, tmp_path, monkeypatch):
     study = made(tmp_path)
-    put = study._store.put
-
-    def put_and_ask(key, data):
-        put(key, data)
-        if study.status.done == 1:
-            signal.raise_signal(signal.SIGTERM)
-
     with monkeypatch.context() as patched:
-        patched.setattr(study._store, "put", put_and_ask)
-        study.run(threads=1)
-    last = study.status.runs[-1]
-    assert (last["event"], last["stopped"]) == ("end", True)
-    assert 1 <= study.status.done == last["units"] <= 3
-
-
-@pytest.mark.thorough
-@pytest.mark.skipif(os.name == "nt", reason="signals are sent the POSIX way")
-def test_a_signal_of_another_process_finishes_what_is_in_hand(tmp_path):
-    with subprocess.Popen(
-        [sys.executable, "-c", SCRIPT + "print(study.status.runs[-1]['event'])", str(tmp_path), "1"],
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as process:
-        while not [*(tmp_path / "result").glob("c.*")]:  # once a unit is there, signals are taken note of
-            assert process.poll() is None
-            time.sleep(0.001)
-        process.send_signal(signal.SIGTERM)
-        assert process.stdout.read().splitlines() == ["ready", "end"]
-        assert process.wait() == 0
-
-
-class Interrupted(Exception):
-    """Stands for a second signal."""
-
-
-def test_the_second_signal_stops_in_the_middle_of_a_unit(complete, tmp_path, monkeypatch):
-    study, numbers, stopped = made(tmp_path), itertools.count(), []
-
-    def compute(work, cancelled):
-        number, late = next(numbers), time.monotonic() + 30.0
-        while number and not cancelled.asked and time.monotonic() < late:
-            time.sleep(0.001)
-        stopped.append(cancelled.asked)
-        return units.compute(work)
-
-    put = study._store.put
-
-    def put_and_stop(key, data):
-        put(key, data)
-        raise Interrupted
-
-    with monkeypatch.context() as patched:
-        patched.setattr("rocking.studies.run.compute", compute)
-        patched.setattr(study._store, "put", put_and_stop)
-        with pytest.raises(Interrupted):
-            study.run(threads=2)
-    assert stopped.count(False) == 1  # the unit that is stored
-    assert len(stopped) == next(numbers) > 1
-    assert study.status.done == 1
+        after_the_first_unit(patched, study, lambda: signal.raise_signal(signal.SIGTERM))
+        report = study.run(threads=1)
+    assert report.stopped and 1 <= report.units == study.status.done <= 3
+    assert "stopped, go on with another run" in str(report)
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
     study.run()
     assert digest(tmp_path) == digest(complete)
 
 
-def test_the_first_signal_is_taken_note_of_and_the_second_raises():
-    stop = Stop()
-    with stop.listening():
-        signal.raise_signal(signal.SIGINT)
-        assert stop.asked
-        with pytest.raises(KeyboardInterrupt):
-            signal.raise_signal(signal.SIGTERM)
-
-
 @pytest.mark.thorough
-@pytest.mark.skipif(os.name == "nt", reason="a pseudo-terminal is POSIX")
-def test_a_run_shows_its_rate_and_others_are_told_of_it(tmp_path):
-    motion = rocking.records.load("el-centro-meloland-270")
-    blocks = rocking.Blocks(p=np.linspace(1.0, 6.0, 2048), alpha=0.2, restitution=0.7)
-    study = rocking.study(tmp_path, blocks, motion, levels=np.linspace(2.0, 8.0, 200), measure="pga", unit_blocks=1024)
-    terminal, inner = os.openpty()
-    os.set_inheritable(inner, True)
-    command = [sys.executable, "-c", "from rocking.cli import main; main()", "study", "run", tmp_path, "--threads", "1"]
-    shown = bytearray()
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=inner, text=True) as process:
-        while b"left" not in shown:
-            shown += os.read(terminal, 4096)
-        status = study.status
-        process.send_signal(signal.SIGINT)
-        reader = threading.Thread(target=lambda: os.read(terminal, 1 << 20), daemon=True)
-        reader.start()
-        out = process.communicate(timeout=60)[0]
-    os.close(inner)
-    assert re.search(rb"simulations.*\d+/409600.*/s \d:\d\d:\d\d left", shown)
-    assert status.running.holder == f"process {process.pid} on {socket.gethostname()}"
-    assert status.running.rate > 0.0
-    assert 0.0 < status.running.seconds_left * status.running.rate < 409_600.0
-    assert f"being run by process {process.pid}" in str(status)
-    assert process.returncode == 130
-    assert "stopped, go on with another run" in out
-    assert study.status.running is None
+@pytest.mark.skipif(os.name == "nt", reason="signals are sent the POSIX way")
+def test_sigterm_of_another_process_finishes_the_units_in_hand(tmp_path):
+    with subprocess.Popen(
+        [sys.executable, "-c", SCRIPT, str(tmp_path), "1"], stdout=subprocess.PIPE, text=True
+    ) as process:
+        while not [*(tmp_path / "result").glob("c.*")]:
+            assert process.poll() is None
+            time.sleep(0.001)
+        process.send_signal(signal.SIGTERM)
+        assert process.stdout.read().splitlines() == ["ready", "True"]
+        assert process.wait() == 0
+    assert rocking.study(tmp_path).status.runs[-1]["stopped"]
+
+
+def test_ctrl_c_stops_in_the_middle_of_a_unit(complete, tmp_path, monkeypatch):
+    study, numbers, stopped = made(tmp_path), itertools.count(), []
+
+    def compute(work, cancelled):
+        if next(numbers):
+            cancelled.wait(30.0)
+        stopped.append(cancelled.is_set())
+        return units.compute(work)
+
+    with monkeypatch.context() as patched:
+        patched.setattr("rocking.studies.run.compute", compute)
+        after_the_first_unit(patched, study, lambda: signal.raise_signal(signal.SIGINT))
+        with pytest.raises(KeyboardInterrupt):
+            study.run(threads=2)
+    assert stopped.count(False) == 1  # the unit that is stored
+    assert len(stopped) == next(numbers) > 1
+    assert study.status.done == 1 and study.status.runs[-1]["error"] == "KeyboardInterrupt"
+    study.run()
+    assert digest(tmp_path) == digest(complete)
+
+
+def test_a_study_that_is_being_run_says_who_runs_it_and_how_fast(tmp_path, monkeypatch):
+    study, seen = made(tmp_path), []
+    with monkeypatch.context() as patched:
+        after_the_first_unit(patched, study, lambda: seen.append(rocking.study(tmp_path).status))
+        study.run(threads=1, part="1/2")
+    for status in seen[:-1]:
+        running = status.running
+        assert running.holder == folders.this_process()
+        assert running.rate > 0.0
+        assert 0.0 < running.seconds_left * running.rate < status.simulations
+        assert f"being run by process {os.getpid()} on" in str(status)
+    assert len(seen) == 18 and study.status.running is None
+
+
+class Broken(ThreadPoolExecutor):
+    """Workers that are gone after a few units."""
+
+    left = 4
+
+    def submit(self, function, /, *arguments):
+        self.left -= 1
+        if self.left >= 0:
+            return super().submit(function, *arguments)
+        lost = Future()
+        lost.set_exception(BrokenExecutor("a process ended abruptly"))
+        return lost
+
+
+def test_workers_that_are_gone_end_the_run_and_another_one_goes_on(complete, tmp_path):
+    study = made(tmp_path)
+    with (
+        Broken(1) as pool,
+        pytest.raises(rocking.StudyError, match="the workers are gone: a process ended abruptly; what"),
+    ):
+        study.run(executor=pool)
+    assert study.status.done <= 4
+    study.run()
+    assert digest(tmp_path) == digest(complete)
 
 
 def test_units_that_failed_are_told_while_it_runs_and_forgotten_by_the_next_run(complete, tmp_path, monkeypatch):
@@ -358,10 +344,10 @@ def test_a_write_that_fails_is_one_sentence_and_leaves_nothing_half_visible(
             failing = Failing(Path.rename, n, code)
             patched.setattr(Path, "replace", lambda self, target: failing(self, target))
         elif call == "write":
-            failing = Failing(places._written, n, code)
-            patched.setattr(places, "_written", failing)
+            failing = Failing(folders._written, n, code)
+            patched.setattr(folders, "_written", failing)
         else:
-            patched.setattr(places.os, call, Failing(getattr(os, call), n, code))
+            patched.setattr(folders.os, call, Failing(getattr(os, call), n, code))
         try:
             small(tmp_path).run(threads=1)
         except rocking.RockingError as error:
@@ -410,9 +396,9 @@ def test_a_damaged_unit_is_named_and_computed_again_on_request(complete, tmp_pat
     assert path.read_bytes() == sound
 
 
-@pytest.mark.parametrize("name", ["zarr.json", "result/zarr.json", "runs.jsonl"])
+@pytest.mark.parametrize("name", ["zarr.json", "result/zarr.json"])
 @pytest.mark.parametrize("kept", ["nothing", "half", "gone"])
-def test_verify_sees_what_describes_a_study_cut_or_emptied_and_corrects_it(complete, tmp_path, name, kept):
+def test_verify_sees_damage_to_the_description_of_the_array_and_a_run_writes_it_anew(complete, tmp_path, name, kept):
     shutil.copytree(complete, tmp_path, dirs_exist_ok=True)
     path = tmp_path / name
     sound = path.read_bytes()
@@ -424,30 +410,9 @@ def test_verify_sees_what_describes_a_study_cut_or_emptied_and_corrects_it(compl
     (fault,) = study.verify()
     assert fault.startswith(f"{name} is damaged")
     assert study.status.complete  # the results do not depend on it
-    assert study.verify(repair=True) == [fault]
-    assert study.verify() == rocking.study(tmp_path).verify() == []
-    if name == "runs.jsonl":
-        assert study.status.runs[-1]["event"] == "repaired"
-    else:
-        assert path.read_bytes() == sound
-
-
-def test_verify_sees_a_log_that_ends_before_the_last_run(tmp_path):
-    study = made(tmp_path)
     study.run()
-    log = tmp_path / "runs.jsonl"
-    first = log.read_bytes()
-    assert len(first.splitlines()) == 2
-    (tmp_path / "result" / name_of(next(iter(study._store.grid)))).unlink()
-    study.run()
-    whole = log.read_bytes()
     assert study.verify() == []
-    entries = [json.loads(line) for line in first.splitlines()]
-    entries[-1]["done"] -= 1  # as if the first run had left a unit
-    log.write_text("".join(json.dumps(entry) + "\n" for entry in entries))
-    assert study.verify() == ["runs.jsonl is damaged: it ends before the last run"]
-    log.write_bytes(whole + b"3\n")
-    assert study.verify() == ["runs.jsonl is damaged: 1 line of it cannot be read whole"]
+    assert path.read_bytes() == sound
 
 
 def test_a_line_of_the_log_that_a_crash_has_cut_takes_no_other_with_it(tmp_path):
@@ -465,7 +430,7 @@ def test_a_study_that_may_not_be_written_to_can_be_opened(tmp_path, monkeypatch)
     def refuse(*_):
         raise AssertionError("nothing is written when a study is opened")
 
-    monkeypatch.setattr(places.Folder, "put", refuse)
+    monkeypatch.setattr(folders.Folder, "put", refuse)
     assert rocking.study(tmp_path).results().peak_rotation.load().size
 
 
@@ -523,29 +488,6 @@ def test_a_unit_that_goes_while_it_is_read_is_no_zero(complete, tmp_path):
         results.load()
 
 
-def test_two_runs_at_once_are_refused(tmp_path):
-    study = made(tmp_path)
-    with study._store.place.locked(), pytest.raises(rocking.StudyError, match=f"process {os.getpid()} on"):
-        study.run()
-    assert not study.run().failed
-
-
-def test_a_lock_that_was_left_behind_is_taken_over_and_noted(tmp_path):
-    study = made(tmp_path)
-    (tmp_path / "lock").write_text("process 1 on elsewhere")
-    study.run()
-    assert "process 1 on elsewhere" in study.status.runs[0]["note"]
-
-
-def test_who_asks_for_the_holder_reads_beyond_the_byte_that_windows_locks(tmp_path):
-    place = made(tmp_path)._store.place
-    assert place.holder() == ""
-    with place.locked():
-        assert (tmp_path / "lock").read_bytes() == f" {places.this_process()}".encode()
-        assert place.holder() == places.this_process()
-    assert place.holder() == ""
-
-
 @pytest.mark.parametrize(
     ("changes", "part"),
     [
@@ -582,44 +524,12 @@ def test_another_version_or_other_kernels_may_read_a_study_but_not_go_on_with_it
     assert study.verify() == []
 
 
-class Dying(ThreadPoolExecutor):
-    """Workers of which the first few lose their task."""
-
-    def __init__(self, deaths):
-        super().__init__(1)
-        self.deaths = deaths
-
-    def submit(self, function, /, *arguments):
-        if self.deaths:
-            self.deaths -= 1
-            lost = Future()
-            lost.set_exception(ConnectionError("the worker is gone"))
-            return lost
-        return super().submit(function, *arguments)
-
-
 @pytest.mark.parametrize("executor", [3, "tcp://127.0.0.1:8786", ProcessPoolExecutor])
 def test_what_is_no_executor_is_refused_before_a_unit(tmp_path, executor):
     study = made(tmp_path)
     with pytest.raises(rocking.InvalidOption, match=r"^executor must be a concurrent.futures.Executor or a client of"):
         study.run(executor=executor)
     assert study.status.done == 0
-
-
-def test_a_unit_whose_worker_dies_is_tried_again(complete, tmp_path):
-    with Dying(4) as pool:
-        report = made(tmp_path).run(executor=pool)
-    assert not report.failed
-    assert digest(tmp_path) == digest(complete)
-
-
-def test_a_unit_that_kills_every_worker_is_reported_and_left(tmp_path):
-    with Dying(10**6) as pool:
-        report = made(tmp_path).run(executor=pool)
-    assert report.units == 0
-    assert len(report.failed) == len(UnitGrid((3, 2, 2, 1300), (1, 1, 1, 512), OUTCOMES))
-    assert "died 4 times" in next(iter(report.failed.values()))
-    assert "failed" in str(rocking.study(tmp_path).status)
 
 
 COLUMNS = [
@@ -692,46 +602,13 @@ def test_a_study_is_exported_to_parquet_or_says_what_is_missing(complete, tmp_pa
         study.to_parquet(tmp_path / "other.parquet")
 
 
-def test_names_of_units_are_their_keys():
-    for key in UnitGrid((2, 3, 1, 5000), (1, 2, 1, 512), OUTCOMES):
-        assert key_of(name_of(key)) == key
-    grid = UnitGrid((2, 3, 1, 5000), (1, 2, 1, 512), OUTCOMES)
-    for name in ("zarr.json", "c.0.1.2.3", "c.1.0.0.0.0", "c.0.a.0.0.0", "c.0.0.2.0.0", "c.0.0.0.0.0.0", "c.0."):
-        assert key_of(name) not in grid
-
-
-@pytest.mark.thorough
-def test_however_many_units_there_are_a_study_opens_alike_and_lists_its_folder_once(tmp_path, monkeypatch):
-    """What it asks of its place is counted; `stress/cost.py` measures how long it takes."""
-    asked = []
-    for name in ("get", "names"):
-        call = getattr(places.Folder, name)
-        monkeypatch.setattr(
-            places.Folder,
-            name,
-            lambda place, what, name=name, call=call: asked.append((name, what)) or call(place, what),
-        )
-    opening = []
-    for scales in (4, 1000):
-        folder = tmp_path / str(scales)
-        blocks = rocking.Blocks(p=np.linspace(1.0, 6.0, 1000), alpha=0.2, restitution=0.7)
-        made = rocking.study(folder, blocks, MOTIONS[0], levels=np.linspace(1.0, 2.0, scales), unit_blocks=512)
-        for key in made._store.grid:
-            (folder / "result" / name_of(key)).touch()
-        asked.clear()
-        study = rocking.study(folder)
-        opening.append([*asked])
-        asked.clear()
-        assert len(study._store.done()) == 2 * scales
-        assert asked == [("names", "result")]
-    assert opening[0] == opening[1] and not any("c.0" in what for _, what in opening[0])
-
-
-def test_a_unit_that_is_gone_is_named_and_so_is_what_to_do(tmp_path):
-    blocks = rocking.Blocks(p=np.linspace(1.0, 6.0, 600), alpha=0.2, restitution=0.7)
-    study = rocking.study(tmp_path, blocks, MOTIONS[0], levels=[1.0], unit_blocks=512)
-    with pytest.raises(rocking.StudyError, match="is gone: run the study again"):
-        study._store.present((0, 0, 0, 1))
+def test_units_have_names_of_their_own_and_other_files_are_none(tmp_path):
+    study = made(tmp_path)
+    names = [name_of(key) for key in study._store.grid]
+    assert len({*names}) == len(study._store.grid) == 36 and names[-1] == "c.0.2.1.1.2"
+    for name in ("c.0.1.2.3", "c.1.0.0.0.0", "c.0.a.0.0.0", "c.0.0.2.0.0", "c.0.0.0.0.0.0", "c.0."):
+        (tmp_path / "result" / name).touch()
+    assert study.status.done == 0
 
 
 def test_the_bytes_of_a_unit_are_the_same_whenever_it_is_encoded(monkeypatch):
@@ -776,7 +653,6 @@ def test_what_would_be_ignored_of_a_study_that_is_there_is_refused(tmp_path):
             rocking.study(tmp_path / "one", **given)
     with pytest.raises(rocking.errors.InvalidOption, match="duration, outcomes belong to"):
         rocking.study(tmp_path / "one", duration=3.0, outcomes=["rests"])
-    assert rocking.study(tmp_path / "one", refine=1e-2).status.refinement is not None
 
 
 @pytest.mark.parametrize("folder", [5, None])

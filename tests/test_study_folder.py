@@ -1,0 +1,150 @@
+"""The folder of a study: what it does so that a file is whole or not there, and who may run the study at a time."""
+
+import os
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import rocking
+from rocking.errors import InvalidOption, StudyError
+from rocking.studies.folder import Folder, this_process
+from rocking.studies.store import Store, exists, require_free
+
+
+@pytest.mark.skipif(os.name == "nt", reason="folders cannot be flushed there")
+def test_a_file_is_on_the_disk_before_it_has_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    done: list[str | int] = []
+    fsync, replace = os.fsync, Path.replace
+
+    def flush(handle: int) -> None:
+        # What a file's buffer still holds is not on the disk: the size counts, and not the call alone.
+        about = os.fstat(handle)
+        done.append("folder" if stat.S_ISDIR(about.st_mode) else about.st_size)
+        fsync(handle)
+
+    def name(path: Path, target: Path) -> Path:
+        done.append("name")
+        return replace(path, target)
+
+    monkeypatch.setattr(os, "fsync", flush)
+    monkeypatch.setattr(Path, "replace", name)
+    Folder(tmp_path).put("c.0.1", b"outcomes")
+    assert done == [len(b"outcomes"), "name", "folder"]
+    assert (tmp_path / "c.0.1").read_bytes() == b"outcomes"
+
+
+@pytest.mark.parametrize("when", ["fsync", "replace"])
+def test_an_interrupt_leaves_no_part_of_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, when: str) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(*((os, "fsync") if when == "fsync" else (Path, "replace")), interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        Folder(tmp_path).put("c.0.1", b"outcomes")
+    assert not [*tmp_path.iterdir()]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="there the folder decides who may read its files")
+@pytest.mark.parametrize(("umask", "mode"), [(0o022, 0o644), (0o002, 0o664), (0o077, 0o600)])
+def test_the_umask_decides_who_may_read_a_study(tmp_path: Path, umask: int, mode: int) -> None:
+    before = os.umask(umask)
+    try:
+        Folder(tmp_path).put("c.0.1", b"outcomes")
+        with Folder(tmp_path).locked():
+            pass
+    finally:
+        os.umask(before)
+    assert [stat.S_IMODE((tmp_path / name).stat().st_mode) for name in ("c.0.1", "lock")] == [mode, mode]
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "together"),
+    [
+        ("lock", "lock", False),
+        ("lock", "lock.1-3", False),
+        ("lock.1-3", "lock", False),
+        ("lock.1-3", "lock.1-3", False),
+        ("lock.1-3", "lock.2-3", True),
+    ],
+)
+def test_one_process_runs_a_study_or_several_run_parts_of_it(
+    tmp_path: Path, one: str, other: str, together: bool
+) -> None:
+    first, second = Folder(tmp_path), Folder(tmp_path)
+    told = rf"run by process {os.getpid()} on .*; wait for it, or end it there"
+    for _ in range(2):  # a lock that was given back locks nothing
+        with first.locked(one):
+            assert second.holders() == {one: this_process()}
+            if together:
+                with second.locked(other):
+                    assert first.holders() == dict.fromkeys((one, other), this_process())
+            else:
+                with pytest.raises(StudyError, match=told), second.locked(other):
+                    pass
+        assert first.holders() == {}
+
+
+def test_a_lock_goes_with_its_process_and_the_next_run_removes_half_written_files(tmp_path: Path) -> None:
+    program = (
+        "import sys, time\nfrom rocking.studies.folder import Folder\n"
+        "with Folder(sys.argv[1]).locked(sys.argv[2]):\n    print('locked', flush=True)\n    time.sleep(600)\n"
+    )
+    (tmp_path / "result").mkdir()
+    part = tmp_path / "result" / ".abc.part"
+    for lock in ("lock", "lock.1-3"):
+        part.write_bytes(b"half")
+        with subprocess.Popen([sys.executable, "-c", program, tmp_path, lock], stdout=subprocess.PIPE) as process:
+            assert process.stdout is not None and process.stdout.readline() == b"locked\n"
+            with pytest.raises(StudyError, match=f"run by process {process.pid} on"), Folder(tmp_path).locked():
+                pass
+            assert part.exists() == (lock != "lock")  # others may be writing beside a part
+            process.kill()
+        with Folder(tmp_path).locked("lock.1-3"):
+            assert part.exists() == (lock != "lock")
+        with Folder(tmp_path).locked():
+            assert not part.exists()
+
+
+def test_an_error_while_a_lock_is_held_is_its_own(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError), Folder(tmp_path).locked():
+        raise FileNotFoundError
+
+
+def test_a_file_with_the_same_content_is_not_written_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder, written = Folder(tmp_path), []
+    put = Folder.put
+    monkeypatch.setattr(Folder, "put", lambda folder, name, data: written.append(data) or put(folder, name, data))
+    for data in (b"one", b"one", b"two"):
+        folder.keep("study.json", data)
+        assert folder.get("study.json") == data
+    assert written == [b"one", b"two"]
+
+
+def test_where_there_is_no_study_none_is_opened(tmp_path: Path) -> None:
+    assert not exists(Folder(tmp_path))
+    with pytest.raises(StudyError, match="there is no study here: create it first"):
+        Store.open(Folder(tmp_path))
+    with pytest.raises(StudyError, match="this is a URL, and a study is kept in a folder"):
+        Folder("s3://bucket/museum")
+
+
+@pytest.mark.parametrize(
+    ("names", "listed"), [(("b", "a"), "but a, b: name"), (("d", "c", "b", "a"), "but a, b, c and more: name")]
+)
+def test_a_folder_of_other_files_is_no_place_for_a_study(tmp_path: Path, names: tuple[str, ...], listed: str) -> None:
+    require_free(Folder(tmp_path))
+    for name in names:
+        (tmp_path / name).touch()
+    with pytest.raises(StudyError, match=listed):
+        require_free(Folder(tmp_path))
+
+
+@pytest.mark.parametrize("part", ["0/3", "4/3", "1", "1/", "/3", "a/b", "-1/3", "1/0", "1.5/3", 3])
+def test_a_part_that_is_none_is_refused(tmp_path: Path, part: str) -> None:
+    motion, blocks = rocking.pulses.one_sine(4.0, 1.0), rocking.Blocks([1.0, 2.0], 0.2, 0.9)
+    study = rocking.study(tmp_path, blocks, motion, unit_blocks=512)
+    with pytest.raises(InvalidOption, match="part must be the number of a share"):
+        study.run(part=part)
