@@ -188,6 +188,7 @@ def test_blocks_come_from_a_table_as_well(tmp_path, file):
         ("frequency = [0.5, 1.0]", "frequency = -2", 12, "frequency must be a positive number"),
         ('amplitude = ["0.3g", "0.5g"]', 'amplitude = "0.3h"', 11, "acceleration"),
         ("factor = [0.5, 1.0]", "factor = []", 15, "factor"),
+        ("factor = [0.5, 1.0]", "refine = 1e-3", 15, r"\[scales\] has no refine; there are factor, pga, pgv, sa, "),
         ("factor = [0.5, 1.0]", "factor = 1\npga = 2", 15, "one measure only"),
         ("factor = [0.5, 1.0]", "sa = 2", 15, "sa needs period"),
         ("factor = [0.5, 1.0]", 'sa = 2\nperiod = "long"', 16, "period must be a positive number"),
@@ -248,7 +249,6 @@ def test_the_commands_go_from_a_file_to_results(run, file, tmp_path):
         "simulations": 200,
         "failed": {},
         "running": None,
-        "refinement": None,
     }
     assert "20 units are sound" in run("study", "verify", folder, "--recompute", 2)[1]
     lost = max((folder / "result").glob("c.*"))
@@ -279,10 +279,12 @@ def test_the_commands_go_from_a_file_to_results(run, file, tmp_path):
     assert "verify(" not in out + err
     assert "1 fault repaired" in run("study", "verify", folder, "--repair")[1]
     (folder / "records.json").write_text("{}")
-    code, out, _ = run("study", "verify", folder)
+    code, out, err = run("study", "verify", folder, "--repair")
     assert code == 2 and "records.json" in out and "is damaged: create the study again from its file" in out
+    assert "1 fault cannot be repaired" in err and "repaired" not in out.splitlines()[-1]
     assert run("study", "create", file, folder)[0] == 0
     assert run("study", "verify", folder)[0] == 0
+    assert run("study", "verify", folder, "--recompute", "-1")[0] == 2
 
 
 def test_a_study_names_its_records_as_its_file_does(file, tmp_path):
@@ -600,25 +602,10 @@ def test_units_of_a_study_that_is_there_are_not_changed_without_a_word(run, file
     assert "in units of 512 blocks: leave --unit-blocks out" in err
 
 
-def test_only_what_was_repaired_counts_as_repaired(run, file, tmp_path):
-    made = tmp_path / "made"
-    assert run("study", "run", file, made)[0] == 0
-    (made / "records.json").write_text("{}")
-    code, out, err = run("study", "verify", made, "--repair")
-    assert code == 2
-    assert "1 fault cannot be repaired" in err
-    assert "repaired" not in out.splitlines()[-1]
-    assert run("study", "verify", made, "--recompute", "-1")[0] == 2
-
-
 @pytest.mark.thorough
 def test_scales_of_changes_and_tables_of_reports_say_what_they_are(run, file, tmp_path, undrawn):
-    text = (
-        TEXT.replace("1:6:5", "1:6:2")
-        .replace("[motions]", '[motions]\nvertical = "el-centro-meloland-up"')
-        .replace("factor = [0.5, 1.0]", "")
-    )
-    text = text.replace("[scales]", "[scales]\npga = [1.0, 3.0, 9.0]\nrefine = 0.2")
+    text = TEXT.replace("1:6:5", "1:6:2").replace("[motions]", '[motions]\nvertical = "el-centro-meloland-up"')
+    text = text.replace("factor = [0.5, 1.0]", "pga = [1.0, 3.0, 9.0]")
     file.write_text(text + "\n[report.spectrum]\nfractiles = [0.5]\n")
     made = tmp_path / "made"
     assert run("study", "run", file, made)[0] == 0
@@ -628,3 +615,19 @@ def test_scales_of_changes_and_tables_of_reports_say_what_they_are(run, file, tm
     assert verticals == {"el-centro-meloland-up"}
     assert run("study", "report", made)[0] == 0
     assert "pga_m_s2" in (made / "report" / "spectrum.csv").read_text().splitlines()[0].split(",")
+
+
+@pytest.mark.parametrize("option", [["--workers", "2"], ["--part", "4/3"], ["--part"]])
+def test_options_of_a_run_that_are_none_are_one_line(run, file, tmp_path, option):
+    code, out, err = run("study", "run", file, tmp_path / "made", *option)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert option[0] in err
+
+
+def test_parts_of_a_study_are_run_by_commands_of_their_own_and_a_last_one_completes_it(run, file, tmp_path):
+    made = tmp_path / "made"
+    assert run("study", "create", file, made, "--unit-blocks", 512)[0] == 0
+    for part, done in (("2/3", 7), ("3/3", 13)):
+        assert f"{made}: {done} of 20 units done" in run("study", "run", made, "--part", part)[1]
+    assert "20 of 20 units done" in run("study", "run", made)[1]
+    assert run("study", "run", made, "--part", "1/3")[1].startswith("0 units, 0 simulations in ")
