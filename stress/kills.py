@@ -17,8 +17,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
-from concurrent.futures import Executor
+from collections.abc import Callable
 from pathlib import Path
 from unittest.mock import patch
 
@@ -26,7 +25,8 @@ import distributed  # noqa: F401 - imported once, and not by every process that 
 import numpy as np
 from common import digest, made, units
 
-from rocking.studies.run import scheduler_executor
+from rocking.studies.run import scheduler_client
+from rocking.studies.units import UnitGrid
 
 HERE = ("--host", "127.0.0.1", "--dashboard-address", "127.0.0.1:0")
 ORDERS = ("as it is", "reversed")
@@ -70,23 +70,15 @@ class Cluster:
         return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
-@contextlib.contextmanager
-def executor(cluster: Cluster, kind: str) -> Iterator[Executor | None]:
-    """Give the executor of the cluster; none for threads."""
-    if kind == "threads":
-        yield None
-        return
-    with scheduler_executor(json.loads(cluster.file.read_text())["address"]) as pool:
-        yield pool
-
-
 def run(folder: Path, cluster: Cluster, kind: str, count: int, order: str) -> None:
     """Run the study as the setting says."""
     study = made(folder)
-    keys = list(study._store.missing())
+    keys = list(study._store.grid)
     ordered = keys[::-1] if order == "reversed" else keys
-    with executor(cluster, kind) as pool, patch.object(study._store, "missing", lambda: iter(ordered)):
-        study.run(threads=count if kind == "threads" else None, executor=pool)
+    address = json.loads(cluster.file.read_text())["address"]
+    client = contextlib.nullcontext() if kind == "threads" else scheduler_client(address)
+    with client as executor, patch.object(UnitGrid, "__iter__", lambda grid: iter(ordered)):
+        study.run(threads=count if kind == "threads" else None, executor=executor)
 
 
 def forked(action: Callable[[], None]) -> int:

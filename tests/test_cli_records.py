@@ -3,9 +3,7 @@
 import importlib
 import io
 import json
-import os
 import re
-import subprocess
 import sys
 from pathlib import Path
 

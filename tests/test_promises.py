@@ -1,15 +1,13 @@
 """The promises of docs/reliability.md at a small size, and the program that runs them."""
 
 import itertools
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from oracles import leapfrog, multiprecision
 from oracles.problem import Problem, linear_record
-from promises import chattering, containment, cross_code, events, exact, interrupts, one_answer
-from promises.promise import Found
+from promises import chattering, containment, cross_code, events, exact, one_answer
 
 ROOT = Path(__file__).parents[1]
 
@@ -92,18 +90,3 @@ def test_the_closed_form_of_a_rest_is_the_sum_of_its_impacts():
     time, speed = next(itertools.islice(exact.impacts(sides, 0.3, 0.2, 1), 60, None))
     assert abs(exact.rest(sides, 0.3, 0.2, 1) - time) < 10.0 * speed
     assert abs(exact.rest(sides, 0.3, float(speed), 0) + time - exact.rest(sides, 0.3, 0.2, 1)) < 1e-30
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="processor time of another process is read as on Linux")
-@pytest.mark.thorough
-def test_a_fork_is_interrupted_as_a_process_is(tmp_path):
-    seconds, whole = interrupts.undisturbed("critical", forked=True)
-    assert whole
-    found = Found()
-    for share in (0.3, 0.6):
-        folder = tmp_path / str(share)
-        folder.mkdir()
-        one = interrupts.ended("critical", folder, share * seconds, forked=True)
-        interrupts._judge_end(found, "critical", one, folder / "out", whole)
-    assert not found.told
-    assert found.cases == 2

@@ -15,10 +15,8 @@ FOLDER = Path(__file__).parents[1] / "stress"
     ("program", "arguments", "says"),
     [
         ("kills.py", ["--kills", "20"], "studies with the one digest"),
-        ("faults.py", ["--most", "3"], "fsync ENOSPC only: 2 runs"),
         ("damage.py", ["--trials", "40"], "unit: reported by verify"),
         ("cost.py", ["--simulations", "20000", "--repeats", "1", "--units", "1000"], "1000 units: opened in"),
-        ("workers.py", ["--scales", "4", "--repeats", "1"], "two are"),
         ("walls.py", ["--pairs", "50"], "of processor time, seed 1"),
         ("museum.py", ["--motions", "12", "--blocks", "50"], "fragility of 50 blocks"),
     ],

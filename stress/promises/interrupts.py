@@ -1,8 +1,7 @@
-"""Ctrl-C at any moment of a long command: over at once, in one sentence, with nothing half-written.
+"""Ctrl-C at any moment of a long command: over within two seconds, with nothing half-written.
 
-The moment is a share of the processor time that the command takes undisturbed, so that it does not hang on how busy the
-machine is. Some commands are processes of their own, in which it may fall into the start of Python itself, the imports,
-the work or the end. Most are forks of a process that has imported and compiled everything: there the work is met.
+The moment is a share of the processor time that the command takes undisturbed, so that it does not depend on how busy
+the machine is. It may fall into the start of Python itself, the imports, the work or the end.
 """
 
 from __future__ import annotations
@@ -16,33 +15,23 @@ import tempfile
 import time
 from functools import cache
 from pathlib import Path
-from types import FrameType
-from typing import Any, Final, NamedTuple, cast
+from typing import Final, NamedTuple
 
-from promises.commands import ENDING_WITH_A_PART, LONG, arguments, called, faults, files
+from promises.commands import ENDING_WITH_A_PART, LONG, arguments, faults, files
 from promises.promise import Found, Promise
-from rocking.cli import main
 from rocking.errors import INTERRUPTED
 
-#: Interrupts of a part, all of one command: of processes of their own, and of forks. A command has two parts.
-PROCESSES: Final = 5
-FORKS: Final = 95
+#: Interrupts of a part, all of one command, which has two parts.
+INTERRUPTS: Final = 20
 
 #: Processor time after an interrupt at most, s; of a command that draws and writes what it has.
-LIMIT: Final = 1.0
+LIMIT: Final = 2.0
 _LIMIT_WITH_A_PART: Final = 5.0
 
 #: Longest a command may take in all, s: long enough for a busy machine.
 _PATIENCE: Final = 300.0
 
 _TICKS: Final = os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 100
-
-#: Status of a fork that was interrupted before or after the command, and of one that went on to its end all the same.
-_OUTSIDE: Final = 99
-_LOST: Final = 98
-
-#: Interrupts that were raised in a fork.
-_raised: list[int] = []
 
 
 class Ended(NamedTuple):
@@ -55,16 +44,15 @@ class Ended(NamedTuple):
     after: float
 
 
-def ended(name: str, folder: Path, moment: float | None, *, forked: bool = False) -> Ended:
+def ended(name: str, folder: Path, moment: float | None) -> Ended:
     """Run a command, and interrupt it once it has taken so many seconds of processor time."""
-    words = arguments(name, folder)
-    process = _forked(words, folder, moment) if forked else _started(words, folder)
-    at, deadline, number = moment or 0.0, time.monotonic() + _PATIENCE, 0
+    process = _started(arguments(name, folder), folder)
+    at, deadline, number = 0.0, time.monotonic() + _PATIENCE, 0
     while time.monotonic() < deadline:
         number, status, used = os.wait4(process, os.WNOHANG)
         if number:
             break
-        if moment is not None and not forked and (at := _spent(process)) >= moment:
+        if moment is not None and (at := _spent(process)) >= moment:
             os.kill(process, signal.SIGINT)
             moment = None
         time.sleep(0.002)
@@ -93,49 +81,6 @@ def _started(words: list[str], folder: Path) -> int:
     return process.pid
 
 
-def _interrupted(number: int, frame: FrameType | None) -> None:
-    """Call who listens as Ctrl-C does: with the place that is interrupted, and not one of ours."""
-    try:
-        cast(Any, signal.getsignal(signal.SIGINT))(signal.SIGINT, frame)
-    except KeyboardInterrupt:
-        _raised.append(number)
-        raise
-
-
-def _forked(words: list[str], folder: Path, moment: float | None) -> int:
-    """Start a fork, which interrupts itself; its number."""
-    sys.stdout.flush()
-    sys.stderr.flush()
-    process = os.fork()
-    if process:
-        return process
-    code: Any = _OUTSIDE
-    try:
-        for number, file in ((1, "out.txt"), (2, "err.txt")):
-            os.dup2(os.open(folder / file, os.O_WRONLY | os.O_CREAT), number)
-        # What a tool for tests has in their places is not ours to write to.
-        sys.stdout, sys.stderr = (os.fdopen(number, "w", closefd=False) for number in (1, 2))
-        os.chdir(folder)
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        signal.signal(signal.SIGPROF, _interrupted)
-        if moment is not None:
-            signal.setitimer(signal.ITIMER_PROF, max(moment, 1e-3))
-        main(words)
-        code = _LOST if _raised and words[0] not in ENDING_WITH_A_PART else 0
-    except SystemExit as stop:
-        code = int(stop.code or 0)
-    except KeyboardInterrupt:
-        code = _OUTSIDE
-    except BaseException as error:
-        code = 1
-        sys.stderr.write(f"Traceback: {type(error).__name__}: {error}\n")
-    finally:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(code)
-
-
 def _spent(process: int) -> float:
     """Processor time of a process so far, s."""
     fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
@@ -143,39 +88,27 @@ def _spent(process: int) -> float:
 
 
 @cache
-def undisturbed(name: str, *, forked: bool = False) -> tuple[float, dict[str, bytes]]:
-    """Processor time of a command that nothing disturbs, s, and its files; the first run compiles what it needs."""
+def undisturbed(name: str) -> tuple[float, dict[str, bytes]]:
+    """Processor time of a command that nothing disturbs, s, and its files."""
     with tempfile.TemporaryDirectory() as where:
-        first, second = (Path(where) / each for each in ("first", "second"))
-        first.mkdir()
-        second.mkdir()
-        if forked:
-            status, said = called(arguments(name, first))
-        else:
-            one = ended(name, first, None)
-            status, said = one.status, one.errors.decode()
-        one = ended(name, second, None, forked=forked)
-        if status != 0 or one.status != 0:
-            raise RuntimeError(f"{name}: {said[-500:]} {one.errors.decode()[-500:]}")
-        return one.seconds, files(second / "out")
+        one = ended(name, Path(where), None)
+        if one.status != 0:
+            raise RuntimeError(f"{name}: {one.errors.decode()[-500:]}")
+        return one.seconds, files(Path(where, "out"))
 
 
 def judge(part: int) -> Found:
     """Interrupt one command at several moments."""
     found, rng = Found(parts=1), random.Random(f"interrupts {part}")
     name = LONG[part % len(LONG)]
-    for forked, count in ((False, PROCESSES), (True, FORKS)):
-        seconds, whole = undisturbed(name, forked=forked)
-        for number in range(count):
-            # One in each stretch of the time, so that start and end are not left to chance.
-            moment = seconds * (number + rng.random()) / count
-            with tempfile.TemporaryDirectory() as where:
-                folder = Path(where)
-                one = ended(name, folder, moment, forked=forked)
-                what = f"{name}{' forked' * forked}, after {moment:.3f} s of {seconds:.3f} s"
-                _judge_end(found, what, one, folder / "out", whole)
-    if name in ENDING_WITH_A_PART and not found.notes["a part"]:
-        found.fail(f"{name}: no interrupt met what it computes, so that nothing is known of how it ends with a part")
+    seconds, whole = undisturbed(name)
+    for number in range(INTERRUPTS):
+        # One in each stretch of the time, so that start and end are not left to chance.
+        moment = seconds * (number + rng.random()) / INTERRUPTS
+        with tempfile.TemporaryDirectory() as where:
+            folder = Path(where)
+            one = ended(name, folder, moment)
+            _judge_end(found, f"{name}, after {moment:.3f} s of {seconds:.3f} s", one, folder / "out", whole)
     return found
 
 
@@ -192,7 +125,7 @@ def _judge_end(found: Found, what: str, one: Ended, folder: Path, whole: dict[st
     lines = [line for line in one.errors.splitlines() if not line.startswith(b"rocking: note:")]
     if one.status == 0 and not lines:
         found.notes["a part" if b"interrupted" in one.errors else "over before"] += 1
-    elif one.status in (-signal.SIGINT, _OUTSIDE):
+    elif one.status == -signal.SIGINT:
         found.notes["before the program"] += 1  # Python itself was starting, or leaving: what it says is its own
     elif one.status == 130 and len(lines) == 1 and lines[0] == INTERRUPTED.encode():
         found.notes["interrupted"] += 1

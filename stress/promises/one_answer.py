@@ -1,9 +1,9 @@
 """The same outcomes, bit for bit, however an ensemble is computed.
 
 An ensemble of many blocks under a record is computed with 1, 2 and 7 threads, in batches of several sizes, and in
-shuffled order; as a study in units of several sizes, and some also by workers of dask.distributed. For one ensemble
-kernels are compiled by numba in the process itself, and taken from the library of each level of the processor. Digests
-of all outcomes are compared, sorted as the blocks were given.
+shuffled order; as a study in units of several sizes, and some also by processes. For one ensemble kernels are compiled
+by numba in the process itself, and taken from the library of each level of the processor. Digests of all outcomes are
+compared, sorted as the blocks were given.
 """
 
 from __future__ import annotations
@@ -16,6 +16,8 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -23,12 +25,11 @@ import numpy as np
 import rocking
 from promises.promise import Found, Promise
 from rocking.kernels import library
-from rocking.studies.run import local_executor
 
 #: Blocks of an ensemble: three units of the smallest size of a study.
 BLOCKS = 1100
 
-#: Ensembles whose studies are run by workers, too, and the one for which kernels come from elsewhere, too.
+#: Ensembles whose studies are run by processes, too, and the one for which kernels come from elsewhere, too.
 BY_WORKERS, ELSEWHERE = (5, 15, 25), 7
 
 _PROGRAM = """
@@ -91,13 +92,13 @@ def rearranged(part: int, batch: int, *, shuffled: bool) -> str:
     return digest({name: values[np.argsort(order)] for name, values in whole.items()})
 
 
-def as_study(part: int, unit_blocks: int, workers: int = 0) -> str:
-    """Digest of the ensemble as a study, in units of so many blocks, by a thread or by workers of dask.distributed."""
+def as_study(part: int, unit_blocks: int, processes: int = 0) -> str:
+    """Digest of the ensemble as a study, in units of so many blocks, by a thread or by processes."""
     blocks, motion, model = drawn(part)
     with tempfile.TemporaryDirectory() as folder:
         made = rocking.study(folder, blocks, motion, model=model, unit_blocks=unit_blocks)  # type: ignore[arg-type]
-        if workers:
-            with local_executor(workers) as executor:
+        if processes:
+            with ProcessPoolExecutor(processes, get_context("spawn")) as executor:
                 made.run(executor=executor, progress=False)
         else:
             made.run(threads=1, progress=False)
@@ -153,7 +154,7 @@ def _answers(part: int) -> Iterator[tuple[str, str]]:
     for name, way in WAYS.items():
         yield name, way(part)
     if part in BY_WORKERS:
-        yield "a study by two workers", as_study(part, 512, workers=2)
+        yield "a study by two processes", as_study(part, 512, processes=2)
     if part == ELSEWHERE:
         yield from elsewhere(part)
 
