@@ -152,7 +152,7 @@ distclean: clean ## remove the environment, too
 # kernels change: the installation compiles them.
 .venv/.base .venv/.all: WHAT = -c constraints.txt -e ".$(EXTRAS)"
 .venv/.base: EXTRAS :=
-.venv/.all: EXTRAS := [formats,excel,explorer,browser,cluster,objects,parquet,mesh,test,lint,docs]
+.venv/.all: EXTRAS := [formats,excel,explorer,browser,cluster,parquet,mesh,test,lint,docs]
 .venv/.base .venv/.all: pyproject.toml constraints.txt $(SOURCES) | .venv/bin/uv
 	@echo "Installing rocking$(EXTRAS) into .venv (a minute or two the first time) ..."
 	@$(INSTALL)

@@ -29,7 +29,6 @@ USES = {
     "explorer": "import bokeh, uvicorn, rocking.explorer.launch, rocking.explorer.server",
     "browser": "import playwright.sync_api",
     "cluster": "import distributed, dask_jobqueue",
-    "objects": "import obstore.store",
     "parquet": "import pandas; pandas.DataFrame({'a': [1.0]}).to_parquet('table.parquet')",
     "mesh": "import rocking; rocking.Solid.from_mesh('statue')",
 }
