@@ -14,7 +14,7 @@ import pytest
 from rocking import threads
 from rocking.explorer import apart, background, launch
 from rocking.plot import canvas
-from rocking.studies import place
+from rocking.studies import folder
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCE = ROOT / "src" / "rocking"
@@ -39,7 +39,7 @@ WORDS = re.compile(rf"\bimport ({'|'.join(MODULES)})\b|\b({'|'.join(MODULES_WITH
 def test_every_place_that_depends_on_the_system_is_on_the_page() -> None:
     assert len(TEXTS) > 200
     places = {name for name, text in TEXTS.items() if WORDS.search(text)}
-    assert {"explorer/apart.py", "studies/place.py", "threads.py"} <= places
+    assert {"explorer/apart.py", "studies/folder.py", "threads.py"} <= places
     shown = {name for name in places if f"`{name}`" in PAGE or f"`{name.removesuffix('.py')}." in PAGE}
     assert places - shown == set()
 
@@ -154,21 +154,20 @@ def test_a_study_is_kept_where_folders_cannot_be_flushed(monkeypatch: pytest.Mon
     def refuse(*given: object) -> None:
         raise PermissionError(13, "Permission denied")
 
-    # Signal 0 would end the process, and folders cannot be opened.
-    monkeypatch.setattr(place, "os", _Windows(name="nt", kill=refuse, open=refuse))
-    kept = place.Folder(tmp_path / "study")
+    # Folders cannot be opened.
+    monkeypatch.setattr(folder, "os", _Windows(name="nt", open=refuse))
+    kept = folder.Folder(tmp_path / "study")
     kept.put("units/1", b"outcomes")
     assert kept.get("units/1") == b"outcomes"
     assert list(kept.names("units")) == ["1"]
-    assert place._is_alive(1)
     kept.append("log", "a line")
     assert (tmp_path / "study" / "log").read_bytes() == b"a line\n"
 
 
 def test_who_holds_a_lock_is_read_without_its_first_byte(tmp_path: Path) -> None:
-    kept = place.Folder(tmp_path / "study")
+    kept = folder.Folder(tmp_path / "study")
     with kept.locked():
         held = (tmp_path / "study" / "lock").read_bytes()
         assert held[:1] == b" "
-        assert held[1:].decode() == place.this_process()
-        assert kept.holder() == place.this_process()
+        assert held[1:].decode() == folder.this_process()
+        assert kept.holders() == {"lock": folder.this_process()}
