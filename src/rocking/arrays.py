@@ -1,5 +1,7 @@
 """Names for the arrays that the package passes about."""
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -34,3 +36,15 @@ def evenly(count: int, most: int) -> list[int]:
     ([0, 4, 8], [0, 1])
     """
     return sorted({round(k) for k in np.linspace(0, count - 1, min(count, most))})
+
+
+def ranges(count: int, size: int) -> Iterator[slice]:
+    """Yield ranges of at most a size that cover a number of things: for calls of kernels, which no interrupt ends.
+
+    Examples
+    --------
+    >>> list(ranges(5, 2))
+    [slice(0, 2, None), slice(2, 4, None), slice(4, 5, None)]
+    """
+    for start in range(0, count, size):
+        yield slice(start, min(start + size, count))

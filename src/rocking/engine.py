@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.arrays import Flags, Floats, Integers
+from rocking.arrays import Flags, Floats, Integers, ranges
 from rocking.block.single import ROTATION
 from rocking.body import Bodies
 from rocking.constants import Model
@@ -50,8 +50,10 @@ _BUDGET_OF_A_PIECE: Final = 4
 SLICE: Final = 50_000
 _FIRST_SLICE: Final = 5_000
 
-#: Bodies that go through a motion together: as many as the fastest cache holds.
+#: Bodies that go through a motion together: as many as the fastest cache holds, and fewer where the motion is so long
+#: that one call of a kernel would take more than half a second for all of its pieces.
 _TOGETHER: Final = 16 * WIDTH
+_PIECES: Final = 20_000_000
 
 #: Steps of all bodies of one task: enough to pay for the call, few enough to stop soon when interrupted.
 _TASK: Final = 8_000_000
@@ -130,8 +132,7 @@ def simulate_tasks(
 def parts_of(count: int, motion: Motion) -> Iterator[slice]:
     """Ranges of ``count`` bodies, each as large as a task should be."""
     size = _TOGETHER * max(1, _TASK // (_TOGETHER * len(motion.coefficients)))
-    for start in range(0, count, size):
-        yield slice(start, min(start + size, count))
+    yield from ranges(count, size)
 
 
 def simulate_each(
@@ -216,10 +217,11 @@ def _groups(ground: Ground, records: Records, motion: Motion, model: Model) -> I
             width <= lanes.LONGEST_STEP, _substeps(width, model, motion.vertical is not None), -1.0
         ).astype(np.int64)
     substeps[records["restrained"] | records["facing"]] = -1
+    size = min(_TOGETHER, max(1, _PIECES // (len(ground.pieces) * WIDTH)) * WIDTH)
     for count in np.unique(substeps):
         chosen = np.flatnonzero(substeps == count)
-        for start in range(0, len(chosen), _TOGETHER):
-            yield chosen[start : start + _TOGETHER], int(count)
+        for some in ranges(len(chosen), size):
+            yield chosen[some], int(count)
 
 
 def _substeps(width: Floats, model: Model, with_vertical: bool) -> Floats:

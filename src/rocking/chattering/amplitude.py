@@ -12,7 +12,7 @@ from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.arrays import Floats
+from rocking.arrays import Floats, ranges
 from rocking.bisection import bisected
 from rocking.block import Block
 from rocking.chattering.coefficients import COEFFICIENTS
@@ -24,7 +24,7 @@ from rocking.motion import pulses
 from rocking.progress import Progress
 from rocking.simulation import simulate
 from rocking.threads import in_threads
-from rocking.treatment import warn_outside_fit
+from rocking.treatment import CRITICAL_TOGETHER, warn_outside_fit
 
 #: Where the Chebyshev expansion holds.
 FREQUENCIES: Final = (0.4, 10.0)
@@ -103,7 +103,8 @@ def _exact(omega: Floats, eta: Floats) -> Floats:
     amplitudes = np.ones(omega.size)
     lossy = np.flatnonzero(eta < 1.0)
     found = np.zeros(lossy.size)
-    critical_amplitudes(omega[lossy], eta[lossy], found)
+    for some in ranges(lossy.size, CRITICAL_TOGETHER):
+        critical_amplitudes(omega[lossy[some]], eta[lossy[some]], found[some])
     amplitudes[lossy] = found
     return amplitudes
 

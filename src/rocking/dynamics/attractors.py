@@ -270,7 +270,7 @@ class Known:
         """
         setting, passing = self.strobe._setting(), made.copy()
         found, taken = np.empty(len(made), dtype=np.int64), np.empty(len(made), dtype=np.int64)
-        for part in parts_of(len(made)):
+        for part in parts_of(len(made), periods):
             settle(setting, new_scratch(), passing[part], periods, self.traps, found[part], taken[part])
         return np.append(self.owner, -1)[found]
 

@@ -87,7 +87,7 @@ class Grid:
         def settled(part: slice) -> None:
             settle(setting, state.new_scratch(), made[part], self.periods, traps, found[part], taken[part])
 
-        for _ in in_threads(settled, parts_of(len(cells)), threads=self.threads):
+        for _ in in_threads(settled, parts_of(len(cells), self.periods), threads=self.threads):
             pass
         outcome = np.full(len(cells), _UNSETTLED)
         inside = found >= 0

@@ -220,7 +220,7 @@ class StroboscopicMap(Repeated):
         def follow(part: slice) -> None:
             iterate(setting, state.new_scratch(), made[part], periods, rows[part], impacts[part])
 
-        for _ in in_threads(follow, parts_of(len(made)), threads=cores()):
+        for _ in in_threads(follow, parts_of(len(made), periods), threads=cores()):
             pass
 
     def _differentiate(self, made: state.Records) -> Floats:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.arrays import Floats, Integers
+from rocking.arrays import Floats, Integers, ranges
 from rocking.block.sides import in_line
 from rocking.body import Body
 from rocking.constants import Model
@@ -31,6 +31,9 @@ _BEYOND_ALL: Final = 1e12
 
 #: States that a thread takes at once, so that an interrupt is seen soon.
 TOGETHER: Final = 256
+
+#: Periods of all states in one call of a kernel: half a second.
+_PERIODS: Final = 100_000
 
 #: Rows of the table that a derivative uses again and again.
 _ROWS: Final = 512
@@ -210,9 +213,9 @@ def repeated(motion: Motion, gravity: float, sign: float = 1.0) -> Ground:
     return ground_of(breakpoints, coefficients, 1.0 / gravity, motion.error)
 
 
-def parts_of(count: int) -> Sequence[slice]:
-    """Ranges of states for one call of a kernel each."""
-    return [slice(start, min(start + TOGETHER, count)) for start in range(0, count, TOGETHER)]
+def parts_of(count: int, periods: int) -> Sequence[slice]:
+    """Ranges of states for one call of a kernel each, over so many periods."""
+    return [*ranges(count, min(TOGETHER, max(1, _PERIODS // periods)))]
 
 
 def sensible(values: Floats, name: str) -> None:
