@@ -37,7 +37,7 @@ motions = [rocking.pulses.one_sine(4.0, frequency) for frequency in (0.5, 1.0, 2
 scales = {"levels": [2.0, 4.0], "measure": "pga", "polarity": "both"}
 study = rocking.study(sys.argv[1], blocks, motions, **scales, model="linear", unit_blocks=512)
 print("ready", flush=True)
-report = study.run(threads=int(sys.argv[2]))
+report = study.run(threads=int(sys.argv[2]), part=sys.argv[3] if sys.argv[3:] else None)
 print(report.stopped)
 """
 
@@ -177,6 +177,25 @@ def test_a_killed_study_loses_no_unit_and_goes_on_to_the_same_bytes(complete, tm
     assert seen and report.units == len(study._store.grid) - len(seen)
     assert digest(tmp_path) == digest(complete)
     assert not list(tmp_path.rglob("*.part"))
+
+
+@pytest.mark.thorough
+@pytest.mark.skipif(os.name == "nt", reason="signals are sent the POSIX way")
+def test_parts_that_run_at_the_same_time_and_are_killed_are_completed_to_the_same_bytes(complete, tmp_path):
+    made(tmp_path)
+    commands = [[sys.executable, "-c", SCRIPT, str(tmp_path), "1", f"{number}/3"] for number in (1, 2, 3)]
+    running = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for command in commands]
+    running[1].stdout.readline()
+    while len([*(tmp_path / "result").glob("c.*")]) < 2:
+        assert running[1].poll() is None or running[0].poll() is None
+    running[1].send_signal(signal.SIGKILL)
+    for process in running:
+        process.communicate()
+    assert [process.returncode for process in running] == [0, -signal.SIGKILL, 0]
+    study = made(tmp_path)
+    assert 24 <= study.status.done <= 36
+    study.run()
+    assert study.status.complete and digest(tmp_path) == digest(complete)
 
 
 def test_what_a_crash_left_half_written_is_removed(complete, tmp_path):
