@@ -211,6 +211,15 @@ def test_a_record_without_motion_cannot_be_scaled_and_is_skipped_as_well(run, fo
     assert "zero throughout" in err
 
 
+def test_a_pulse_has_the_vertical_component_that_is_given(run):
+    given = ["simulate", "--pulse", "one-sine:amplitude=0.3g,frequency=3Hz", *BLOCK, "--json"]
+    code, out, _ = run(*given, "--vertical", "el-centro-meloland-up")
+    motion = rocking.pulses.one_sine(0.3 * GRAVITY, 3.0).with_vertical(rocking.records.load("el-centro-meloland-up"))
+    found, response = json.loads(out), rocking.simulate(rocking.Block(width=0.24, height=1.1), motion)
+    assert code == 0 and found["impacts_resolved"] == len(response.impacts) > 0
+    assert found["peak_rotation_rad"] == response.peak_rotation != json.loads(run(*given)[1])["peak_rotation_rad"]
+
+
 def test_each_record_counts_once(folder):
     assert len(expanded([str(folder), str(folder / "*.AT2")])) == 3
     with pytest.raises(rocking.UnreadableRecord, match="matches"):
