@@ -401,3 +401,24 @@ def test_a_free_history_goes_without_what_is_said_of_motions(run, tmp_path, argu
     code, _, err = run("calibrate", history, *arguments)
     assert code == 2
     assert said in err
+
+
+@pytest.mark.thorough
+def test_standing_is_about_overturning_in_whatever_order_the_limits_come(run, monkeypatch):
+    common = [
+        "fragility",
+        RECORD,
+        "ridgecrest-clc-090",
+        *SIZES,
+        "--levels",
+        "0.1g:1g:19",
+        "--standing",
+        "1000",
+        "--json",
+    ]
+    for limits in ("overturning,half=0.5", "half=0.5,overturning"):
+        code, out, _ = run(*common, "--limits", limits)
+        assert code == 0 and json.loads(out)["survival"]["limit_state"] == "overturning"
+    monkeypatch.setattr("rocking.cli.fragility.run", None)  # it is refused before anything is simulated
+    code, _, err = run(*common, "--limits", "half=0.5,most=0.8")
+    assert code == 2 and "--standing is about overturning, or about one limit, not half and most" in err

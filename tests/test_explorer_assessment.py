@@ -121,6 +121,14 @@ def test_the_margin_is_the_lowest_band_of_an_incremental_dynamic_analysis(width,
     assert levels[1] / levels[0] == pytest.approx(1.0 + note["values"]["step"] / 100.0)
 
 
+def test_a_block_that_no_level_overturns_has_no_margin_up_to_the_highest_level_looked_at():
+    case = {"width": "2", "height": "8", "motion": "half-sine:amplitude=1g,frequency=3000"}
+    margin = last(assessed(case, **FEW)).header["margin"]
+    block, motion = rocking.Block(width=2.0, height=8.0), rocking.pulses.half_sine(9.80665, 3000.0)
+    assert margin["factor"] is None and margin["pga"] > 400.0 * block.uplift_thresholds()[0]
+    assert not rocking.simulate(block, motion.scaled_to(margin["pga"])).overturned
+
+
 @pytest.mark.thorough
 def test_the_margin_has_the_treatment_of_the_case():
     treated = {**STATUE, "motion": "ridgecrest-clc-090", "chattering": "velocity=0.5"}
@@ -163,3 +171,8 @@ def test_levels_go_from_where_a_record_lifts_the_block_to_where_most_overturn_it
 def test_what_cannot_be_assessed_is_refused_in_a_sentence(texts, words):
     with pytest.raises(rocking.RockingError, match=words):
         last(assessed(STATUE, **texts))
+
+
+def test_a_block_that_hardly_comes_to_rest_is_refused_whatever_the_duration_of_the_case():
+    with pytest.raises(rocking.RockingError, match="hardly comes to rest: lower it"):
+        assessed({**STATUE, "restitution": "1", "duration": "10"}, records=PLAIN, **LEVELS)

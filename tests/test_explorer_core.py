@@ -235,6 +235,11 @@ def test_shipped_records_with_a_vertical_component_are_both_named(factor):
         assert np.array_equal(store.motion(key.removeprefix("given:")).vertical.coefficients, other.coefficients)
 
 
+def test_a_motion_that_is_no_pulse_any_more_is_not_written_as_one():
+    assert pulse_as_text(rocking.pulses.one_sine(3.0, 1.0).delayed(1.0)) is None
+    assert pulse_as_text(rocking.records.load("ridgecrest-clc-090")) is None
+
+
 @pytest.mark.parametrize(
     ("texts", "error", "words"),
     [
@@ -493,6 +498,12 @@ def test_a_window_that_begins_when_the_response_is_over_is_where_it_moves(explor
     assert explorer.compare(short, {"model": "linear"}, (400.0, 500.0)).header["window"] == both
     with pytest.raises(InvalidOption, match="window"):
         explorer.case(short, (math.nan, 1.0))
+
+
+@pytest.mark.parametrize("window", [(5.0, 5.0), (6.0, 5.0), (math.nan, 1.0), (0.0, math.inf), (400.0, 500.0)])
+def test_a_window_that_is_none_is_refused(explorer, window):
+    with pytest.raises(InvalidOption, match="window"):
+        explorer.window(STATUE, window)
 
 
 def test_verdicts_are_those_of_the_response(explorer):

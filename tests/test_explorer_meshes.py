@@ -344,3 +344,15 @@ def test_no_text_of_a_mesh_fails_otherwise_than_by_a_sentence(seed):
             assert "\n" not in str(error)
             answered += 1
     assert answered >= 25
+
+
+def test_a_body_is_read_once_as_long_as_it_is_kept(monkeypatch):
+    read, bodies = [], meshes.MeshStore(lambda key: None)
+    monkeypatch.setattr(meshes, "_KEPT", 2)
+    monkeypatch.setattr(
+        meshes, "_read", lambda name, upload, given: read.append(given["gravity"]) or InvalidBlock("no")
+    )
+    for gravity in (1.0, 2.0, 2.0, 1.0, 3.0, 1.0):
+        with pytest.raises(InvalidBlock):
+            bodies.body("statue", {}, None, gravity)
+    assert read == [1.0, 2.0, 3.0, 1.0]

@@ -38,6 +38,14 @@ def bodies(count, seed):
     return made
 
 
+def test_a_slider_of_a_lively_block_moves_where_a_duration_ends_the_simulation():
+    texts = {"p": "2", "alpha": "0.2", "restitution": "1", "motion": "none", "duration": "10"}
+    ((first, last),) = tracks(texts)["p"]
+    assert (first, last) == (0, STEPS)
+    for step in (first, last):
+        Explorer().show({**texts, "p": text_at(PARAMETERS["p"], step), "initial_rotation": "0.01"})
+
+
 @pytest.mark.parametrize("count", [12, pytest.param(200, marks=pytest.mark.slow)])
 def test_no_drag_along_a_track_is_refused_and_the_next_step_is(count):
     draw, explorer, dragged, ended = random.Random(2), Explorer(), 0, 0
