@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from oracles import standing
 from oracles.cases import GRAVITY
 from oracles.multiprecision import follow
 from oracles.problem import Problem
-from test_restrained import drawn as restrained
 
 import rocking
 from rocking import Block, Motion
@@ -117,8 +117,7 @@ def judged_by_variation(seeds: range) -> int:
     """Judge restrained bodies by what is carried forwards: all samples together, and the start."""
     judged = 0
     for seed in seeds:
-        body, _, motion, start = restrained(seed)
-        motion = motion * (1.3 * min(body.uplift_thresholds()) / motion.pga)
+        body, motion, start = standing.drawn(seed)
         for model in ("linear", "nonlinear"):
             response = rocking.simulate(body, motion, model=model, initial_rotation=start, duration=motion.end)
             found = rocking.gradient(response)

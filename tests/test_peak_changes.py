@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_restrained import drawn
+from oracles.standing import drawn
 
 import rocking
 from rocking import Blocks, InvalidOption, Motion, dynamics, simulate, simulate_many

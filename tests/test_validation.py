@@ -1,4 +1,4 @@
-"""The validation page says what its script computes, and the numbers that others publish are met."""
+"""The validation page says what 'scripts/validation.py' computes, and the numbers that others publish are met."""
 
 import math
 from pathlib import Path

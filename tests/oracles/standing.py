@@ -353,6 +353,13 @@ def case(kind: str, seed: int, number: int) -> tuple[RestrainedBlock, Held, Moti
     return ours, held, motion, 1.2 * motion.end + 0.5, near if number % 2 else 0.0
 
 
+def drawn(seed: int) -> tuple[RestrainedBlock, Motion, float]:
+    """Draw a body, each kind in turn, a motion of 1.3 times what lifts it, and an initial rotation."""
+    number, kind = divmod(seed, len(OF_ENSEMBLES))
+    ours, _, motion, _, start = case(OF_ENSEMBLES[kind], 3, number)
+    return ours, motion * (1.3 * min(ours.uplift_thresholds()) / motion.pga), start or 1e-3
+
+
 def single_and_integrated(kind: str, seed: int, cases: int) -> Judged:
     """Compare verdicts, and peaks of bodies that stand, with DOP853 restarted at impacts, rests and breakpoints."""
     found = Judged()
