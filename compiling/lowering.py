@@ -46,64 +46,41 @@ from rocking.kernels.library import layout
 #: Modules of the kernels that one process translates; a second one translates the others, which takes about as long.
 MARCHES = ("march", "lanes", "periodic")
 
-#: A function that every library has: the number of the highest level of the processor. It executes the instructions
-#: cpuid and xgetbv: the operating system must save the registers of AVX2 and AVX-512, too.
-LEVEL = "define i64 @rocking_level() {\n  ret i64 0\n}\n"
-if MACHINE == "x86_64":
-    CPUID = '{ i32, i32, i32, i32 } asm sideeffect "cpuid", "={ax},={bx},={cx},={dx},{ax},{cx}"'
-    XGETBV = '{ i32, i32 } asm sideeffect "xgetbv", "={ax},={dx},{cx}"'
-    #: Bits that each level needs: of leaf 1 (FMA, MOVBE, OSXSAVE, AVX, F16C), of leaf 7 (BMI1, AVX2, BMI2; AVX512F, DQ,
-    #: CD, BW, VL), of leaf 0x80000001 (LZCNT), and of the registers that the system saves.
-    BITS = {
-        "first": (12, 22, 27, 28, 29),
-        "seventh3": (3, 5, 8),
-        "seventh4": (16, 17, 28, 30, 31),
-        "extended": (5,),
-        "saved3": (1, 2),
-        "saved4": (5, 6, 7),
-    }
-    MASKS = {name: sum(1 << bit for bit in bits) for name, bits in BITS.items()}
-    LEVEL = f"""
-define i64 @rocking_level() {{
-  %leaves = call {CPUID}(i32 0, i32 0)
-  %highest = extractvalue {{ i32, i32, i32, i32 }} %leaves, 0
-  %old = icmp ult i32 %highest, 7
-  br i1 %old, label %lowest, label %ask
-ask:
-  %leaf1 = call {CPUID}(i32 1, i32 0)
-  %first = extractvalue {{ i32, i32, i32, i32 }} %leaf1, 2
-  %first3 = and i32 %first, {MASKS["first"]}
-  %plain = icmp ne i32 %first3, {MASKS["first"]}
-  br i1 %plain, label %lowest, label %higher
-higher:
-  %leaf7 = call {CPUID}(i32 7, i32 0)
-  %seventh = extractvalue {{ i32, i32, i32, i32 }} %leaf7, 1
-  %leafx = call {CPUID}(i32 {0x80000001 - 2**32}, i32 0)
-  %extended = extractvalue {{ i32, i32, i32, i32 }} %leafx, 2
-  %state = call {XGETBV}(i32 0)
-  %saved = extractvalue {{ i32, i32 }} %state, 0
-  %seventh3 = and i32 %seventh, {MASKS["seventh3"]}
-  %extended3 = and i32 %extended, {MASKS["extended"]}
-  %saved3 = and i32 %saved, {MASKS["saved3"]}
-  %wide3 = icmp eq i32 %seventh3, {MASKS["seventh3"]}
-  %counts3 = icmp eq i32 %extended3, {MASKS["extended"]}
-  %saves3 = icmp eq i32 %saved3, {MASKS["saved3"]}
-  %both3 = and i1 %wide3, %counts3
-  %all3 = and i1 %both3, %saves3
-  %seventh4 = and i32 %seventh, {MASKS["seventh4"]}
-  %saved4 = and i32 %saved, {MASKS["saved4"]}
-  %wide4 = icmp eq i32 %seventh4, {MASKS["seventh4"]}
-  %saves4 = icmp eq i32 %saved4, {MASKS["saved4"]}
-  %both4 = and i1 %wide4, %saves4
-  %all4 = and i1 %all3, %both4
-  %number3 = zext i1 %all3 to i64
-  %number4 = zext i1 %all4 to i64
-  %level = add i64 %number3, %number4
-  ret i64 %level
-lowest:
-  ret i64 0
-}}
-"""
+#: Bits that levels of x86-64 processors need, by the instruction that reports them, its argument and the number of the
+#: register; the first level that needs them. The operating system must save the registers of AVX2 and AVX-512, too.
+CPUID, XGETBV = "cpuid", "xgetbv"
+NEEDED = [
+    (CPUID, 1, 2, (12, 22, 27, 28, 29), 1),  # FMA, MOVBE, OSXSAVE, AVX, F16C
+    (CPUID, 7, 1, (3, 5, 8), 1),  # BMI1, AVX2, BMI2
+    (CPUID, 0x80000001, 2, (5,), 1),  # LZCNT
+    (XGETBV, 0, 0, (1, 2), 1),
+    (CPUID, 7, 1, (16, 17, 28, 30, 31), 2),  # AVX512F, DQ, CD, BW, VL
+    (XGETBV, 0, 0, (5, 6, 7), 2),
+]
+
+
+def level_function() -> str:
+    """Return the function that every library has, in LLVM's language: the number of the processor's highest level."""
+    if MACHINE != "x86_64":
+        return "define i64 @rocking_level() {\n  ret i64 0\n}\n"
+    lines = ["define i64 @rocking_level() {", "  br label %bits0"]
+    for k, (instruction, leaf, register, bits, level) in enumerate(NEEDED):
+        results, constraints = ("{ i32, i32, i32, i32 }", "={ax},={bx},={cx},={dx},{ax},{cx}")
+        given, mask = f"(i32 {leaf - (leaf >> 31 << 32)}, i32 0)", sum(1 << bit for bit in bits)
+        if instruction == XGETBV:
+            results, constraints, given = "{ i32, i32 }", "={ax},={dx},{cx}", f"(i32 {leaf})"
+        lines += [
+            f"bits{k}:",
+            f'  %all{k} = call {results} asm sideeffect "{instruction}", "{constraints}"{given}',
+            f"  %one{k} = extractvalue {results} %all{k}, {register}",
+            f"  %set{k} = and i32 %one{k}, {mask}",
+            f"  %has{k} = icmp eq i32 %set{k}, {mask}",
+            f"  br i1 %has{k}, label %bits{k + 1}, label %without{k}",
+            f"without{k}:",
+            f"  ret i64 {level - 1}",
+        ]
+    return "\n".join([*lines, f"bits{len(NEEDED)}:", "  ret i64 2", "}", ""])
+
 
 #: The first version of the GNU C library for a processor. Its functions are linked in that version, so that a library
 #: works on older systems too: `exp` and others have newer versions, which report errors in another way.
@@ -338,7 +315,7 @@ def optimise(folder: Path, level: str) -> None:
     target = llvm.Target.from_triple(llvm.get_process_triple())
     machine = target.create_target_machine(cpu=level, features="", opt=3, reloc="pic", codemodel="default")
     around = [share.read_text("utf-8") for share in sorted(folder.glob("*.around"))]
-    (folder / f"{level}.o").write_bytes(object_of("\n".join([made.get_llvm_str(), *around, LEVEL]), machine))
+    (folder / f"{level}.o").write_bytes(object_of("\n".join([made.get_llvm_str(), *around, level_function()]), machine))
 
 
 def object_of(text: str, machine: llvm.TargetMachine) -> bytes:
@@ -369,7 +346,7 @@ def object_of(text: str, machine: llvm.TargetMachine) -> bytes:
 def level(folder: Path, _: str) -> None:
     """Write the number of the highest level of this processor, as a library answers later."""
     machine = llvm.Target.from_triple(llvm.get_process_triple()).create_target_machine()
-    with llvm.create_mcjit_compiler(llvm.parse_assembly(LEVEL), machine) as engine:
+    with llvm.create_mcjit_compiler(llvm.parse_assembly(level_function()), machine) as engine:
         engine.finalize_object()
         number = ctypes.CFUNCTYPE(ctypes.c_int64)(engine.get_function_address("rocking_level"))()
     (folder / "level").write_text(LEVELS[number], "utf-8")
