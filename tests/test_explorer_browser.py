@@ -1911,6 +1911,7 @@ LATE = {
     "keys of a map": (
         SINE_MAP, "map", ["press #map +"], ["press #map +"], f"Math.abs({AT}('x_to') - {AT}('x_from') - 1) < 0.01",
     ),
+    "values": (STATUE, "case", ["enter pga 0.45"], ["enter pga 0.5", "enter pga 0.3"], f"{AT}('pga') === '0.3g'"),
     "another description": (
         STATUE, "case", ["enter width 0.3"], ["choose #shape parameters"],
         f"{AT}('alpha') && document.getElementById('derived').textContent.includes('15.3')",
