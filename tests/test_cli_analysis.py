@@ -369,6 +369,7 @@ def test_an_ensemble_goes_without_a_restitution(run, tmp_path, command):
     assert "leave --restitution out" in err
 
 
+@pytest.mark.thorough
 def test_records_of_a_fragility_belong_together_by_station_or_by_labels(run):
     names = [name for name in rocking.records.names() if not name.endswith("up")]
     motions = [rocking.records.load(name) for name in names]

@@ -166,6 +166,7 @@ def test_the_table_is_written_and_each_record_only_on_request(run, folder, tmp_p
     assert "--out" in run("simulate", folder, *BLOCK, "--each")[2]
 
 
+@pytest.mark.thorough
 def test_the_table_is_a_workbook_where_openpyxl_is_installed(run, folder, tmp_path):
     openpyxl = pytest.importorskip("openpyxl")
     assert run("simulate", folder, *BLOCK, "--out", tmp_path)[0] == 0

@@ -28,8 +28,9 @@ EXAMPLE = EXAMPLES["EXAMPLE"]
 PAGES_WITH_EXAMPLES = [page for page in PAGES if EXAMPLE.search(page.read_text("utf-8"))]
 # They take seconds; the other pages show that examples run.
 THOROUGH = (
-    "chattering.md", "chattering-maps.md", "first-response.md", "fragility.md", "from-a-mesh.md", "hazard.md",
-    "orbits.md", "overturning-map.md", "results.md", "risk.md", "spectrum.md", "validate.md", "walls-and-tendons.md",
+    "bifurcation.md", "chattering.md", "chattering-maps.md", "first-response.md", "fragility.md", "from-a-mesh.md",
+    "hazard.md", "orbits.md", "overturning-map.md", "results.md", "risk.md", "rules.md", "spectrum.md", "validate.md",
+    "vertical-friction-sensitivity.md", "walls-and-tendons.md",
 )  # fmt: skip
 SLOW = ("basins.md", "calibrate.md", "calibration.md", "gradients.md", "periodic-orbits.md", "study.md")
 MARKS = {**dict.fromkeys(THOROUGH, pytest.mark.thorough), **dict.fromkeys(SLOW, pytest.mark.slow)}

@@ -51,7 +51,7 @@ NUMBERS = {
 
 #: Their laws are held by faster tests, too.
 MARKS = {
-    **dict.fromkeys(("chaos", "precarious_rock", "sizes", "ten_thousand"), pytest.mark.thorough),
+    **dict.fromkeys(("chaos", "median_gradient", "precarious_rock", "sizes", "ten_thousand"), pytest.mark.thorough),
     **dict.fromkeys(("calibration", "frame", "pulse_map"), pytest.mark.slow),
 }
 

@@ -101,6 +101,7 @@ def test_a_rose_leaves_out_what_was_given_up():
     assert f"{counted(missing.sum(), 'simulation')} given up after too many steps" in found.summary()
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("small_budget")
 def test_a_study_leaves_out_what_was_given_up(tmp_path):
     pulses = [PULSE, rocking.pulses.one_sine(6.0, 1.8)]
