@@ -440,7 +440,35 @@ class Study:
         return made_report(self._store, progress)
 
     def to_netcdf(self, path: str | Path, *, critical: StudyVerdict | None = None) -> None:
-        """Write the results as `results` has them to a NetCDF file; parameters and errors as of `to_csv`."""
+        """Write the results as `results` returns them to a NetCDF file.
+
+        Parameters
+        ----------
+        path : path
+            File to write.
+        critical : {"overturning", "complete_chattering"}, optional
+            Write the `critical_scales` of this verdict instead, a row for each change.
+
+        Raises
+        ------
+        OutputError
+            If the file cannot be written.
+        StudyError
+            If a unit is damaged, or units are missing for critical scales.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import rocking
+        >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
+        >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
+        >>> folder = pathlib.Path(tempfile.mkdtemp())
+        >>> study = rocking.study(folder / "study", blocks, motion, levels=[0.4, 1.0], unit_blocks=512)
+        >>> _ = study.run()
+        >>> study.to_netcdf(folder / "all.nc")
+        >>> (folder / "all.nc").is_file()
+        True
+        """
         write_netcdf(path, self._results(critical)[0])
 
     def to_csv(self, path: str | Path, *, critical: StudyVerdict | None = None, progress: bool | None = None) -> None:
@@ -461,36 +489,131 @@ class Study:
             If the file cannot be written.
         StudyError
             If a unit is damaged, or units are missing for critical scales.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import rocking
+        >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
+        >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
+        >>> folder = pathlib.Path(tempfile.mkdtemp())
+        >>> study = rocking.study(folder / "study", blocks, motion, levels=[0.4, 1.0], unit_blocks=512)
+        >>> _ = study.run()
+        >>> study.to_csv(folder / "all.csv")
+        >>> (folder / "all.csv").read_text().splitlines()[1][:40]
+        'one-sine,0.4,0,2.0,0.1,0.9,True,1.570796'
         """
         write_table("csv", path, *self._results(critical), progress)
 
     def to_json(self, path: str | Path, *, critical: StudyVerdict | None = None, progress: bool | None = None) -> None:
-        """Write an object for each simulation as JSON; parameters and errors as of `to_csv`.
+        """Write an object for each simulation as JSON.
 
-        The keys are those of its columns, and NaN is null; attributes of the study and of its measure stand under
-        "study".
+        The keys are those of the columns of `to_csv`, and NaN is null. The attributes of the study and of its measure
+        are under "study".
+
+        Parameters
+        ----------
+        path : path
+            File to write.
+        critical : {"overturning", "complete_chattering"}, optional
+            Write the `critical_scales` of this verdict instead, a row for each change.
+        progress : bool, optional
+            Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
+
+        Raises
+        ------
+        OutputError
+            If the file cannot be written.
+        StudyError
+            If a unit is damaged, or units are missing for critical scales.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import rocking
+        >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
+        >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
+        >>> folder = pathlib.Path(tempfile.mkdtemp())
+        >>> study = rocking.study(folder / "study", blocks, motion, levels=[0.4, 1.0], unit_blocks=512)
+        >>> _ = study.run()
+        >>> study.to_json(folder / "all.json")
+        >>> import json
+        >>> len(json.loads((folder / "all.json").read_text())["simulations"])
+        8
         """
         write_table("json", path, *self._results(critical), progress)
 
     def to_parquet(
         self, path: str | Path, *, critical: StudyVerdict | None = None, progress: bool | None = None
     ) -> None:
-        """Write the table of `to_csv` as Parquet; parameters and errors as there.
+        """Write the table of `to_csv` as Parquet.
+
+        Parameters
+        ----------
+        path : path
+            File to write.
+        critical : {"overturning", "complete_chattering"}, optional
+            Write the `critical_scales` of this verdict instead, a row for each change.
+        progress : bool, optional
+            Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
 
         Raises
         ------
+        OutputError
+            If the file cannot be written.
+        StudyError
+            If a unit is damaged, or units are missing for critical scales.
         InvalidOption
             If pyarrow is not installed.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import rocking
+        >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
+        >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
+        >>> folder = pathlib.Path(tempfile.mkdtemp())
+        >>> study = rocking.study(folder / "study", blocks, motion, levels=[0.4, 1.0], unit_blocks=512)
+        >>> _ = study.run()
+        >>> study.to_parquet(folder / "all.parquet")
+        >>> (folder / "all.parquet").is_file()
+        True
         """
         write_table("parquet", path, *self._results(critical), progress)
 
     def to_excel(self, path: str | Path, *, critical: StudyVerdict | None = None, progress: bool | None = None) -> None:
-        """Write the table of `to_csv` as a workbook (.xlsx); parameters and errors as there.
+        """Write the table of `to_csv` as a workbook (.xlsx).
+
+        Parameters
+        ----------
+        path : path
+            File to write.
+        critical : {"overturning", "complete_chattering"}, optional
+            Write the `critical_scales` of this verdict instead, a row for each change.
+        progress : bool, optional
+            Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
 
         Raises
         ------
+        OutputError
+            If the file cannot be written.
+        StudyError
+            If a unit is damaged, or units are missing for critical scales.
         InvalidOption
             If openpyxl is not installed, or a sheet has too few rows.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import rocking
+        >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
+        >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
+        >>> folder = pathlib.Path(tempfile.mkdtemp())
+        >>> study = rocking.study(folder / "study", blocks, motion, levels=[0.4, 1.0], unit_blocks=512)
+        >>> _ = study.run()
+        >>> study.to_excel(folder / "all.xlsx")
+        >>> (folder / "all.xlsx").is_file()
+        True
         """
         write_table("excel", path, *self._results(critical), progress)
 
