@@ -115,6 +115,7 @@ def test_a_body_released_where_it_leans_stays_there():
         assert response.peak_rotation == pytest.approx(balance, rel=1e-9)
 
 
+@pytest.mark.cases(fast=1)
 @pytest.mark.parametrize("model", ["nonlinear", "linear"])
 def test_only_a_body_below_the_barrier_leans(model):
     """Released without speed where its tendon has just yielded: the climb inwards decides, by an integral."""
