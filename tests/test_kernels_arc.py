@@ -101,28 +101,28 @@ def assert_series_is(c: np.ndarray, order: int, t: float, expected: tuple[mpmath
 
 
 #: lambda h^2 over the longest step, of a block, an oscillator with a stop and a ball, and the gain over p^2.
-stiffnesses = st.sampled_from([1.0, -1.0, 0.0])
+STIFFNESSES = (1.0, -1.0, 0.0)
+stiffnesses = st.sampled_from(STIFFNESSES)
 gains = st.floats(0.1, 3.0)
 
 
-@pytest.mark.parametrize("examples", [12, pytest.param(40, marks=pytest.mark.thorough)])
-def test_a_linear_series_is_the_solution(examples: int) -> None:
+@pytest.mark.parametrize("examples", [5, pytest.param(20, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("sign", STIFFNESSES)
+def test_a_linear_series_is_the_solution(examples: int, sign: float) -> None:
     judged = []
 
     @settings(quick, max_examples=examples)
-    @given(rotations, speeds, frequencies, stiffnesses, gains, slendernesses, motions, st.floats(0.01, 1.0))
-    def judge(
-        u: float, v: float, p: float, sign: float, gain: float, threshold: float, A: list[float], share: float
-    ) -> None:
+    @given(rotations, speeds, frequencies, gains, slendernesses, motions, st.floats(0.01, 1.0))
+    def judge(u: float, v: float, p: float, gain: float, threshold: float, A: list[float], share: float) -> None:
         motion = motion_over(A, share / p)
         lam, gain = sign * p * p, gain * p * p
         c, order, h = linear_series(u, v, lam, gain, threshold, motion, share / p)
         assert 0.0 < h <= share / p
         assert_series_is(c, order, h, after(System(lam, threshold, gain=gain), u, v, h, list(motion)))
-        judged.append((sign, len(A) > 2))
+        judged.append(len(A))
 
     judge()
-    assert len(judged) >= examples and len(set(judged)) >= 4
+    assert len(judged) >= examples and len(set(judged)) >= 2
 
 
 @quick
