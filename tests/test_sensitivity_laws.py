@@ -110,3 +110,15 @@ def test_rotations_impacts_and_uplifts_change_with_everything_as_differences_say
     assert judged["rotation"] >= (20 if body.is_one_sided else 40)
     assert judged["impact"] >= 5
     assert judged["uplift"] >= (1 if body.is_one_sided else 2) * (2 - (name == "yielding tendon"))
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_peak_where_a_simulation_stops_lies_within_it_and_changes_with_the_motion(side):
+    block, start = rocking.Block.from_parameters(p=2.0, alpha=0.2), side * 0.05
+    motion = rocking.Motion.from_samples([0.0, 1.0, 0.3, 1.1, 0.0], 0.1).scaled(side)
+    for duration in np.linspace(0.013, 0.37, 300):
+        response = rocking.simulate(
+            block, motion, duration=duration, initial_rotation=start, initial_velocity=0.5 * side
+        )
+        assert response.peak_time <= duration and response.peak_rotation > 0.0
+        assert np.isfinite(response.rotation(response.peak_time)) and response.sensitivity.peak["motion"][0] != 0.0

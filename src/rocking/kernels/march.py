@@ -291,8 +291,9 @@ def end_by_overturning(ground: Ground, block: Record, rules: Record, table: Reco
 
 @inlined
 def end_by_stopping(ground: Ground, rules: Record, table: Records, state: Record) -> int:
-    """End a march in the middle of an arc, at the time given by the rules."""
+    """End a march in the middle of an arc, at the time given by the rules; a peak there may be a rounding later."""
     state.end = rules.stop
+    state.peak_time = min(state.peak_time, rules.stop)
     write_node(ground, rules, table, state)
     return Ending.DONE
 
