@@ -25,10 +25,9 @@ import rocking
 from rocking.errors import InvalidOption, RockingError, StudyError
 from rocking.explorer import connections, launch, maps, server, uploads
 from rocking.explorer.authentication import RequestAuthentication
-from rocking.explorer.background import low_priority
 from rocking.explorer.core import Explorer
 from rocking.explorer.launch import served
-from rocking.explorer.server import App
+from rocking.explorer.server import App, low_priority
 from rocking.explorer.studies import StudyView
 from rocking.explorer.uploads import LARGEST, UploadStore
 from rocking.threads import AHEAD, cores

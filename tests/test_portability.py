@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import pytest
 
 from rocking import threads
-from rocking.explorer import apart, background, launch
+from rocking.explorer import apart, launch, server
 from rocking.plot import canvas
 from rocking.studies import folder
 
@@ -91,7 +91,7 @@ def test_only_linux_knows_the_priority_of_a_thread(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(sys, "platform", system)
     monkeypatch.setattr(os, "setpriority", lambda *given: calls.append(given), raising=False)
     monkeypatch.setattr(os, "PRIO_PROCESS", 0, raising=False)
-    background._lower_priority()
+    server._lower_priority()
     assert calls == [(0, threading.get_native_id(), 19)] * asked
 
 

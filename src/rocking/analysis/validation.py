@@ -250,7 +250,7 @@ class ModelValidation(DrawnResult, TableResult):
         return pd.DataFrame([asdict(test) for test in self.tests])
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.validation import reliability_figure
+        from rocking.plot.calibration import reliability_figure
 
         columns = ("predicted", "observed", "band_lower", "band_upper")
         return reliability_figure(

@@ -41,8 +41,7 @@ for _module, _commands in {
     "analysis": ("spectrum", "map", "ida", "measures"),
     "dynamics": ("orbits", "bifurcation", "basin"),
     "fragility": ("fragility",),
-    "calibrate": ("calibrate",),
-    "validation": ("validate",),
+    "calibrate": ("calibrate", "validate"),
     "mesh": ("mesh",),
     "explore": ("explore",),
 }.items():

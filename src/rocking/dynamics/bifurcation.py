@@ -147,7 +147,7 @@ class BifurcationDiagram(DatasetResult):
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.bifurcation import bifurcation_figure
+        from rocking.plot.orbits import bifurcation_figure
 
         data = self.data
         over = (data.period.values == OVERTURNED).all(axis=(0, 2))

@@ -5,9 +5,14 @@ from __future__ import annotations
 import asyncio
 import json
 import math
+import os
 import secrets
 import struct
-from collections.abc import AsyncIterator, Awaitable, Callable, Generator, Mapping
+import sys
+import threading
+from collections.abc import AsyncIterator, Awaitable, Callable, Generator, Iterator, Mapping
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import asdict
 from functools import cached_property
 from importlib import metadata, resources, util
@@ -24,7 +29,6 @@ from starlette.routing import Route
 
 from rocking.errors import InvalidOption, RockingError
 from rocking.explorer import assessment, maps, periodic, readings, sweeps
-from rocking.explorer.background import low_priority
 from rocking.explorer.catalogue import entries_of, listing
 from rocking.explorer.code import map_as_code, sweep_as_code
 from rocking.explorer.core import EXPORTS, Explorer
@@ -443,3 +447,23 @@ def _too_large() -> Response:
 async def _failure(_: Request, error: Exception) -> Response:
     problem = f"this could not be computed ({type(error).__name__}); please report it"
     return JSONResponse({"problem": problem, "argument": None}, 500, headers=_FRESH)
+
+
+#: Lowest priority of all: such a thread takes what others leave, and all of it where they leave everything.
+_NICENESS: Final = 19
+
+
+@contextmanager
+def low_priority() -> Iterator[Executor]:
+    """Give an executor of one thread that takes the processor only where nobody else wants it.
+
+    Where the system knows priorities of threads (Linux) those that it starts have the same one; elsewhere it is an
+    ordinary thread.
+    """
+    with ThreadPoolExecutor(1, "rocking-low-priority", initializer=_lower_priority) as executor:
+        yield executor
+
+
+def _lower_priority() -> None:
+    if sys.platform == "linux":
+        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)

@@ -5,7 +5,7 @@ Piece k is ``sum_j coefficients[k, j] x**j`` on ``0 <= x <= widths[k]``, x count
 
 import functools
 import math
-from typing import Final, NamedTuple, Protocol
+from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +14,6 @@ from rocking import checks
 from rocking.arrays import Flags, Floats, Integers
 from rocking.constants import HIGHEST_DEGREE
 from rocking.errors import InvalidMotion
-from rocking.motion.exact import exact_product, exact_sum
 
 #: Pieces that meet within this part of the largest value do not jump.
 _JUMP: Final = 1e-12
@@ -356,3 +355,31 @@ def _floats(values: ArrayLike, what: str, dimensions: int, hint: str = "") -> Fl
         sentence = f"the {{}} of a motion must have {dimensions} dimension(s), not {array.ndim}{hint}"
         raise InvalidMotion(sentence, what, value=values)
     return array
+
+
+def exact_sum(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+    """Sum and its rounding error (Knuth 1969)."""
+    total = a + b
+    of_b = total - a
+    return total, (a - (total - of_b)) + (b - of_b)
+
+
+def exact_product(a: float | Floats, b: Floats) -> tuple[Floats, Floats]:
+    """Product and its rounding error (Dekker 1971)."""
+    product = a * b
+    a_high, a_low = _halves(a)
+    b_high, b_low = _halves(b)
+    return product, ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low
+
+
+def exact_quotient(a: Floats, rest: Floats, divisor: float) -> tuple[Floats, Floats]:
+    """Quotient of ``a + rest``, and what it lacks."""
+    quotient = a / divisor
+    product, error = exact_product(divisor, quotient)
+    return quotient, ((a - product) - error + rest) / divisor
+
+
+def _halves(a: float | Floats) -> tuple[Any, Any]:
+    scaled = 134217729.0 * a
+    high = scaled - (scaled - a)
+    return high, a - high

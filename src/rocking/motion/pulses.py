@@ -15,8 +15,8 @@ import numpy as np
 from rocking import checks
 from rocking.errors import InvalidMotion
 from rocking.motion.description import Description
-from rocking.motion.exact import exact_product, exact_quotient
 from rocking.motion.motion import Motion
+from rocking.motion.piecewise import exact_product, exact_quotient
 from rocking.motion.series import (
     ERROR,
     GAUSSIAN_PIECE,

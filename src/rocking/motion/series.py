@@ -17,7 +17,7 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidMotion
 from rocking.motion import piecewise
-from rocking.motion.exact import exact_product
+from rocking.motion.piecewise import exact_product
 
 
 class Angle(NamedTuple):

@@ -1,4 +1,4 @@
-"""How well a calibrated block explains what was measured: outcomes of tests, or a rotation history."""
+"""How well a calibrated block explains outcomes of tests or a rotation history, and how reliable predictions are."""
 
 from __future__ import annotations
 
@@ -125,3 +125,27 @@ def _draw_parameter(axes: Axes, parameter: Parameter, weights: Floats) -> None:
     axes.set_ylim(0.0, 1.3 * axes.get_ylim()[1])
     axes.set_yticks([])
     add_labels(axes, parameter.label, "")
+
+
+def reliability_figure(
+    *,
+    predicted: Floats,
+    observed: Floats,
+    band_lower: Floats,
+    band_upper: Floats,
+    title: str = "",
+    ax: Axes | None = None,
+    figsize: tuple[float, float] | None = None,
+) -> Figure:
+    """Draw observed shares against predicted ones (bins,), with the bands of right predictions."""
+    with figure_for(ax, (3.7, 3.7), figsize, title) as figure:
+        axes = ax or figure.add_subplot()
+        axes.plot([0.0, 1.0], [0.0, 1.0], color=GROUND, linewidth=0.8, linestyle=(0, (4, 2)))
+        label = "90 % of what right predictions would show"
+        axes.vlines(predicted, band_lower, band_upper, color=GROUND, linewidth=5.0, alpha=0.55, label=label)
+        axes.plot(predicted, observed, "o-", color=INK, linewidth=0.9, markersize=4.0, clip_on=False, label="observed")
+        axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
+        axes.grid(True)
+        add_labels(axes, "predicted probability of overturning", "share that overturned")
+        add_legend(figure, ax, handles_of(axes))
+    return figure
