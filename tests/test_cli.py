@@ -235,6 +235,28 @@ def test_an_interrupt_is_one_sentence_and_closes_what_is_half_done(monkeypatch, 
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
+@pytest.mark.parametrize("dropped", ["KeyboardInterrupt", "KeyError"])
+def test_an_interrupt_that_python_drops_comes_again(dropped):
+    probe = (
+        "import sys, time\n"
+        "from rocking import cli\n"
+        "from rocking.__main__ import main\n"
+        "class Dropping:\n"
+        "    def __del__(self):\n"
+        f"        raise {dropped}\n"
+        "def run(_):\n"
+        "    Dropping()\n"
+        f"    time.sleep({60.0 if dropped == 'KeyboardInterrupt' else 0.1})\n"
+        "cli._run = run\n"
+        "main()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=False, timeout=50.0)
+    if dropped == "KeyboardInterrupt":
+        assert (done.returncode, done.stderr) == (130, f"{INTERRUPTED}\n")
+    else:
+        assert done.returncode == 0 and "KeyError" in done.stderr
+
+
 def test_help_starts_without_the_heavy_libraries():
     probe = (
         "import sys\nfrom rocking.cli import main\n"

@@ -1,11 +1,15 @@
 """The program `rocking`: an interrupt while the command line is being imported ends it as one later does."""
 
+import _thread
 import gc
 import sys
+import threading
+from typing import Any
 
 
 def main() -> None:
     """Run the command line, as `rocking.cli.main` does."""
+    sys.unraisablehook = _raise_again
     try:
         from rocking.cli import main as run
 
@@ -19,6 +23,14 @@ def main() -> None:
         # As Python ends it looks for cycles among all objects, again and again: up to a second, for memory that is
         # given back anyway.
         gc.freeze()
+
+
+def _raise_again(unraisable: Any) -> None:
+    """Repeat an interrupt that Python drops because it fell into a callback: each import calls one."""
+    if issubclass(unraisable.exc_type, KeyboardInterrupt):
+        threading.Timer(0.02, _thread.interrupt_main).start()  # once the callback is over
+    else:
+        sys.__unraisablehook__(unraisable)
 
 
 if __name__ == "__main__":
