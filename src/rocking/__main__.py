@@ -2,6 +2,7 @@
 
 import _thread
 import gc
+import signal
 import sys
 import threading
 from typing import Any
@@ -28,7 +29,9 @@ def main() -> None:
 def _raise_again(unraisable: Any) -> None:
     """Repeat an interrupt that Python drops because it fell into a callback: each import calls one."""
     if issubclass(unraisable.exc_type, KeyboardInterrupt):
-        threading.Timer(0.02, _thread.interrupt_main).start()  # once the callback is over
+        # Once the callback is over. A true signal also ends a wait, where there is one.
+        again = getattr(signal, "pthread_kill", lambda *_: _thread.interrupt_main())
+        threading.Timer(0.02, again, (threading.main_thread().ident, signal.SIGINT)).start()
     else:
         sys.__unraisablehook__(unraisable)
 
