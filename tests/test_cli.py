@@ -235,6 +235,24 @@ def test_an_interrupt_is_one_sentence_and_closes_what_is_half_done(monkeypatch, 
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
+@pytest.mark.parametrize("interrupted", [True, False])
+def test_an_error_in_place_of_an_interrupt_is_one(run, monkeypatch, interrupted):
+    def called(*_):
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:
+            if interrupted:
+                raise RuntimeError("release unlocked lock")  # noqa: B904 - as Python itself does
+        raise ValueError("of its own")
+
+    monkeypatch.setattr("rocking.cli.wording.called", called)
+    if interrupted:
+        assert run("records") == (130, "", f"{INTERRUPTED}\n")
+    else:
+        with pytest.raises(ValueError, match="of its own"):
+            run("records")
+
+
 @pytest.mark.parametrize("dropped", ["KeyboardInterrupt", "KeyError"])
 def test_an_interrupt_that_python_drops_comes_again(dropped):
     probe = (

@@ -75,14 +75,22 @@ def main(arguments: Sequence[str] | None = None) -> None:
         _close_output()
         return
     except Exception as error:
-        sentence = _sentence(error, given)
-        if not sentence:
-            raise
-        print(f"rocking: {sentence}", file=sys.stderr)
-        sys.exit(2)
+        if not _is_of_an_interrupt(error):
+            sentence = _sentence(error, given)
+            if not sentence:
+                raise
+            print(f"rocking: {sentence}", file=sys.stderr)
+            sys.exit(2)
     # Not within `except`: its traceback would keep the iterators whose threads end when they are closed.
     print(INTERRUPTED, file=sys.stderr)
     sys.exit(130)
+
+
+def _is_of_an_interrupt(error: BaseException | None) -> bool:
+    """Whether an error was raised in place of an interrupt, as by a lock of `threading` within which that fell."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__context__
+    return error is not None
 
 
 def _sentence(error: Exception, given: list[str]) -> str:
