@@ -41,10 +41,10 @@ wheel: .venv/.all ## build a wheel for this platform into dist
 quick: .venv/.all ## run the nearest tests of what has changed since the last commit, or since BASE=..., in about half a minute
 	@$(BIN)/python tests/of_changes.py $(or $(BASE),HEAD) $(PYTEST) --dist load --maxschedchunk 4 $(QUICKLY)
 
-test: .venv/.all ## run the tests (three to four minutes on two slow cores)
+test: .venv/.all ## run the tests (two to three minutes on two cores)
 	$(PYTEST) $(QUICKLY)
 
-test-all: .venv/.all ## run them with more cases each, and longer ones (three times as long)
+test-all: .venv/.all ## run them with more cases each, and longer ones (twice as long)
 	$(PYTEST) -m "not slow and not browser" $(LIMITED)
 
 browser: .venv/.all .page-tools/.installed ## drive the explorer's page in Chromium, which must be installed
