@@ -87,18 +87,19 @@ def fill(breakpoints: Floats, coefficients: Floats, unit: float, ground: Ground,
     for k in range(last):
         pieces[k, _START] = breakpoints[k]
         pieces[k, _LENGTH] = breakpoints[k + 1] - breakpoints[k]
-        for j in range(coefficients.shape[1]):
-            pieces[k, ground.first + j] = coefficients[k, j] * unit
+    for j in range(coefficients.shape[1]):
+        column = pieces[:, ground.first + j]
+        for k in range(last):
+            column[k] = coefficients[k, j] * unit
     pieces[last, _START] = breakpoints[last]
     pieces[last, _LENGTH] = np.inf
     for stretch in range(ground.stretches.shape[0]):
-        set_stretch(ground, stretch, Window(np.inf, -np.inf, 0.0, 0.0))
-    for k in range(last + 1):
-        piece = bounds_within(ground, k, 0.0, pieces[k, _LENGTH], A)
-        jumps = piece.jumps + jump_after(ground, k) if k < last else 0.0
-        before = stretch_bounds(ground, k // STRETCH)
-        low, high = min(before.low, piece.low), max(before.high, piece.high)
-        set_stretch(ground, k // STRETCH, Window(low, high, max(before.slope, piece.slope), before.jumps + jumps))
+        low, high, steepest, jumps = np.inf, -np.inf, 0.0, 0.0
+        for k in range(stretch * STRETCH, min((stretch + 1) * STRETCH, last + 1)):
+            piece = bounds_within(ground, k, 0.0, pieces[k, _LENGTH], A)
+            low, high, steepest = min(low, piece.low), max(high, piece.high), max(steepest, piece.slope)
+            jumps += piece.jumps + jump_after(ground, k) if k < last else 0.0
+        set_stretch(ground, stretch, Window(low, high, steepest, jumps))
 
 
 @inlined
