@@ -50,15 +50,15 @@ print(f"largest Lyapunov exponent {largest:.2f} a period, standard error {error:
 block = rocking.Block.from_parameters(p=3.0, alpha=0.25, restitution=0.9)
 sine = rocking.pulses.sine(6.0, 2.5, cycles=1)
 basins = dynamics.basins(block, sine, np.linspace(-0.25, 0.25, 120), np.linspace(-0.75, 0.75, 120))
-shares = basins.share.values
-for name, share in zip(basins.attractor.values, shares, strict=True):
+shares = basins.data.share.values
+for name, share in zip(basins.data.attractor.values, shares, strict=True):
     print(f"{name}: {100.0 * share:.1f} %")
 
 # %%
 # The share of states with a neighbour k cells away that has another outcome grows as k to the power of two minus
 # the dimension (McDonald and others 1985).
 
-outcome, steps = basins.outcome.values, (1, 2, 4)
+outcome, steps = basins.data.outcome.values, (1, 2, 4)
 uncertain = []
 for k in steps:
     middle, rows, columns = outcome[k:-k, k:-k], outcome[:, k:-k], outcome[k:-k]

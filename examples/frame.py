@@ -36,7 +36,7 @@ for frame in frames:
         frequencies=2.0 * np.pi * frequencies / frame.p,
         tolerance=1e-6,
     )
-    lowest.append(found.overturning_amplitude.values * np.tan(frame.alpha))  # g
+    lowest.append(found.data.overturning_amplitude.values * np.tan(frame.alpha))  # g
 at_one = [float(np.interp(1.0, frequencies, amplitude)) for amplitude in lowest]
 print("a pulse of 1 Hz overturns them from", ", ".join(f"{amplitude:.3f} g" for amplitude in at_one), "on")
 

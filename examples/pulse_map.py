@@ -34,7 +34,7 @@ slender = rocking.Block.from_parameters(p=2.0, alpha=1e-5, restitution=0.9)
 found = rocking.overturning_map(
     slender, "one-sine", amplitudes=np.linspace(0.5, 15.0, 30), frequencies=w, model="linear"
 )
-at_once = found.boundary_amplitude.where(found.mode_above == 0, drop=True).values
+at_once = found.data.boundary_amplitude.where(found.data.mode_above == 0, drop=True).values
 difference = np.max(np.abs(at_once - exact))
 print(f"largest difference from the closed form {difference:.0e}")
 

@@ -17,7 +17,7 @@ motions = [rocking.records.load(name).scaled_to(0.5, "pgv") for name in names]
 
 sizes = np.geomspace(20.0, 160.0, 16)  # half diagonal, m
 large = rocking.rocking_spectrum(rocking.Blocks.grid(alpha=[0.1], size=sizes), motions)
-exponents = [np.polyfit(np.log(sizes), np.log(peaks), 1)[0] for peaks in large.peak_rotation.values[:, 0]]
+exponents = [np.polyfit(np.log(sizes), np.log(peaks), 1)[0] for peaks in large.data.peak_rotation.values[:, 0]]
 exponent = np.median(exponents)
 print(f"peak rotation goes as R^{exponent:.3f}, in the median of {len(motions)} records")
 
@@ -26,7 +26,7 @@ print(f"peak rotation goes as R^{exponent:.3f}, in the median of {len(motions)} 
 
 blocks = rocking.Blocks.grid(alpha=[0.1, 0.2], size=np.geomspace(0.3, 60.0, 48))
 spectrum = rocking.rocking_spectrum(blocks, motions)
-largest = spectrum["size"].where(spectrum.overturned_share > 0.0).max("p").values
+largest = spectrum.data["size"].where(spectrum.data.overturned_share > 0.0).max("p").values
 for alpha, size in zip((0.1, 0.2), largest, strict=True):
     print(f"slenderness {alpha:g}: the largest block that some record overturns has R = {size:.2f} m")
 

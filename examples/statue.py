@@ -30,8 +30,8 @@ print(f"under the Ridgecrest record, scaled to 5 m/s^2, it turns by {peak:.4f} r
 # The rose has all azimuths: what acceleration of the ground lifts the statue towards each.
 
 rose = statue.rose()
-least = rose.weakest_acceleration
-print(f"the least acceleration that lifts it is {least:.4f} g, towards {rose.weakest_azimuth:g} degrees")
+least = rose.data.weakest_acceleration
+print(f"the least acceleration that lifts it is {least:.4f} g, towards {rose.data.weakest_azimuth:g} degrees")
 
 # %%
 

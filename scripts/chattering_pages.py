@@ -209,7 +209,7 @@ def largest_complete(family, omega):
     while high - low > 1e-7:
         middle = 0.5 * (low + high)
         dataset = chattering_map(family, {"a": [middle], "omega": [omega]})
-        low, high = (middle, high) if bool(dataset.complete.item()) else (low, middle)
+        low, high = (middle, high) if bool(dataset.data.complete.item()) else (low, middle)
     return f"{low:.6f}"
 
 

@@ -95,7 +95,7 @@ def blocks_tables():
             block, "one-sine", amplitudes=np.linspace(1.001, 6.0, 51), frequencies=[4.0 * math.pi / block.sides[0].p],
             tolerance=1e-12, progress=False,
         )  # fmt: skip
-        ours = float(map_of.overturning_amplitude[0])
+        ours = float(map_of.data.overturning_amplitude[0])
         within = "yes" if abs(ours - theirs) <= OTHERS_ERROR else "no"
         rows.append((f"{radius:g}", f"{theirs:.5f}", f"{ours:.8f}", f"{ours - theirs:+.1e}", within))
     heading = ("R, m", "theirs, +- 4.9e-6", "here", "difference", "within their bound")

@@ -22,7 +22,7 @@ ONE = {"a": [1.0], "b": [1.0]}
 
 def outcome_of(motion, block=BLOCK, model="linear"):
     dataset = chattering_map(lambda a, b: SimulationInput(block, motion, model), ONE)
-    return Outcome(dataset.outcome.item())
+    return Outcome(dataset.data.outcome.item())
 
 
 # The region of complete chattering
@@ -35,23 +35,23 @@ def test_under_a_sine_the_boundary_is_the_critical_amplitude(omega, eta):
     critical = float(critical_amplitude(omega, eta))
     around = critical + (critical - 1.0) * np.array([-1e-6, 1e-6])
     dataset = chattering_map(families.sine(block, model="linear"), {"a": around, "omega": [omega]})
-    assert dataset.complete.values.ravel().tolist() == [True, False]
+    assert dataset.data.complete.values.ravel().tolist() == [True, False]
 
 
 def test_under_a_sine_the_time_to_rest_is_the_chattering_time():
     a, omega = np.linspace(1.005, 1.035, 7), np.array([0.8, 2.0, 5.0])
     dataset = chattering_map(families.sine(BLOCK, model="linear"), {"a": a, "omega": omega})
     expected = chattering_time(a[:, np.newaxis], omega, 0.92) / 2.0
-    np.testing.assert_allclose((dataset.rest - dataset.uplift).values, expected, rtol=1e-10)
-    assert (dataset.lower <= dataset.rest).all()
-    assert (dataset.rest <= dataset.upper).all()
-    assert (dataset.upper - dataset.lower < 1e-11).all()
+    np.testing.assert_allclose((dataset.data.rest - dataset.data.uplift).values, expected, rtol=1e-10)
+    assert (dataset.data.lower <= dataset.data.rest).all()
+    assert (dataset.data.rest <= dataset.data.upper).all()
+    assert (dataset.data.upper - dataset.data.lower < 1e-11).all()
 
 
 def test_the_nonlinear_boundary_of_a_slender_block_is_near_the_linear_one():
     slender = rocking.Block.from_parameters(p=2.0, alpha=0.02, restitution=0.92)
     around = {"a": float(critical_amplitude(2.0, 0.92)) + np.array([-1e-4, 1e-4]), "omega": [2.0]}
-    assert chattering_map(families.sine(slender), around).complete.values.ravel().tolist() == [True, False]
+    assert chattering_map(families.sine(slender), around).data.complete.values.ravel().tolist() == [True, False]
 
 
 def lobes(*amplitudes):
@@ -85,19 +85,19 @@ def test_overturning_after_a_complete_sequence_is_both():
     dataset = chattering_map(
         lambda a, b: SimulationInput(BLOCK, lobes(1.02, *quiet, a), "linear"), {"strong": [1.5, 9.0], "any": [0.0]}
     )
-    assert dataset.complete.all()
-    assert dataset.overturned.values.ravel().tolist() == [False, True]
-    assert dataset.rests.values.ravel().tolist() == [2, 1]
+    assert dataset.data.complete.all()
+    assert dataset.data.overturned.values.ravel().tolist() == [False, True]
+    assert dataset.data.rests.values.ravel().tolist() == [2, 1]
 
 
 def test_an_uplift_by_hardly_more_than_rounding_is_complete_only_if_proven():
     record = rocking.records.load("ridgecrest-clc-090").processed(trim=(225.0, 245.0))
     dataset = chattering_map(families.record(record, 0.2, 0.92), {"a": [1.0 + 1e-15, 1.0 + 1e-13], "p": [2.0]})
-    below, above = dataset.outcome.values.ravel()
+    below, above = dataset.data.outcome.values.ravel()
     assert below == Outcome.NO_UPLIFT
     assert above in (Outcome.COMPLETE, Outcome.UNPROVEN)
-    assert bool(dataset.complete[1, 0]) == (above == Outcome.COMPLETE)
-    assert bool(np.isfinite(dataset.upper[1, 0])) == (above == Outcome.COMPLETE)
+    assert bool(dataset.data.complete[1, 0]) == (above == Outcome.COMPLETE)
+    assert bool(np.isfinite(dataset.data.upper[1, 0])) == (above == Outcome.COMPLETE)
 
 
 @pytest.mark.parametrize("model", ["linear", "nonlinear"])
@@ -108,8 +108,8 @@ def test_at_the_threshold_nothing_lifts_a_block_whichever_way_its_peak_was_round
     peaks = [pulses(1.0, ratio).motion.pga / min(block.uplift_thresholds(model)) for ratio in omega]
     assert max(peaks) > 1.0
     dataset = chattering_map(pulses, {"a": [1.0, 1.0 + 1e-9], "omega": omega})
-    assert (dataset.outcome.values[0] == Outcome.NO_UPLIFT).all()
-    assert (dataset.outcome.values[1] == Outcome.COMPLETE).all()
+    assert (dataset.data.outcome.values[0] == Outcome.NO_UPLIFT).all()
+    assert (dataset.data.outcome.values[1] == Outcome.COMPLETE).all()
 
 
 def test_a_weight_that_falls_lifts_a_block_whose_motion_does_not_reach_the_threshold():
@@ -126,9 +126,11 @@ def test_what_overturns_after_its_first_rocking_is_counted_and_hatched():
         return families.SimulationInput(rocking.Block.from_parameters(p, 0.15, 0.93), record.scaled_to(pga * 9.80665))
 
     found = chattering_map(case, {"pga": np.linspace(0.3, 0.9, 5), "p": np.linspace(2.0, 6.0, 5)})
-    later = (found.overturned & (found.outcome != Outcome.OVERTURNS)).values
-    assert 2 <= later.sum() < found.overturned.values.sum() or later.sum() == found.overturned.values.sum() >= 2
-    share = f"{100 * found.overturned.values.mean():.1f} %, {100 * later.mean():.1f} % after a first rest"
+    later = (found.data.overturned & (found.data.outcome != Outcome.OVERTURNS)).values
+    assert (
+        2 <= later.sum() < found.data.overturned.values.sum() or later.sum() == found.data.overturned.values.sum() >= 2
+    )
+    share = f"{100 * found.data.overturned.values.mean():.1f} %, {100 * later.mean():.1f} % after a first rest"
     assert found.summary().endswith(f"overturns in the end: {share}")
     figure = found.plot()
     hatched = [each for each in figure.axes[0].collections if each.get_hatch()]
@@ -138,14 +140,14 @@ def test_what_overturns_after_its_first_rocking_is_counted_and_hatched():
 
 def test_a_map_tells_its_outcomes_and_units_and_can_be_stored(tmp_path):
     dataset = chattering_map(families.sine(BLOCK, model="linear"), {"a": [0.9, 1.03, 1.05], "omega": [1.0, 2.0]})
-    assert dataset.outcome.dims == ("a", "omega")
-    assert dataset.outcome.attrs["flag_meanings"].split()[Outcome.COMPLETE] == "complete"
-    assert dataset.rest.attrs["units"] == "s"
+    assert dataset.data.outcome.dims == ("a", "omega")
+    assert dataset.data.outcome.attrs["flag_meanings"].split()[Outcome.COMPLETE] == "complete"
+    assert dataset.data.rest.attrs["units"] == "s"
     dataset.to_netcdf(tmp_path / "map.nc")
     import xarray as xr
 
     with xr.open_dataset(tmp_path / "map.nc", engine="h5netcdf") as stored:
-        np.testing.assert_array_equal(stored.outcome, dataset.outcome)
+        np.testing.assert_array_equal(stored.outcome, dataset.data.outcome)
 
 
 @pytest.mark.parametrize(
@@ -169,15 +171,15 @@ def test_parameters_that_a_family_has_by_name_may_stand_in_any_order(names):
     frequencies, amplitudes = [1.0, 2.0, 4.0], [1.02, 1.05]
     usual = chattering_map(families.sine(BLOCK), {"a": amplitudes, "omega": frequencies})
     turned = chattering_map(families.sine(BLOCK), dict(zip(names, (frequencies, amplitudes), strict=True)))
-    assert turned.outcome.dims == names
-    np.testing.assert_array_equal(turned.outcome.values, usual.outcome.values.T)
-    assert len(np.unique(usual.outcome)) > 1
+    assert turned.data.outcome.dims == names
+    np.testing.assert_array_equal(turned.data.outcome.values, usual.data.outcome.values.T)
+    assert len(np.unique(usual.data.outcome)) > 1
 
 
 def test_names_that_a_family_does_not_have_keep_their_order():
     usual = chattering_map(families.sine(BLOCK), {"a": [1.02, 1.05], "omega": [1.0, 2.0]})
     named = chattering_map(families.sine(BLOCK), {"amplitude": [1.02, 1.05], "frequency": [1.0, 2.0]})
-    np.testing.assert_array_equal(named.outcome.values, usual.outcome.values)
+    np.testing.assert_array_equal(named.data.outcome.values, usual.data.outcome.values)
 
 
 @pytest.mark.parametrize(

@@ -30,8 +30,8 @@ def test_spectrum_json_is_the_spectrum(run):
     dataset = rocking_spectrum(rocking.Blocks.grid(alpha=[0.1, 0.2], p=quantities.values("1:4:5:log", "--p")), motions)
     assert result["motions"] == [RECORD, OTHER]
     assert result["axes"] == ["alpha", "p"]
-    assert result["overturned_share"] == dataset.overturned_share.values.tolist()
-    shown = dataset.fractile_over_alpha.values
+    assert result["overturned_share"] == dataset.data.overturned_share.values.tolist()
+    shown = dataset.data.fractile_over_alpha.values
     assert result["fractile_over_alpha"] == np.where(np.isinf(shown), None, shown).tolist()
 
 
@@ -50,8 +50,10 @@ def test_map_json_is_the_map(run):
     block = rocking.Block.from_parameters(1.0, 0.2, 0.9)
     grid = {"amplitudes": np.linspace(0.5, 8.0, 16), "frequencies": [2.0, 5.0]}
     dataset = overturning_map(block, "one-sine", model="linear", **grid)
-    assert result["mode"] == dataset.mode.values.tolist()
-    assert [row["boundary_amplitude"] for row in result["boundaries"]] == dataset.boundary_amplitude.values.tolist()
+    assert result["mode"] == dataset.data.mode.values.tolist()
+    assert [
+        row["boundary_amplitude"] for row in result["boundaries"]
+    ] == dataset.data.boundary_amplitude.values.tolist()
     assert result["modes"]["0"] == "overturns without impact"
 
 
@@ -65,8 +67,8 @@ def test_ida_json_is_the_analysis(run):
         measure="pgv",
         levels=np.linspace(0.2, 1.5, 12),
     )
-    assert result["overturning_level_m_s"] == float(dataset.overturning_level[0, 0])
-    assert [band["from_m_s"] for band in result["overturns"]] == dataset.band_start.values.tolist()
+    assert result["overturning_level_m_s"] == float(dataset.data.overturning_level[0, 0])
+    assert [band["from_m_s"] for band in result["overturns"]] == dataset.data.band_start.values.tolist()
     assert result["overturns"][-1]["to_m_s"] is None
 
 

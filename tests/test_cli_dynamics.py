@@ -20,8 +20,8 @@ def test_basin_json_is_the_basins(run):
     block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     shaking = pulses.sine(3.5, 1.2, cycles=1)
     found = dynamics.basins(block, shaking, np.linspace(-0.2, 0.2, 12), np.linspace(-0.4, 0.4, 11))
-    assert [each["attractor"] for each in result["attractors"]] == found.attractor.values.tolist()
-    assert [each["share"] for each in result["attractors"]] == found.share.values.tolist()
+    assert [each["attractor"] for each in result["attractors"]] == found.data.attractor.values.tolist()
+    assert [each["share"] for each in result["attractors"]] == found.data.share.values.tolist()
     assert result["complete"] is True and result["basin_entropy"] == found.entropy[0]
 
 
@@ -44,7 +44,10 @@ def test_bifurcation_json_is_the_diagram(run, pulse, along, parameter):
         lambda value: (block, pulses.sine(value if over else 2.5, 1.2 if over else value, cycles=1)),
         result["value"], [0.02, 0.1], kept=8,
     )  # fmt: skip
-    assert result["period"] == found.period.values.tolist() and result["impacts"] == found.impacts.values.tolist()
+    assert (
+        result["period"] == found.data.period.values.tolist()
+        and result["impacts"] == found.data.impacts.values.tolist()
+    )
 
 
 @pytest.mark.thorough
@@ -69,10 +72,10 @@ def test_every_body_has_a_basin_and_a_diagram(run, options, body):
     grid = ["--positions", "0:1cm:3", "--velocities", "0,0.1"]
     _, out, _ = run("basin", *pulse, *options, *grid, "--json")
     expected = dynamics.basins(body, pulses.sine(3.0, 1.3, cycles=1), [0.0, 0.005, 0.01], [0.0, 0.1])
-    assert [each["share"] for each in json.loads(out)["attractors"]] == expected.share.values.tolist()
+    assert [each["share"] for each in json.loads(out)["attractors"]] == expected.data.share.values.tolist()
     code, out, err = run("bifurcation", *pulse, *options, "--along", "amplitude:2,3", "--kept", "8", "--json")
     assert (code, err) == (0, "")
     found = dynamics.bifurcation_diagram(
         lambda value: (body, pulses.sine(value, 1.3, cycles=1)), [2.0, 3.0], [0.01, 0.0], direction="both", kept=8
     )
-    assert json.loads(out)["period"] == found.period.values.tolist()
+    assert json.loads(out)["period"] == found.data.period.values.tolist()

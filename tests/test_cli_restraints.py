@@ -51,7 +51,7 @@ def test_ida_and_fragility_take_restraints(run):
     assert code == 0
     levels = [1.0 + 0.5 * k for k in range(7)]
     truth = rocking.incremental_dynamic_analysis(body, pulse, levels=levels)
-    assert json.loads(out)["motions"][0]["peak_over_alpha"][0] == truth.peak_over_alpha.values.ravel()[0]
+    assert json.loads(out)["motions"][0]["peak_over_alpha"][0] == truth.data.peak_over_alpha.values.ravel()[0]
     code, out, _ = run("fragility", *given, *SIZES, *FACADE, "--levels", "1:4:7", "--polarity", "both", "--json")
     truth = rocking.fragility(body, pulse, levels=levels, polarity="both")
     assert json.loads(out)["curves"][0]["median"] == pytest.approx(truth.curves[0].median)

@@ -263,7 +263,7 @@ def test_a_scaled_motion_is_distinguished_from_the_record(run):
     spectrum = rocking.rocking_spectrum(rocking.Blocks.grid(alpha=0.2, p=[1.0, 2.0], restitution=0.9), scaled)
     assert scaled.label in spectrum.summary().splitlines()[0]
     assert scaled.label in spectrum.plot().get_suptitle().replace("\n", " ")
-    assert list(spectrum.motion.values) == [RECORD]
+    assert list(spectrum.data.motion.values) == [RECORD]
     blocks = rocking.Blocks.grid(alpha=0.2, p=[1.0, 2.0], restitution=0.9)
     two = rocking.rocking_spectrum(blocks, [scaled, record]).summary()
     assert "2 motions, 1 of them scaled or processed" in two

@@ -36,7 +36,7 @@ def test_every_outcome_is_that_of_the_block_under_the_motion_along_its_azimuth(s
             for azimuth in azimuths:
                 block = statue.block(azimuth)
                 response = rocking.simulate(block, one.rotated(other, azimuth).scaled(factor))
-                here = found.sel(pair=name, level=level, azimuth=azimuth)
+                here = found.data.sel(pair=name, level=level, azimuth=azimuth)
                 assert bool(here.overturned) == response.overturned
                 if not response.overturned:
                     wanted = response.peak_rotation / min(block.balance)
@@ -46,15 +46,15 @@ def test_every_outcome_is_that_of_the_block_under_the_motion_along_its_azimuth(s
                 judged += 1
     assert judged == 16
     # Across from 50 deg the mirror image is under the mirrored motion.
-    assert np.array_equal(found.overturned.sel(azimuth=50.0), found.overturned.sel(azimuth=230.0))
-    assert 0.0 < float(found.overturned.mean()) < 1.0
-    assert found.anywhere.values.tolist() == found.overturned.any("azimuth").mean("pair").values.tolist()
+    assert np.array_equal(found.data.overturned.sel(azimuth=50.0), found.data.overturned.sel(azimuth=230.0))
+    assert 0.0 < float(found.data.overturned.mean()) < 1.0
+    assert found.data.anywhere.values.tolist() == found.data.overturned.any("azimuth").mean("pair").values.tolist()
 
 
 def test_pairs_as_they_are_have_one_level(statue, pairs):
     found = response_rose(statue, [pairs["pulses"]] * 2, azimuths=[0.0])
-    assert found.level.values.tolist() == [1.0]
-    assert len({*found.pair.values.tolist()}) == 2
+    assert found.data.level.values.tolist() == [1.0]
+    assert len({*found.data.pair.values.tolist()}) == 2
     assert "factor of the motion 1" in found.summary()
 
 
@@ -63,7 +63,7 @@ def test_the_figure_has_the_full_circle(statue, pairs):
     axes = found.plot().axes[0]
     curves = [line for line in axes.lines if line.get_marker() == "o"]
     assert [len(line.get_xdata()) for line in curves] == [7, 7]
-    for line, shares in zip(curves, found.overturned_share.values, strict=True):
+    for line, shares in zip(curves, found.data.overturned_share.values, strict=True):
         np.testing.assert_allclose(np.hypot(*line.get_data())[:6], [*shares, *shares], atol=1e-15)
 
 

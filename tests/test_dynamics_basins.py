@@ -48,7 +48,7 @@ def compared(seed, cells, periods=200):
     strobe = dynamics.stroboscopic_map(body, motion, model=model)
     states = np.stack(np.meshgrid(x, v), axis=-1).reshape(-1, 2)
     plain, fates, _ = strobe.followed(states, periods)
-    names, outcome = found.attractor.values, found.outcome.values.ravel()
+    names, outcome = found.data.attractor.values, found.data.outcome.values.ravel()
     size = np.array([np.ptp(x), np.ptp(v)])
     judged, wrong, ambiguous = 0, 0, 0
     for k, name in enumerate(names):
@@ -59,10 +59,12 @@ def compared(seed, cells, periods=200):
         if name.startswith("overturns"):
             off = here & (fates != dynamics.Fate.OVERTURNED)
         else:
-            orbit = np.stack([found.orbit_coordinate.values[k], found.orbit_velocity.values[k]], axis=-1)
+            orbit = np.stack([found.data.orbit_coordinate.values[k], found.data.orbit_velocity.values[k]], axis=-1)
             apart = np.nanmin(np.abs((plain[:, None] - orbit) / size).max(axis=2), axis=1, initial=9.0)
             # A slow approach is still on its way.
-            late = found.multiplier.values[k] ** ((periods - found.periods.values.ravel()) / found.period.values[k])
+            late = found.data.multiplier.values[k] ** (
+                (periods - found.data.periods.values.ravel()) / found.data.period.values[k]
+            )
             off = here & ~(apart < 1e-6 + 0.1 * late)
         wrong += np.count_nonzero(off)
         for state in states[off]:
@@ -92,9 +94,9 @@ def test_the_order_of_work_and_threads_do_not_count():
     x, v = np.linspace(-0.2, 0.2, 36), np.linspace(-0.4, 0.4, 31)
     one, two = (dynamics.basins(BLOCK, SHAKING, x, v, threads=count) for count in (1, 3))
     assert one.data.identical(two.data)
-    assert one.share.values.sum() == pytest.approx(1.0)
-    assert one.standard_error.values == pytest.approx(np.sqrt(one.share * (1.0 - one.share) / (36 * 31)))
-    assert np.count_nonzero(one.outcome.values < 0) == 0
+    assert one.data.share.values.sum() == pytest.approx(1.0)
+    assert one.data.standard_error.values == pytest.approx(np.sqrt(one.data.share * (1.0 - one.data.share) / (36 * 31)))
+    assert np.count_nonzero(one.data.outcome.values < 0) == 0
 
 
 @pytest.mark.thorough
@@ -112,12 +114,12 @@ def test_an_interrupt_keeps_what_was_computed(monkeypatch):
 
     monkeypatch.setattr(basin_grid.Grid, "_follow", interrupted)
     part = dynamics.basins(BLOCK, SHAKING, x, v)
-    reached = part.outcome.values >= 0
+    reached = part.data.outcome.values >= 0
     assert 400 < np.count_nonzero(reached) == sum(calls[:2]) < reached.size
     assert np.all(np.any(reached.reshape(22, 2, 22, 2), axis=(1, 3)))  # coarse to fine: one of each four cells
     assert "not reached" in part.summary() and part.to_dict()["complete"] is False
-    names = part.attractor.values[part.outcome.values[reached]]
-    assert np.array_equal(names, whole.attractor.values[whole.outcome.values[reached]])
+    names = part.data.attractor.values[part.data.outcome.values[reached]]
+    assert np.array_equal(names, whole.data.attractor.values[whole.data.outcome.values[reached]])
 
 
 @pytest.mark.thorough
@@ -141,24 +143,24 @@ def test_a_state_at_any_point_of_a_long_orbit_has_settled_on_it():
 def test_a_small_part_of_a_grid_has_the_same_attractor(width):
     x, v = np.linspace(0.02, 0.02 + width, 3), np.linspace(0.1, 0.1 + 2.0 * width, 3)
     found = dynamics.basins(BLOCK, SHAKING, *((x, v) if width else (x[:1], v[:1])))
-    assert found.attractor.values.tolist() == ["period 1, 2 impacts"]
+    assert found.data.attractor.values.tolist() == ["period 1, 2 impacts"]
 
 
 def test_what_rests_is_an_attractor_and_a_chaotic_state_has_not_settled():
     still = dynamics.basins(BLOCK, pulses.sine(1.0, 1.0, cycles=1), np.linspace(-1e-3, 1e-3, 9), [0.0])
-    assert still.attractor.values.tolist() == ["rest"] and still.share.values == [1.0]
-    assert still.rests.values.tolist() == [True] and still.multiplier.values == [0.0]
+    assert still.data.attractor.values.tolist() == ["rest"] and still.data.share.values == [1.0]
+    assert still.data.rests.values.tolist() == [True] and still.data.multiplier.values == [0.0]
     ball = dynamics.BouncingBall(0.8, gravity=10.0)
     chaos = dynamics.basins(ball, pulses.sine(30.0, 5.0, cycles=1), np.linspace(0.0, 0.5, 9), [0.0, 0.5])
-    assert chaos.attractor.values.tolist() == ["not settled"]
-    assert np.all(chaos.periods.values == 200) and math.isnan(chaos.multiplier.values[0])
+    assert chaos.data.attractor.values.tolist() == ["not settled"]
+    assert np.all(chaos.data.periods.values == 200) and math.isnan(chaos.data.multiplier.values[0])
 
 
 def test_an_orbit_that_neither_attracts_nor_repels_is_no_attractor():
     """Without damping and impacts every state comes back after two periods of a motion twice as fast."""
     free = dynamics.ImpactOscillator(1.0, 0.5, stop=1.0)
     found = dynamics.basins(free, pulses.sine(0.1, 2.0, cycles=1), np.linspace(-0.1, 0.1, 5), [0.0, 0.1], 50)
-    assert found.attractor.values.tolist() == ["not settled"]
+    assert found.data.attractor.values.tolist() == ["not settled"]
 
 
 def test_a_neighbourhood_holds_what_enters_it():

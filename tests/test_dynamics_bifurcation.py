@@ -30,11 +30,11 @@ def test_the_period_of_a_ball_doubles_where_its_closed_form_says(e, about):
     found = dynamics.bifurcation_diagram(
         ball_case(e), values, start_of_one_bounce(e, values[0])[0], transient=6000, kept=16
     )
-    assert found.period.values[0, :, 0].tolist() == [1, 1, 2, 2]
-    assert found.impacts.values[0, :, 0].tolist() == [1, 1, 2, 2]
+    assert found.data.period.values[0, :, 0].tolist() == [1, 1, 2, 2]
+    assert found.data.impacts.values[0, :, 0].tolist() == [1, 1, 2, 2]
     assert found.changes() == [(values[1], values[2], 1, 2)]
     # The two states part as the square root of the distance from the bifurcation.
-    parted = np.ptp(found.velocity.values[0, :, 0], axis=-1)
+    parted = np.ptp(found.data.velocity.values[0, :, 0], axis=-1)
     assert parted[3] / parted[2] == pytest.approx(math.sqrt(2.0), rel=0.02)
 
 
@@ -44,9 +44,9 @@ def test_an_orbit_that_is_still_settling_has_no_period():
     found = dynamics.bifurcation_diagram(
         ball_case(0.5), at - np.array([0.002, 0.0008]), start_of_one_bounce(0.5, at - 0.1)[0], transient=1500
     )
-    states = found.velocity.values[0, 1, 0]
+    states = found.data.velocity.values[0, 1, 0]
     assert abs(states[-1] - states[-3]) < 1e-6 * abs(states[-1]) < abs(states[-1] - states[-2])
-    assert found.period.values[0, 1, 0] == 0
+    assert found.data.period.values[0, 1, 0] == 0
 
 
 def symmetric_states(p, alpha, e, amplitude, omega):
@@ -89,9 +89,9 @@ def test_a_linear_block_follows_its_symmetric_orbit():
     judged = 0
     for way in range(2):
         for k, ratio in enumerate(values):
-            if found.period.values[way, k, 0] != 1 or found.impacts.values[way, k, 0] != 2:
+            if found.data.period.values[way, k, 0] != 1 or found.data.impacts.values[way, k, 0] != 2:
                 continue
-            state = [found.coordinate.values[way, k, 0, -1], found.velocity.values[way, k, 0, -1]]
+            state = [found.data.coordinate.values[way, k, 0, -1], found.data.velocity.values[way, k, 0, -1]]
             closed = symmetric_states(p, alpha, e, ratio * G * alpha, omega)
             assert np.abs(closed - state).max(axis=1).min() < 1e-10
             judged += 1
@@ -104,11 +104,11 @@ def test_going_up_and_down_keep_what_they_are_on():
     for direction, first in (("up", values[0]), ("down", values[-1])):
         starts = [[0.0, 0.0], start_of_one_bounce(0.8, first)[0]]
         found = dynamics.bifurcation_diagram(ball_case(0.8), values, starts, direction=direction)
-        assert np.all(found.coordinate.values[0, :, 0] == 0.0) and np.all(found.impacts.values[0, :, 0] == 0)
-        assert np.all(found.impacts.values[0, :, 1] == 1)
+        assert np.all(found.data.coordinate.values[0, :, 0] == 0.0) and np.all(found.data.impacts.values[0, :, 0] == 0)
+        assert np.all(found.data.impacts.values[0, :, 1] == 1)
         expected = np.array([start_of_one_bounce(0.8, value)[0] for value in values])
-        assert found.coordinate.values[0, :, 1, -1] == pytest.approx(expected[:, 0], abs=1e-9)
-        assert found.velocity.values[0, :, 1, -1] == pytest.approx(expected[:, 1], abs=1e-8)
+        assert found.data.coordinate.values[0, :, 1, -1] == pytest.approx(expected[:, 0], abs=1e-9)
+        assert found.data.velocity.values[0, :, 1, -1] == pytest.approx(expected[:, 1], abs=1e-8)
 
 
 def test_kept_states_are_those_of_the_map_after_its_transient():
@@ -119,9 +119,9 @@ def test_kept_states_are_those_of_the_map_after_its_transient():
     for k, value in enumerate(values):
         strobe = dynamics.stroboscopic_map(*ball_case(0.5)(value))
         kept = strobe.orbit(strobe([0.1, 0.5], 30), 7)[1:]
-        assert np.array_equal(np.stack([afresh.coordinate[0, k, 0], afresh.velocity[0, k, 0]], axis=-1), kept)
+        assert np.array_equal(np.stack([afresh.data.coordinate[0, k, 0], afresh.data.velocity[0, k, 0]], axis=-1), kept)
         going = strobe.orbit(strobe(state, 30), 7)[1:]
-        assert np.array_equal(np.stack([up.coordinate[0, k, 0], up.velocity[0, k, 0]], axis=-1), going)
+        assert np.array_equal(np.stack([up.data.coordinate[0, k, 0], up.data.velocity[0, k, 0]], axis=-1), going)
         state = going[-1]
 
 
@@ -130,8 +130,8 @@ def test_a_block_that_overturns_leaves_a_gap_and_starts_again():
     found = dynamics.bifurcation_diagram(
         lambda a: (block, pulses.sine(a, 0.8, cycles=1)), [1.0, 9.0, 30.0], [0.0, 0.0], direction="down"
     )
-    assert found.period.values[0, :, 0].tolist() == [1, -1, -1]
-    assert np.isnan(found.coordinate.values[0, 1:]).all() and "overturned" in found.summary()
+    assert found.data.period.values[0, :, 0].tolist() == [1, -1, -1]
+    assert np.isnan(found.data.coordinate.values[0, 1:]).all() and "overturned" in found.summary()
     assert found.changes() == [(9.0, 1.0, -1, 1)]
 
 
@@ -142,8 +142,8 @@ def test_a_velocity_that_is_zero_but_for_rounding_has_no_period_of_its_own():
         lambda frequency: (oscillator, pulses.sine(1.0, frequency, cycles=1)),
         [0.8, 0.9, 1.0, 1.1, 1.2], [0.0, 0.1], transient=800,
     )  # fmt: skip
-    assert np.abs(found.velocity.values[0, 2]).max() < 1e-14
-    assert found.period.values[0, :, 0].tolist() == [1] * 5
+    assert np.abs(found.data.velocity.values[0, 2]).max() < 1e-14
+    assert found.data.period.values[0, :, 0].tolist() == [1] * 5
 
 
 def test_a_small_orbit_has_its_period():
@@ -161,7 +161,7 @@ def test_impacts_are_those_of_the_orbit_infinite_where_chattering_is_complete(re
 
     found = dynamics.bifurcation_diagram(case, levels, [0.0, 0.0], chattering=chattering)
     orbits = [dynamics.periodic_orbits(*case(level), starts=[[0.0, 0.0]], chattering=chattering)[0] for level in levels]
-    impacts = found.impacts.values[0, :, 0].tolist()
+    impacts = found.data.impacts.values[0, :, 0].tolist()
     assert impacts == [each.impacts for each in orbits] and impacts[0] == 0.0 < impacts[1]
     assert math.isinf(impacts[1]) == (restitution > 0.0 and chattering == "certified")
 
@@ -173,8 +173,8 @@ def test_what_takes_too_many_steps_is_not_said_to_overturn(transient):
         lambda level: (lively, pulses.sine(level, 0.5, cycles=1)), [0.1], start, transient=transient, kept=2
     )
     _, fate, _ = dynamics.stroboscopic_map(lively, pulses.sine(0.1, 0.5, cycles=1)).followed(start)
-    assert fate == dynamics.Fate.UNFINISHED and np.isnan(found.coordinate.values).all()
-    assert found.period.values.tolist() == [[[-2]]]
+    assert fate == dynamics.Fate.UNFINISHED and np.isnan(found.data.coordinate.values).all()
+    assert found.data.period.values.tolist() == [[[-2]]]
     assert found.summary().endswith("up: not followed throughout") and "overturned" not in found.summary()
     (figure_legend,) = found.plot().legends
     assert "not followed" in [text.get_text() for text in figure_legend.get_texts()]
@@ -185,7 +185,7 @@ def test_a_stop_that_moves_takes_the_body_with_it():
         lambda stop: (dynamics.ImpactOscillator(1.0, 0.7, stop=stop), pulses.sine(1.0, 0.7, cycles=1)),
         [-0.3, -0.2, 0.0], [0.4, 0.0], direction="down", transient=50,
     )  # fmt: skip
-    assert np.all(found.coordinate.values[0, :, 0].min(axis=-1) >= np.array([0.3, 0.2, 0.0]))
+    assert np.all(found.data.coordinate.values[0, :, 0].min(axis=-1) >= np.array([0.3, 0.2, 0.0]))
 
 
 @pytest.mark.parametrize(

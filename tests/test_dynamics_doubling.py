@@ -97,4 +97,4 @@ def test_orbits_leave_a_flip_as_the_square_root_of_the_distance(once, twice):
 def test_a_period_doubles_again_where_a_long_simulation_says(twice):
     flip = twice.bifurcations[1].value
     found = dynamics.bifurcation_diagram(table, [flip - 0.004, flip + 0.004], twice.states[-1], transient=1500)
-    assert found.period.values[0, :, 0].tolist() == [2, 4]
+    assert found.data.period.values[0, :, 0].tolist() == [2, 4]

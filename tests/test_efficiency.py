@@ -25,22 +25,22 @@ def test_dispersions_are_those_of_the_closed_form_of_rectangular_pulses(rectangl
     amplitude = G * 1e-3 / -np.expm1(-LENGTHS)
     names = {"PGA": amplitude, "PGV": amplitude * LENGTHS, "PGA / uplift acceleration": amplitude}
     for name, capacity in names.items():
-        found = rectangles.sel(measure=name)
+        found = rectangles.data.sel(measure=name)
         assert float(found.dispersion) == pytest.approx(np.std(np.log(capacity), ddof=1), rel=1e-7)
         assert float(found.dispersion_of_all) == pytest.approx(float(found.dispersion), rel=1e-12)
-    np.testing.assert_allclose(rectangles.intensity.sel(measure="PGA").values[:, 0], amplitude, rtol=1e-8)
+    np.testing.assert_allclose(rectangles.data.intensity.sel(measure="PGA").values[:, 0], amplitude, rtol=1e-8)
     np.testing.assert_allclose(
-        rectangles.intensity.sel(measure="p PGV / uplift acceleration").values[:, 0],
+        rectangles.data.intensity.sel(measure="p PGV / uplift acceleration").values[:, 0],
         amplitude * LENGTHS / (G * 1e-3),
         rtol=1e-8,
     )
 
 
 def test_the_interval_is_that_of_a_normal_sample(rectangles):
-    beta = rectangles.dispersion.values
+    beta = rectangles.data.dispersion.values
     low, high = (np.sqrt(2.0 / chi2.ppf(share, 2)) for share in (0.95, 0.05))
-    np.testing.assert_allclose(rectangles.dispersion_low.values, low * beta, rtol=1e-12)
-    np.testing.assert_allclose(rectangles.dispersion_high.values, high * beta, rtol=1e-12)
+    np.testing.assert_allclose(rectangles.data.dispersion_low.values, low * beta, rtol=1e-12)
+    np.testing.assert_allclose(rectangles.data.dispersion_high.values, high * beta, rtol=1e-12)
 
 
 @pytest.mark.slow
@@ -60,8 +60,8 @@ def test_a_measure_that_was_scattered_by_hand_gets_its_scatter_back():
     block = rocking.Block.from_parameters(p=2.0, alpha=0.2)
     found = compare_measures(block, motions, periods=[1.0], tolerance=1e-6, progress=False)
     expected = float(np.std(np.log(scatter), ddof=1))
-    assert float(found.dispersion.sel(measure="PGA")) == pytest.approx(expected, rel=0.02)
-    assert float(found.dispersion.sel(measure="PGV")) < 0.02
+    assert float(found.data.dispersion.sel(measure="PGA")) == pytest.approx(expected, rel=0.02)
+    assert float(found.data.dispersion.sel(measure="PGV")) < 0.02
     assert found.summary().splitlines()[3].startswith(("PGV", "SA(1 s)", "p PGV"))
 
 
@@ -71,7 +71,7 @@ def test_a_measure_in_the_blocks_own_units_serves_blocks_of_all_sizes():
     # Each pulse is short for every block, so that its velocity counts.
     pulses = [rocking.pulses.rectangular(1.0, length) for length in (0.005, 0.01, 0.02)]
     found = compare_measures(blocks, pulses, periods=[1.0], model="linear", tolerance=1e-3, progress=False)
-    within, overall = found.dispersion.to_series(), found.dispersion_of_all.to_series()
+    within, overall = found.data.dispersion.to_series(), found.data.dispersion_of_all.to_series()
     assert within["PGV"] == pytest.approx(within["p PGV / uplift acceleration"], rel=1e-9)
     assert overall["p PGV / uplift acceleration"] < 0.03 < 0.5 < overall["PGV"]
     assert "of all blocks" in found.summary()
@@ -93,11 +93,11 @@ def test_motions_of_a_cluster_count_as_one_in_the_intervals():
     options = {"periods": [0.7], "model": "linear", "tolerance": 1e-3, "progress": False}
     alone = compare_measures(SLENDER, pulses, **options)
     found = compare_measures(SLENDER, pulses, clusters=["a", "a", "b", "b", "c", "c"], **options)
-    assert np.array_equal(found.dispersion, alone.dispersion)
+    assert np.array_equal(found.data.dispersion, alone.data.dispersion)
     for compared, freedom in ((alone, 4), (found, 1)):
         ends = [math.sqrt(freedom / chi2.ppf(share, freedom)) for share in (0.95, 0.05)]
-        assert compared.dispersion_low.values == pytest.approx(ends[0] * alone.dispersion.values, rel=1e-12)
-        assert compared.dispersion_high.values == pytest.approx(ends[1] * alone.dispersion.values, rel=1e-12)
+        assert compared.data.dispersion_low.values == pytest.approx(ends[0] * alone.data.dispersion.values, rel=1e-12)
+        assert compared.data.dispersion_high.values == pytest.approx(ends[1] * alone.data.dispersion.values, rel=1e-12)
     assert "6 motions in 2 clusters" in found.summary() and "6 motions overturn" in alone.summary()
     with pytest.raises(rocking.InvalidOption, match="fewer than two clusters overturn"):
         compare_measures(SLENDER, pulses, clusters=[0] * 6)
@@ -110,12 +110,12 @@ def test_reversed_motions_count_where_the_sides_of_a_block_differ(slendernesses)
     pulses = [rocking.pulses.ricker(1.0, f).with_vertical(up) for f in (0.4, 0.6, 0.9)]
     options = {"periods": [1.0], "tolerance": 1e-3, "progress": False}
     found = compare_measures(block, [*pulses, *(pulse.scaled(-1.0) for pulse in pulses)], **options)
-    logarithms = np.log(found.intensity.sel(measure="PGA").values[:, 0])
+    logarithms = np.log(found.data.intensity.sel(measure="PGA").values[:, 0])
     counts = logarithms if block.sides[0] != block.sides[1] else logarithms[:3]
-    assert float(found.dispersion.sel(measure="PGA")) == pytest.approx(np.std(counts, ddof=1), rel=1e-12)
-    assert float(found.median_intensity.sel(measure="PGA")) == pytest.approx(np.exp(counts.mean()), rel=1e-12)
+    assert float(found.data.dispersion.sel(measure="PGA")) == pytest.approx(np.std(counts, ddof=1), rel=1e-12)
+    assert float(found.data.median_intensity.sel(measure="PGA")) == pytest.approx(np.exp(counts.mean()), rel=1e-12)
     end = math.sqrt(2.0 / chi2.ppf(0.05, 2))  # three pulses, each as it is and reversed
-    assert float(found.dispersion_high[0] / found.dispersion[0]) == pytest.approx(end, rel=1e-12)
+    assert float(found.data.dispersion_high[0] / found.data.dispersion[0]) == pytest.approx(end, rel=1e-12)
     assert (np.ptp(logarithms.reshape(2, 3), axis=0).max() > 0.01) == (len(counts) == 6)
 
 
@@ -127,14 +127,14 @@ def test_dispersions_of_several_blocks_are_written_out_sums(monkeypatch):
 
     def without_one(*given, **options):
         scaled = search(*given, **options)
-        level = scaled.overturning_level
+        level = scaled.data.overturning_level
         level[{"motion": 2, "block": 1}] = math.nan
         assert int(level.isnull().sum()) == 1
         return scaled
 
     monkeypatch.setattr(efficiency, "incremental_dynamic_analysis", without_one)
     found = compare_measures(blocks, motions, periods=[1.0], weights=[3.0, 1.0], tolerance=1e-2, progress=False)
-    for k, values in enumerate(found.intensity.values):
+    for k, values in enumerate(found.data.intensity.values):
         x = np.log(values)
         assert np.isnan(x).tolist() == [[False, False], [False, False], [False, True]]
         first, second = x[:, 0], x[:2, 1]
@@ -143,7 +143,7 @@ def test_dispersions_of_several_blocks_are_written_out_sums(monkeypatch):
         own = math.sqrt((shares[0] * squares[0] + shares[1] * squares[1]) / (shares[0] * 2.0 + shares[1] * 1.0))
         mean = (shares[0] * first.sum() + shares[1] * second.sum()) / (3 * shares[0] + 2 * shares[1])
         total = shares[0] * np.sum((first - mean) ** 2) + shares[1] * np.sum((second - mean) ** 2)
-        one = found.isel(measure=k)
+        one = found.data.isel(measure=k)
         assert float(one.median_intensity) == pytest.approx(math.exp(mean), rel=1e-13)
         assert float(one.dispersion) == pytest.approx(own, rel=1e-12)
         assert float(one.dispersion_of_all) == pytest.approx(
@@ -152,7 +152,7 @@ def test_dispersions_of_several_blocks_are_written_out_sums(monkeypatch):
         # Two motions remain that both blocks share: one degree of freedom, and no more.
         ends = [math.sqrt(1.0 / chi2.ppf(share, 1)) * own for share in (0.95, 0.05)]
         assert [float(one.dispersion_low), float(one.dispersion_high)] == pytest.approx(ends, rel=1e-12)
-    assert found.sizes["measure"] == 5
+    assert found.data.sizes["measure"] == 5
     assert "left out: 1 pair of block and motion" in found.summary()
 
 
@@ -171,6 +171,6 @@ def test_multiples_of_a_motion_count_once(rectangles):
     pulses = [rocking.pulses.rectangular(*one) for one in ((1.0, LENGTHS[0]), *((2.5, length) for length in LENGTHS))]
     found = compare_measures(SLENDER, pulses, periods=[0.7], model="linear", tolerance=1e-9, progress=False)
     for name in ("median_intensity", "dispersion", "dispersion_low", "dispersion_high", "dispersion_of_all"):
-        np.testing.assert_allclose(found[name].values, rectangles[name].values, rtol=1e-7)
+        np.testing.assert_allclose(found.data[name].values, rectangles.data[name].values, rtol=1e-7)
     with pytest.raises(rocking.InvalidOption, match="not multiples of one another"):
         compare_measures(SLENDER, pulses[:2], model="linear", progress=False)

@@ -691,8 +691,8 @@ def test_a_map_of_a_sine_is_the_packages_chattering_map():
     )
     found = filled(grid)
     expected = chattering_map(families.sine(case.block, model="linear"), {"a": grid.y.values, "omega": grid.x.values})
-    assert np.array_equal(found["outcome"], expected.outcome.values)
-    times = (expected.rest - expected.uplift).values
+    assert np.array_equal(found["outcome"], expected.data.outcome.values)
+    times = (expected.data.rest - expected.data.uplift).values
     assert np.array_equal(np.isnan(found["rest"]), np.isnan(times))
     assert found["rest"] == pytest.approx(times, rel=2e-6, nan_ok=True)
 
@@ -707,7 +707,7 @@ def test_a_map_of_a_record_is_the_packages_chattering_map():
     found = filled(grid)
     family = families.record(rocking.records.load("el-centro-meloland-270"), 0.2, 0.9)
     expected = chattering_map(family, {"a": grid.y.values, "p": grid.x.values})
-    assert np.array_equal(found["outcome"], expected.outcome.values)
+    assert np.array_equal(found["outcome"], expected.data.outcome.values)
 
 
 def test_peaks_and_modes_of_a_map_are_those_of_single_simulations():
@@ -719,10 +719,10 @@ def test_peaks_and_modes_of_a_map_are_those_of_single_simulations():
     expected = rocking.overturning_map(
         case.block, "one-sine", amplitudes=grid.y.values, frequencies=grid.x.values, model="linear", tolerance=0.4
     )
-    assert np.array_equal(found["mode"], expected.mode.values)
+    assert np.array_equal(found["mode"], expected.data.mode.values)
     stays = found["mode"] < 0
     assert np.count_nonzero(stays) >= 10 and np.count_nonzero(~stays) >= 10
-    assert found["peak"][stays] == pytest.approx(expected.peak_rotation.values[stays] / 0.2, rel=1e-6)
+    assert found["peak"][stays] == pytest.approx(expected.data.peak_rotation.values[stays] / 0.2, rel=1e-6)
     assert np.isinf(found["peak"][~stays]).all()
 
 
@@ -914,7 +914,7 @@ def test_the_critical_amplitude_is_drawn_where_it_parts_complete_chattering_from
     parted = []
     for omega, a in zip(grid.x.values, critical_amplitude(grid.x.values, 0.92), strict=True):
         near = chattering_map(at, {"a": [0.999 * a, 1.001 * a], "omega": [omega]}, progress=False)
-        parted.append(near.complete.values[:, 0].tolist() == [True, False])
+        parted.append(near.data.complete.values[:, 0].tolist() == [True, False])
     assert all(parted) is valid
     if valid:
         assert np.isfinite(found["exact"]).all()

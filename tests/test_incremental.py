@@ -28,18 +28,18 @@ def analysis(record):
 
 
 def bands(dataset, motion=0, block=0):
-    mine = (dataset.band_motion.values == motion) & (dataset.band_block.values == block)
-    return np.column_stack([dataset.band_start.values[mine], dataset.band_end.values[mine]])
+    mine = (dataset.data.band_motion.values == motion) & (dataset.data.band_block.values == block)
+    return np.column_stack([dataset.data.band_start.values[mine], dataset.data.band_end.values[mine]])
 
 
 def test_a_pulse_overturns_in_two_bands_that_a_map_finds_as_well():
     dataset = incremental_dynamic_analysis(BLOCK, PULSE, measure="pga_ratio")
     grid = {"amplitudes": np.linspace(0.5, 10.0, 30), "frequencies": [5.0]}
-    edges = rocking.overturning_map(BLOCK, "one-sine", **grid).boundary_amplitude.values[-3:]
+    edges = rocking.overturning_map(BLOCK, "one-sine", **grid).data.boundary_amplitude.values[-3:]
     (start, end), (again, never) = bands(dataset)
     np.testing.assert_allclose([start, end, again], edges, rtol=1e-6)
     assert math.isnan(never)
-    assert float(dataset.overturning_level[0, 0]) == start
+    assert float(dataset.data.overturning_level[0, 0]) == start
 
 
 def both_verdicts_are_near(body, motion, level, measure):
@@ -51,7 +51,7 @@ def both_verdicts_are_near(body, motion, level, measure):
 
 def test_the_ends_of_every_band_are_where_the_verdict_changes(analysis, record):
     blocks, dataset = analysis
-    assert dataset.sizes["band"] > 4
+    assert dataset.data.sizes["band"] > 4
     judged = 0
     for m, motion in enumerate((record, PULSE)):
         for k, block in enumerate(blocks):
@@ -66,8 +66,8 @@ def test_the_ends_of_every_band_are_where_the_verdict_changes(analysis, record):
 def test_blocks_keep_their_order_though_each_is_simulated_in_its_own_unit():
     blocks = Blocks(p=2.0, alpha=[0.2, 0.3, 0.1], restitution=0.9)
     options = {"measure": "pga_ratio", "levels": np.linspace(1.0, 8.0, 8), "tolerance": 1e-3}
-    together = incremental_dynamic_analysis(blocks, PULSE, **options).overturning_level.values[0]
-    alone = [incremental_dynamic_analysis(block, PULSE, **options).overturning_level.item() for block in blocks]
+    together = incremental_dynamic_analysis(blocks, PULSE, **options).data.overturning_level.values[0]
+    alone = [incremental_dynamic_analysis(block, PULSE, **options).data.overturning_level.item() for block in blocks]
     assert len({*alone}) == 3
     assert together == pytest.approx(alone, rel=1e-12)
 
@@ -77,10 +77,10 @@ def test_the_bands_hold_the_levels_that_overturn_and_no_others(analysis):
     seen = []
     for m in range(2):
         for k in range(2):
-            inside = np.zeros(dataset.sizes["level"], dtype=bool)
+            inside = np.zeros(dataset.data.sizes["level"], dtype=bool)
             for start, end in bands(dataset, m, k):
-                inside |= (dataset.level.values >= start) & ~(dataset.level.values >= end)
-            fell = dataset.overturned.isel(motion=m, block=k).values
+                inside |= (dataset.data.level.values >= start) & ~(dataset.data.level.values >= end)
+            fell = dataset.data.overturned.isel(motion=m, block=k).values
             np.testing.assert_array_equal(inside, fell)
             seen += fell.tolist()
     assert min(seen.count(True), seen.count(False)) > 20
@@ -88,10 +88,10 @@ def test_the_bands_hold_the_levels_that_overturn_and_no_others(analysis):
 
 def test_peaks_are_those_of_the_scaled_motion(analysis, record):
     blocks, dataset = analysis
-    level = float(dataset.level[20])
+    level = float(dataset.data.level[20])
     for k, block in enumerate(blocks):
         response = rocking.simulate(block, record.scaled_to(level, "pgv"))
-        cell = dataset.isel(motion=0, level=20, block=k)
+        cell = dataset.data.isel(motion=0, level=20, block=k)
         assert float(cell.peak_rotation) == pytest.approx(response.peak_rotation, rel=1e-9)
         smaller = min(side.alpha for side in block.sides)
         expected = math.inf if response.overturned else response.peak_rotation / smaller
@@ -107,10 +107,10 @@ def test_without_levels_they_go_from_the_first_uplift_to_twice_the_first_overtur
             plus, minus = block.uplift_thresholds()
             factor = min(plus / -ground.min(), minus / ground.max())
             uplift = min(uplift, factor * motion.pgv)
-    assert float(dataset.level[0]) == pytest.approx(uplift, rel=1e-9)
-    assert not dataset.overturned.isel(level=0).any()
-    assert float(dataset.level[-1]) >= 2.0 * float(dataset.overturning_level.max())
-    np.testing.assert_allclose(dataset.level.values[1:] / dataset.level.values[:-1], 1.05, rtol=1e-12)
+    assert float(dataset.data.level[0]) == pytest.approx(uplift, rel=1e-9)
+    assert not dataset.data.overturned.isel(level=0).any()
+    assert float(dataset.data.level[-1]) >= 2.0 * float(dataset.data.overturning_level.max())
+    np.testing.assert_allclose(dataset.data.level.values[1:] / dataset.data.level.values[:-1], 1.05, rtol=1e-12)
 
 
 @pytest.fixture(scope="module")
@@ -135,10 +135,10 @@ def by_acceleration():
 def test_every_measure_finds_the_same_factor(by_acceleration, measure, units):
     blocks, reference = by_acceleration
     dataset = incremental_dynamic_analysis(blocks, PULSE, measure=measure)
-    assert np.isfinite(reference.overturning_level.values).sum() == len(blocks)
+    assert np.isfinite(reference.data.overturning_level.values).sum() == len(blocks)
     for k, block in enumerate(blocks):
-        factor = float(dataset.overturning_level[0, k]) / units(block, PULSE)
-        assert factor == pytest.approx(float(reference.overturning_level[0, k]) / PULSE.pga, rel=2e-6)
+        factor = float(dataset.data.overturning_level[0, k]) / units(block, PULSE)
+        assert factor == pytest.approx(float(reference.data.overturning_level[0, k]) / PULSE.pga, rel=2e-6)
 
 
 def test_given_levels_that_begin_or_end_in_a_band_leave_it_open():
@@ -147,24 +147,24 @@ def test_given_levels_that_begin_or_end_in_a_band_leave_it_open():
     assert math.isnan(first)
     assert math.isnan(last)
     assert end < 6.8 < start
-    assert np.isnan(dataset.overturning_level.values).all()
+    assert np.isnan(dataset.data.overturning_level.values).all()
     safe = incremental_dynamic_analysis(BLOCK, PULSE, measure="pga_ratio", levels=[1.0, 2.0])
-    assert safe.sizes["band"] == 0
-    assert np.isnan(safe.overturning_level.values).all()
+    assert safe.data.sizes["band"] == 0
+    assert np.isnan(safe.data.overturning_level.values).all()
 
 
 def test_the_figure_shows_peaks_and_bands(analysis):
     _, dataset = analysis
     curves, strip = dataset.plot(block=1).axes
     lines = [line for line in curves.lines if not line.get_label().startswith("_")]
-    assert [line.get_label() for line in lines] == [str(name) for name in dataset.motion.values]
-    peaks = dataset.peak_over_alpha.isel(motion=0, block=1).values
+    assert [line.get_label() for line in lines] == [str(name) for name in dataset.data.motion.values]
+    peaks = dataset.data.peak_over_alpha.isel(motion=0, block=1).values
     np.testing.assert_array_equal(lines[0].get_xdata(), np.where(np.isinf(peaks), np.nan, peaks))
     strips = [line for line in strip.lines if line.get_linestyle() == "-"]
     assert len(strips) == len(bands(dataset, 0, 1)) + len(bands(dataset, 1, 1))
     assert curves.get_ylabel() == "peak ground velocity (m/s)"
     # Where a band begins and ends between levels at which the block stands, dotted lines lead off the frame and back.
-    edge, top = curves.get_xlim()[1], dataset.level.values[-1]
+    edge, top = curves.get_xlim()[1], dataset.data.level.values[-1]
     ways = [line.get_xydata() for line in curves.lines if line not in lines]
     left = sorted(float(y) for way in ways for x, y in way if x == edge)
     expected = [end for m in (0, 1) for band in bands(dataset, m, 1) for end in band if 0.0 < end < top]

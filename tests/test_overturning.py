@@ -45,16 +45,16 @@ def one_sine_amplitude(ratio: float) -> float:
 
 def sequence(dataset, column):
     """Modes from the lowest amplitude to the highest, and the amplitudes between them."""
-    here = dataset.boundary_frequency.values == dataset.frequency.values[column]
-    modes = [int(dataset.mode[0, column]), *dataset.mode_above.values[here].tolist()]
-    return modes, dataset.boundary_amplitude.values[here]
+    here = dataset.data.boundary_frequency.values == dataset.data.frequency.values[column]
+    modes = [int(dataset.data.mode[0, column]), *dataset.data.mode_above.values[here].tolist()]
+    return modes, dataset.data.boundary_amplitude.values[here]
 
 
 def test_a_half_sine_overturns_a_slender_block_from_the_closed_form_on():
     grid = np.linspace(0.5, 6.0, 12)
     dataset = overturning_map(THIN, "half-sine", amplitudes=grid, frequencies=FREQUENCIES, model="linear")
     exact = [half_sine_amplitude(ratio) for ratio in FREQUENCIES]
-    np.testing.assert_allclose(dataset.overturning_amplitude, exact, rtol=0.0, atol=1e-8)
+    np.testing.assert_allclose(dataset.data.overturning_amplitude, exact, rtol=0.0, atol=1e-8)
     # Values known beforehand.
     np.testing.assert_allclose(exact[:4], [1.3223965979, 1.8007239306, 2.2938723134, 3.2891467775], atol=1e-10)
 
@@ -86,10 +86,10 @@ def test_boundaries_separate_what_simulate_says():
     dataset = overturning_map(BLOCK, "one-sine", amplitudes=[0.5, 2.0, 4.0, 7.0, 10.0], frequencies=[4.5])
     motion = rocking.pulses.one_sine(1.0, 4.5 * 2.0 / (2.0 * math.pi))
     threshold = BLOCK.minimum_acceleration
-    assert dataset.sizes["boundary"] >= 4
+    assert dataset.data.sizes["boundary"] >= 4
     judged = set()
     for edge, *modes in zip(
-        *(dataset[n].values for n in ("boundary_amplitude", "mode_below", "mode_above")), strict=True
+        *(dataset.data[n].values for n in ("boundary_amplitude", "mode_below", "mode_above")), strict=True
     ):
         for factor, mode in zip((1.0 - 1e-8, 1.0 + 1e-8), modes, strict=True):
             response = rocking.simulate(BLOCK, motion.scaled(edge * factor * threshold))
@@ -107,10 +107,10 @@ def test_boundaries_separate_what_simulate_says():
 
 def test_nothing_moves_below_an_amplitude_of_one():
     dataset = overturning_map(BLOCK, "half-sine", amplitudes=[0.5, 1.5], frequencies=[1.0, 4.0])
-    assert np.all(dataset.mode.values[0] == -3)
-    assert np.count_nonzero(dataset.mode_below == -3) >= 2
-    np.testing.assert_allclose(dataset.boundary_amplitude.values[dataset.mode_below == -3], 1.0, rtol=1e-9)
-    assert np.all(dataset.peak_rotation.values[0] == 0.0)
+    assert np.all(dataset.data.mode.values[0] == -3)
+    assert np.count_nonzero(dataset.data.mode_below == -3) >= 2
+    np.testing.assert_allclose(dataset.data.boundary_amplitude.values[dataset.data.mode_below == -3], 1.0, rtol=1e-9)
+    assert np.all(dataset.data.peak_rotation.values[0] == 0.0)
 
 
 def test_a_block_that_overturns_after_a_rest_is_told_so():
@@ -124,7 +124,7 @@ def test_a_block_that_overturns_after_a_rest_is_told_so():
     assert response.overturned
     assert response.events["kind"].tolist() == ["uplift", "rest", "uplift", "overturn"]
     assert len(response.impacts) > 0
-    assert dataset.mode.values[0, 0] == -4
+    assert dataset.data.mode.values[0, 0] == -4
     assert mode_name(-4) in dataset.summary()
     assert "3 or less" in dataset.summary()
     (legend,) = dataset.plot().legends
@@ -140,9 +140,9 @@ def test_a_mirrored_two_sided_block_under_a_mirrored_pulse():
 
     grid = {"amplitudes": np.linspace(0.5, 8.0, 6), "frequencies": [2.0, 4.0], "tolerance": 1e-3}
     here, there = overturning_map(sided, "one-sine", **grid), overturning_map(mirrored, reversed_sine, **grid)
-    np.testing.assert_array_equal(here.mode, there.mode)
-    np.testing.assert_array_equal(here.boundary_amplitude, there.boundary_amplitude)
-    assert here.sizes["boundary"] >= 6
+    np.testing.assert_array_equal(here.data.mode, there.data.mode)
+    np.testing.assert_array_equal(here.data.boundary_amplitude, there.data.boundary_amplitude)
+    assert here.data.sizes["boundary"] >= 6
 
 
 @pytest.mark.parametrize(
@@ -157,9 +157,9 @@ def test_a_mirrored_two_sided_block_under_a_mirrored_pulse():
 )
 def test_the_amplitude_of_a_pulse_is_its_peak(pulse, parameters):
     dataset = overturning_map(BLOCK, pulse, amplitudes=[0.9, 1.1], frequencies=[2.0], **parameters)
-    assert dataset.mode.values[0, 0] == -3
-    assert dataset.mode.values[1, 0] > -3
-    lifting = dataset.boundary_amplitude.values[dataset.mode_below == -3]
+    assert dataset.data.mode.values[0, 0] == -3
+    assert dataset.data.mode.values[1, 0] > -3
+    lifting = dataset.data.boundary_amplitude.values[dataset.data.mode_below == -3]
     np.testing.assert_allclose(lifting, 1.0, rtol=2e-9)
 
 
@@ -216,18 +216,18 @@ def test_blocks_that_each_have_their_own_scaling_do_what_simulate_says():
 
 def test_a_map_has_units_names_and_provenance():
     dataset = overturning_map(BLOCK, "half-sine", amplitudes=[0.5, 3.0], frequencies=[1.0, 2.0])
-    assert dataset.pulse.startswith("half sine: ")
-    assert dataset.alpha_rad == [0.2, 0.2]
-    assert dataset.tolerance == 1e-9
-    assert all(dataset[name].attrs for name in ("mode", "peak_rotation", "overturning_amplitude", "amplitude"))
+    assert dataset.data.pulse.startswith("half sine: ")
+    assert dataset.data.alpha_rad == [0.2, 0.2]
+    assert dataset.data.tolerance == 1e-9
+    assert all(dataset.data[name].attrs for name in ("mode", "peak_rotation", "overturning_amplitude", "amplitude"))
 
 
 def test_a_map_that_never_overturns_has_no_overturning_amplitude():
     dataset = overturning_map(BLOCK, "half-sine", amplitudes=[0.5, 1.01], frequencies=[5.0])
-    assert np.isnan(dataset.overturning_amplitude.values).all()
+    assert np.isnan(dataset.data.overturning_amplitude.values).all()
     below = overturning_map(BLOCK, "half-sine", amplitudes=[8.0, 9.0], frequencies=[1.0])
-    assert np.isnan(below.overturning_amplitude.values).all()
-    assert below.sizes["boundary"] == 0
+    assert np.isnan(below.data.overturning_amplitude.values).all()
+    assert below.data.sizes["boundary"] == 0
 
 
 def test_the_figure_names_every_mode_that_it_shows():
@@ -295,7 +295,7 @@ def test_a_pulse_with_a_vertical_component_overturns_where_single_simulations_sa
     ratios = np.array([1.5, 3.0])
     found = overturning_map(BLOCK, pulse, amplitudes=np.linspace(0.8, 6.0, 14), frequencies=ratios, tolerance=1e-6)
     side = BLOCK.sides[0]
-    for ratio, level in zip(ratios, found.overturning_amplitude.values, strict=True):
+    for ratio, level in zip(ratios, found.data.overturning_amplitude.values, strict=True):
         frequency, lifting = ratio * side.p / (2.0 * math.pi), BLOCK.gravity * math.tan(side.alpha)
         for times, falls in ((1.0 - 1e-5, False), (1.0 + 1e-5, True)):
             response = rocking.simulate(BLOCK, pulse(times * level * lifting, frequency))
@@ -325,4 +325,4 @@ def test_a_function_of_samples_at_a_constant_step_is_of_one_shape():
 
     grid = {"amplitudes": np.linspace(0.5, 6.0, 6), "frequencies": [1.0, 4.0], "tolerance": 1e-4}
     by_function, by_name = overturning_map(BLOCK, sampled, **grid), overturning_map(BLOCK, "one-sine", **grid)
-    np.testing.assert_allclose(by_function.overturning_amplitude, by_name.overturning_amplitude, rtol=1e-2)
+    np.testing.assert_allclose(by_function.data.overturning_amplitude, by_name.data.overturning_amplitude, rtol=1e-2)

@@ -103,8 +103,8 @@ def test_a_spectrum_makes_restraints_larger_with_their_block():
     for k, size in enumerate(sizes.tolist()):
         for m, motion in enumerate(motions):
             alone = rocking.simulate(body(size), motion)
-            assert found.overturned.values[m, 0, k] == alone.overturned
-            assert found.peak_rotation.values[m, 0, k] == pytest.approx(alone.peak_rotation, rel=1e-9)
+            assert found.data.overturned.values[m, 0, k] == alone.overturned
+            assert found.data.peak_rotation.values[m, 0, k] == pytest.approx(alone.peak_rotation, rel=1e-9)
             judged += not alone.overturned and alone.peak_rotation > 0.0
     assert judged >= 3
 
@@ -149,7 +149,7 @@ def test_what_a_study_of_walls_computes_another_process_resumes_and_reads(tmp_pa
     for name in ("overturned", "peak_rotation", "impacts"):
         np.testing.assert_array_equal(results[name].values, whole[name].values)
     assert {"one_sided_plus", "slack_minus"} <= set(results.coords)
-    shares = read.spectrum().overturned_share.values
+    shares = read.spectrum().data.overturned_share.values
     np.testing.assert_array_equal(shares, whole.overturned.mean(["motion", "polarity"]).values)
 
 

@@ -57,7 +57,8 @@ def test_a_fragility_leaves_out_what_was_given_up_and_reports_it():
 def test_scaling_has_no_peak_where_a_simulation_was_given_up():
     found = rocking.incremental_dynamic_analysis(TWO, PULSE, levels=[2.2, 9.0])
     np.testing.assert_array_equal(
-        np.isnan(found.peak_over_alpha.transpose("motion", "block", "level").values), [[[False] * 2, [True, False]]]
+        np.isnan(found.data.peak_over_alpha.transpose("motion", "block", "level").values),
+        [[[False] * 2, [True, False]]],
     )
     assert f"note: {ONE_MISSING}" in found.summary()
 
@@ -69,9 +70,9 @@ def test_a_spectrum_leaves_out_what_was_given_up(ensemble):
     found = rocking.rocking_spectrum(blocks, PULSE.scaled(0.4), **({"p": [2.0]} if ensemble else {}))
     assert f"note: {ONE_MISSING}" in found.summary()
     alone = rocking.rocking_spectrum(rocking.Blocks.grid(p=[2.0], alpha=[0.2], restitution=[0.9]), PULSE.scaled(0.4))
-    fractiles = found.fractile_over_alpha.values.reshape(3, -1)
-    np.testing.assert_array_equal(fractiles[:, 0], alone.fractile_over_alpha.values.ravel())
-    shares = found.overturned_share.values.ravel()
+    fractiles = found.data.fractile_over_alpha.values.reshape(3, -1)
+    np.testing.assert_array_equal(fractiles[:, 0], alone.data.fractile_over_alpha.values.ravel())
+    shares = found.data.overturned_share.values.ravel()
     assert shares[0] == 0.0
     if not ensemble:
         assert np.isnan(fractiles[:, 1]).all()
@@ -81,7 +82,7 @@ def test_a_spectrum_leaves_out_what_was_given_up(ensemble):
 @pytest.mark.usefixtures("small_budget")
 def test_a_map_has_a_mode_for_what_was_given_up():
     found = rocking.overturning_map(RESTLESS, "one-sine", amplitudes=[0.5, 1.2], frequencies=[3.0])
-    assert found.mode.values[:, 0].tolist() == [-3, -5]
+    assert found.data.mode.values[:, 0].tolist() == [-3, -5]
     assert "not finished" in found.summary()
     assert f"note: {ONE_MISSING}" in found.summary()
     found.plot()
@@ -93,10 +94,10 @@ def test_a_rose_leaves_out_what_was_given_up():
     pulses = PULSE, rocking.pulses.one_sine(2.0, 0.8)
     pair = tuple(pulses[0].rotated(pulses[1], azimuth, recorded=(90.0, 0.0)) for azimuth in (90.0, 0.0))
     found = rocking.response_rose(solid, [pair], azimuths=[45.0], levels=[0.6, 0.9, 1.2], restitution=1.0 - 1e-9)
-    missing, fell = np.isnan(found.peak_over_slenderness.values.ravel()), found.overturned.values.ravel()
+    missing, fell = np.isnan(found.data.peak_over_slenderness.values.ravel()), found.data.overturned.values.ravel()
     assert missing.tolist() == [False, True, False]
     assert fell.tolist() == [False, False, True]
-    for shares in (found.overturned_share.values.ravel(), found.anywhere.values):
+    for shares in (found.data.overturned_share.values.ravel(), found.data.anywhere.values):
         np.testing.assert_array_equal(shares, [0.0, np.nan, 1.0])
     assert f"{counted(missing.sum(), 'simulation')} given up after too many steps" in found.summary()
 
@@ -114,12 +115,12 @@ def test_a_study_leaves_out_what_was_given_up(tmp_path):
     together, each, spectrum = study.fragility(measure="pga"), study.block_fragilities(measure="pga"), study.spectrum()
     assert together.missing == direct.missing == text
     assert together.curves[0].median == pytest.approx(direct.curves[0].median, rel=1e-9)
-    assert each.outcomes.values[0].tolist() == [20.0, 20.0 - missing]
+    assert each.data.outcomes.values[0].tolist() == [20.0, 20.0 - missing]
     for found in (together, each, spectrum):
         assert text in found.summary()
     known = direct.outcomes[direct.outcomes.block == 1]
     shares = known[~known.unfinished].groupby("pga_m_s2").overturned.mean().reindex(levels).values
-    np.testing.assert_array_equal(spectrum.overturned_share.values[:, 1], shares)
+    np.testing.assert_array_equal(spectrum.data.overturned_share.values[:, 1], shares)
 
 
 @pytest.mark.usefixtures("small_budget")
@@ -133,7 +134,7 @@ def test_a_calibration_takes_what_was_given_up_for_half_overturned():
 @pytest.mark.usefixtures("small_budget")
 def test_a_map_of_chattering_calls_what_was_given_up_unproven():
     found = chattering_map(families.sine(RESTLESS), {"a": [1.2], "omega": [3.0]})
-    assert found.outcome.values.tolist() == [[5]]
+    assert found.data.outcome.values.tolist() == [[5]]
 
 
 @pytest.fixture(scope="module")
@@ -206,18 +207,16 @@ def test_every_bar_comes_to_its_end(results, bars):
 
 
 @pytest.mark.parametrize("written", [3, pytest.param(11, marks=pytest.mark.thorough)])
-def test_a_result_has_the_variables_of_its_dataset(results, tmp_path, written):
+def test_a_result_keeps_its_dataset_and_offers_nothing_of_it_as_its_own(results, tmp_path, written):
     assert len(results) == 11
     for number, found in enumerate(results.values()):
         for again in (copy.copy(found), pickle.loads(pickle.dumps(found))):
             assert again.data.identical(found.data)
-            assert again.sizes == found.data.sizes
+            assert again.data.sizes == found.data.sizes
             assert type(again) is type(found)
-        first = next(iter(found.data_vars))
-        assert found[first].identical(found.data[first])
-        assert str(first) in dir(found)
-        with pytest.raises(AttributeError):
-            _ = found.no_such_variable
+        for missing in (next(iter(found.data.data_vars)), "sizes", "no_such_variable"):
+            with pytest.raises(AttributeError):
+                getattr(found, missing)
         if number < written:
             found.to_netcdf(tmp_path / "result.nc")
     with pytest.raises(rocking.OutputError, match="cannot be written"):
@@ -300,7 +299,7 @@ def test_the_rows_of_a_table_are_the_values_of_the_result(results):
     spectrum, scaled = results["RockingSpectrum"], results["IncrementalDynamicAnalysis"]
     for row in spectrum.to_dataframe("peaks").itertuples():
         at = {"motion": row.motion, "alpha": row.alpha_rad, "restitution": row.restitution, "p": row.p_rad_s}
-        assert float(spectrum.peak_over_alpha.sel(at)) == row.peak_over_alpha
+        assert float(spectrum.data.peak_over_alpha.sel(at)) == row.peak_over_alpha
         assert math.isinf(row.peak_over_alpha) == row.overturned
     bands = scaled.to_dataframe("bands")
     assert bands.motion.tolist() == ["one-sine"] * len(scaled.bands())
@@ -310,7 +309,7 @@ def test_the_rows_of_a_table_are_the_values_of_the_result(results):
 
 def test_a_part_of_a_result_is_a_result(spectrum):
     part = spectrum.select(alpha=0.2, p=[1.0, 3.0])
-    assert dict(part.sizes) == {"motion": 2, "alpha": 1, "restitution": 1, "p": 2, "fractile": 3}
+    assert dict(part.data.sizes) == {"motion": 2, "alpha": 1, "restitution": 1, "p": 2, "fractile": 3}
     assert len(part.plot().axes[0].lines) > 0
     with pytest.raises(rocking.InvalidOption, match="dimensions are"):
         spectrum.select(height=1.0)
@@ -319,9 +318,9 @@ def test_a_part_of_a_result_is_a_result(spectrum):
 def test_levels_go_on_to_three_times_the_first_that_overturns_and_no_further():
     blocks = [BLOCK, rocking.Block.from_parameters(p=3.0, alpha=0.15, restitution=0.9)]
     found = rocking.incremental_dynamic_analysis(blocks, PULSE)
-    first = found.overturned.isel(motion=0).transpose("block", "level").values.argmax(axis=1)
-    last = 3.0 * float(found.level[first.max()])
-    assert float(found.level[-2]) < last <= float(found.level[-1])
+    first = found.data.overturned.isel(motion=0).transpose("block", "level").values.argmax(axis=1)
+    last = 3.0 * float(found.data.level[first.max()])
+    assert float(found.data.level[-2]) < last <= float(found.data.level[-1])
 
 
 def test_a_fragility_keeps_every_simulation_for_an_audit(tmp_path):
@@ -379,7 +378,7 @@ def test_a_part_has_no_numbers_of_the_whole(results, of_several):
         ("ResponseRose", "pair"), ("ResponseRose", "azimuth"), ("Basins", "attractor"), ("Basins", "rotation"),
         ("Basins", "angular_velocity"),
     ):  # fmt: skip
-        assert dimension in results[name].sizes, name
+        assert dimension in results[name].data.sizes, name
         with pytest.raises(rocking.InvalidOption, match=f"of all its values of {dimension} together; compute a part"):
             results[name].select(**{dimension: results[name].data[dimension].values[0]})
 

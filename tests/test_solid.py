@@ -424,16 +424,18 @@ def test_the_rose_is_the_blocks_and_the_least_is_at_an_edge():
     rose = solid.rose(azimuths)
     for k, azimuth in enumerate(azimuths):
         side, other = solid.block(azimuth).sides
-        assert rose.acceleration.values[k] == pytest.approx(math.tan(side.alpha), rel=1e-12)
+        assert rose.data.acceleration.values[k] == pytest.approx(math.tan(side.alpha), rel=1e-12)
         for name in ("alpha", "p", "restitution", "radius"):
-            assert rose[name].values[k] == pytest.approx(getattr(side, name), rel=1e-12), name
-        assert rose.rise.values[k] == pytest.approx(side.radius - solid.centre[2], rel=1e-12)
-        assert rose.select(azimuth=(azimuth + 180.0) % 360.0).p.values[0] == pytest.approx(other.p, rel=1e-12)
+            assert rose.data[name].values[k] == pytest.approx(getattr(side, name), rel=1e-12), name
+        assert rose.data.rise.values[k] == pytest.approx(side.radius - solid.centre[2], rel=1e-12)
+        assert rose.select(azimuth=(azimuth + 180.0) % 360.0).data.p.values[0] == pytest.approx(other.p, rel=1e-12)
     fine = solid.rose(np.arange(0.0, 360.0, 0.5))
-    assert float(fine.acceleration.min()) == pytest.approx(rose.weakest_acceleration, rel=1e-12)
-    assert fine.azimuth.values[np.argmin(fine.acceleration.values)] == pytest.approx(rose.weakest_azimuth)
-    assert solid.rose().sizes["azimuth"] == 72
-    assert solid.rose([360.0, 0.0, -90.0]).azimuth.values.tolist() == [0.0, 270.0]
+    assert float(fine.data.acceleration.min()) == pytest.approx(rose.data.weakest_acceleration, rel=1e-12)
+    assert fine.data.azimuth.values[np.argmin(fine.data.acceleration.values)] == pytest.approx(
+        rose.data.weakest_azimuth
+    )
+    assert solid.rose().data.sizes["azimuth"] == 72
+    assert solid.rose([360.0, 0.0, -90.0]).data.azimuth.values.tolist() == [0.0, 270.0]
 
 
 def test_what_planar_rocking_leaves_out_is_measured():
@@ -444,17 +446,17 @@ def test_what_planar_rocking_leaves_out_is_measured():
     tensor = solid.inertia_over_mass
     rose = solid.rose([0.0, 90.0])
     np.testing.assert_allclose(
-        rose.coupling.values,
+        rose.data.coupling.values,
         [np.hypot(tensor[0, 1], tensor[0, 2]) / tensor[0, 0], np.hypot(tensor[0, 1], tensor[1, 2]) / tensor[1, 1]],
         rtol=1e-12,
     )
-    assert rose.coupling.values.min() > 0.03
+    assert rose.data.coupling.values.min() > 0.03
     even = Solid.from_mesh(box()).rose([0.0, 30.0])
-    assert even.coupling.values[0] == pytest.approx(0.0, abs=1e-12)
+    assert even.data.coupling.values[0] == pytest.approx(0.0, abs=1e-12)
     # At 30 deg the corner at (0.3, 0.2) is the pivot: on the right of the direction, and the other one on its left.
     aside = abs(0.3 * math.cos(math.radians(30.0)) - 0.2 * math.sin(math.radians(30.0)))
-    np.testing.assert_allclose(even.aside.values, [0.0, aside], atol=1e-12)
-    np.testing.assert_allclose(even.gap.values, [0.0, 2.0 * aside], atol=1e-12)
+    np.testing.assert_allclose(even.data.aside.values, [0.0, aside], atol=1e-12)
+    np.testing.assert_allclose(even.data.gap.values, [0.0, 2.0 * aside], atol=1e-12)
 
 
 def test_a_body_needs_no_mesh():

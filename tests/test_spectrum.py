@@ -21,12 +21,12 @@ def spectrum():
 
 
 def test_every_peak_is_the_one_of_its_block_and_motion(spectrum):
-    assert spectrum.peak_rotation.dims == ("motion", "alpha", "restitution", "p")
+    assert spectrum.data.peak_rotation.dims == ("motion", "alpha", "restitution", "p")
     for m, motion in enumerate(PULSES):
         for alpha, e, p in ((0.1, 0.9, 2.0), (0.2, 0.8, 4.0), (0.2, 0.9, 1.0)):
             block = rocking.Block.from_parameters(p, alpha, e)
             response = rocking.simulate(block, motion)
-            cell = spectrum.isel(motion=m).sel(alpha=alpha, restitution=e, p=p)
+            cell = spectrum.data.isel(motion=m).sel(alpha=alpha, restitution=e, p=p)
             assert float(cell.peak_rotation) == pytest.approx(response.peak_rotation, rel=1e-9)
             assert bool(cell.overturned) == response.overturned
             over = math.inf if response.overturned else response.peak_rotation / alpha
@@ -34,7 +34,7 @@ def test_every_peak_is_the_one_of_its_block_and_motion(spectrum):
 
 
 def test_an_overturned_block_counts_as_infinitely_large(spectrum):
-    cell = spectrum.sel(alpha=0.2, restitution=0.9, p=1.0)
+    cell = spectrum.data.sel(alpha=0.2, restitution=0.9, p=1.0)
     peaks = np.sort(cell.peak_over_alpha.values.ravel())
     assert np.isfinite(peaks).sum() == 3
     # Fractiles stand between the 1st and 2nd, the 2nd and 3rd, and the 3rd and 4th of four peaks.
@@ -47,20 +47,22 @@ def test_an_overturned_block_counts_as_infinitely_large(spectrum):
 
 def test_housners_restitution_goes_with_each_slenderness():
     result = rocking_spectrum(rocking.Blocks.grid(alpha=[0.1, 0.3], p=[2.0]), PULSES[2])
-    assert "restitution" not in result.dims
+    assert "restitution" not in result.data.dims
     for alpha in (0.1, 0.3):
         response = rocking.simulate(rocking.Block.from_parameters(2.0, alpha), PULSES[2])
-        assert float(result.peak_rotation.sel(alpha=alpha, p=2.0)[0]) == pytest.approx(response.peak_rotation, rel=1e-9)
+        assert float(result.data.peak_rotation.sel(alpha=alpha, p=2.0)[0]) == pytest.approx(
+            response.peak_rotation, rel=1e-9
+        )
 
 
 def test_sizes_are_half_diagonals_of_rectangles():
     block = rocking.Block(half_width=0.2, half_height=1.0)
     result = rocking_spectrum(rocking.Blocks.grid(alpha=block.alpha, size=[block.radius]), PULSES[3])
-    assert float(result.p[0]) == pytest.approx(block.p, rel=1e-14)
-    assert float(result["size"][0]) == pytest.approx(block.radius, rel=1e-14)
-    assert float(result.period[0]) == pytest.approx(2.0 * math.pi / block.p, rel=1e-14)
+    assert float(result.data.p[0]) == pytest.approx(block.p, rel=1e-14)
+    assert float(result.data["size"][0]) == pytest.approx(block.radius, rel=1e-14)
+    assert float(result.data.period[0]) == pytest.approx(2.0 * math.pi / block.p, rel=1e-14)
     response = rocking.simulate(block, PULSES[3])
-    assert result.peak_rotation.values.item() == pytest.approx(response.peak_rotation, rel=1e-9)
+    assert result.data.peak_rotation.values.item() == pytest.approx(response.peak_rotation, rel=1e-9)
 
 
 def test_large_similar_blocks_have_equal_displacements():
@@ -69,7 +71,7 @@ def test_large_similar_blocks_have_equal_displacements():
     record = rocking.records.load("el-centro-meloland-270")
     sizes = [80.0, 160.0, 320.0, 640.0, 1280.0]
     result = rocking_spectrum(rocking.Blocks.grid(alpha=[0.1, 0.2], size=sizes, restitution=[0.9]), record)
-    displacement = (result.peak_rotation * result["size"]).isel(motion=0, restitution=0).values
+    displacement = (result.data.peak_rotation * result.data["size"]).isel(motion=0, restitution=0).values
     steps = np.abs(np.diff(displacement, axis=1))
     assert np.all(steps[:, -1] < 0.005 * displacement[:, -1])
     np.testing.assert_allclose(steps[:, -2:] / steps[:, -3:-1], 0.5, atol=0.03)
@@ -98,11 +100,11 @@ def test_the_figure_draws_fractiles_and_leaves_out_what_overturns(spectrum):
     peaks, shares = figure.axes
     thick = [line for line in peaks.lines if line.get_linewidth() > 1.5]
     assert len(thick) == 2
-    expected = few.fractile_over_alpha.sel(fractile=0.5, alpha=0.2, restitution=0.9).values
+    expected = few.data.fractile_over_alpha.sel(fractile=0.5, alpha=0.2, restitution=0.9).values
     np.testing.assert_array_equal(thick[1].get_ydata(), np.where(np.isinf(expected), np.nan, expected))
-    np.testing.assert_array_equal(thick[1].get_xdata(), few["size"].values)
+    np.testing.assert_array_equal(thick[1].get_xdata(), few.data["size"].values)
     drawn = shares.lines[0].get_ydata()
-    np.testing.assert_array_equal(drawn, few.overturned_share.sel(alpha=0.1, restitution=0.9).values)
+    np.testing.assert_array_equal(drawn, few.data.overturned_share.sel(alpha=0.1, restitution=0.9).values)
 
 
 @pytest.mark.parametrize(
@@ -172,8 +174,8 @@ def test_an_ensemble_of_one_block_has_the_spectrum_of_its_shape():
     p = [1.0, 2.0, 3.0]
     grid = rocking_spectrum(rocking.Blocks.grid(alpha=[0.2], restitution=[0.9], p=p), motions)
     ensemble = rocking_spectrum(block, motions, p=p)
-    assert ensemble.peak_rotation.values[:, 0] == pytest.approx(grid.peak_rotation.values[:, 0, 0], rel=1e-12)
-    assert ensemble.overturned_share.values.tolist() == grid.overturned_share.values[0, 0].tolist()
+    assert ensemble.data.peak_rotation.values[:, 0] == pytest.approx(grid.data.peak_rotation.values[:, 0, 0], rel=1e-12)
+    assert ensemble.data.overturned_share.values.tolist() == grid.data.overturned_share.values[0, 0].tolist()
     assert ensemble.plot().axes
     with pytest.raises(rocking.InvalidBlock, match="not both of p "):
         rocking_spectrum(block, motions, p=p, size=[1.0])
@@ -182,11 +184,11 @@ def test_an_ensemble_of_one_block_has_the_spectrum_of_its_shape():
 def test_a_grid_that_is_moved_or_weighted_is_an_ensemble():
     grid = rocking.Blocks.grid(p=[2.0, 3.0], alpha=[0.1, 0.2], restitution=0.9)
     assert [*grid.axes] == ["p", "alpha", "restitution"] and grid.select(slice(2)).axes is None
-    assert dict(rocking_spectrum(grid, PULSES[0]).peak_rotation.sizes) == {
+    assert dict(rocking_spectrum(grid, PULSES[0]).data.peak_rotation.sizes) == {
         "motion": 1, "alpha": 2, "restitution": 1, "p": 2,
     }  # fmt: skip
     for options in ({"p": [1.0]}, {"size": [1.0]}, {"weights": [1.0, 1.0, 2.0, 2.0]}):
-        assert rocking_spectrum(grid, PULSES[0], **options).sizes["block"] == 4
+        assert rocking_spectrum(grid, PULSES[0], **options).data.sizes["block"] == 4
 
 
 def test_peaks_of_asymmetric_blocks_count_in_their_smaller_slenderness():
@@ -194,9 +196,9 @@ def test_peaks_of_asymmetric_blocks_count_in_their_smaller_slenderness():
     found = rocking_spectrum([block], [rocking.pulses.one_sine(2.5, 1.5), rocking.pulses.one_sine(-3.0, 2.0)], p=p)
     judged = 0
     for over, peak, overturned in zip(
-        found.peak_over_alpha.values.ravel(),
-        found.peak_rotation.values.ravel(),
-        found.overturned.values.ravel(),
+        found.data.peak_over_alpha.values.ravel(),
+        found.data.peak_rotation.values.ravel(),
+        found.data.overturned.values.ravel(),
         strict=True,
     ):
         assert over == (math.inf if overturned else pytest.approx(peak / 0.2, rel=1e-12))
@@ -208,7 +210,7 @@ def test_peaks_of_asymmetric_blocks_count_in_their_smaller_slenderness():
 def test_weights_count_over_each_other_however_large_or_small(scale):
     blocks = rocking.Blocks(p=[2.0, 3.0, 4.0], alpha=0.2, restitution=0.9)
     found = rocking_spectrum(blocks, PULSES[0], p=[2.0], weights=scale * np.array([1.0, 1.0, 0.0]))
-    assert found.weight.values.tolist() == [1.5, 1.5, 0.0]
+    assert found.data.weight.values.tolist() == [1.5, 1.5, 0.0]
 
 
 def test_a_line_goes_along_its_abscissa_in_whatever_order_p_was_given():

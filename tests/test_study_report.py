@@ -154,8 +154,8 @@ def test_a_study_of_one_block_says_what_a_fragility_at_once_does(tmp_path, alpha
 def test_a_spectrum_is_the_fractiles_of_the_simulations(study, simulated):
     found = study.spectrum([0.5])
     ratio = np.where(simulated.overturned, np.inf, simulated.peak_rotation / BLOCKS.alpha[:, 0])
-    np.testing.assert_array_equal(found.fractile_over_alpha.values[0], np.median(ratio, axis=0))
-    np.testing.assert_array_equal(found.overturned_share.values, simulated.overturned.values.mean(axis=0))
+    np.testing.assert_array_equal(found.data.fractile_over_alpha.values[0], np.median(ratio, axis=0))
+    np.testing.assert_array_equal(found.data.overturned_share.values, simulated.overturned.values.mean(axis=0))
 
 
 def test_what_is_written_of_spectral_accelerations_says_their_period_and_damping(tmp_path):
@@ -209,9 +209,9 @@ def test_outcomes_are_counted_for_each_block_by_its_own_polarities(tmp_path, ord
     study = rocking.study(tmp_path, blocks, MOTIONS, levels=LEVELS, measure="pga", polarity="both", unit_blocks=512)
     study.run(progress=False)
     found, once = study.block_fragilities(), len(MOTIONS) * len(LEVELS)
-    assert found.outcomes.values.tolist() == [[once * (1 + k) for k in order]]
+    assert found.data.outcomes.values.tolist() == [[once * (1 + k) for k in order]]
     assert f"fragility of 2 blocks, {once} to {2 * once} outcomes each" in found.summary()
-    for k, count in enumerate(found.exceeded.values[0]):
+    for k, count in enumerate(found.data.exceeded.values[0]):
         assert f"{count:.0f} of {once * (1 + order[k])}" in found.summary()
 
 
@@ -220,9 +220,9 @@ def test_a_block_that_no_curve_fits_says_why(tmp_path):
     study = rocking.study(tmp_path, blocks, MOTIONS, levels=LEVELS, measure="pga", unit_blocks=512)
     study.run()
     found = study.block_fragilities()
-    assert found.fault.values[0, 0] == ""
-    assert "none of the 72 outcomes exceeds the limit" in found.fault.values[0, 1]
-    assert np.isnan(found["median"].values[0, 1])
+    assert found.data.fault.values[0, 0] == ""
+    assert "none of the 72 outcomes exceeds the limit" in found.data.fault.values[0, 1]
+    assert np.isnan(found.data["median"].values[0, 1])
     assert "; 1 curve cannot be fitted (fault says why)" in found.summary()
 
 

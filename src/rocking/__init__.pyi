@@ -55,7 +55,7 @@ from .motion.description import Description, Origin
 from .motion.formats import read
 from .motion.scaling import Measure
 from .response import Gradient, Perturbed, Repeat, Response, Sensitivity, gradient
-from .result import DatasetResult, DrawnResult, Result, Row, TableResult
+from .result import DatasetResult, Result, Row
 from .simulation import simulate
 from .solid.solid import Solid
 from .studies import Study, study
@@ -77,7 +77,6 @@ __all__ = [
     "Damper",
     "DatasetResult",
     "Description",
-    "DrawnResult",
     "FallingRestitution",
     "Fragility",
     "Frame",
@@ -116,7 +115,6 @@ __all__ = [
     "Spring",
     "Study",
     "StudyError",
-    "TableResult",
     "Tendon",
     "Thrust",
     "Treatment",

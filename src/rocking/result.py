@@ -1,4 +1,4 @@
-"""What was found: in words, as plain values, as tables and as a figure; analyses add a dataset with labels."""
+"""Results: text, plain values, tables made from one list of columns, figures; analyses add a labelled dataset."""
 
 from __future__ import annotations
 
@@ -14,7 +14,19 @@ import numpy as np
 from rocking import checks
 from rocking.arrays import evenly
 from rocking.errors import InvalidOption
-from rocking.tables import data_frame, named, plain, text_table, to_json, write_netcdf, write_text
+from rocking.tables import (
+    Column,
+    columns_of,
+    frame_of,
+    named,
+    plain,
+    text_table,
+    to_json,
+    write_csv,
+    write_excel,
+    write_netcdf,
+    write_text,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,7 +44,7 @@ class Row(NamedTuple):
     Attributes
     ----------
     name : str
-        What it is about: words in a summary, the name of a quantity in a dictionary.
+        Words in a summary, the name of a quantity in a dictionary.
     value : object
         Its value; in a summary a text with the digits that are known.
     unit : str
@@ -74,11 +86,22 @@ def dictionary_of(rows: Iterable[Row]) -> dict[str, Any]:
 
 
 class Result(ABC):
-    """What was found, in words and as plain values; base of all that analyses return."""
+    """Base class of everything that simulations and analyses return.
+
+    Attributes
+    ----------
+    TABLES : collection of str
+        Names of the tables, the default one first; empty where the result has none.
+    """
+
+    TABLES: ClassVar[Collection[str]] = ()
+
+    #: Format of numbers in CSV files.
+    _FORMAT: ClassVar[str | None] = "%.15g"
 
     @abstractmethod
     def summary(self) -> str:
-        """Say in words what was found.
+        """Summarise the result in words.
 
         Returns
         -------
@@ -94,7 +117,7 @@ class Result(ABC):
 
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:
-        """Return what was found as plain values by name.
+        """Return the result as plain values by name.
 
         Returns
         -------
@@ -109,7 +132,7 @@ class Result(ABC):
         """
 
     def to_json(self, path: str | Path) -> None:
-        """Write what `to_dict` returns as JSON; NaN and infinity are null.
+        """Write the values of `to_dict` as JSON; NaN and infinity are null.
 
         Parameters
         ----------
@@ -120,80 +143,12 @@ class Result(ABC):
         ------
         OutputError
             If the file cannot be written.
-
-        Examples
-        --------
-        >>> import tempfile
-        >>> from rocking.chattering import critical_report
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     critical_report(2.0, 0.92).to_json(f"{folder}/critical.json")
         """
         write_text(path, to_json(self.to_dict()) + "\n")
 
-    def _headline(self) -> str:
-        """Return what was found in one line, for the representation."""
-        return self.summary().splitlines()[0]
-
-    def __repr__(self) -> str:
-        return f"<{type(self).__name__}: {self._headline()}>"
-
-
-class DrawnResult(Result):
-    """A result that has a figure."""
-
-    @abstractmethod
-    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        """Draw what was found.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw, of several panels the main one alone; by default in a new figure with all panels.
-        title : str
-            Title; by default one that says what is drawn.
-        figsize : (float, float), optional
-            Width and height of a new figure, inches.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            The new figure, or that of `ax`.
-
-        Raises
-        ------
-        InvalidOption
-            If the size is not two positive numbers, or `ax` are no axes.
-
-        Examples
-        --------
-        >>> from rocking.chattering import chattering_report
-        >>> chattering_report(1.03, 2.0, 0.92).plot(figsize=(4.0, 3.0)).get_size_inches().tolist()
-        [4.0, 3.0]
-        """
-
-
-class TableResult(Result):
-    """A result that has tables, one row for each point, in columns named with their units.
-
-    Attributes
-    ----------
-    TABLES : collection of str
-        Names of the tables, the default one first.
-    """
-
-    TABLES: ClassVar[Collection[str]] = ()
-
-    #: How numbers and NaN are written to files.
-    _FORMAT: ClassVar[str | None] = "%.15g"
-    _NAN: ClassVar[str] = ""
-
-    def _names(self) -> list[str]:
-        """Return the names of the tables."""
-        return [*self.TABLES]
-
-    @abstractmethod
-    def _frame(self, table: str) -> pd.DataFrame:
-        """Return a table by its name."""
+    def _columns(self, table: str) -> list[Column]:
+        """Return the columns of a table."""
+        raise NotImplementedError(table)
 
     def to_dataframe(self, table: str | None = None) -> pd.DataFrame:
         """Return one of the tables as a data frame.
@@ -219,12 +174,13 @@ class TableResult(Result):
         >>> [*chattering_report(1.03, 2.0, 0.92).to_dataframe("impacts").columns]
         ['time', 'side', 'interval', 'speed_before', 'speed_after']
         """
-        names = self._names()
-        name = next(iter(names), "") if table is None else table
-        return self._frame(checks.one_of(name, "table", InvalidOption, names))
+        names = [*self.TABLES]
+        if not names:
+            raise InvalidOption(f"a {type(self).__name__} has no tables; use to_dict or to_json")
+        return frame_of(self._columns(checks.one_of(table or names[0], "table", InvalidOption, names)))
 
     def to_csv(self, path: str | Path, table: str | None = None) -> None:
-        """Write one of the tables of `to_dataframe` as text columns with a header; "inf" stands for infinity.
+        """Write one of the tables as text columns with a header; "inf" stands for infinity.
 
         Parameters
         ----------
@@ -239,21 +195,71 @@ class TableResult(Result):
             If there is no such table.
         OutputError
             If the file cannot be written.
+        """
+        write_csv(path, self.to_dataframe(table), digits=self._FORMAT)
+
+    def to_excel(self, path: str | Path) -> None:
+        """Write all tables as the sheets of a workbook (.xlsx).
+
+        Parameters
+        ----------
+        path : str or pathlib.Path
+            File to write, whole or not at all.
+
+        Raises
+        ------
+        InvalidOption
+            If there is no table, or openpyxl is not installed.
+        OutputError
+            If the file cannot be written.
+        """
+        write_excel(path, {table: self.to_dataframe(table) for table in self.TABLES or [""]})
+
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
+        """Draw the result.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Axes for the main panel alone; by default a new figure has all panels.
+        title : str
+            Title; by default it describes what is drawn.
+        figsize : (float, float), optional
+            Width and height of a new figure, inches.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The new figure, or that of `ax`.
+
+        Raises
+        ------
+        InvalidOption
+            If the result has no figure, the size is not two positive numbers, or `ax` are no axes.
 
         Examples
         --------
-        >>> import tempfile
         >>> from rocking.chattering import chattering_report
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     chattering_report(1.03, 2.0, 0.92).to_csv(f"{folder}/cycles.csv", "cycles")
+        >>> chattering_report(1.03, 2.0, 0.92).plot(figsize=(4.0, 3.0)).get_size_inches().tolist()
+        [4.0, 3.0]
         """
-        frame = self.to_dataframe(table)
-        write_text(path, frame.to_csv(index=False, float_format=self._FORMAT, na_rep=self._NAN, lineterminator="\n"))
+        raise InvalidOption(f"a {type(self).__name__} has no figure; use summary or to_dict")
+
+    def _headline(self) -> str:
+        """Return the result in one line, for the representation."""
+        return self.summary().splitlines()[0]
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self._headline()}>"
+
+    def _repr_html_(self) -> str:
+        table = self.to_dataframe().to_html(max_rows=_SHOWN, index=False) if self.TABLES else ""
+        return f"<p><b>{type(self).__name__}</b>: {escape(self._headline())}</p>{table}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DatasetResult(DrawnResult, TableResult):
-    """Result whose numbers are a dataset with labels; its variables, coordinates and methods are the result's own.
+class DatasetResult(Result):
+    """Result whose numbers are a dataset with labels, `data`.
 
     Attributes
     ----------
@@ -293,7 +299,7 @@ class DatasetResult(DrawnResult, TableResult):
         >>> import rocking
         >>> blocks = rocking.Blocks.grid(p=[1.0, 2.0], alpha=[0.1, 0.2], restitution=[0.9])
         >>> spectrum = rocking.rocking_spectrum(blocks, rocking.pulses.one_sine(5.0, 1.0))
-        >>> spectrum.select(alpha=0.2).sizes["alpha"]
+        >>> spectrum.select(alpha=0.2).data.sizes["alpha"]
         1
         """
         for name in labels.keys() & {*self.POOLED}:
@@ -321,8 +327,8 @@ class DatasetResult(DrawnResult, TableResult):
         """Return the data of a part without what belongs to another part."""
         return data
 
-    def _frame(self, table: str) -> pd.DataFrame:
-        return data_frame(self._table(table))
+    def _columns(self, table: str) -> list[Column]:
+        return columns_of(self._table(table))
 
     def _table(self, name: str) -> xr.Dataset:
         return self.data[[*self.TABLES[name]]]
@@ -339,28 +345,8 @@ class DatasetResult(DrawnResult, TableResult):
         ------
         OutputError
             If the file cannot be written.
-
-        Examples
-        --------
-        >>> import rocking, tempfile
-        >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
-        >>> found = rocking.overturning_map(block, "one-sine", amplitudes=[1.0, 4.0], frequencies=[2.0])
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     found.to_netcdf(f"{folder}/map.nc")
         """
         write_netcdf(path, self.data)
-
-    def __getattr__(self, name: str) -> Any:
-        # Not before `data` is there (while it is unpickled), and no protocol that was not meant.
-        if name == "data" or name.startswith("__"):
-            raise AttributeError(name)
-        return getattr(self.data, name)
-
-    def __getitem__(self, name: str) -> xr.DataArray:
-        return self.data[name]
-
-    def __dir__(self) -> list[str]:
-        return sorted({*super().__dir__(), *dir(self.data)})
 
     def __repr__(self) -> str:
         sizes = ", ".join(f"{size} {name}" for name, size in self.data.sizes.items())

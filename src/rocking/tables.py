@@ -12,15 +12,15 @@ import os
 import re
 import shutil
 import uuid
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from rocking import checks
 from rocking.arrays import Floats
-from rocking.errors import OutputError
+from rocking.errors import InvalidOption, OutputError, install
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -41,6 +41,32 @@ _HASH: Final = 8
 
 #: A number with a decimal comma, and maybe a unit.
 _WITH_COMMA = re.compile(r"([+-]?\d*),(\d+(?:[eE][+-]?\d+)?\s*[a-zA-Z°/%]*)")
+
+
+class Column(NamedTuple):
+    """One column of a table, from which files, data frames and text are made.
+
+    Attributes
+    ----------
+    name : str
+        Name of the quantity.
+    values : array_like
+        One value for each row.
+    unit : str
+        Unit of the values, "1" where they have none; part of the column's name in files.
+    label : str
+        Heading in texts for people; empty where only files have the column.
+    """
+
+    name: str
+    values: Any
+    unit: str = "1"
+    label: str = ""
+
+    @property
+    def key(self) -> str:
+        """Name with the unit."""
+        return named(self.name, self.unit)
 
 
 def text_table(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
@@ -149,8 +175,37 @@ def decimal(value: float) -> float:
     return written if abs(written - value) <= _ROUNDING * abs(value) else value
 
 
-def frame_of(rows: Sequence[Mapping[str, Any]], unread: Mapping[str, str]) -> pd.DataFrame:
-    """Rows of records as a data frame, and a row for each that could not be read, with the reason as its verdict.
+def frame_of(columns: Iterable[Column]) -> pd.DataFrame:
+    """Return columns as a data frame."""
+    import pandas as pd
+
+    return pd.DataFrame({column.key: column.values for column in columns})
+
+
+def records_of(columns: Sequence[Column]) -> list[dict[str, Any]]:
+    """Return the rows of columns as mappings of plain values."""
+    names, values = [column.key for column in columns], [np.asarray(column.values).tolist() for column in columns]
+    return [dict(zip(names, row, strict=True)) for row in zip(*values, strict=True)]
+
+
+def text_of_columns(columns: Sequence[Column]) -> str:
+    """Return the columns that have a label as a table for people."""
+    labelled = [column for column in columns if column.label]
+    rows = zip(*(column.values for column in labelled), strict=True)
+    return text_table([column.label for column in labelled], [*rows])
+
+
+def columns_of(part: xr.Dataset) -> list[Column]:
+    """Return dimensions, coordinates and variables of a dataset as columns, with a row for each point."""
+    # A dimension alone, without labels, only counts the rows.
+    rows = [] if len(part.dims) == 1 and not part.coords else [*part.dims]
+    frame = part.to_dataframe().reset_index()
+    names = dict.fromkeys([*rows, *part.coords, *part.data_vars])
+    return [Column(str(name), frame[name], part[name].attrs.get("units", "1")) for name in names]
+
+
+def columns_with_skipped(rows: Sequence[Mapping[str, Any]], unread: Mapping[str, str]) -> list[Column]:
+    """Return rows of records as columns, with a row for each record that could not be read and the reason.
 
     Whole numbers and truth values stay such beside rows that have none.
     """
@@ -162,16 +217,7 @@ def frame_of(rows: Sequence[Mapping[str, Any]], unread: Mapping[str, str]) -> pd
         kinds = {type(row[name]) for row in rows}
         if kinds <= {bool, int}:
             frame[name] = frame[name].astype("boolean" if kinds == {bool} else "Int64")
-    return frame
-
-
-def data_frame(part: xr.Dataset) -> pd.DataFrame:
-    """Rows for each point of a dataset, in columns named with their units: dimensions, coordinates, variables."""
-    # A dimension alone, without labels, only counts the rows.
-    rows = [] if len(part.dims) == 1 and not part.coords else [*part.dims]
-    columns = dict.fromkeys([*rows, *part.coords, *part.data_vars])
-    frame = part.to_dataframe().reset_index()[[*columns]]
-    return frame.rename(columns=lambda name: named(str(name), part[name].attrs.get("units", "1")))
+    return [Column(name, frame[name]) for name in frame]
 
 
 def csv_rows(text: str) -> list[tuple[int, list[str]]]:
@@ -267,9 +313,23 @@ def write_bytes(path: str | Path, content: bytes | memoryview) -> None:
         beside.write_bytes(content)
 
 
-def write_csv(path: str | Path, frame: pd.DataFrame, *, index: bool = False) -> None:
-    """Write a data frame as text columns with a header, whole or not at all; numbers to 15 digits."""
-    write_text(path, frame.to_csv(index=index, float_format="%.15g", lineterminator="\n"))
+def write_csv(path: str | Path, frame: pd.DataFrame, *, index: bool = False, digits: str | None = "%.15g") -> None:
+    """Write a data frame as text columns with a header, whole or not at all."""
+    write_text(path, frame.to_csv(index=index, float_format=digits, lineterminator="\n"))
+
+
+def write_excel(path: str | Path, sheets: Mapping[str, pd.DataFrame]) -> None:
+    """Write data frames as the sheets of a workbook, whole or not at all."""
+    import pandas as pd
+
+    content = io.BytesIO()
+    try:
+        with pd.ExcelWriter(content, engine="openpyxl") as book:
+            for name, frame in sheets.items():
+                frame.to_excel(book, sheet_name=name, freeze_panes=(1, 0), index=False, float_format="%.15g")
+    except ImportError:
+        raise InvalidOption(f"a workbook needs openpyxl: {install('excel')}, or write CSV") from None
+    write_bytes(path, content.getvalue())
 
 
 def write_netcdf(path: str | Path, dataset: xr.Dataset) -> None:

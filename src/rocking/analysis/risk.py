@@ -24,7 +24,7 @@ from rocking.analysis.hazard import (
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
-from rocking.result import DrawnResult
+from rocking.result import Result
 from rocking.tables import as_written, counted, known_digits, text_table, within
 
 if TYPE_CHECKING:
@@ -164,7 +164,7 @@ def _period(rate: float) -> float:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Risk(DrawnResult):
+class Risk(Result):
     """Annual rates of all limit states of a fragility under a hazard curve; from `Fragility.annual_rate`.
 
     Its figure has the hazard curve, and below it for each limit state which intensities its rate comes from.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
@@ -20,12 +19,12 @@ from rocking.problem import one_body
 from rocking.progress import Progress, note
 from rocking.response import PRECISION, Response, in_brief, ratio_text, steps_within
 from rocking.response.contact import friction_coefficient
-from rocking.result import TableResult
+from rocking.result import Result
 from rocking.simulation import simulate
-from rocking.tables import counted, decimal, frame_of, named, text_table, write_bytes
+from rocking.tables import Column, columns_with_skipped, counted, decimal, named, text_table
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 #: Columns for people; files hold all.
 _SHOWN: Final = {
@@ -41,7 +40,7 @@ _SLIDING: Final = named("sliding_time", "s")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class BlockUnderRecords(TableResult):
+class BlockUnderRecords(Result):
     """One block under several motions: a table "records" with a row for each, also for those that could not be read.
 
     `records` are the names of the motions; `skipped` says why records could not be read.
@@ -74,8 +73,8 @@ class BlockUnderRecords(TableResult):
     def to_dict(self) -> dict[str, Any]:
         return {"block": str(self.block), "records": self.rows(), "skipped": dict(self.skipped)}
 
-    def _frame(self, table: str) -> pd.DataFrame:
-        return frame_of(self.rows(), self.skipped)
+    def _columns(self, table: str) -> list[Column]:
+        return columns_with_skipped(self.rows(), self.skipped)
 
     def _labels(self) -> list[dict[str, Any]]:
         """First columns of each row: the record, its motion, the block."""
@@ -169,11 +168,8 @@ class Survey(BlockUnderRecords):
         folder = Path(folder)
         self.to_csv(folder / "summary.csv")
         try:
-            workbook = io.BytesIO()
-            table = self.to_dataframe()
-            table.to_excel(workbook, sheet_name="summary", freeze_panes=(1, 0), index=False, float_format="%.15g")
-            write_bytes(folder / "summary.xlsx", workbook.getvalue())
-        except ImportError:
+            self.to_excel(folder / "summary.xlsx")
+        except InvalidOption:
             note(f"no summary.xlsx: {install('excel')} for a workbook; summary.csv contains the same table")
         self.to_json(folder / "summary.json")
 

@@ -16,7 +16,7 @@ from rocking.analysis.risk import Rate, beyond_notes, gradient_of
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
-from rocking.result import DrawnResult
+from rocking.result import Result
 from rocking.tables import as_written, counted, known_digits, text_table, within
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ _STEPS: Final = np.linspace(0.0, 1.0, 4001)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Survival(DrawnResult):
+class Survival(Result):
     """A limit state that was not exceeded in a time, and what that says of the shaking; from `Fragility.survival`.
 
     Its figure has the largest rates that fit with the survival, and the hazard curve beside them.

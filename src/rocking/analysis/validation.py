@@ -24,11 +24,10 @@ from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.named import distinct_motions, numbered, one_motion
 from rocking.problem import bodies_of, slenderness_of
-from rocking.result import DrawnResult, TableResult
-from rocking.tables import as_written, counted, text_table
+from rocking.result import Result
+from rocking.tables import Column, as_written, columns_with_skipped, counted, text_table
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -172,7 +171,7 @@ class ShareInBin:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ModelValidation(DrawnResult, TableResult):
+class ModelValidation(Result):
     """Predictions judged against tests; from `validate`.
 
     Its table has a row for each test. Its figure is the reliability diagram with consistency bands.
@@ -244,10 +243,8 @@ class ModelValidation(DrawnResult, TableResult):
     def to_dict(self) -> dict[str, Any]:
         return asdict(self) | {"notes": [*self.notes]}
 
-    def _frame(self, table: str) -> pd.DataFrame:
-        import pandas as pd
-
-        return pd.DataFrame([asdict(test) for test in self.tests])
+    def _columns(self, table: str) -> list[Column]:
+        return columns_with_skipped([asdict(test) for test in self.tests], {})
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         from rocking.plot.calibration import reliability_figure

@@ -142,8 +142,8 @@ def chattering_map(
     >>> import rocking
     >>> from rocking.chattering import families
     >>> block = rocking.Block.from_parameters(p=1.0, alpha=0.2, restitution=0.92)
-    >>> dataset = chattering_map(families.sine(block, model="linear"), {"a": [0.9, 1.03, 1.05], "omega": [1.0, 2.0]})
-    >>> dataset.complete.values.tolist()
+    >>> found = chattering_map(families.sine(block, model="linear"), {"a": [0.9, 1.03, 1.05], "omega": [1.0, 2.0]})
+    >>> found.data.complete.values.tolist()
     [[False, False], [True, True], [False, False]]
     """
     import xarray as xr

@@ -23,11 +23,10 @@ from rocking.chattering.expansions import (
     series_diagnosis,
 )
 from rocking.errors import InvalidOption, OutsideFit
-from rocking.result import DrawnResult, Result, TableResult
-from rocking.tables import counted, text_table
+from rocking.result import Result
+from rocking.tables import Column, counted, text_table
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -41,7 +40,7 @@ _AMPLITUDES: Final = {"exact": "exact", "eq76": "Eq. 76", "eq77": "Eq. 77", "app
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ChatteringReport(DrawnResult, TableResult):
+class ChatteringReport(Result):
     """What becomes of one chattering sequence of a slender block under a sine; from `chattering_report`.
 
     Its tables are "impacts", those that are resolved, and "cycles", the paper's iterative procedure. Its figure has the
@@ -150,15 +149,13 @@ class ChatteringReport(DrawnResult, TableResult):
             figsize=figsize,
         )
 
-    def _frame(self, table: str) -> pd.DataFrame:
-        import pandas as pd
-
+    def _columns(self, table: str) -> list[Column]:
         rows = self.impacts if table == "impacts" else self.cycles
         if rows is None:
             raise InvalidOption(
                 "{} must be below 1 for the iterative procedure: without loss at impacts nothing ends", "eta"
             )
-        return pd.DataFrame(rows)
+        return [Column(name, rows[name]) for name in rows.dtype.names or ()]
 
     def _verdict(self) -> str:
         half_period = self._time(self.values["half_period"])

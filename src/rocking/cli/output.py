@@ -18,7 +18,7 @@ from rocking.tables import to_json, write_figure, write_text
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from rocking.result import DatasetResult, TableResult
+    from rocking.result import DatasetResult, Result
 
 
 #: Resolution of figures as PNG.
@@ -73,7 +73,7 @@ def write_results(folder: Path, *, figures: Mapping[str, Callable[[], Figure]], 
     write_text(folder / "result.json", to_json(result) + "\n")  # last: where it is, all is there
 
 
-def write_tables(folder: Path, found: TableResult) -> None:
+def write_tables(folder: Path, found: Result) -> None:
     """Write every table of a result into a folder, each into a file of its name."""
     for table in found.TABLES:
         found.to_csv(folder / f"{table}.csv", table)

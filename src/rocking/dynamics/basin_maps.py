@@ -199,7 +199,7 @@ def basins(
     >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     >>> shaking = rocking.pulses.sine(3.5, 1.2, cycles=1)
     >>> found = dynamics.basins(block, shaking, np.linspace(-0.2, 0.2, 21), np.linspace(-0.4, 0.4, 21))
-    >>> for name, share in zip(found.attractor.values, found.share.values):
+    >>> for name, share in zip(found.data.attractor.values, found.data.share.values):
     ...     print(f"{name}: {share:.2f}")
     period 1, 2 impacts: 0.35
     overturns to side -: 0.52

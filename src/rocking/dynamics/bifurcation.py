@@ -231,7 +231,7 @@ def bifurcation_diagram(
     >>> def case(ratio):
     ...     return ball, rocking.pulses.sine(10.0 * ratio, 5.0, cycles=1)
     >>> found = dynamics.bifurcation_diagram(case, np.linspace(1.4, 1.6, 5), [0.1, 0.5], parameter="A w^2/g")
-    >>> found.period.values[0, :, 0].tolist()
+    >>> found.data.period.values[0, :, 0].tolist()
     [1, 1, 1, 2, 2]
     """
     if not callable(case):

@@ -19,12 +19,11 @@ from rocking.dynamics.maps import StroboscopicMap
 from rocking.dynamics.orbits import PeriodicOrbit, orbit_at, sizes_of
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.result import DrawnResult, TableResult
-from rocking.tables import as_written, cell, counted, named, text_table
+from rocking.result import Result
+from rocking.tables import Column, as_written, cell, counted, named, text_table
 from rocking.treatment import Treatment
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -80,7 +79,7 @@ class Bifurcation(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Branch(DrawnResult, TableResult):
+class Branch(Result):
     """Periodic orbits along a parameter, made by `continue_orbit`.
 
     Attributes
@@ -202,24 +201,27 @@ class Branch(DrawnResult, TableResult):
             "ends": [*self.ends],
         }
 
-    def _frame(self, table: str) -> pd.DataFrame:
-        import pandas as pd
-
-        parameter = named(self.name, self.unit)
+    def _columns(self, table: str) -> list[Column]:
         if table == "bifurcations":
-            rows = [(each.kind, each.value, *each.bracket) for each in self.bifurcations]
-            return pd.DataFrame(rows, columns=["kind", parameter, f"{parameter}_lower", f"{parameter}_upper"])
+            parameter, each = named(self.name, self.unit), self.bifurcations
+            return [
+                Column("kind", [one.kind for one in each]),
+                Column(parameter, [one.value for one in each]),
+                *(
+                    Column(f"{parameter}_{end}", [one.bracket[k] for one in each])
+                    for k, end in enumerate(("lower", "upper"))
+                ),
+            ]
         coordinate = self.family(float(self.values[0]))[0].coordinate
-        columns = {
-            parameter: self.values,
-            named(coordinate.name, coordinate.unit): self.states[:, 0],
-            named("velocity", f"{coordinate.unit}/s"): self.states[:, 1],
-            named("peak", coordinate.unit): self.peaks,
-            "first_multiplier": np.abs(self.multipliers[:, 0]),
-            "second_multiplier": np.abs(self.multipliers[:, 1]),
-            "stable": self.is_stable,
-        }
-        return pd.DataFrame(columns)
+        return [
+            Column(self.name, self.values, self.unit),
+            Column(coordinate.name, self.states[:, 0], coordinate.unit),
+            Column("velocity", self.states[:, 1], f"{coordinate.unit}/s"),
+            Column("peak", self.peaks, coordinate.unit),
+            Column("first_multiplier", np.abs(self.multipliers[:, 0])),
+            Column("second_multiplier", np.abs(self.multipliers[:, 1])),
+            Column("stable", self.is_stable),
+        ]
 
     def plot(
         self,

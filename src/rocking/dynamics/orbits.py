@@ -18,12 +18,11 @@ from rocking.dynamics.maps import StroboscopicMap
 from rocking.dynamics.symmetry import is_symmetric
 from rocking.motion.motion import Motion
 from rocking.response import Response
-from rocking.result import DrawnResult, Row, TableResult, dictionary_of, text_of
-from rocking.tables import as_written, counted, named
+from rocking.result import Result, Row, dictionary_of, text_of
+from rocking.tables import Column, as_written, counted
 from rocking.treatment import Treatment
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -41,7 +40,7 @@ _WIDTH: Final = 20
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PeriodicOrbit(DrawnResult, TableResult):
+class PeriodicOrbit(Result):
     """A motion of a body that repeats after some periods of what shakes it, made by `periodic_orbits`.
 
     Attributes
@@ -151,18 +150,17 @@ class PeriodicOrbit(DrawnResult, TableResult):
         ]
         return dictionary_of(rows)
 
-    def _frame(self, table: str) -> pd.DataFrame:
-        import pandas as pd
-
+    def _columns(self, table: str) -> list[Column]:
         if table == "impacts":
-            return self.response.to_dataframe("impacts")
+            return self.response._columns("impacts")
         coordinate = self.body.coordinate
-        columns = [
-            named("time", "s"), named(coordinate.name, coordinate.unit), named("velocity", f"{coordinate.unit}/s"),
-        ]  # fmt: skip
         times = self._map.period * np.arange(self.period) if table == "states" else self._times()
         states = self.states if table == "states" else self.response.states(times)[:, :2]
-        return pd.DataFrame(np.column_stack([times, states]), columns=columns)
+        return [
+            Column("time", times, "s"),
+            Column(coordinate.name, states[:, 0], coordinate.unit),
+            Column("velocity", states[:, 1], f"{coordinate.unit}/s"),
+        ]
 
     def _times(self) -> Floats:
         """Return times of a figure: even, with the last before and the first after every impact."""

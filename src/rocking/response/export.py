@@ -53,7 +53,7 @@ def dataset(response: Answers, dt: float | None) -> xr.Dataset:
     return xr.Dataset(variables, {"time": ("time", times, {"units": "s"})}, _attributes(response))
 
 
-def frame(response: Answers, table: ResponseTable, dt: float | None) -> pd.DataFrame:
+def frame(response: Answers, table: str, dt: float | None) -> pd.DataFrame:
     """One table as a data frame; histories are indexed by time."""
     import pandas as pd
 

@@ -13,11 +13,11 @@ from rocking import checks
 from rocking.arrays import Flags, Floats
 from rocking.body import Coordinate
 from rocking.errors import InvalidOption
-from rocking.result import TableResult
-from rocking.tables import frame_of, named, text_table
+from rocking.result import Result
+from rocking.tables import Column, columns_with_skipped, named, text_table
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 #: Relative step of the factors, and their number, in summaries and tables.
 RELATIVE: Final = 1e-6
@@ -46,7 +46,7 @@ class Repeat(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Perturbed(TableResult):
+class Perturbed(Result):
     """One simulation repeated with its motion, or its initial state, scaled; from `Response.perturbed`.
 
     Its table "repeats" has a row for each factor.
@@ -232,8 +232,8 @@ class Perturbed(TableResult):
             "repeats": self.rows(),
         }
 
-    def _frame(self, table: str) -> pd.DataFrame:
-        return frame_of(self.rows(), {})
+    def _columns(self, table: str) -> list[Column]:
+        return columns_with_skipped(self.rows(), {})
 
 
 def repeated(

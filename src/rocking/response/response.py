@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 
@@ -15,8 +15,8 @@ from rocking.plot.response import RotationUnits
 from rocking.response import export, phase, summary
 from rocking.response.answers import Answers
 from rocking.response.perturbed import PRECISION
-from rocking.result import DrawnResult, Row, dictionary_of, text_of
-from rocking.tables import write_csv, write_netcdf
+from rocking.result import Result, Row, dictionary_of, text_of
+from rocking.tables import Column, write_csv, write_netcdf
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,7 +32,7 @@ _HIGHEST_PICTURED = 2.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Response(Answers, DrawnResult):
+class Response(Answers, Result):
     """Response of one body to one motion, made by `rocking.simulate`.
 
     Attributes
@@ -72,6 +72,11 @@ class Response(Answers, DrawnResult):
         Times that the last digits decided whether a block touches the ground, or to which side it leaves it where
         nothing weighs it down.
     """
+
+    TABLES = get_args(export.ResponseTable)
+
+    def _columns(self, table: str) -> list[Column]:
+        return [Column(name, values, unit) for name, (values, unit) in export._columns(self, table).items()]
 
     def _headline(self) -> str:
         return summary.line(self)
@@ -223,7 +228,7 @@ class Response(Answers, DrawnResult):
         """
         return export.dataset(self, dt)
 
-    def to_dataframe(self, table: export.ResponseTable = "histories", *, dt: float | None = None) -> pd.DataFrame:
+    def to_dataframe(self, table: str | None = None, *, dt: float | None = None) -> pd.DataFrame:
         """Return one of the response's tables as a data frame; columns are named with their units.
 
         Parameters
@@ -253,7 +258,7 @@ class Response(Answers, DrawnResult):
         >>> list(response.to_dataframe("impacts").columns)
         ['time_s', 'side', 'speed_before_rad_s', 'speed_after_rad_s']
         """
-        return export.frame(self, table, dt)
+        return export.frame(self, table or "histories", dt)
 
     def to_netcdf(self, path: str | Path, dt: float | None = None) -> None:
         """Write `to_xarray` to a NetCDF file.
@@ -279,7 +284,7 @@ class Response(Answers, DrawnResult):
         """
         write_netcdf(path, export.dataset(self, dt))
 
-    def to_csv(self, path: str | Path, table: export.ResponseTable = "histories", *, dt: float | None = None) -> None:
+    def to_csv(self, path: str | Path, table: str | None = None, *, dt: float | None = None) -> None:
         """Write one of the tables of `to_dataframe` as text columns with a header.
 
         Parameters
@@ -308,7 +313,7 @@ class Response(Answers, DrawnResult):
         >>> file.read_text().splitlines()[0]
         'time_s,side,speed_before_rad_s,speed_after_rad_s'
         """
-        write_csv(path, export.frame(self, table, dt), index=table == "histories")
+        write_csv(path, self.to_dataframe(table, dt=dt), index=table in (None, "histories"))
 
     def plot(
         self,

@@ -284,7 +284,7 @@ class Solid(Result):
 
     def summary(self) -> str:
         weakest = self.rose([self.weakest_azimuth])
-        one = {name: float(weakest[name][0]) for name in weakest.TABLES["rose"]}
+        one = {name: float(weakest.data[name][0]) for name in weakest.TABLES["rose"]}
         east, north = (float(each) for each in self.centre[:2])
         sizes = np.ptp(self.support, axis=0)
         radii = np.sqrt(np.diag(self.inertia_over_mass))

@@ -18,7 +18,7 @@ from rocking.errors import InvalidOption, StudyError, install
 from rocking.progress import Progress
 from rocking.studies.store import Store
 from rocking.studies.units import name_of
-from rocking.tables import data_frame, plain, whole_file
+from rocking.tables import columns_of, frame_of, plain, whole_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,7 +44,7 @@ def write_table(kind: str, path: str | Path, dataset: xr.Dataset, along: str, st
 
         def frames() -> Iterator[pd.DataFrame]:
             for start in range(0, count, step):
-                yield data_frame(table.isel({along: slice(start, start + step)}).load())
+                yield frame_of(columns_of(table.isel({along: slice(start, start + step)}).load()))
                 bar.advance(min(step, count - start))
 
         with whole_file(path) as beside:

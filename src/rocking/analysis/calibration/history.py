@@ -29,7 +29,7 @@ from rocking.progress import Progress
 from rocking.response import Response, drawing_times
 from rocking.response.answers import history_of
 from rocking.response.sensitivity import changes_along
-from rocking.result import DrawnResult
+from rocking.result import Result
 from rocking.simulation import simulate
 from rocking.tables import as_written, counted, text_table
 
@@ -84,7 +84,7 @@ class Measured:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class HistoryCalibration(DrawnResult):
+class HistoryCalibration(Result):
     """The block that explains a rotation history best.
 
     Made by `calibrate_history`. Its figure has the measured rotation, that of the fitted block, and the residuals.

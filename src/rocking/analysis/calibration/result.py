@@ -27,11 +27,10 @@ from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.named import Motions
-from rocking.result import DrawnResult, TableResult
-from rocking.tables import as_written, counted, named, text_table
+from rocking.result import Result
+from rocking.tables import Column, as_written, counted, text_table
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -87,7 +86,7 @@ class Validation:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Calibration(DrawnResult, TableResult):
+class Calibration(Result):
     """Blocks that explain which motions overturned a specimen, and what they predict.
 
     Made by `calibrate`. Its table "ensemble" has a row for each block: parameters of both sides, weight, and the
@@ -306,7 +305,7 @@ class Calibration(DrawnResult, TableResult):
         >>> import rocking
         >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (2.0, 3.0, 4.0, 5.0)]
         >>> found = rocking.calibrate(pulses, [0, 0, 1, 1], p=2.0, restitution=0.9, two_sided=False, candidates=128)
-        >>> found.spectrum(pulses, p=[1.0, 2.0]).sizes["p"]
+        >>> found.spectrum(pulses, p=[1.0, 2.0]).data.sizes["p"]
         2
         """
         chosen = self.model if model is None else model
@@ -339,15 +338,13 @@ class Calibration(DrawnResult, TableResult):
             "probabilities": self.probabilities,
         }
 
-    def _frame(self, table: str) -> pd.DataFrame:
-        import pandas as pd
-
-        columns = {
-            named(f"{name}_{side}", unit): getattr(self.blocks, name)[:, k]
+    def _columns(self, table: str) -> list[Column]:
+        columns = [
+            Column(f"{name}_{side}", getattr(self.blocks, name)[:, k], unit)
             for name, unit in (("p", "rad/s"), ("alpha", "rad"), ("restitution", "1"))
             for k, side in enumerate(("plus", "minus"))
-        }
-        return pd.DataFrame({**columns, "weight": self.weights, "model": self.model})
+        ]
+        return [*columns, Column("weight", self.weights), Column("model", [self.model] * len(self.weights))]
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         from rocking.plot.calibration import outcomes_figure

@@ -24,8 +24,8 @@ from rocking.errors import InvalidOption, Message
 from rocking.motion.scaling import Measure
 from rocking.problem import bodies_of
 from rocking.progress import spelled
-from rocking.result import DrawnResult, TableResult
-from rocking.tables import as_written, counted, text_table
+from rocking.result import Result
+from rocking.tables import Column, as_written, counted, text_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,7 +37,7 @@ _POINTS: Final = 201
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Fragility(DrawnResult, TableResult):
+class Fragility(Result):
     """Fragility curves of one or several limit states against one intensity measure; from `fragility`.
 
     Its tables are "curves" (limit state, intensity in SI units, probability, lower and upper end of the band) and,
@@ -283,20 +283,16 @@ class Fragility(DrawnResult, TableResult):
         held = np.concatenate([curve.intensity for curve in self.curves])
         return float(held.min()), float(held.max())
 
-    def _frame(self, table: str) -> pd.DataFrame:
-        import pandas as pd
-
+    def _columns(self, table: str) -> list[Column]:
         if table == "curves":
             at = np.linspace(0.0, self.range[1], _POINTS)
-            columns = [
-                {"limit_state": curve.limit_state, self.measure.column: at, "probability": curve.probability(at)}
-                | dict(zip(("lower", "upper"), curve.band(at), strict=True))
-                for curve in self.curves
-            ]
-            return pd.concat(map(pd.DataFrame, columns), ignore_index=True)
+            values = np.concatenate([[at, curve.probability(at), *curve.band(at)] for curve in self.curves], axis=1)
+            names = [curve.limit_state for curve in self.curves for _ in at]
+            columns = zip((self.measure.column, "probability", "lower", "upper"), values, strict=True)
+            return [Column("limit_state", names), *(Column(name, column) for name, column in columns)]
         if self.outcomes is None:
             raise InvalidOption("this fragility was fitted to given outcomes: there are no simulations to write")
-        return self.outcomes
+        return [Column(str(name), self.outcomes[name]) for name in self.outcomes]
 
     def to_nrml(
         self,

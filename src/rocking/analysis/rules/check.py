@@ -213,7 +213,7 @@ def _margin(response: Response, block: Block, motion: Motion, model: Model, thre
     scaled = incremental_dynamic_analysis(
         block, motion, model=model, tolerance=_TOLERANCE, threads=threads, progress=False
     )
-    margin = motion.pga / float(scaled.overturning_level[0, 0])
+    margin = motion.pga / float(scaled.data.overturning_level[0, 0])
     if response.overturned:
         return float(np.fmax(margin, 1.0))  # it may be beyond all levels that were looked at
     # The level is the middle of a bracket: where that holds the motion itself, which stands, the change lies above it.
