@@ -11,7 +11,7 @@ from rocking.analysis.hazard import HEADINGS
 from rocking.analysis.input_tables import read_observed
 from rocking.motion.scaling import _MEASURES
 from rocking.records import units
-from rocking.solid.reading import UNITS as LENGTHS_OF_MESHES
+from rocking.solid.mesh import UNITS as LENGTHS_OF_MESHES
 
 G = 9.80665
 

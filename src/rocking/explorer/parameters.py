@@ -30,8 +30,8 @@ from rocking.quantities import (
     velocity,
 )
 from rocking.records.units import CHOICES, plain_spelling
-from rocking.solid.reading import SHIPPED
-from rocking.solid.reading import UNITS as MESH_UNITS
+from rocking.solid.mesh import SHIPPED
+from rocking.solid.mesh import UNITS as MESH_UNITS
 from rocking.treatment import treatment
 
 #: Parameters that one form sets together, and that a comparison replaces together.

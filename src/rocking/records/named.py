@@ -87,7 +87,8 @@ def numbered(given: Sequence[str]) -> list[str]:
 def distinct_motions(motions: Sequence[Motion]) -> tuple[list[Motion], list[int]]:
     """Motions that differ, and which of them each one is: the same command is often given several times."""
     places: dict[tuple[bytes, ...], int] = {}
-    distinct, which = [], []
+    distinct: list[Motion] = []
+    which: list[int] = []
     for motion in motions:
         parts = [part for part in (motion, motion.vertical) if part is not None]
         key = tuple(values.tobytes() for part in parts for values in (part.breakpoints, part.coefficients))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 import re
+from typing import Any
 
 from rocking.records.formats.channel import Channel, Recognised, azimuth_of, channel_of, first_match
 from rocking.records.formats.source import Line, Request, Source
@@ -57,6 +58,13 @@ def _read(source: Source, titles: list[Line], sizes: Line, points: int, dt: floa
         event, station, name = ", ".join(parts[:-2]), parts[-2], parts[-1] or name
     else:
         owner = ""
-    known = {"name": name, "number": 1, "dt": dt, "azimuth": azimuth_of(name), "station": station, "event": event}
+    known: dict[str, Any] = {
+        "name": name,
+        "number": 1,
+        "dt": dt,
+        "azimuth": azimuth_of(name),
+        "station": station,
+        "event": event,
+    }
     facts = {"station line": owner}
     return [channel_of(source, "PEER AT2", values, unit, sizes.start, spelling=spelling, facts=facts, **known)]

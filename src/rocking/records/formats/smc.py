@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 import re
+from typing import Any
 
 import numpy as np
 
@@ -83,7 +84,14 @@ def _read(source: Source, title: Line, kind: re.Match[str], request: Request) ->
         found[1].strip() if (found := first_match(each, text)) else "" for each in (_COMPONENT, _STATION)
     )
     name = component.strip(" *") or "acceleration"
-    known = {"name": name, "number": 1, "dt": dt, "times": times, "azimuth": azimuth_of(name), "station": station}
+    known: dict[str, Any] = {
+        "name": name,
+        "number": 1,
+        "dt": dt,
+        "times": times,
+        "azimuth": azimuth_of(name),
+        "station": station,
+    }
     known |= {"event": " ".join(text[3].text.split())}
     facts = {"stage": kind[2].lower()}
     return [channel_of(source, "USGS SMC", values, unit, start, spelling="cm/s2", facts=facts, **known)]

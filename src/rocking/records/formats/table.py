@@ -15,7 +15,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from decimal import Decimal
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -191,7 +191,13 @@ def _read(source: Source, shape: _Shape, heading: Heading, request: Request) -> 
         column = heading.columns[place]
         dt, times = _timing(source, request, shape, heading, table, place)
         name = source.stem if shape.columns <= 2 and len(held) == 1 else column.name
-        known = {"name": name, "number": number, "dt": dt, "times": times, "start": _start(heading, table, place)}
+        known: dict[str, Any] = {
+            "name": name,
+            "number": number,
+            "dt": dt,
+            "times": times,
+            "start": _start(heading, table, place),
+        }
         channel = channel_of(
             source,
             "text table",
