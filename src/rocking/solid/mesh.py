@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from rocking import checks
 from rocking.arrays import Floats, Integers
 from rocking.errors import InvalidBlock, InvalidOption, install, literal
-from rocking.motion.directions import sine_cosine
+from rocking.motion.processing import sine_cosine
 from rocking.plausibility import density_notes, height_notes
 from rocking.solid import support as polygons
 from rocking.solid.repair import (

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidBlock, literal
-from rocking.motion.directions import sine_cosine
+from rocking.motion.processing import sine_cosine
 from rocking.solid.repair import Surface, components
 
 #: Corners of a polygon within this part of its size of the outermost one are on one edge with it.

@@ -92,7 +92,7 @@ def _read(source: Source, title: Line, kind: re.Match[str], request: Request) ->
         "azimuth": azimuth_of(name),
         "station": station,
     }
-    known |= {"event": " ".join(text[3].text.split())}
+    known |= {"station": station, "event": " ".join(text[3].text.split())}
     facts = {"stage": kind[2].lower()}
     return [channel_of(source, "USGS SMC", values, unit, start, spelling="cm/s2", facts=facts, **known)]
 
