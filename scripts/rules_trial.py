@@ -14,9 +14,9 @@ from pages import markdown
 
 import rocking
 from rocking import rules
-from rocking.analysis.rules.criteria import TITLES
 from rocking.constants import MODELS
 from rocking.plot.canvas import CURVES, add_labels, add_legend, figure_for, handles_of
+from rocking.rules import TITLES
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 TABLES = DOCS / "_tables"

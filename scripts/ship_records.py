@@ -3,7 +3,7 @@
     python scripts/ship_records.py FOLDER
 
 FOLDER holds the CSMIP V1 and V2 files named in STATIONS. For each station one compressed NumPy archive is
-written to ``src/rocking/motion/data``: per channel the printed values as integers (printed value = integer /
+written to ``src/rocking/records/data``: per channel the printed values as integers (printed value = integer /
 denominator), stored as second differences, which compress best; and ``catalogue.json`` says what they are.
 Nothing is rounded, filtered or cut.
 """

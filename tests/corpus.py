@@ -553,10 +553,10 @@ def measures_of_records() -> Iterator[Item]:
 
 @group()
 def record_files() -> Iterator[Item]:
-    from rocking.motion import formats
+    from rocking import records
 
     for path in sorted(FORMATS.iterdir()):
-        channels = repr(attempt(formats.channels, path))
+        channels = repr(attempt(records.channels, path))
         yield path.name, channels.replace(str(path), path.name)
         for channel in (None, 1, 2):
             motion = attempt(rocking.read, path, channel=channel)

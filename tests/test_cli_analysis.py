@@ -116,7 +116,7 @@ def no_work(monkeypatch):
 
     monkeypatch.setattr("rocking.engine.simulate_task", simulated)
     # A function has the name of its module there.
-    monkeypatch.setattr(import_module("rocking.analysis.rules.check"), "simulate", simulated)
+    monkeypatch.setattr(import_module("rocking.rules"), "simulate", simulated)
 
 
 LEVELS = ["--levels", "0.1g:1.2g:12"]

@@ -14,10 +14,10 @@ import rocking
 from rocking import quantities
 from rocking.cli import main
 from rocking.errors import InvalidOption
-from rocking.motion.named import expanded
 from rocking.motion.scaling import Measure
 from rocking.plausibility import motion_notes
 from rocking.progress import note, notes_for
+from rocking.records.named import expanded
 
 RECORD = "el-centro-meloland-270"
 OTHER = "ridgecrest-clc-090"

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking import InvalidBlock, InvalidMotion, InvalidOption, Motion, Solid, response_rose
-from rocking.motion import records
+from rocking import InvalidBlock, InvalidMotion, InvalidOption, Motion, Solid, records, response_rose
 
 
 @pytest.fixture(scope="module")

@@ -22,7 +22,7 @@ from rocking.explorer.core import Explorer
 from rocking.explorer.inputs import read_case
 from rocking.explorer.server import App
 from rocking.explorer.uploads import LARGEST, MOST, UploadStore
-from rocking.solid.reading import SHIPPED
+from rocking.solid.mesh import SHIPPED
 
 STATUE = {"mesh": "statue", "azimuth": "30", "motion": "ridgecrest-clc-090", "pga": "0.6g"}
 DENSITY = "plinth=2700,figure=2650,head=2650"

@@ -19,7 +19,7 @@ from oracles import record_files as written
 from oracles.damaged_files import TOKENS, damaged
 
 from rocking.errors import RockingError
-from rocking.motion.formats import channels, identify, read
+from rocking.records import channels, identify, read
 
 RECORDS = Path(__file__).resolve().parents[2] / "shared" / "records"
 

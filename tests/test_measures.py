@@ -14,9 +14,9 @@ from mpmath import mp
 from scipy import linalg
 from scipy.integrate import solve_ivp
 
+from rocking import pulses, records
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion
-from rocking.motion import pulses, records
 from rocking.motion.motion import Motion
 
 samples = st.lists(st.floats(-10.0, 10.0).map(lambda x: round(x, 3)), min_size=2, max_size=25)
@@ -251,7 +251,7 @@ def test_measures_name_their_units():
 
 
 def test_the_oscillator_kernel_works_uncompiled():
-    code = "from rocking.motion import pulses; print(repr(pulses.one_sine(1.0, 1.0).spectral_acceleration(0.7)))"
+    code = "from rocking import pulses; print(repr(pulses.one_sine(1.0, 1.0).spectral_acceleration(0.7)))"
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
     assert float(done.stdout) == pytest.approx(pulses.one_sine(1.0, 1.0).spectral_acceleration(0.7), rel=1e-14)

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 from numpy.testing import assert_allclose, assert_array_equal
 
+from rocking import pulses, records
 from rocking.errors import InvalidMotion, InvalidOption
-from rocking.motion import pulses, records
 from rocking.motion.motion import Description, Motion
 from rocking.motion.scaling import Measure
 
@@ -455,10 +455,19 @@ def test_what_is_no_text_and_no_number_is_refused(made):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    "statement",
+    ["from rocking.pulses import ricker", "import rocking.records", "from rocking.records import load, read",
+     "from rocking.rules import rate", "import rocking; rocking.pulses.ricker, rocking.rules.rate"],
+)  # fmt: skip
+def test_public_modules_can_be_imported(statement):
+    subprocess.run([sys.executable, "-c", statement], check=True)
+
+
 def test_motions_import_without_slow_libraries():
     code = (
-        "import sys; import rocking.motion.motion, rocking.motion.pulses, rocking.motion.records as r;"
-        "r.load('el-centro-meloland-270').scaled_to(1.0).pgv;"
+        "import sys; import rocking.motion.motion, rocking.pulses; from rocking.records import load;"
+        "load('el-centro-meloland-270').scaled_to(1.0).pgv;"
         "print(sorted({'scipy', 'numba', 'xarray', 'matplotlib'} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
+from rocking import pulses, records
 from rocking.errors import InvalidMotion
-from rocking.motion import pulses, records
 from rocking.motion.motion import Motion
 
 STEP = 0.01

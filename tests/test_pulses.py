@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
+from rocking import pulses
 from rocking.errors import InvalidMotion
-from rocking.motion import pulses
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -9,14 +9,13 @@ import pytest
 import ship_records
 from numpy.testing import assert_array_equal
 
+from rocking import read, records
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import UnreadableRecord
-from rocking.motion import records
-from rocking.motion.formats import read
-from rocking.motion.named import named_motion, numbered, shipped
+from rocking.records.named import named_motion, numbered, shipped
 
 ROOT = Path(__file__).resolve().parents[1]
-DATA = ROOT / "src" / "rocking" / "motion" / "data"
+DATA = ROOT / "src" / "rocking" / "records" / "data"
 
 # As printed in the files' headers: g and s for Ridgecrest, cm/s^2 and s for El Centro.
 PUBLISHED_PEAKS = {
@@ -69,7 +68,7 @@ def test_a_record_says_where_it_comes_from(name):
 
 @pytest.mark.parametrize("file", FILES)
 def test_values_are_those_of_the_published_file(file, shared):
-    from rocking.motion.formats import channels
+    from rocking.records import channels
 
     found = channels(shared / "records" / "shippable" / file)
     assert len(found) == len(FILES[file])

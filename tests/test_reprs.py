@@ -13,10 +13,10 @@ import pytest
 import xarray as xr
 
 import rocking
+from rocking import records
 from rocking.analysis import Band
 from rocking.analysis.survey import survey
 from rocking.kernels.trace import Trail
-from rocking.motion import formats, named
 
 BLOCK = rocking.Block(width=0.24, height=1.1)
 RECORD = rocking.records.load("el-centro-meloland-270")
@@ -68,10 +68,10 @@ RESULTS = {
     "survey": lambda path: survey(BLOCK, {"one": RECORD, "two": -RECORD}),
     "rule": lambda path: rocking.rules.west([BLOCK, rocking.Block(half_width=0.2, half_height=1.0)], RECORD),
     "check": lambda path: rocking.rules.check(BLOCK, {"one": RECORD}, rules=["west"]),
-    "channel": lambda path: formats.channels(path)[0],
-    "contents": lambda path: named.contents(path),
-    "shipped": lambda path: named.shipped(),
-    "format": lambda path: formats.identify(path),
+    "channel": lambda path: records.channels(path)[0],
+    "contents": lambda path: records.contents(path),
+    "shipped": lambda path: records.shipped(),
+    "format": lambda path: records.identify(path),
     "chattering": lambda path: rocking.chattering.chattering_report(1.03, 2.0, 0.92),
     "critical amplitude": lambda path: rocking.chattering.critical_report(2.0, 0.92),
     "episodes": lambda path: rocking.chattering.chattering_episodes(rocking.simulate(BLOCK, RECORD)),

@@ -12,12 +12,12 @@ import xarray as xr
 
 import rocking
 from rocking import Block, InvalidOption, OutputError, simulate
-from rocking.analysis.rules.check import Check
 from rocking.analysis.survey import survey
 from rocking.explorer.facts import verdict
 from rocking.kernels import state
 from rocking.response import QUANTITIES, history, sensitivity, summary
 from rocking.response.summary import known_ratio, time_text
+from rocking.rules import Check
 from rocking.tables import named
 
 TABLES = {

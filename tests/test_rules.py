@@ -11,7 +11,7 @@ from scipy.integrate import quad
 
 import rocking
 from rocking import rules
-from rocking.analysis.rules import criteria
+from rocking import rules as criteria
 from rocking.constants import STANDARD_GRAVITY as G
 
 NUMBER = re.compile(r"\d+(?:\.\d+)?")

@@ -18,10 +18,8 @@ from scipy.spatial.transform import Rotation
 
 import rocking
 from rocking import Block, InvalidBlock, InvalidOption, Solid
-from rocking.solid.moments import moments
-from rocking.solid.overlap import overlaps
-from rocking.solid.reading import _NothingElse, upright
-from rocking.solid.repair import agreeing, closed, is_closed, joined, shells_of
+from rocking.solid.mesh import _NothingElse, upright
+from rocking.solid.repair import agreeing, closed, is_closed, joined, moments, overlaps, shells_of
 
 SCRIPT = runpy.run_path(str(Path(__file__).resolve().parents[1] / "scripts" / "ship_statue.py"))
 SIZES = (0.6, 0.4, 1.8)
@@ -291,7 +289,7 @@ def test_cavities_are_hollow_and_pieces_are_not():
     core = Solid.from_mesh(trimesh.util.concatenate([outer, inner]))
     assert core.volume == pytest.approx(1.008)
     assert core.repairs == ()
-    assert core.notes[0].startswith("two pieces of mesh overlap in at least 0.008 m^3, which is counted twice: ")
+    assert core.notes[0].startswith("two pieces of mesh overlap in about 0.008 m^3, which is counted twice: ")
     assert core.notes[0].endswith("if one is a cavity, turn its normals inwards")
     apart = box((0.2, 0.2, 0.2), at=(0.0, 2.0))
     apart.invert()
@@ -336,7 +334,7 @@ def test_a_part_inside_another_that_is_turned_the_other_way_is_its_cavity():
     ],
     ids=["corner", "sunk", "nested", "on", "beside", "edge", "apart"],
 )
-def test_what_two_boxes_have_in_common_is_said_once_and_exactly(at, sizes, common):
+def test_what_two_boxes_have_in_common_is_noted_once(at, sizes, common):
     other = box(sizes, at[:2])
     other.apply_translation([0.0, 0.0, at[2]])
     parts = {"foot": box((1.0, 1.0, 1.0)), "post": other}
@@ -347,7 +345,7 @@ def test_what_two_boxes_have_in_common_is_said_once_and_exactly(at, sizes, commo
             continue
         (note,) = solid.notes
         assert note == (
-            f"{names} overlap in at least {common:.3g} m^3, which is counted twice: make one surface of the two, cut "
+            f"{names} overlap in about {common:.2g} m^3, which is counted twice: make one surface of the two, cut "
             "one out of the other, or, if one is a cavity, turn its normals inwards"
         )
 
@@ -739,7 +737,7 @@ def test_open_pieces_that_share_an_edge_are_one_surface_and_closed_ones_are_not(
 
 
 @pytest.mark.parametrize("pairs", [1, pytest.param(30, marks=pytest.mark.slow)])
-def test_what_is_proven_in_common_is_never_more_than_there_is(pairs):
+def test_what_two_boxes_at_any_angle_have_in_common_is_estimated(pairs):
     rng, shares = np.random.default_rng(3), []
     for _ in range(pairs):
         half, middles = rng.uniform(0.2, 0.5, (2, 3)), rng.uniform(-0.2, 0.2, (2, 3))
@@ -753,10 +751,8 @@ def test_what_is_proven_in_common_is_never_more_than_there_is(pairs):
             planes.append(np.column_stack([normals, -np.tile(half[k], 2) - normals @ middles[k]]))
         exact = convex_volume(np.vstack(planes))
         found = overlaps(["one", "other"], meshes)
-        proven = float(found[0].partition("at least ")[2].partition(" ")[0]) if found else 0.0
-        assert proven <= exact * (1.0 + 1e-9)
-        shares.append(proven / exact)
-    assert len(shares) == pairs and min(shares) > 0.2
+        shares.append(float(found[0].partition("about ")[2].partition(" ")[0]) / exact)
+    assert len(shares) == pairs and 0.85 < min(shares) <= max(shares) < 1.15
 
 
 def convex_volume(planes):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from rocking.solid.building import properties
-from rocking.solid.sections import sections_of
+from rocking.solid.mesh import properties
+from rocking.solid.support import sections_of
 
 
 def surfaces_of(mesh):

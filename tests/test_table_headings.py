@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from rocking.errors import UnreadableRecord
-from rocking.motion.formats import channels, chosen, identify, read
-from rocking.motion.formats.source import Request
-from rocking.motion.named import named_motion, named_vertical
 from rocking.plausibility import reading_notes, vertical_notes
+from rocking.records.formats import channels, chosen, identify, read
+from rocking.records.formats.source import Request
+from rocking.records.named import named_motion, named_vertical
 
 G = 9.80665
 FT, IN = 0.3048, 0.0254

@@ -9,9 +9,9 @@ import rocking
 from rocking import HazardCurve, Measure, quantities
 from rocking.analysis.hazard import HEADINGS
 from rocking.analysis.input_tables import read_observed
-from rocking.motion import units
 from rocking.motion.scaling import _MEASURES
-from rocking.solid.reading import UNITS as LENGTHS_OF_MESHES
+from rocking.records import units
+from rocking.solid.mesh import UNITS as LENGTHS_OF_MESHES
 
 G = 9.80665
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking import checks
+from rocking import checks, pulses
 from rocking.arrays import Floats
 from rocking.block import Block
 from rocking.chattering.amplitude import critical_amplitude
@@ -24,7 +24,6 @@ from rocking.chattering.parameters import (
     single,
 )
 from rocking.errors import InvalidOption
-from rocking.motion import pulses
 from rocking.motion.motion import Motion
 from rocking.response import Response
 from rocking.simulation import simulate

@@ -1,5 +1,4 @@
-from . import analysis, chattering, dynamics, solid, studies
-from .analysis import rules
+from . import analysis, chattering, dynamics, pulses, records, rules, solid, studies
 from .analysis.calibration.history import HistoryCalibration, calibrate_history
 from .analysis.calibration.outcomes import calibrate
 from .analysis.calibration.result import Calibration
@@ -50,10 +49,10 @@ from .errors import (
     UnreadableRecord,
 )
 from .explorer.launch import Frame, explore
-from .motion import Motion, pulses, records
+from .motion import Motion
 from .motion.description import Description, Origin
-from .motion.formats import read
 from .motion.scaling import Measure
+from .records.formats import read
 from .response import Gradient, Perturbed, Repeat, Response, Sensitivity, gradient
 from .result import DatasetResult, Result, Row
 from .simulation import simulate

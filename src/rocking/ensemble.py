@@ -19,12 +19,12 @@ from rocking.constants import VERSION, Model
 from rocking.engine import OUTCOME, Setup, Task, check_components, parts_of, simulate_tasks
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.motion.named import Motions, names_of, several_motions
 from rocking.motion.piecewise import STRONGEST
 from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
 from rocking.peak_changes import BETWEEN_STOPS, OF_BLOCKS, By, peak_changes
 from rocking.problem import bodies_of, rules_of
 from rocking.progress import Progress
+from rocking.records.named import Motions, names_of, several_motions
 from rocking.response import COUNT, RELATIVE, factors_near
 from rocking.threads import cores
 from rocking.treatment import Treatment, treatment

@@ -7,9 +7,8 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
-from rocking import checks, quantities
+from rocking import checks, pulses, quantities
 from rocking.errors import InvalidOption
-from rocking.motion import pulses
 from rocking.motion.motion import Motion
 
 

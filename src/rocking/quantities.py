@@ -13,7 +13,7 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption, literal
 from rocking.motion.scaling import FACTOR, Measure
-from rocking.motion.units import Unit, accelerations, plain_spelling, times
+from rocking.records.units import Unit, accelerations, plain_spelling, times
 from rocking.tables import decimal
 
 #: What reads one number: its text and the name of the argument that it is of, to SI units.

@@ -17,8 +17,8 @@ from rocking.kernels import state
 from rocking.kernels.march import march
 from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
-from rocking.motion.named import one_motion
 from rocking.problem import ground_of, highest, one_body, rules_of, set_start
+from rocking.records.named import one_motion
 from rocking.response import Response
 from rocking.treatment import Treatment, treatment
 

@@ -27,9 +27,9 @@ from promises.promise import Found, Promise
 from rocking.analysis import input_tables
 from rocking.analysis.hazard import HazardCurve
 from rocking.errors import RockingError
-from rocking.motion import formats
-from rocking.motion.formats import through_obspy
-from rocking.motion.formats.source import Request
+from rocking.records import formats
+from rocking.records.formats import through_obspy
+from rocking.records.formats.source import Request
 from rocking.studies.file import TEMPLATE, read_study
 
 #: Parts of the full run; a part takes the truncations whose number has its own as the rest.

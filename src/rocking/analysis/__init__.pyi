@@ -1,4 +1,3 @@
-from . import rules
 from .calibration.diagnostics import BoundReached, Diagnostics, Scores
 from .calibration.history import Measured
 from .calibration.result import Estimate, Validation
@@ -40,5 +39,4 @@ __all__ = [
     "Survival",
     "Validation",
     "mode_name",
-    "rules",
 ]

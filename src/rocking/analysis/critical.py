@@ -12,7 +12,7 @@ from rocking.body import Body
 from rocking.constants import Model
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.motion.named import one_motion
+from rocking.records.named import one_motion
 from rocking.response import Gradient, Response, gradient
 from rocking.simulation import simulate
 

@@ -18,9 +18,9 @@ from rocking.engine import missing_text
 from rocking.ensemble import Scales, simulate_many
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.motion.motion import Motion
-from rocking.motion.named import several_motions
 from rocking.motion.scaling import FACTOR, Measure, MeasureName
 from rocking.progress import Progress
+from rocking.records.named import several_motions
 from rocking.result import DatasetResult, variable
 from rocking.solid.rose import checked_azimuths
 from rocking.solid.solid import Solid

@@ -26,9 +26,9 @@ from rocking.arrays import Flags, Floats, Integers
 from rocking.body import Bodies, Body
 from rocking.constants import Model
 from rocking.errors import InvalidOption
-from rocking.motion.named import Motions, several_motions
 from rocking.motion.scaling import Measure
 from rocking.problem import bodies_of, slenderness_of
+from rocking.records.named import Motions, several_motions
 from rocking.result import DatasetResult, variable
 from rocking.tables import as_written, text_table
 

@@ -30,9 +30,9 @@ from rocking.engine import Setup, missing_text, simulate_each
 from rocking.errors import InvalidOption
 from rocking.motion.exceedance import lifting_factors
 from rocking.motion.motion import Motion
-from rocking.motion.named import Motions, several_motions
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.problem import bodies_of, never_rests, slenderness_of, thresholds_of
+from rocking.records.named import Motions, several_motions
 from rocking.result import DatasetResult
 from rocking.tables import as_written, counted, named, text_table
 from rocking.treatment import Certified

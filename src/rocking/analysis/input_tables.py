@@ -20,9 +20,9 @@ from rocking.block import Blocks
 from rocking.constants import Model
 from rocking.errors import InvalidOption, RockingError, UnreadableRecord
 from rocking.motion.motion import Motion
-from rocking.motion.named import is_there, named_motion, named_vertical
 from rocking.motion.scaling import Measure
 from rocking.named_pulses import FAMILIES, named_pulse
+from rocking.records.named import is_there, named_motion, named_vertical
 from rocking.tables import counted, csv_rows, named
 
 _FOLDER: Final = re.compile(r"[\w-][\w. -]*(?<![. ])")

@@ -20,9 +20,9 @@ from rocking.constants import VERSION, Model
 from rocking.engine import OUTCOME, Setup, missing_text, simulate_each
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion.motion import Motion
-from rocking.motion.named import one_motion
 from rocking.named_pulses import pulse_family
 from rocking.progress import Progress
+from rocking.records.named import one_motion
 from rocking.result import DatasetResult, table_of_some, variable
 from rocking.tables import as_written, cell, named, text_table
 from rocking.treatment import Certified

@@ -22,8 +22,8 @@ from rocking.engine import missing_text
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.motion.named import Motions, several_motions
 from rocking.problem import bodies_of
+from rocking.records.named import Motions, several_motions
 from rocking.result import DatasetResult, table_of_some, variable
 from rocking.tables import as_written
 from rocking.treatment import Treatment

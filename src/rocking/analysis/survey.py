@@ -14,9 +14,9 @@ from rocking.constants import STANDARD_GRAVITY
 from rocking.ensemble import body_coordinates, verticals_of
 from rocking.errors import InvalidOption, install
 from rocking.motion.motion import Motion
-from rocking.motion.named import Motions, motions_by_name, names_of
 from rocking.problem import one_body
 from rocking.progress import Progress, note
+from rocking.records.named import Motions, motions_by_name, names_of
 from rocking.response import PRECISION, Response, in_brief, ratio_text, steps_within
 from rocking.response.contact import friction_coefficient
 from rocking.result import Result

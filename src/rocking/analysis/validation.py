@@ -22,8 +22,8 @@ from rocking.constants import Model
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion.motion import Motion
-from rocking.motion.named import distinct_motions, numbered, one_motion
 from rocking.problem import bodies_of, slenderness_of
+from rocking.records.named import distinct_motions, numbered, one_motion
 from rocking.result import Result
 from rocking.tables import Column, as_written, columns_with_skipped, counted, text_table
 

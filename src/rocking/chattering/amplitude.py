@@ -11,7 +11,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike
 
-from rocking import checks
+from rocking import checks, pulses
 from rocking.arrays import Floats, ranges
 from rocking.bisection import bisected
 from rocking.block import Block
@@ -20,7 +20,6 @@ from rocking.chattering.parameters import broadcast, checked_frequency, checked_
 from rocking.engine import require_finished
 from rocking.errors import InvalidOption, Unfinished
 from rocking.kernels.sine.sequence import critical_amplitudes, fitted_amplitudes
-from rocking.motion import pulses
 from rocking.progress import Progress
 from rocking.simulation import simulate
 from rocking.threads import in_threads

@@ -12,13 +12,12 @@ import math
 from collections.abc import Callable
 from typing import Literal, NamedTuple
 
-from rocking import checks
+from rocking import checks, pulses
 from rocking.block import Block, one_block
 from rocking.constants import Model
 from rocking.errors import InvalidMotion, InvalidOption
-from rocking.motion import pulses
 from rocking.motion.motion import Motion
-from rocking.motion.named import one_motion
+from rocking.records.named import one_motion
 
 
 class SimulationInput(NamedTuple):

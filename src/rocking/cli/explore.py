@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from rocking.cli.options import WHOLE
 from rocking.cli.output import OUTPUT, QuietOptions
 from rocking.errors import InvalidOption, UnreadableRecord
-from rocking.motion.named import is_shipped
+from rocking.records.named import is_shipped
 
 if TYPE_CHECKING:
     from rocking.explorer.core import Explorer

@@ -15,7 +15,12 @@ from rocking.cli.output import OUTPUT, PrintOptions
 from rocking.cli.wording import option_of
 from rocking.errors import InvalidMotion, InvalidOption, RockingError, UnreadableRecord
 from rocking.motion.motion import Motion
-from rocking.motion.named import (
+from rocking.motion.scaling import Measure
+from rocking.named_pulses import FAMILIES, PulseFamily, named_pulse
+from rocking.plausibility import motion_notes, reading_notes, vertical_notes
+from rocking.progress import Progress, note
+from rocking.quantities import duration, scaling, velocity
+from rocking.records.named import (
     STANDARD_INPUT,
     Contents,
     contents,
@@ -26,11 +31,6 @@ from rocking.motion.named import (
     refuse_what_is_known,
     shipped,
 )
-from rocking.motion.scaling import Measure
-from rocking.named_pulses import FAMILIES, PulseFamily, named_pulse
-from rocking.plausibility import motion_notes, reading_notes, vertical_notes
-from rocking.progress import Progress, note
-from rocking.quantities import duration, scaling, velocity
 from rocking.tables import text_table, to_json
 
 #: What a message about a record file may name.

@@ -10,7 +10,6 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from rocking import quantities
-from rocking.analysis.rules.check import check as apply_rules
 from rocking.analysis.survey import folder_names, survey
 from rocking.cli.body_options import BlockOptions, HeldOptions
 from rocking.cli.options import BLOCK, MODEL, ModelOptions, TreatmentOptions, measured
@@ -19,6 +18,7 @@ from rocking.cli.records import RECORDS, MotionOptions, Names
 from rocking.errors import InvalidOption
 from rocking.response import PRECISION, Response, steps_within
 from rocking.response.contact import friction_coefficient
+from rocking.rules import check as apply_rules
 from rocking.simulation import simulate as run
 
 

@@ -22,8 +22,8 @@ from rocking.kernels.ground import Ground, ground_of
 from rocking.kernels.periodic import Fate, Setting, step_rows
 from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
-from rocking.motion.named import one_motion
 from rocking.problem import FASTEST, one_body, rules_of, set_start
+from rocking.records.named import one_motion
 from rocking.treatment import Treatment, treatment
 
 #: Ground acceleration, g, that lifts any body: it stands behind the second period.

@@ -19,9 +19,9 @@ from rocking.dynamics.linear_bodies import LinearBodies, LinearBody
 from rocking.ensemble import dataset_of, outcomes_of, product_of, setup_of
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.motion.motion import Motion
-from rocking.motion.named import Motions, one_motion
 from rocking.peak_changes import BETWEEN_STOPS
 from rocking.problem import never_rests
+from rocking.records.named import Motions, one_motion
 from rocking.simulation import response_to
 from rocking.treatment import Treatment
 

@@ -18,11 +18,11 @@ import numpy as np
 
 from rocking import errors
 from rocking.errors import InvalidBlock, RockingError
-from rocking.solid.building import Region, properties
-from rocking.solid.sections import Piece, Sections, sections_of
+from rocking.solid.mesh import Region, properties
+from rocking.solid.support import Piece, Sections, sections_of
 
 if TYPE_CHECKING:
-    from rocking.solid.reading import Mesh
+    from rocking.solid.mesh import Mesh
 
 #: Triangles of a mesh at most: some six seconds of work.
 MOST_TRIANGLES: Final = 500_000

@@ -11,7 +11,6 @@ import numpy as np
 
 from rocking.analysis.fragility.fit import fit_fragility
 from rocking.analysis.levels import simulate_levels
-from rocking.analysis.rules.criteria import overturning_velocity, rate
 from rocking.arrays import Flags, Floats
 from rocking.bisection import bisected
 from rocking.block import Blocks
@@ -31,6 +30,7 @@ from rocking.motion.motion import Motion
 from rocking.motion.scaling import FACTOR, Measure
 from rocking.quantities import number
 from rocking.response.contact import friction_coefficient
+from rocking.rules import overturning_velocity, rate
 from rocking.simulation import simulate
 
 #: Levels of a fragility, and points of its curve.

@@ -21,12 +21,12 @@ from rocking.explorer.payload import Payload
 from rocking.explorer.phrases import phrase
 from rocking.quantities import densities, number
 from rocking.solid import Rose, Solid
-from rocking.solid.reading import SHIPPED
+from rocking.solid.mesh import SHIPPED
 from rocking.solid.solid import Plane, plane_of
 from rocking.solid.support import directions
 
 if TYPE_CHECKING:
-    from rocking.solid.sections import Sections
+    from rocking.solid.support import Sections
 
 #: Bodies that are kept.
 _KEPT: Final = 12

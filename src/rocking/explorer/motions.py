@@ -9,12 +9,11 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from rocking import checks
+from rocking import checks, records
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.explorer.parameters import PARAMETERS, PULSES, SCALINGS, names_of
 from rocking.explorer.texts import Texts, Values, as_option, as_path, given_texts, written_arguments
 from rocking.explorer.uploads import UploadStore
-from rocking.motion import records
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
 from rocking.named_pulses import FAMILIES, pulse_values

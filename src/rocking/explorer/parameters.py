@@ -11,11 +11,10 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Final, Literal, NamedTuple
 
+from rocking import records
 from rocking.constants import VERSION
 from rocking.errors import InvalidOption
 from rocking.explorer.phrases import english
-from rocking.motion import records
-from rocking.motion.units import CHOICES, plain_spelling
 from rocking.quantities import (
     UNITS,
     Quantity,
@@ -30,8 +29,9 @@ from rocking.quantities import (
     sides,
     velocity,
 )
-from rocking.solid.reading import SHIPPED
-from rocking.solid.reading import UNITS as MESH_UNITS
+from rocking.records.units import CHOICES, plain_spelling
+from rocking.solid.mesh import SHIPPED
+from rocking.solid.mesh import UNITS as MESH_UNITS
 from rocking.treatment import treatment
 
 #: Parameters that one form sets together, and that a comparison replaces together.

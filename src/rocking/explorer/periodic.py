@@ -8,6 +8,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rocking import pulses
 from rocking.arrays import Floats
 from rocking.dynamics.bifurcation import period_of, settled_states
 from rocking.dynamics.maps import Fate, StroboscopicMap, stroboscopic_map
@@ -17,7 +18,6 @@ from rocking.explorer.inputs import Case
 from rocking.explorer.motions import arguments_of, is_pulse, pulse_of
 from rocking.explorer.payload import Payload
 from rocking.explorer.phrases import phrase
-from rocking.motion import pulses
 from rocking.motion.motion import Motion
 from rocking.response import Response
 from rocking.simulation import simulate

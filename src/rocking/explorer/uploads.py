@@ -14,12 +14,12 @@ from typing import Any, Final, NamedTuple
 from rocking.errors import InvalidMotion, RockingError, UnreadableRecord
 from rocking.explorer.meshes import MeshStore
 from rocking.explorer.parameters import MESH_KINDS
-from rocking.motion import formats
-from rocking.motion.formats.channel import Channel
-from rocking.motion.formats.source import Request
 from rocking.motion.motion import Motion
-from rocking.motion.units import CHOICES, find_unit
 from rocking.plausibility import motion_notes
+from rocking.records import formats
+from rocking.records.formats.channel import Channel
+from rocking.records.formats.source import Request
+from rocking.records.units import CHOICES, find_unit
 
 #: Largest file, bytes: twenty times a long record of three channels.
 LARGEST: Final = 16 * 2**20

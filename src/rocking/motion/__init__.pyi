@@ -1,5 +1,4 @@
-from . import formats, pulses, records
 from .description import Description
 from .motion import Motion
 
-__all__ = ["Description", "Motion", "formats", "pulses", "records"]
+__all__ = ["Description", "Motion"]

@@ -1,10 +1,10 @@
-"""What is measured of a motion's pieces: intensities, from exact integrals."""
+"""Kinematics and intensity measures of a motion, from exact integrals of its pieces."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import Any, Final, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,119 +15,308 @@ from rocking.bisection import bisected
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion
 from rocking.motion import piecewise
-from rocking.motion.piecewise import Piecewise
 from rocking.tables import named
 
 #: Damping of a spectral acceleration, if none is named.
 DAMPING: Final = 0.05
 
 
-def peak_acceleration(motion: Piecewise) -> float:
-    """Peak ground acceleration, m/s^2: the exact extremum of the pieces."""
-    return piecewise.largest_magnitude(np.diff(motion.breakpoints), motion.coefficients)
+def checked_damping(value: object, error: checks.Error) -> float:
+    """Return a fraction of critical damping, or raise `error`."""
+    ratio = checks.number(value, "damping", error)
+    if not 0.0 <= ratio < 1.0:
+        raise error(f"{{}} must be a fraction of critical from 0 to below 1, not {ratio:g}", "damping", value=value)
+    return ratio
 
 
-def peak_velocity(motion: Piecewise) -> float:
-    """Peak ground velocity, m/s: the exact extremum of the exact integral, from rest."""
-    return piecewise.largest_magnitude(np.diff(motion.breakpoints), velocity_pieces(motion))
+class Measured:
+    """What follows from the pieces of a motion; all of it is about the horizontal component."""
+
+    breakpoints: Floats
+    coefficients: Floats
+
+    @property
+    def duration(self) -> float:
+        """Time of the last breakpoint, s; the acceleration is zero after it."""
+        return float(self.breakpoints[-1])
+
+    @property
+    def samples(self) -> tuple[Floats, Floats]:
+        """Times (s) and accelerations (m/s^2) at the breakpoints; at a jump, the acceleration after it."""
+        return piecewise.samples(self)
+
+    @property
+    def jumps(self) -> bool:
+        """Whether the acceleration jumps from a piece to the next, beyond rounding; ends of the motion do not count."""
+        return piecewise.jumps(self)
+
+    def _widths(self) -> Floats:
+        return np.diff(self.breakpoints)
+
+    def _velocity(self) -> Floats:
+        """Coefficients of the ground velocity on each piece."""
+        return piecewise.antiderivative(self._widths(), self.coefficients)
+
+    def _displacement(self) -> Floats:
+        """Coefficients of the ground displacement on each piece."""
+        return piecewise.antiderivative(self._widths(), self._velocity())
+
+    @overload
+    def acceleration(self, time: float) -> float: ...
+    @overload
+    def acceleration(self, time: Sequence[float] | NDArray[Any]) -> Floats: ...
+    def acceleration(self, time: float | Sequence[float] | NDArray[Any]) -> float | Floats:
+        """Ground acceleration; zero outside the motion.
+
+        Parameters
+        ----------
+        time : float or array_like
+            Times, s.
+
+        Returns
+        -------
+        float or ndarray
+            m/s^2, shaped like `time`.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> rocking.Motion([0.0, 2.0], [[1.0]]).acceleration([1.0, 3.0])
+        array([1., 0.])
+        """
+        at = checks.numbers(time, "time", InvalidMotion)
+        result = piecewise.at(self.breakpoints, self.coefficients, at)
+        result = np.where((at < 0.0) | (at > self.duration), 0.0, result)
+        return result if result.ndim else float(result)
+
+    @overload
+    def velocity(self, time: float) -> float: ...
+    @overload
+    def velocity(self, time: Sequence[float] | NDArray[Any]) -> Floats: ...
+    def velocity(self, time: float | Sequence[float] | NDArray[Any]) -> float | Floats:
+        """Ground velocity, from rest; zero before the motion and constant after its end.
+
+        Parameters
+        ----------
+        time : float or array_like
+            Times, s.
+
+        Returns
+        -------
+        float or ndarray
+            m/s, shaped like `time`.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> rocking.Motion([0.0, 2.0], [[1.0]]).velocity([1.0, 3.0])
+        array([1., 2.])
+        """
+        at = checks.numbers(time, "time", InvalidMotion)
+        result = piecewise.at(self.breakpoints, self._velocity(), at)
+        return result if result.ndim else float(result)
+
+    @overload
+    def displacement(self, time: float) -> float: ...
+    @overload
+    def displacement(self, time: Sequence[float] | NDArray[Any]) -> Floats: ...
+    def displacement(self, time: float | Sequence[float] | NDArray[Any]) -> float | Floats:
+        """Ground displacement, from rest; zero before the motion, and after its end at its last velocity.
+
+        Parameters
+        ----------
+        time : float or array_like
+            Times, s.
+
+        Returns
+        -------
+        float or ndarray
+            m, shaped like `time`.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> rocking.Motion([0.0, 2.0], [[1.0]]).displacement([1.0, 3.0])
+        array([0.5, 4. ])
+        """
+        at = checks.numbers(time, "time", InvalidMotion)
+        result = piecewise.at(self.breakpoints, self._displacement(), at)
+        result = result + self.velocity(self.duration) * np.maximum(at - self.duration, 0.0)
+        return result if result.ndim else float(result)
+
+    @property
+    def extremes(self) -> tuple[float, float]:
+        """Lowest and highest acceleration, m/s^2, with their signs: the exact extrema of the pieces.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> rocking.Motion.from_samples([0.0, 1.0, -2.0, 0.0], 0.02).extremes
+        (-2.0, 1.0)
+        """
+        return -piecewise.highest(self._widths(), -self.coefficients), piecewise.highest(
+            self._widths(), self.coefficients
+        )
+
+    @property
+    def pga(self) -> float:
+        """Peak ground acceleration, m/s^2: the exact extremum of the pieces."""
+        return piecewise.largest_magnitude(self._widths(), self.coefficients)
+
+    @property
+    def pgv(self) -> float:
+        """Peak ground velocity, m/s: the exact extremum of the exact integral, from rest."""
+        return piecewise.largest_magnitude(self._widths(), self._velocity())
+
+    @property
+    def pgd(self) -> float:
+        """Peak ground displacement up to the motion's end, m: the exact extremum of the exact integral."""
+        return piecewise.largest_magnitude(self._widths(), self._displacement())
+
+    @property
+    def arias_intensity(self) -> float:
+        """Arias intensity, m/s: ``pi/(2 g)`` times the exact integral of the squared acceleration."""
+        return math.pi / (2.0 * STANDARD_GRAVITY) * float(np.sum(_energy(self.coefficients, self._widths())))
+
+    @property
+    def cumulative_absolute_velocity(self) -> float:
+        """Integral of the absolute acceleration, m/s; exact, changes of sign within a piece are located."""
+        widths = self._widths()
+        integral = self._velocity()[:, np.newaxis, :]
+        roots = piecewise.root_candidates(widths, self.coefficients)
+        cuts = np.hstack([np.zeros((len(widths), 1)), roots, widths[:, np.newaxis]])
+        # Between two cuts the sign is constant; the integral's own start value would only cost digits.
+        integral[..., 0] = 0.0
+        return float(np.sum(np.abs(np.diff(piecewise.value(integral, cuts), axis=1))))
+
+    def significant_duration(self, start: float = 0.05, end: float = 0.95) -> float:
+        """Time between two fractions of the Arias intensity, s.
+
+        Parameters
+        ----------
+        start, end : float
+            The fractions.
+
+        Returns
+        -------
+        float
+            NaN if the intensity is zero.
+
+        Raises
+        ------
+        InvalidMotion
+            If not ``0 <= start < end <= 1``.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> round(rocking.Motion([0.0, 2.0], [[1.0]]).significant_duration(0.05, 0.75), 12)
+        1.4
+        """
+        start, end = (checks.finite(value, "ends of a significant duration", InvalidMotion) for value in (start, end))
+        if not 0.0 <= start < end <= 1.0:
+            sentence = f"a significant duration needs 0 <= {{}} < {{}} <= 1, not {start:g} and {end:g}"
+            raise InvalidMotion(sentence, "start", "end", value=(start, end))
+        first, last = significant_span(self, start, end)
+        return last - first
+
+    @overload
+    def spectral_acceleration(self, period: float, damping: float = ...) -> float: ...
+    @overload
+    def spectral_acceleration(self, period: Sequence[float] | NDArray[Any], damping: float = ...) -> Floats: ...
+    def spectral_acceleration(
+        self, period: float | Sequence[float] | NDArray[Any], damping: float = DAMPING
+    ) -> float | Floats:
+        """Pseudo-spectral acceleration: ``(2 pi/period)**2`` times an oscillator's peak displacement, m/s^2.
+
+        The linear oscillator starts from rest and is followed through the motion and the first extremum after it, by
+        the Taylor series of the exact solution on each piece; extrema between samples are located.
+
+        Parameters
+        ----------
+        period : float or array_like
+            Undamped period, s.
+        damping : float
+            Fraction of critical damping, from 0 to below 1.
+
+        Returns
+        -------
+        float or ndarray
+            m/s^2, shaped like `period`.
+
+        Raises
+        ------
+        InvalidMotion
+            If a period is not positive and finite or below a millionth of the duration (use `pga` there), or the
+            damping is out of range.
+
+        Examples
+        --------
+        An undamped oscillator under a long step of acceleration: twice the static response.
+
+        >>> import rocking
+        >>> round(rocking.Motion([0.0, 2.0], [[1.0]]).spectral_acceleration(1.0, 0.0), 12)
+        2.0
+        """
+        from rocking.kernels import oscillator  # the library: loaded only where it is used
+
+        periods = checks.numbers(period, "period of a spectral acceleration", InvalidMotion)
+        if not np.all(np.isfinite(periods) & (periods > 0.0)):
+            raise InvalidMotion("the {} of a spectral acceleration must be a positive number of seconds", "period")
+        length = f"the duration, {self.duration:.6g} s"
+        if np.any(periods < 1e-6 * self.duration):
+            raise InvalidMotion(f"a {{}} below a millionth of {length}, takes too long: use pga", "period")
+        if np.any(periods > 1e6 * self.duration):
+            raise InvalidMotion(f"a {{}} above a million times {length}, says nothing: use pgd", "period")
+        ratio = checked_damping(damping, InvalidMotion)
+        frequencies = np.ravel(2.0 * np.pi / periods)
+        peaks = np.empty_like(frequencies)
+        work = np.empty(2 * self.coefficients.shape[1] + oscillator.TERMS)
+        oscillator.peak_displacements(self.breakpoints, self.coefficients, frequencies, ratio, work, peaks)
+        result = (frequencies**2 * peaks).reshape(periods.shape)
+        return result if result.ndim else float(result)
+
+    def measures(self, periods: Sequence[float] = ()) -> dict[str, float]:
+        """Intensity measures by name; each name ends in its unit.
+
+        Parameters
+        ----------
+        periods : sequence of float
+            Periods, s, of which the spectral acceleration (5 % damping) is added.
+
+        Returns
+        -------
+        dict of str to float
+            SI units.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> measures = rocking.Motion([0.0, 2.0], [[1.0]]).measures(periods=[0.5])
+        >>> measures["pga_m_s2"], round(measures["spectral_acceleration_0.5s_m_s2"], 6)
+        (1.0, 1.854468)
+        """
+        values = {
+            named("duration", "s"): self.duration,
+            named("pga", "m/s^2"): self.pga,
+            named("pgv", "m/s"): self.pgv,
+            named("pgd", "m"): self.pgd,
+            named("arias_intensity", "m/s"): self.arias_intensity,
+            named("cumulative_absolute_velocity", "m/s"): self.cumulative_absolute_velocity,
+            named("significant_duration_5_75", "s"): self.significant_duration(0.05, 0.75),
+            named("significant_duration_5_95", "s"): self.significant_duration(0.05, 0.95),
+        }
+        for period in np.ravel(checks.numbers(periods, "periods of a spectral acceleration", InvalidMotion)).tolist():
+            values[named(f"spectral_acceleration_{period:g}s", "m/s^2")] = self.spectral_acceleration(period)
+        return values
 
 
-def peak_displacement(motion: Piecewise) -> float:
-    """Peak ground displacement up to the motion's end, m: the exact extremum of the exact integral."""
-    return piecewise.largest_magnitude(np.diff(motion.breakpoints), displacement_pieces(motion))
-
-
-def velocity_pieces(motion: Piecewise) -> Floats:
-    """Coefficients of the ground velocity on each piece."""
-    return piecewise.antiderivative(np.diff(motion.breakpoints), motion.coefficients)
-
-
-def displacement_pieces(motion: Piecewise) -> Floats:
-    """Coefficients of the ground displacement on each piece."""
-    return piecewise.antiderivative(np.diff(motion.breakpoints), velocity_pieces(motion))
-
-
-def arias_intensity(motion: Piecewise) -> float:
-    """Arias intensity, m/s."""
-    return math.pi / (2.0 * STANDARD_GRAVITY) * float(np.sum(_energies(motion)))
-
-
-def cumulative_absolute_velocity(motion: Piecewise) -> float:
-    """Integral of the absolute acceleration, m/s."""
-    widths = np.diff(motion.breakpoints)
-    integral = piecewise.antiderivative(widths, motion.coefficients)[:, np.newaxis, :]
-    roots = piecewise.root_candidates(widths, motion.coefficients)
-    cuts = np.hstack([np.zeros((len(widths), 1)), roots, widths[:, np.newaxis]])
-    # Between two cuts the sign is constant; the integral's own start value would only cost digits.
-    integral[..., 0] = 0.0
-    return float(np.sum(np.abs(np.diff(piecewise.value(integral, cuts), axis=1))))
-
-
-def significant_duration(motion: Piecewise, start: float, end: float) -> float:
-    """Time between two fractions of the Arias intensity, s."""
-    start, end = (checks.finite(value, "ends of a significant duration", InvalidMotion) for value in (start, end))
-    if not 0.0 <= start < end <= 1.0:
-        sentence = f"a significant duration needs 0 <= {{}} < {{}} <= 1, not {start:g} and {end:g}"
-        raise InvalidMotion(sentence, "start", "end", value=(start, end))
-    first, last = significant_span(motion, start, end)
-    return last - first
-
-
-def significant_span(motion: Piecewise, start: float = 0.05, end: float = 0.95) -> tuple[float, float]:
+def significant_span(motion: Measured, start: float = 0.05, end: float = 0.95) -> tuple[float, float]:
     """Return the times, s, at which the Arias intensity reaches two fractions of itself; NaN if it is zero."""
-    cumulated = np.append(0.0, np.cumsum(_energies(motion)))
+    cumulated = np.append(0.0, np.cumsum(_energy(motion.coefficients, np.diff(motion.breakpoints))))
     if cumulated[-1] == 0.0:
         return math.nan, math.nan
     return _time_at(motion, cumulated, start), _time_at(motion, cumulated, end)
-
-
-def spectral_acceleration(
-    motion: Piecewise, period: float | Sequence[float] | NDArray[Any], damping: float
-) -> float | Floats:
-    """Pseudo-spectral acceleration, m/s^2."""
-    from rocking.kernels import oscillator  # numba: loaded only where it is used
-
-    periods = checks.numbers(period, "period of a spectral acceleration", InvalidMotion)
-    if not np.all(np.isfinite(periods) & (periods > 0.0)):
-        raise InvalidMotion("the {} of a spectral acceleration must be a positive number of seconds", "period")
-    duration = float(motion.breakpoints[-1])
-    if np.any(periods < 1e-6 * duration):
-        sentence = f"a {{}} below a millionth of the duration, {duration:.6g} s, takes too long: use pga"
-        raise InvalidMotion(sentence, "period")
-    if np.any(periods > 1e6 * duration):
-        sentence = f"a {{}} above a million times the duration, {duration:.6g} s, says nothing: use pgd"
-        raise InvalidMotion(sentence, "period")
-    if not 0.0 <= checks.finite(damping, "damping", InvalidMotion) < 1.0:
-        sentence = f"the {{}} must be a fraction of critical from 0 to below 1, not {damping:g}"
-        raise InvalidMotion(sentence, "damping", value=damping)
-    frequencies = np.ravel(2.0 * np.pi / periods)
-    peaks = np.empty_like(frequencies)
-    work = np.empty(2 * motion.coefficients.shape[1] + oscillator.TERMS)
-    oscillator.peak_displacements(motion.breakpoints, motion.coefficients, frequencies, float(damping), work, peaks)
-    result = (frequencies**2 * peaks).reshape(periods.shape)
-    return result if result.ndim else float(result)
-
-
-def table(motion: Piecewise, periods: Sequence[float]) -> dict[str, float]:
-    """All measures by name, each name ending in its unit."""
-    measures = {
-        named("duration", "s"): float(motion.breakpoints[-1]),
-        named("pga", "m/s^2"): peak_acceleration(motion),
-        named("pgv", "m/s"): peak_velocity(motion),
-        named("pgd", "m"): peak_displacement(motion),
-        named("arias_intensity", "m/s"): arias_intensity(motion),
-        named("cumulative_absolute_velocity", "m/s"): cumulative_absolute_velocity(motion),
-        named("significant_duration_5_75", "s"): significant_duration(motion, 0.05, 0.75),
-        named("significant_duration_5_95", "s"): significant_duration(motion, 0.05, 0.95),
-    }
-    for period in np.ravel(checks.numbers(periods, "periods of a spectral acceleration", InvalidMotion)).tolist():
-        name = named(f"spectral_acceleration_{period:g}s", "m/s^2")
-        measures[name] = float(spectral_acceleration(motion, period, DAMPING))
-    return measures
-
-
-def _energies(motion: Piecewise) -> Floats:
-    return _energy(motion.coefficients, np.diff(motion.breakpoints))
 
 
 def _energy(coefficients: Floats, span: Floats) -> Floats:
@@ -138,7 +327,7 @@ def _energy(coefficients: Floats, span: Floats) -> Floats:
     return energy
 
 
-def _time_at(motion: Piecewise, cumulated: Floats, fraction: float) -> float:
+def _time_at(motion: Measured, cumulated: Floats, fraction: float) -> float:
     """First time at which the energy reaches a fraction of the whole, by bisection within its piece."""
     wanted = fraction * cumulated[-1]
     piece = max(int(np.searchsorted(cumulated, wanted, side="left")) - 1, 0)

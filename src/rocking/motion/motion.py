@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rocking import checks, svg
 from rocking.arrays import Floats
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion
-from rocking.motion import measures, piecewise, processing
+from rocking.motion import piecewise, processing
 from rocking.motion.description import Description, Origin, check_description, checked_history, labelled
-from rocking.motion.directions import check_start, recorded_azimuths, shares
-from rocking.motion.floors import floor_pieces
-from rocking.motion.measures import DAMPING
+from rocking.motion.measures import DAMPING, Measured
 from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
 from rocking.tables import as_written
 
@@ -25,19 +23,16 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Times at which a motion is looked at between its breakpoints, for a picture.
-_DRAWN = 33
-
-_OF_SAMPLES = Description("samples", text="linear between even samples")
-_OF_POINTS = Description("points", text="linear between uneven points")
+#: A step of processing.
+_Step = Callable[[piecewise.Piecewise], processing.Processed]
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class Motion(Measured):
     """A ground acceleration that is a polynomial on each of its pieces, and zero outside ``[0, duration]``.
 
-    Pieces may jump. A record is piecewise linear, exactly; a pulse is approximated to 1e-15 of its amplitude.
-    Usually made by `from_samples`, `from_points`, `rocking.pulses`, `rocking.records` or `rocking.read`.
+    Pieces may jump. A record is piecewise linear, exactly; a pulse is approximated to 1e-15 of its amplitude. Motions
+    are usually made by `from_samples`, `from_points`, `rocking.pulses`, `rocking.records` or `rocking.read`.
 
     Parameters
     ----------
@@ -55,14 +50,12 @@ class Motion:
         Bound on the difference from the motion that `description` describes, m/s^2, beyond the rounding of
         breakpoints and coefficients; 0 where the pieces are the motion itself (records).
     vertical : Motion, optional
-        Vertical ground acceleration over the same time, positive upwards; see `with_vertical`. All else here is about
-        the horizontal one.
+        Vertical ground acceleration over the same time, positive upwards; see `with_vertical`.
 
     Attributes
     ----------
     step : float or None
-        Sampling step if all pieces are straight lines and equally long, s; it follows from them. Neighbouring lines may
-        jump.
+        Sampling step if all pieces are straight lines and equally long, s.
 
     Raises
     ------
@@ -94,8 +87,12 @@ class Motion:
         check_description(self.description)
         history = checked_history(self.history)
         error = checks.within(self.error, "approximation error of a motion", InvalidMotion, 0.0, piecewise.STRONGEST)
-        if self.vertical is not None:
-            _check_vertical(self.vertical)
+        if self.vertical is not None and not isinstance(self.vertical, Motion):
+            given = type(self.vertical).__name__
+            sentence = f"{{}} must be a Motion, as from rocking.read or Motion.from_samples, not {given}"
+            raise InvalidMotion(sentence, "vertical", value=self.vertical)
+        if self.vertical is not None and self.vertical.vertical is not None:
+            raise InvalidMotion("{} must be a motion without a vertical component of its own", "vertical")
         held = {"breakpoints": breakpoints, "coefficients": coefficients, "history": history, "error": error}
         for name, value in held.items():
             object.__setattr__(self, name, value)
@@ -145,7 +142,8 @@ class Motion:
         """
         samples, step = piecewise.checked_samples(acceleration), piecewise.checked_step(dt)
         times = piecewise.even_times(len(samples), step)
-        return cls(times, piecewise.linear(times, samples), name=name, description=description or _OF_SAMPLES)
+        description = description or Description("samples", text="linear between even samples")
+        return cls(times, piecewise.linear(times, samples), name=name, description=description)
 
     @classmethod
     def from_points(
@@ -188,14 +186,8 @@ class Motion:
         instants = piecewise.checked_times(times, len(samples))
         with np.errstate(over="ignore"):
             breakpoints = instants - instants[0]
-        return cls(
-            breakpoints, piecewise.linear(breakpoints, samples), name=name, description=description or _OF_POINTS
-        )
-
-    @property
-    def duration(self) -> float:
-        """Time of the last breakpoint, s; the acceleration is zero after it."""
-        return float(self.breakpoints[-1])
+        description = description or Description("points", text="linear between uneven points")
+        return cls(breakpoints, piecewise.linear(breakpoints, samples), name=name, description=description)
 
     @property
     def end(self) -> float:
@@ -220,219 +212,6 @@ class Motion:
         ('step', 'step, scaled by 2', 'step, polarity reversed, delayed by 1 s')
         """
         return labelled(self.name, self.history, "" if self.vertical is None else self.vertical.name)
-
-    @property
-    def samples(self) -> tuple[Floats, Floats]:
-        """Times (s) and accelerations (m/s^2) at the breakpoints; at a jump, the acceleration after it."""
-        return piecewise.samples(self)
-
-    @property
-    def jumps(self) -> bool:
-        """Whether the acceleration jumps from a piece to the next, beyond rounding; ends of the motion do not count."""
-        return piecewise.jumps(self)
-
-    @property
-    def pga(self) -> float:
-        """Peak ground acceleration, m/s^2: the exact extremum of the pieces."""
-        return measures.peak_acceleration(self)
-
-    @property
-    def extremes(self) -> tuple[float, float]:
-        """Lowest and highest acceleration, m/s^2, with their signs: the exact extrema of the pieces.
-
-        Examples
-        --------
-        >>> Motion.from_samples([0.0, 1.0, -2.0, 0.0], 0.02).extremes
-        (-2.0, 1.0)
-        """
-        widths = np.diff(self.breakpoints)
-        return -piecewise.highest(widths, -self.coefficients), piecewise.highest(widths, self.coefficients)
-
-    @property
-    def pgv(self) -> float:
-        """Peak ground velocity, m/s: the exact extremum of the exact integral, from rest."""
-        return measures.peak_velocity(self)
-
-    @property
-    def pgd(self) -> float:
-        """Peak ground displacement up to the motion's end, m: the exact extremum of the exact integral."""
-        return measures.peak_displacement(self)
-
-    @overload
-    def acceleration(self, time: float) -> float: ...
-    @overload
-    def acceleration(self, time: Sequence[float] | NDArray[Any]) -> Floats: ...
-    def acceleration(self, time: float | Sequence[float] | NDArray[Any]) -> float | Floats:
-        """Ground acceleration; zero outside the motion.
-
-        Parameters
-        ----------
-        time : float or array_like
-            Times, s.
-
-        Returns
-        -------
-        float or ndarray
-            m/s^2, shaped like `time`.
-
-        Examples
-        --------
-        >>> Motion([0.0, 2.0], [[1.0]]).acceleration([1.0, 3.0])
-        array([1., 0.])
-        """
-        at = checks.numbers(time, "time", InvalidMotion)
-        result = piecewise.at(self.breakpoints, self.coefficients, at)
-        result = np.where((at < 0.0) | (at > self.duration), 0.0, result)
-        return result if result.ndim else float(result)
-
-    @overload
-    def velocity(self, time: float) -> float: ...
-    @overload
-    def velocity(self, time: Sequence[float] | NDArray[Any]) -> Floats: ...
-    def velocity(self, time: float | Sequence[float] | NDArray[Any]) -> float | Floats:
-        """Ground velocity, from rest; zero before the motion and constant after its end.
-
-        Parameters
-        ----------
-        time : float or array_like
-            Times, s.
-
-        Returns
-        -------
-        float or ndarray
-            m/s, shaped like `time`.
-
-        Examples
-        --------
-        >>> Motion([0.0, 2.0], [[1.0]]).velocity([1.0, 3.0])
-        array([1., 2.])
-        """
-        at = checks.numbers(time, "time", InvalidMotion)
-        result = piecewise.at(self.breakpoints, measures.velocity_pieces(self), at)
-        return result if result.ndim else float(result)
-
-    @overload
-    def displacement(self, time: float) -> float: ...
-    @overload
-    def displacement(self, time: Sequence[float] | NDArray[Any]) -> Floats: ...
-    def displacement(self, time: float | Sequence[float] | NDArray[Any]) -> float | Floats:
-        """Ground displacement, from rest; zero before the motion, and after its end at its last velocity.
-
-        Parameters
-        ----------
-        time : float or array_like
-            Times, s.
-
-        Returns
-        -------
-        float or ndarray
-            m, shaped like `time`.
-
-        Examples
-        --------
-        >>> Motion([0.0, 2.0], [[1.0]]).displacement([1.0, 3.0])
-        array([0.5, 4. ])
-        """
-        at = checks.numbers(time, "time", InvalidMotion)
-        result = piecewise.at(self.breakpoints, measures.displacement_pieces(self), at)
-        result = result + self.velocity(self.duration) * np.maximum(at - self.duration, 0.0)
-        return result if result.ndim else float(result)
-
-    @property
-    def arias_intensity(self) -> float:
-        """Arias intensity, m/s: ``pi/(2 g)`` times the exact integral of the squared acceleration."""
-        return measures.arias_intensity(self)
-
-    @property
-    def cumulative_absolute_velocity(self) -> float:
-        """Integral of the absolute acceleration, m/s; exact, changes of sign within a piece are located."""
-        return measures.cumulative_absolute_velocity(self)
-
-    def significant_duration(self, start: float = 0.05, end: float = 0.95) -> float:
-        """Time between two fractions of the Arias intensity, s.
-
-        Parameters
-        ----------
-        start, end : float
-            The fractions.
-
-        Returns
-        -------
-        float
-            NaN if the intensity is zero.
-
-        Raises
-        ------
-        InvalidMotion
-            If not ``0 <= start < end <= 1``.
-
-        Examples
-        --------
-        >>> round(Motion([0.0, 2.0], [[1.0]]).significant_duration(0.05, 0.75), 12)
-        1.4
-        """
-        return measures.significant_duration(self, start, end)
-
-    @overload
-    def spectral_acceleration(self, period: float, damping: float = ...) -> float: ...
-    @overload
-    def spectral_acceleration(self, period: Sequence[float] | NDArray[Any], damping: float = ...) -> Floats: ...
-    def spectral_acceleration(
-        self, period: float | Sequence[float] | NDArray[Any], damping: float = measures.DAMPING
-    ) -> float | Floats:
-        """Pseudo-spectral acceleration: ``(2 pi/period)**2`` times an oscillator's peak displacement, m/s^2.
-
-        The linear oscillator starts from rest and is followed through the motion and the first extremum after
-        it. Its response on each piece is the Taylor series of the exact solution, to rounding, for records
-        and pulses alike; extrema between samples are located.
-
-        Parameters
-        ----------
-        period : float or array_like
-            Undamped period, s.
-        damping : float
-            Fraction of critical damping, from 0 to below 1.
-
-        Returns
-        -------
-        float or ndarray
-            m/s^2, shaped like `period`.
-
-        Raises
-        ------
-        InvalidMotion
-            If a period is not positive and finite or below a millionth of the duration (take `pga` there), or
-            the damping is out of range.
-
-        Examples
-        --------
-        An undamped oscillator under a long step of acceleration: twice the static response.
-
-        >>> round(Motion([0.0, 2.0], [[1.0]]).spectral_acceleration(1.0, 0.0), 12)
-        2.0
-        """
-        return measures.spectral_acceleration(self, period, damping)
-
-    def measures(self, periods: Sequence[float] = ()) -> dict[str, float]:
-        """Intensity measures by name; each name ends in its unit.
-
-        Parameters
-        ----------
-        periods : sequence of float
-            Periods, s, of which the spectral acceleration (5 % damping) is added.
-
-        Returns
-        -------
-        dict of str to float
-            SI units.
-
-        Examples
-        --------
-        >>> measures = Motion([0.0, 2.0], [[1.0]]).measures(periods=[0.5])
-        >>> measures["pga_m_s2"], round(measures["spectral_acceleration_0.5s_m_s2"], 6)
-        (1.0, 1.854468)
-        """
-        return measures.table(self, periods)
 
     def scaled(self, factor: float) -> Motion:
         """Return the motion times a factor.
@@ -500,9 +279,8 @@ class Motion:
     def with_vertical(self, vertical: Motion | None) -> Motion:
         """Return the motion with a vertical component, which changes the weight of what stands on the ground.
 
-        It goes with the motion wherever that is scaled, delayed, processed or added to another; reversing the polarity
-        leaves it as it is. Intensity measures are those of the horizontal component. A record whose file calls the
-        channel "Down" or "DWN" is turned round, which its history says.
+        It is scaled, delayed, processed and added with the horizontal component; reversing the polarity leaves it as it
+        is. A record whose channel is called "Down" or "DWN" is turned round.
 
         Parameters
         ----------
@@ -569,28 +347,19 @@ class Motion:
         ['2.927', '3.050', '2.322']
         """
         if not isinstance(other, Motion):
-            raise InvalidMotion(
-                f"{{}} must be a Motion, the other horizontal component, not {type(other).__name__}",
-                "other",
-                value=other,
-            )
-        first, second = recorded_azimuths(self, other, recorded)
-        check_start(self, other)
+            sentence = f"{{}} must be a Motion, the other horizontal component, not {type(other).__name__}"
+            raise InvalidMotion(sentence, "other", value=other)
+        first, second = processing.recorded_azimuths(self, other, recorded)
+        processing.check_start(self, other)
         wanted = checks.finite(azimuth, "azimuth", InvalidMotion)
-        verticals = [motion.vertical for motion in (self, other) if motion.vertical is not None]
-        if len(verticals) == 2 and verticals[0] is not verticals[1]:
+        if self.vertical is not None and other.vertical not in (None, self.vertical):
             raise InvalidMotion("each component has a vertical one: give it to one of the two with with_vertical")
-        mine, theirs = shares((first, second), wanted)
+        mine, theirs = processing.shares((first, second), wanted)
         breakpoints, (one, two) = piecewise.together(self, other)
-        origin = replace(
-            self.description.origin or Origin(), channel=f"{wanted:g} deg", number=None, azimuth=wanted, reversed=False
-        )
-        described = replace(
-            self.description.changed("rotated"),
-            parameters={},
-            text=f"at {wanted:g} deg, from {first:g} deg: {self._origin()}; and {second:g} deg: {other._origin()}",
-            origin=origin,
-        )
+        along = {"channel": f"{wanted:g} deg", "number": None, "azimuth": wanted, "reversed": False}
+        origin = replace(self.description.origin or Origin(), **along)
+        text = f"at {wanted:g} deg, from {first:g} deg: {self._origin()}; and {second:g} deg: {other._origin()}"
+        described = replace(self.description.changed("rotated"), parameters={}, text=text, origin=origin)
         return replace(
             self,
             breakpoints=breakpoints,
@@ -598,7 +367,7 @@ class Motion:
             description=described,
             history=(*self.history, f"with {other.name} rotated to {wanted:g} deg"),
             error=abs(mine) * self.error + abs(theirs) * other.error,
-            vertical=verticals[0] if verticals else None,
+            vertical=self.vertical or other.vertical,
         )
 
     def delayed(self, delay: float) -> Motion:
@@ -659,10 +428,10 @@ class Motion:
 
         Notes
         -----
-        Of a building that moves in one mode this is the motion of its roof where the mode's shape times its
-        participation factor is 1; of a floor below multiply the part beyond the ground's own accordingly, as
-        ``ground + (floor + -ground) * 0.6``. What stands on the floor does not act back on it. Its `pga`, `pgv` and
-        spectra are the floor's: a fragility against them goes with no hazard curve of the ground.
+        In a building with one mode this is the motion of the floor where the mode's shape times its participation
+        factor is 1; on a floor below, ``ground + (floor + -ground) * 0.6`` has a share of 0.6. What stands on the floor
+        does not act back on it. A fragility against the floor's `pga`, `pgv` or spectra has no hazard curve of the
+        ground.
 
         Examples
         --------
@@ -674,7 +443,7 @@ class Motion:
         >>> round(floor.pga, 2), round(floor.duration, 1)
         (9.62, 16.0)
         """
-        pieces, error = floor_pieces(self, period, damping, ringing, self.error)
+        pieces, error = processing.floor_pieces(self, period, damping, ringing, self.error)
         return replace(
             self,
             breakpoints=pieces.breakpoints,
@@ -731,7 +500,7 @@ class Motion:
         >>> done.history
         ('trimmed to 0.5-2 s', 'baseline of degree 0 removed')
         """
-        steps: list[Callable[[piecewise.Piecewise], processing.Processed]] = []
+        steps: list[_Step] = []
         kept = None if trim is None else processing.ends(self, *processing.pair(trim, "trim"))
         if baseline is not None:
             steps.append(lambda motion: processing.baseline(motion, baseline))
@@ -754,7 +523,7 @@ class Motion:
     def _processed(
         self,
         kept: tuple[float, float] | None,
-        steps: list[Callable[[piecewise.Piecewise], processing.Processed]],
+        steps: list[_Step],
         grid: float | None = None,
     ) -> Motion:
         """Return the part between two times (s; even samples stay even on a finer `grid`), after these steps."""
@@ -835,7 +604,7 @@ class Motion:
         """
         corners = self.breakpoints
         if self.coefficients.shape[1] > 2:
-            corners = (corners[:-1, None] + np.linspace(0.0, 1.0, _DRAWN) * np.diff(corners)[:, None]).ravel()
+            corners = (corners[:-1, None] + np.linspace(0.0, 1.0, 33) * np.diff(corners)[:, None]).ravel()
         after = piecewise.jumps_after(self)
         inner, last = self.breakpoints[1:-1][after[:-1]], self.breakpoints[-1:][after[-1:]]
         corners = np.concatenate([corners, np.nextafter(inner, -np.inf), np.nextafter(last, np.inf)])
@@ -873,14 +642,14 @@ class Motion:
         if not isinstance(other, Motion):
             return NotImplemented
         breakpoints, (mine, theirs) = piecewise.together(self, other)
-        verticals = [motion.vertical for motion in (self, other) if motion.vertical is not None]
+        both = self.vertical is not None and other.vertical is not None
         return Motion(
             breakpoints,
             mine + theirs,
             name=f"{self.name} + {other.name}",
             description=Description("sum", text=f"{self._origin()}; plus {other._origin()}"),
             error=self.error + other.error,
-            vertical=verticals[0] + verticals[1] if len(verticals) == 2 else next(iter(verticals), None),
+            vertical=self.vertical + other.vertical if both else self.vertical or other.vertical,
         )
 
     def _origin(self) -> str:
@@ -909,14 +678,3 @@ class Motion:
 
 def _peak(motion: Motion) -> str:
     return f"peak {motion.pga:.5g} m/s^2 ({motion.pga / STANDARD_GRAVITY:.4g} g)"
-
-
-def _check_vertical(given: object) -> None:
-    if not isinstance(given, Motion):
-        raise InvalidMotion(
-            f"{{}} must be a Motion, as from rocking.read or Motion.from_samples, not {type(given).__name__}",
-            "vertical",
-            value=given,
-        )
-    if given.vertical is not None:
-        raise InvalidMotion("{} must be a motion without a vertical component of its own", "vertical")

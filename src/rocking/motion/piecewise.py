@@ -257,7 +257,7 @@ def highest(widths: Floats, coefficients: Floats) -> float:
     best = max(float(np.max(coefficients[:, 0])), float(np.max(value(coefficients, widths))))
     if coefficients.shape[1] <= 2:
         return best
-    may_exceed = np.max(_control_points(widths, coefficients), axis=1) > best
+    may_exceed = np.max(_control_points(widths, coefficients), axis=1) > best + 1e-15 * abs(best)
     if not np.any(may_exceed):
         return best
     pieces, spans = coefficients[may_exceed], widths[may_exceed]
@@ -267,15 +267,14 @@ def highest(widths: Floats, coefficients: Floats) -> float:
 
 def largest_magnitude(widths: Floats, coefficients: Floats) -> float:
     """Largest absolute value over all pieces, at their ends or at their interior extrema."""
-    best = max(float(np.max(np.abs(coefficients[:, 0]))), float(np.max(np.abs(value(coefficients, widths)))))
-    if coefficients.shape[1] <= 2:
-        return best
-    may_exceed = bounds(widths, coefficients) > best * (1.0 + 1e-15)
-    if not np.any(may_exceed):
-        return best
-    pieces, spans = coefficients[may_exceed], widths[may_exceed]
-    extrema = root_candidates(spans, derivative(pieces))
-    return max(best, float(np.max(np.abs(value(pieces[:, np.newaxis, :], extrema)))))
+    return max(highest(widths, coefficients), highest(widths, -coefficients))
+
+
+def from_quadrant(quarters: Floats, rest: Floats) -> tuple[Floats, Floats]:
+    """Sine and cosine of a whole number of quarter turns and the rest of an angle, rad."""
+    sine, cosine = np.sin(rest), np.cos(rest)
+    quadrant = np.mod(quarters, 4.0).astype(np.int64)
+    return np.choose(quadrant, [sine, cosine, -sine, -cosine]), np.choose(quadrant, [cosine, -sine, -cosine, sine])
 
 
 def checked_pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Floats, Floats]:

@@ -1,24 +1,28 @@
-"""Processing of a ground motion: trim, baseline, band-pass, resample; each gives new pieces, and says what it did."""
+"""Processing of a motion: trim, baseline, band-pass, resample, rotate, and filter through a building to a floor."""
 
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple, TypeVar
+from typing import Any, Final, NamedTuple, Protocol, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidMotion
 from rocking.motion import piecewise
-from rocking.motion.piecewise import Piecewise
+from rocking.motion.description import Description, begins_later
+from rocking.motion.measures import checked_damping
+from rocking.motion.piecewise import Pieces, Piecewise
 
 T = TypeVar("T")
 
 _MOST_SAMPLES: Final = 50_000_000
 
-#: Ratios of times and steps are off a whole number by no more than this, through rounding.
-_ROUNDING: Final = 1e-8
+#: Largest angle of the oscillation on a piece, and degree of its series: 0.25**10 / 10! = 3e-13.
+_RADIANS: Final = 0.25
+_DEGREE: Final = 9
 
 
 class Processed(NamedTuple):
@@ -81,7 +85,7 @@ def cut(motion: Piecewise, start: float, end: float, grid: float | None = None) 
 
 def _whole(ratio: float) -> int | None:
     """Return the whole number that a ratio is up to rounding, or None."""
-    return round(ratio) if abs(ratio - round(ratio)) <= _ROUNDING else None
+    return round(ratio) if abs(ratio - round(ratio)) <= 1e-8 else None
 
 
 def baseline(motion: Piecewise, degree: int) -> Processed:
@@ -102,7 +106,16 @@ def band_pass(motion: Piecewise, low: float | None, high: float | None, *, order
     from scipy import signal  # half a second: loaded only where it is used
 
     step = _step(motion, "band_pass")
-    corners = _corners(motion, step, low, high)
+    nyquist, duration = 0.5 / step, float(motion.breakpoints[-1])
+    corners = [
+        checks.positive(corner, "corner frequency", InvalidMotion, "Hz") for corner in (low, high) if corner is not None
+    ]
+    if not corners or corners != sorted(set(corners)) or corners[-1] >= nyquist:
+        sentence = f"{{}} needs (low, high) with low < high < {nyquist:.6g} Hz, the Nyquist frequency; one of them may"
+        raise InvalidMotion(f"{sentence} be None", "band_pass", value=(low, high))
+    if corners[0] * duration < 0.1:
+        sentence = f"a corner frequency of {corners[0]:.6g} Hz is too low for a motion of {duration:.6g} s"
+        raise InvalidMotion(sentence, value=(low, high))
     order = checks.whole(order, "order of a filter", InvalidMotion, 1, 12)
     kind: Final = "bandpass" if len(corners) == 2 else "highpass" if high is None else "lowpass"
     at = corners if kind == "bandpass" else corners[0]
@@ -112,22 +125,6 @@ def band_pass(motion: Piecewise, low: float | None, high: float | None, *, order
     filtered: Floats = signal.sosfiltfilt(sections, padded, padtype=None)[pad:-pad]
     span = f"{'0' if low is None else f'{low:.6g}'}-{'inf' if high is None else f'{high:.6g}'} Hz"
     return _joined(filtered, step, f"band-passed {span}, order {order} forwards and backwards")
-
-
-def _corners(motion: Piecewise, step: float, low: float | None, high: float | None) -> list[float]:
-    corners = [
-        checks.positive(corner, "corner frequency", InvalidMotion, "Hz") for corner in (low, high) if corner is not None
-    ]
-    nyquist, duration = 0.5 / step, float(motion.breakpoints[-1])
-    if not corners or corners != sorted(set(corners)) or corners[-1] >= nyquist:
-        sentence = (
-            f"{{}} needs (low, high) with low < high < {nyquist:.6g} Hz, the Nyquist frequency; one of them may be"
-        )
-        raise InvalidMotion(f"{sentence} None", "band_pass", value=(low, high))
-    if corners[0] * duration < 0.1:
-        sentence = f"a corner frequency of {corners[0]:.6g} Hz is too low for a motion of {duration:.6g} s"
-        raise InvalidMotion(sentence, value=(low, high))
-    return corners
 
 
 def resample(motion: Piecewise, step: float) -> Processed:
@@ -157,3 +154,169 @@ def _step(motion: Piecewise, what: str) -> float:
 def _joined(samples: Floats, step: float, done: str) -> Processed:
     times = piecewise.even_times(len(samples), step)
     return Processed(times, piecewise.linear(times, samples), done)
+
+
+def floor_pieces(
+    motion: Piecewise, period: float, damping: float, ringing: float | None, error: float = 0.0
+) -> tuple[Pieces, float]:
+    """Absolute acceleration of an oscillator that starts at rest, and a bound on the error of its pieces, m/s^2.
+
+    With u'' + 2 z w u' + w^2 u = -a(t) it is -(2 z w u' + w^2 u). On each piece u is the Taylor series of the exact
+    solution about its start, from the series of the solutions of the states (1, 0), (0, 1), and of the one at rest.
+    """
+    end = float(motion.breakpoints[-1])
+    time, stiff = checks.positive(period, "period", InvalidMotion, "s"), 1e-4 * end
+    if time < stiff:
+        raise InvalidMotion(
+            f"{{}} of a floor must be at least a ten-thousandth of the motion, {stiff:.4g} s, not {time:g} s: a floor "
+            "that is so stiff moves as the ground does",
+            "period",
+            value=period,
+        )
+    rate, ratio = 2.0 * math.pi / time, checked_damping(damping, InvalidMotion)
+    if ringing is None and ratio == 0.0:
+        raise InvalidMotion("a floor without {} moves for ever: give {}, s", "damping", "ringing")
+    # Without a time, a free oscillation is followed until it has faded to a thousandth of itself.
+    after = -math.log(1e-3) / (ratio * rate) if ringing is None else checks.finite(ringing, "ringing", InvalidMotion)
+    if after < 0.0:
+        raise InvalidMotion(f"{{}} must be a time of at least 0 s, not {after:g}", "ringing", value=ringing)
+    step = _RADIANS / rate
+    if not (end + after) / step <= 1e6:
+        raise InvalidMotion(
+            f"the floor moves for {end + after:.4g} s, which is too long for a {{}} of {period:g} s; give a shorter "
+            "time for it after the motion, {}",
+            "period",
+            "ringing",
+            value=ringing,
+        )
+    whole = np.append(motion.breakpoints, end + after) if after > 0.0 else motion.breakpoints
+    shares = np.maximum(1, np.ceil(np.diff(whole) / step)).astype(np.int64)
+    start, width = np.repeat(whole[:-1], shares), np.repeat(np.diff(whole) / shares, shares)
+    place = np.arange(shares.sum()) - np.repeat(np.cumsum(shares) - shares, shares)
+    breakpoints = np.append(start + place * width, whole[-1])
+    width = np.diff(breakpoints)
+    columns = max(motion.coefficients.shape[1], _DEGREE + 1)
+    given = piecewise.refined(motion.breakpoints, motion.coefficients, breakpoints, columns)
+    series = _series(given, rate, ratio, columns + 2)
+    ends = np.stack([_at(series, width), _at(series[..., 1:] * np.arange(1, columns + 2), width)])
+    states = _marched(ends)
+    solution = series[2] + np.einsum("jn,jnk->nk", states, series[:2])
+    slope = solution[:, 1:] * np.arange(1, columns + 2)
+    acceleration = -(2.0 * ratio * rate * slope[:, :columns] + rate**2 * solution[:, :columns])
+    largest = float(np.max(np.abs(acceleration[:, 0]), initial=0.0))
+    own = 4.0 * largest * _RADIANS**columns / math.factorial(columns)
+    grown = error * (2.0 / ratio if ratio > 0.0 else rate * (end + after))  # the sum of all that an error can do
+    return Pieces(breakpoints, acceleration), own + grown
+
+
+def _series(given: Floats, rate: float, ratio: float, terms: int) -> Floats:
+    """Series of three solutions on each piece, shape (3, pieces, terms): of two free ones, and of that from rest."""
+    series = np.zeros((3, len(given), terms))
+    series[0, :, 0] = series[1, :, 1] = 1.0
+    for k in range(terms - 2):
+        free = 2.0 * ratio * rate * (k + 1) * series[..., k + 1] + rate * rate * series[..., k]
+        free[2] += given[:, k]
+        series[..., k + 2] = -free / ((k + 1) * (k + 2))
+    return series
+
+
+def _at(series: Floats, x: Floats) -> Floats:
+    return piecewise.value(series, np.broadcast_to(x, series.shape[:-1]))
+
+
+def _marched(ends: Floats) -> Floats:
+    """Displacement and velocity at the start of every piece, shape (2, pieces), from what each makes of the states."""
+    found = np.empty((2, ends.shape[2]))
+    u = v = 0.0
+    for k, (a, b, c, d, e, f) in enumerate(ends.transpose(2, 0, 1).reshape(-1, 6).tolist()):
+        found[:, k] = u, v
+        u, v = a * u + b * v + c, d * u + e * v + f
+    return found
+
+
+class Component(Protocol):
+    """What is known of a horizontal component."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+    @property
+    def description(self) -> Description:
+        """How it was made, and of a record its azimuth and the instant when it begins."""
+
+    @property
+    def duration(self) -> float:
+        """Its end, s."""
+
+    @property
+    def step(self) -> float | None:
+        """Step of its samples, s; None if they are uneven."""
+
+
+def sine_cosine(degrees: ArrayLike) -> tuple[Floats, Floats]:
+    """Return sine and cosine of angles in degrees, exact at multiples of a right angle.
+
+    Examples
+    --------
+    >>> [part.tolist() for part in sine_cosine([0.0, 90.0, 180.0, -90.0])]
+    [[0.0, 1.0, 0.0, -1.0], [1.0, 0.0, -1.0, 0.0]]
+    """
+    angle = np.asarray(degrees, dtype=np.float64)
+    quarters = np.rint(angle / 90.0)
+    sine, cosine = piecewise.from_quadrant(quarters, np.deg2rad(angle - 90.0 * quarters))
+    return sine + 0.0, cosine + 0.0  # no negative zeros
+
+
+def check_start(one: Component, other: Component) -> None:
+    """Refuse two components that begin at different times, by the clock of their files."""
+    if later := begins_later(one.description, other.description, one.step):
+        early, late = (one, other) if later > 0.0 else (other, one)
+        raise InvalidMotion(
+            f"by their files {checks.shown(late.name)} begins {abs(later):.6g} s after {checks.shown(early.name)}: cut "
+            f"what comes first with processed(trim=({abs(later):.6g}, {early.duration:.6g})) of the latter"
+        )
+
+
+def recorded_azimuths(one: Component, other: Component, recorded: Any) -> tuple[float, float]:
+    """Return the azimuths of two components, as they are given, or else as their records say; or refuse them."""
+    if recorded is None:
+        known = [(each, each.description.origin) for each in (one, other)]
+        missing = [each.name for each, origin in known if origin is None or origin.azimuth is None]
+        if missing:
+            raise InvalidMotion(
+                f"the azimuth of {checks.shown(missing[0])} is not known: give {{}}=(first, second), the directions of "
+                "both components in degrees clockwise from north",
+                "recorded",
+            )
+        first, second = (origin.azimuth for _, origin in known if origin is not None and origin.azimuth is not None)
+    else:
+        given = checks.numbers(recorded, "recorded", InvalidMotion)
+        if given.shape != (2,) or not np.all(np.isfinite(given)):
+            raise InvalidMotion(
+                "{} must be the azimuths of both components, two numbers in degrees", "recorded", value=recorded
+            )
+        first, second = given.tolist()
+    between = abs((second - first + 90.0) % 180.0 - 90.0)
+    if between < 15.0:
+        raise InvalidMotion(
+            f"the components point to azimuths of {first:g} and {second:g} deg, along one line to {between:g} deg: two "
+            "that are across each other are needed"
+        )
+    return first, second
+
+
+def shares(recorded: tuple[float, float], azimuth: float) -> tuple[float, float]:
+    """Return the factors on two components, at their azimuths, whose sum is the component along another azimuth.
+
+    With a vector a, its components a_1 = a n_1 and a_2 = a n_2 along two directions determine the one along n, even
+    where the two are not perpendicular.
+
+    Examples
+    --------
+    >>> shares((90.0, 0.0), 180.0)
+    (0.0, -1.0)
+    """
+    first, second = recorded
+    sine, _ = sine_cosine([second - azimuth, azimuth - first, second - first])
+    return float(sine[0] / sine[2]) + 0.0, float(sine[1] / sine[2]) + 0.0

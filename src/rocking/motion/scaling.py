@@ -13,8 +13,7 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion, InvalidOption
-from rocking.motion import measures
-from rocking.motion.piecewise import Piecewise
+from rocking.motion.measures import DAMPING, Measured, checked_damping
 
 #: What an analysis may count motions by.
 IntensityName = Literal["pga", "pgv", "sa", "pga_ratio", "pgv_ratio"]
@@ -69,24 +68,19 @@ class Measure:
 
     name: MeasureName
     period: float | None = None
-    damping: float = measures.DAMPING
+    damping: float = DAMPING
 
     def __post_init__(self) -> None:
         checks.one_of(self.name, "measure", InvalidOption, get_args(MeasureName))
-        damping = checks.number(self.damping, "damping", InvalidOption)
-        if not 0.0 <= damping < 1.0:
-            raise InvalidOption(
-                f"{{}} must be a fraction of critical from 0 to below 1, not {damping:g}", "damping", value=damping
-            )
+        damping = checked_damping(self.damping, InvalidOption)
         object.__setattr__(self, "damping", damping)
         if self.name == "sa":
             if self.period is None:
                 raise InvalidOption('{} "sa" needs {}, in s', "measure", "period")
             object.__setattr__(self, "period", checks.positive(self.period, "period", InvalidOption, "s"))
-        elif self.period is not None:
-            raise InvalidOption(f'{{}} belongs to {{}} "sa", not to "{self.name}"', "period", "measure")
-        elif damping != measures.DAMPING:
-            raise InvalidOption(f'{{}} belongs to {{}} "sa", not to "{self.name}"', "damping", "measure")
+        elif self.period is not None or damping != DAMPING:
+            wrong = "damping" if self.period is None else "period"
+            raise InvalidOption(f'{{}} belongs to {{}} "sa", not to "{self.name}"', wrong, "measure")
 
     @classmethod
     def of(cls, measure: MeasureName | Measure, among: Sequence[str] = INTENSITIES) -> Measure:
@@ -114,10 +108,10 @@ class Measure:
         >>> Measure.of("pgv")
         Measure(name='pgv', period=None, damping=0.05)
         """
+        name = measure.name if isinstance(measure, Measure) else measure
+        checks.one_of(name, "measure", InvalidOption, among)
         if isinstance(measure, Measure):
-            checks.one_of(measure.name, "measure", InvalidOption, among)
             return measure
-        checks.one_of(measure, "measure", InvalidOption, among)
         if measure == "sa":
             raise InvalidOption('{} "sa" needs a period: give rocking.Measure("sa", period=1.0), in s', "measure")
         return cls(measure)
@@ -151,7 +145,7 @@ class Measure:
 
     @property
     def _oscillator(self) -> str:
-        return f"{self.period:g} s" + ("" if self.damping == measures.DAMPING else f", damping {self.damping:g}")
+        return f"{self.period:g} s" + ("" if self.damping == DAMPING else f", damping {self.damping:g}")
 
     @property
     def label(self) -> str:
@@ -188,16 +182,14 @@ class Measure:
     @property
     def of_motion(self) -> Literal["factor", "pga", "pgv", "sa"]:
         """Name of the measure of the motion alone that this one counts."""
-        if self.name == "pga_ratio":
-            return "pga"
-        return "pgv" if self.name == "pgv_ratio" else self.name
+        return {"pga_ratio": "pga", "pgv_ratio": "pgv"}.get(self.name, self.name)  # type: ignore[return-value]
 
     @property
     def alone(self) -> Measure:
         """Measure of the motion alone that this one counts."""
         return self if self.of_motion == self.name else Measure(self.of_motion, self.period, self.damping)
 
-    def value(self, motion: Piecewise) -> float:
+    def value(self, motion: Measured) -> float:
         """Return what the motion alone measures.
 
         Parameters
@@ -217,12 +209,12 @@ class Measure:
         3.0
         """
         if self.period is not None:
-            return float(measures.spectral_acceleration(motion, self.period, self.damping))
+            return motion.spectral_acceleration(self.period, self.damping)
         if self.of_motion == "factor":
             return 1.0
-        return measures.peak_acceleration(motion) if self.of_motion == "pga" else measures.peak_velocity(motion)
+        return motion.pga if self.of_motion == "pga" else motion.pgv
 
-    def positive(self, motion: Piecewise, name: str) -> float:
+    def positive(self, motion: Measured, name: str) -> float:
         """Return what the motion alone measures, as `value`, of a motion that can be scaled.
 
         Parameters

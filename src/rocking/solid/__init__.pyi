@@ -1,4 +1,4 @@
-from .building import Region
+from .mesh import Region
 from .rose import Rose
 from .solid import Solid
 

@@ -1,30 +1,22 @@
-"""A closed surface with its normals outwards from the triangles of a mesh, and a sentence for all that was done to it.
+"""Closed surfaces from the triangles of a mesh, with a sentence for every repair; their moments, and their overlaps.
 
 What is inside a surface is known where its triangles make a cycle: every edge is passed as often one way as the other.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+import itertools
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from rocking.arrays import Flags, Floats, Integers
 from rocking.errors import InvalidBlock
-from rocking.solid.moments import signed_volumes
 from rocking.tables import counted
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
-
-#: Corners within this part of the mesh's size are one.
-_SAME: Final = 1e-8
-
-#: Sine of the solid angle of a tetrahedron that is flat but for rounding.
-_IN_PLANE: Final = 1e-12
-
-#: Triangles of a surface that are looked at to see where it lies.
-_LOOKED_AT: Final = 12
 
 
 class Surface(NamedTuple):
@@ -49,7 +41,7 @@ def joined(vertices: Floats, faces: Integers) -> Surface:
     if not size > 0.0:
         raise InvalidBlock("all corners of the mesh are at one place")
     places, at, index = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
-    near = components(len(places), cKDTree(places).query_pairs(size * _SAME, output_type="ndarray"))
+    near = components(len(places), cKDTree(places).query_pairs(1e-8 * size, output_type="ndarray"))
     _, first, of_place = np.unique(near, return_index=True, return_inverse=True)
     first = at[first]
     three = of_place.reshape(-1)[index.reshape(-1)][faces]
@@ -214,7 +206,7 @@ def surrounds(vertices: Floats, faces: Integers, other: Floats, others: Integers
 
     What both have in common has a half of the one inside, or nearly so.
     """
-    some = others[np.linspace(0, len(others) - 1, _LOOKED_AT).astype(np.int64)]
+    some = others[np.linspace(0, len(others) - 1, 12).astype(np.int64)]
     places = np.vstack([other[some[:, 0]], other[some].mean(axis=1)])
     around = [abs(winding(vertices, faces, place)) for place in np.unique(places, axis=0)]
     return max(around, key=lambda times: abs(times - 0.5)) > 0.5
@@ -228,5 +220,120 @@ def winding(vertices: Floats, faces: Integers, place: Floats) -> float:
     below = la * lb * lc + np.sum(a * b, axis=1) * lc + np.sum(b * c, axis=1) * la + np.sum(c * a, axis=1) * lb
     halves = np.arctan2(above, below)
     # In a triangle itself the sign of its solid angle is that of rounding; halfway from one side to the other it is 0.
-    halves[(below < 0.0) & (np.abs(above) <= _IN_PLANE * la * lb * lc)] = 0.0
+    halves[(below < 0.0) & (np.abs(above) <= 1e-12 * la * lb * lc)] = 0.0
     return float(np.sum(halves) / (2.0 * np.pi))
+
+
+class Moments(NamedTuple):
+    """Volume (or mass), centre, shape (3,), and the integral of x x^T about the centre, shape (3, 3)."""
+
+    amount: float
+    centre: Floats
+    second: Floats
+
+    def inertia_over_amount(self) -> Floats:
+        """Return the tensor of inertia about the centre over the amount, m^2: of x x^T its trace less itself."""
+        mean = self.second / self.amount
+        return np.asarray(np.trace(mean) * np.eye(3) - mean)
+
+
+def signed_volumes(vertices: Floats, faces: Integers) -> Floats:
+    """Volumes between each triangle and the middle of all corners, positive where its normal points away from it."""
+    one, two, three = (vertices[faces[:, k]] - _middle(vertices) for k in range(3))
+    return np.asarray(np.einsum("ij,ij->i", one, np.cross(two, three)) / 6.0)
+
+
+def moments(vertices: Floats, faces: Integers) -> Moments:
+    """Return the moments of what a closed surface encloses, exact but for rounding.
+
+    Every triangle and one place span a tetrahedron of signed volume V. With s the sum of its corners a, b, c from that
+    place, its first moment is V s/4, its second V (s s^T + a a^T + b b^T + c c^T)/20.
+    """
+    middle = _middle(vertices)
+    corners = vertices[faces] - middle
+    volumes = signed_volumes(vertices, faces)
+    amount = float(volumes.sum())
+    sums = corners.sum(axis=1)
+    first = volumes @ sums / 4.0
+    second = np.einsum("i,ij,ik->jk", volumes, sums, sums) + np.einsum("i,inj,ink->jk", volumes, corners, corners)
+    off = first / amount if amount else np.zeros(3)
+    return Moments(amount, middle + off, second / 20.0 - amount * np.outer(off, off))
+
+
+def together(parts: Sequence[Moments], densities: Sequence[float]) -> Moments:
+    """Return the moments of several parts, each with its density."""
+    masses = np.array([part.amount * density for part, density in zip(parts, densities, strict=True)])
+    total = float(masses.sum())
+    centre = masses @ np.array([part.centre for part in parts]) / total
+    second = np.zeros((3, 3))
+    for part, density, mass in zip(parts, densities, masses, strict=True):
+        off = part.centre - centre
+        second += density * part.second + mass * np.outer(off, off)
+    return Moments(total, centre, second)
+
+
+def _middle(vertices: Floats) -> Floats:
+    """Place in the middle of all corners: differences from it keep their digits."""
+    return np.asarray(0.5 * (vertices.min(axis=0) + vertices.max(axis=0)))
+
+
+def overlaps(names: Sequence[str], surfaces: Sequence[Surface]) -> tuple[str, ...]:
+    """Return a sentence on the pieces of a mesh that overlap, by sampling where the boxes around them do."""
+    pieces = [piece for name, surface in zip(names, surfaces, strict=True) for piece in _pieces(name, surface)]
+    used = [each.vertices[np.unique(each.faces)] for each in pieces]
+    ends = [(corners.min(axis=0), corners.max(axis=0)) for corners in used]
+    size = max(float(np.max(high - low)) for low, high in ends)
+    boxes = []
+    for (one, first), (other, second) in itertools.combinations(zip(pieces, ends, strict=True), 2):
+        low, high = np.maximum(first[0], second[0]), np.minimum(first[1], second[1])
+        if np.all(high - low > 2e-9 * size):
+            boxes.append((float(np.prod(high - low)), one, other, low, high))
+    found = []
+    for volume, one, other, low, high in sorted(boxes, key=lambda box: -box[0])[:50]:
+        count = min(max(20_000_000 // (len(boxes) * (len(one.faces) + len(other.faces))), 30), 1000)
+        # An additive recurrence fills the box evenly, with no place on a face of a common shape.
+        shares = (0.5 + np.arange(count)[:, None] * 1.2207440846057596 ** -np.arange(1.0, 4.0)) % 1.0
+        within = sum(
+            all(winding(each.vertices, each.faces, place) > 0.75 for each in (one, other))
+            for place in low + shares * (high - low)
+        )
+        if volume * within / count > 1e-4 * min(one.volume, other.volume):
+            found.append((volume * within / count, one.part, other.part))
+    if not found:
+        return ()
+    found.sort(key=lambda pair: -pair[0])
+    said = [
+        f"{f'{one} and {other}' if one != other else f'two pieces of {one}'} overlap in about {common:.2g} m^3"
+        for common, one, other in found[:3]
+    ]
+    more = f", and so do {len(found) - 3} more pairs" if len(found) > 3 else ""
+    return (
+        f"{', '.join(said)}{more}, which is counted twice: make one surface of the two, cut one out of the other, or, "
+        "if one is a cavity, turn its normals inwards",
+    )
+
+
+class _Piece(NamedTuple):
+    """A closed surface with its cavities: the part that it is of, its corners, triangles and volume."""
+
+    part: str
+    vertices: Floats
+    faces: Integers
+    volume: float
+
+
+def _pieces(name: str, surface: Surface) -> list[_Piece]:
+    """Part a surface into closed ones whose normals point outwards, each with its cavities."""
+    vertices, faces, _ = surface
+    label = shells_of(faces)
+    volumes = np.bincount(label, weights=signed_volumes(vertices, faces))
+    outer = np.flatnonzero(volumes > 0.0)
+    if len(outer) == 1:
+        return [_Piece(name, vertices, faces, float(volumes.sum()))]
+    members = {int(k): [faces[label == k]] for k in outer}
+    for k in np.flatnonzero(volumes < 0.0):
+        cavity = faces[label == k]
+        around = [n for n, parts in members.items() if winding(vertices, parts[0], vertices[cavity[0, 0]]) > 0.5]
+        for n in around[:1]:
+            members[n].append(cavity)
+    return [_Piece(name, vertices, np.vstack(parts), float(volumes[n])) for n, parts in members.items()]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,18 +18,12 @@ from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidBlock
 from rocking.result import Result, Row, dictionary_of, text_of
 from rocking.solid import support as polygons
-from rocking.solid.building import Region, properties
+from rocking.solid.mesh import Region, properties
 from rocking.solid.rose import Rose, about_axes, checked_azimuths, rose_of
 from rocking.tables import counted
 
 if TYPE_CHECKING:
-    from rocking.solid.reading import Mesh
-
-#: Letters of the names of a summary.
-_NAMES: Final = 22
-
-#: Relative difference of distances to both sides that are one.
-_EVEN: Final = 1e-12
+    from rocking.solid.mesh import Mesh
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -141,8 +135,7 @@ class Solid(Result):
         Parameters
         ----------
         mesh : path, binary stream, trimesh.Trimesh or trimesh.Scene
-            Triangles; "statue" is a mesh that ships with the package. A stream has the file's name as its ``name``, as
-            an open file has; nothing is read beside it, while of a path files that it names are read, too.
+            Triangles; "statue" is a mesh that ships with the package. A stream needs the file's name as its ``name``.
         density : float or mapping of str to float, optional
             Density, kg/m^3: of all, or of each part (object, group, node) by its name. Without it all is of one
             density, and the mass not known. What parts have in common counts twice, and is noted.
@@ -289,7 +282,10 @@ class Solid(Result):
         sizes = np.ptp(self.support, axis=0)
         radii = np.sqrt(np.diag(self.inertia_over_mass))
         rows = [
-            *(Row("part", f"{each.name}: {each.volume:.4g} m^3", note=_of_density(each)) for each in self.regions),
+            *(
+                Row("part", f"{name}: {volume:.4g} m^3", note=f" of {density:g} kg/m^3" if density is not None else "")
+                for name, volume, density in self.regions
+            ),
             Row("centre of mass", f"{self.centre[2]:.5g} m high, at {east:.4g} m east, {north:.4g} m north"),
             Row("radii of gyration", "about axes to the east, to the north and up "
                 + ", ".join(f"{radius:.4g} m" for radius in radii)),
@@ -302,7 +298,7 @@ class Solid(Result):
             *(Row("repaired", sentence) for sentence in self.repairs),
             *(Row("note", sentence) for sentence in self.notes),
         ]  # fmt: skip
-        return f"{self._headline()}\n\n{text_of(rows, _NAMES)}"
+        return f"{self._headline()}\n\n{text_of(rows, 22)}"
 
     def to_dict(self) -> dict[str, Any]:
         rows = [
@@ -319,14 +315,8 @@ class Solid(Result):
             "description": self.description,
             **dictionary_of(rows),
             "regions": [
-                dictionary_of(
-                    [
-                        Row("name", each.name),
-                        Row("volume", each.volume, "m^3"),
-                        Row("density", each.density, "kg/m^3"),
-                    ]
-                )
-                for each in self.regions
+                dictionary_of([Row("name", name), Row("volume", volume, "m^3"), Row("density", density, "kg/m^3")])
+                for name, volume, density in self.regions
             ],
             "repairs": [*self.repairs],
             "notes": [*self.notes],
@@ -357,14 +347,10 @@ def plane_of(solid: Solid, azimuth: float) -> Plane:
     towards = checks.finite(azimuth, "azimuth", InvalidBlock)
     pivots = polygons.extents(solid.support - solid.centre[:2], [towards, towards + 180.0])
     middle, apart = pivots.distance.mean(), np.ptp(pivots.distance)
-    if apart <= _EVEN * middle:  # by rounding alone: a body that is symmetric has equal sides wherever it stands
+    if apart <= 1e-12 * middle:  # by rounding alone: a body that is symmetric has equal sides wherever it stands
         pivots = pivots._replace(distance=np.full(2, middle))
     squared, _ = about_axes(solid.inertia_over_mass, np.array([towards]))
     return Plane(towards, pivots, float(solid.centre[2]), math.sqrt(float(squared[0])))
-
-
-def _of_density(region: Region) -> str:
-    return "" if region.density is None else f" of {region.density:g} kg/m^3"
 
 
 def _shaped(value: ArrayLike, name: str, shape: tuple[int, ...]) -> Floats:
@@ -376,16 +362,11 @@ def _shaped(value: ArrayLike, name: str, shape: tuple[int, ...]) -> Floats:
 
 def _checked_inertia(value: ArrayLike) -> Floats:
     found = _shaped(value, "inertia_over_mass", (3, 3))
-    largest = float(np.abs(found).max())
+    rounding = 1e-9 * float(np.abs(found).max())
     # Principal moments: none is larger than the sum of both others.
-    principal = np.linalg.eigvalsh(0.5 * (found + found.T))
-    rounding = 1e-9 * largest
-    if not (
-        largest > 0.0
-        and np.allclose(found, found.T, rtol=0.0, atol=rounding)
-        and principal[0] + principal[1] >= principal[2] - rounding
-        and principal[0] > -rounding
-    ):
+    least, middle, most = np.linalg.eigvalsh(0.5 * (found + found.T))
+    is_symmetric = np.allclose(found, found.T, rtol=0.0, atol=rounding)
+    if not (rounding > 0.0 and is_symmetric and least + middle >= most - rounding and least > -rounding):
         raise InvalidBlock(
             "{} is the tensor of no body: it must be symmetric, each principal moment at most the sum of the others",
             "inertia_over_mass",

@@ -19,8 +19,8 @@ from rocking.body import Bodies, Body
 from rocking.constants import Model
 from rocking.ensemble import Polarity, Product, dataset_of, product_of
 from rocking.errors import InvalidOption
-from rocking.motion.named import Motions, names_of
 from rocking.motion.scaling import IntensityName, Measure, MeasureName
+from rocking.records.named import Motions, names_of
 from rocking.studies.critical import StudyVerdict, critical_scales
 from rocking.studies.folder import Folder
 from rocking.studies.fragility import BlockFragilities, block_fragilities, pooled_fragility

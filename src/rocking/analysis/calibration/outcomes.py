@@ -18,7 +18,7 @@ from rocking.arrays import Flags, Floats
 from rocking.constants import Model
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.motion.named import distinct_motions, several_motions
+from rocking.records.named import distinct_motions, several_motions
 
 #: Chance that an outcome is not that of a rocking block at all (the specimen slid, was touched, was noted wrongly).
 _LAPSE: Final = 0.005

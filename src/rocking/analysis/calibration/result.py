@@ -26,7 +26,7 @@ from rocking.constants import Model
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.motion.named import Motions
+from rocking.records.named import Motions
 from rocking.result import Result
 from rocking.tables import Column, as_written, counted, text_table
 

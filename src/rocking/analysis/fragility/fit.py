@@ -31,9 +31,9 @@ from rocking.constants import Model
 from rocking.engine import Setup, missing_text
 from rocking.ensemble import SIGNS, Polarity, simulate_many
 from rocking.errors import InvalidOption, Unfitted
-from rocking.motion.named import Motions, several_motions
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.problem import bodies_of, slenderness_of
+from rocking.records.named import Motions, several_motions
 from rocking.tables import counted
 from rocking.treatment import Treatment, treatment
 

@@ -9,16 +9,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from rocking import records
 from rocking.arrays import Floats
 from rocking.ensemble import Scales
 from rocking.errors import InvalidMotion, UnreadableRecord
-from rocking.motion import records
-from rocking.motion.formats.source import Request
 from rocking.motion.motion import Motion
-from rocking.motion.named import expanded, is_there, named_motion
 from rocking.named_pulses import pulse_family
 from rocking.plausibility import motion_notes
 from rocking.progress import note
+from rocking.records.formats.source import Request
+from rocking.records.named import expanded, is_there, named_motion
 from rocking.studies.file.tables import Tables, read
 
 

@@ -12,11 +12,11 @@ import stat
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import BinaryIO, NamedTuple
 
 from rocking import checks
 from rocking.errors import InvalidMotion, UnreadableRecord, literal
-from rocking.motion.units import CHOICES, Unit, choose_unit, find_unit
+from rocking.records.units import CHOICES, Unit, choose_unit, find_unit
 
 #: Largest file that is read, bytes; the longest strong-motion records are a hundred times smaller.
 SIZE_LIMIT = 512 * 2**20
@@ -24,23 +24,11 @@ SIZE_LIMIT = 512 * 2**20
 #: Header lines are decoded up to this length, so that a file without line ends costs no more than any other.
 LINE_LIMIT = 512
 
-#: What an open file without a name of its own is called in messages.
-_STREAM = "standard input"
-
-#: How alike the names of two files must be for the one to be a slip of the other.
-_ALIKE = 0.8
-
-_UTF8_MARK = b"\xef\xbb\xbf"
-_UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 _CONTROL = bytes(c for c in range(32) if c not in b"\t\n")
-#: A larger share of such bytes makes a file binary; a stray one in a text does not.
-_MOST_CONTROL = 0.01
-_ENDS_OF_TEXT = b"\x00\x1a"
 _VISIBLE = re.compile(rb"\S")
 
 
-@dataclass(frozen=True)
-class Line:
+class Line(NamedTuple):
     """One line: its text (cut at LINE_LIMIT), its offset in the file and that of the next line."""
 
     text: str
@@ -114,8 +102,8 @@ class Source:
 
     @cached_property
     def is_binary(self) -> bool:
-        """Whether too many bytes are such as no text file holds."""
-        return len(self.data.translate(None, _CONTROL)) < (1.0 - _MOST_CONTROL) * len(self.data)
+        """Whether one byte in a hundred is such as no text file contains; a stray one is none."""
+        return len(self.data.translate(None, _CONTROL)) < 0.99 * len(self.data)
 
     def binary_at(self) -> int | None:
         """Return the offset of the first byte that no text file holds, or None if this is text."""
@@ -135,7 +123,14 @@ class Source:
 def open_source(path: str | os.PathLike[str] | BinaryIO) -> Source:
     """Read a file whole, or what is left of one that is open."""
     read = getattr(path, "read", None)
-    name = _name(path) if read is None else _stream_name(path)
+    if read is not None:  # Python's own streams have no name but "<stdin>" or a number
+        name = getattr(path, "name", None)
+        name = name if isinstance(name, str) and name and not name.startswith("<") else "standard input"
+    else:
+        try:
+            name = os.fsdecode(path)  # type: ignore[arg-type]
+        except TypeError as error:
+            raise UnreadableRecord(f"the path of a record must be a file name, not {path!r}") from error
     try:
         raw = _content(name) if read is None else read(SIZE_LIMIT + 1)
     except FileNotFoundError as error:
@@ -157,29 +152,16 @@ def open_source(path: str | os.PathLike[str] | BinaryIO) -> Source:
 
 
 def _hint(name: str) -> str:
-    """Return what may be meant by the name of a file that does not exist."""
+    """Suggest what may be meant by the name of a file that does not exist."""
     try:
         beside = {path.name: str(path) for path in Path(name).parent.iterdir()}
     except (OSError, ValueError):
         beside = {}
-    from rocking.motion import records  # it reads its own with the help of the formats
+    from rocking.records import catalogue  # it loads its records with the units of the formats
 
-    if name in records.names():
+    if name in catalogue.names():
         return f"it is a shipped record: load it with rocking.records.load({name!r})"
-    return checks.meant(Path(name).name, beside, "check the name and the folder", _ALIKE)
-
-
-def _name(path: Any) -> str:
-    try:
-        return os.fsdecode(path)
-    except TypeError as error:
-        raise UnreadableRecord(f"the path of a record must be a file name, not {path!r}") from error
-
-
-def _stream_name(stream: Any) -> str:
-    """Return the name of an open file; Python's own streams have none but "<stdin>" or a number."""
-    name = getattr(stream, "name", None)
-    return name if isinstance(name, str) and name and not name.startswith("<") else _STREAM
+    return checks.meant(Path(name).name, beside, "check the name and the folder", likeness=0.8)
 
 
 def _content(name: str) -> bytes:
@@ -190,26 +172,17 @@ def _content(name: str) -> bytes:
         raise UnreadableRecord("this is not a regular file; copy the record into one", path=name)
     with open(name, "rb") as file:  # noqa: PTH123
         # A read sets aside as much memory as it is asked for.
-        raw = file.read(min(status.st_size, SIZE_LIMIT) + 1)
-        if len(raw) > status.st_size:
-            raw += file.read(SIZE_LIMIT + 1 - len(raw))
-    return raw
+        return file.read(min(status.st_size, SIZE_LIMIT) + 1)
 
 
 def _text(raw: bytes) -> bytes:
     data = raw
-    if data.startswith(_UTF16_MARKS):
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         data = data.decode("utf-16", "replace").encode("latin-1", "replace")
-    data = data.removeprefix(_UTF8_MARK)
-    if b"\r" in data:
-        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    if b"\f" in data:
-        # At the start of a line a form feed is the printer's page break and takes no column.
-        data = data.removeprefix(b"\f").replace(b"\n\f", b"\n").replace(b"\f", b" ")
-    return data.rstrip(_ENDS_OF_TEXT)
-
-
-_SAME_STEP = 1e-6
+    data = data.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    # At the start of a line a form feed is the printer's page break and takes no column.
+    data = data.removeprefix(b"\f").replace(b"\n\f", b"\n").replace(b"\f", b" ")
+    return data.rstrip(b"\x00\x1a")
 
 
 @dataclass(frozen=True)
@@ -244,7 +217,7 @@ class Request:
         # No file holds more samples than bytes, so this also bounds the record's length.
         if not (stated > 0.0 and math.isfinite(stated * len(source.raw))):
             raise source.error(f"the sampling step is {stated:g} s, but it must be positive; correct it", at)
-        if self.dt is not None and not self.several and not math.isclose(self.dt, stated, rel_tol=_SAME_STEP):
+        if self.dt is not None and not self.several and not math.isclose(self.dt, stated, rel_tol=1e-6):
             raise source.error(
                 f"the sampling step is {stated:g} s, not {{}} {self.dt:g} s; leave {{}} out",
                 at,

@@ -13,20 +13,25 @@ from typing import BinaryIO, Final
 
 from rocking import checks
 from rocking.errors import UnreadableRecord, install
-from rocking.motion.formats import at2, cosmos, csmip, esm, knet, smc, table, through_obspy
-from rocking.motion.formats.channel import Channel, Identification, Recognised
-from rocking.motion.formats.source import Request, Source, open_source
 from rocking.motion.motion import Motion
+from rocking.records.formats import at2, cosmos, csmip, keyed, smc, table, through_obspy
+from rocking.records.formats.channel import Channel, Identification, Recognised
+from rocking.records.formats.source import Request, Source, open_source
 
 __all__ = ["Channel", "Identification", "channels", "identify", "read"]
 
 
-#: In the order in which they are asked; the last two take what no title claims.
-_RECOGNISERS: Final[tuple[Callable[[Source], Recognised | None], ...]] = tuple(
-    each.recognise for each in (at2, cosmos, csmip, smc, esm, knet, table, through_obspy)
+#: In the order in which they are tried; the last two accept what no title claims.
+_RECOGNISERS: Final[tuple[Callable[[Source], Recognised | None], ...]] = (
+    at2.recognise,
+    cosmos.recognise,
+    csmip.recognise,
+    smc.recognise,
+    keyed.recognise_esm,
+    keyed.recognise_knet,
+    table.recognise,
+    through_obspy.recognise,
 )
-
-_LISTED = 30
 
 #: How files begin that hold no record as they are, and what becomes of them.
 _FOREIGN = {
@@ -54,14 +59,13 @@ def read(
         column (accelerations), two (times, accelerations) or more that a heading names (times, then channels), or any
         file that ObsPy reads if the `formats` extra is installed. The format is recognised from the content.
     channel : int or str, optional
-        Number or name of the channel; needed only where the file holds several.
+        Number or name of the channel; needed only where the file contains several.
     dt : float, optional
-        Sampling step, s; needed only for one column of accelerations, and for times that are printed with so few digits
-        that they do not tell it. Elsewhere it must agree with the file.
+        Sampling step, s; needed only for one column of accelerations, and for times printed with too few digits.
+        Elsewhere it must agree with the file.
     units : {"g", "m/s2", "cm/s2", "gal", "mm/s2", "mg"}, optional
-        Units of the accelerations; needed only where the file does not say: ObsPy's formats, and text tables without
-        a heading such as "acceleration (cm/s2)" or "a_g". They overrule a heading. Times in a text table are in the
-        unit that their heading names, "time (ms)", or else in seconds.
+        Units of the accelerations, which overrule a heading; needed only where the file does not say: ObsPy's formats,
+        and text tables without a heading such as "acceleration (cm/s2)" or "a_g".
 
     Returns
     -------
@@ -87,12 +91,7 @@ def read(
     >>> motion.duration, motion.pga
     (0.02, 4.903325)
     """
-    return read_as(path, Request.checked(dt, units, channel))
-
-
-def read_as(path: str | os.PathLike[str] | BinaryIO, request: Request) -> Motion:
-    """Read one channel as `read` does."""
-    return chosen(path, request).motion()
+    return chosen(path, Request.checked(dt, units, channel)).motion()
 
 
 def chosen(path: str | os.PathLike[str] | BinaryIO, request: Request) -> Channel:
@@ -120,17 +119,22 @@ def read_vertical(path: str | os.PathLike[str], name: str, request: Request) -> 
 def content(path: str | os.PathLike[str] | BinaryIO, request: Request) -> tuple[Identification, list[Channel]]:
     """Return what format a file is taken for, and its acceleration channels, or the one that is named."""
     source = open_source(path)
-    identification, read = _recognised(source)
-    found = read(request)
-    return identification, found if request.channel is None else [_choose(source, found, request)]
+    recognised = _recognised(source)
+    found = recognised.read(request)
+    chosen_ones = found if request.channel is None else [_choose(source, found, request)]
+    return Identification(recognised.format, recognised.reason), chosen_ones
 
 
 def channels(path: str | os.PathLike[str], *, dt: float | None = None, units: str | None = None) -> tuple[Channel, ...]:
-    """Return all acceleration channels of a record file.
+    r"""Return all acceleration channels of a record file.
 
     Parameters
     ----------
-    path, dt, units
+    path : str or path
+        The file.
+    dt : float, optional
+        As for `read`.
+    units : str, optional
         As for `read`.
 
     Returns
@@ -142,6 +146,15 @@ def channels(path: str | os.PathLike[str], *, dt: float | None = None, units: st
     ------
     UnreadableRecord, InvalidMotion
         As for `read`.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> file = Path(tempfile.mkdtemp()) / "pair.txt"
+    >>> _ = file.write_text("time (s), NS (g), EW (g)\n0.00, 0.0, 0.1\n0.01, 0.5, -0.2\n")
+    >>> [channel.name for channel in channels(file)]
+    ['NS', 'EW']
     """
     return tuple(content(path, Request.checked(dt, units))[1])
 
@@ -173,7 +186,8 @@ def identify(path: str | os.PathLike[str]) -> Identification:
     >>> identify(file)
     Identification(format='text table', reason='from line 2 on each line holds one number')
     """
-    return _recognised(open_source(path)).identification
+    recognised = _recognised(open_source(path))
+    return Identification(recognised.format, recognised.reason)
 
 
 def _recognised(source: Source) -> Recognised:
@@ -187,32 +201,27 @@ def _unknown(source: Source) -> UnreadableRecord:
     line = source.first_line()
     if line is not None and "RESPONSE AND FOURIER" in line.text.upper():
         return source.error("this is a V3 file of spectra; give the V1 or V2 file of the acceleration", line.start)
-    refused = table.refusal(source)
-    if refused is not None:
+    if refused := table.refusal(source):
         return refused
-    foreign = next((what for mark, what in _FOREIGN.items() if source.raw.startswith(mark)), None)
-    if foreign is not None:
-        return source.error(f"this is {foreign}")
-    position = source.binary_at()
+    for mark, foreign in _FOREIGN.items():
+        if source.raw.startswith(mark):
+            return source.error(f"this is {foreign}")
+    position, most = source.binary_at(), table.HEADING_LINES
     if position is None and not table.is_foreign(source):
         what = "no line of it holds numbers alone: if it is the heading of a record, get the whole file"
-        if source.data.count(b"\n") >= table.HEADING_LINES:
-            what = (
-                f"none of its first {table.HEADING_LINES} lines holds numbers alone: shorten a heading that is longer"
-            )
+        if source.data.count(b"\n") >= most:
+            what = f"none of its first {most} lines holds numbers alone: shorten a heading that is longer"
         return source.error(f"this is text in no format known here, and {what}")
     what = "this is text" if position is None else f"this is a binary file (byte {source.data[position]} at {position})"
     if through_obspy.installed():
         return source.error(f"{what} in no format known here, nor to ObsPy; give a strong-motion record")
-    return source.error(
-        f"{what} in no format known here; if it is MiniSEED, SAC or another format that ObsPy reads, "
-        f"{install('formats')}"
-    )
+    how = f"if it is MiniSEED, SAC or another format that ObsPy reads, {install('formats')}"
+    return source.error(f"{what} in no format known here; {how}")
 
 
 def _listed(found: Sequence[Channel]) -> str:
-    more = len(found) - _LISTED
-    return ", ".join(channel.label for channel in found[:_LISTED]) + (f" and {more} more" if more > 0 else "")
+    more = f" and {len(found) - 30} more" if len(found) > 30 else ""
+    return ", ".join(channel.label for channel in found[:30]) + more
 
 
 def _choose(source: Source, found: list[Channel], request: Request) -> Channel:
@@ -234,8 +243,8 @@ def _hint(found: list[Channel], wanted: int | str | None) -> str:
 
 def _matching(found: list[Channel], wanted: int | str) -> list[Channel]:
     """Return the channels of that name, or else of that number, or whose name begins with that word."""
-    text = " ".join(str(wanted).casefold().split())
-    by_number = [channel for channel in found if str(channel.number) == text]
-    by_name = [channel for channel in found if " ".join(channel.name.casefold().split()) == text]
-    by_word = [channel for channel in found if channel.name.casefold().split()[:1] == [text]]
+    text = str(wanted).casefold().split()
+    by_number = [channel for channel in found if [str(channel.number)] == text]
+    by_name = [channel for channel in found if channel.name.casefold().split() == text]
+    by_word = [channel for channel in found if channel.name.casefold().split()[:1] == text]
     return by_name or by_number or by_word if isinstance(wanted, str) else by_number or by_name or by_word

@@ -1,8 +1,8 @@
-"""Strong-motion records that ship with the package, and are read without a network.
+"""Strong-motion records that ship with the package.
 
-Every channel of three stations: China Lake and Tower 2 in the 2019 Ridgecrest earthquake (M 7.1), and the
-free field of the Meloland overpass in El Centro in the 1979 Imperial Valley earthquake, whose 270 degree
-channel has a near-fault pulse. The values are exactly those published.
+Every channel of three stations: China Lake and Tower 2 in the 2019 Ridgecrest earthquake (M 7.1), and the free field of
+the Meloland overpass in El Centro in the 1979 Imperial Valley earthquake, whose 270 degree channel has a near-fault
+pulse. The values are exactly those published.
 """
 
 from __future__ import annotations
@@ -20,14 +20,12 @@ from rocking import checks
 from rocking.errors import UnreadableRecord
 from rocking.motion.description import Description, Origin
 from rocking.motion.motion import Motion
-from rocking.motion.units import choose_unit
-
-__all__ = ["Record", "info", "load", "names"]
+from rocking.records.units import choose_unit
 
 
 @dataclass(frozen=True)
 class Record:
-    """What is known of a shipped record.
+    """Facts on a shipped record.
 
     Attributes
     ----------
@@ -97,7 +95,7 @@ def names() -> tuple[str, ...]:
 
 
 def info(name: str) -> Record:
-    """Return what is known of a shipped record: event, station, direction, step, source and terms.
+    """Return the facts on a shipped record: event, station, direction, step, source and terms.
 
     Parameters
     ----------
@@ -199,4 +197,4 @@ def _catalogue() -> dict[str, dict[str, Any]]:
 
 
 def _folder() -> Traversable:
-    return resources.files("rocking.motion") / "data"
+    return resources.files("rocking.records") / "data"

@@ -1,6 +1,6 @@
-"""Rules of thumb of the practice: what each makes of a block and a motion, as demand over capacity.
+"""Rules of thumb for the rocking and overturning of blocks, as demand over capacity, and a check by simulations.
 
-Every demand here grows in proportion with the motion, so a ratio of 0.5 says that by the rule the motion may double.
+Every demand grows in proportion with the motion: at a ratio of 0.5 the rule permits twice the motion.
 """
 
 from __future__ import annotations
@@ -10,23 +10,27 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import wraps
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from rocking import checks
+from rocking.analysis.incremental import incremental_dynamic_analysis
+from rocking.analysis.levels import REVERSED_TOO, values_of
+from rocking.analysis.survey import BlockUnderRecords, motion_of
 from rocking.arrays import Floats
 from rocking.block import Block, Blocks
+from rocking.constants import STANDARD_GRAVITY, Model
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.motion.motion import Motion
-from rocking.motion.named import several_motions
-from rocking.tables import range_text
+from rocking.motion.scaling import Measure
+from rocking.progress import Progress
+from rocking.records.named import Motions, motions_by_name, several_motions
+from rocking.response import PRECISION, Response, in_brief, known_ratio
+from rocking.simulation import simulate
+from rocking.tables import decimal, named, range_text, text_table
 
-#: Share of the velocity that would overturn a block at one blow, from which on Ishiyama sees blocks overturn.
-_ISHIYAMA: Final = 0.4
-
-#: Periods, s, over which Housner (1952) takes the mean of a spectrum.
-_HOUSNER_PERIODS: Final = np.linspace(0.1, 2.5, 97)
+__all__ = ["RULES", "Check", "Rating", "asce_43_05", "check", "housner", "ishiyama", "priestley", "rate", "west"]
 
 #: Rotations over slenderness at which a spectrum is compared with the block: at the first the oscillators are stiff, at
 #: the last a rocking period is 30/p.
@@ -35,17 +39,20 @@ _SHARES: Final = np.append(np.geomspace(1e-3, 0.5, 30, endpoint=False), np.linsp
 #: Damping over -ln e^2 (Makris and Konstantinidis 2003).
 _DAMPING: Final = 0.34
 
+#: Relative width of the bracket of the level that overturns first.
+_TOLERANCE: Final = 1e-4
+
 
 @dataclass(frozen=True, eq=False)
 class Rating:
-    """What a rule makes of n blocks under one motion.
+    """Demand and capacity of n blocks under one motion by a rule.
 
     Attributes
     ----------
     rule : str
         Name of the rule.
     demand, capacity : ndarray, shape (n,)
-        What the motion asks of the weaker side of each block, and what that side has.
+        Those of the weaker side of each block.
     unit : str
         Their unit; "1" if they have none.
     """
@@ -72,24 +79,29 @@ class Rating:
         return np.asarray(self.ratio >= 1.0)
 
 
-#: What a rule takes, and what it makes of it.
 Rule = Callable[[Blocks | Block | Iterable[Block], Motion], Rating]
 
+#: Demand and capacity of the sides of blocks, shape (n, 2).
+Comparison = Callable[[Blocks, Motion], tuple[Any, Floats]]
+
 _rules: dict[str, Rule] = {}
-_titles: dict[str, str] = {}
 
 #: Rules by name, and their names for people.
 RULES: Final[Mapping[str, Rule]] = MappingProxyType(_rules)
-TITLES: Final[Mapping[str, str]] = MappingProxyType(_titles)
+TITLES: Final[dict[str, str]] = {}
 
-#: What is the same in the documentation of every rule.
-_PARAMETERS: Final = """    Parameters
+#: Sections that the documentation of every rule shares.
+_DOCUMENTATION: Final = """{}
+
+    Parameters
     ----------
     blocks : Blocks, Block or iterable of Block
         n blocks.
     motion : Motion
-        Ground motion."""
-_EXAMPLE: Final = """
+        Ground motion.
+
+{}
+
     Examples
     --------
     >>> import rocking
@@ -100,23 +112,21 @@ _EXAMPLE: Final = """
     """
 
 
-def _rule(title: str, unit: str, example: str) -> Callable[[Callable[[Blocks, Motion], tuple[Any, Floats]]], Rule]:
-    """Make a rule of demand and capacity of the sides of blocks, shape (n, 2), with their unit and a ratio to show."""
+def _rule(title: str, unit: str, example: str) -> Callable[[Comparison], Rule]:
+    """Make a rule of a comparison, with the unit of its numbers and the ratio that its example shows."""
 
-    def rule_of(compared: Callable[[Blocks, Motion], tuple[Any, Floats]]) -> Rule:
-        @wraps(compared, assigned=("__module__", "__name__", "__qualname__"))
+    def rule_of(comparison: Comparison) -> Rule:
+        @wraps(comparison, assigned=("__module__", "__name__", "__qualname__"))
         def rule(blocks: Blocks | Block | Iterable[Block], motion: Motion) -> Rating:
-            (shaking,) = several_motions([motion])
-            demand, capacity = np.broadcast_arrays(*compared(Blocks.of(blocks), shaking))
-            weaker = np.argmax(demand / capacity, axis=1)[:, None]
-            of_weaker = [np.take_along_axis(each, weaker, axis=1)[:, 0] for each in (demand, capacity)]
-            return Rating(name, of_weaker[0], of_weaker[1], unit)
+            demand, capacity = np.broadcast_arrays(*comparison(Blocks.of(blocks), several_motions([motion])[0]))
+            weaker = np.arange(len(demand)), np.argmax(demand / capacity, axis=1)
+            return Rating(name, demand[weaker], capacity[weaker], unit)
 
-        name = compared.__name__
-        first, _, rest = (compared.__doc__ or "").partition("\n\n")
-        rule.__doc__ = f"{first}\n\n{_PARAMETERS}\n\n{rest.rstrip()}\n{_EXAMPLE.format(name, example)}"
+        name = comparison.__name__
+        first, _, rest = (comparison.__doc__ or "").partition("\n\n")
+        rule.__doc__ = _DOCUMENTATION.format(first, rest.rstrip(), name, example)
         del rule.__wrapped__  # its arguments are not those of the rule
-        _rules[name], _titles[name] = rule, title
+        _rules[name], TITLES[name] = rule, title
         return rule
 
     return rule_of
@@ -166,23 +176,12 @@ def ishiyama(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     Engineering and Structural Dynamics 10(5), 635-650.
     """
     acceleration = motion.pga / (blocks.gravity * np.tan(blocks.alpha))
-    velocity = motion.pgv / (_ISHIYAMA * overturning_velocity(blocks))
+    velocity = motion.pgv / (0.4 * overturning_velocity(blocks))
     return np.minimum(acceleration, velocity), np.ones_like(velocity)
 
 
 def overturning_velocity(blocks: Blocks) -> Floats:
-    """Sudden ground velocity after which a block at rest just reaches its balance point, m/s, shape (n, 2).
-
-    Examples
-    --------
-    By energy and angular momentum of a rectangle, V^2 = 8 g R (1 - cos(alpha))/(3 cos(alpha)^2):
-
-    >>> import rocking
-    >>> block = rocking.Block(half_width=0.15, half_height=0.45)
-    >>> squared = 8.0 * 9.80665 * block.radius * (1.0 - math.cos(block.alpha)) / (3.0 * math.cos(block.alpha) ** 2)
-    >>> bool(abs(overturning_velocity(Blocks.of(block))[0, 0] ** 2 / squared - 1.0) < 1e-12)
-    True
-    """
+    """Sudden ground velocity after which a block at rest just reaches its balance point, m/s, shape (n, 2)."""
     return np.asarray(2.0 * blocks.gravity * np.sin(0.5 * blocks.alpha) / (blocks.p * np.cos(blocks.alpha)))
 
 
@@ -221,7 +220,7 @@ def housner(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
 
 def mean_spectral_velocity(motion: Motion) -> float:
     """Mean of the undamped pseudo-velocity over periods of 0.1 to 2.5 s, m/s (Housner 1952)."""
-    periods = _HOUSNER_PERIODS
+    periods = np.linspace(0.1, 2.5, 97)
     velocities = motion.spectral_acceleration(periods, 0.0) * periods / (2.0 * np.pi)
     return float(np.trapezoid(velocities, periods) / (periods[-1] - periods[0]))
 
@@ -345,13 +344,8 @@ def rate(
     return {name: RULES[name](many, motion) for name in names}
 
 
-@dataclass(frozen=True, eq=False)
-class _Oscillator:
-    """Oscillators that stand for one side of a block at some rotations.
-
-    They have periods (s), a fraction of critical damping, capacities, and demands for a spectral acceleration of 1
-    m/s^2.
-    """
+class _Oscillator(NamedTuple):
+    """Oscillators that stand for one side of a block at some rotations; demands are for a spectrum of 1 m/s^2."""
 
     periods: Floats
     damping: float
@@ -373,18 +367,16 @@ def _reserve_energy(p: float, alpha: float, restitution: float, gravity: float, 
 def _free_rocking(p: float, alpha: float, restitution: float, gravity: float) -> _Oscillator:
     """Priestley, Evison and Carr (1978)."""
     periods = 4.0 / p * np.arccosh(1.0 / (1.0 - _SHARES))
-    radius = 0.75 * gravity / p**2
-    displacements = radius * (math.sin(alpha) - np.sin(alpha * (1.0 - _SHARES)))
-    per_acceleration = (periods / (2.0 * np.pi)) ** 2
-    return _Oscillator(periods, -2.0 * _DAMPING * math.log(restitution), displacements, per_acceleration)
+    displacements = 0.75 * gravity / p**2 * (math.sin(alpha) - np.sin(alpha * (1.0 - _SHARES)))
+    damping = -2.0 * _DAMPING * math.log(restitution)
+    return _Oscillator(periods, damping, displacements, (periods / (2.0 * np.pi)) ** 2)
 
 
 def _least_ratio(
     blocks: Blocks, motion: Motion, oscillator_of: Callable[[float, float, float, float], _Oscillator]
 ) -> tuple[Floats, Floats]:
-    """Demand and capacity of the sides of blocks at the rotation where the demand on oscillators is least over it."""
+    """Demand and capacity of the sides of blocks at the rotation where their ratio is least."""
     sides = np.stack([blocks.p, blocks.alpha, blocks.restitution], axis=-1).reshape(-1, 3)
-    # Both sides of a symmetric block, and blocks that repeat, are looked at once.
     distinct, place = np.unique(sides, axis=0, return_inverse=True)
     found = np.empty((len(distinct), 2))
     for k, (p, alpha, restitution) in enumerate(distinct.tolist()):
@@ -394,3 +386,190 @@ def _least_ratio(
         found[k] = demands[least], here.capacities[least]
     demand, capacity = found[place.reshape(-1)].reshape(len(blocks), 2, 2).transpose(2, 0, 1)
     return demand, capacity
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Check(BlockUnderRecords):
+    """Rules of thumb compared with simulations, for a block under several motions; from `check`.
+
+    Attributes
+    ----------
+    ratios : tuple of mapping of str to float
+        For each motion, demand over capacity by each rule.
+    margins : tuple of float
+        For each motion, one over the lowest factor on it at which the block overturns; NaN if it overturns at none.
+    block, records, responses, skipped
+        The block, the name of each motion, the simulated response to each, and why records could not be read.
+    """
+
+    ratios: tuple[Mapping[str, float], ...]
+    margins: tuple[float, ...]
+
+    @property
+    def falls_under_less(self) -> tuple[bool, ...]:
+        """Whether the block stands under each motion as it is, and falls under the same motion times less than 1."""
+        each = zip(self.responses, self.margins, strict=True)
+        return tuple(margin > 1.0 and not (one.overturned or one.unfinished) for one, margin in each)
+
+    def rows(self) -> list[dict[str, Any]]:
+        return [
+            {
+                **label,
+                named("pga", "g"): decimal(motion_of(response).pga / STANDARD_GRAVITY),
+                named("pgv", "m/s"): motion_of(response).pgv,
+                **ratios,
+                "simulated": margin,
+                "lowest_factor": 1.0 / margin,
+                "peak_over_slenderness": response.peak_over_slenderness,
+                "overturned": response.overturned,
+                "falls_under_less": less,
+                "verdict": in_brief(response, PRECISION) + (f"; overturns at x {_short(1.0 / margin)}" if less else ""),
+            }
+            for label, response, ratios, margin, less in zip(
+                self._labels(), self.responses, self.ratios, self.margins, self.falls_under_less, strict=True
+            )
+        ]
+
+    def summary(self) -> str:
+        rules = [*self.ratios[0]]
+        shown = {"record": "record", named("pga", "g"): "PGA, g", named("pgv", "m/s"): "PGV, m/s"}
+        shown |= {rule: TITLES[rule] for rule in rules}
+        shown |= {"simulated": "simulated", "peak_over_slenderness": "peak/slenderness", "verdict": "outcome"}
+        known = [{"peak_over_slenderness": known_ratio(response)} for response in self.responses]
+        rows = [row | each for row, each in zip(self.rows(), known, strict=True)]
+        # No rule of thumb is better than to three digits.
+        cells = [[float(f"{x:.3g}") if isinstance(x := row[name], float) else x for name in shown] for row in rows]
+        table = text_table(list(shown.values()), cells)
+        return "\n".join(
+            [
+                str(self.block),
+                "demand over capacity: from 1 on a rule predicts overturning; simulated: one over the lowest factor on "
+                "the motion that was found to overturn the block, in steps of 5 %",
+                "",
+                table,
+                *(["", *self._disagreements(rules)] if rules else []),
+                *(f"note: {note}" for note in self._notes()),
+            ]
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        return super().to_dict() | {"notes": self._notes()}
+
+    def _notes(self) -> list[str]:
+        return [] if self.block.alone().is_symmetric else [REVERSED_TOO]
+
+    def _headline(self) -> str:
+        return f"{super()._headline()}; by {', '.join(self.ratios[0]) or 'no rule'}"
+
+    def _disagreements(self, rules: list[str]) -> list[str]:
+        """Say how often each rule is wrong; records under which no single number can be right are not counted."""
+        lines = []
+        less = self.falls_under_less
+        for rule in rules:
+            said = [
+                (ratios[rule] >= 1.0, response.overturned)
+                for ratios, response, is_left_out in zip(self.ratios, self.responses, less, strict=True)
+                if not (is_left_out or response.unfinished)
+            ]
+            unsafe = sum(not yes and real for yes, real in said)
+            wary = sum(yes and not real for yes, real in said)
+            right = len(said) - unsafe - wary
+            lines.append(f"{TITLES[rule]}: right {right}, unsafe {unsafe}, over-conservative {wary} of {len(said)}")
+        if any(less):
+            lines.append(
+                f"not counted: {sum(less)} of {len(less)}, where the block stands under the motion as it is, but falls "
+                "under the same motion scaled down"
+            )
+        if unfinished := sum(response.unfinished for response in self.responses):
+            lines.append(f"not counted: {unfinished} of {len(less)}, whose simulation was not finished")
+        return lines
+
+
+def check(
+    block: Block,
+    motions: Motions,
+    *,
+    rules: Iterable[str] | None = None,
+    model: Model = "nonlinear",
+    threads: int | None = None,
+    progress: bool | None = None,
+) -> Check:
+    """Apply rules of thumb to a block under motions, and simulate the block.
+
+    Parameters
+    ----------
+    block : Block
+        What rocks.
+    motions : Motion, sequence of Motion, or mapping of str to Motion
+        m motions; the table shows the names of a mapping, or else the motions' own.
+    rules : iterable of str, optional
+        Names in `RULES`; by default all.
+    model : {"nonlinear", "linear"}
+        Equation of motion of the simulations.
+    threads : int, optional
+        Number of threads; by default one for every core.
+    progress : bool, optional
+        Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
+
+    Returns
+    -------
+    Check
+        Demand over capacity by each rule, and the simulated margin.
+
+    Raises
+    ------
+    InvalidOption
+        If there is no motion, or no rule of a name, or the block never comes to rest (restitution 1).
+    InvalidBlock, InvalidMotion
+        As the rules, and if a motion is zero throughout.
+
+    Notes
+    -----
+    The simulated margin comes from `incremental_dynamic_analysis`, whose levels are 5 % apart: a thinner band of levels
+    that overturn may lie below it. The factor that overturns is known to 1e-4. Where 1 is within that of it, the
+    response to the motion as it is decides on which side of 1 the margin is.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> tombstone = rocking.Block(width=0.3, height=0.9)
+    >>> records = {name: rocking.records.load(name) for name in ["el-centro-meloland-270", "el-centro-meloland-360"]}
+    >>> found = check(tombstone, records, rules=["west", "ishiyama"])
+    >>> for row in found.rows():
+    ...     print(f"{row['west']:.2f} {row['ishiyama']:.2f} {row['simulated']:.2f} {row['verdict']}")
+    0.90 0.90 0.71 does not move in 5 of 5 (3e-6), 11 of 11 (0.1 %)
+    0.93 0.93 0.64 does not move in 5 of 5 (3e-6), 11 of 11 (0.1 %)
+    """
+    named_motions = motions_by_name(motions)
+    names = None if rules is None else checks.several(rules, "rules", InvalidOption)
+    # What is refused is refused before the work.
+    values_of([*named_motions.values()], Measure("pga"))
+    ratios = [
+        {name: float(rating.ratio[0]) for name, rating in rate(block, motion, names).items()}
+        for motion in named_motions.values()
+    ]
+    responses, margins = [], []
+    with Progress("checking", total=len(named_motions), show=progress) as bar:
+        for motion in named_motions.values():
+            responses.append(simulate(block, motion, model=model))
+            margins.append(_margin(responses[-1], block, motion, model, threads))
+            bar.advance()
+    return Check(block, tuple(named_motions), tuple(responses), tuple(ratios), tuple(margins))
+
+
+def _margin(response: Response, block: Block, motion: Motion, model: Model, threads: int | None) -> float:
+    """One over the lowest factor on the motion that overturns the block, on the side of 1 that the response tells."""
+    scaled = incremental_dynamic_analysis(
+        block, motion, model=model, tolerance=_TOLERANCE, threads=threads, progress=False
+    )
+    margin = motion.pga / float(scaled.data.overturning_level[0, 0])
+    if response.overturned:
+        return float(np.fmax(margin, 1.0))  # it may be beyond all levels that were looked at
+    # The level is the middle of a bracket: where that holds the motion itself, which stands, the change lies above it.
+    is_near = 1.0 <= margin <= 1.0 + _TOLERANCE and not response.unfinished
+    return float(np.nextafter(1.0, 0.0)) if is_near else margin
+
+
+def _short(factor: float) -> str:
+    """Write a factor below 1, with more digits near 1."""
+    return f"{factor:.2f}" if factor < 0.985 else f"{factor:.4f}"

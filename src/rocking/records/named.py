@@ -1,4 +1,4 @@
-"""Motions as they are given: as arguments, by name, of record files, of whole folders; and tables of what there is."""
+"""Motions as arguments, by name, from record files and folders; and lists of records and of channels."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ import numpy as np
 
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion, InvalidOption, UnreadableRecord
-from rocking.motion import formats, records
-from rocking.motion.formats.source import Request
 from rocking.motion.motion import Motion
+from rocking.records import catalogue, formats
+from rocking.records.formats.source import Request
 from rocking.tables import decimal, named, text_table
 
 #: One motion, several, or several by names that replace their own.
@@ -26,15 +26,7 @@ Motions = Motion | Mapping[str, Motion] | Sequence[Motion]
 
 
 def one_motion(motion: Motion | None) -> Motion | None:
-    """Return the motion (None is free rocking).
-
-    Examples
-    --------
-    >>> one_motion("RSN6.AT2")
-    Traceback (most recent call last):
-        ...
-    rocking.errors.InvalidMotion: a Motion is needed, not 'RSN6.AT2': load it with rocking.read("RSN6.AT2")
-    """
+    """Return a motion (None is free rocking), or refuse what is none."""
     if motion is not None and not isinstance(motion, Motion):
         raise InvalidMotion(_refusal(motion))
     return motion
@@ -94,18 +86,22 @@ def numbered(given: Sequence[str]) -> list[str]:
 
 def distinct_motions(motions: Sequence[Motion]) -> tuple[list[Motion], list[int]]:
     """Motions that differ, and which of them each one is: the same command is often given several times."""
-    places: dict[tuple[bytes, ...], tuple[int, Motion]] = {}
-    which = []
+    places: dict[tuple[bytes, ...], int] = {}
+    distinct: list[Motion] = []
+    which: list[int] = []
     for motion in motions:
         parts = [part for part in (motion, motion.vertical) if part is not None]
         key = tuple(values.tobytes() for part in parts for values in (part.breakpoints, part.coefficients))
-        which.append(places.setdefault(key, (len(places), motion))[0])
-    return [motion for _, motion in places.values()], which
+        if key not in places:
+            places[key] = len(distinct)
+            distinct.append(motion)
+        which.append(places[key])
+    return distinct, which
 
 
 def _refusal(given: Any) -> str:
     if isinstance(given, (str, Path)):
-        how = "rocking.records.load" if str(given) in records.names() else "rocking.read"
+        how = "rocking.records.load" if str(given) in catalogue.names() else "rocking.read"
         return f'a Motion is needed, not {str(given)!r}: load it with {how}("{given}")'
     made = "make one with Motion.from_samples(array, dt), in m/s^2 and s"
     if given is None:
@@ -137,10 +133,10 @@ def named_motion(
     if is_shipped(name):
         if not several:
             refuse_what_is_known(name, channel=channel, dt=dt, units=units)
-        motion = records.load(name)
+        motion = catalogue.load(name)
     else:
         file = sys.stdin.buffer if name == STANDARD_INPUT else name
-        motion = formats.read_as(file, Request.checked(dt, units, channel, several=several))
+        motion = formats.chosen(file, Request.checked(dt, units, channel, several=several)).motion()
     if vertical is not None:
         up = named_vertical(vertical, name, channel=channel, dt=dt, units=units, several=several)
         motion = motion.with_vertical(up)
@@ -173,7 +169,7 @@ def named_vertical(
 
 def _stands_alone(vertical: str) -> bool:
     """Whether a vertical motion is a file or a shipped record of its own, and no channel of the horizontal one's."""
-    return os.path.isfile(vertical) or vertical in records.names()  # noqa: PTH113 - see `is_there`
+    return os.path.isfile(vertical) or vertical in catalogue.names()  # noqa: PTH113 - see `is_there`
 
 
 def refuse_what_is_known(name: str, **said: object) -> None:
@@ -194,9 +190,9 @@ def is_shipped(name: str) -> bool:
     """Whether a name is that of a shipped record, and not of a file."""
     if name == STANDARD_INPUT or is_there(name):
         return False
-    if name in records.names():
+    if name in catalogue.names():
         return True
-    meant = records.meant(name)
+    meant = catalogue.meant(name)
     if meant and not Path(name).suffix:
         raise UnreadableRecord(
             f"there is no such file or shipped record; did you mean {' or '.join(meant)}?", path=name
@@ -225,7 +221,7 @@ def _files(name: str) -> list[str]:
     if not glob.has_magic(name) or is_there(name):
         return [name]
     matching = sorted(path for path in glob.glob(name, recursive=True) if Path(path).is_file())  # noqa: PTH207 - any root
-    matching = matching or fnmatch.filter(records.names(), name)
+    matching = matching or fnmatch.filter(catalogue.names(), name)
     if not matching:
         raise UnreadableRecord(
             "no file or shipped record matches this pattern; check the folder and the pattern", path=name
@@ -258,7 +254,18 @@ class Contents:
     motions: tuple[Motion, ...] = ()
 
     def summary(self) -> str:
-        """Return the table for people."""
+        """Return the table for people.
+
+        Returns
+        -------
+        str
+            Title and table.
+
+        Examples
+        --------
+        >>> "el-centro-meloland-270" in shipped().summary()
+        True
+        """
         columns = list(self.entries[0])
         # What has no value is the step of samples that are not evenly spaced.
         rows = [["uneven" if entry[column] is None else entry[column] for column in columns] for entry in self.entries]
@@ -272,7 +279,18 @@ class Contents:
         return f"<Contents: {title}{len(self.entries)} {kind}: {names}>"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the table for machines."""
+        """Return the table for machines.
+
+        Returns
+        -------
+        dict
+            The facts, and the entries under their kind.
+
+        Examples
+        --------
+        >>> len(shipped().to_dict()["records"])
+        9
+        """
         return {**self.facts, self.kind: self.entries}
 
 
@@ -299,7 +317,12 @@ def shipped(name: str | None = None) -> Contents:
     >>> [entry["name"] for entry in shipped().entries][:2]
     ['ridgecrest-clc-090', 'ridgecrest-clc-360']
     """
-    return Contents("", {}, "records", [_shipped(each) for each in (records.names() if name is None else [name])])
+    entries = []
+    for each in catalogue.names() if name is None else [name]:
+        record = catalogue.info(each)
+        known = {"name": each, "event": record.event, "station": record.station, "direction": record.direction}
+        entries.append(known | _measures(catalogue.load(each)) | {"terms": record.terms})
+    return Contents("", {}, "records", entries)
 
 
 def contents(
@@ -310,12 +333,18 @@ def contents(
     units: str | None = None,
     several: bool = False,
 ) -> Contents:
-    """List the acceleration channels of a file, and say what it was taken for.
+    """List the acceleration channels of a file, with its format.
 
     Parameters
     ----------
-    file, channel, dt, units
-        As for `rocking.read`; without `channel`, all of them.
+    file : str, path or binary file
+        As for `rocking.read`.
+    channel : str, optional
+        The only one to list; by default all.
+    dt : float, optional
+        As for `rocking.read`.
+    units : str, optional
+        As for `rocking.read`.
     several : bool
         Whether the arguments are for several files: those that say their step and units keep them.
 
@@ -328,6 +357,15 @@ def contents(
     ------
     UnreadableRecord, InvalidMotion
         As for `rocking.read`.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> path = Path(tempfile.mkdtemp()) / "pulse.csv"
+    >>> _ = path.write_text("time (s), a (g)" + chr(10) + "0.0, 0.0" + chr(10) + "0.1, 0.5" + chr(10))
+    >>> [entry["pga_g"] for entry in contents(path).entries]
+    [0.5]
     """
     identification, channels = formats.content(file, Request.checked(dt, units, channel, several=several))
     motions = tuple(each.motion() for each in channels)
@@ -339,12 +377,6 @@ def contents(
         for each, motion in zip(channels, motions, strict=True)
     ]
     return Contents(title, facts, "channels", entries, motions)
-
-
-def _shipped(name: str) -> dict[str, Any]:
-    record = records.info(name)
-    known = {"name": name, "event": record.event, "station": record.station, "direction": record.direction}
-    return known | _measures(records.load(name)) | {"terms": record.terms}
 
 
 def _measures(motion: Motion) -> dict[str, Any]:

@@ -2,36 +2,29 @@
 
 Each is a `Motion` whose pieces approximate the formula to 1e-15 of the largest acceleration (`Motion.error`); those of
 straight lines are exact. Pulses start at time 0, are zero after their end, and are added with ``+``.
+
+A piece is the Taylor series about its middle, moved to its start, and so short that the first term left out is below
+1e-16 of the amplitude. Large angles are computed without their rounding: products and quotients with their errors,
+whole turns subtracted exactly.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
+from numpy.polynomial import hermite_e
+from numpy.typing import NDArray
 
 from rocking import checks
+from rocking.arrays import Floats
 from rocking.errors import InvalidMotion
+from rocking.motion import piecewise
 from rocking.motion.description import Description
 from rocking.motion.motion import Motion
 from rocking.motion.piecewise import exact_product, exact_quotient
-from rocking.motion.series import (
-    ERROR,
-    GAUSSIAN_PIECE,
-    MOST_CYCLES,
-    PIECES_PER_CYCLE,
-    about_starts,
-    checked_frequency,
-    gaussian_derivative,
-    middles,
-    sine_and_cosine,
-    sine_pieces,
-    sine_series,
-    sum_of_angles,
-    whole_pieces,
-)
 
 __all__ = [
     "half_sine",
@@ -44,6 +37,20 @@ __all__ = [
     "sine",
     "triangular",
 ]
+
+#: Relative to the amplitude of the acceleration, which a pulse that is cut need not reach; covers the terms left out
+#: and the rounding of the coefficients, which are multiples of it.
+_ERROR: Final = 1e-15
+
+#: Of a sine: half a piece is pi/8 = 0.39 rad, and 0.39**14 / 14! = 2.4e-17.
+_PIECES_PER_CYCLE: Final = 8
+_SINE_DEGREE: Final = 13
+_MOST_CYCLES: Final = 100_000
+
+#: Of a derivative of a Gaussian, in its standard deviations: by Cramer's inequality (|He_n(x)| exp(-x^2/4) is at most
+#: 1.09 sqrt(n!)) the first term left out is below 6 e-17 of the peak.
+_GAUSSIAN_PIECE: Final = 0.4
+_GAUSSIAN_DEGREE: Final = 15
 
 
 def rectangular(amplitude: float, duration: float) -> Motion:
@@ -70,13 +77,8 @@ def rectangular(amplitude: float, duration: float) -> Motion:
     1.0
     """
     amplitude, duration = _amplitude(amplitude), checks.positive(duration, "duration", InvalidMotion, "s")
-    numbers = {"amplitude": amplitude, "duration": duration}
-    return Motion(
-        np.array([0.0, duration]),
-        np.array([[amplitude]]),
-        name="rectangular",
-        description=Description("rectangular", numbers, "constant"),
-    )
+    description = Description("rectangular", {"amplitude": amplitude, "duration": duration}, "constant")
+    return Motion([0.0, duration], [[amplitude]], name="rectangular", description=description)
 
 
 def triangular(amplitude: float, duration: float) -> Motion:
@@ -103,14 +105,10 @@ def triangular(amplitude: float, duration: float) -> Motion:
     0.5
     """
     amplitude, duration = _amplitude(amplitude), checks.positive(duration, "duration", InvalidMotion, "s")
-    numbers = {"amplitude": amplitude, "duration": duration}
     formula = "linear from 0 to amplitude at duration/2 and back to 0"
-    return Motion.from_points(
-        [0.0, 0.5 * duration, duration],
-        [0.0, amplitude, 0.0],
-        name="triangular",
-        description=Description("triangular", numbers, formula),
-    )
+    description = Description("triangular", {"amplitude": amplitude, "duration": duration}, formula)
+    points = [0.0, 0.5 * duration, duration], [0.0, amplitude, 0.0]
+    return Motion.from_points(*points, name="triangular", description=description)
 
 
 def sine(amplitude: float, frequency: float, *, cycles: float, phase: float = 0.0) -> Motion:
@@ -254,10 +252,10 @@ def n_lobe(amplitude: float | Sequence[float], frequency: float, *, lobes: int |
     array([ 1., -3.,  2.])
     """
     amplitudes = _lobe_amplitudes(amplitude, lobes)
-    frequency = checked_frequency(frequency)
-    per_lobe = PIECES_PER_CYCLE // 2
-    breakpoints = np.arange(len(amplitudes) * per_lobe + 1.0) / (PIECES_PER_CYCLE * frequency)
-    unit = sine_pieces(breakpoints, frequency, 0.0)
+    frequency = _checked_frequency(frequency)
+    per_lobe = _PIECES_PER_CYCLE // 2
+    breakpoints = np.arange(len(amplitudes) * per_lobe + 1.0) / (_PIECES_PER_CYCLE * frequency)
+    unit = _sine_pieces(breakpoints, frequency, 0.0)
     one = np.ndim(amplitude) == 0
     numbers = {"amplitude" if one else f"amplitude_{k}": a for k, a in enumerate(amplitudes)}
     formula = "amplitude sin(2 pi frequency t), an amplitude for each half cycle"
@@ -266,7 +264,7 @@ def n_lobe(amplitude: float | Sequence[float], frequency: float, *, lobes: int |
         unit * np.repeat(amplitudes, per_lobe)[:, np.newaxis],
         name=f"{len(amplitudes)} lobes",
         description=Description("n-lobe", numbers | {"frequency": frequency, "lobes": len(amplitudes)}, formula),
-        error=ERROR * max(map(abs, amplitudes)),
+        error=_ERROR * max(map(abs, amplitudes)),
     )
 
 
@@ -274,23 +272,23 @@ def _amplitude(value: float) -> float:
     return checks.finite(value, "amplitude", InvalidMotion)
 
 
-def _phase(value: float) -> float:
-    return checks.finite(value, "phase", InvalidMotion)
-
-
 def _sine(family: str, amplitude: float, frequency: float, cycles: float, phase: float) -> Motion:
-    amplitude, phase, frequency = _amplitude(amplitude), _phase(phase), checked_frequency(frequency)
+    amplitude, phase, frequency = (
+        _amplitude(amplitude),
+        checks.finite(phase, "phase", InvalidMotion),
+        _checked_frequency(frequency),
+    )
     cycles = checks.positive(cycles, "number of cycles", InvalidMotion, "cycles")
-    if cycles > MOST_CYCLES:
-        raise InvalidMotion(f"a sine may have at most {MOST_CYCLES} {{}}, not {cycles:g}", "cycles", value=cycles)
-    breakpoints = np.linspace(0.0, cycles / frequency, whole_pieces(PIECES_PER_CYCLE * cycles))
+    if cycles > _MOST_CYCLES:
+        raise InvalidMotion(f"a sine may have at most {_MOST_CYCLES} {{}}, not {cycles:g}", "cycles", value=cycles)
+    breakpoints = np.linspace(0.0, cycles / frequency, _whole_pieces(_PIECES_PER_CYCLE * cycles))
     numbers = {"amplitude": amplitude, "frequency": frequency, "cycles": cycles, "phase": phase}
     return Motion(
         breakpoints,
-        amplitude * sine_pieces(breakpoints, frequency, phase),
+        amplitude * _sine_pieces(breakpoints, frequency, phase),
         name=family,
         description=Description(family, numbers, "amplitude sin(2 pi frequency t + phase) over the given cycles"),
-        error=ERROR * abs(amplitude),
+        error=_ERROR * abs(amplitude),
     )
 
 
@@ -299,7 +297,7 @@ def _lobe_amplitudes(amplitude: float | Sequence[float], lobes: int | None) -> l
         raise InvalidMotion("the amplitudes of the lobes must be one number or a flat sequence of numbers")
     each = np.atleast_1d(np.asarray(amplitude, dtype=object))
     given = [checks.finite(value, "amplitude of a lobe", InvalidMotion) for value in each]
-    count = None if lobes is None else checks.whole(lobes, "number of lobes", InvalidMotion, 1, 2 * MOST_CYCLES)
+    count = None if lobes is None else checks.whole(lobes, "number of lobes", InvalidMotion, 1, 2 * _MOST_CYCLES)
     if np.ndim(amplitude) == 0 and count is not None:
         return given * count
     if np.ndim(amplitude) == 0 or not given or count not in (None, len(given)):
@@ -307,11 +305,6 @@ def _lobe_amplitudes(amplitude: float | Sequence[float], lobes: int | None) -> l
             "give one amplitude and the number of lobes, or a sequence with one amplitude for each lobe"
         )
     return given
-
-
-# Where Ricker pulses fall below 1e-16 of their peak, in standard deviations of their Gaussian.
-_SYMMETRIC_REACH: Final = 9.1
-_ANTISYMMETRIC_REACH: Final = 9.3
 
 
 def ricker(
@@ -358,17 +351,19 @@ def ricker(
     >>> round(pulse.pga, 12), abs(pulse.velocity(pulse.duration)) < 1e-15
     (2.0, True)
     """
-    amplitude, frequency = _amplitude(amplitude), checked_frequency(frequency)
+    amplitude, frequency = _amplitude(amplitude), _checked_frequency(frequency)
     kinds = ("symmetric", "antisymmetric")
     symmetric = checks.one_of(kind, "kind of a Ricker pulse", InvalidMotion, kinds) == "symmetric"
     rate = math.sqrt(2.0) * math.pi * frequency if symmetric else 2.0 * math.pi * frequency / math.sqrt(3.0)
-    longest = 2.0 * (_SYMMETRIC_REACH if symmetric else _ANTISYMMETRIC_REACH) / rate
+    longest = 2.0 * (9.1 if symmetric else 9.3) / rate  # to 1e-16 of the peak
     length = longest if duration is None else checks.positive(duration, "duration", InvalidMotion, "s")
     if length > longest:
         raise InvalidMotion(f"a Ricker pulse of {frequency:.6g} Hz lasts only {longest:.6g} s: give no longer duration")
-    breakpoints = np.linspace(0.0, length, whole_pieces(rate * length / GAUSSIAN_PIECE))
-    series = -gaussian_derivative(2 if symmetric else 3, middles(breakpoints) - 0.5 * length, rate)
-    peak = 1.0 if symmetric else _antisymmetric_peak()
+    breakpoints = np.linspace(0.0, length, _whole_pieces(rate * length / _GAUSSIAN_PIECE))
+    series = -_gaussian_derivative(2 if symmetric else 3, _middles(breakpoints) - 0.5 * length, rate)
+    # (x^2 - 3) x exp(-x^2 / 2) is stationary where x^4 - 6 x^2 + 3 = 0.
+    squared = 3.0 - math.sqrt(6.0)
+    peak = 1.0 if symmetric else (3.0 - squared) * math.sqrt(squared) * math.exp(-0.5 * squared)
     formula = (
         "amplitude (1 - x^2) exp(-x^2/2), x = sqrt(2) pi frequency (t - duration/2)"
         if symmetric
@@ -377,10 +372,10 @@ def ricker(
     parameters = {"amplitude": amplitude, "frequency": frequency, "duration": length}
     return Motion(
         breakpoints,
-        about_starts(breakpoints, series * (amplitude / peak)),
+        _about_starts(breakpoints, series * (amplitude / peak)),
         name=f"{kind} Ricker",
         description=Description(f"{kind} Ricker", parameters, formula),
-        error=ERROR * abs(amplitude),
+        error=_ERROR * abs(amplitude),
     )
 
 
@@ -426,27 +421,31 @@ def mavroeidis_papageorgiou(amplitude: float, frequency: float, *, phase: float,
     >>> pulse.duration, round(pulse.pgv, 12)
     (4.0, 0.8)
     """
-    amplitude, phase, frequency = _amplitude(amplitude), _phase(phase), checked_frequency(frequency)
+    amplitude, phase, frequency = (
+        _amplitude(amplitude),
+        checks.finite(phase, "phase", InvalidMotion),
+        _checked_frequency(frequency),
+    )
     gamma = checks.positive(gamma, "gamma", InvalidMotion, "cycles")
-    if not 1.0 <= gamma <= MOST_CYCLES:
-        sentence = f"{{}} of a Mavroeidis-Papageorgiou pulse must be from 1 to {MOST_CYCLES}, not {gamma}"
+    if not 1.0 <= gamma <= _MOST_CYCLES:
+        sentence = f"{{}} of a Mavroeidis-Papageorgiou pulse must be from 1 to {_MOST_CYCLES}, not {gamma}"
         raise InvalidMotion(sentence, "gamma", value=gamma)
-    breakpoints = np.linspace(0.0, gamma / frequency, whole_pieces(PIECES_PER_CYCLE * (gamma + 1.0)))
-    turns, rest = exact_product(frequency, middles(breakpoints))
-    carrier = sine_and_cosine(turns, rest - 0.5 * math.fmod(gamma, 2.0), phase)
+    breakpoints = np.linspace(0.0, gamma / frequency, _whole_pieces(_PIECES_PER_CYCLE * (gamma + 1.0)))
+    turns, rest = exact_product(frequency, _middles(breakpoints))
+    carrier = _sine_and_cosine(turns, rest - 0.5 * math.fmod(gamma, 2.0), phase)
     quotient, quotient_rest = exact_quotient(turns, rest, gamma)
-    envelope = sine_and_cosine(quotient, quotient_rest - 0.5, 0.0)
+    envelope = _sine_and_cosine(quotient, quotient_rest - 0.5, 0.0)
     # The product of cosines is a sum of three; they have a half, a quarter and a quarter of the amplitude.
     rate, shift = 2.0 * math.pi * frequency, 1.0 / gamma
     series = (
-        0.5 * sine_series(carrier, rate)
-        + 0.25 * (1.0 + shift) * sine_series(sum_of_angles(carrier, envelope, 1.0), rate * (1.0 + shift))
-        + 0.25 * (1.0 - shift) * sine_series(sum_of_angles(carrier, envelope, -1.0), rate * (1.0 - shift))
+        0.5 * _sine_series(carrier, rate)
+        + 0.25 * (1.0 + shift) * _sine_series(_sum_of_angles(carrier, envelope, 1.0), rate * (1.0 + shift))
+        + 0.25 * (1.0 - shift) * _sine_series(_sum_of_angles(carrier, envelope, -1.0), rate * (1.0 - shift))
     )
     peak = rate * amplitude
     return Motion(
         breakpoints,
-        about_starts(breakpoints, -peak * series),
+        _about_starts(breakpoints, -peak * series),
         name="Mavroeidis-Papageorgiou",
         description=Description(
             "Mavroeidis-Papageorgiou",
@@ -454,11 +453,83 @@ def mavroeidis_papageorgiou(amplitude: float, frequency: float, *, phase: float,
             "derivative of amplitude/2 [1 + cos(2 pi frequency s/gamma)] cos(2 pi frequency s + phase), "
             "s = t - gamma/(2 frequency); amplitude is a velocity, m/s",
         ),
-        error=ERROR * abs(peak),
+        error=_ERROR * abs(peak),
     )
 
 
-def _antisymmetric_peak() -> float:
-    """Largest value of ``(x^2 - 3) x exp(-x^2 / 2)``, which is stationary where ``x^4 - 6 x^2 + 3 = 0``."""
-    squared = 3.0 - math.sqrt(6.0)
-    return (3.0 - squared) * math.sqrt(squared) * math.exp(-0.5 * squared)
+class _Angle(NamedTuple):
+    """Angles by their sines and cosines."""
+
+    sine: Floats
+    cosine: Floats
+
+
+def _sine_and_cosine(turns: Floats, rest: Floats, phase: float) -> _Angle:
+    """_Angle ``2 pi (turns + rest) + phase``, `rest` far below `turns`, without the rounding of a large angle.
+
+    Whole quarter turns are taken off exactly, and the phase is added by the addition theorem.
+    """
+    within = (turns - np.rint(turns)) + rest
+    quarter = np.rint(4.0 * within)
+    turned = _Angle(*piecewise.from_quadrant(quarter, 2.0 * np.pi * (within - 0.25 * quarter)))
+    return _sum_of_angles(turned, _Angle(np.sin(phase), np.cos(phase)), 1.0)
+
+
+def _sum_of_angles(one: _Angle, other: _Angle, sign: float) -> _Angle:
+    """Sum of two angles, or their difference where the sign is -1."""
+    return _Angle(
+        one.sine * other.cosine + sign * one.cosine * other.sine,
+        one.cosine * other.cosine - sign * one.sine * other.sine,
+    )
+
+
+def _whole_pieces(pieces: float) -> int:
+    """Return the number of breakpoints of at least so many equal pieces."""
+    return math.ceil(pieces - 1e-9) + 1
+
+
+def _middles(breakpoints: Floats) -> Floats:
+    """Middle of each piece, s."""
+    return breakpoints[:-1] + 0.5 * np.diff(breakpoints)
+
+
+def _about_starts(breakpoints: Floats, about_middles: Floats) -> Floats:
+    """Coefficients about the start of each piece, from those about its middle."""
+    return piecewise.moved(about_middles, breakpoints[:-1] - _middles(breakpoints))
+
+
+def _sine_pieces(breakpoints: Floats, frequency: float, phase: float) -> Floats:
+    """Coefficients of ``sin(2 pi frequency t + phase)`` on each piece."""
+    turns, rest = exact_product(frequency, _middles(breakpoints))
+    angle = _sine_and_cosine(turns, rest, phase)
+    return _about_starts(breakpoints, _sine_series(angle, 2.0 * math.pi * frequency))
+
+
+def _sine_series(angle: _Angle, rate: float) -> Floats:
+    """Taylor coefficients of ``sin(angle + rate t)`` about ``t = 0``; shape (angles, degree + 1)."""
+    powers = np.arange(_SINE_DEGREE + 1)
+    derivatives = np.column_stack([angle.sine, angle.cosine, -angle.sine, -angle.cosine])[:, powers % 4]
+    return derivatives * _scaled_powers(rate, powers)
+
+
+def _gaussian_derivative(order: int, times: Floats, rate: float) -> Floats:
+    """Taylor coefficients in t of the derivative in x of ``exp(-x^2 / 2)``, ``x = rate t``, about each time.
+
+    The n-th derivative of the Gaussian is ``(-1)^n He_n(x) exp(-x^2 / 2)``, He_n Hermite's polynomials.
+    """
+    x = rate * times
+    powers = np.arange(_GAUSSIAN_DEGREE + 1)
+    hermite = hermite_e.hermevander(x, order + _GAUSSIAN_DEGREE)[:, order:]
+    derivatives = hermite * np.exp(-0.5 * x * x)[:, np.newaxis]
+    return (-1.0) ** (order + powers) * derivatives * _scaled_powers(rate, powers)
+
+
+def _scaled_powers(rate: float, powers: NDArray[np.int_]) -> Floats:
+    """Return ``rate**n / n!``."""
+    return rate ** powers.astype(np.float64) / np.array([math.factorial(n) for n in powers], dtype=np.float64)
+
+
+def _checked_frequency(frequency: float) -> float:
+    """Return a frequency, Hz, or raise InvalidMotion if it is no pulse's."""
+    checked = checks.positive(frequency, "frequency", InvalidMotion, "Hz")
+    return checks.within(checked, "frequency of a pulse", InvalidMotion, 1e-9, 1e6, "Hz")

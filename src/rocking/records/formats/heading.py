@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple
 
-from rocking.motion.formats.source import Source
-from rocking.motion.units import SECOND, Unit, find_time_unit, find_unit
+from rocking.records.formats.source import Source
+from rocking.records.units import SECOND, Unit, find_time_unit, find_unit
 
 #: What a column holds: times, numbers of rows, periods or ordinates of a spectrum, or values of a channel.
 Kind = Literal["time", "count", "spectrum", "channel"]

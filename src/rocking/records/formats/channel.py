@@ -3,37 +3,29 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rocking.arrays import Floats
 from rocking.constants import STANDARD_GRAVITY
-from rocking.errors import InvalidMotion, UnreadableRecord
+from rocking.errors import UnreadableRecord
 from rocking.motion.description import Description, Origin
-from rocking.motion.formats.source import Request, Source
 from rocking.motion.motion import Motion
-from rocking.motion.units import Unit
+from rocking.records.formats.source import Line, Request, Source
+from rocking.records.units import Unit
 
 #: Even times may be off their grid by this share of the step (or by what the printed decimals round away).
 _JITTER = 1e-6
-_MOST_DECIMALS = 9
-#: Significant digits that times are printed with.
-_FEWEST_DIGITS, _MOST_DIGITS = 4, 9
-#: No more times than this are printed alike.
-_MOST_ALIKE = 10.0
-
 #: Rounded times leave the best even grid by one unit of their last decimal, and a little for that grid's own error.
 _SPREAD = 1.25
-
 #: Later times are mistakes, s (30,000 years).
 _LATEST = 1e12
 
 
-def first_fault(times: NDArray[np.float64]) -> int | None:
+def first_fault(times: Floats) -> int | None:
     """Return the index of the first time that does not come after the one before it, or None."""
     with np.errstate(over="ignore"):
         fine = (np.diff(times) > 0.0) & (np.abs(times[1:]) <= _LATEST) & (np.abs(times[:-1]) <= _LATEST)
@@ -41,7 +33,7 @@ def first_fault(times: NDArray[np.float64]) -> int | None:
     return int(faults[0]) + 1 if len(faults) else None
 
 
-def even_step(times: NDArray[np.float64]) -> float | None:
+def even_step(times: Floats) -> float | None:
     """Return the step of increasing `times` (s) if they are even up to their printed decimals, else None.
 
     Of all steps that fit, it is the one with the fewest digits: times printed with three decimals at 200 samples per
@@ -58,10 +50,12 @@ def even_step(times: NDArray[np.float64]) -> float | None:
     if resolution > 0.5 * mean:
         return None
     allowed = max(_SPREAD * resolution, _JITTER * mean) + rounding
-    return _simplest_fit(times, _slope(times), (_SPREAD - 1.0) * resolution + rounding, allowed)
+    index = np.arange(len(times)) - 0.5 * intervals
+    slope = float(index @ times / (index @ index))
+    return _simplest_fit(times, slope, (_SPREAD - 1.0) * resolution + rounding, allowed)
 
 
-def prints_as(times: NDArray[np.float64], step: float) -> bool:
+def prints_as(times: Floats, step: float) -> bool:
     """Whether even times with this step may be printed as `times` are: with so many decimals or significant digits.
 
     Some that follow each other may be printed alike.
@@ -75,31 +69,25 @@ def prints_as(times: NDArray[np.float64], step: float) -> bool:
     rounded = last[0] and abs(step / last[0] - round(step / last[0])) > _JITTER
     if not np.ptp(off) <= (last[0] if rounded else _JITTER * step) + rounding:
         powers = np.floor(np.log10(np.where(sizes > 0.0, sizes, 1.0)))
-        for digits in range(_FEWEST_DIGITS, _MOST_DIGITS + 1):
+        for digits in range(4, 10):
             last = 10.0 ** (powers - digits + 1)
             if np.abs(times / last - np.rint(times / last)).max() <= _JITTER:
                 break
         if not np.all(np.abs(off) <= 0.5 * _SPREAD * (last + last[0]) + rounding):
             return False
-    return bool(last.max() <= _MOST_ALIKE * step)
+    return bool(last.max() <= 10.0 * step)
 
 
-def _resolution(times: NDArray[np.float64], rounding: float) -> float:
+def _resolution(times: Floats, rounding: float) -> float:
     """Return the place of the last decimal that the times were printed with, s; 0 for all digits."""
-    for decimals in range(_MOST_DECIMALS + 1):
+    for decimals in range(10):
         scaled = times * 10.0**decimals
         if float(np.abs(scaled - np.rint(scaled)).max()) <= max(_JITTER, rounding * 10.0**decimals):
             return 10.0**-decimals
     return 0.0
 
 
-def _slope(times: NDArray[np.float64]) -> float:
-    """Return the least-squares step."""
-    index = np.arange(len(times)) - 0.5 * (len(times) - 1)
-    return float(index @ times / (index @ index))
-
-
-def _simplest_fit(times: NDArray[np.float64], step: float, drift: float, allowed: float) -> float | None:
+def _simplest_fit(times: Floats, step: float, drift: float, allowed: float) -> float | None:
     """Return the step of fewest digits within `drift` of `step`, s, over all times; None if these leave its grid."""
     candidates = (float(f"{step:.{digits}g}") for digits in range(1, 18))
     simplest = next((each for each in candidates if abs(each - step) * len(times) <= drift), step)
@@ -107,9 +95,7 @@ def _simplest_fit(times: NDArray[np.float64], step: float, drift: float, allowed
     return simplest if spread <= allowed else None
 
 
-def step_or_times(
-    source: Source, request: Request, times: NDArray[np.float64], at: int
-) -> tuple[float | None, NDArray[np.float64] | None]:
+def step_or_times(source: Source, request: Request, times: Floats, at: int) -> tuple[float | None, Floats | None]:
     """Return the step (s) of increasing times, or the times where they are uneven; refuse another step."""
     step = even_step(times) if len(times) > 1 else None
     if step is not None:
@@ -121,21 +107,19 @@ def step_or_times(
     return request.dt, None
 
 
-#: Numbers that files have where a value is missing: nines before and after the point, those of well logs and of SAC,
-#: the ends of 16 and 24 bits.
-_MARKS = [float("9" * whole + "." + "9" * decimals) for whole in range(2, 9) for decimals in range(5)]
-_MARKS += [999.25, 12345.0, 32767.0, 32768.0, 8388607.0, 8388608.0]
-#: No acceleration is so large, in any unit.
-_LARGEST = 1e9
-#: A number stands for a missing value where those beside it are smaller than this share of it.
-_FAR_SMALLER = 0.2
-
-
 class Identification(NamedTuple):
     """A file's format, and what in its content says so."""
 
     format: str
     reason: str
+
+
+class Recognised(NamedTuple):
+    """What a file is taken for, and what reads its channels, from what was seen of it already."""
+
+    format: str
+    reason: str
+    read: Callable[[Request], list[Channel]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,11 +129,11 @@ class Channel:
     Attributes
     ----------
     name : str
-        What the file calls the component, for instance "90 Deg", "Up" or "HNE".
+        Name of the component in the file, for instance "90 Deg", "Up" or "HNE".
     number : int
         The channel's number in the file, counted from 1 where the file gives none.
     acceleration : ndarray, shape (n,)
-        m/s^2, read-only; nothing is removed, so an instrument's constant offset is still in it.
+        m/s^2; nothing is removed, so an instrument's constant offset is still in it.
     dt : float or None
         Sampling step, s; None where the samples are uneven.
     times : ndarray, shape (n,), or None
@@ -165,40 +149,23 @@ class Channel:
     start : float or None
         Instant of the first sample by the file's own clock, s; None where that is not known.
 
-    Raises
-    ------
-    InvalidMotion
-        If not exactly one of `dt` and `times` is given.
-
     Examples
     --------
-    >>> Channel("Up", 3, [0.0, 0.1, 0.0], dt=0.02, station="CLC").motion().duration
+    >>> Channel("Up", 3, np.array([0.0, 0.1, 0.0]), dt=0.02, station="CLC").motion().duration
     0.04
     """
 
     name: str
     number: int
-    acceleration: NDArray[np.float64]
+    acceleration: Floats
     dt: float | None = None
-    times: NDArray[np.float64] | None = None
+    times: Floats | None = None
     azimuth: float | None = None
     units: str = ""
     station: str = ""
     event: str = ""
     metadata: Mapping[str, str] = field(default_factory=dict)
     start: float | None = None
-
-    def __post_init__(self) -> None:
-        if (self.dt is None) == (self.times is None):
-            raise InvalidMotion("a channel needs its sampling step dt or its times, and not both")
-        object.__setattr__(self, "acceleration", _frozen(self.acceleration))
-        if self.times is not None:
-            object.__setattr__(self, "times", _frozen(self.times))
-        object.__setattr__(self, "metadata", MappingProxyType(dict(self.metadata)))
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        samples = (self.name, self.number, self.acceleration, self.dt, self.times)
-        return Channel, (*samples, self.azimuth, self.units, self.station, self.event, dict(self.metadata), self.start)
 
     def __repr__(self) -> str:
         taken = f"in steps of {self.dt:g} s" if self.dt is not None else "at uneven times"
@@ -211,27 +178,39 @@ class Channel:
 
     @property
     def label(self) -> str:
-        """Number and name, as lists of channels show them."""
+        """Number and name, for lists of channels."""
         return f"{self.number} {self.name!r}"
 
     def motion(self) -> Motion:
         """Return the channel as a motion, linear between samples, its time counted from the first sample.
 
+        Returns
+        -------
+        Motion
+            Its description has what the file says.
+
         Raises
         ------
         InvalidMotion
             If there are fewer than two samples, or they are too large for a motion.
+
+        Examples
+        --------
+        >>> Channel("Up", 3, np.array([0.0, 0.1, 0.0]), times=np.array([0.0, 0.1, 0.3])).motion().duration
+        0.3
         """
+        facts = {"event": self.event, "station": self.station, "channel": self.label, "units": self.units}
+        text = ", ".join(f"{key} {value}" for key, value in {**self.metadata, **facts}.items() if value)
         name = " ".join(part for part in (self.station, self.name) if part)
-        description = Description("record", text=self._facts(), origin=self.origin)
-        if self.times is not None:
+        description = Description("record", text=text, origin=self.origin)
+        if self.dt is None:
+            assert self.times is not None
             return Motion.from_points(self.times, self.acceleration, name=name, description=description)
-        assert self.dt is not None
         return Motion.from_samples(self.acceleration, self.dt, name=name, description=description)
 
     @property
     def origin(self) -> Origin:
-        """What the file says of the channel."""
+        """Origin of the motion, for its description."""
         return Origin(
             format=self.metadata.get("format", ""),
             file=self.metadata.get("file", ""),
@@ -245,16 +224,10 @@ class Channel:
             start=self.start,
         )
 
-    def _facts(self) -> str:
-        facts = {"event": self.event, "station": self.station, "channel": self.label, "units": self.units}
-        return ", ".join(f"{key} {value}" for key, value in {**self.metadata, **facts}.items() if value)
 
-
-class Recognised(NamedTuple):
-    """What a file is taken for, and what reads its channels, from what was seen of it already."""
-
-    identification: Identification
-    read: Callable[[Request], list[Channel]]
+def first_match(pattern: re.Pattern[str], lines: Iterable[Line]) -> re.Match[str] | None:
+    """Return what a pattern finds in the first of the lines in which it finds anything."""
+    return next((found for line in lines if (found := pattern.search(line.text))), None)
 
 
 def azimuth_of(name: str) -> float | None:
@@ -262,46 +235,59 @@ def azimuth_of(name: str) -> float | None:
     return float(name) % 360.0 if re.fullmatch(r"\d{1,3}", name, re.ASCII) else None
 
 
-def to_acceleration(
-    source: Source,
-    at: int | None,
-    values: NDArray[np.float64],
-    unit: Unit,
-    *,
-    row_at: Callable[[int], int] | None = None,
-) -> NDArray[np.float64]:
-    """Return numbers in `unit`, which stand at the offset `at` of the file, in m/s^2.
+#: Numbers that files have where a value is missing: nines before and after the point, those of well logs and of SAC,
+#: the ends of 16 and 24 bits.
+_MARKS = [float("9" * whole + "." + "9" * decimals) for whole in range(2, 9) for decimals in range(5)]
+_MARKS += [999.25, 12345.0, 32767.0, 32768.0, 8388607.0, 8388608.0]
 
-    Where each has a row of its own, `row_at` gives its offset.
+
+def channel_of(
+    source: Source,
+    form: str,
+    values: Floats,
+    unit: Unit,
+    at: int | None,
+    *,
+    spelling: str = "",
+    facts: Mapping[str, str] | None = None,
+    row_at: Callable[[int], int | None] | None = None,
+    **known: Any,
+) -> Channel:
+    """Return the channel of numbers in a unit, which stand at the offset `at` of a file of that format.
+
+    `spelling` is the file's own name of the unit, `facts` are further metadata, and `known` the channel's other fields.
+    Where each number has a row of its own, `row_at` gives its offset.
     """
+    row_at = row_at or (lambda _: at)
     if len(values) < 2:
         raise source.error(f"{len(values)} values are too few for a record; get the whole file", at)
     if np.isnan(values).any():
         where = int(np.argmax(np.isnan(values)))
-        raise missing_value(source, values[where], at if row_at is None else row_at(where))
+        raise missing_value(source, values[where], row_at(where))
     acceleration = unit.to_si(values)
     if not np.isfinite(acceleration).all():
         raise source.error("some values are too large for an acceleration; check the file and its units", at)
     gap = gap_at(values)
     if gap is not None:
-        raise missing_value(source, values[gap], at if row_at is None else row_at(gap))
-    return acceleration
+        raise missing_value(source, values[gap], row_at(gap))
+    metadata = {"format": form, "file": source.file} | {key: fact for key, fact in (facts or {}).items() if fact}
+    return Channel(acceleration=acceleration, units=spelling or unit.name, metadata=metadata, **known)
 
 
-def gap_at(values: NDArray[np.float64]) -> int | None:
+def gap_at(values: Floats) -> int | None:
     """Return the index of the first number that stands for a missing value, or None.
 
-    Such numbers (-999, 9999.0, 99999.99, -32768, 1e20, ...) are values as well: they stand for missing ones where what
-    is beside them is far smaller.
+    Such numbers (-999, 9999.0, 99999.99, -32768, 1e20, ...) are values as well: they stand for missing ones where the
+    numbers beside them are far smaller.
     """
     sizes = np.abs(values)
-    marked = np.isin(sizes, _MARKS) | (sizes >= _LARGEST)
+    marked = np.isin(sizes, _MARKS) | (sizes >= 1e9)
     if not marked.any():
         return None
     edges = np.diff(np.concatenate([[False], marked, [False]]).astype(np.int8))
     starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
     padded = np.concatenate([[0.0], sizes, [0.0]])
-    alone = np.maximum(padded[starts], padded[ends + 1]) < _FAR_SMALLER * sizes[starts]
+    alone = np.maximum(padded[starts], padded[ends + 1]) < 0.2 * sizes[starts]
     return int(starts[alone][0]) if alone.any() else None
 
 
@@ -311,9 +297,3 @@ def missing_value(source: Source, value: float, at: int | None) -> UnreadableRec
         f"{value:g} seems to stand for a missing value; a record needs a value at every instant: get one without gaps",
         at,
     )
-
-
-def _frozen(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    array = np.array(values, dtype=np.float64)
-    array.setflags(write=False)
-    return array

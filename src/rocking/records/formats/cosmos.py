@@ -12,12 +12,10 @@ import re
 from typing import NamedTuple
 
 from rocking.arrays import Floats
-from rocking.motion.formats import csmip
-from rocking.motion.formats.channel import Channel, Identification, Recognised, to_acceleration
-from rocking.motion.formats.source import Line, Request, Source
-from rocking.motion.formats.values import Stated, read_values
-
-NAME = "COSMOS"
+from rocking.records.formats import csmip
+from rocking.records.formats.channel import Channel, Recognised, channel_of, first_match
+from rocking.records.formats.source import Line, Request, Source
+from rocking.records.formats.values import Stated, read_values
 
 _TITLE = re.compile(r"\(format\s+v\s*[\d.]{1,8}\s+with\s+(\d{1,3})\s+text", re.IGNORECASE | re.ASCII)
 _NUMBERS = re.compile(
@@ -29,10 +27,7 @@ _DURATION = re.compile(r"approx\s+(\d{1,9})\s+secs", re.IGNORECASE | re.ASCII)
 _UNITS = re.compile(r"units\s*=\s*([A-Za-z0-9/^]+)", re.IGNORECASE)
 _UNKNOWN = re.compile(r"unspecified:.*,\s*(-\d{1,9}(?:\.\d{0,9})?)\s*$", re.IGNORECASE | re.ASCII)
 _CHANNEL = re.compile(r"^\s*sta\s+cha\w*\s*:?\s*(\w+|\?)\s*:\s*([^(]*)", re.IGNORECASE)
-_CHANNEL_NUMBER = re.compile(r"\d{1,6}", re.ASCII)
 _STATION = re.compile(r"^\s*statn\s+no\S*\s+(\S+)\s*(?:code:\s*\S+)?\s*(.*)$", re.IGNORECASE)
-
-_STEP_MS, _RAW_STEP_S = 62, 34
 
 
 class _CosmosHeader(NamedTuple):
@@ -49,12 +44,11 @@ def recognise(source: Source) -> Recognised | None:
     found = _TITLE.search(line.text) if line is not None else None
     if line is None or found is None:
         return None
-    identification = Identification(NAME, f"line {source.line_number(line.start)} says {found[0] + ' lines)'!r}")
-    return Recognised(identification, functools.partial(_read, source, line))
+    reason = f"line {source.line_number(line.start)} says {found[0] + ' lines)'!r}"
+    return Recognised("COSMOS", reason, functools.partial(_read, source, line))
 
 
 def _read(source: Source, first: Line, request: Request) -> list[Channel]:
-    """Return the accelerations in the file."""
     found: list[Channel] = []
     others: list[str] = []
     title: Line | None = first
@@ -80,7 +74,9 @@ def _header(source: Source, title: Line) -> _CosmosHeader:
     text = source.lines(title.start, max(int(stated[1]), 1))
     _, after = _numbers(source, text[-1].next, "integer")
     reals, after = _numbers(source, after, "real")
-    data = source.line(_after_comments(source, after))
+    data = source.line(after)
+    if comments := _COMMENTS.match(data.text):
+        data = source.line(_after(source, data, int(comments[1])))
     found = _DATA_LINE.match(data.text)
     if found is None:
         raise source.error("the line with the number of points should stand here; get the file again", data.start)
@@ -97,76 +93,60 @@ def _numbers(source: Source, start: int, kind: str) -> tuple[Floats, int]:
     return read_values(source, line.next, end, layout, Stated(int(stated[1]), start)), end
 
 
-def _after_comments(source: Source, start: int) -> int:
-    line = source.line(start)
-    stated = _COMMENTS.match(line.text)
-    return _after(source, line, int(stated[1])) if stated else start
-
-
 def _after(source: Source, line: Line, count: int) -> int:
     """Return the offset after the `count` lines that follow `line`."""
     return [line, *source.lines(line.next, count)][-1].next
 
 
 def _channel(source: Source, request: Request, header: _CosmosHeader, end: int, ordinal: int) -> Channel:
-    line = header.data
-    spelling = _UNITS.search(line.text)
-    unit = request.units(source, spelling[1] if spelling else None, line.start)
+    line, text = header.data, header.text
+    found = _UNITS.search(line.text)
+    spelling = found[1] if found else ""
+    unit = request.units(source, spelling, line.start)
     dt = request.step(source, _step(source, header), line.start)
     layout, stated = csmip.layout_in(line.text), Stated(header.points, line.start)
     values = read_values(source, line.next, end, layout, stated)
-    _refuse_unknown(source, header, values)
-    number, name, place = _name(header.text, ordinal)
-    station = next((found[2] or found[1] for each in header.text if (found := _STATION.match(each.text))), "")
-    facts = {"format": NAME, "file": source.file, "stage": header.text[0].text.split("(")[0].strip()}
-    return Channel(
+    flag = first_match(_UNKNOWN, text)
+    if flag is not None and (values == float(flag[1])).any():
+        raise source.error(
+            f"some values are {flag[1]}, which here means 'unknown'; get a record without gaps", line.start
+        )
+    number, name, place = ordinal, "", ""
+    if channel := first_match(_CHANNEL, text):
+        number = int(channel[1]) if re.fullmatch(r"\d{1,6}", channel[1], re.ASCII) else ordinal
+        name, place = " ".join(channel[2].split("  ")[0].split()), csmip.location(channel.string)
+    name = name or f"channel {number}"
+    station = first_match(_STATION, text)
+    return channel_of(
+        source,
+        "COSMOS",
+        values,
+        unit,
+        line.start,
+        spelling=spelling,
+        facts={"stage": text[0].text.split("(")[0].strip(), "location": place},
         name=name,
         number=number,
-        acceleration=to_acceleration(source, line.start, values, unit),
         dt=dt,
         azimuth=csmip.azimuth(name),
-        units=spelling[1] if spelling else unit.name,
-        station=" ".join(station.split()),
-        event=header.text[1].text.strip() if len(header.text) > 1 else "",
-        metadata=facts | ({"location": place} if place else {}),
+        station=" ".join((station[2] or station[1]).split()) if station else "",
+        event=text[1].text.strip() if len(text) > 1 else "",
     )
 
 
 def _step(source: Source, header: _CosmosHeader) -> float:
-    """Return the step (s) of the two in the header that fits the stated duration."""
-    steps = [each for each in (_real(header, _STEP_MS) / 1000.0, _real(header, _RAW_STEP_S)) if each > 0.0]
+    """Return the step (s) that fits the stated duration: real header 62 is in ms, 34, that of the raw data, in s."""
+    reals, at = header.reals, header.data.start
+    written = [float(reals[k - 1]) / unit for k, unit in ((62, 1000.0), (34, 1.0)) if len(reals) >= k]
+    steps = [step for step in written if step > 0.0 and math.isfinite(step)]
     if not steps:
-        raise source.error("real headers 34 and 62 give no sampling step; get the file again", header.data.start)
+        raise source.error("real headers 34 and 62 give no sampling step; get the file again", at)
     stated = _DURATION.search(header.data.text)
     if stated is None or int(stated[1]) == 0:
         return steps[0]
     # The duration is printed in whole seconds, by some without the last interval.
     duration = int(stated[1])
-    fitting = [each for each in steps if abs(header.points * each - duration) <= 1.0 + each]
+    fitting = [step for step in steps if abs(header.points * step - duration) <= 1.0 + step]
     if not fitting:
-        raise source.error(
-            f"{header.points} points at {steps[0]:g} s do not last {duration} s; correct the header", header.data.start
-        )
+        raise source.error(f"{header.points} points at {steps[0]:g} s do not last {duration} s; correct the header", at)
     return fitting[0]
-
-
-def _real(header: _CosmosHeader, number: int) -> float:
-    value = float(header.reals[number - 1]) if len(header.reals) >= number else 0.0
-    return value if math.isfinite(value) else 0.0
-
-
-def _refuse_unknown(source: Source, header: _CosmosHeader, values: Floats) -> None:
-    flag = next((found[1] for line in header.text if (found := _UNKNOWN.search(line.text))), None)
-    if flag is not None and (values == float(flag)).any():
-        raise source.error(
-            f"some values are {flag}, which here means 'unknown'; get a record without gaps", header.data.start
-        )
-
-
-def _name(text: list[Line], ordinal: int) -> tuple[int, str, str]:
-    found = next((found for line in text if (found := _CHANNEL.match(line.text))), None)
-    if found is None:
-        return ordinal, f"channel {ordinal}", ""
-    number = int(found[1]) if _CHANNEL_NUMBER.fullmatch(found[1]) else ordinal
-    name = " ".join(found[2].split("  ")[0].split())
-    return number, name or f"channel {number}", csmip.location(found.string)

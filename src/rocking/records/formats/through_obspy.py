@@ -7,21 +7,17 @@ import io
 import re
 import warnings
 from collections import Counter
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from rocking.motion.formats.channel import Channel, Identification, Recognised, to_acceleration
-from rocking.motion.formats.source import Request, Source
-from rocking.motion.formats.values import wrong_count
-from rocking.motion.units import Unit
+from rocking.records.formats.channel import Channel, Recognised, channel_of
+from rocking.records.formats.source import Request, Source
+from rocking.records.formats.values import wrong_count
+from rocking.records.units import Unit
 
 #: PICKLE runs what a file tells it to; the other two open further files that a file names.
 _REFUSED = frozenset({"PICKLE", "CSS", "NNSA_KB_CORE"})
-_REASON_LENGTH = 200
-#: A component that dips by no more than this, degrees, is horizontal.
-_HORIZONTAL = 5.0
 _TITLE = re.compile(rb"(?m)^TIMESERIES [^\n]*?, (\d{1,12}) samples,")
 
 
@@ -44,8 +40,8 @@ def recognise(source: Source) -> Recognised | None:
     name = claims[0]
     if len(claims) > 1:
         name = next((each for each in claims if not isinstance(_traces(source, each), str)), name)
-    identification = Identification(f"{name} (through ObsPy)", f"ObsPy's {name} reader recognises it")
-    return Recognised(identification, functools.partial(_read, source, name))
+    reason = f"ObsPy's {name} reader recognises it"
+    return Recognised(f"{name} (through ObsPy)", reason, functools.partial(_read, source, name))
 
 
 def _read(source: Source, name: str, request: Request) -> list[Channel]:
@@ -74,25 +70,23 @@ def _channel(source: Source, request: Request, unit: Unit, trace: Any, form: str
         dt, station = float(stats.delta), f"{stats.network}.{stats.station}".strip(".")
     except (TypeError, ValueError) as error:
         raise source.error(f"trace {number} does not hold plain numbers; choose another file") from error
-    return Channel(
+    # SAC gives the azimuth of a component, and its angle from above, which is about a right one of horizontal ones.
+    sac = stats.get("sac", {})
+    direction, from_above = (sac.get(key) for key in ("cmpaz", "cmpinc"))
+    horizontal = direction is not None and from_above is not None and abs(from_above - 90.0) <= 5.0
+    return channel_of(
+        source,
+        form,
+        values,
+        unit,
+        None,
         name=str(stats.channel) or f"trace {number}",
         number=number,
-        acceleration=to_acceleration(source, None, values, unit),
         dt=request.step(source, dt, None),
-        azimuth=_azimuth(stats.get("sac", {})),
-        units=unit.name,
+        azimuth=float(direction) % 360.0 if horizontal else None,
         station=station,
-        metadata={"format": form, "file": source.file},
         start=float(stats.starttime.timestamp),
     )
-
-
-def _azimuth(header: Mapping[str, Any]) -> float | None:
-    """Return the azimuth that a header of SAC gives a horizontal component, degrees; None of any other one."""
-    azimuth, from_above = (header.get(name) for name in ("cmpaz", "cmpinc"))
-    if azimuth is None or from_above is None or abs(from_above - 90.0) > _HORIZONTAL:
-        return None
-    return float(azimuth) % 360.0
 
 
 def _refuse_long(source: Source, name: str, most: int) -> None:
@@ -108,8 +102,9 @@ def _refuse_cut(source: Source, traces: Any) -> None:
     titles = list(_TITLE.finditer(source.data))
     for title, trace in zip(titles, traces if len(titles) == len(traces) else (), strict=False):
         if int(title[1]) != len(trace.data):
-            said, found = int(title[1]), len(trace.data)
-            raise wrong_count(source, title.start(), f"the header says {said} samples", found, more=found > said)
+            raise wrong_count(
+                source, title.start(), f"the header says {int(title[1])} samples", len(trace.data), int(title[1])
+            )
     lengths = {int(trace.stats.mseed.record_length) for trace in traces if "mseed" in trace.stats}
     if len(lengths) == 1 and len(source.raw) % (length := lengths.pop()):
         raise source.error(f"the last of its blocks of {length} bytes is not whole; get the whole file again")
@@ -155,5 +150,5 @@ def _traces(source: Source, name: str, *, headonly: bool = False) -> Any:
             traces = obspy.read(_opened(source), format=name, headonly=headonly)
         except Exception as error:
             # ObsPy's readers raise whatever their parsing ran into.
-            return " ".join(str(error).split())[:_REASON_LENGTH] or type(error).__name__
+            return " ".join(str(error).split())[:200] or type(error).__name__
     return traces if len(traces) else "it holds no trace"

@@ -3,37 +3,201 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from os import PathLike
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.arrays import Floats
-from rocking.errors import InvalidBlock
-from rocking.motion.directions import sine_cosine
+from rocking.arrays import Floats, Integers
+from rocking.errors import InvalidBlock, InvalidOption, install, literal
+from rocking.motion.processing import sine_cosine
 from rocking.plausibility import density_notes, height_notes
 from rocking.solid import support as polygons
-from rocking.solid.moments import moments, signed_volumes, together
-from rocking.solid.overlap import overlaps
-from rocking.solid.reading import length_of, parts_of, upright
-from rocking.solid.repair import Surface, agreeing, closed, is_closed, joined, surrounds
+from rocking.solid.repair import (
+    Surface,
+    agreeing,
+    closed,
+    is_closed,
+    joined,
+    moments,
+    overlaps,
+    signed_volumes,
+    surrounds,
+    together,
+)
 
 if TYPE_CHECKING:
-    from rocking.solid.reading import Mesh, Part
+    from typing import BinaryIO
 
-#: Corners within this part of the height above the lowest one are where a body stands, unless it is said.
-_TOLERANCE: Final = 1e-3
-#: A support that grows by more than this with ten times the tolerance is worth a note.
-_GROWS: Final = 0.02
-#: Between the names of parts that were joined.
-_AND: Final = " + "
-#: Sizes of a body, m, whose fifth powers can be computed with.
-_SMALLEST: Final = 1e-9
-_LARGEST: Final = 1e9
-#: Volumes below this part of the cube of the size are none, and supports may be this part of the size beyond the mesh.
-_FLAT: Final = 1e-9
-_BEYOND: Final = 1e-6
+    from trimesh import Scene, Trimesh
+
+    #: A file, the name of the mesh that ships with the package, a stream with a name, or what trimesh has read.
+    Mesh = str | PathLike[str] | BinaryIO | Trimesh | Scene
+
+#: The mesh that ships with the package, and its name.
+SHIPPED: Final = {"statue": Path(__file__).with_name("data") / "statue.obj"}
+
+#: Lengths of units, m.
+UNITS: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
+
+
+class Part(NamedTuple):
+    """One part of a mesh: its corners, shape (n, 3), and three of them for each triangle, shape (m, 3)."""
+
+    name: str
+    vertices: Floats
+    faces: Integers
+
+
+class Parts(NamedTuple):
+    """All parts of a mesh, what it is called, and the axis that points up in it."""
+
+    parts: tuple[Part, ...]
+    name: str
+    up: str
+
+
+def parts_of(mesh: Mesh, most: int | None = None) -> Parts:
+    """Return the parts of a mesh, which share no name, in the order of their names; of so many triangles at most."""
+    name, up, path = type(mesh).__name__, "z", ""
+    found: list[tuple[str, Any, Any]]
+    if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
+        found = [("mesh", mesh, np.eye(4))]
+    else:
+        scene: Any = mesh
+        if not hasattr(mesh, "geometry"):
+            file: PurePath
+            if isinstance(mesh, (str, PathLike)):
+                file = SHIPPED.get(str(mesh)) or Path(mesh)
+                path, scene = str(mesh), _read(file, str(mesh))
+            elif hasattr(mesh, "read") and isinstance(getattr(mesh, "name", None), str):
+                file = PurePath(mesh.name)
+                path, scene = file.name, _streamed(mesh, file.name)
+            else:
+                raise InvalidBlock(
+                    "{} must be the path of a file, a binary stream that has a name, or a mesh or scene of trimesh, "
+                    f"not {checks.shown(mesh)}",
+                    "mesh",
+                    value=mesh,
+                )
+            name, up = file.name, "y" if file.suffix.lower() in (".glb", ".gltf") else "z"
+        graph, geometry = scene.graph, scene.geometry
+        placed = [(str(node), *graph[node]) for node in sorted(graph.nodes_geometry)]
+        found = [(node, geometry[shape], transform) for node, transform, shape in placed]
+    if most is not None and (count := sum(len(getattr(each, "faces", ())) for _, each, _ in found)) > most:
+        raise InvalidBlock(
+            f"holds {count} triangles, of which at most {most} are read here: make the mesh coarser", path=path or name
+        )
+    parts = tuple(_part(node, each, transform) for node, each, transform in found if len(getattr(each, "faces", ())))
+    if not parts:
+        raise InvalidBlock(
+            "holds no faces: a mesh of triangles is needed, not points, lines or other text", path=path or name
+        )
+    if not all(np.all(np.isfinite(part.vertices)) for part in parts):
+        raise InvalidBlock("has corners that are not finite numbers: export the mesh again", path=path or name)
+    return Parts(parts, name, up)
+
+
+def _read(file: Path, named: str) -> Scene:
+    if file.is_dir():
+        raise InvalidBlock("this is a folder, not a file: name the file in it", path=named)
+    if not file.is_file():
+        known = f"; the mesh that ships is {', '.join(SHIPPED)}" if not file.suffix else ""
+        raise InvalidBlock(f"there is no such file{known}", path=named)
+    if not file.stat().st_size:
+        raise InvalidBlock("this file is empty: export the mesh again", path=named)
+    return _loaded(file, named)
+
+
+class _NothingElse:
+    """What a stream may read beside itself: nothing, neither files nor addresses that it names."""
+
+    def __init__(self, file_name: str) -> None:
+        self.file_name = file_name
+
+    def __getitem__(self, other: str) -> bytes:
+        if other == "model.gltf":  # what trimesh looks for where a text is no JSON
+            raise ValueError("it is no JSON")
+        raise InvalidBlock(
+            f"names another file, {checks.shown(other[:60])}, which is not read: export the mesh as one file",
+            path=self.file_name,
+        )
+
+
+def _streamed(stream: BinaryIO, name: str) -> Scene:
+    """Read a stream; a mesh that the format gives no name has the stream's, as one that is read from a path."""
+    scene = _loaded(stream, name, resolver=_NothingElse(name))
+    if PurePath(name).suffix.lower() in (".ply", ".stl") and len(scene.geometry) == 1:
+        (mesh,) = scene.geometry.values()
+        scene = type(scene)()
+        scene.add_geometry(mesh, node_name=name)
+    return scene
+
+
+def _loaded(source: Path | BinaryIO, named: str, **how: Any) -> Scene:
+    """Read a file or a stream with trimesh, with all that it names."""
+    try:
+        import trimesh
+    except ImportError:
+        raise InvalidOption(f"meshes are read with trimesh, which is not installed: {install('mesh')}") from None
+    suffix = PurePath(source.name).suffix.lower().removeprefix(".")
+    # Every object and group of an OBJ file is a part, whatever its material; corners stay as they are.
+    how |= {"split_objects": True, "split_groups": True, "skip_materials": True, "group_material": False}
+    try:
+        return trimesh.load_scene(source, file_type=suffix, process=False, **how)
+    except InvalidBlock:
+        raise
+    except Exception as error:  # what a reader of foreign files raises is of any kind
+        formats = sorted(trimesh.available_formats())
+        said = f"it lacks {error}" if isinstance(error, KeyError) else " ".join(str(error).split())
+        reason = f"{said or type(error).__name__}; is it whole, and what its name says?"
+        if suffix not in formats:
+            reason = f"is of no format that trimesh reads ({', '.join(formats)})"
+        raise InvalidBlock(f"cannot be read: {literal(reason)}", path=named) from None
+
+
+def _part(name: str, mesh: Any, transform: Any) -> Part:
+    vertices = np.asarray(mesh.vertices, dtype=np.float64)
+    matrix = np.asarray(transform, dtype=np.float64)
+    faces = np.asarray(mesh.faces, dtype=np.int64)
+    if not np.array_equal(matrix, np.eye(4)):
+        vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
+        if np.linalg.det(matrix[:3, :3]) < 0.0:  # a mirror image turns the normals round
+            faces = faces[:, ::-1]
+    return Part(name, vertices, faces)
+
+
+def length_of(unit: object) -> float:
+    """Return the length of the unit that a mesh's coordinates are in, m: by its name, or as a number."""
+    if isinstance(unit, str):
+        return UNITS[checks.one_of(unit, "unit", InvalidBlock, [*UNITS])]
+    return checks.positive(unit, "unit", InvalidBlock, "m")
+
+
+def upright(up: object) -> Floats:
+    """Return the rotation, shape (3, 3), by the shortest way, that turns an axis of a mesh to z.
+
+    The axis is x, y or z, with a minus sign or without, or a vector.
+    """
+    if isinstance(up, str):
+        axis = checks.one_of(up, "up", InvalidBlock, ["x", "y", "z", "-x", "-y", "-z"])
+        u = np.eye(3)["xyz".index(axis[-1])] * (-1.0 if axis[0] == "-" else 1.0)
+    else:
+        u = checks.numbers(up, "up", InvalidBlock)  # type: ignore[arg-type]
+        length = float(np.linalg.norm(u)) if u.shape == (3,) else 0.0
+        if not 0.0 < length < np.inf:
+            raise InvalidBlock("{} must be x, y or z, or a vector of three numbers that points up", "up", value=up)
+        u = u / length
+    if u[2] < 0.0 and not u[0] * u[0] + u[1] * u[1] > 0.0:
+        return np.diag([1.0, -1.0, -1.0])
+    x, y, _ = u
+    # Rodrigues' formula for the axis u x z: 1 + V + V^2/(1 + u_z), whose divisor loses its digits near -z.
+    v = np.array([[0.0, 0.0, -x], [0.0, 0.0, -y], [x, y, 0.0]])
+    share = 1.0 / (1.0 + u[2]) if u[2] > 0.0 else (1.0 - u[2]) / (x * x + y * y)
+    return np.asarray(np.eye(3) + v + v @ v * share)
 
 
 class Region(NamedTuple):
@@ -64,7 +228,7 @@ def properties(
     found = parts_of(mesh, most)
     with np.errstate(over="ignore"):
         extent = max(float(np.ptp(part.vertices, axis=0).max()) for part in found.parts) * length_of(unit)
-    if extent and not _SMALLEST < extent < _LARGEST:
+    if extent and not 1e-9 < extent < 1e9:
         raise InvalidBlock(f"is {extent:.3g} m large, which no body is: correct {{}}", "unit", path=found.name)
     rotation = _turned(turn) @ upright(found.up if up is None else up) * length_of(unit)
     parts = [part._replace(vertices=part.vertices @ rotation.T) for part in found.parts]
@@ -76,14 +240,14 @@ def properties(
     densities = _densities(density, names, [part.name for part in parts])
     inside = [moments(surface.vertices, surface.faces) for surface in surfaces]
     for name, surface, each in zip(names, surfaces, inside, strict=True):
-        if not each.amount > _FLAT * float(np.ptp(surface.vertices, axis=0).max()) ** 3:
+        if not each.amount > 1e-9 * float(np.ptp(surface.vertices, axis=0).max()) ** 3:
             what = "" if name == found.name else f"{name} "
             raise InvalidBlock(
                 f"{what}encloses no volume: it is a surface without an inside; give it a thickness", path=found.name
             )
     used = [densities[name] for name in names]
     whole = together(inside, [1.0 if each is None else each for each in used])
-    within = _TOLERANCE * height if tolerance is None else checks.positive(tolerance, "tolerance", InvalidBlock, "m")
+    within = 1e-3 * height if tolerance is None else checks.positive(tolerance, "tolerance", InvalidBlock, "m")
     if within >= height:
         raise InvalidBlock(
             f"{{}} must be below the height of the mesh, {height:.4g} m, not {within:g}", "tolerance", value=tolerance
@@ -141,7 +305,7 @@ def _surfaces(parts: Sequence[Part], density: float | Mapping[str, float] | None
         some = [part for part, each in zip(parts, is_open, strict=True) if each]
         rest = _one_of([Surface(part.vertices, part.faces) for part in some])
         kept = [k for k, each in enumerate(is_open) if not each]
-        names = [*(names[k] for k in kept), _AND.join(part.name for part in some)]
+        names = [*(names[k] for k in kept), " + ".join(part.name for part in some)]
         found = [*(found[k] for k in kept), agreeing(joined(rest.vertices, rest.faces))]
     given = density if isinstance(density, Mapping) else {}
     cavities = _cavities(found, [name not in given for name in names])
@@ -198,7 +362,7 @@ def _support(corners: Floats, given: ArrayLike | None, tolerance: float, path: s
     if given is not None:
         polygon = polygons.given_polygon(given)
         beyond = 0.0 if outline is None else _outside(outline, polygon)
-        if outline is None or beyond > _BEYOND * float(np.ptp(corners, axis=0).max()):
+        if outline is None or beyond > 1e-6 * float(np.ptp(corners, axis=0).max()):
             raise InvalidBlock(
                 f"{{}} reaches {beyond:.3g} m beyond the outline of the mesh, from {_ends(corners)}; its corners are "
                 "(east, north) in m, in the mesh's own coordinates",
@@ -217,7 +381,7 @@ def _support(corners: Floats, given: ArrayLike | None, tolerance: float, path: s
     wider = polygons.hull(corners[corners[:, 2] <= 10.0 * tolerance, :2])
     assert wider is not None
     growth = polygons.area(wider) / polygons.area(base) - 1.0
-    if growth <= _GROWS:
+    if growth <= 0.02:
         return base, ()
     return base, (
         f"the base is not flat or its edges are round: the support would be {100.0 * growth:.2g} % larger with the "

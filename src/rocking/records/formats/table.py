@@ -15,29 +15,26 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from decimal import Decimal
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from rocking.arrays import Floats
 from rocking.errors import UnreadableRecord, literal
-from rocking.motion.formats.channel import (
+from rocking.records.formats.channel import (
     Channel,
-    Identification,
     Recognised,
+    channel_of,
     even_step,
     first_fault,
     gap_at,
     missing_value,
     prints_as,
-    to_acceleration,
 )
-from rocking.motion.formats.heading import RULE, Column, Heading, heading_of, names_columns
-from rocking.motion.formats.source import Line, Request, Source
-from rocking.motion.formats.values import NUMBER, convert, not_a_number, parse, rows_of_numbers
-from rocking.motion.units import CHOICES, Unit
-
-NAME = "text table"
+from rocking.records.formats.heading import RULE, Column, Heading, heading_of, names_columns
+from rocking.records.formats.source import Line, Request, Source
+from rocking.records.formats.values import NUMBER, convert, not_a_number, parse
+from rocking.records.units import CHOICES, Unit
 
 _DELIMITERS = {",": "a comma", ";": "a semicolon", " ": "a blank"}
 
@@ -134,8 +131,8 @@ def recognise(source: Source) -> Recognised | None:
         what = "one number with a decimal comma, or two numbers"
     else:
         what = f"{'two' if shape.columns == 2 else shape.columns} numbers, between them {_DELIMITERS[shape.delimiter]}"
-    identification = Identification(NAME, f"from line {source.line_number(shape.start)} on each line holds {what}")
-    return Recognised(identification, functools.partial(_read, source, shape, heading))
+    reason = f"from line {source.line_number(shape.start)} on each line holds {what}"
+    return Recognised("text table", reason, functools.partial(_read, source, shape, heading))
 
 
 def refusal(source: Source) -> UnreadableRecord | None:
@@ -193,13 +190,25 @@ def _read(source: Source, shape: _Shape, heading: Heading, request: Request) -> 
     for number, (place, unit) in enumerate(zip(held, units, strict=True), 1):
         column = heading.columns[place]
         dt, times = _timing(source, request, shape, heading, table, place)
-        acceleration = to_acceleration(
-            source, shape.start, table[:, place], unit, row_at=lambda index: shape.row_at(source, index)
-        )
-        facts = {"format": NAME, "file": source.file} | _heading_units(column)
         name = source.stem if shape.columns <= 2 and len(held) == 1 else column.name
-        start = _start(heading, table, place)
-        channels.append(Channel(name, number, acceleration, dt, times, units=unit.name, metadata=facts, start=start))
+        known: dict[str, Any] = {
+            "name": name,
+            "number": number,
+            "dt": dt,
+            "times": times,
+            "start": _start(heading, table, place),
+        }
+        channel = channel_of(
+            source,
+            "text table",
+            table[:, place],
+            unit,
+            shape.start,
+            facts=_heading_units(column),
+            row_at=lambda index: shape.row_at(source, index),
+            **known,
+        )
+        channels.append(channel)
     return channels
 
 
@@ -434,10 +443,7 @@ def _delimiter(line: Line) -> tuple[bytes, str]:
 
 
 def _values(source: Source, shape: _Shape) -> Floats:
-    """Return all numbers, row by row: at once where there is nothing but rows, else one row after the other."""
-    plain = rows_of_numbers(source, shape.start, shape.columns, shape.translation, _ROW_LIMIT)
-    if plain is not None:
-        return plain
+    """Return all numbers, row by row."""
     parts = []
     for rows in _groups(_rows(source, shape), shape.columns):
         values = convert([token for row in rows for token in row.tokens])

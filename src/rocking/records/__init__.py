@@ -1,0 +1,5 @@
+"""Strong-motion records: those that ship with the package, and files in the usual formats."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
