@@ -16,7 +16,7 @@ import numpy as np
 
 from rocking import checks
 from rocking.arrays import Floats
-from rocking.block import Block, Blocks
+from rocking.block import Block, Blocks, one_block
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.named import several_motions
@@ -107,7 +107,7 @@ def _rule(title: str, unit: str, example: str) -> Callable[[Callable[[Blocks, Mo
         @wraps(compared, assigned=("__module__", "__name__", "__qualname__"))
         def rule(blocks: Blocks | Block | Iterable[Block], motion: Motion) -> Rating:
             (shaking,) = several_motions([motion])
-            demand, capacity = np.broadcast_arrays(*compared(Blocks.of(blocks), shaking))
+            demand, capacity = np.broadcast_arrays(*compared(_free(blocks), shaking))
             weaker = np.argmax(demand / capacity, axis=1)[:, None]
             of_weaker = [np.take_along_axis(each, weaker, axis=1)[:, 0] for each in (demand, capacity)]
             return Rating(name, of_weaker[0], of_weaker[1], unit)
@@ -120,6 +120,14 @@ def _rule(title: str, unit: str, example: str) -> Callable[[Callable[[Blocks, Mo
         return rule
 
     return rule_of
+
+
+def _free(blocks: Blocks | Block | Iterable[Block]) -> Blocks:
+    """Gather blocks, and refuse those with restraints."""
+    many = Blocks.of(blocks)
+    for each in many if many.terms else ():
+        one_block(each)
+    return many
 
 
 @_rule("West", "m/s^2", "0.895")
@@ -341,7 +349,7 @@ def rate(
     """
     wanted = [*RULES] if rules is None else checks.several(rules, "rules", InvalidOption)
     names = [checks.one_of(name, "rules", InvalidOption, [*RULES]) for name in wanted]
-    many = Blocks.of(blocks)
+    many = _free(blocks)
     return {name: RULES[name](many, motion) for name in names}
 
 
