@@ -24,7 +24,6 @@ PROTOCOLS: dict[Any, tuple[Any, ...]] = {
     rocking.Block: (Body,),
     rocking.Blocks: (Bodies,),
     rocking.RestrainedBlock: (Body,),
-    rocking.RestrainedBlocks: (Bodies,),
 }
 
 #: Checks of numpydoc: form and order of sections; parameters, returns and yields without a name, a type or a word.

@@ -118,7 +118,7 @@ def test_what_is_known_in_closed_form():
     assert whole.p == pytest.approx(math.sqrt(5000.0 * column.gravity * math.hypot(0.25, z) / inertia))
     assert whole.alpha == pytest.approx(math.atan2(0.25 - x, z))
     toe = RestrainedBlock(column, Tendon(1e5, offset=0.25))
-    assert toe._held[0].sine == 0.0 < -toe._held[1].sine
+    assert toe._terms[0].sine == 0.0 < -toe._terms[1].sine
     leaning = RestrainedBlock(column, lean=0.02)
     assert [side.alpha for side in leaning.sides] == pytest.approx([column.alpha - 0.02, column.alpha + 0.02])
 
@@ -247,3 +247,47 @@ def test_a_body_of_another_size_moves_alike_in_another_time(restraint, factor):
         peaks.append([found.peak_rotation.values.ravel(), rate * found.peak_time.values.ravel()])
     np.testing.assert_allclose(peaks[1], peaks[0], rtol=1e-9)
     assert 0.0 < peaks[0][0][0] < 1.0
+
+
+UNEVEN = Block.from_pivots((0.3, 0.15), 0.9, 0.5, restitution=(0.8, 0.9), mass=400.0)
+
+
+@pytest.mark.parametrize("chattering", ["certified", "bypass"])
+@pytest.mark.parametrize("vertical", [False, True], ids=["horizontal", "vertical"])
+@pytest.mark.parametrize("sign", [1.0, -1.0], ids="+-")
+@pytest.mark.parametrize("model", ["nonlinear", "linear"])
+@pytest.mark.parametrize("block", [Block(width=0.4, height=2.0), UNEVEN], ids=["even", "uneven"])
+def test_without_a_restraint_it_is_the_block_bit_for_bit(block, model, sign, vertical, chattering):
+    held, options = RestrainedBlock(block), {"model": model, "chattering": chattering}
+    motions = [rocking.pulses.sine(sign * a, 1.1, cycles=3) for a in (2.2, 3.0, 4.5, 9.0)]
+    if vertical:
+        motions = [each.with_vertical(rocking.pulses.sine(3.0, 3.3, cycles=4)) for each in motions]
+    assert held.balance == block.balance and held.alone().kind == "blocks"
+    assert held.uplift_thresholds(model) == block.uplift_thresholds(model)
+    for motion in motions:
+        found, expected = (rocking.simulate(each, motion, **options) for each in (held, block))
+        for table in ("events", "impacts", "chattering"):
+            assert getattr(found, table).tobytes() == getattr(expected, table).tobytes()
+        times = np.linspace(0.0, found.duration, 200)
+        assert np.array_equal(found.states(times), expected.states(times))
+        assert (found.outcome, found.peak_rotation) == (expected.outcome, expected.peak_rotation)
+    many = [rocking.simulate_many(each, motions, **options) for each in (held, block)]
+    assert many[0].identical(many[1])
+
+
+def test_blocks_of_all_kinds_are_simulated_together_as_alone():
+    blocks = [UNEVEN, RestrainedBlock(UNEVEN, Spring(300.0)), Block.one_sided(width=0.4, height=3.0), UNEVEN]
+    motion = rocking.pulses.sine(4.0, 1.3, cycles=2)
+    found = rocking.simulate_many(blocks, motion).peak_rotation.values.ravel()
+    assert found.tolist() == [rocking.simulate(each, motion).peak_rotation for each in blocks]
+    assert len({*found.tolist()}) == 3
+    gathered = rocking.Blocks.of(blocks)
+    assert [type(each) for each in gathered] == [Block, RestrainedBlock, RestrainedBlock, Block]
+    again = rocking.Blocks(
+        gravity=gathered.gravity, **{name: each for name, (each, _) in gathered.parameters().items()}
+    )
+    limits = np.zeros((4, 2))
+    for model in ("nonlinear", "linear"):
+        assert np.array_equal(again.kernel_records(model, limits), gathered.kernel_records(model, limits))
+    with pytest.raises(InvalidBlock, match="blocks have no stif; terms of restraints are sine, cosine"):
+        rocking.Blocks(1.0, 0.2, 0.9, stif=3.0)

@@ -5,7 +5,6 @@ import pytest
 
 import rocking
 from rocking import Damper, FallingRestitution, Load, RestrainedBlock, Spring, Tendon, Thrust
-from rocking.block.restrained_many import RestrainedBlocks
 
 BLOCK = rocking.Block.from_pivots((1.0, 1.2), 3.5, 2.3, mass=2e3, restitution=(0.8, 0.75))
 
@@ -65,7 +64,7 @@ def change(made, name, nonlinear, strength):
 def test_rotations_impacts_and_uplifts_change_with_everything_as_differences_say(name, model, monkeypatch):
     """From rest to either side, with a vertical component and without one."""
     body, judged, h = BODIES[name], {"rotation": 0, "impact": 0, "uplift": 0}, 1e-6
-    made = RestrainedBlocks.kernel_records
+    made = rocking.Blocks.kernel_records
     for sign in (1.0, -1.0):
         size = sign * 1.35 * max(each for each in body.uplift_thresholds(model) if np.isfinite(each))
         motion = rocking.pulses.sine(size, 0.9, cycles=2)
@@ -80,7 +79,7 @@ def test_rotations_impacts_and_uplifts_change_with_everything_as_differences_say
                 if of == "motion":
                     motion = motion * (1.0 + strength)
                 else:
-                    patched.setattr(RestrainedBlocks, "kernel_records", kernel_records)
+                    patched.setattr(rocking.Blocks, "kernel_records", kernel_records)
                 return rocking.simulate(body, motion, model=model, duration=motion.end)
 
         found = simulated()

@@ -206,7 +206,7 @@ class Product:
         InvalidOption
             If they are of another kind.
         """
-        if not isinstance(self.bodies, Blocks):
+        if not isinstance(self.bodies, Blocks) or self.bodies.terms:
             raise InvalidOption(f"this is known of blocks alone, not of {self.bodies.kind}")
         return self.bodies
 

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.block import Block, Load, RestrainedBlock, RestrainedBlocks, Thrust
+from rocking.block import Block, Load, RestrainedBlock, Thrust
 from rocking.block.rigid_body import rigid_bodies
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import Message
@@ -264,10 +264,7 @@ def restraint_notes(body: RestrainedBlock, top: float | None = None) -> tuple[st
             notes.append(
                 f"a {kind} is at a height of {each.height:g} m, above the top of the block, {top:g} m: is it in metres?"
             )
-    made = RestrainedBlocks.of([body])
-    names = ("sine", "cosine", "prestress", "spring")
-    strongest = max(float(np.max(np.abs(getattr(made, name)))) for name in names)
-    strongest = max(strongest, float(np.max(made.stiffness * made.opening)))
+    strongest = max(max(*map(abs, terms[:4]), terms.stiffness * terms.opening) for terms in body._terms)
     if strongest > _MOST_HELD:
         notes.append(
             f"what a restraint does is {strongest:.2g} times the weight or more: are forces in N, and masses in kg?"

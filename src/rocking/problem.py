@@ -57,7 +57,7 @@ def step_of(motion: Motion) -> float | None:
 def bodies_of(given: Bodies | Body | Iterable[Body]) -> Bodies:
     """Return bodies as they are, and single ones of one kind as `Bodies` of that kind."""
     if isinstance(given, type):  # has what its objects have, but is none
-        one_block(cast("Block", given), _NEEDED)
+        one_block(given, _NEEDED)
     if isinstance(given, Bodies):
         return given
     if isinstance(given, Body):
@@ -66,7 +66,7 @@ def bodies_of(given: Bodies | Body | Iterable[Body]) -> Bodies:
     if isinstance(several, list) and several and isinstance(several[0], Body) and not isinstance(several[0], type):
         return KINDS[several[0].alone().kind].of(several)
     for each in several if isinstance(several, list) else [several]:
-        one_block(cast("Block", each), _NEEDED)
+        one_block(each, _NEEDED)
     return Blocks.of(cast("Iterable[Block]", several))
 
 
@@ -98,7 +98,7 @@ def one_body(body: Body) -> Body:
     """Return the body, or say that it is none."""
     if isinstance(body, Block) or (isinstance(body, Body) and not isinstance(body, type)):  # a protocol is slow to ask
         return body
-    return one_block(cast("Block", body), _NEEDED)
+    return one_block(body, _NEEDED)
 
 
 def set_start(

@@ -19,7 +19,7 @@ from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.analysis.levels import REVERSED_TOO, values_of
 from rocking.analysis.survey import BlockUnderRecords, motion_of
 from rocking.arrays import Floats
-from rocking.block import Block, Blocks
+from rocking.block import Block, Blocks, one_block
 from rocking.constants import STANDARD_GRAVITY, Model
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.motion.motion import Motion
@@ -118,7 +118,7 @@ def _rule(title: str, unit: str, example: str) -> Callable[[Comparison], Rule]:
     def rule_of(comparison: Comparison) -> Rule:
         @wraps(comparison, assigned=("__module__", "__name__", "__qualname__"))
         def rule(blocks: Blocks | Block | Iterable[Block], motion: Motion) -> Rating:
-            demand, capacity = np.broadcast_arrays(*comparison(Blocks.of(blocks), several_motions([motion])[0]))
+            demand, capacity = np.broadcast_arrays(*comparison(_free(blocks), several_motions([motion])[0]))
             weaker = np.arange(len(demand)), np.argmax(demand / capacity, axis=1)
             return Rating(name, demand[weaker], capacity[weaker], unit)
 
@@ -130,6 +130,14 @@ def _rule(title: str, unit: str, example: str) -> Callable[[Comparison], Rule]:
         return rule
 
     return rule_of
+
+
+def _free(blocks: Blocks | Block | Iterable[Block]) -> Blocks:
+    """Gather blocks, and refuse those with restraints."""
+    many = Blocks.of(blocks)
+    for each in many if many.terms else ():
+        one_block(each)
+    return many
 
 
 @_rule("West", "m/s^2", "0.895")
@@ -340,7 +348,7 @@ def rate(
     """
     wanted = [*RULES] if rules is None else checks.several(rules, "rules", InvalidOption)
     names = [checks.one_of(name, "rules", InvalidOption, [*RULES]) for name in wanted]
-    many = Blocks.of(blocks)
+    many = _free(blocks)
     return {name: RULES[name](many, motion) for name in names}
 
 

@@ -188,7 +188,7 @@ class AsymptoticTime(Treatment):
             )
         if motion.vertical is not None:
             raise InvalidOption('{} "time" knows no vertical motion; use "certified"', "chattering")
-        if not isinstance(bodies, Blocks) or not bodies.is_symmetric:
+        if not isinstance(bodies, Blocks) or bodies.terms or not bodies.is_symmetric:
             raise InvalidOption('{} "time" is for symmetric blocks; use "certified"', "chattering")
         parameters, eta = motion.description.parameters, bodies.restitution
         threshold = bodies.alpha if model == "linear" else np.tan(bodies.alpha)

@@ -348,7 +348,7 @@ def case(kind: str, seed: int, number: int) -> tuple[RestrainedBlock, Held, Moti
     if number % 3 == 0:
         up = rocking.pulses.sine(rng.uniform(0.5, 6.0), frequency * rng.uniform(1.0, 3.0), cycles=cycles)
         motion = motion.with_vertical(up)
-    tendon = ours._tendon[0]
+    tendon = ours._terms[0]
     near = min(0.3 * min(*ours.balance, 0.5), 0.1, 0.8 * tendon.yields / max(tendon.opening, 1e-9))
     return ours, held, motion, 1.2 * motion.end + 0.5, near if number % 2 else 0.0
 

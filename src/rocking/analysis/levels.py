@@ -51,7 +51,7 @@ def described(blocks: Bodies | Body | Sequence[Body]) -> str:
     only = only_block(blocks)
     if only is None:
         return counted(len(bodies_of(blocks)), "block")
-    if not isinstance(blocks, Blocks):
+    if not isinstance(blocks, Blocks) or blocks.terms:
         return title_of(only)
     return f"block with p = {_pair(blocks.p[0])} rad/s, alpha = {_pair(blocks.alpha[0])} rad"
 

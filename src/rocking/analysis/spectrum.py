@@ -14,8 +14,8 @@ from rocking import checks
 from rocking.analysis.labels import curves_of, labels_of, motions_in_words
 from rocking.analysis.levels import mean_one, pooled, ratios_of
 from rocking.arrays import Floats
-from rocking.block import Blocks, RestrainedBlocks
-from rocking.block.many import rates_of
+from rocking.block import Blocks
+from rocking.block.bodies import rates_of
 from rocking.body import Bodies, Body
 from rocking.constants import Model
 from rocking.engine import missing_text
@@ -66,7 +66,7 @@ def rocking_spectrum(
         A grid of frequency parameters, slendernesses and restitutions (`Blocks.grid`), which are the dimensions of the
         spectrum. Or any blocks as an ensemble, such as that of a calibration: all are made larger or smaller together,
         so that their median p is each of `p`, and keep their shapes. A grid with `p`, `size` or `weights` is an
-        ensemble, too. Restraints grow with the blocks, as `RestrainedBlocks.resized` says.
+        ensemble, too. Restraints grow with the blocks, as `Blocks.resized` says.
     motions : Motion, sequence of Motion, or mapping of str to Motion
         m motions; a mapping gives them its names.
     p : array_like, optional
@@ -126,9 +126,9 @@ def rocking_spectrum(
     shares = _shares(fractiles)
     options: dict[str, Any] = {"model": model, "chattering": chattering, "threads": threads, "progress": progress}
     gathered, shaken = bodies_of(blocks), several_motions(motions)
-    if not isinstance(gathered, Blocks | RestrainedBlocks):
+    if not isinstance(gathered, Blocks):
         raise InvalidOption(f"a spectrum is of blocks, which have a size, not of {gathered.kind}")
-    if isinstance(gathered, Blocks) and gathered.axes is not None and p is None and size is None and weights is None:
+    if gathered.axes is not None and p is None and size is None and weights is None:
         checks.grid_size({"motions": len(shaken), "blocks": len(gathered)}, InvalidOption)
         table = simulate_many(gathered, shaken, **options)
         return RockingSpectrum(_grid_spectrum(table, gathered.axes, gathered.gravity, shares))
@@ -329,7 +329,7 @@ class RockingSpectrum(DatasetResult):
 
 
 def _ensemble_spectrum(
-    blocks: Blocks | RestrainedBlocks,
+    blocks: Blocks,
     weight: Floats,
     motions: Sequence[Motion],
     factors: Floats,

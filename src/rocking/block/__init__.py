@@ -1,6 +1,6 @@
 """What rocks: one block, or many as a struct of arrays; free, or held back."""
 
-from rocking.block.many import Blocks
+from rocking.block.bodies import Blocks
 from rocking.block.restitution import (
     FallingRestitution,
     RandomRestitution,
@@ -10,10 +10,12 @@ from rocking.block.restitution import (
     one_sided_restitution,
 )
 from rocking.block.restrained import RestrainedBlock
-from rocking.block.restrained_many import RestrainedBlocks
 from rocking.block.restraints import Damper, Load, Restraint, Spring, Tendon, Thrust
 from rocking.block.sides import Side
 from rocking.block.single import Block, one_block
+
+#: The same class: arrays of terms say what restrains them.
+RestrainedBlocks = Blocks
 
 __all__ = [
     "Block",

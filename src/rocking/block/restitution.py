@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Final
 
 from rocking import checks
 from rocking.block.limits import checked_length, checked_pair, checked_parameter
@@ -174,34 +174,31 @@ def _on_leaving(away: Sequence[float], inertia: float, share: float, points: int
 # ---- Laws by which it varies ----
 
 
-class Varying(NamedTuple):
-    """How the restitution on leaving one side varies below the largest, that of the `Side`.
+class Restitution(ABC):
+    """A law by which the restitution of a `RestrainedBlock` varies from impact to impact, within bounds.
 
-    Attributes
-    ----------
-    least : float
-        Lower bound.
-    slope : float
-        How much it falls per angular speed of the impact, s/rad.
-    seed : float
-        Seed by which it is drawn at each impact; -1 where it is not.
+    Its largest factor takes the place of the restitution of each `Side`.
     """
 
-    least: float = 0.0
-    slope: float = 0.0
-    seed: float = -1.0
-
-
-class Restitution(ABC):
-    """A law by which the restitution of a `RestrainedBlock` varies from impact to impact, within bounds."""
+    least: float | Sequence[float]
+    largest: float | Sequence[float]
 
     @abstractmethod
-    def _factors(self) -> tuple[float, float]:
-        """Return the largest factors on leaving side + and side -."""
+    def _terms(self, side: int) -> dict[str, float]:
+        """Return what is below the largest factor on leaving a side, as fields of `restraints.Terms`."""
 
-    @abstractmethod
-    def _varying(self) -> tuple[Varying, Varying]:
-        """Return what is below the largest factors, for side + and side -."""
+    def _check_bounds(self) -> None:
+        """Refuse bounds outside (0, 1], or in the wrong order."""
+        for low, high in zip(checked_pair(self.least, "least"), checked_pair(self.largest, "largest"), strict=True):
+            if not 0.0 < high <= 1.0:
+                raise InvalidBlock(
+                    f"{{}} must be in (0, 1], not {high:g}{checks.hint_of_percent(high)}", "largest", value=self.largest
+                )
+            if not 0.0 < low <= high:
+                raise InvalidBlock(
+                    f"{{}} must be above 0 and at most {{}}, {high:g}, not {low:g}", "least", "largest",
+                    value=self.least,
+                )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -236,7 +233,6 @@ class FallingRestitution(Restitution):
     least: float | Sequence[float]
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
         slopes = checked_pair(self.slope, "slope")
         if wrong := [slope for slope in slopes if not 0.0 <= slope < math.inf]:
             raise InvalidBlock(
@@ -244,17 +240,13 @@ class FallingRestitution(Restitution):
                 "slope",
                 value=self.slope,
             )
-        _check_bounds(self.least, self.largest)
+        self._check_bounds()
 
-    def _factors(self) -> tuple[float, float]:
-        return checked_pair(self.largest, "largest")
-
-    def _varying(self) -> tuple[Varying, Varying]:
-        plus, minus = zip(checked_pair(self.least, "least"), checked_pair(self.slope, "slope"), strict=True)
-        return Varying(*plus), Varying(*minus)
+    def _terms(self, side: int) -> dict[str, float]:
+        least, slope = checked_pair(self.least, "least")[side], checked_pair(self.slope, "slope")[side]
+        return {"restitution_least": least, "restitution_slope": slope}
 
     def __str__(self) -> str:
-        """Return the law as people read it."""
         return f"restitution falling from {self.largest} by {self.slope} per rad/s to {self.least}"
 
 
@@ -298,35 +290,11 @@ class RandomRestitution(Restitution):
     seed: int
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
-        _check_bounds(self.least, self.largest)
+        self._check_bounds()
         checks.whole(self.seed, "seed", InvalidBlock, 0, _LARGEST_SEED)
 
-    def _factors(self) -> tuple[float, float]:
-        return checked_pair(self.largest, "largest")
-
-    def _varying(self) -> tuple[Varying, Varying]:
-        plus, minus = checked_pair(self.least, "least")
-        return Varying(plus, seed=float(self.seed)), Varying(minus, seed=float(self.seed))
+    def _terms(self, side: int) -> dict[str, float]:
+        return {"restitution_least": checked_pair(self.least, "least")[side], "restitution_seed": float(self.seed)}
 
     def __str__(self) -> str:
-        """Return the law as people read it."""
         return f"restitution drawn from {self.least} to {self.largest}, seed {self.seed}"
-
-
-def _check_bounds(least: float | Sequence[float], largest: float | Sequence[float]) -> None:
-    """Refuse bounds outside (0, 1], or in the wrong order."""
-    for low, high in zip(checked_pair(least, "least"), checked_pair(largest, "largest"), strict=True):
-        if not 0.0 < high <= 1.0:
-            raise InvalidBlock(
-                f"{{}} must be in (0, 1], not {high:g}{checks.hint_of_percent(high)}",
-                "largest",
-                value=largest,
-            )
-        if not 0.0 < low <= high:
-            raise InvalidBlock(
-                f"{{}} must be above 0 and at most {{}}, {high:g}, not {low:g}",
-                "least",
-                "largest",
-                value=least,
-            )

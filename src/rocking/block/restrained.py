@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Final
 
 import numpy as np
 
 from rocking import checks
 from rocking.arrays import Floats, Integers
-from rocking.block.limits import checked_pair
-from rocking.block.moments import Held, Yielding
-from rocking.block.restitution import Restitution, Varying, one_sided_restitution
-from rocking.block.restraints import Restraint, Tendon
+from rocking.bisection import bisected
+from rocking.block.limits import checked_pair, checked_parameter
+from rocking.block.restitution import Restitution, one_sided_restitution
+from rocking.block.restraints import Load, Pivot, Restraint, Tendon, Terms
 from rocking.block.sides import Side, in_line
 from rocking.block.single import Block, one_block
-from rocking.block.standing import balance_of, carrying, following, leaning, pivots_of, with_restitution
 from rocking.body import KINDS, Bodies, ContactLaw, Coordinate
-from rocking.constants import Model
-from rocking.errors import InvalidBlock
+from rocking.constants import MODELS, Model
+from rocking.errors import InvalidBlock, InvalidOption
+
+#: Rotations at which the balance is looked for, on each side.
+_LOOKS: Final = 512
 
 #: So many restraints are told with their numbers in the title of a figure.
 _FEW: Final = 2
@@ -75,9 +78,7 @@ class RestrainedBlock:
     coordinate: ClassVar[Coordinate] = _ROTATION
 
     block: Block
-    _held: tuple[Held, Held]
-    _tendon: tuple[Yielding, Yielding]
-    _varying: tuple[Varying, Varying]
+    _terms: tuple[Terms, Terms]
     is_one_sided: bool
     description: str
     title: str
@@ -97,39 +98,58 @@ class RestrainedBlock:
         own, one_way = one_block(block), checks.flag(one_sided, "one_sided", InvalidBlock)
         _check(restraints, own)
         tilt = checks.finite(lean, "lean", InvalidBlock)
+        law = restitution if isinstance(restitution, Restitution) else None
+        factors = restitution.largest if isinstance(restitution, Restitution) else restitution
         rest = [f"leaning {tilt:.4g} rad to side +"] * (tilt != 0.0) + ["rocking one way"] * one_way
-        varying, factors = (Varying(), Varying()), None if isinstance(restitution, Restitution) else restitution
-        if isinstance(restitution, Restitution):
-            rest.append(str(restitution))
-            varying, factors = restitution._varying(), restitution._factors()
-        elif one_way and restitution is None:
+        rest += [str(law)] * (law is not None)
+        if one_way and restitution is None:
             factors = one_sided_restitution(own.sides[0].alpha)
-        elif one_way and len({*checked_pair(restitution, "restitution")}) > 1:
+        elif one_way and law is None and len({*checked_pair(restitution, "restitution")}) > 1:
             raise InvalidBlock(
                 "{} of a block that rocks one way is one number, not a pair: it leaves one side alone",
                 "restitution",
                 value=restitution,
             )
-        standing = leaning(carrying(own, following(restraints), factors), tilt)
+        standing = _tilted(_with_loads(own, _following(restraints), factors), tilt)
         if factors is not None:
-            standing = with_restitution(standing, factors)
-        pivots = pivots_of(standing, tilt, restraints)
-        held = [Held(), Held()]
-        for each in restraints:
-            held = [of_side.plus(each._held(pivot)) for of_side, pivot in zip(held, pivots, strict=True)]
-        yielding = [found for each in restraints for pivot in pivots if (found := each._yielding(pivot))]
-        if len(yielding) > len(pivots):
+            plus, minus = (
+                replace(side, restitution=checked_parameter(factor, "restitution"))
+                for side, factor in zip(standing.sides, checked_pair(factors, "restitution"), strict=True)
+            )
+            standing = standing._with_sides((plus, minus))
+        if sum(isinstance(each, Tendon) and each.strength < math.inf for each in restraints) > 1:
             raise InvalidBlock("one tendon of a block may yield; let the others have no {}", "strength")
-        tendon = (yielding[0], yielding[1]) if yielding else (Yielding(), Yielding())
+        pivots = _pivots_of(standing, tilt, restraints)
+        terms = [
+            functools.reduce(Terms.plus, (each._terms(pivot) for each in restraints), Terms())._replace(
+                **(law._terms(side) if law else {})
+            )
+            for side, pivot in enumerate(pivots)
+        ]
         kinds = [type(each).__name__.lower() for each in restraints]
         text, title = (", ".join([own.description, *_listed(words), *rest]) for words in (restraints, kinds))
         title = title if len(restraints) > _FEW else text
-        filled(self, standing, (held[0], held[1]), tendon, varying, one_way, (text, title), restraints, tilt)
+        self._fill(standing, terms, one_way, (text, title), restraints, tilt)
         if (least := min(self.uplift_thresholds())) <= 0.0:
             raise InvalidBlock(
                 f"this block does not stand: it would take a ground acceleration of {least:.3g} m/s^2 to lift it; "
                 f"a smaller thrust, load or lean lets it{'; forces are in N, masses in kg' * (least < -self.gravity)}"
             )
+
+    def _fill(
+        self,
+        block: Block,
+        terms: Sequence[Terms],
+        one_sided: bool,
+        texts: tuple[str, str],
+        restraints: tuple[Restraint, ...] | None,
+        lean: float,
+    ) -> RestrainedBlock:
+        """Set all attributes; without restraints where they are not known one by one."""
+        names = ("block", "_terms", "is_one_sided", "description", "title", "restraints", "lean")
+        for name, value in zip(names, (block, tuple(terms), one_sided, *texts, restraints, lean), strict=True):
+            object.__setattr__(self, name, value)
+        return self
 
     def __str__(self) -> str:
         """Return description and parameters in one line."""
@@ -156,11 +176,12 @@ class RestrainedBlock:
     @property
     def balance(self) -> tuple[float, float]:
         """Rotation of the unstable balance on each side, rad; infinite where the restraints hold it at any rotation."""
-        plus, minus = map(balance_of, self.block.sides, self._held, self._tendon)
+        plus, minus = map(_balance_of, self.block.sides, self._terms)
         return plus, math.inf if self.is_one_sided else minus
 
     def uplift_thresholds(self, model: Model = "nonlinear") -> tuple[float, float]:
         """Ground accelerations, m/s^2, that lift it to side + (when -a passes the first) and to side -."""
+        checks.one_of(model, "model", InvalidOption, MODELS)
         made = self.alone().kernel_records(model, np.zeros((1, 2)))
         plus, minus = (self.gravity * (made["threshold"] + made["hold"])[0]).tolist()
         return plus, minus
@@ -171,7 +192,7 @@ class RestrainedBlock:
 
         What stands behind a block of one side pushes it to side +, without friction, as far as that is needed while it
         is at rest; so what is left for the ground is least then. None where the forces are not known: of a block that
-        was made of the arrays of `RestrainedBlocks`.
+        was made of the arrays of `Blocks`.
         """
         return None if self.restraints is None else self._contact_forces
 
@@ -184,7 +205,7 @@ class RestrainedBlock:
     ) -> tuple[Floats, Floats]:
         horizontal, vertical = self.block.contact(motion, ground_over_g, side, stretch)
         if self.restraints and self.block.mass is not None:
-            pivots, weight = pivots_of(self.block, self.lean, self.restraints), self.block.mass * self.gravity
+            pivots, weight = _pivots_of(self.block, self.lean, self.restraints), self.block.mass * self.gravity
             for each in self.restraints:
                 across, up = each._acting(pivots, motion[0], side, stretch)
                 horizontal, vertical = horizontal - across / weight, vertical - up / weight
@@ -216,13 +237,13 @@ class RestrainedBlock:
         [[0.004, 2799.986667, 0.0]]
         """
         plus, minus = largest if model == "linear" else (2.0 * math.sin(0.5 * u) for u in largest)
-        pivots = pivots_of(self.block, self.lean, self.restraints or ())
+        pivots = _pivots_of(self.block, self.lean, self.restraints or ())
         tendons = [each for each in self.restraints or () if isinstance(each, Tendon)]
         return [each._stretched(pivots, (plus, minus)) for each in tendons]
 
     def alone(self) -> Bodies:
-        """Return `RestrainedBlocks` of which it is the only one."""
-        return KINDS["restrained-blocks"].of([self])
+        """Return `Blocks` of which it is the only one."""
+        return KINDS["blocks"].of([self])
 
 
 def _listed(restraints: Sequence[object]) -> list[str]:
@@ -243,20 +264,93 @@ def _check(restraints: Sequence[object], block: Block) -> None:
         raise InvalidBlock("a block with restraints needs its {}, kg, beside its sizes or its pivots", "mass")
 
 
-def filled(
-    made: RestrainedBlock,
-    block: Block,
-    held: tuple[Held, Held],
-    tendon: tuple[Yielding, Yielding],
-    varying: tuple[Varying, Varying],
-    one_sided: bool,
-    texts: tuple[str, str],
-    restraints: tuple[Restraint, ...] | None,
-    lean: float,
-) -> RestrainedBlock:
-    """Fill in what a restrained block is, and return it."""
-    names = ("block", "_held", "_tendon", "_varying", "is_one_sided", "description", "title", "restraints", "lean")
-    values = (block, held, tendon, varying, bool(one_sided), *texts, restraints, lean)
-    for name, value in zip(names, values, strict=True):
-        object.__setattr__(made, name, value)
-    return made
+def _with_loads(block: Block, loads: Sequence[Load], restitution: float | Sequence[float] | None) -> Block:
+    """Return the rigid body of a block and the loads that follow it, with a restitution or that of angular momentum."""
+    if not loads:
+        return block
+    assert block.mass is not None
+    plus = block.sides[0]
+    height = plus.radius * math.cos(plus.alpha)
+    right, left = (side.radius * math.sin(side.alpha) for side in block.sides)
+    masses = np.array([block.mass, *(load.mass for load in loads)])
+    across = np.array([0.0, *(load.offset for load in loads)])
+    up = np.array([height, *(load.height for load in loads)])
+    share = masses / masses.sum()
+    x, z = float(share @ across), float(share @ up)
+    own = block.gravity * plus.radius / plus.p**2 - plus.radius**2
+    gyration = float(share[0] * own + share @ ((across - x) ** 2 + (up - z) ** 2))
+    beyond = max(x - right, -x - left)
+    if beyond >= 0.0:
+        raise InvalidBlock(
+            f"with its loads the centre of mass of this block lies {beyond:.3g} m beyond its pivot, so that it falls: "
+            "give a load less mass, or less {}",
+            "offset",
+        )
+    return Block.from_pivots(
+        (right - x, left + x),
+        z,
+        math.sqrt(gyration),
+        restitution=restitution,
+        mass=float(masses.sum()),
+        gravity=block.gravity,
+    )
+
+
+def _tilted(block: Block, lean: float) -> Block:
+    """Return a block that leans to side + by an angle."""
+    if lean == 0.0:
+        return block
+    plus, minus = block.sides
+    if not -minus.alpha < lean < plus.alpha:
+        raise InvalidBlock(
+            f"a block whose {{}} is {lean:g} rad falls: from {-minus.alpha:.4g} to {plus.alpha:.4g} rad it stands"
+            f"{f'; if it is in degrees, give math.radians({lean:g})' if 0.5 <= abs(lean) < 90.0 else ''}",
+            "lean",
+            value=lean,
+        )
+    sides = replace(plus, alpha=plus.alpha - lean), replace(minus, alpha=minus.alpha + lean)
+    return block._with_sides(sides)
+
+
+def _following(restraints: Sequence[Restraint]) -> list[Load]:
+    """Return the loads that follow the block, of all that restrains it."""
+    return [each for each in restraints if isinstance(each, Load) and each.follows]
+
+
+def _pivots_of(block: Block, lean: float, restraints: Sequence[Restraint]) -> tuple[Pivot, Pivot]:
+    """Both sides of a block that leans, with the loads that follow it, as its restraints see them.
+
+    Their points are placed from the centre of mass of the block without these loads, from which the loads are, too.
+    """
+    mass = math.nan if block.mass is None else block.mass
+    shift = sum(load.mass * load.offset for load in _following(restraints)) / mass
+    plus, minus = (
+        Pivot(
+            sign, side.alpha, sign * lean, side.radius * math.sin(side.alpha + sign * lean) + sign * shift, side.p,
+            mass * block.gravity * side.radius, block.gravity,
+        )
+        for sign, side in zip((1.0, -1.0), block.sides, strict=True)
+    )  # fmt: skip
+    return plus, minus
+
+
+def _balance_of(side: Side, terms: Terms) -> float:
+    """First rotation at which what brings a block back has become nothing, without ground motion, rad.
+
+    A tendon that yields does so for the first time.
+    """
+    if terms[:-3] == Terms()[:-3]:
+        return side.alpha
+
+    def moment(u: float) -> float:
+        own = (1.0 + terms.sine) * math.sin(side.alpha - u) + terms.cosine * math.cos(side.alpha - u)
+        stretch = min(2.0 * terms.opening * math.sin(0.5 * u), terms.yields) - terms.slack
+        return own + (terms.prestress + terms.stiffness * stretch) * math.cos(0.5 * u) + terms.spring * u
+
+    looks = np.linspace(0.0, 0.5 * math.pi, _LOOKS)
+    values = np.array([moment(u) for u in looks.tolist()])
+    negative = np.flatnonzero(values[1:] <= 0.0)
+    if not len(negative):
+        return math.inf
+    k = int(negative[0])
+    return bisected(float(looks[k]), float(looks[k + 1]), lambda u: moment(u) <= 0.0)[1]

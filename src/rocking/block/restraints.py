@@ -1,101 +1,100 @@
-"""What holds a block back, or pushes it: tendons, springs, dampers, thrusts and loads, as moments about its pivots."""
+"""Tendons, springs, dampers, thrusts and loads, each as terms of the moment about the pivots of a block."""
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from rocking import checks
 from rocking.arrays import Floats, Integers
-from rocking.block.moments import Held, Pivot, Yielding
 from rocking.errors import InvalidBlock
 
 
-class Restraint(ABC):
-    """What holds a block back, or pushes it."""
+class Terms(NamedTuple):
+    """What restraints add on one side, at a rotation u and a rate u'; a law of restitution, too.
 
-    def _yielding(self, pivot: Pivot) -> Yielding | None:
-        """Return what it is as a tendon that yields, on a side; None where it is none.
+    Their moment about the pivot, positive where it brings the block back, divided by weight times R, is
 
-        Parameters
-        ----------
-        pivot : Pivot
-            The side.
+        sine sin(alpha - u) + cosine cos(alpha - u) + prestress cos(u/2) + spring u + (damping/p^2) u'
 
-        Returns
-        -------
-        Yielding or None
-            Without what `_held` returns.
+    and that of a tendon that yields.
+    """
 
-        Examples
-        --------
-        >>> Spring(2e3)._yielding(Pivot(1.0, 0.2, 0.0, 0.2, 2.7, 1e4, 9.81)) is None
-        True
+    sine: float = 0.0
+    cosine: float = 0.0
+    prestress: float = 0.0
+    spring: float = 0.0
+    damping: float = 0.0  # 1/s
+    opening: float = 0.0  # distance of the yielding tendon's duct from the pivot, m
+    stiffness: float = 0.0  # its stiffness times that distance, divided by weight times R, 1/m
+    yields: float = math.inf  # elongation beyond the plastic one at which it yields, m
+    slack: float = 0.0  # elongation above which it is taut, m
+    restitution_least: float = 0.0  # lower bound of a restitution that varies
+    restitution_slope: float = 0.0  # how much it falls per angular speed of the impact, s/rad
+    restitution_seed: float = -1.0  # by which it is drawn at each impact; -1 where it is not
+
+    def plus(self, other: Terms) -> Terms:
+        """Return both together; one of them at most has a tendon that yields, and only this one a restitution."""
+        tendon = self if other.yields == math.inf else other
+        sums = (a + b for a, b in zip(self[:5], other[:5], strict=True))
+        return Terms._make((*sums, *tendon[5:9], *self[9:]))
+
+
+class Pivot(NamedTuple):
+    """One side of a standing block, as restraints see it."""
+
+    sign: float  # +1 on side +, -1 on side -
+    alpha: float  # slenderness as it stands, rad
+    lean: float  # angle by which the block leans to this side, rad
+    distance: float  # of the pivot along the base from the centre of mass without loads that follow, m
+    p: float  # rad/s
+    moment: float  # weight times R, N m
+    gravity: float  # m/s^2
+
+    def arms(self, height: float, offset: float) -> tuple[float, float]:
+        """Distance from the pivot inwards and height above it, m, of a point of the standing block.
+
+        The point is at a height above the base and at an offset to side + from the centre of mass of the block without
+        loads, both along the block's own axes.
         """
-        return None
+        inwards = self.distance - self.sign * offset
+        c, s = math.cos(self.lean), math.sin(self.lean)
+        return inwards * c - height * s, height * c + inwards * s
+
+    def turned(self, inwards: float, upwards: float) -> tuple[float, float]:
+        """Return ``rho sin`` and ``rho cos`` of the angle of a point from the line of the centre of mass, m."""
+        c, s = math.cos(self.alpha), math.sin(self.alpha)
+        return inwards * c - upwards * s, upwards * c + inwards * s
+
+
+class Restraint(ABC):
+    """Force or moment on a block, as a term for each side."""
+
+    @abstractmethod
+    def _terms(self, pivot: Pivot) -> Terms:
+        """Return what it adds while the block leans to a side."""
 
     def _acting(
         self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats
     ) -> tuple[Floats, Floats]:
-        """Return the force on the block; a spring and a damper have none, since they turn it alone.
+        """Return the force on the block to side + and up, N; a spring and a damper have none.
 
-        Parameters
-        ----------
-        pivots : (Pivot, Pivot)
-            Both sides.
-        rotation : ndarray
-            Rotations to side +, rad.
-        side : ndarray of int
-            0 on side +, 1 on side -, -1 at rest.
-        stretch : ndarray
-            Elongation of a tendon that yields beyond its plastic one, m.
-
-        Returns
-        -------
-        (ndarray, ndarray)
-            To side + and up, N.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> pivot = Pivot(1.0, 0.2, 0.0, 0.2, 2.7, 1e4, 9.81)
-        >>> Thrust(1.5e3, height=4.0)._acting((pivot, pivot), np.zeros(1), np.zeros(1, int), np.zeros(1))
-        (array([1500.]), array([0.]))
+        ``side`` is -1 at rest, ``stretch`` the elongation of a tendon that yields beyond its plastic one, m.
         """
         return np.zeros_like(rotation), np.zeros_like(rotation)
 
-    def _finite(self, name: str) -> float:
-        """Check a number and keep it as a float."""
-        value = checks.finite(getattr(self, name), name, InvalidBlock)
-        object.__setattr__(self, name, value)
-        return value
+    def _finite(self, *names: str) -> None:
+        """Check numbers and keep them as floats."""
+        for name in names:
+            object.__setattr__(self, name, checks.finite(getattr(self, name), name, InvalidBlock))
 
     def _positive(self, name: str, unit: str) -> None:
         """Check that a number is positive and keep it as a float."""
         object.__setattr__(self, name, checks.positive(getattr(self, name), name, InvalidBlock, unit))
-
-    @abstractmethod
-    def _held(self, pivot: Pivot) -> Held:
-        """Say what it does while the block leans to a side.
-
-        Parameters
-        ----------
-        pivot : Pivot
-            The side.
-
-        Returns
-        -------
-        Held
-            Its moment.
-
-        Examples
-        --------
-        >>> Spring(2e3)._held(Pivot(1.0, 0.2, 0.0, 0.2, 2.7, 1e4, 9.81)).spring
-        0.2
-        """
 
 
 @dataclass(frozen=True)
@@ -140,9 +139,8 @@ class Tendon(Restraint):
     strength: float = math.inf
 
     def __post_init__(self) -> None:
-        stiffness = self._finite("stiffness")
-        prestress = self._finite("prestress")
-        self._finite("offset")
+        self._finite("stiffness", "prestress", "offset")
+        stiffness, prestress = self.stiffness, self.prestress
         if stiffness < 0.0:
             raise InvalidBlock(
                 f"{{}} of a tendon must be at least 0 N/m, not {stiffness:g}", "stiffness", value=stiffness
@@ -165,25 +163,16 @@ class Tendon(Restraint):
         if stiffness == 0.0 and self.strength < math.inf:
             raise InvalidBlock("a tendon that yields needs a {}, N/m", "stiffness")
 
-    def _held(self, pivot: Pivot) -> Held:
-        """Its moment; without one where the duct is at the pivot, or where it yields."""
+    def _terms(self, pivot: Pivot) -> Terms:
         x = self._opening(pivot)
         if self.strength < math.inf:
-            return Held()
+            yields = (self.strength - self.prestress) / self.stiffness
+            return Terms(
+                opening=x, stiffness=self.stiffness * x / pivot.moment, yields=yields,
+                slack=-self.prestress / self.stiffness,
+            )  # fmt: skip
         stiff = self.stiffness * x * x / pivot.moment
-        return Held(-stiff * math.cos(pivot.alpha), stiff * math.sin(pivot.alpha), self.prestress * x / pivot.moment)
-
-    def _yielding(self, pivot: Pivot) -> Yielding | None:
-        """Return what it is where it yields."""
-        if self.strength == math.inf:
-            return None
-        x = self._opening(pivot)
-        return Yielding(
-            x,
-            self.stiffness * x / pivot.moment,
-            (self.strength - self.prestress) / self.stiffness,
-            -self.prestress / self.stiffness,
-        )
+        return Terms(-stiff * math.cos(pivot.alpha), stiff * math.sin(pivot.alpha), self.prestress * x / pivot.moment)
 
     def _acting(
         self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats
@@ -199,23 +188,7 @@ class Tendon(Restraint):
     def _stretched(self, pivots: tuple[Pivot, Pivot], bends: tuple[float, float]) -> tuple[float, float, float]:
         """Return the largest elongation, m, the largest force, N, and the plastic elongation, m.
 
-        Parameters
-        ----------
-        pivots : (Pivot, Pivot)
-            Both sides.
-        bends : (float, float)
-            Largest opening of the base over the distance from the pivot on each: 2 sin(u/2), in the linear model u.
-
-        Returns
-        -------
-        (float, float, float)
-            After these rotations; without a plastic elongation before.
-
-        Examples
-        --------
-        >>> pivot = Pivot(1.0, 0.2, 0.0, 0.5, 2.7, 1e4, 9.81)
-        >>> [round(value, 6) for value in Tendon(1e6, strength=1e3)._stretched((pivot, pivot), (0.01, 0.0))]
-        [0.005, 1000.0, 0.004]
+        ``bends``: largest opening of the base on each side divided by the distance from the pivot.
         """
         elongation = max(self._opening(pivot) * bend for pivot, bend in zip(pivots, bends, strict=True))
         elastic = self.prestress + self.stiffness * elongation
@@ -269,9 +242,8 @@ class Spring(Restraint):
     def __post_init__(self) -> None:
         self._positive("stiffness", "N m/rad")
 
-    def _held(self, pivot: Pivot) -> Held:
-        """Its moment."""
-        return Held(spring=self.stiffness / pivot.moment)
+    def _terms(self, pivot: Pivot) -> Terms:
+        return Terms(spring=self.stiffness / pivot.moment)
 
     def __str__(self) -> str:
         return f"spring of {_thousands(self.stiffness, 'N m/rad')}"
@@ -302,9 +274,8 @@ class Damper(Restraint):
     def __post_init__(self) -> None:
         self._positive("coefficient", "N m s/rad")
 
-    def _held(self, pivot: Pivot) -> Held:
-        """Its moment."""
-        return Held(damping=self.coefficient * pivot.p**2 / pivot.moment)
+    def _terms(self, pivot: Pivot) -> Terms:
+        return Terms(damping=self.coefficient * pivot.p**2 / pivot.moment)
 
     def __str__(self) -> str:
         return f"damper of {_thousands(self.coefficient, 'N m s/rad')}"
@@ -343,21 +314,19 @@ class Thrust(Restraint):
     offset: float = 0.0
 
     def __post_init__(self) -> None:
-        if self._finite("force") == 0.0:
+        self._finite("force", "offset")
+        if self.force == 0.0:
             raise InvalidBlock("{} of a thrust must not be zero", "force", value=self.force)
         self._positive("height", "m")
-        self._finite("offset")
 
-    def _held(self, pivot: Pivot) -> Held:
-        """Its moment, which pushes the block over on the side it points to."""
+    def _terms(self, pivot: Pivot) -> Terms:
         across, along = pivot.turned(*pivot.arms(self.height, self.offset))
         force = pivot.sign * self.force / pivot.moment
-        return Held(force * across, -force * along)
+        return Terms(force * across, -force * along)
 
     def _acting(
         self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats
     ) -> tuple[Floats, Floats]:
-        """Return the thrust."""
         return np.full_like(rotation, self.force), np.zeros_like(rotation)
 
     def __str__(self) -> str:
@@ -402,18 +371,16 @@ class Load(Restraint):
         self._finite("offset")
         object.__setattr__(self, "follows", checks.flag(self.follows, "follows", InvalidBlock))
 
-    def _held(self, pivot: Pivot) -> Held:
-        """Return the moment of one that does not follow; of one that follows none, which is part of the block."""
-        if self.follows:
-            return Held()
+    def _terms(self, pivot: Pivot) -> Terms:
+        if self.follows:  # it is part of the block
+            return Terms()
         across, along = pivot.turned(*pivot.arms(self.height, self.offset))
         weight = self.mass * pivot.gravity / pivot.moment
-        return Held(weight * along, weight * across)
+        return Terms(weight * along, weight * across)
 
     def _acting(
         self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats
     ) -> tuple[Floats, Floats]:
-        """Return the weight of one that does not follow; that of one that follows is part of the block's."""
         weight = 0.0 if self.follows else self.mass * pivots[0].gravity
         return np.zeros_like(rotation), np.full_like(rotation, -weight)
 

@@ -1,4 +1,4 @@
-"""What rocks: free-standing rigid blocks, symmetric or with two different sides."""
+"""Free-standing rigid blocks, symmetric or with two different sides."""
 
 from __future__ import annotations
 
@@ -136,7 +136,32 @@ class Block:
                 (b - s, b + s), h, gyration_squared(b, h, s), g, restitution, _perhaps_swapped(b, h)
             )
             text += f", centre of mass {abs(s):.5g} m off its middle to side {'+' if s > 0.0 else '-'}"
-        block_of_sides(self, sides, g, text, mass, (b, h, s))
+        self._fill(sides, g, text, mass, (b, h, s))
+
+    def _fill(
+        self,
+        sides: tuple[Side, Side],
+        gravity: float,
+        description: str,
+        mass: float | None = None,
+        rectangle: tuple[float | None, float | None, float] = (None, None, 0.0),
+    ) -> Block:
+        """Set all attributes; of a rectangle also half its sizes and its offset, m."""
+        for side in sides:
+            checked_parameter(side.p, "p", origin=" (from the sizes)")
+            checked_parameter(side.alpha, "alpha", origin=" (from the sizes)")
+        if mass is not None:
+            mass = checked_mass(mass)
+            first, second = (replace(side, inertia=mass * gravity * side.radius / side.p**2) for side in sides)
+            sides = first, second
+        names = ("sides", "gravity", "description", "mass", "half_width", "half_height", "offset")
+        for name, value in zip(names, (sides, gravity, description, mass, *rectangle), strict=True):
+            object.__setattr__(self, name, value)
+        return self
+
+    def _with_sides(self, sides: tuple[Side, Side]) -> Block:
+        """Return the block with other sides."""
+        return Block.__new__(Block)._fill(sides, self.gravity, self.description, self.mass)
 
     @classmethod
     def from_parameters(
@@ -207,7 +232,7 @@ class Block:
                 k = math.sqrt(max(g * radii[0] / rates[0] ** 2 - radii[0] ** 2, 0.0))
                 text = f"body from its parameters, centre of mass {depth:.4g} m high, radius of gyration {k:.4g} m"
         sides = tuple(Side(rates[i], angles[i], e[i], radii[i]) for i in range(2))
-        return block_of_sides(cls.__new__(cls), (sides[0], sides[1]), g, text)
+        return cls.__new__(cls)._fill((sides[0], sides[1]), g, text)
 
     @classmethod
     def from_pivots(
@@ -270,7 +295,7 @@ class Block:
         g = checked_gravity(gravity)
         sides = sides_on_pivots((plus, minus), h, k * k, g, restitution)
         pivots = f"body on pivots {plus:.5g} m and {minus:.5g} m from its centre of mass, which is {h:.5g} m high"
-        return block_of_sides(cls.__new__(cls), sides, g, description or pivots, mass)
+        return cls.__new__(cls)._fill(sides, g, description or pivots, mass)
 
     @classmethod
     def from_frame(
@@ -328,9 +353,8 @@ class Block:
         # The beam moves twice as far as the centres of the columns do.
         arm = math.hypot(b, h) * (1.0 + 2.0 * gamma) / (1.0 + gamma)
         sides = replace(plus, arm=arm), replace(minus, arm=arm)
-        return block_of_sides(
-            cls.__new__(cls), sides, g, f"frame of columns {2 * b:.5g} m x {2 * h:.5g} m, mass ratio {gamma:.5g}"
-        )
+        text = f"frame of columns {2 * b:.5g} m x {2 * h:.5g} m, mass ratio {gamma:.5g}"
+        return cls.__new__(cls)._fill(sides, g, text)
 
     @classmethod
     def one_sided(
@@ -491,37 +515,15 @@ class Block:
         return self.gravity * steepness(self.sides[0].alpha), self.gravity * steepness(self.sides[1].alpha)
 
 
-def one_block(block: Block, needed: str = "a Block") -> Block:
+def one_block(block: object, needed: str = "a Block") -> Block:
     """Return the block, or say that it is none, and what is needed."""
     if not isinstance(block, Block):
         how = "make one with Block(width=, height=), in m"
         if hasattr(block, "restraints"):
-            how = "here a block is free; among restrained ones, RestrainedBlock(block) is"
+            how = "this is known of free blocks alone"
         elif hasattr(block, "rose"):
             how = "block(azimuth) of a Solid is what it is in a plane"
         raise InvalidBlock(f"{needed} is needed, not a {type(block).__name__}: {how}")
-    return block
-
-
-def block_of_sides(
-    block: Block,
-    sides: tuple[Side, Side],
-    gravity: float,
-    description: str,
-    mass: float | None = None,
-    rectangle: tuple[float | None, float | None, float] = (None, None, 0.0),
-) -> Block:
-    """Fill in what a block is, and return it; of a rectangle also half its sizes and its offset, m."""
-    for side in sides:
-        checked_parameter(side.p, "p", origin=" (from the sizes)")
-        checked_parameter(side.alpha, "alpha", origin=" (from the sizes)")
-    if mass is not None:
-        mass = checked_mass(mass)
-        first, second = (replace(side, inertia=mass * gravity * side.radius / side.p**2) for side in sides)
-        sides = first, second
-    names = ("sides", "gravity", "description", "mass", "half_width", "half_height", "offset")
-    for name, value in zip(names, (sides, gravity, description, mass, *rectangle), strict=True):
-        object.__setattr__(block, name, value)
     return block
 
 

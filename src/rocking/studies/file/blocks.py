@@ -14,7 +14,7 @@ import numpy as np
 
 from rocking import checks
 from rocking.arrays import Floats
-from rocking.block import Block, Blocks, RestrainedBlock, RestrainedBlocks, Restraint
+from rocking.block import Block, Blocks, RestrainedBlock, Restraint
 from rocking.body import Bodies
 from rocking.errors import Message, RockingError, StudyError
 from rocking.plausibility import block_notes, restraint_notes
@@ -82,7 +82,7 @@ def blocks_of(tables: Tables) -> Bodies:
         ]  # fmt: skip
         _noted([body.block for body in bodies[:_NOTED]])
         _say(restraint_notes(body, _height(body.block)) for body in bodies[:_NOTED])
-        return RestrainedBlocks.of(bodies)
+        return Blocks.of(bodies)
 
 
 def _noted(blocks: list[Block]) -> list[Block]:

@@ -1,11 +1,11 @@
-"""Many blocks as a struct of arrays."""
+"""Any number of blocks as a struct of arrays: all that a kernel needs."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import ClassVar, cast
+from typing import Any, Final, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.block.limits import checked_gravity, checked_sides
+from rocking.block.restrained import RestrainedBlock
+from rocking.block.restraints import Terms
 from rocking.block.rigid_body import refusal, rigid_bodies
 from rocking.block.single import Block, one_block
 from rocking.body import KINDS
@@ -21,12 +23,24 @@ from rocking.errors import InvalidBlock
 from rocking.kernels import state
 from rocking.tables import range_text
 
+#: Terms of restraints on each side, and their values without one; and whether a block rocks to side + only.
+_TERMS: Final = {**Terms()._asdict(), "one_sided": 0.0}
+_UNITS: Final = {
+    "p": "rad/s", "alpha": "rad", "damping": "1/s", "opening": "m", "stiffness": "1/m", "yields": "m", "slack": "m",
+    "restitution_slope": "s/rad",
+}  # fmt: skip
+
+#: Powers of a factor on p by which a block of the same shape differs; all else stays.
+_POWERS: Final = {
+    "damping": 1, "stiffness": 2, "opening": -2, "yields": -2, "slack": -2, "restitution_slope": -1,
+}  # fmt: skip
+
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
     """Any number n of blocks, each array of shape (n, 2): side +, side -.
 
-    What is given broadcasts against each other: a number, shape (n,) for symmetric blocks, or shape (n, 2).
+    Arguments broadcast against each other: a number, shape (n,) for symmetric blocks, or shape (n, 2).
 
     Parameters
     ----------
@@ -39,9 +53,14 @@ class Blocks:
         `alpha` where both sides are equal, else of the one rigid body whose sides have these p and alpha.
     gravity : float
         Acceleration of gravity, m/s^2.
+    **terms : array_like
+        Terms of restraints by name, as `parameters` of restrained blocks returns them.
 
     Attributes
     ----------
+    terms : dict of str to ndarray
+        Terms of restraints of blocks that restraints hold, that lean, or that rock one way; of free ones none. Of a
+        block that rocks to side + only, `one_sided` is 1, and all of its parameters are those of side +, twice.
     axes : dict of str to ndarray, or None
         Of a grid its axes p (rad/s), alpha (rad) and, where it was given, restitution; the last one varies fastest.
 
@@ -57,13 +76,12 @@ class Blocks:
     (2, 3.0, True)
     """
 
-    kind: ClassVar[str] = "blocks"
-
     p: Floats
     alpha: Floats
     restitution: Floats
-    gravity: float = STANDARD_GRAVITY
-    axes: dict[str, Floats] | None = None
+    gravity: float
+    terms: dict[str, Floats]
+    axes: dict[str, Floats] | None
 
     def __init__(
         self,
@@ -72,10 +90,15 @@ class Blocks:
         restitution: ArrayLike | None = None,
         *,
         gravity: float = STANDARD_GRAVITY,
+        **terms: ArrayLike,
     ) -> None:
         given: dict[str, ArrayLike] = {"p": p, "alpha": alpha}
         if restitution is not None:
             given["restitution"] = restitution
+        if terms:
+            given |= {**_TERMS, **terms}
+            if wrong := [*terms.keys() - _TERMS.keys()]:
+                raise InvalidBlock(f"blocks have no {{}}; terms of restraints are {', '.join(_TERMS)}", wrong[0])
         try:
             columns = [_columns(checks.numbers(values, name, InvalidBlock)) for name, values in given.items()]
             arrays = dict(zip(given, np.broadcast_arrays(*columns), strict=True))
@@ -85,11 +108,22 @@ class Blocks:
                 "p", "alpha", "restitution",
             ) from None  # fmt: skip
         g = checked_gravity(gravity)
-        for name, values in arrays.items():
-            checked_sides(values, name)
+        for name in ("p", "alpha", "restitution") if restitution is not None else ("p", "alpha"):
+            checked_sides(arrays[name], name)
         if restitution is None:
             arrays["restitution"] = _conserved(arrays["p"], arrays["alpha"])
-        _filled(self, g, **{name: np.array(values) for name, values in arrays.items()})
+        self._fill(g, {name: np.array(values) for name, values in arrays.items()})
+
+    def _fill(self, gravity: float, arrays: Mapping[str, Floats], axes: dict[str, Floats] | None = None) -> Blocks:
+        """Set all attributes, sound arrays of shape (n, 2) that nobody can change then."""
+        held = {name: np.ascontiguousarray(values) for name, values in arrays.items()}
+        for values in held.values():
+            values.flags.writeable = False
+        for name in ("p", "alpha", "restitution"):
+            object.__setattr__(self, name, held.pop(name))
+        for name, value in (("gravity", gravity), ("terms", held), ("axes", axes)):
+            object.__setattr__(self, name, value)
+        return self
 
     @classmethod
     def grid(
@@ -140,19 +174,18 @@ class Blocks:
             raise InvalidBlock("each parameter of a grid must be a number or a sequence of at least one number")
         checks.grid_size({name: axis.size for name, axis in axes.items()}, InvalidBlock)
         blocks = cls(*(column.ravel() for column in np.meshgrid(*axes.values(), indexing="ij")), gravity=gravity)
-        object.__setattr__(blocks, "axes", axes)
-        return blocks
+        return blocks._fill(blocks.gravity, blocks._arrays(), axes)
 
     @classmethod
-    def of(cls, blocks: Blocks | Block | Iterable[Block]) -> Blocks:
+    def of(cls, blocks: Blocks | Block | RestrainedBlock | Iterable[Block | RestrainedBlock]) -> Blocks:
         """Gather single blocks, all under the same gravity; what is gathered already stays as it is.
 
-        Many blocks know p, alpha and restitution, which decide all motion, but not their sizes: a block that is taken
-        out again has those of a rectangle, as by `Block.from_parameters`, and so have its forces on the ground.
+        Arrays decide all motion, but they do not contain sizes: a block that is taken out again has those of a
+        rectangle, as by `Block.from_parameters`, and so have its forces on the ground.
 
         Parameters
         ----------
-        blocks : Block, iterable of Block, or Blocks
+        blocks : Block, RestrainedBlock, iterable of these, or Blocks
             The blocks.
 
         Returns
@@ -172,18 +205,32 @@ class Blocks:
         """
         if isinstance(blocks, Blocks):
             return blocks
-        several = not isinstance(blocks, (Block, str)) and isinstance(blocks, Iterable)
-        gathered = [one_block(block) for block in cast("Iterable[Block]", blocks if several else [blocks])]
-        gravities = {block.gravity for block in gathered}
+        several = not isinstance(blocks, (Block, RestrainedBlock, str)) and isinstance(blocks, Iterable)
+        gathered: list[Any] = [*cast("Iterable[Block]", blocks)] if several else [blocks]
+        free = True
+        for each in gathered:
+            if isinstance(each, RestrainedBlock):
+                free = free and not each.is_one_sided and each._terms == (Terms(), Terms())
+            else:
+                one_block(each)
+        gravities = {each.gravity for each in gathered}
         if len(gravities) != 1:
-            raise InvalidBlock("Blocks.of needs at least one block, and all of them under the same gravity")
-        table = np.array([[(side.p, side.alpha, side.restitution) for side in block.sides] for block in gathered])
-        p, alpha, restitution = table.transpose(2, 0, 1)
-        return _filled(cls.__new__(cls), gravities.pop(), p=p, alpha=alpha, restitution=restitution)
+            raise InvalidBlock("Blocks.of needs at least one block, and all of them under the same {}", "gravity")
+        table = np.array([_rows(each, free) for each in gathered]).transpose(2, 0, 1)
+        names = ("p", "alpha", "restitution", *_TERMS)[: len(table)]
+        return cls.__new__(cls)._fill(gravities.pop(), dict(zip(names, table, strict=True)))
+
+    @property
+    def kind(self) -> str:
+        """Name of the kind of bodies."""
+        return "restrained-blocks" if self.terms else "blocks"
+
+    def _arrays(self) -> dict[str, Floats]:
+        return {"p": self.p, "alpha": self.alpha, "restitution": self.restitution, **self.terms}
 
     def parameters(self) -> Mapping[str, tuple[Floats, str]]:
-        """Return p, alpha and restitution with their units, by name."""
-        return {"p": (self.p, "rad/s"), "alpha": (self.alpha, "rad"), "restitution": (self.restitution, "1")}
+        """Return p, alpha and restitution with their units, by name; of restrained blocks also the terms."""
+        return {name: (values, _UNITS.get(name, "1")) for name, values in self._arrays().items()}
 
     def speed_limits(self, share: float) -> Floats:
         """Return a share of p alpha on every side, rad/s, shape (n, 2)."""
@@ -202,7 +249,54 @@ class Blocks:
         made["limit"] = limits
         made["entered"] = (1, 0)
         made["fallen"] = 0.5 * math.pi
+        if self.terms:
+            self._add_terms(made, model)
         return made
+
+    def _add_terms(self, made: state.Records, model: Model) -> None:
+        """Add what restraints do to records of free blocks."""
+        term, p, sine, cosine = self.terms, self.p, made["sine"], made["cosine"]
+        one_way = term["one_sided"] > 0.0
+        made["entered"][one_way] = 0
+        made["threshold"][:, 1] = np.where(one_way[:, 1], math.inf, made["threshold"][:, 1])
+        made["least"], made["slope"] = term["restitution_least"], term["restitution_slope"]
+        made["seed"] = term["restitution_seed"][:, 0]
+        made["varying"] = (made["seed"] >= 0) | np.any(made["slope"] > 0.0, axis=1)
+        made["prestress"], made["spring"], made["damping"] = (
+            p * p * term["prestress"],
+            p * p * term["spring"],
+            term["damping"],
+        )
+        at_zero = term["sine"] * sine + term["cosine"] * cosine  # of the moment, and its slope by -u
+        slope = term["sine"] * cosine - term["cosine"] * sine
+        # A moment that only a tendon without prestress makes is zero there, whatever rounding says.
+        at_zero[np.abs(at_zero) <= 1e-14 * (np.abs(term["sine"] * sine) + np.abs(term["cosine"] * cosine))] = 0.0
+        across = 1.0 if model == "linear" else cosine  # of the gain over p^2
+        made["hold"] = (at_zero + term["prestress"]) / across
+        if model == "linear":
+            made["added_weight"], made["added_push"] = slope, at_zero - self.alpha * slope
+        else:
+            made["added_weight"], made["added_push"] = term["sine"], term["cosine"]
+        made["yielding"] = np.any(term["stiffness"] > 0.0, axis=1)
+        if np.any(made["yielding"]):  # elastic as such a tendon is at first
+            for name, field in (
+                ("weight", "added_weight"),
+                ("push", "added_push"),
+                ("prestress", "prestress"),
+                ("hold", "hold"),
+            ):
+                made[f"base_{name}"] = made[field]
+            made["tendon"] = p * p * term["stiffness"]
+            made["opening"], made["yields"], made["slack"] = term["opening"], term["yields"][:, 0], term["slack"][:, 0]
+            stiff, at_rest = term["stiffness"] * term["opening"], -term["stiffness"] * term["slack"]
+            made["tendon_weight"] = -stiff * (1.0 if model == "linear" else cosine)
+            made["tendon_push"] = stiff * (self.alpha if model == "linear" else sine)
+            made["added_weight"] += made["tendon_weight"]
+            made["added_push"] += made["tendon_push"]
+            made["prestress"] += p * p * at_rest
+            made["hold"] += at_rest / across
+        names = ("hold", "added_weight", "added_push", "prestress", "spring", "damping", "tendon")
+        made["restrained"] = np.any([np.any(made[name] != 0.0, axis=1) for name in names], axis=0)
 
     @property
     def stops(self) -> Floats:
@@ -211,39 +305,51 @@ class Blocks:
 
     @property
     def is_symmetric(self) -> bool:
-        """Whether both sides of every block are equal."""
-        return all(np.array_equal(values[:, 0], values[:, 1]) for values, _ in self.parameters().values())
+        """Whether both sides of every block are equal, and it rocks to both."""
+        even = all(np.array_equal(values[:, 0], values[:, 1]) for values in self._arrays().values())
+        return even and not np.any(self.terms.get("one_sided", 0.0))
 
     def __repr__(self) -> str:
         if not len(self):
             return "<Blocks: none>"
         ranges = [
-            f"{name} {range_text(values)}{'' if unit == '1' else f' {unit}'}"
-            for name, (values, unit) in self.parameters().items()
+            f"{name} {range_text(values)}{'' if name == 'restitution' else f' {_UNITS[name]}'}"
+            for name, values in (("p", self.p), ("alpha", self.alpha), ("restitution", self.restitution))
         ]
-        return f"<Blocks: {len(self)}; {', '.join(ranges)}>"
+        return f"<Blocks: {len(self)}; {', '.join(ranges)}{', restrained' if self.terms else ''}>"
 
     def __len__(self) -> int:
         return len(self.p)
 
-    def __getitem__(self, index: int) -> Block:
+    def __getitem__(self, index: int) -> Block | RestrainedBlock:
         if isinstance(index, (slice, tuple, list, np.ndarray)):
             raise InvalidBlock("blocks[index] takes one whole number; use blocks.select for slices, indices and masks")
-        p, alpha, e = (array[index] for array in (self.p, self.alpha, self.restitution))
-        return Block.from_parameters(tuple(p), tuple(alpha), tuple(e), gravity=self.gravity)
+        p, alpha, e = (tuple(array[index]) for array in (self.p, self.alpha, self.restitution))
+        block = Block.from_parameters(p, alpha, e, gravity=self.gravity)
+        terms, one_way = [Terms(), Terms()], False
+        if self.terms:
+            terms = [Terms(*(float(self.terms[name][index, side]) for name in Terms._fields)) for side in range(2)]
+            one_way = bool(self.terms["one_sided"][index, 0])
+        if not one_way and terms == [Terms(), Terms()]:
+            return block
+        text = "block with restraints" + ", rocking one way" * one_way
+        return RestrainedBlock.__new__(RestrainedBlock)._fill(block, terms, one_way, (text, text), None, 0.0)
 
-    def __iter__(self) -> Iterator[Block]:
+    def __iter__(self) -> Iterator[Block | RestrainedBlock]:
         return (self[index] for index in range(len(self)))
 
     def select(self, index: slice | NDArray[np.int64] | NDArray[np.bool_]) -> Blocks:
         """Return some of the blocks: a slice, indices, or a mask."""
         if not isinstance(index, slice):
             index = self._indices(index)
-        chosen = {name: values[index] for name, (values, _) in self.parameters().items()}
-        return _filled(Blocks.__new__(Blocks), self.gravity, **chosen)
+        chosen = {name: values[index] for name, values in self._arrays().items()}
+        return Blocks.__new__(Blocks)._fill(self.gravity, chosen)
 
     def resized(self, factors: Floats) -> Blocks:
         """Return blocks of the same shapes whose p is so many times theirs.
+
+        Lengths are then divided by the square of the factor, and forces of restraints keep their ratio to the weight:
+        of a tendon prestress, strength and stiffness times length, so that its strain at yield is the same, too.
 
         Parameters
         ----------
@@ -260,7 +366,9 @@ class Blocks:
         >>> Blocks(p=[1.0, 2.0], alpha=0.2).resized(np.array([2.0, 0.5])).p[:, 0].tolist()
         [2.0, 1.0]
         """
-        return Blocks(self.p * factors[:, None], self.alpha, self.restitution, gravity=self.gravity)
+        by = factors[:, None]
+        terms = {name: values * by ** _POWERS.get(name, 0) for name, values in self.terms.items()}
+        return Blocks(self.p * by, self.alpha, self.restitution, gravity=self.gravity, **terms)
 
     def _indices(self, index: NDArray[np.int64] | NDArray[np.bool_]) -> NDArray[np.int64]:
         """Positions of the blocks of a flat array of indices, or of a mask."""
@@ -277,14 +385,16 @@ class Blocks:
         return chosen
 
 
-def _filled(blocks: Blocks, gravity: float, **sides: Floats) -> Blocks:
-    """Fill in what blocks are, sound values of shape (n, 2) that nobody can change then, and return them."""
-    object.__setattr__(blocks, "gravity", gravity)
-    for name, values in sides.items():
-        held = np.ascontiguousarray(values)
-        held.flags.writeable = False
-        object.__setattr__(blocks, name, held)
-    return blocks
+def _rows(body: Block | RestrainedBlock, free: bool) -> list[tuple[float, ...]]:
+    """Parameters of both sides of a block, and unless it is free their terms."""
+    block, terms, one_way = body, (Terms(), Terms()), False
+    if isinstance(body, RestrainedBlock):
+        block, terms, one_way = body.block, body._terms, body.is_one_sided
+    rows = [
+        (side.p, side.alpha, side.restitution, *(() if free else (*term, float(one_way))))
+        for side, term in zip(block.sides, terms, strict=True)
+    ]
+    return rows[:1] * 2 if one_way else rows
 
 
 def rates_of(p: ArrayLike | None, size: ArrayLike | None, gravity: float) -> ArrayLike:
@@ -325,4 +435,4 @@ def _conserved(p: Floats, alpha: Floats) -> Floats:
     return checked_sides(kept, "restitution")
 
 
-KINDS[Blocks.kind] = Blocks
+KINDS["blocks"] = KINDS["restrained-blocks"] = Blocks
