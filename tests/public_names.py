@@ -25,6 +25,7 @@ PROTOCOLS: dict[Any, tuple[Any, ...]] = {
     rocking.Blocks: (Bodies,),
     rocking.RestrainedBlock: (Body,),
     rocking.RestrainedBlocks: (Bodies,),
+    rocking.dynamics.LinearBodies: (Bodies,),
 }
 
 #: Checks of numpydoc: form and order of sections; parameters, returns and yields without a name, a type or a word.
