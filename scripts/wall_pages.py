@@ -5,18 +5,15 @@ Run ``python scripts/wall_pages.py`` from the repository's root (a minute); the 
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pages import write
 
 import rocking
 from rocking import Block, RestrainedBlock, Tendon, Thrust
 from rocking.plot.canvas import ABOVE, CURVES, GROUND, INK, add_labels, add_legend, figure_for, handles_of
 
-IMAGES = Path(__file__).resolve().parents[1] / "docs" / "_static"
-DOTS_PER_INCH = 110
 G = 9.80665
 
 #: A strip of a facade, 1 m long, and the thrusts of a vault on it, N.
@@ -31,17 +28,6 @@ BODIES: dict[str, Any] = {
     "prestress alone, 30 kN": RestrainedBlock(COLUMN, Tendon(0.0, prestress=3e4)),
 }
 FREQUENCIES = np.geomspace(0.2, 1.6, 25)
-
-
-def main() -> None:
-    """Write all images."""
-    for name, figure in {
-        "facade.png": facade_figure(),
-        "tendons.png": tendon_figure(),
-        "yielding-tendon.png": yielding_figure(),
-    }.items():
-        figure.savefig(IMAGES / name, dpi=DOTS_PER_INCH, pil_kwargs={"optimize": True})
-        sys.stdout.write(f"{IMAGES / name}: {(IMAGES / name).stat().st_size // 1000} kB\n")
 
 
 def facade(thrust):
@@ -127,4 +113,5 @@ def tension(tendon, rotation):
 
 
 if __name__ == "__main__":
-    main()
+    figures = {"facade": facade_figure, "tendons": tendon_figure, "yielding-tendon": yielding_figure}
+    write({}, ((f"{name}.png", draw()) for name, draw in figures.items()))

@@ -36,7 +36,7 @@ import rocking
 from rocking.progress import Progress
 
 ROOT = Path(__file__).resolve().parents[1]
-LIBRARIES = ("numpy", "numba", "scipy", "python-flint", "heyoka")
+LIBRARIES = ("numpy", "numba", "scipy", "python-flint")
 STOPPED = 130
 #: What the overview shows of a promise.
 _SHOWN = ("parts", "cases", "judged", "failures", "worst", "seconds")

@@ -24,6 +24,7 @@ PROTOCOLS: dict[Any, tuple[Any, ...]] = {
     rocking.Block: (Body,),
     rocking.Blocks: (Bodies,),
     rocking.RestrainedBlock: (Body,),
+    rocking.dynamics.LinearBodies: (Bodies,),
 }
 
 #: Checks of numpydoc: form and order of sections; parameters, returns and yields without a name, a type or a word.

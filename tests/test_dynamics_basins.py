@@ -7,8 +7,8 @@ import pytest
 from numpy.random import default_rng
 
 from rocking import Block, InvalidMotion, InvalidOption, dynamics, pulses
-from rocking.dynamics import basin_grid
-from rocking.dynamics.attractors import Known
+from rocking.dynamics import basin_maps
+from rocking.dynamics.attractors import KnownAttractors
 from rocking.dynamics.bifurcation import period_of, settled_states
 
 BLOCK = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
@@ -101,10 +101,10 @@ def test_the_order_of_work_and_threads_do_not_count():
 
 @pytest.mark.thorough
 def test_an_interrupt_keeps_what_was_computed(monkeypatch):
-    monkeypatch.setattr(basin_grid, "_COARSEST", 100)  # A small grid, too, then has three passes.
+    monkeypatch.setattr(basin_maps, "_COARSEST", 100)  # A small grid, too, then has three passes.
     x, v = np.linspace(-0.2, 0.2, 44), np.linspace(-0.4, 0.4, 44)
     whole = dynamics.basins(BLOCK, SHAKING, x, v)
-    follow, calls = basin_grid.Grid._follow, []
+    follow, calls = basin_maps._Grid._follow, []
 
     def interrupted(self, cells):
         calls.append(len(cells))
@@ -112,7 +112,7 @@ def test_an_interrupt_keeps_what_was_computed(monkeypatch):
             raise KeyboardInterrupt
         follow(self, cells)
 
-    monkeypatch.setattr(basin_grid.Grid, "_follow", interrupted)
+    monkeypatch.setattr(basin_maps._Grid, "_follow", interrupted)
     part = dynamics.basins(BLOCK, SHAKING, x, v)
     reached = part.data.outcome.values >= 0
     assert 400 < np.count_nonzero(reached) == sum(calls[:2]) < reached.size
@@ -130,12 +130,12 @@ def test_a_state_at_any_point_of_a_long_orbit_has_settled_on_it():
     kept = settled_states(strobe, states, 400, 64)
     periods = [period_of(each) for each in kept]
     assert sorted(set(periods)) == [4, 23]
-    known = Known(strobe, np.array([0.1, 0.4]))
+    known = KnownAttractors(strobe, np.array([0.1, 0.4]))
     owners = known.settle(kept[:, -1])
     assert [each.period for each in known.attractors] in ([4, 23], [23, 4])
     assert [known.attractors[owner].period for owner in owners] == periods
     on = kept[periods.index(23)][:23]
-    assert np.count_nonzero(known.owners(on) == -1) > Known.MOST_TRIES
+    assert np.count_nonzero(known.owners(on) == -1) > KnownAttractors.MOST_TRIES
     assert set(known.settle(on).tolist()) == {owners[periods.index(23)]} and len(known.attractors) == 2
 
 
@@ -168,7 +168,7 @@ def test_a_neighbourhood_holds_what_enters_it():
     for seed in (0, 2, 3, 4):
         body, motion, (low, high), model = drawn(seed)
         strobe = dynamics.stroboscopic_map(body, motion, model=model)
-        known = Known(strobe, np.array([np.ptp(low), np.ptp(high)]))
+        known = KnownAttractors(strobe, np.array([np.ptp(low), np.ptp(high)]))
         ends, fates, _ = strobe.followed(default_rng(seed).uniform(*np.transpose([low, high]), (20, 2)), 300)
         known.settle(ends[fates != dynamics.Fate.OVERTURNED])
         for trap, owner in zip(known.traps, known.owner, strict=True):
@@ -240,5 +240,5 @@ def test_an_attractor_that_rests_at_the_start_of_a_period_is_known_after_one():
 
 
 def test_attractors_of_one_name_are_told_apart_by_letters():
-    assert basin_grid._distinct(["orbit", "rest", "orbit", "orbit"]) == ["orbit (a)", "rest", "orbit (b)", "orbit (c)"]
-    assert basin_grid._distinct(["orbit"] * 28)[25:] == ["orbit (z)", "orbit (27)", "orbit (28)"]
+    assert basin_maps._distinct(["orbit", "rest", "orbit", "orbit"]) == ["orbit (a)", "rest", "orbit (b)", "orbit (c)"]
+    assert basin_maps._distinct(["orbit"] * 28)[25:] == ["orbit (z)", "orbit (27)", "orbit (28)"]

@@ -9,9 +9,9 @@ from oracles import closed_orbits
 from scipy.optimize import brentq
 
 from rocking import Block, VelocityThreshold, dynamics, pulses, simulate
-from rocking.dynamics.courses import Course
-from rocking.dynamics.locating import _reason
-from rocking.dynamics.orbit_equations import Kind, _kind_of
+from rocking.dynamics.continuation import reason_of_end
+from rocking.dynamics.orbit_equations import Kind, kind_of
+from rocking.dynamics.orbits import OrbitTrajectory
 
 G = 10.0
 TABLE = 5.0  # Hz
@@ -131,11 +131,11 @@ def test_a_branch_beyond_which_nothing_can_be_followed_is_lost_and_does_not_over
     falls = dynamics.stroboscopic_map(block, pulses.sine(20.0, 0.5, cycles=1))
     judged = 0
     for reason, strobe, state in (("lost", lively, [0.0, 1e-5]), ("overturning", falls, [0.1, 0.2])):
-        kind = _kind_of(strobe, np.array(state), 1)
+        kind = kind_of(strobe, np.array(state), 1)
         before = Kind(rests=False, for_ever=False, impacts=1, overturns=False, unknown=False)
         equations = SimpleNamespace(kind=before, sizes=np.ones(3), kind_at=lambda z, kind=kind: kind)
-        here = SimpleNamespace(equations=equations, course=Course(1.0, 1.0, 1.0, np.empty(0)), tangent=np.ones(3))
-        assert _reason(here, np.zeros(3)) == reason
+        trajectory = OrbitTrajectory(1.0, 1.0, 1.0, np.empty(0))
+        assert reason_of_end(equations, trajectory, np.zeros(3), np.ones(3)) == reason
         judged += 1
     assert judged == 2
 

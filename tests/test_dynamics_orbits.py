@@ -10,7 +10,7 @@ from oracles import closed_orbits
 
 from rocking import Block, InvalidMotion, InvalidOption, dynamics, pulses, records
 from rocking.chattering import critical_amplitude
-from rocking.dynamics.symmetry import distances
+from rocking.dynamics.maps import distances
 
 G = 10.0
 TABLE = 5.0  # Hz

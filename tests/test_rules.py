@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import rules_trial
+from pages import DOCS
 from scipy.integrate import quad
 
 import rocking
@@ -208,7 +209,7 @@ def test_white_noise_at_housners_ratio_does_not_overturn_one_block_in_two():
 @pytest.mark.slow
 def test_the_table_of_white_noises_is_that_which_the_script_makes():
     made = rules_trial.noise_table(rules_trial.overturned_by_noise(range(rules_trial.NOISES)))
-    kept = (rules_trial.TABLES / "rules-noise.txt").read_text("utf-8")
+    kept = (DOCS / "_tables" / "rules-noise.txt").read_text("utf-8")
     assert NUMBER.sub("#", made) == NUMBER.sub("#", kept)
     # Some responses are ambiguous: the last digit of another platform may let another noise overturn the block.
     for now, before in zip(NUMBER.findall(made), NUMBER.findall(kept), strict=True):
@@ -222,7 +223,7 @@ def test_the_tables_of_the_trial_are_those_that_the_script_makes():
     verdicts = rules_trial.verdict_table(blocks, motions, ratios, rules_trial.simulated_verdicts(blocks, motions))
     capacities = rules_trial.capacity_table(ratios, rules_trial.simulated_capacities(blocks, motions))
     for name, made, share in (("verdicts", verdicts, 0.11), ("capacities", capacities, 0.021)):
-        kept = (rules_trial.TABLES / f"rules-{name}.txt").read_text("utf-8")
+        kept = (DOCS / "_tables" / f"rules-{name}.txt").read_text("utf-8")
         assert NUMBER.sub("#", made) == NUMBER.sub("#", kept)
         # Of 7,200 responses 248 are ambiguous: the last digit of another platform may let a few more fall.
         numbers = [*zip(NUMBER.findall(made), NUMBER.findall(kept), strict=True)]

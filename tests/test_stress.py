@@ -16,9 +16,7 @@ FOLDER = Path(__file__).parents[1] / "stress"
     [
         ("kills.py", ["--kills", "20"], "studies with the one digest"),
         ("damage.py", ["--trials", "40"], "unit: reported by verify"),
-        ("cost.py", ["--simulations", "20000", "--repeats", "1", "--units", "1000"], "1000 units: opened in"),
         ("walls.py", ["--pairs", "50"], "of processor time, seed 1"),
-        ("museum.py", ["--motions", "12", "--blocks", "50"], "fragility of 50 blocks"),
     ],
 )
 def test_a_trial_finds_what_is_promised(tmp_path, program, arguments, says):

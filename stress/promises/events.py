@@ -1,4 +1,4 @@
-"""Adversarial uplifts and impacts against exact answers in 50 digits; SciPy and heyoka locate events of the same cases.
+"""Adversarial uplifts and impacts against exact answers in 50 digits; SciPy locates events of the same cases.
 
 Each case asks when something first happens within a time, if it does: an uplift where the motion passes a threshold,
 or an impact where an arc comes down to the ground. Each kind is as near as double precision lets it be to not
@@ -7,7 +7,6 @@ happening, to happening twice, or to nothing at all.
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -28,7 +27,7 @@ UNDECIDED = 2.0**-47
 #: Errors of times, in units in the last place of what they come from, over the slope there.
 UNITS = 16.0
 
-#: Times of other solvers count as off beyond this, s: a hundred times the tolerance that SciPy was given.
+#: Times of SciPy count as off beyond this, s: a hundred times the tolerance that SciPy was given.
 LATE = 1e-8
 
 #: Of whatever types.
@@ -261,13 +260,6 @@ def by_scipy(asked: Question) -> list[float]:
     return found
 
 
-SOLVERS: dict[str, Callable[[Question], list[float]]] = {"SciPy": by_scipy}
-if importlib.util.find_spec("heyoka"):
-    from promises.by_heyoka import by_heyoka
-
-    SOLVERS["heyoka"] = by_heyoka
-
-
 def judge(part: int) -> Found:
     """Judge the cases of a part, of every kind."""
     found = Found(parts=1)
@@ -287,10 +279,8 @@ def judge(part: int) -> Found:
                     found.notes[f"{name}: {wrong}"] += 1
                     told = f"{times}, true {[float(t) for t in asked.true]}, margin {asked.margin:g}"
                     found.fail(f"{name}, case {number}: {wrong} at {told}")
-                for solver, answer in SOLVERS.items():
-                    theirs = _wrong(asked, answer(asked), limit=LATE / asked.known)
-                    found.notes[f"{name}: {solver} asked"] += 1
-                    found.notes[f"{name}: {solver} {theirs}"] += theirs != ""
+                theirs = _wrong(asked, by_scipy(asked), limit=LATE / asked.known)
+                found.notes[f"{name}: SciPy {theirs}"] += theirs != ""
     return found
 
 
@@ -311,14 +301,13 @@ def _wrong(asked: Question, times: list[float], limit: float) -> str:
 
 def table(found: Found) -> str:
     """Scores by kind: missed, spurious and off, of the package and of others."""
-    heads = ("kind", "cases", "undecided", "not told", "rocking", "SciPy", "heyoka")
+    heads = ("kind", "cases", "undecided", "not told", "rocking", "SciPy")
     lines = ["| " + " | ".join(heads) + " |", "|---" + "|--:" * (len(heads) - 1) + "|"]
     for name in KINDS:
         cells = [str(found.notes[f"{name}: {head}"]) for head in heads[1:4]]
-        for solver in ("", "SciPy ", "heyoka "):
-            asked = not solver or found.notes[f"{name}: {solver}asked"]
-            score = " / ".join(str(found.notes[f"{name}: {solver}{wrong}"]) for wrong in ("missed", "spurious", "off"))
-            cells.append(score if asked else "not there")
+        for solver in ("", "SciPy "):
+            score = (str(found.notes[f"{name}: {solver}{wrong}"]) for wrong in ("missed", "spurious", "off"))
+            cells.append(" / ".join(score))
         lines.append("| " + " | ".join([name, *cells]) + " |")
     return "\n".join(lines) + "\n"
 

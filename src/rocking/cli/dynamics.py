@@ -20,10 +20,9 @@ from rocking.dynamics.basin_maps import basins
 from rocking.dynamics.bifurcation import Direction, bifurcation_diagram
 from rocking.dynamics.branches import Branch
 from rocking.dynamics.continuation import continue_orbit
+from rocking.dynamics.forcing import scale_of
 from rocking.dynamics.maps import stroboscopic_map
-from rocking.dynamics.orbit_search import periodic_orbits
-from rocking.dynamics.orbits import PeriodicOrbit
-from rocking.dynamics.repeated import scale_of
+from rocking.dynamics.orbits import PeriodicOrbit, periodic_orbits
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.named_pulses import PulseFamily, pulse_values

@@ -1,14 +1,11 @@
 from .basin_maps import Basins, basin_entropy, basins
 from .bifurcation import BifurcationDiagram, bifurcation_diagram
-from .bodies import BouncingBall, ImpactOscillator, InvertedPendulum
+from .bodies import BouncingBall, ImpactOscillator, InvertedPendulum, Law, LinearBodies
 from .branches import Bifurcation, Branch
 from .continuation import continue_orbit
 from .exponents import LyapunovExponents, lyapunov_exponents
-from .impact_maps import ImpactMap, impact_map
-from .linear_bodies import Law, LinearBodies
-from .maps import Fate, StroboscopicMap, stroboscopic_map
-from .orbit_search import periodic_orbits
-from .orbits import PeriodicOrbit
+from .maps import Fate, ImpactMap, StroboscopicMap, impact_map, stroboscopic_map
+from .orbits import PeriodicOrbit, periodic_orbits
 from .simulation import Response, simulate, simulate_many
 
 __all__ = [

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.arrays import Flags, Floats, Integers, evenly
+from rocking.dynamics.forcing import parts_of
 from rocking.dynamics.maps import StroboscopicMap
 from rocking.dynamics.orbits import multipliers_at, sizes_of
-from rocking.dynamics.repeated import parts_of
 from rocking.errors import InvalidOption
 from rocking.kernels.periodic import TRAP, settle
 from rocking.kernels.state import Records, new_scratch
@@ -222,7 +222,7 @@ def _stays(
     return bool(same_side and np.all(impacts == attractor.impacts) and np.all(norms <= rate))
 
 
-class Known:
+class KnownAttractors:
     """Attractors that are known so far, and their traps.
 
     Attributes

@@ -2,33 +2,46 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rocking import checks
+from rocking.arrays import Floats, Integers
 from rocking.body import Body
-from rocking.constants import Model
-from rocking.dynamics.basin_grid import NAMES, NOT_REACHED, Grid
+from rocking.constants import VERSION, Model
+from rocking.dynamics.attractors import KnownAttractors
+from rocking.dynamics.forcing import described, parts_of, scale_of, sensible
 from rocking.dynamics.maps import StroboscopicMap
-from rocking.dynamics.repeated import sensible
 from rocking.errors import InvalidOption
+from rocking.kernels import state
+from rocking.kernels.periodic import Fate, settle
 from rocking.motion.motion import Motion
-from rocking.progress import note
-from rocking.result import DatasetResult
+from rocking.progress import Progress, note
+from rocking.result import DatasetResult, variable
 from rocking.tables import as_written, counted, text_table
-from rocking.threads import cores
+from rocking.threads import cores, in_threads
 from rocking.treatment import Treatment
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 #: Cells along each side of a box for the basin entropy.
 _BOX: Final = 5
+
+#: What a cell is, before attractors are sorted: 3 + k belongs to attractor k.
+_NOT_REACHED, _TO_PLUS, _TO_MINUS, _UNSETTLED, _FIRST = -1, 0, 1, 2, 3
+_NAMES: Final = ("overturns to side +", "overturns to side -", "not settled")
+
+#: Cells of the coarsest pass, at least, and cells between two looks for attractors.
+_COARSEST: Final = 400
+_BATCH: Final = 16_384
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -76,7 +89,7 @@ class Basins(DatasetResult):
         cells = data.outcome.size
         head = f"basins of {data.body} under {data.motion}: {cells} cells, {counted(data.most_periods, 'period')}"
         text = [head, "", text_table(["attractor", "share", "standard error", "multiplier"], rows)]
-        missing = int(np.count_nonzero(data.outcome.values == NOT_REACHED))
+        missing = int(np.count_nonzero(data.outcome.values == _NOT_REACHED))
         if missing:
             return "\n".join([*text, f"not reached before an interrupt: {missing} cells"])
         whole, boundary = self.entropy
@@ -87,7 +100,7 @@ class Basins(DatasetResult):
 
     def to_dict(self) -> dict[str, Any]:
         data = self.data
-        complete = not np.any(data.outcome.values == NOT_REACHED)
+        complete = not np.any(data.outcome.values == _NOT_REACHED)
         whole, boundary = self.entropy if complete else (np.nan, np.nan)
         names = self.TABLES["attractors"]
         return {
@@ -123,7 +136,7 @@ class Basins(DatasetResult):
             y=v.values,
             outcome=data.outcome.values,
             names=names,
-            kinds=["overturns" if n in NAMES[:2] else "unsettled" if n == NAMES[2] else "orbit" for n in names],
+            kinds=["overturns" if n in _NAMES[:2] else "unsettled" if n == _NAMES[2] else "orbit" for n in names],
             orbits=np.stack([data.orbit_coordinate.values, data.orbit_velocity.values], axis=-1),
             x_label=f"{x.name} at the start of a period ({x.units})",
             y_label=f"{str(v.name).replace('_', ' ')} ({v.units})",
@@ -163,10 +176,8 @@ def basins(
         As for `stroboscopic_map`.
     chattering : str or treatment
         As for `rocking.simulate`.
-    threads : int, optional
-        Number of threads; by default one for every core.
-    progress : bool, optional
-        Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
+    threads, progress : int or bool, optional
+        As for `rocking.simulate_many`.
 
     Returns
     -------
@@ -212,11 +223,11 @@ def basins(
     checks.grid_size({"positions": len(x), "velocities": len(v)}, InvalidOption)
     most = checks.whole(periods, "periods", InvalidOption, least=1)
     count = None if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
-    work = Grid(strobe, x, v, most, cores() if count is None else count)
+    work = _Grid(strobe, x, v, most, cores() if count is None else count)
     try:
         work.run(progress)
     except KeyboardInterrupt:
-        if np.all(work.outcome == NOT_REACHED):
+        if np.all(work.outcome == _NOT_REACHED):
             raise
         note("interrupted: the basins hold the cells that were reached")
     return Basins(work.dataset())
@@ -260,7 +271,9 @@ def basin_entropy(outcomes: ArrayLike, box: int = 5) -> tuple[float, float]:
     >>> [round(value, 12) for value in dynamics.basin_entropy(outcomes, box=4)]
     [0.69314718056, 0.69314718056]
     """
-    grid = _grid(outcomes)
+    grid = np.asarray(outcomes)
+    if grid.ndim != 2 or grid.size == 0 or grid.dtype.kind not in "iub":
+        raise InvalidOption("{} must be a grid of whole numbers", "outcomes")
     side = checks.whole(box, "box", InvalidOption, least=2)
     rows, columns = (length // side for length in grid.shape)
     if rows * columns == 0:
@@ -272,8 +285,129 @@ def basin_entropy(outcomes: ArrayLike, box: int = 5) -> tuple[float, float]:
     return float(entropies.mean()), float(entropies[mixed].mean()) if mixed.any() else 0.0
 
 
-def _grid(outcomes: ArrayLike) -> NDArray[np.int64]:
-    grid = np.asarray(outcomes)
-    if grid.ndim != 2 or grid.size == 0 or grid.dtype.kind not in "iub":
-        raise InvalidOption("{} must be a grid of whole numbers", "outcomes")
-    return grid.astype(np.int64)
+class _Grid:
+    """Cells of a grid, coarse to fine, with the attractors that are known so far."""
+
+    def __init__(self, strobe: StroboscopicMap, x: Floats, v: Floats, periods: int, threads: int) -> None:
+        self.strobe, self.x, self.v, self.periods, self.threads = strobe, x, v, periods, threads
+        # What becomes of a small grid's states is as large as that of others: to compare them more closely than by
+        # rounding would find no attractor.
+        self.size = np.maximum([float(np.ptp(each) or abs(each[0]) or 1.0) for each in (x, v)], scale_of(strobe))
+        self.outcome = np.full(len(x) * len(v), _NOT_REACHED, dtype=np.int16)
+        self.taken = np.zeros(len(x) * len(v), dtype=np.int32)
+        self.known = KnownAttractors(strobe, self.size)
+        corners = self._states(np.array([0, len(x) * len(v) - 1]))
+        strobe._states(corners, "positions", "velocities")  # a start behind a stop, or into one, is refused at once
+
+    def run(self, progress: bool | None) -> None:
+        """Follow all cells."""
+        with Progress("basins", self.outcome.size, show=progress) as bar:
+            for cells in self._batches():
+                self._follow(cells)
+                bar.advance(len(cells))
+
+    def _batches(self) -> Iterator[Integers]:
+        """Cells, coarse to fine."""
+        stride = 1
+        while self.outcome.size // (4 * stride * stride) >= _COARSEST:
+            stride *= 2
+        row, column = (each.ravel() for each in np.indices((len(self.v), len(self.x))))
+        level = np.zeros(self.outcome.size, dtype=np.int64)
+        first = stride
+        while stride > 1:
+            stride //= 2
+            level[(row % (2 * stride) != 0) | (column % (2 * stride) != 0)] += 1
+        for pass_ in range(int(np.log2(first)) + 1):
+            # Those of a pass in a mixed order: what an interrupt leaves out is then left out all over the grid.
+            cells = np.random.default_rng(pass_).permutation(np.flatnonzero(level == pass_))
+            for start in range(0, len(cells), _BATCH):
+                yield cells[start : start + _BATCH]
+
+    def _states(self, cells: Integers) -> Floats:
+        row, column = np.divmod(cells, len(self.x))
+        return np.stack([self.x[column], self.v[row]], axis=-1)
+
+    def _follow(self, cells: Integers) -> None:
+        strobe = self.strobe
+        _, made = strobe._states(self._states(cells))
+        found, taken = np.empty(len(cells), dtype=np.int64), np.empty(len(cells), dtype=np.int64)
+        setting, traps = strobe._setting(), self.known.traps
+
+        def settled(part: slice) -> None:
+            settle(setting, state.new_scratch(), made[part], self.periods, traps, found[part], taken[part])
+
+        for _ in in_threads(settled, parts_of(len(cells), self.periods), threads=self.threads):
+            pass
+        outcome = np.full(len(cells), _UNSETTLED)
+        inside = found >= 0
+        outcome[inside] = _FIRST + self.known.owner[found[inside]]
+        over = made["ending"] == Fate.OVERTURNED
+        outcome[over] = np.where(made["side"][over] > 0, _TO_MINUS, _TO_PLUS)
+        left = np.flatnonzero(~inside & ~over & (made["ending"] != Fate.UNFINISHED))
+        ends = strobe._coordinates(made["u"][left], made["v"][left], made["side"][left])
+        later = self.known.settle(ends)
+        outcome[left] = np.where(later >= 0, _FIRST + later, _UNSETTLED)
+        self.taken[cells], self.outcome[cells] = taken, outcome
+
+    def dataset(self) -> xr.Dataset:
+        """Everything that was found, attractors in the order of their shares, then what is none."""
+        import xarray as xr
+
+        found, counts = np.unique(self.outcome[self.outcome != _NOT_REACHED], return_counts=True)
+        total = counts.sum()
+        order = sorted(zip(found.tolist(), counts.tolist(), strict=True), key=lambda each: (each[0] < _FIRST, -each[1]))
+        numbers, share = [number for number, _ in order], np.array([count for _, count in order]) / total
+        orbits = [self.known.attractors[n - _FIRST] if n >= _FIRST else None for n in numbers]
+        names = [_NAMES[n] if orbit is None else orbit.name for n, orbit in zip(numbers, orbits, strict=True)]
+        place = np.full(_FIRST + len(self.known.attractors) + 1, -1, dtype=np.int16)
+        place[numbers] = np.arange(len(numbers))
+        points = np.full((len(orbits), max([1, *(each.period for each in orbits if each is not None)]), 2), np.nan)
+        about: list[tuple[int, int, bool, float]] = []
+        for k, orbit in enumerate(orbits):
+            if orbit is None:
+                about.append((0, -1, False, np.nan))
+                continue
+            points[k, : orbit.period] = orbit.states
+            about.append((orbit.period, orbit.impacts, orbit.rests, float(np.abs(orbit.multipliers).max())))
+        period, impacts, rests, multiplier = map(list, zip(*about, strict=True))
+        error = np.sqrt(share * (1.0 - share) / total)
+        coordinate = self.strobe.body.coordinate
+        at, rate, unit = coordinate.name, coordinate.rate, coordinate.unit
+        cells, shape = (rate, at), (len(self.v), len(self.x))
+        return xr.Dataset(
+            {
+                "outcome": variable(cells, place[self.outcome].reshape(shape), "number of the attractor, or -1"),
+                "periods": variable(cells, self.taken.reshape(shape), "periods until the outcome was known"),
+                "share": variable("attractor", share, "share of the cells", "1"),
+                "standard_error": variable("attractor", error, "of the share, as of random states", "1"),
+                "period": variable("attractor", period, "periods of the motion"),
+                "impacts": variable("attractor", impacts, "impacts in a period of the orbit"),
+                "rests": variable("attractor", rests, "has a rest"),
+                "multiplier": variable("attractor", multiplier, "largest multiplier in size", "1"),
+                "orbit_coordinate": variable(("attractor", "phase"), points[..., 0], f"{at} on the orbit", unit),
+                "orbit_velocity": variable(("attractor", "phase"), points[..., 1], "rate on the orbit", f"{unit}/s"),
+            },
+            {
+                rate: variable(rate, self.v, "velocity at the start of a period", f"{unit}/s"),
+                at: variable(at, self.x, f"{at} at the start of a period", unit),
+                "attractor": _distinct(names),
+            },
+            {
+                "program": f"rocking {VERSION}",
+                "body": described(self.strobe.body),
+                "motion": described(self.strobe.motion),
+                "model": self.strobe.model,
+                "most_periods": self.periods,
+                "period_s": self.strobe.period,
+            },
+        )
+
+
+def _distinct(names: list[str]) -> list[str]:
+    """Return names of which no two are equal: a letter behind each of those that were."""
+    seen: dict[str, int] = {}
+    found = []
+    for name in names:
+        k = seen[name] = seen.get(name, 0) + 1
+        found.append(f"{name} ({chr(ord('a') + k - 1) if k <= 26 else k})" if names.count(name) > 1 else name)
+    return found

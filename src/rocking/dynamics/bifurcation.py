@@ -15,10 +15,10 @@ from rocking.arrays import Floats, Integers
 from rocking.body import Body
 from rocking.constants import VERSION, Model
 from rocking.dynamics.attractors import RETURN
-from rocking.dynamics.linear_bodies import LinearBody
+from rocking.dynamics.bodies import LinearBody
+from rocking.dynamics.forcing import Scale, described, scale_of
 from rocking.dynamics.maps import Fate, StroboscopicMap, stroboscopic_map
 from rocking.dynamics.orbits import impacts_of
-from rocking.dynamics.repeated import Scale, described, scale_of
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.progress import Progress

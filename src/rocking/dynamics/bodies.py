@@ -1,17 +1,196 @@
-"""The kinds of bodies on a line: a ball, an oscillator and a pendulum. What differs is the sign of the stiffness."""
+"""Bodies on a line between stops: a ball, an oscillator and a pendulum.
+
+They share x'' = stiffness x - damping x' - pull - a(t): position and motion are those of the table or the support, and
+at a stop the velocity changes its sign and drops by the restitution.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
 
 from rocking import checks
-from rocking.body import KINDS
-from rocking.constants import STANDARD_GRAVITY
-from rocking.dynamics.linear_bodies import Law, LinearBody, MakerOfKind
-from rocking.errors import InvalidBlock
+from rocking.arrays import Floats, Integers
+from rocking.body import KINDS, Coordinate
+from rocking.constants import STANDARD_GRAVITY, Model
+from rocking.errors import InvalidBlock, InvalidOption
+from rocking.kernels import state
+
+
+class Law(NamedTuple):
+    """Equation of motion of a body: stiffness (1/s^2), damping (1/s), pull (m/s^2), stops (m), the last one or inf."""
+
+    stiffness: float
+    damping: float
+    pull: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class LinearBody(ABC):
+    """What the kinds share: what `rocking.Body` asks of them."""
+
+    coordinate: ClassVar[Coordinate] = Coordinate("position", "velocity", "acceleration", "m")
+    balance: ClassVar[tuple[float, float]] = (math.inf, math.inf)
+    contact: ClassVar[None] = None
+    kind: ClassVar[str]
+    units: ClassVar[Mapping[str, str]]
+
+    @property
+    @abstractmethod
+    def law(self) -> Law:
+        """Equation of motion."""
+
+    @property
+    def gravity(self) -> float:
+        """Unit of accelerations, m/s^2."""
+        return STANDARD_GRAVITY
+
+    @property
+    def description(self) -> str:
+        """What it is, in words."""
+        return self.kind.replace("-", " ")
+
+    @property
+    def sides(self) -> Sequence[object]:
+        """Its parameters, as text."""
+        values = ((entry.name, getattr(self, entry.name)) for entry in fields(self))
+        texts = (f"{k.replace('_', ' ')} = {v:.5g} {self.units[k]}".rstrip() for k, v in values if v is not None)
+        return (", ".join(texts),)
+
+    @property
+    def stops(self) -> tuple[float, float]:
+        """Positions of its stops, m; without a second one the first twice."""
+        low, high = self.law.low, self.law.high
+        return low, (high if math.isfinite(high) else low)
+
+    def uplift_thresholds(self, model: Model = "linear") -> tuple[float, float]:
+        """Accelerations (m/s^2) that take it off its stops: the first when -a passes it, the other when a; or inf."""
+        _check_model(model)
+        stiffness, _, pull, low, high = self.law
+        return pull - stiffness * low, stiffness * high - pull if math.isfinite(high) else math.inf
+
+    def alone(self) -> LinearBodies:
+        """Bodies of which it is the only one."""
+        return LinearBodies((self,))
+
+    def _check(self, *positive: str) -> None:
+        """Check the restitution, and that these are positive; numbers are kept as floats."""
+        for name in positive:
+            object.__setattr__(self, name, checks.positive(getattr(self, name), name, InvalidBlock, self.units[name]))
+        restitution = checks.finite(self.restitution, "restitution", InvalidBlock)  # type: ignore[attr-defined]
+        if not 0.0 <= restitution <= 1.0:
+            raise InvalidBlock(f"{{}} must be from 0 to 1, not {restitution:g}", "restitution", value=restitution)
+        object.__setattr__(self, "restitution", restitution)
+
+
+@dataclass(frozen=True, eq=False)
+class LinearBodies:
+    """Any number n of bodies of one of these kinds.
+
+    Parameters
+    ----------
+    members : sequence
+        Bodies of one kind under one gravity.
+
+    Raises
+    ------
+    InvalidBlock
+        If there is none, or they are of several kinds.
+
+    Examples
+    --------
+    >>> from rocking.dynamics import BouncingBall
+    >>> LinearBodies([BouncingBall(0.8), BouncingBall(0.9)])
+    <LinearBodies: 2 of kind bouncing-ball>
+    """
+
+    members: tuple[LinearBody, ...]
+
+    def __init__(self, members: Sequence[LinearBody]) -> None:
+        given = tuple(members)
+        if not given or any(type(each) is not type(given[0]) for each in given) or not isinstance(given[0], LinearBody):
+            raise InvalidBlock("bodies of one of the kinds in rocking.dynamics are needed, all of the same kind")
+        if len({each.gravity for each in given}) > 1:
+            raise InvalidBlock("all bodies must be under one {}", "gravity")
+        object.__setattr__(self, "members", given)
+
+    @property
+    def kind(self) -> str:
+        """Name of the kind."""
+        return self.members[0].kind
+
+    @property
+    def gravity(self) -> float:
+        """Unit of accelerations, m/s^2."""
+        return self.members[0].gravity
+
+    @property
+    def restitution(self) -> Floats:
+        """Factors on the speed at a stop, shape (n, 2)."""
+        return self._pairs("restitution")
+
+    @property
+    def stops(self) -> Floats:
+        """Positions of the stops, m, shape (n, 2)."""
+        return np.array([each.stops for each in self.members])
+
+    @property
+    def is_symmetric(self) -> bool:
+        """Whether all hang or stand between two stops that are equally far away, without a pull."""
+        return all(law.pull == 0.0 and law.low == -law.high for law in (each.law for each in self.members))
+
+    def __len__(self) -> int:
+        return len(self.members)
+
+    def __getitem__(self, index: int) -> LinearBody:
+        return self.members[index]
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {len(self)} of kind {self.kind}>"
+
+    def select(self, index: slice | Integers) -> LinearBodies:
+        return LinearBodies([self.members[k] for k in np.arange(len(self))[index]])
+
+    def parameters(self) -> Mapping[str, tuple[Floats, str]]:
+        names = [entry.name for entry in fields(self.members[0]) if entry.name != "gravity"]
+        return {name: (self._pairs(name), self.members[0].units[name] or "1") for name in names}
+
+    def speed_limits(self, share: float) -> Floats:
+        return np.full((len(self), 2), share)  # these bodies have no speed that is natural to them
+
+    def kernel_records(self, model: Model, limits: Floats) -> state.Records:
+        _check_model(model)
+        made = state.records(len(self), state.BLOCK)
+        laws = np.array([each.law for each in self.members])
+        facing = np.isfinite(laws[:, 4])
+        made["stiffness"] = laws[:, :1]
+        made["damping"] = laws[:, 1:2]
+        made["restrained"] = laws[:, 1] > 0.0
+        made["gain"] = self.gravity
+        made["threshold"] = np.array([each.uplift_thresholds() for each in self.members]) / self.gravity
+        made["restitution"] = self.restitution
+        made["facing"] = facing
+        made["entered"][:, 1] = facing
+        made["fallen"] = laws[:, 4] - laws[:, 3]
+        made["limit"] = limits
+        return made
+
+    def _pairs(self, name: str) -> Floats:
+        values = [getattr(each, name) for each in self.members]
+        return np.repeat(np.array([math.nan if value is None else value for value in values])[:, None], 2, axis=1)
+
+
+def _check_model(model: Model) -> None:
+    if model != "linear":
+        advice = 'call simulate or simulate_many of rocking.dynamics, or give {} "linear"'
+        raise InvalidOption(f"a body of rocking.dynamics moves by linear equations: {advice}", "model", value=model)
 
 
 @dataclass(frozen=True)
@@ -182,4 +361,19 @@ class InvertedPendulum(LinearBody):
         return Law(self.p * self.p, 0.0, 0.0, -self.gap, self.gap)
 
 
-KINDS.update({made.kind: MakerOfKind(made) for made in (BouncingBall, ImpactOscillator, InvertedPendulum)})
+class _MakerOfKind(NamedTuple):
+    """Makes bodies of a kind of what `LinearBodies.parameters` returned, and gathers single ones."""
+
+    made: type[LinearBody]
+
+    def __call__(self, *, gravity: float, **parameters: Any) -> LinearBodies:
+        own = {"gravity": gravity} if self.made is BouncingBall else {}
+        rows = zip(*(values[:, 0].tolist() for values in parameters.values()), strict=True)
+        given = ({k: None if math.isnan(v) else v for k, v in zip(parameters, row, strict=True)} for row in rows)
+        return LinearBodies([self.made(**each, **own) for each in given])
+
+    def of(self, bodies: Iterable[LinearBody], /) -> LinearBodies:
+        return LinearBodies([*bodies])
+
+
+KINDS.update({made.kind: _MakerOfKind(made) for made in (BouncingBall, ImpactOscillator, InvertedPendulum)})

@@ -14,9 +14,8 @@ from rocking import checks
 from rocking.arrays import Flags, Floats
 from rocking.body import Body, title_of
 from rocking.constants import Model
-from rocking.dynamics.courses import course_of
 from rocking.dynamics.maps import StroboscopicMap
-from rocking.dynamics.orbits import PeriodicOrbit, orbit_at, sizes_of
+from rocking.dynamics.orbits import PeriodicOrbit, orbit_at, sizes_of, trajectory_of
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.result import Result
@@ -298,7 +297,7 @@ def _apart(lines: Sequence[NDArray[Any]]) -> Floats:
 def _peak_at(bifurcation: Bifurcation) -> float:
     """Greatest size of the coordinate on the orbit at a bifurcation."""
     orbit = bifurcation.orbit
-    return course_of(
+    return trajectory_of(
         StroboscopicMap(orbit.body, orbit.motion, orbit.model, orbit.treatment), orbit.state, orbit.period
     ).peak
 

@@ -1,10 +1,13 @@
-"""Continuation: a periodic orbit followed as a parameter changes, through folds, to where orbits of its kind end."""
+"""Continuation: a periodic orbit followed as a parameter changes, through folds, to where orbits of its kind end.
+
+Bifurcations on the way are roots of test functions between two points.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -13,12 +16,12 @@ from numpy.typing import NDArray
 from rocking import checks
 from rocking.arrays import Floats
 from rocking.body import Body
-from rocking.dynamics.branches import CLOSED, GRAZING, LIMIT, LOST, SHORT, Bifurcation, Branch
-from rocking.dynamics.courses import Course
-from rocking.dynamics.locating import LEAST_STEP, Location, ending, joined, passed, vanishing
-from rocking.dynamics.orbit_equations import AT_VALUE, OrbitEquations, Solved, Tests
-from rocking.dynamics.orbits import PeriodicOrbit
-from rocking.errors import InvalidOption
+from rocking.dynamics import branches as ends
+from rocking.dynamics.branches import Bifurcation, Branch
+from rocking.dynamics.maps import is_mirrored
+from rocking.dynamics.orbit_equations import AT_VALUE, OrbitEquations, Solved, Tests, tangent_of
+from rocking.dynamics.orbits import OrbitTrajectory, PeriodicOrbit
+from rocking.errors import InvalidOption, RockingError
 from rocking.motion.motion import Motion
 
 #: Steps along a branch, over the scales of state and parameter: the first one, and the factor by which one grows after
@@ -54,6 +57,27 @@ _AHEAD: Final = 1e-6
 #: Points after which a branch may have come back to where it began, and how far from that it may pass, over the step.
 _ROUND: Final = 12
 _BESIDE: Final = 0.1
+
+#: Step along a branch below which it has come to its end.
+_LEAST_STEP: Final = 1e-13
+
+#: Gap and speed, over their scales, below which a branch that ends has come to grazing.
+_GRAZES: Final = 1e-4
+
+#: Steps beyond the end of a branch at which the kind of its orbits is looked at.
+_BEYOND: Final = (0.0, *np.geomspace(1e-12, 1e-4, 9).tolist())
+
+#: Points from which grazing is extrapolated, at least and at most, and how far the last two estimates may differ, over
+#: the range of the parameter.
+_FEWEST: Final = 4
+_EXTRAPOLATED: Final = 6
+_AGREEMENT: Final = 1e-6
+
+#: Points from which the crossing of two branches is interpolated.
+_CROSSING: Final = 4
+
+#: Shares of the range of the parameter within which the orbits are sought from which a branch bifurcates.
+_WIDER: Final = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 
 
 def continue_orbit(
@@ -105,8 +129,8 @@ def continue_orbit(
     image half a period later. Ends are located by halving the step. Of two multipliers whose product is less than one,
     none leaves the unit circle but through 1 or -1: there is no Neimark-Sacker bifurcation with restitution below 1.
 
-    The motion is to be given over its least period. Over two of them, orbits of twice the period and those from which
-    they bifurcate are of one kind, so that a long step may lead from the ones to the others without a word.
+    The motion must be given over its least period: over two of them, orbits of twice the period and those from which
+    they bifurcate are of one kind, and a long step may lead from the ones to the others.
 
     References
     ----------
@@ -130,7 +154,12 @@ def continue_orbit(
     """
     if not isinstance(orbit, PeriodicOrbit):
         raise InvalidOption("{} must be one of those that periodic_orbits returns", "orbit", value=orbit)
-    low, high = range_of(limits)
+    bounds = checks.several(limits, "limits", InvalidOption)
+    if len(bounds) != 2:
+        raise InvalidOption("{} must be (lower, higher)", "limits")
+    low, high = (checks.finite(each, "limits", InvalidOption) for each in bounds)
+    if not (low < high and math.isfinite(high - low)):
+        raise InvalidOption(f"{{}} must be (lower, higher), not ({low:g}, {high:g})", "limits")
     start = checks.within(value, "value", InvalidOption, low, high)
     longest = checks.positive(step, "step", InvalidOption)
     count = checks.whole(most, "most", InvalidOption, least=1)
@@ -138,8 +167,8 @@ def continue_orbit(
     z = np.append(orbit.state, start) / equations.sizes
     backward = _followed(equations, z, -1.0, longest, count)
     # What has come back to where it began is all there is.
-    onwards = backward.end != CLOSED
-    forward = _followed(equations, z, 1.0, longest, count) if onwards else _Path([], [], CLOSED)
+    onwards = backward.end != ends.CLOSED
+    forward = _followed(equations, z, 1.0, longest, count) if onwards else _Path([], [], ends.CLOSED)
     points = [*reversed(backward.points), *forward.points[1:]]
     return Branch(
         family, name, unit, orbit.model, orbit.treatment, (low, high), orbit.period,
@@ -172,18 +201,18 @@ class _Path(NamedTuple):
 
 def _followed(equations: OrbitEquations, z: Floats, direction: float, longest: float, most: int) -> _Path:
     """Follow the branch in one direction of the parameter, as it leaves the orbit."""
-    course = equations.course(z)
-    equations, z = equations.moved(z, course)
-    path = _Path([_point(equations, z, course.peak)], [], SHORT)
+    trajectory = equations.trajectory(z)
+    equations, z = equations.moved(z, trajectory)
+    path = _Path([_point(equations, z, trajectory.peak)], [], ends.SHORT)
     if path.points[0].value == equations.limits[0 if direction < 0.0 else 1]:
-        return path._replace(end=LIMIT)
+        return path._replace(end=ends.LIMIT)
     step = min(_FIRST_STEP, longest)
     equations.for_step(step)
     found = equations.solved(z, AT_VALUE)
     if found is None:
-        return path._replace(end=LOST)
-    tangent = found.tangent(direction * AT_VALUE)
-    walk = _Walk(equations, found.z, tangent, found.tests(tangent), course, step, longest)
+        return path._replace(end=ends.LOST)
+    tangent = tangent_of(found.jacobian, direction * AT_VALUE)
+    walk = _Walk(equations, found.z, tangent, found.tests(tangent), trajectory, step, longest)
     for _ in range(_TRIALS * most):
         if len(path.points) >= most:
             break
@@ -194,10 +223,15 @@ def _followed(equations: OrbitEquations, z: Floats, direction: float, longest: f
     return path
 
 
-@dataclass
-class _Walk(Location):
-    """Where a branch has been followed to, and the next step along it."""
+@dataclass(eq=False)
+class _Walk:
+    """Where a branch has been followed to (equations, point, tangent, test functions, orbit), and the next step."""
 
+    equations: OrbitEquations
+    z: Floats
+    tangent: Floats
+    tests: Tests
+    trajectory: OrbitTrajectory
     step: float
     longest: float
     #: How far ahead there is no point of this kind, as far as is known, and successful steps since that was found.
@@ -209,41 +243,45 @@ class _Walk(Location):
     def __post_init__(self) -> None:
         self.written = self.z
         #: Speed of the slowest impact and parameter, over its size, at all points so far.
-        self.slowest = [(self.course.slowest, self.z[2])]
+        self.slowest = [(self.trajectory.slowest, self.z[2])]
+
+    def bifurcation(self, kind: str, z: Floats, values: Sequence[float]) -> Bifurcation:
+        """Bifurcation at a point near this one, between values of the parameter over its size."""
+        bracket = sorted(float(each * self.equations.sizes[2]) for each in values)
+        value, orbit = self.equations.physical(z)[1], self.equations.orbit(z)
+        return Bifurcation(kind, value, (bracket[0], bracket[-1]), orbit)
 
     def advance(self, path: _Path) -> str:
         """Take a step along the branch, or find that it is too long; returns why the branch ends, if it does."""
         equations = self.equations
-        if self.ahead < LEAST_STEP:
-            end, bifurcations = ending(self, self.ahead)
-            path.bifurcations.extend(bifurcations)
-            return end
+        if self.ahead < _LEAST_STEP:
+            return self.end(path)
         found = self.next()
         if found is None:
             self.shorten()
             return ""
         solved, at_limit = found
-        new, tangent = solved.z, solved.tangent(self.tangent)
+        new, tangent = solved.z, tangent_of(solved.jacobian, self.tangent)
         tests = solved.tests(tangent)
         if self.turns(tests) or equations.is_parent(new):
-            path.bifurcations.append(joined(self, new))
+            path.bifurcations.append(_joined(self, new))
             return path.bifurcations[-1].kind
-        path.bifurcations.extend(passed(self, new, tests))
-        course, before = equations.course(new), self.course
+        path.bifurcations.extend(_passed(self, new, tests))
+        trajectory, before = equations.trajectory(new), self.trajectory
         if len(path.points) > 1 and np.max(np.abs(new - self.written)) < _NEAR:
             path.points.pop()
         else:
             self.written = new
-        path.points.append(_point(equations, new, course.peak))
-        self.go_to(new, tangent, tests)
-        self.course, self.successes = course, self.successes + 1
+        path.points.append(_point(equations, new, trajectory.peak))
+        self.z, self.tangent, self.tests = new, tangent, tests
+        self.trajectory, self.successes = trajectory, self.successes + 1
         self.ahead = math.inf if self.successes > _SUCCESSES else self.ahead - self.step
         if at_limit:
-            return LIMIT
+            return ends.LIMIT
         if self.comes_to_graze(path, before):
-            return GRAZING
+            return ends.GRAZING
         if self.has_returned(path):
-            return CLOSED
+            return ends.CLOSED
         self.move_start()
         if self.ahead < math.inf:
             self.step = 0.5 * self.ahead
@@ -251,13 +289,28 @@ class _Walk(Location):
             self.step = min(self.step * _LONGER, self.longest)
         return ""
 
-    def comes_to_graze(self, path: _Path, before: Course) -> bool:
+    def end(self, path: _Path) -> str:
+        """Say why the branch ends just ahead, and note the bifurcation there, if there is one."""
+        reason = reason_of_end(self.equations, self.trajectory, self.z, self.tangent)
+        if reason != ends.LOST:
+            values = [(self.z + step * self.tangent)[2] for step in (0.0, self.ahead)]
+            path.bifurcations.append(self.bifurcation(reason, self.z, values))
+        return reason
+
+    def shorten(self) -> None:
+        """Try half the step that failed; there is no point of this kind at its end, unless the branch bends."""
+        if not (self.turned and self.step > _SHARP):
+            self.ahead, self.successes = self.step, 0
+        self.step *= 0.5
+        self.tangent = self.equations.tangent(self.z, self.tangent)
+
+    def comes_to_graze(self, path: _Path, before: OrbitTrajectory) -> bool:
         """Whether the slowest impact comes to have no speed, and where."""
-        equations, speed = self.equations, self.course.slowest
+        equations, speed = self.equations, self.trajectory.slowest
         self.slowest.append((speed, self.z[2]))
         if equations.kind.rests or speed >= min(_SLOW * equations.sizes[1], before.slowest):
             return False
-        grazing = vanishing(self, self.slowest)
+        grazing = _vanishing(self)
         path.bifurcations.extend([] if grazing is None else [grazing])
         return grazing is not None
 
@@ -276,17 +329,6 @@ class _Walk(Location):
         same_way = float(step @ left) > _COSINE * size * float(np.linalg.norm(left))
         return 0.0 <= share <= 1.0 and beside < _BESIDE * size and same_way
 
-    def shorten(self) -> None:
-        """Try half the step that failed; there is no point of this kind at its end, unless the branch bends."""
-        if not (self.turned and self.step > _SHARP):
-            self.ahead, self.successes = self.step, 0
-        self.step *= 0.5
-        self.tangent = self.equations.tangent(self.z, self.tangent)
-
-    def go_to(self, z: Floats, tangent: Floats, tests: Tests) -> None:
-        """Go to another point."""
-        self.z, self.tangent, self.tests = z, tangent, tests
-
     def next(self) -> tuple[Solved, bool] | None:
         """Return the next point where a step leads to one of the same kind, and whether at a limit."""
         equations, z, tangent, self.turned = self.equations, self.z, self.tangent, False
@@ -302,7 +344,7 @@ class _Walk(Location):
             found = equations.solved(guess, AT_VALUE)
         if found is None:
             return None
-        onwards = found.tangent(tangent)
+        onwards = tangent_of(found.jacobian, tangent)
         # Far from the prediction it is another branch.
         self.turned = bool(np.linalg.norm(found.z - guess) > _ASIDE * self.step or onwards @ tangent < _COSINE)
         if self.turned:
@@ -324,7 +366,7 @@ class _Walk(Location):
 
     def move_start(self) -> None:
         """Move the start of the period where an impact is near it."""
-        equations, z = self.equations.moved(self.z, self.course)
+        equations, z = self.equations.moved(self.z, self.trajectory)
         if equations is self.equations:
             return
         # At a fold the parameter does not say where the branch leads: the course a little ahead does.
@@ -332,22 +374,149 @@ class _Walk(Location):
         onwards /= np.linalg.norm(onwards)
         found = equations.solved(z, onwards)
         if found is not None:
-            tangent = found.tangent(onwards)
-            self.equations = equations
-            self.go_to(found.z, tangent, found.tests(tangent))
+            self.equations, self.z, self.tangent = equations, found.z, tangent_of(found.jacobian, onwards)
+            self.tests = found.tests(self.tangent)
 
 
 def _point(equations: OrbitEquations, z: Floats, peak: float) -> _Point:
     """Point of a branch."""
-    return _Point(equations.physical(z)[1], equations.at_start(z), equations.multipliers(z), peak)
+    return _Point(equations.physical(z)[1], equations.state(z), equations.multipliers(z), peak)
 
 
-def range_of(limits: Sequence[float]) -> tuple[float, float]:
-    """Return a range of the parameter, checked."""
-    values = checks.several(limits, "limits", InvalidOption)
-    if len(values) != 2:
-        raise InvalidOption("{} must be (lower, higher)", "limits")
-    low, high = (checks.finite(each, "limits", InvalidOption) for each in values)
-    if not (low < high and math.isfinite(high - low)):
-        raise InvalidOption(f"{{}} must be (lower, higher), not ({low:g}, {high:g})", "limits")
-    return low, high
+def _passed(here: _Walk, new: Floats, after: Tests) -> Iterator[Bifurcation]:
+    """Bifurcations between a point and the next one at which the branch goes on."""
+    before = here.tests
+    if before.at_one * after.at_one < 0.0:
+        kind = ends.FOLD if before.onwards * after.onwards < 0.0 else ends.BRANCHES
+        yield from _located(kind, here, new, lambda tests: tests.at_one)
+    if before.at_minus_one * after.at_minus_one < 0.0:
+        kind = ends.SYMMETRY if here.equations.by_half else ends.FLIP
+        yield from _located(kind, here, new, lambda tests: tests.at_minus_one)
+
+
+def _located(kind: str, here: _Walk, new: Floats, value_of: Callable[[Tests], float]) -> Iterator[Bifurcation]:
+    """Root of a test function between two points."""
+    z, tangent = here.z, here.tangent
+
+    def solve(length: float) -> Solved | None:
+        return here.equations.solved(z + length * tangent, tangent)
+
+    def test(solved: Solved) -> float:
+        return value_of(solved.tests(tangent_of(solved.jacobian, tangent)))
+
+    points, reached = _towards_root(solve, test, 0.0, float(tangent @ (new - z)))
+    if not reached and len(points) > 1:
+        # Where branches cross the equations are singular.
+        value = _at_zero([each for _, each in points[:_CROSSING]], [each.z[2] for each, _ in points[:_CROSSING]])
+        found = here.bifurcation(kind, points[0][0].z, [z[2], new[2]])
+        yield found._replace(value=float(value * here.equations.sizes[2]))
+    elif reached:
+        yield here.bifurcation(kind, points[0][0].z, [each.z[2] for each, _ in points[:2]])
+
+
+def _joined(here: _Walk, new: Floats) -> Bifurcation:
+    """Bifurcation at which a branch meets, between two points, orbits of half the period, or symmetric ones."""
+    equations, middle = here.equations, 0.5 * (here.z + new)
+    even = equations.period % 2 == 0
+    parent = replace(equations, period=equations.period // 2 if even else equations.period, by_half=not even)
+
+    def solve(value: float) -> Solved | None:
+        return parent.solved(np.append(middle[:2], value), AT_VALUE)
+
+    def test(solved: Solved) -> float:
+        return solved.tests(AT_VALUE).at_minus_one
+
+    for share in _WIDER if even or is_mirrored(equations.strobe(equations.physical(middle)[1])) else ():
+        points, reached = _towards_root(solve, test, middle[2] - share, middle[2] + share)
+        if reached:
+            near = [each.z for each, _ in points[:2]]
+            found = here.bifurcation(ends.FLIP if even else ends.SYMMETRY, near[0], [each[2] for each in near])
+            return found._replace(orbit=parent.orbit(near[0]))
+    return here.bifurcation(ends.BRANCHES, middle, [here.z[2], new[2]])
+
+
+def _vanishing(here: _Walk) -> Bifurcation | None:
+    """Grazing, where the speed of the slowest impact vanishes: extrapolated, as the equations are singular there.
+
+    None where the speed has not fallen far enough yet for estimates that agree.
+    """
+    (least, value), *others = reversed(here.slowest)
+    speeds, values = [least], [value]
+    for speed, value in others:
+        if len(speeds) == _EXTRAPOLATED or speed < speeds[-1]:
+            break
+        if speed >= speeds[-1] + least:
+            speeds.append(speed)
+            values.append(value)
+    if len(speeds) < _FEWEST:
+        return None
+    estimates = [_at_zero(speeds[:most], values[:most]) for most in range(len(speeds) - 2, len(speeds) + 1)]
+    if abs(estimates[-1] - estimates[-2]) > _AGREEMENT:
+        return None
+    found = here.bifurcation(ends.GRAZING, here.z, estimates)
+    return found._replace(value=float(estimates[-1] * here.equations.sizes[2]))
+
+
+def reason_of_end(equations: OrbitEquations, trajectory: OrbitTrajectory, z: Floats, tangent: Floats) -> str:
+    """Name what ends a branch just beyond its last point."""
+    kind, sizes = equations.kind, equations.sizes
+    if not kind.rests and (trajectory.slowest < _GRAZES * sizes[1] or trajectory.gap < _GRAZES * sizes[0]):
+        return ends.GRAZING
+    beyond = z + 8.0 * _LEAST_STEP * tangent
+    on_other_courses = False
+    for step in _BEYOND:
+        try:
+            found = equations.kind_at(beyond + step * tangent)
+        except RockingError:
+            continue
+        if found.unknown:
+            return ends.LOST
+        if found.overturns:
+            return ends.OVERTURNING
+        if found.for_ever != kind.for_ever:
+            return ends.UPLIFT
+        if found.rests != kind.rests:
+            return ends.REST if found.rests else ends.CHATTERING
+        if found != kind:
+            return ends.GRAZING
+        on_other_courses = kind.rests and not kind.for_ever
+    # A body that lifts and rests as before, but not in the same way, has touched or missed something in between.
+    return ends.GRAZING if on_other_courses else ends.LOST
+
+
+def _towards_root(
+    solve: Callable[[float], Solved | None], test: Callable[[Solved], float], low: float, high: float
+) -> tuple[list[tuple[Solved, float]], bool]:
+    """Return points of a branch with values of a test function, the nearest to its root first, and whether it is there.
+
+    None where it does not change its sign. The search ends where there is no point to be found.
+    """
+    from scipy.optimize import brentq
+
+    found: dict[float, tuple[Solved, float]] = {}
+
+    def tested(at: float) -> float:
+        solved = solve(at)
+        if solved is None:
+            raise _Missed
+        found[at] = solved, test(solved)
+        return found[at][1]
+
+    try:
+        root = brentq(tested, low, high, xtol=1e-16, rtol=1e-15)
+    except ValueError:
+        return [], False
+    except _Missed:
+        signs = {each > 0.0 for _, each in found.values()}
+        return sorted(found.values(), key=lambda each: abs(each[1])) if len(signs) > 1 else [], False
+    return [found[at] for at in sorted(found, key=lambda at: abs(at - root))], True
+
+
+class _Missed(Exception):
+    """There is no point of the branch where one was looked for."""
+
+
+def _at_zero(x: Sequence[float], y: Sequence[float]) -> float:
+    """Value at zero of the polynomial through points."""
+    weights = [math.prod(b / (b - a) for b in x if b != a) for a in x]
+    return float(np.dot(weights, y))

@@ -8,6 +8,7 @@ both ends of the orbit, so that a frame which turns (complex multipliers) leaves
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
@@ -17,9 +18,10 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.body import Body
 from rocking.constants import Model
+from rocking.dynamics.forcing import TOGETHER
 from rocking.dynamics.maps import stroboscopic_map
 from rocking.errors import InvalidOption
-from rocking.kernels.periodic import Fate
+from rocking.kernels.periodic import Fate, stretch
 from rocking.motion.motion import Motion
 from rocking.result import Result
 from rocking.tables import counted
@@ -166,11 +168,23 @@ def lyapunov_exponents(
     strobe.checked_starts(given, "state")
     count = checks.whole(periods, "periods", InvalidOption, least=_BATCHES)
     before = checks.whole(transient, "transient", InvalidOption, least=0)
-    logs, impacts, fate = strobe._stretches(given, before, count)
+    made, marching = strobe._states(given[None])[1][0], strobe._marching()
+    frame, logs, impacts = np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]]), np.full((before + count, 2), np.nan), 0
+    for start, stop in pairwise(sorted({*range(0, before + count, TOGETHER), before, before + count})):
+        here = stretch(*marching, made, frame, logs[start:stop])
+        impacts += here if start >= before else 0
+        if made["ending"] not in (Fate.MOVES, Fate.RESTS):
+            break
+    fate, logs = Fate(int(made["ending"])), logs[before:]
+    if fate == Fate.RESTS_FOR_EVER:
+        logs[np.isnan(logs)] = -np.inf
     rests = np.isneginf(logs[:, 0])
     if strobe._loses_nothing:  # what is near a rest never comes to one, and goes neither nearer nor away
         logs[rests] = 0.0
-    weights = _weights(count)
+    # Weights of a mean over so many periods, all of whose derivatives vanish at both ends (Das and others 2016).
+    at = (np.arange(count) + 0.5) / count
+    bump = np.exp(-1.0 / (at * (1.0 - at)))
+    weights: Floats = bump / bump.sum()
     known = ~np.isnan(logs).any(axis=1)
     mean = np.full(2, np.nan)
     if known.all():  # else nothing is known of what would follow, whatever rests came before
@@ -186,14 +200,6 @@ def lyapunov_exponents(
         fate=fate,
         stretches=logs,
     )
-
-
-def _weights(count: int) -> Floats:
-    """Weights of a mean over so many periods, all of whose derivatives vanish at both ends (Das and others 2016)."""
-    at = (np.arange(count) + 0.5) / count
-    bump = np.exp(-1.0 / (at * (1.0 - at)))
-    weights: Floats = bump / bump.sum()
-    return weights
 
 
 def _standard_error(values: Floats) -> float:

@@ -1,27 +1,36 @@
-"""Maps of a body under periodic motion from the start of one period to that of the next, with their derivatives."""
+"""Maps of a body under periodic motion, with their derivatives: from period to period, and from impact to impact."""
 
 from __future__ import annotations
 
-from itertools import pairwise
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
-from rocking.arrays import Floats
+from rocking.arrays import Flags, Floats
 from rocking.body import Body
 from rocking.constants import Model
-from rocking.dynamics.repeated import TOGETHER, Repeated, parts_of
+from rocking.dynamics.forcing import PeriodicForcing, parts_of, repeated
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.periodic import Fate as Fate
-from rocking.kernels.periodic import differentiate, iterate, stretch
+from rocking.kernels.periodic import differentiate, iterate, to_next_impact
 from rocking.motion.motion import Motion
 from rocking.threads import cores, in_threads
-from rocking.treatment import Treatment
+from rocking.treatment import Treatment, VelocityThreshold
+
+#: Threshold on a speed that none is below: an impact map closes no chattering.
+_NO_SPEED: Final = 1e-300
+
+#: Fields of a body's record that are a side's own.
+_OF_SIDES: Final = (
+    "stiffness", "gain", "threshold", "slenderness", "restitution", "least", "slope", "hold", "added_weight",
+    "added_push", "prestress", "spring", "damping",
+)  # fmt: skip
 
 
-class StroboscopicMap(Repeated):
+class StroboscopicMap(PeriodicForcing):
     """Map of a state (coordinate, velocity) to that one period later, made by `stroboscopic_map`.
 
     Attributes
@@ -127,13 +136,9 @@ class StroboscopicMap(Repeated):
         ('RESTS_FOR_EVER', True)
         """
         given, made = self._states(states)
-        shape = given.shape[:-1]
-        self._iterate(made, checks.whole(periods, "periods", InvalidOption, least=1), np.empty((len(made), 0, 3)))
-        return (
-            self._known(made).reshape(given.shape),
-            np.array(made["ending"]).reshape(shape),
-            np.array(made["impacts"]).reshape(shape),
-        )
+        self._iterate(made, checks.whole(periods, "periods", InvalidOption, least=1))
+        fates, impacts = (np.array(made[name]).reshape(given.shape[:-1]) for name in ("ending", "impacts"))
+        return self._known(made).reshape(given.shape), fates, impacts
 
     def derivative(self, states: ArrayLike, periods: int = 1) -> tuple[Floats, Floats]:
         """Return states after some periods and their derivatives by the states before.
@@ -171,15 +176,15 @@ class StroboscopicMap(Repeated):
         """
         given, made = self._states(states)
         total = np.broadcast_to(np.eye(2), (len(made), 2, 2)).copy()
-        ended = np.zeros(len(made), dtype=np.int64)
+        change, ended = np.empty_like(total), np.zeros(len(made), dtype=np.bool_)
         for _ in range(checks.whole(periods, "periods", InvalidOption, least=1)):
-            signs, before = self._signs(made["side"]), made.copy()
-            self._iterate(made, 1, np.empty((len(made), 0, 3)))
-            change = self._differentiate(state.attributed(before))
-            ended = np.maximum(ended, np.isin(made["ending"], (Fate.OVERTURNED, Fate.UNFINISHED)))
-            total = (signs * self._signs(made["side"]))[:, None, None] * change @ total
+            signs, before = _signs(made["side"]), made.copy()
+            self._iterate(made)
+            differentiate(*self._marching(), state.attributed(before), change)
+            ended |= np.isin(made["ending"], (Fate.OVERTURNED, Fate.UNFINISHED))
+            total = (signs * _signs(made["side"]))[:, None, None] * change @ total
         found = self._coordinates(made["u"], made["v"], made["side"])
-        found[ended > 0] = total[ended > 0] = np.nan
+        found[ended] = total[ended] = np.nan
         return found.reshape(given.shape), total.reshape(*given.shape, 2)
 
     def from_impacts(self, impacts: ArrayLike) -> Floats:
@@ -208,42 +213,158 @@ class StroboscopicMap(Repeated):
         >>> dynamics.stroboscopic_map(ball, table).from_impacts([0.05, 1.0]).shape
         (2,)
         """
-        given = self._pairs_of_impacts(impacts)
+        given = self._pairs(impacts, "impacts", "phase in s")
         made = self._after_impacts(given.reshape(-1, 2))
-        self._iterate(made, 1, np.empty((len(made), 0, 3)))
+        self._iterate(made)
         return self._known(made).reshape(given.shape)
 
-    def _iterate(self, made: state.Records, periods: int, rows: Floats) -> None:
+    def _iterate(self, made: state.Records, periods: int = 1, rows: Floats | None = None) -> None:
         setting = self._setting()
+        orbits = np.empty((len(made), 0, 3)) if rows is None else rows
         impacts = np.zeros(len(made), dtype=np.int64)
 
         def follow(part: slice) -> None:
-            iterate(setting, state.new_scratch(), made[part], periods, rows[part], impacts[part])
+            iterate(setting, state.new_scratch(), made[part], periods, orbits[part], impacts[part])
 
         for _ in in_threads(follow, parts_of(len(made), periods), threads=cores()):
             pass
 
-    def _differentiate(self, made: state.Records) -> Floats:
-        change = np.empty((len(made), 2, 2))
-        differentiate(*self._marching(), made, change)
-        return change
 
-    def _stretches(self, given: Floats, before: int, count: int) -> tuple[Floats, int, Fate]:
-        """Logarithms of the stretches of a frame in each of some periods, after others; impacts in them; the fate."""
-        _, made = self._states(given[None])
-        marching = self._marching()
-        frame = np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]])
-        logs, impacts = np.full((before + count, 2), np.nan), 0
-        edges = sorted({*range(0, before + count, TOGETHER), before, before + count})
-        for start, stop in pairwise(edges):
-            here = stretch(*marching, made[0], frame, logs[start:stop])
-            impacts += here if start >= before else 0
-            if made["ending"][0] not in (Fate.MOVES, Fate.RESTS):
+class HalfMap(StroboscopicMap):
+    """Map of a mirrored body under an antisymmetric motion to the mirror image of its state half a period later.
+
+    Its square is the stroboscopic map.
+    """
+
+    def __init__(self, strobe: StroboscopicMap) -> None:
+        super().__init__(strobe.body, strobe.motion, strobe.model, strobe.treatment)
+        motion = strobe.motion
+        middle = int(np.argmin(np.abs(motion.breakpoints - 0.5 * motion.duration)))
+        half = Motion(motion.breakpoints[: middle + 1], motion.coefficients[:middle], error=motion.error)
+        self.period *= 0.5
+        self._ground = repeated(half, self.body.gravity, -1.0)
+        self._steps = np.ascontiguousarray(self._steps[:, :middle])  # as kernels take arrays
+
+    def mirrored(self, state: Floats, halves: int) -> tuple[Floats, Floats]:
+        """Mirror image of a state after an odd number of half periods, and its derivative; NaN where it overturns."""
+        total, at = np.eye(2), state
+        for _ in range(halves):
+            if not np.all(np.isfinite(at)):  # a march from there would take all its turns
                 break
-        fate = Fate(int(made["ending"][0]))
-        if fate == Fate.RESTS_FOR_EVER:
-            logs[np.isnan(logs)] = -np.inf
-        return logs[before:], impacts, fate
+            after, change = self.derivative(at)
+            at, total = 0.0 - after, -change @ total
+        return at, total
+
+
+class ImpactMap(PeriodicForcing):
+    """Map of an impact (phase, velocity after it) to the next one, made by `impact_map`."""
+
+    def __call__(self, impacts: ArrayLike) -> Floats:
+        """Return the next impacts.
+
+        Parameters
+        ----------
+        impacts : array_like, shape (..., 2)
+            Time of an impact since the start of the period, s, and velocity after it: of a block its sign is the side
+            that is entered; between two stops it leads away from the stop that was hit.
+
+        Returns
+        -------
+        ndarray, shape (..., 2)
+            The next ones, with times within the period; NaN where the body rests or overturns first.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> from rocking import dynamics
+        >>> ball, table = dynamics.BouncingBall(0.5, gravity=10.0), rocking.pulses.sine(15.0, 5.0, cycles=1)
+        >>> dynamics.impact_map(ball, table)([0.05, 1.0]).round(12).tolist()
+        [0.05, 0.5]
+        """
+        return self.derivative(impacts)[0]
+
+    def derivative(self, impacts: ArrayLike) -> tuple[Floats, Floats]:
+        """Return the next impacts and their derivatives by the impacts before.
+
+        Parameters
+        ----------
+        impacts : array_like, shape (..., 2)
+            As for the map.
+
+        Returns
+        -------
+        impacts : ndarray, shape (..., 2)
+            As of the map.
+        derivatives : ndarray, shape (..., 2, 2)
+            NaN where there is no next impact.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> from rocking import dynamics
+        >>> ball, table = dynamics.BouncingBall(0.5, gravity=10.0), rocking.pulses.sine(15.0, 5.0, cycles=1)
+        >>> dynamics.impact_map(ball, table).derivative([0.05, 1.0])[1].shape
+        (2, 2)
+        """
+        given = self._pairs(impacts, "impacts", "phase in s")
+        made = self._after_impacts(given.reshape(-1, 2))
+        start, signs, change = self._rates(made), _signs(made["side"]), np.empty((len(made), 2, 2))
+        to_next_impact(*self._marching(), made, change)
+        end = self._rates(made)
+        times = self._ground.pieces[made["piece"], 0] + made["offset"]
+        found = np.stack([times, _signs(made["side"]) * made["v"]], axis=-1)
+        # At fixed times a later impact is (-v, -v') off; the shift of the next one is read off in the same way.
+        zeros, ones = np.zeros(len(made)), np.ones(len(made))
+        before = np.array([[-start[:, 0], zeros], [-start[:, 1], ones]]).transpose(2, 0, 1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            after = np.array([[-1.0 / end[:, 0], zeros], [-end[:, 1] / end[:, 0], ones]])
+            total = after.transpose(2, 0, 1) @ change @ before
+        total *= np.stack([ones, _signs(made["side"])], axis=-1)[:, :, None] * np.stack([ones, signs], axis=-1)[:, None]
+        lost = made["ending"] != Fate.MOVES
+        found[lost] = total[lost] = np.nan
+        return found.reshape(given.shape), total.reshape(*given.shape, 2)
+
+    def _rates(self, made: state.Records) -> Floats:
+        """Velocity and acceleration just after impacts, in the frames of their sides, shape (n, 2)."""
+        record = self._records[0]
+        side = np.maximum(made["side"], 0)
+        push = np.zeros(len(made))
+        for column in self._ground.pieces[made["piece"]][:, :1:-1].T:
+            push = push * made["offset"] + column
+        restoring = record["gain"][side] * (record["threshold"][side] + record["hold"][side] + _signs(side) * push)
+        with np.errstate(invalid="ignore"):  # a velocity may be infinite
+            return np.stack([made["v"], -restoring - record["damping"][side] * made["v"]], axis=-1)
+
+
+def _signs(side: NDArray[np.int64]) -> Floats:
+    return np.where(side > 0, -1.0, 1.0)
+
+
+def is_mirrored(strobe: StroboscopicMap) -> bool:
+    """Whether the mirror image of every course of a body is one half a period later."""
+    record, (low, high), motion = strobe._records[0], strobe.body.stops, strobe.motion
+    if not strobe._is_two_sided or low != -high or any(record[name][0] != record[name][1] for name in _OF_SIDES):
+        return False
+    half = 0.5 * motion.duration
+    if not are_halved(motion)[0]:
+        return False
+    times = half * (np.arange(200) + 0.5) / 200.0
+    sums = motion.acceleration(times) + motion.acceleration(times + half)
+    return bool(np.max(np.abs(sums)) <= 1e-12 * motion.pga)
+
+
+def distances(times: Floats, marks: Floats, period: float) -> Floats:
+    """Distance in time of each of some times to the nearest of some marks, all of them within a period that repeats."""
+    marks = np.sort(marks)
+    after = np.searchsorted(marks, times)
+    away = np.abs(times - marks[[after - 1, after % len(marks)]])
+    return np.asarray(np.min(np.minimum(away, period - away), axis=0))
+
+
+def are_halved(motion: Motion) -> Flags:
+    """Of each breakpoint but the last: whether there is another one half a period later."""
+    starts, period = motion.breakpoints[:-1] - motion.breakpoints[0], motion.duration
+    return distances(np.mod(starts + 0.5 * period, period), starts, period) <= 1e-14 * period
 
 
 def stroboscopic_map(
@@ -289,3 +410,32 @@ def stroboscopic_map(
     [-0.085002, 0.087054]
     """
     return StroboscopicMap(body, motion, model, chattering)
+
+
+def impact_map(body: Body, motion: Motion, *, model: Model | None = None) -> ImpactMap:
+    """Map of a body under periodic motion from just after one impact to just after the next.
+
+    Parameters
+    ----------
+    body, motion, model : Body, Motion, str
+        As for `stroboscopic_map`.
+
+    Returns
+    -------
+    ImpactMap
+        A function of impacts (phase in s, velocity after).
+
+    Raises
+    ------
+    InvalidMotion, InvalidOption
+        As `stroboscopic_map`.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> from rocking import dynamics
+    >>> ball, table = dynamics.BouncingBall(0.5, gravity=10.0), rocking.pulses.sine(15.0, 5.0, cycles=1)
+    >>> dynamics.impact_map(ball, table)([[0.05, 1.0], [0.1, 0.8]]).shape
+    (2, 2)
+    """
+    return ImpactMap(body, motion, model, VelocityThreshold(_NO_SPEED))

@@ -18,11 +18,17 @@ from numpy.typing import NDArray
 from rocking.arrays import Floats
 from rocking.body import Body
 from rocking.constants import Model
-from rocking.dynamics.courses import Course, course_of, response_of
-from rocking.dynamics.maps import Fate, StroboscopicMap
-from rocking.dynamics.orbits import SAME, PeriodicOrbit, multipliers_at, orbit_at
-from rocking.dynamics.repeated import scale_of
-from rocking.dynamics.symmetry import HalfMap, are_halved, distances, is_mirrored
+from rocking.dynamics.forcing import scale_of
+from rocking.dynamics.maps import Fate, HalfMap, StroboscopicMap, are_halved, distances, is_mirrored
+from rocking.dynamics.orbits import (
+    SAME,
+    OrbitTrajectory,
+    PeriodicOrbit,
+    multipliers_at,
+    orbit_at,
+    response_of,
+    trajectory_of,
+)
 from rocking.errors import InvalidOption, RockingError
 from rocking.motion.motion import Motion
 from rocking.treatment import Treatment
@@ -51,16 +57,13 @@ _ROUNDING: Final = 2.0**-50
 _TOO_NEAR: Final = 0.03
 
 #: Values of the parameter at which a family is looked at.
-_LOOKS: Final = 5
-
-#: Maps that are kept, by the parameter.
-_KEPT: Final = 64
+_SCAN_POINTS: Final = 5
 
 
 class Kind(NamedTuple):
     """What does not change along a branch: whether a body rests (for ever), its impacts, and whether it overturns.
 
-    And whether it took too many steps to be followed, so that nothing is known.
+    It is unknown of a body that took too many steps to be followed.
     """
 
     rests: bool
@@ -86,10 +89,6 @@ class Solved(NamedTuple):
     change: Floats
     steps: int
 
-    def tangent(self, like: Floats) -> Floats:
-        """Return the unit tangent of the branch, in the direction of another."""
-        return tangent_of(self.jacobian, like)
-
     def tests(self, tangent: Floats) -> Tests:
         """Return the test functions."""
         less, plus = (float(np.linalg.det(self.change + sign * np.eye(2))) for sign in (-1.0, 1.0))
@@ -114,8 +113,8 @@ class OrbitEquations:
     difference: float = _DIFFERENCE
 
     def __post_init__(self) -> None:
-        self.strobe = lru_cache(maxsize=_KEPT)(self._strobe)
-        self.half = lru_cache(maxsize=_KEPT)(self._half)
+        self.strobe = lru_cache(maxsize=64)(self._strobe)
+        self.half = lru_cache(maxsize=64)(self._half)
 
     @classmethod
     def of(cls, orbit: PeriodicOrbit, family: Family, value: float, limits: tuple[float, float]) -> OrbitEquations:
@@ -133,13 +132,17 @@ class OrbitEquations:
             )
         by_half = orbit.symmetric and not orbit.rests and _stays_mirrored(family, strobe, limits)
         sizes = np.array([*scale, limits[1] - limits[0]])
-        kind = _kind_of(strobe, orbit.state, orbit.period)
+        kind = kind_of(strobe, orbit.state, orbit.period)
         return cls(family, orbit.model, orbit.treatment, orbit.period, by_half, sizes, kind, limits)
 
     def _strobe(self, value: float) -> StroboscopicMap:
         """Map of the body and the motion at a value, with the start of the period shifted."""
         body, motion = self.family(value)
-        return StroboscopicMap(body, _shifted(motion, self.shift), self.model, self.treatment)
+        if k := self.shift:
+            breaks, rows = motion.breakpoints, np.roll(motion.coefficients, -k, axis=0)
+            later = np.concatenate([breaks[k:] - breaks[k], breaks[1 : k + 1] + (breaks[-1] - breaks[k])])
+            motion = Motion(later, rows, motion.name, motion.description, error=motion.error)
+        return StroboscopicMap(body, motion, self.model, self.treatment)
 
     def _half(self, value: float) -> HalfMap:
         strobe = self.strobe(value)
@@ -204,12 +207,12 @@ class OrbitEquations:
     def kind_at(self, z: Floats) -> Kind:
         """Kind of the course from a state."""
         state, value = self.physical(z)
-        return _kind_of(self.strobe(value), state, self.period)
+        return kind_of(self.strobe(value), state, self.period)
 
-    def course(self, z: Floats) -> Course:
-        """Course of the orbit at a point."""
+    def trajectory(self, z: Floats) -> OrbitTrajectory:
+        """Extremes of the orbit at a point."""
         state, value = self.physical(z)
-        return course_of(self.strobe(value), state, self.period)
+        return trajectory_of(self.strobe(value), state, self.period)
 
     def is_parent(self, z: Floats) -> bool:
         """Whether a point is of orbits from which this branch bifurcates: of half the period, or symmetric."""
@@ -230,25 +233,25 @@ class OrbitEquations:
         strobe = self.strobe(value)
         return multipliers_at(strobe, strobe.derivative(state, self.period)[1])
 
-    def at_start(self, z: Floats) -> Floats:
-        """State at the start of the period as it was given."""
+    def state(self, z: Floats, shift: int = 0) -> Floats:
+        """State of the same course where a period starts at another breakpoint of the motion as it was given."""
         state, value = self.physical(z)
-        if self.shift == 0:
+        if shift == self.shift:
             return state
         _, motion = self.family(value)
-        time = motion.duration - float(motion.breakpoints[self.shift])
+        time = float(np.mod(motion.breakpoints[shift] - motion.breakpoints[self.shift], motion.duration))
         return response_of(self.strobe(value), state, self.period).states(time)[:2]
 
     def orbit(self, z: Floats) -> PeriodicOrbit:
         """Orbit at a point."""
         strobe = StroboscopicMap(*self.family(self.physical(z)[1]), self.model, self.treatment)
-        return orbit_at(strobe, self.at_start(z), self.period)
+        return orbit_at(strobe, self.state(z), self.period)
 
-    def moved(self, z: Floats, course: Course) -> tuple[OrbitEquations, Floats]:
+    def moved(self, z: Floats, trajectory: OrbitTrajectory) -> tuple[OrbitEquations, Floats]:
         """Equations with a start of the period that no impact is near, and the same orbit in these."""
         _, motion = self.family(self.physical(z)[1])
         starts, period = motion.breakpoints[:-1] - motion.breakpoints[0], motion.duration
-        phases = np.mod(course.phases + starts[self.shift], period)
+        phases = np.mod(trajectory.phases + starts[self.shift], period)
         if not len(phases):
             return self, z
         nearest = distances(starts, phases, period)
@@ -260,19 +263,15 @@ class OrbitEquations:
         return replace(self, shift=best), self.later(z, best)
 
     def later(self, z: Floats, shift: int) -> Floats:
-        """Numbers of the same course where a period starts at another breakpoint of the motion."""
-        state, value = self.physical(z)
-        _, motion = self.family(value)
-        time = float(np.mod(motion.breakpoints[shift] - motion.breakpoints[self.shift], motion.duration))
-        after = response_of(self.strobe(value), state, self.period).states(time)[:2]
-        return np.append(after, value) / self.sizes
+        """Numbers of the same course where a period starts at another breakpoint."""
+        return np.append(self.state(z, shift), self.physical(z)[1]) / self.sizes
 
 
 def _stays_mirrored(family: Family, strobe: StroboscopicMap, limits: tuple[float, float]) -> bool:
     """Whether the mirror image of every course is one half a period later, at a value and over the whole range."""
     if not is_mirrored(strobe):
         return False
-    for value in np.linspace(*limits, _LOOKS):
+    for value in np.linspace(*limits, _SCAN_POINTS):
         try:
             if not is_mirrored(StroboscopicMap(*family(float(value)), strobe.model, strobe.treatment)):
                 return False
@@ -291,20 +290,10 @@ def tangent_of(jacobian: Floats, like: Floats) -> Floats:
     return along if along @ like >= 0.0 else -along
 
 
-def _kind_of(strobe: StroboscopicMap, state: Floats, period: int) -> Kind:
+def kind_of(strobe: StroboscopicMap, state: Floats, period: int) -> Kind:
+    """Kind of the course of a body over so many periods."""
     _, fate, impacts = strobe.followed(state, period)
     _, change = strobe.derivative(state, period)
     rests, for_ever = not np.any(change), bool(fate == Fate.RESTS_FOR_EVER and not impacts)
-    overturns, unknown = bool(fate == Fate.OVERTURNED), bool(fate == Fate.UNFINISHED)
-    return Kind(rests, for_ever, 0 if rests else int(impacts), overturns, unknown)
-
-
-def _shifted(motion: Motion, shift: int) -> Motion:
-    """One period of a motion that starts some pieces later."""
-    if shift == 0:
-        return motion
-    breaks = motion.breakpoints
-    later = np.concatenate([breaks[shift:] - breaks[shift], breaks[1 : shift + 1] + (breaks[-1] - breaks[shift])])
-    return Motion(
-        later, np.roll(motion.coefficients, -shift, axis=0), motion.name, motion.description, error=motion.error
-    )
+    number = 0 if rests else int(impacts)
+    return Kind(rests, for_ever, number, bool(fate == Fate.OVERTURNED), bool(fate == Fate.UNFINISHED))

@@ -1,24 +1,28 @@
-"""Periodic orbits of a body under periodic motion: in words, as tables and as a figure."""
+"""Periodic orbits of a body under periodic motion: found by Newton's method, in words, as tables and as a figure."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from rocking.arrays import Floats
+from rocking import checks
+from rocking.arrays import Flags, Floats
 from rocking.body import Body, title_of
 from rocking.constants import Model
-from rocking.dynamics.courses import response_of
-from rocking.dynamics.maps import StroboscopicMap
-from rocking.dynamics.symmetry import is_symmetric
+from rocking.dynamics.bodies import LinearBody
+from rocking.dynamics.forcing import mean_size, scale_of
+from rocking.dynamics.maps import StroboscopicMap, is_mirrored
+from rocking.dynamics.simulation import in_positions
+from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.response import Response
 from rocking.result import Result, Row, dictionary_of, text_of
+from rocking.simulation import response_to
 from rocking.tables import Column, as_written, counted
 from rocking.treatment import Treatment
 
@@ -34,9 +38,31 @@ SAME: Final = 1e-7
 _NEUTRAL: Final = 1e-9
 _NEUTRAL_PAIR: Final = 1e-6
 
+#: Points at which a period is looked at for extremes, and bisections by which these are found.
+_SCAN_POINTS: Final = 64
+_BISECTIONS: Final = 40
+
 #: Points of a figure for each period, and letters of the column of names in a summary.
 _DRAWN: Final = 400
 _WIDTH: Final = 20
+
+
+#: Starts of a search, where none are given; periods after which every so many-th is given once more: it is then near
+#: what attracts it.
+_STARTS: Final = 1024
+_LATER, _EVERY = 60, 8
+
+#: Newton steps of a search, and how often one that does not bring a state nearer is halved.
+_NEWTON_STEPS: Final = 40
+_HALVINGS: Final = 5
+
+#: Residual of an orbit, over the scale of its states and the size of the derivative; and the largest one: what comes
+#: back no nearer is called no orbit, however large the derivative.
+_RESIDUAL: Final = 1e-11
+_LARGEST_RESIDUAL: Final = 1e-6
+
+#: Speeds of starts: least and greatest gain over the impulse of a period, and what a block that overturns has at most.
+_LEAST_GAIN, _MOST_GAIN, _BLOCK_SPEED = 0.5, 20.0, 2.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -103,33 +129,38 @@ class PeriodicOrbit(Result):
     @property
     def _kind(self) -> str:
         grows = np.any(sizes_of(self.multipliers) > 1.0)
-        words = [
-            "stable" if self.is_stable else "unstable" if grows else "neutral",
-            *(["symmetric"] if self.symmetric else []),
-        ]
-        how = "with complete chattering" if math.isinf(self.impacts) else f"with {counted(int(self.impacts), 'impact')}"
-        rests = ["with a rest"] if self.rests and self.impacts and not math.isinf(self.impacts) else []
-        always = ["always at rest"] if self.rests and not self.impacts else []
-        each = [" ".join([*words, "orbit"]), f"of {counted(self.period, 'period')}", *(always or [how, *rests])]
-        return " ".join(each)
+        stable = "stable" if self.is_stable else "unstable" if grows else "neutral"
+        if self.rests and not self.impacts:
+            how = "always at rest"
+        elif math.isinf(self.impacts):
+            how = "with complete chattering"
+        else:
+            how = f"with {counted(int(self.impacts), 'impact')}{' with a rest' if self.rests else ''}"
+        return f"{stable}{' symmetric' if self.symmetric else ''} orbit of {counted(self.period, 'period')} {how}"
 
-    def _rows(self) -> list[Row]:
-        coordinate = self.body.coordinate
-        x, v = self.state
-        return [
+    @property
+    def _multipliers(self) -> str:
+        """Multipliers as text, to three digits."""
+        signs = ("-" if each.imag < 0.0 else "+" for each in self.multipliers)
+        return ", ".join(
+            f"{each.real:.3g}" + (f" {sign} {abs(each.imag):.3g}i" if each.imag else "")
+            for each, sign in zip(self.multipliers, signs, strict=True)
+        )
+
+    def _headline(self) -> str:
+        return f"{self._kind}, multipliers {self._multipliers}"
+
+    def summary(self) -> str:
+        coordinate, (x, v) = self.body.coordinate, self.state
+        rows = [
             Row("orbit", self._kind),
             Row("body", self.body.description),
             Row("motion", f"{self.motion.label}, one period of {self._map.period:.6g} s"),
             Row(coordinate.name, f"{x:.12g}", coordinate.unit, " at the start of a period"),
             Row("velocity", f"{v:.12g}", f"{coordinate.unit}/s"),
-            Row("multipliers", ", ".join(_number(each) for each in self.multipliers)),
+            Row("multipliers", self._multipliers),
         ]
-
-    def _headline(self) -> str:
-        return f"{self._kind}, multipliers {', '.join(_number(each) for each in self.multipliers)}"
-
-    def summary(self) -> str:
-        return text_of(self._rows(), _WIDTH)
+        return text_of(rows, _WIDTH)
 
     def to_dict(self) -> dict[str, Any]:
         coordinate = self.body.coordinate
@@ -187,13 +218,67 @@ class PeriodicOrbit(Result):
         )
 
 
+class OrbitTrajectory(NamedTuple):
+    """What a period of an orbit shows: greatest coordinate, slowest impact, least gap, and the phases of impacts."""
+
+    peak: float
+    slowest: float
+    gap: float
+    phases: Floats
+
+
+def response_of(strobe: StroboscopicMap, state: Floats, periods: int) -> Response:
+    """Course of a body from a state on, over so many periods."""
+    motion, duration = strobe.motion, periods * strobe.period
+    # One period more: what comes after the end decides how long a chattering sequence lasts.
+    starts = strobe.period * np.arange(periods + 1)
+    breakpoints = np.append((starts[:, None] + motion.breakpoints[:-1]).ravel(), strobe.period * (periods + 1))
+    many = Motion(
+        breakpoints, np.tile(motion.coefficients, (periods + 1, 1)), motion.name, motion.description, error=motion.error
+    )
+    start = float(state[0]), float(state[1])
+    found = response_to(strobe.body, many, strobe.model, strobe.treatment, duration, start, "initial_position")
+    return in_positions(found) if isinstance(strobe.body, LinearBody) else found
+
+
+def trajectory_of(strobe: StroboscopicMap, state: Floats, periods: int) -> OrbitTrajectory:
+    """Extremes of the course of a body over so many periods."""
+    response = response_of(strobe, state, periods)
+    duration, impacts = response.duration, response.impacts
+    times = np.linspace(0.0, duration, _SCAN_POINTS * periods + 1)
+    states = response.states(times)
+    # A gap is least where the velocity passes zero between impacts.
+    ends = np.concatenate([[0.0], impacts["time"], [duration]])
+    inner = np.searchsorted(ends, times, side="right")
+    v = states[:, 1]
+    crossing = np.flatnonzero((v[1:] * v[:-1] < 0.0) & (inner[1:] == inner[:-1]))
+    low, high = times[crossing], times[crossing + 1]
+    rising = v[crossing] < 0.0
+    for _ in range(_BISECTIONS if len(crossing) else 0):
+        middle = 0.5 * (low + high)
+        before = (response.states(middle)[:, 1] < 0.0) == rising
+        low, high = np.where(before, middle, low), np.where(before, high, middle)
+    at = response.states(0.5 * (low + high))[:, 0]
+    # What a body nearly hits: the stop below where its coordinate is lowest, one above where it is highest.
+    low_stop, high_stop = strobe.body.stops
+    gaps = np.where(rising, at - low_stop, high_stop - at if strobe._is_two_sided else math.inf)
+    hits = response.states(impacts["time"])[:, 0]  # at a second stop the coordinate may be greatest
+    peak = float(np.max(np.abs(np.concatenate([states[:, 0], at, hits]))))
+    slowest = float(np.min(impacts["speed_before"], initial=math.inf))
+    gap = float(np.min(gaps, initial=math.inf, where=gaps > 0.0))
+    return OrbitTrajectory(peak, slowest, gap, np.mod(impacts["time"], strobe.period))
+
+
 def orbit_at(strobe: StroboscopicMap, state: Floats, period: int) -> PeriodicOrbit:
     """Periodic orbit of a state that comes back after so many periods."""
     _, change = strobe.derivative(state, period)
+    symmetric = False
+    if period % 2 and is_mirrored(strobe):  # its own mirror image half a period later
+        after = response_of(strobe, state, period).states(0.5 * period * strobe.period)[:2]
+        symmetric = bool(np.all(np.abs(after + state) < 1e-9 * np.array(scale_of(strobe))))
     return PeriodicOrbit(
         strobe.body, strobe.motion, strobe.model, strobe.treatment, state, period,
-        impacts_of(strobe, state, period, change), multipliers_at(strobe, change), is_symmetric(strobe, state, period),
-        not np.any(change),
+        impacts_of(strobe, state, period, change), multipliers_at(strobe, change), symmetric, not np.any(change),
     )  # fmt: skip
 
 
@@ -207,25 +292,19 @@ def impacts_of(strobe: StroboscopicMap, state: Floats, period: int, change: Floa
     return math.inf if chatters and not np.any(change) else impacts
 
 
-def multipliers_of(change: Floats) -> NDArray[np.complex128]:
-    """Floquet multipliers of a derivative, the largest first."""
+def multipliers_at(strobe: StroboscopicMap, change: Floats) -> NDArray[np.complex128]:
+    """Floquet multipliers of an orbit with this derivative of the map, the largest first.
+
+    What is near the rest of a body whose impacts lose nothing bounces for ever, so that they are one there, not zero.
+    """
+    record = strobe._records[0]
+    if strobe._loses_nothing and not np.any(change):
+        return np.ones(2, dtype=np.complex128)
+    if strobe._loses_nothing and not (record["varying"] or np.any(record["damping"])):
+        # By the rounding of many impacts the product of both would differ from 1, as if the orbit attracted.
+        change = change / np.sqrt(np.abs(np.linalg.det(change)))
     found = np.linalg.eigvals(change).astype(np.complex128)
     return found[np.lexsort((-found.imag, -np.abs(found)))] + 0.0
-
-
-def multipliers_at(strobe: StroboscopicMap, change: Floats) -> NDArray[np.complex128]:
-    """Floquet multipliers of an orbit with this derivative of the map, also of a body whose impacts lose nothing.
-
-    What is near the rest of such a body bounces for ever, so that they are one there, not zero.
-    """
-    if not strobe._loses_nothing:
-        return multipliers_of(change)
-    if not np.any(change):
-        return np.ones(2, dtype=np.complex128)
-    record = strobe._records[0]
-    keeps_areas = not (record["varying"] or np.any(record["damping"]))
-    # By the rounding of many impacts the product of both would differ from 1, as if the orbit attracted.
-    return multipliers_of(change / np.sqrt(np.abs(np.linalg.det(change)))) if keeps_areas else multipliers_of(change)
 
 
 def sizes_of(multipliers: NDArray[np.complex128]) -> Floats:
@@ -235,8 +314,207 @@ def sizes_of(multipliers: NDArray[np.complex128]) -> Floats:
     return np.where(np.abs(sizes - 1.0) < np.where(is_pair, _NEUTRAL_PAIR, _NEUTRAL), 1.0, sizes)
 
 
-def _number(value: complex) -> str:
-    """Return a multiplier as text, to three digits."""
-    if value.imag == 0.0:
-        return f"{value.real:.3g}"
-    return f"{value.real:.3g} {'-' if value.imag < 0.0 else '+'} {abs(value.imag):.3g}i"
+def periodic_orbits(
+    body: Body,
+    motion: Motion,
+    *,
+    period: int = 1,
+    model: Model | None = None,
+    chattering: str | Treatment = "certified",
+    starts: ArrayLike | int | None = None,
+) -> list[PeriodicOrbit]:
+    """Periodic orbits of a body under periodic motion, stable and unstable ones.
+
+    Parameters
+    ----------
+    body : Block, or a body of `rocking.dynamics`
+        What moves.
+    motion : Motion
+        One period, which repeats for ever: as ``pulses.sine(a, f, cycles=1)``.
+    period : int
+        Periods of the motion after which orbits repeat. Those of a shorter period that divides it are found as well.
+    model : {"nonlinear", "linear"}, optional
+        Equation of motion; by default nonlinear of a body that rocks.
+    chattering : str or treatment
+        As for `rocking.simulate`.
+    starts : int or array_like, shape (..., 2), optional
+        Number of states from which orbits are looked for, or these states; by default about a thousand: impacts at all
+        phases and speeds, states between them, rests, and what becomes of some of these.
+
+    Returns
+    -------
+    list of PeriodicOrbit
+        Each once, those with the shortest period first, then those with the fewest impacts. There may be others, which
+        no start led to.
+
+    Raises
+    ------
+    InvalidMotion
+        If the motion is none, or has no length.
+    InvalidOption
+        If the period is no whole number from 1, the model is not one of the body's, or a start is behind a stop.
+
+    Notes
+    -----
+    Newton's method solves P^n(x) = x for all starts at once, with the derivative of the stroboscopic map P. Where that
+    is exactly zero, after a proven rest, a step of it is the map itself.
+
+    References
+    ----------
+    J. M. T. Thompson and H. B. Stewart, "Nonlinear Dynamics and Chaos", 2nd edition, Wiley (2002), chapter 15.
+
+    Examples
+    --------
+    A ball on a table that goes up and down with 1.2 g bounces once a period, in two ways, or rests every period:
+
+    >>> from rocking import dynamics, pulses
+    >>> ball, table = dynamics.BouncingBall(0.5, gravity=10.0), pulses.sine(12.0, 5.0, cycles=1)
+    >>> for orbit in dynamics.periodic_orbits(ball, table):
+    ...     print(orbit)
+    <PeriodicOrbit: unstable orbit of 1 period with 1 impact, multipliers 2.47, 0.101>
+    <PeriodicOrbit: stable orbit of 1 period with 1 impact, multipliers -0.0342 + 0.499i, -0.0342 - 0.499i>
+    <PeriodicOrbit: stable orbit of 1 period with complete chattering, multipliers 0, 0>
+    """
+    count = checks.whole(period, "period", InvalidOption, least=1)
+    search = _Search(StroboscopicMap(body, motion, model, chattering), count)
+    distinct = np.empty((0, 2))
+    for state in search.converged(search.starts(starts), count):
+        if not len(distinct) or np.min(search.size(distinct - state)) > SAME:
+            distinct = np.vstack([distinct, state])
+    kept: list[PeriodicOrbit] = []
+    for each in map(search.orbit, distinct):
+        shifts = [np.roll(each.states, k, axis=0) for k in range(each.period)]
+        same = (other for other in kept if other.period == each.period)
+        if not any(np.max(search.size(shift - other.states)) < SAME for other in same for shift in shifts):
+            kept.append(each)
+    return sorted(kept, key=lambda each: (each.period, each.impacts, *each.state))
+
+
+class _Search:
+    """Looks for states that come back after some periods."""
+
+    def __init__(self, strobe: StroboscopicMap, count: int) -> None:
+        self.strobe, self.count = strobe, count
+        self.scale = scale_of(strobe)
+
+    def starts(self, given: ArrayLike | int | None) -> Floats:
+        """States to start from: those given, or about as many as are wanted."""
+        if given is not None and np.ndim(given) > 0:
+            return self.strobe.checked_starts(given, "starts")
+        wanted = _STARTS if given is None else checks.whole(given, "starts", InvalidOption, least=1)
+        strobe, (low, high) = self.strobe, self.strobe.body.stops
+        both = strobe._is_two_sided
+        speed = self._fastest()
+        side = max(2, round(math.sqrt(wanted / (2 if both else 1))))
+        phases = strobe.period * (np.arange(side) + 0.5) / side
+        speeds = speed * ((np.arange(side) + 0.5) / side) ** 1.5
+        impacts = np.stack(np.meshgrid(phases, speeds), axis=-1).reshape(-1, 2)
+        if both:
+            impacts = np.concatenate([impacts, impacts * [1.0, -1.0]])
+        few = np.linspace(-0.9, 0.9, max(2, side // 4))
+        width = high - low if strobe._records[0]["facing"] else self.scale.coordinate
+        at = 0.5 * (low + high) + 0.5 * width * few if both else low + width * (1.0 + few)
+        between = np.stack(np.meshgrid(at, speed * few), axis=-1).reshape(-1, 2)
+        rests = np.array([[stop, 0.0] for stop in {low, high}])
+        states = np.concatenate([rests, between, strobe.from_impacts(impacts)])
+        states = states[self._possible(states)]
+        later = strobe(states[::_EVERY], _LATER * self.count)
+        return np.concatenate([states, later[self._possible(later)]])
+
+    def _fastest(self) -> float:
+        """Return a speed that impacts of an orbit of so many periods hardly exceed."""
+        strobe = self.strobe
+        restitution = float(np.max(strobe.bodies.restitution))
+        gain = restitution / max(1.0 - restitution, 1e-300)
+        push = self.count * strobe.period * mean_size(strobe.motion)
+        speed = min(max(gain, _LEAST_GAIN), _MOST_GAIN) * push or self.scale.velocity
+        record = strobe._records[0]
+        if not math.isinf(min(strobe.body.balance)):
+            return min(speed, _BLOCK_SPEED * self.scale.velocity + push)
+        if float(record["stiffness"][0]) == 0.0:  # A ball flies for as long as its speed lets it.
+            pull = float(record["gain"][0] * record["threshold"][0])
+            return min(speed, 0.5 * self.count * strobe.period * pull + push)
+        return speed
+
+    def _possible(self, states: Floats) -> Flags:
+        """Which states a body may have."""
+        record, (low, high) = self.strobe._records[0], self.strobe.body.stops
+        x, v = states.T
+        fine: Flags = np.all(np.isfinite(states), axis=-1)
+        if self.strobe._is_two_sided and not record["facing"]:
+            return np.asarray(fine & (np.abs(x) < record["fallen"]))
+        if record["facing"]:
+            fine &= (x <= high) & ~((x == high) & (v > 0.0))
+        return np.asarray(fine & (x >= low) & ~((x == low) & (v < 0.0)))
+
+    def _mapped(self, states: Floats, count: int) -> tuple[Floats, Floats]:
+        """States after periods and their derivatives; NaN of those that no body may have."""
+        after, change = np.full(states.shape, np.nan), np.full((*states.shape, 2), np.nan)
+        fine = self._possible(states)
+        after[fine], change[fine] = self.strobe.derivative(states[fine], count)
+        return after, change
+
+    def converged(self, states: Floats, count: int) -> Floats:
+        """States that come back after so many periods, to which Newton's method leads from others."""
+        x = states.copy()
+        after, change = self._mapped(x, count)
+        done = np.zeros(len(x), dtype=bool)
+        for _ in range(_NEWTON_STEPS):
+            residual = self.size(after - x)
+            sharp = residual < _tolerance(change)
+            finished = done & sharp
+            open_ = np.flatnonzero(~finished & np.isfinite(residual))
+            if not len(open_):
+                break
+            done |= sharp  # One more step after the first that is sharp.
+            step = _newton_step(x[open_], after[open_], change[open_])
+            new, new_after, new_change = x[open_].copy(), after[open_].copy(), change[open_].copy()
+            better = np.zeros(len(open_), dtype=bool)
+            for halving in range(_HALVINGS):
+                left = np.flatnonzero(~better)
+                tried = x[open_[left]] + 0.5**halving * step[left]
+                tried_after, tried_change = self._mapped(tried, count)
+                # A step that is sharp already need not come nearer: it only rounds in another way.
+                better[left] = near = self.size(tried_after - tried) < residual[open_[left]]
+                chosen = left[near]
+                new[chosen], new_after[chosen], new_change[chosen] = tried[near], tried_after[near], tried_change[near]
+            stuck = ~better & ~sharp[open_]
+            if np.any(stuck):  # The map itself leads to what attracts.
+                new[stuck] = new_after[stuck]
+                new_after[stuck], new_change[stuck] = self._mapped(new[stuck], count)
+            x[open_], after[open_], change[open_] = new, new_after, new_change
+        return x[self.size(after - x) < _tolerance(change)]
+
+    def size(self, differences: Floats) -> Floats:
+        with np.errstate(invalid="ignore", over="ignore"):
+            return np.asarray(np.max(np.abs(differences) / self.scale, axis=-1))
+
+    def orbit(self, state: Floats) -> PeriodicOrbit:
+        """Orbit of a state, with its least period."""
+        for count in range(1, self.count):
+            if self.count % count == 0:
+                after = self.strobe(state, count)
+                if self.size(after - state) < math.sqrt(SAME):
+                    found = self.converged(state[None], count)
+                    if len(found) and self.size(found[0] - state) < SAME:
+                        return orbit_at(self.strobe, found[0], count)
+        return orbit_at(self.strobe, state, self.count)
+
+
+def _tolerance(change: Floats) -> Floats:
+    """Residual, over the scale, up to which a state comes back: rounding grows with the derivative, to a limit."""
+    size = np.max(np.abs(change), axis=(-2, -1))
+    return np.asarray(np.minimum(_RESIDUAL * np.maximum(1.0, size), _LARGEST_RESIDUAL))
+
+
+def _newton_step(x: Floats, after: Floats, change: Floats) -> Floats:
+    """Newton's steps towards fixed points; where that is none, a step of the map."""
+    jacobian, residual = change - np.eye(2), after - x
+    with np.errstate(all="ignore"):
+        determinant = np.linalg.det(jacobian)
+        a, b, c, d = (jacobian[:, i, j] for i in (0, 1) for j in (0, 1))
+        r, s = residual.T
+        step: Floats = np.stack([b * s - d * r, c * r - a * s], axis=-1) / determinant[:, None]
+    plain = ~np.all(np.isfinite(step), axis=1)
+    step[plain] = residual[plain]
+    return step

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
@@ -13,15 +12,13 @@ from numpy.typing import ArrayLike
 import rocking.response
 from rocking import checks
 from rocking.arrays import Floats, as_asked
-from rocking.body import Body
-from rocking.constants import MODELS, Model
-from rocking.dynamics.linear_bodies import LinearBodies, LinearBody
+from rocking.dynamics.bodies import LinearBodies, LinearBody
 from rocking.ensemble import dataset_of, outcomes_of, product_of, setup_of
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.motion.motion import Motion
 from rocking.peak_changes import BETWEEN_STOPS
 from rocking.problem import never_rests
-from rocking.records.named import Motions, one_motion
+from rocking.records.named import Motions, one_motion, several_motions
 from rocking.simulation import response_to
 from rocking.treatment import Treatment
 
@@ -87,6 +84,11 @@ class Response(rocking.response.Response):
         return as_asked(self.states(time)[..., 1])
 
 
+def in_positions(response: rocking.response.Response) -> Response:
+    """Return the response of a body between stops as one in positions."""
+    return Response(**{entry.name: getattr(response, entry.name) for entry in fields(response)})
+
+
 def simulate(
     body: LinearBody,
     motion: Motion | None,
@@ -137,10 +139,9 @@ def simulate(
     '1.800000000000'
     """
     body, motion = _one_body(body), one_motion(motion)
-    _check_rests(body, duration)
-    at = position_at_start(body, initial_position)
-    found = response_to(body, motion, "linear", chattering, _duration(body, motion, duration), (at, initial_velocity))
-    return Response(**{entry.name: getattr(found, entry.name) for entry in fields(found)})
+    until = _duration(body, motion, duration)
+    at = min(max(0.0, body.law.low), body.law.high) if initial_position is None else initial_position
+    return in_positions(response_to(body, motion, "linear", chattering, until, (at, initial_velocity)))
 
 
 def simulate_many(
@@ -169,12 +170,8 @@ def simulate_many(
         As for `simulate`; by default of bodies that need not come to rest the end of the longest motion.
     initial_position, initial_velocity : float
         As for `simulate`, for all bodies.
-    derivatives : bool
+    derivatives, threads, progress : bool or int, optional
         As for `rocking.simulate_many`.
-    threads : int, optional
-        Number of threads; by default one for every core.
-    progress : bool, optional
-        Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
 
     Returns
     -------
@@ -201,8 +198,6 @@ def simulate_many(
     if not isinstance(gathered, LinearBodies):
         given = gathered if isinstance(gathered, Iterable) else [gathered]
         gathered = LinearBodies([_one_body(each) for each in given])
-    for each in gathered.members:
-        _check_rests(each, duration)
     pressed = np.array([_is_pressed(each) for each in gathered.members])
     if duration is None and pressed.any() and not pressed.all():
         # Those that nothing presses against a stop end with the motion; the others go on until they rest.
@@ -216,21 +211,18 @@ def simulate_many(
         parts = [simulate_many(gathered.select(kind), motions, **options) for kind in kinds]
         whole = xr.concat(parts, "body", data_vars="all", coords="minimal", compat="override", join="override")
         return whole.isel(body=np.argsort(np.concatenate(kinds)))
-    product = product_of(gathered, motions, None, "factor", "+", "linear", chattering, duration)
+    several = several_motions(motions)
+    longest = max(several, key=lambda motion: motion.end)
+    ends = [_duration(each, longest, duration) or 0.0 for each in gathered.members]
     if initial_position is not None:
         initial_position = checks.finite(initial_position, "initial_position", InvalidOption)
-    setup = replace(
-        setup_of(product),
-        start=(initial_position, checks.finite(initial_velocity, "initial_velocity", InvalidOption)),
-        duration=max(
-            _duration(each, motion, duration) or 0.0 for each in gathered.members for motion in product.motions
-        )
-        or None,
-    )
+    product = product_of(gathered, several, None, "factor", "+", "linear", chattering, duration)
+    start = initial_position, checks.finite(initial_velocity, "initial_velocity", InvalidOption)
     by = BETWEEN_STOPS if checks.flag(derivatives, "derivatives", InvalidOption) else None
-    results = outcomes_of(product, setup, threads, progress, by)
+    setup = replace(setup_of(product), start=start, duration=max(ends) or None)
     names = {"peak_rotation": "peak_position", "residual_rotation": "residual_position", "block": "body"}
-    found = dataset_of(product, results).drop_vars(["overturned", "leans"]).rename(names)
+    found = dataset_of(product, outcomes_of(product, setup, threads, progress, by))
+    found = found.drop_vars(["overturned", "leans"]).rename(names)
     found["peak_position"].attrs.update(units="m", long_name="highest position")
     found["residual_position"].attrs.update(units="m", long_name="position at which it stays; NaN where not known")
     found["peak_time"].attrs.update(long_name="time of the highest position")
@@ -239,42 +231,6 @@ def simulate_many(
     for name in by or ():
         found[name].attrs.update(units="m")
     return found
-
-
-def simulate_any(
-    body: Body,
-    motion: Motion | None,
-    *,
-    model: Model,
-    chattering: str | Treatment,
-    duration: float | None,
-    initial_position: float,
-    initial_velocity: float,
-) -> rocking.response.Response:
-    """Response of a body of any kind; the position of a block is its rotation."""
-    if isinstance(body, LinearBody):
-        return simulate(
-            body, motion, chattering=chattering, duration=duration,
-            initial_position=initial_position, initial_velocity=initial_velocity,
-        )  # fmt: skip
-    return response_to(
-        body, motion, model, chattering, duration, (initial_position, initial_velocity), "initial_position"
-    )
-
-
-def model_of(body: Body, model: Model | None) -> Model:
-    """Return the equation of motion: as it is given, else nonlinear for a body that rocks."""
-    if model is not None:
-        checks.one_of(model, "model", InvalidOption, MODELS)
-        return model
-    return "linear" if isinstance(body, LinearBody) else "nonlinear"
-
-
-def position_at_start(body: Body, position: float | None) -> float:
-    """Return the position at time 0: as it is given, else zero, or the stop where that is behind it."""
-    if position is not None:
-        return position
-    return _start_of(body) if isinstance(body, LinearBody) else 0.0
 
 
 def _one_body(body: object) -> LinearBody:
@@ -286,30 +242,25 @@ def _one_body(body: object) -> LinearBody:
     return body
 
 
-def _start_of(body: LinearBody) -> float:
-    """Return position zero, or the stop that zero is behind."""
-    return min(max(0.0, body.law.low), body.law.high)
-
-
 def _is_pressed(body: LinearBody) -> bool:
     """Whether something presses the body against one of its stops where nothing moves."""
-    low, high = body.thresholds
-    return low > 0.0 or 0.0 < high < math.inf
+    low, high = body.uplift_thresholds()
+    return low > 0.0 or 0.0 < high < np.inf
 
 
-def _check_rests(body: LinearBody, duration: float | None) -> None:
-    """Ask for a duration where a body that is pressed against its stop bounces for ever."""
-    if duration is None and _is_pressed(body) and never_rests(body.alone()):
+def _duration(body: LinearBody, motion: Motion | None, duration: float | None) -> float | None:
+    """Return the duration: as it is given, else until rest, or of a body that need not rest that of the motion."""
+    if duration is not None:
+        return duration
+    if not _is_pressed(body):
+        if motion is None:
+            raise InvalidOption(
+                "nothing presses this body against a stop, so that it need not rest; give {}", "duration"
+            )
+        return motion.end
+    if never_rests(body.alone()):
         raise InvalidOption(
             f"a body with {{}} 1, as this {body.description}, never comes to rest; give {{}} to say when to stop",
             *("restitution", "duration"),
         )
-
-
-def _duration(body: LinearBody, motion: Motion | None, duration: float | None) -> float | None:
-    """Return the given duration, or that of the motion for a body that nothing presses against its stop."""
-    if duration is not None or _is_pressed(body):
-        return duration
-    if motion is None:
-        raise InvalidOption("nothing presses this body against a stop, so that it need not rest; give {}", "duration")
-    return motion.end
+    return None

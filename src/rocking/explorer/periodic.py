@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 from rocking import pulses
 from rocking.arrays import Floats
 from rocking.dynamics.bifurcation import period_of, settled_states
+from rocking.dynamics.forcing import scale_of
 from rocking.dynamics.maps import Fate, StroboscopicMap, stroboscopic_map
 from rocking.dynamics.orbits import multipliers_at
-from rocking.dynamics.repeated import scale_of
 from rocking.explorer.inputs import Case
 from rocking.explorer.motions import arguments_of, is_pulse, pulse_of
 from rocking.explorer.payload import Payload

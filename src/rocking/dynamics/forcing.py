@@ -13,9 +13,8 @@ from rocking import checks
 from rocking.arrays import Floats, Integers, ranges
 from rocking.block.sides import in_line
 from rocking.body import Body
-from rocking.constants import Model
-from rocking.dynamics.linear_bodies import LinearBody
-from rocking.dynamics.simulation import model_of
+from rocking.constants import MODELS, Model
+from rocking.dynamics.bodies import LinearBody
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
 from rocking.kernels import state
 from rocking.kernels.ground import Ground, ground_of
@@ -38,17 +37,25 @@ _PERIODS: Final = 100_000
 #: Rows of the table that a derivative uses again and again.
 _ROWS: Final = 512
 
-#: A highest rotation that asks for none: below the one at which a body has fallen by no more than rounding.
+#: A share of one that is less by no more than rounding.
 _ALMOST: Final = 1.0 - 2.0**-40
 
 
-class Repeated:
+class PeriodicForcing:
     """A body under a motion that repeats for ever, as kernels take both."""
 
     def __init__(self, body: Body, motion: Motion, model: Model | None, chattering: str | Treatment) -> None:
-        self.body, self.motion = one_body(body), one_period(motion)
+        given = one_motion(motion)
+        if given is None:
+            raise InvalidMotion("one period of the motion is needed, as rocking.pulses.sine(a, f, cycles=1), not None")
+        if given.vertical is not None:
+            raise InvalidMotion("maps are made for one component; give a motion without a vertical one")
+        self.body, self.motion = one_body(body), given
         self.bodies = self.body.alone()
-        self.model: Model = model_of(self.body, model)
+        self.model: Model = "linear" if isinstance(self.body, LinearBody) else "nonlinear"
+        if model is not None:
+            checks.one_of(model, "model", InvalidOption, MODELS)
+            self.model = model
         self.treatment = treatment(chattering)
         self.period = float(self.motion.breakpoints[-1] - self.motion.breakpoints[0])
         if not np.max(np.abs(self.motion.coefficients[:, 0])) < _BEYOND_ALL * self.body.gravity:
@@ -91,35 +98,36 @@ class Repeated:
 
     def _states(self, states: ArrayLike, name: str = "states", velocities: str = "") -> tuple[Floats, state.Records]:
         """States as given, flat, and as records; ``name`` is what a caller calls them, or their positions."""
-        given = checks.numbers(states, name, InvalidOption)
-        if given.ndim == 0 or given.shape[-1] != 2:
-            raise InvalidOption(
-                f"{{}} must hold pairs ({self.body.coordinate.name}, velocity) along the last axis, not have the shape "
-                f"{given.shape}",
-                name,
-            )
+        given = self._pairs(states, name, self.body.coordinate.name)
         flat = given.reshape(-1, 2)
-        self._refuse_into_stop(flat[:, 0], flat[:, 1], velocities or name)
+        (at, speed), record, (low, high) = flat.T, self._records[0], self.body.stops
+        if record["entered"][0] == 0:  # a stop, no ground on its other side
+            into = (at == low) & (speed < 0.0) | (bool(record["facing"]) & (at == high) & (speed > 0.0))
+            if np.any(into):
+                x, v = float(at[into][0]), float(speed[into][0])
+                raise InvalidOption(
+                    f"{{}} must not lead into a stop, as {v:g} m/s at {x:g} m does; change its sign, or begin in front "
+                    "of the stop", velocities or name, value=v,
+                )  # fmt: skip
         made = state.new_states(len(flat), 0)
-        set_start(made, self._records, self.bodies, flat[:, 0], flat[:, 1], name)
-        fallen = float(self._records["fallen"][0])
-        made["peak"] = fallen if np.isinf(fallen) else fallen * _ALMOST
+        set_start(made, self._records, self.bodies, at, speed, name)
+        made["peak"] = self._no_peak
         return given, made
 
-    def _refuse_into_stop(self, at: Floats, speed: Floats, name: str) -> None:
-        """Refuse states at a stop that lead into it."""
-        record, (low, high) = self._records[0], self.body.stops
-        if record["entered"][0] != 0:  # no stop, but the ground on both sides
-            return
-        wrong = (at == low) & (speed < 0.0) | (bool(record["facing"]) & (at == high) & (speed > 0.0))
-        if np.any(wrong):
-            x, v = float(at[wrong][0]), float(speed[wrong][0])
+    @property
+    def _no_peak(self) -> float:
+        """A highest rotation that asks for none: below the one at which a body has fallen by no more than rounding."""
+        fallen = float(self._records["fallen"][0])
+        return fallen if np.isinf(fallen) else fallen * _ALMOST
+
+    def _pairs(self, values: ArrayLike, name: str, first: str) -> Floats:
+        """Pairs of numbers, shape (..., 2)."""
+        given = checks.numbers(values, name, InvalidOption)
+        if given.ndim == 0 or given.shape[-1] != 2:
             raise InvalidOption(
-                f"{{}} must not lead into a stop, as {v:g} m/s at {x:g} m does; change its sign, or begin in front of "
-                "the stop",
-                name,
-                value=v,
+                f"{{}} must hold pairs ({first}, velocity) along the last axis, not have the shape {given.shape}", name
             )
+        return given
 
     def _coordinates(self, u: Floats, v: Floats, side: Integers) -> Floats:
         """Coordinates and velocities of states given in the frames of their sides."""
@@ -136,9 +144,6 @@ class Repeated:
         found[np.isin(made["ending"], (Fate.OVERTURNED, Fate.UNFINISHED))] = np.nan
         return found
 
-    def _signs(self, side: Integers) -> Floats:
-        return np.where(side > 0, -1.0, 1.0)
-
     @property
     def _is_two_sided(self) -> bool:
         """Whether the coordinate passes zero, or there is a second stop."""
@@ -150,27 +155,18 @@ class Repeated:
         """Whether no speed is lost from one impact to the next but one, so that nothing near a rest comes to rest."""
         return bool(np.prod(self._records[0]["restitution"]) >= 1.0)
 
-    def _pairs_of_impacts(self, impacts: ArrayLike) -> Floats:
-        given = checks.numbers(impacts, "impacts", InvalidOption)
-        if given.ndim == 0 or given.shape[-1] != 2:
-            raise InvalidOption("{} must hold pairs (phase in s, velocity) along the last axis", "impacts")
-        return given
-
     def _after_impacts(self, flat: Floats) -> state.Records:
-        record, made = self._records[0], state.new_states(len(flat), 0)
+        made = state.new_states(len(flat), 0)
         phase = np.mod(np.where(np.isfinite(flat[:, 0]), flat[:, 0], np.nan), self.period)
         starts = self._ground.pieces[: (len(self._ground.pieces) - 3) // 2, 0]
         made["piece"] = np.searchsorted(starts, phase, side="right") - 1
         made["offset"] = phase - starts[made["piece"]]
-        made["side"] = np.where(self._directions(flat[:, 1]) < 0.0, 1, 0)
+        made["side"] = np.where(flat[:, 1] < 0.0, 1, 0)
         made["v"] = np.where(np.isnan(phase), np.nan, np.abs(flat[:, 1]))
         if np.any(flat[:, 1] == 0.0) or (not self._is_two_sided and np.any(flat[:, 1] < 0.0)):
             raise InvalidOption("every velocity in {} must lead away from the stop that was hit", "impacts")
-        made["peak"] = record["fallen"] if np.isinf(record["fallen"]) else record["fallen"] * _ALMOST
+        made["peak"] = self._no_peak
         return made
-
-    def _directions(self, velocity: Floats) -> Floats:
-        return np.where(velocity < 0.0, -1.0, 1.0)
 
 
 class Scale(NamedTuple):
@@ -180,7 +176,7 @@ class Scale(NamedTuple):
     velocity: float
 
 
-def scale_of(strobe: Repeated) -> Scale:
+def scale_of(strobe: PeriodicForcing) -> Scale:
     """Sizes of coordinate and velocity that are natural to a body under a motion."""
     record, period = strobe._records[0], strobe.period
     if not isinstance(strobe.body, LinearBody):
@@ -229,13 +225,3 @@ def described(what: Body | Motion) -> str:
     if isinstance(what, Motion):
         return ", ".join(part for part in (what.label, what.description.numbers) if part)
     return f"{what.description}, {in_line(what.sides)}"
-
-
-def one_period(motion: Motion | None) -> Motion:
-    """Return one period of a motion, or say that it is none."""
-    given = one_motion(motion)
-    if given is None:
-        raise InvalidMotion("one period of the motion is needed, as rocking.pulses.sine(a, f, cycles=1), not None")
-    if given.vertical is not None:
-        raise InvalidMotion("maps are made for one component; give a motion without a vertical one")
-    return given
