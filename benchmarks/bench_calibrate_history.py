@@ -17,7 +17,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 import rocking
-from rocking.analysis.calibration import history
+from rocking.calibration import history
 
 NOISES = (1e-3, 1e-2, 5e-2)
 TIMES = np.arange(0.0, 4.0, 0.01)

@@ -22,7 +22,7 @@ import rocking
 from rocking.studies import folder as folders
 from rocking.studies import units
 from rocking.studies.file import read_study
-from rocking.studies.inputs import OUTCOMES
+from rocking.studies.product import OUTCOMES
 from rocking.studies.units import DamagedUnit, UnitGrid, decoded, encoded, name_of
 
 BLOCKS = rocking.Blocks(p=np.linspace(1.0, 6.0, 1300), alpha=0.2, restitution=0.7)
@@ -535,7 +535,7 @@ def test_other_blocks_and_motions_are_refused_by_name(tmp_path):
 @pytest.mark.parametrize(("part", "other"), [("VERSION", "9.9.9"), ("fingerprint", lambda: "9.9.9")])
 def test_another_version_or_other_kernels_may_read_a_study_but_not_go_on_with_it(tmp_path, monkeypatch, part, other):
     study = made(tmp_path)
-    monkeypatch.setattr(f"rocking.studies.store.{part}", other)
+    monkeypatch.setattr(f"rocking.studies.folder.{part}", other)
     assert rocking.study(tmp_path).results().sizes["block"] == 1300
     for compute in (study.run, lambda: study.verify(recompute=1), lambda: study.verify(repair=True)):
         with pytest.raises(rocking.StudyError, match=r"9\.9\.9"):

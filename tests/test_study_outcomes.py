@@ -11,8 +11,8 @@ import xarray as xr
 import rocking
 from rocking.explorer.studies import StudyView
 from rocking.studies import read_study
-from rocking.studies.inputs import ALWAYS_KEPT, OUTCOMES, UNNAMED
-from rocking.studies.store import sealed
+from rocking.studies.folder import sealed
+from rocking.studies.product import ALWAYS_KEPT, OUTCOMES, UNNAMED
 
 BLOCKS = rocking.Blocks.grid(p=np.linspace(1.0, 6.0, 130), alpha=[0.1, 0.2, 0.25, 0.3], restitution=[0.85])
 FEW = BLOCKS.select(slice(None, None, 27))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.analysis.fragility.lognormal import Probit
+from rocking.analysis.probit import Probit
 from rocking.arrays import Floats, Integers, as_asked
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.analysis.labels import labels_of
 from rocking.analysis.levels import (
     REVERSED_TOO,
     Boundaries,
     boundaries,
     described,
+    labels_of,
     simulate_levels,
     undecided_text,
     units_of,

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from rocking import checks
-from rocking.analysis.fragility.curve import FragilityCurve, interval_of
-from rocking.analysis.fragility.lognormal import Probit
+from rocking.analysis.curve import FragilityCurve, in_units, interval_of
 from rocking.analysis.hazard import (
     HazardCurve,
     hazard_line,
@@ -21,6 +20,7 @@ from rocking.analysis.hazard import (
     shares_beyond,
     shown_range,
 )
+from rocking.analysis.probit import Outcomes, Probit, fit_or_limits
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
@@ -28,6 +28,7 @@ from rocking.result import DrawnResult
 from rocking.tables import as_written, counted, known_digits, text_table, within
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -399,3 +400,298 @@ def gradient_of(quantity: Any, fitted: Probit) -> Floats:
         up, down = (quantity(fitted._replace(**{name: value + sign * step}))[0] for sign in (1.0, -1.0))
         rows.append((up - down) / (2.0 * step))
     return np.array(rows)
+
+
+#: Probabilities of exceedance of the intensities in the table.
+_CHANCES: Final = (0.05, 0.16, 0.5, 0.84, 0.95)
+
+#: Probabilities between which a figure shows the rates, and its points.
+_SHOWN: Final = (0.01, 0.999)
+
+#: An integral over a normal distribution: its farthest ends, and its points.
+_FARTHEST: Final = 38.0
+_STEPS: Final = np.linspace(0.0, 1.0, 4001)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Survival(DrawnResult):
+    """A limit state that was not exceeded in a time, and what that says of the shaking; from `Fragility.survival`.
+
+    Its figure has the largest rates that fit with the survival, and the hazard curve beside them.
+
+    A curve of several blocks (for example an ensemble that stands for one block which is not quite known) does not
+    separate their dispersion from that of the motions. Rates and `probability` are then those of motions that each meet
+    another of the blocks. If one of the blocks has stood all the time, the probability is `mean_probability`, and
+    `most_probable` bounds it.
+
+    Attributes
+    ----------
+    curve : FragilityCurve
+        Probabilities that the limit is exceeded.
+    measure : Measure
+        What its intensity is.
+    description : str
+        What was simulated or observed.
+    years : float
+        For how long it was not exceeded.
+    confidence : float
+        Probability with which it would have been, if shaking were any stronger or more frequent than what is said.
+    hazard : HazardCurve or None
+        Annual rates of intensities at the site.
+    rate : Rate or None
+        Annual rate of the limit state under that hazard curve.
+    several_blocks : bool
+        Whether outcomes of several blocks count together in the curve.
+    mean_probability : float
+        Probability of the survival under the hazard curve of one of several blocks: the mean, by their weights, of the
+        probabilities of the blocks, each by a fragility curve of its own. NaN of one block, without a hazard curve, and
+        where the outcomes of each block are not kept.
+    """
+
+    curve: FragilityCurve
+    measure: Measure
+    description: str
+    years: float
+    confidence: float
+    hazard: HazardCurve | None
+    rate: Rate | None
+    several_blocks: bool = False
+    mean_probability: float = math.nan
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "years", checks.positive(self.years, "years", InvalidOption))
+        checks.share(self.confidence, "confidence", InvalidOption)
+
+    @property
+    def intensity(self) -> Floats:
+        """Intensities (SI) that exceed the limit with probabilities of 0.05, 0.16, 0.5, 0.84 and 0.95."""
+        return np.array([self.curve.intensity_of(chance) for chance in _CHANCES])
+
+    @property
+    def unlikely(self) -> float:
+        """Intensity (SI) that one motion, had it come, would have exceeded the limit with the confidence asked for."""
+        return self.curve.intensity_of(self.confidence)
+
+    @property
+    def largest_rate(self) -> Floats:
+        """Annual rates of motions of each `intensity` or more above which the limit would have been exceeded.
+
+        Of several blocks, if each motion met another of them.
+        """
+        return self.curve.largest_rate(self.intensity, self.years, self.confidence)
+
+    @property
+    def probability(self) -> float:
+        """Probability, under the hazard curve, that the limit is not exceeded in the time; NaN without one.
+
+        Of several blocks the least it can be: if each motion met another of them.
+        """
+        return math.nan if self.rate is None else self.rate.survival(self.years)
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Its confidence interval, from that of the fragility."""
+        if self.rate is None:
+            return math.nan, math.nan
+        low, high = self.rate.interval
+        return math.exp(-high * self.years), math.exp(-low * self.years)
+
+    @property
+    def most_probable(self) -> float:
+        """The largest `probability` that fits with all that is known: with the interval, the hazard curve, the blocks.
+
+        It is at the upper end of the interval, and without motions below the hazard curve's first point or above its
+        last, where its lines are only extended. Of several blocks it is that of one which has stood all the time, and
+        of which the intensity alone decides whether it falls: the integral of exp(-rate(x) years) dP(x).
+        """
+        if self.rate is None or self.hazard is None:
+            return math.nan
+        hazard, fitted = self.hazard, self.curve.fitted
+        if not self.several_blocks:
+
+            def within(fits: Probit) -> Floats:
+                return _log_rate_within(fits, hazard)
+
+            low, _ = interval_of(self.curve, within, within(fitted)[0], gradient_of(within, fitted))
+            return math.exp(-math.exp(float(low[0])) * self.years)
+
+        def logarithm(fits: Probit) -> Floats:
+            return _log_standing(fits, hazard, self.years)
+
+        _, high = interval_of(self.curve, logarithm, logarithm(fitted)[0], gradient_of(logarithm, fitted))
+        return math.exp(min(float(high[0]), 0.0))
+
+    @property
+    def contradicts(self) -> bool:
+        """Whether the survival, at its `most_probable`, is less probable than 1 - confidence."""
+        return self.most_probable < 1.0 - self.confidence
+
+    def summary(self) -> str:
+        measure, share = self.measure, f"{100.0 * self.confidence:g} %"
+        header = [measure.label, "probability", "at most a year", "at most once in (years)"]
+        columns: list[list[Any]] = [
+            [within(x, self._known, lambda end: f"{measure.scale * end:.5g}") for x in self.intensity],
+            [*_CHANCES],
+            [f"{rate:.2g}" for rate in self.largest_rate],
+            [f"{float(f'{1.0 / rate:.2g}'):.7g}" for rate in self.largest_rate],
+        ]
+        if self.hazard is not None:
+            header += ["hazard curve, a year", "survival at most"]
+            highest, lowest = self.hazard.rate[[0, -1]]
+            rates = self.hazard.rate_of(self.intensity)
+            known = np.where(rates < lowest, 0.0, np.minimum(rates, highest))
+            columns += [
+                [within(rate, (lowest, highest), "{:.2g}".format) for rate in rates],
+                [f"{chance:.2g}" for chance in np.exp(-self.years * known * _CHANCES)],
+            ]
+        return "\n".join(
+            [
+                f"{self.curve.limit_state}: not in {counted(self.years, 'year')}; intensity: {measure.label}",
+                f"most likely never {self._never}: one such motion would have exceeded the limit with {share}",
+                f"largest rates of motions of an intensity or more; with larger ones the limit would have been "
+                f"exceeded with {share}" + (", if each met another of the blocks" if self.several_blocks else ""),
+                "",
+                text_table(header, [*map(list, zip(*columns, strict=True))]),
+                *([] if self.rate is None or self.hazard is None else ["", self._verdict(self.rate, self.hazard)]),
+                *([] if self.rate is None else beyond_notes(self.rate)),
+            ]
+        )
+
+    @property
+    def _known(self) -> tuple[float, float]:
+        """Lowest and highest intensity (SI) of the data and of the hazard curve."""
+        known = np.concatenate([self.curve.intensity, [] if self.hazard is None else self.hazard.intensity])
+        return float(known.min()), float(known.max())
+
+    @property
+    def _never(self) -> str:
+        """Say which motions have most likely never come."""
+        text = in_units(min(self.unlikely, self._known[1]), self.measure)
+        return f"some intensity above {text}, beyond the data" if self.unlikely > self._known[1] else f"{text} or more"
+
+    def _verdict(self, rate: Rate, hazard: HazardCurve) -> str:
+        """Say how probable the survival is under a hazard curve."""
+        low, high = rate.bounds
+        bounds = math.exp(-high * self.years), math.exp(-low * self.years)
+        chance, between = known_digits(self.probability, self.interval, bounds)
+        pooled = f"{chance} ({100.0 * self.curve.confidence:g} % interval {between})"
+        has_mean = not math.isnan(self.mean_probability)
+        likely = self.mean_probability if has_mean else self.probability
+        if self.several_blocks:
+            mean = f"{likely:.2g} in the mean and " if has_mean else ""
+            pooled = (
+                f"{mean}at most {self.most_probable:.2g} if one of the blocks has stood all the time, and {pooled} if "
+                "each motion met another of them"
+            )
+        text = (
+            f"under the hazard curve {hazard.name!r} the probability of {counted(self.years, 'year')} without it is "
+            f"{pooled}"
+        )
+        least = f"{1.0 - self.confidence:.3g}"
+        if likely >= 1.0 - self.confidence:
+            return f"{text}, so they do not contradict each other"
+        if not self.contradicts:
+            return f"{text}; below {least} they would contradict each other, which is not settled"
+        return (
+            f"{text}; all of that is below {least}, so they contradict each other: the hazard curve is too high, or "
+            "the block stronger than its fragility, or younger"
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        column = self.measure.column
+        found = {
+            "limit_state": self.curve.limit_state,
+            "years": self.years,
+            "confidence": self.confidence,
+            f"most_likely_never_{column}": self.unlikely,
+            "probability_of_exceedance": [*_CHANCES],
+            column: self.intensity,
+            "largest_annual_rate": self.largest_rate,
+        }
+        if self.hazard is None:
+            return found
+        return found | {
+            "hazard_annual_rate": self.hazard.rate_of(self.intensity),
+            "probability": self.probability,
+            "probability_interval": [*self.interval],
+            "most_probable": self.most_probable,
+            "mean_probability": self.mean_probability,
+            "share_below_hazard_curve": math.nan if self.rate is None else self.rate.below,
+            "share_above_hazard_curve": math.nan if self.rate is None else self.rate.above,
+            "contradicts": self.contradicts,
+        }
+
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
+        from rocking.plot.risk import survival_figure
+
+        ends = [end for end in map(self.curve.intensity_of, _SHOWN) if 0.0 < end < math.inf]
+        if len(ends) < len(_SHOWN):  # the curve is so wide that these are not numbers any more
+            ends = [self.curve.intensity.min(), self.curve.intensity.max()]
+        if self.hazard is not None:
+            ends += self.hazard.intensity[[0, -1]].tolist()
+        at = np.geomspace(min(ends), max(ends), 200)
+        at = at[self.curve.probability(at) > _SHOWN[0] * 0.1]
+        return survival_figure(
+            intensity=self.measure.scale * at,
+            largest=self.curve.largest_rate(at, self.years, self.confidence),
+            largest_label=f"at most, with {counted(self.years, 'year')} without {self.curve.limit_state} "
+            f"({100.0 * self.confidence:g} %)",
+            hazard=None if self.hazard is None else hazard_line(self.hazard, at),
+            intensity_label=self.measure.label,
+            title=title or as_written(self.description),
+            ax=ax,
+            figsize=figsize,
+        )
+
+    def _headline(self) -> str:
+        return f"{self.curve.limit_state}: not in {counted(self.years, 'year')}; most likely never {self._never}"
+
+
+def mean_of_blocks(outcomes: pd.DataFrame, column: str, limit_state: str, hazard: HazardCurve, years: float) -> float:
+    """Mean of the probabilities that blocks survive, each by a curve fitted to its own outcomes."""
+    table = outcomes.sort_values("block", kind="stable")
+    blocks = table.drop_duplicates("block")
+    intensity, exceeded = (
+        table[name].to_numpy(np.float64).reshape(len(blocks), -1) for name in (column, f"exceeded_{limit_state}")
+    )
+    fits, _ = fit_or_limits(Outcomes(np.log(intensity[0]), exceeded, np.ones_like(exceeded)))
+    # Of a curve that does not rise, motions below the hazard curve would exceed the limit as often as they come.
+    parts = np.where(fits.slope[:, None] > 0.0, log_parts(fits, hazard), -np.inf)
+    parts[fits.slope <= 0.0, :1] = _log_rate_within(fits, hazard)[fits.slope <= 0.0]
+    rates = np.exp(np.logaddexp.reduce(parts, axis=1))
+    return float(np.average(np.exp(-years * rates), weights=blocks.get("weight")))
+
+
+def _log_rate_within(fits: Probit, hazard: HazardCurve) -> Floats:
+    """Logarithms of the rates that motions between the ends of the hazard curve add, shape (fits, 1).
+
+    That is the integral of P(x) |d rate(x)|, by parts.
+    """
+    from scipy.special import ndtr
+
+    a, b = (values[:, None] for values in fits)
+    first, last = ndtr(a + b * np.log(hazard.intensity[[0, -1]])).T
+    # Of a curve that does not rise, dP is 0 on every segment.
+    between = np.where(fits.slope > 0.0, np.exp(log_parts(fits, hazard)[:, 1:-1]).sum(axis=1), 0.0)
+    rate = first * hazard.rate[0] - last * hazard.rate[-1] + between
+    return np.asarray(np.log(np.maximum(rate, np.finfo(float).tiny)))[:, None]
+
+
+def _log_standing(fits: Probit, hazard: HazardCurve, years: float) -> Floats:
+    """Logarithms of the integral of exp(-rate(x) years) dP(x), shape (fits, 1).
+
+    Motions below the hazard curve's first point, or above its last, add nothing.
+    """
+    from scipy.special import log_ndtr
+
+    a, b = (values[:, None] for values in fits)
+    log_x, log_rate = np.log(hazard.intensity), np.log(hazard.rate)
+    with np.errstate(all="ignore"):
+        first, last = (np.clip(a + b * end, -_FARTHEST, _FARTHEST) for end in log_x[[0, -1]])
+        z = first + (last - first) * _STEPS
+        density = -0.5 * z * z - years * np.exp(np.interp((z - a) / b, log_x, log_rate))
+        between = np.logaddexp(density[:, 1:], density[:, :-1]) + np.log(np.diff(z) * math.sqrt(0.125 / math.pi))
+        # Under a curve that does not rise, what falls at all falls under the weakest motions.
+        between = np.where(b > 0.0, between, -np.inf)
+        parts = np.column_stack([log_ndtr(first) - years * hazard.rate[0], between, log_ndtr(-last)])
+        return np.asarray(np.logaddexp.reduce(parts, axis=1)[:, None])

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.analysis.labels import curves_of, labels_of, motions_in_words
-from rocking.analysis.levels import mean_one, pooled, ratios_of
+from rocking.analysis.levels import curves_of, labels_of, mean_one, motions_text, pooled, ratios_of
 from rocking.arrays import Floats
 from rocking.block import Blocks, RestrainedBlocks
 from rocking.block.many import rates_of
@@ -205,7 +204,7 @@ class RockingSpectrum(DatasetResult):
 
     def summary(self) -> str:
         header = ["p (rad/s)", "R (m)", *(f"{100 * share:g} %" for share in self.data.fractile.values), "overturned"]
-        parts = [f"peak rotation over slenderness, {motions_in_words(self.data)}, {self.data.model} model"]
+        parts = [f"peak rotation over slenderness, {motions_text(self.data)}, {self.data.model} model"]
         for title, one in curves_of(self.data):
             fractiles = one.fractile_over_alpha.transpose("p", "fractile").values
             rows = [
@@ -309,7 +308,7 @@ class RockingSpectrum(DatasetResult):
             title=title
             or as_written(
                 ", ".join(
-                    [motions_in_words(self.data), *([named_curves[0][0]] if alone else []), f"{self.data.model} model"]
+                    [motions_text(self.data), *([named_curves[0][0]] if alone else []), f"{self.data.model} model"]
                 )
             ),
             ax=ax,

@@ -10,7 +10,7 @@ from pathlib import PurePath
 from typing import Any, Final
 from urllib.parse import parse_qsl
 
-from rocking.analysis.labels import numbered
+from rocking.analysis.levels import numbered
 from rocking.errors import InvalidOption, RockingError
 from rocking.explorer.parameters import PARAMETERS, field_label, names_of
 from rocking.explorer.phrases import phrase

@@ -13,24 +13,30 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.analysis.fragility.fit import OVERTURNING
-from rocking.analysis.fragility.result import Fragility
+from rocking.analysis.fragility import OVERTURNING, Fragility
 from rocking.body import Bodies, Body
 from rocking.constants import Model
 from rocking.ensemble import Polarity, Product, dataset_of, product_of
 from rocking.errors import InvalidOption
 from rocking.motion.named import Motions, names_of
 from rocking.motion.scaling import IntensityName, Measure, MeasureName
-from rocking.studies.critical import StudyVerdict, critical_scales
-from rocking.studies.folder import Folder
-from rocking.studies.fragility import BlockFragilities, block_fragilities, pooled_fragility
-from rocking.studies.inputs import OUTCOMES, chosen_outcomes
-from rocking.studies.report import ReportPart, ReportPlan, keep_report, kept_report, made_report
-from rocking.studies.results import lazy_outcome, write_table
-from rocking.studies.run import RunReport, run
-from rocking.studies.spectrum import FRACTILES, StudySpectrum, study_spectrum
-from rocking.studies.status import Status, log_run, status_of, verified
-from rocking.studies.store import Store, exists, require_free
+from rocking.studies.folder import Folder, Store, exists, require_free
+from rocking.studies.product import OUTCOMES, chosen_outcomes
+from rocking.studies.report import (
+    FRACTILES,
+    BlockFragilities,
+    ReportPart,
+    ReportPlan,
+    StudySpectrum,
+    block_fragilities,
+    keep_report,
+    kept_report,
+    made_report,
+    pooled_fragility,
+    study_spectrum,
+)
+from rocking.studies.results import StudyVerdict, critical_scales, lazy_outcome, write_table
+from rocking.studies.run import RunReport, Status, log_run, run, status_of, verified
 from rocking.studies.units import fitting_unit, width_of
 from rocking.tables import counted, write_netcdf
 from rocking.treatment import Treatment

@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from rocking.analysis.fragility.lognormal import (
+from rocking.analysis.probit import (
     STEEP,
     Outcomes,
     Probit,

@@ -13,10 +13,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.analysis.calibration.evidence import unpacked
-from rocking.analysis.calibration.search import AGREEMENT, RUNS, Search
-from rocking.analysis.calibration.space import HIGHEST, Space, unit_of
 from rocking.arrays import Flags, Floats
+from rocking.calibration.search import AGREEMENT, RUNS, Search, unpacked
+from rocking.calibration.space import HIGHEST, Space, unit_of
 from rocking.errors import InvalidOption
 from rocking.tables import counted
 

@@ -17,7 +17,7 @@ from typing import Final, Literal, NamedTuple, get_args
 import numpy as np
 
 from rocking import checks
-from rocking.analysis.fragility.curve import FragilityCurve
+from rocking.analysis.curve import FragilityCurve
 from rocking.analysis.levels import units_of
 from rocking.arrays import Floats
 from rocking.body import Body

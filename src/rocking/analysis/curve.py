@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.analysis.fragility import lognormal
-from rocking.analysis.fragility.confidence import FEWEST, Confidence, Ends, LikelyRegion, Quantity, Resamples
-from rocking.analysis.fragility.lognormal import Outcomes, Probit, normal_scores, probabilities
+from rocking.analysis import probit as lognormal
+from rocking.analysis.probit import Outcomes, Probit, normal_scores, probabilities
+from rocking.analysis.regions import FEWEST, Confidence, Ends, LikelyRegion, Quantity, Resamples
 from rocking.arrays import Floats, Integers, as_asked
 from rocking.errors import InvalidOption, Unfitted
 from rocking.motion.scaling import Measure, intensities

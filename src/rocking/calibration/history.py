@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.analysis.calibration.space import (
+from rocking.arrays import Floats
+from rocking.block import Block
+from rocking.calibration.space import (
     EVERYTHING_IS_KNOWN,
     HIGHEST,
     PARAMETERS,
@@ -20,8 +22,6 @@ from rocking.analysis.calibration.space import (
     unit_of,
     value_range,
 )
-from rocking.arrays import Floats
-from rocking.block import Block
 from rocking.constants import Model
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion

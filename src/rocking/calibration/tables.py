@@ -14,9 +14,9 @@ import numpy as np
 from rocking import checks
 from rocking.analysis.hazard import HEADINGS, heading_of
 from rocking.analysis.levels import families_of
-from rocking.analysis.validation import ShakeTest
 from rocking.arrays import Floats
 from rocking.block import Blocks
+from rocking.calibration.validate import ShakeTest
 from rocking.constants import Model
 from rocking.errors import InvalidOption, RockingError, UnreadableRecord
 from rocking.motion.motion import Motion

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.analysis import labels
-from rocking.analysis.calibration.diagnostics import Scores, log_losses
-from rocking.analysis.calibration.evidence import blurred, expected_share
-from rocking.analysis.calibration.result import Calibration, Validation
+from rocking.analysis import levels as labels
 from rocking.analysis.levels import mean_one, note_missing, pooled
 from rocking.arrays import Flags, Floats, Integers
 from rocking.body import Bodies, Body
+from rocking.calibration.diagnostics import Scores, log_losses
+from rocking.calibration.outcomes import Calibration, Validation
+from rocking.calibration.search import blurred, expected_share
 from rocking.constants import Model
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidMotion, InvalidOption
