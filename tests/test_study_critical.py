@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking.studies import critical
+from rocking.studies import results as critical
 from rocking.studies.product import OUTCOMES
 
 SCALES = np.geomspace(1.6, 20.0, 16)

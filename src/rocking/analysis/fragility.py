@@ -59,7 +59,7 @@ class Fragility(DrawnResult, TableResult):
     """Fragility curves of one or several limit states against one intensity measure; from `fragility`.
 
     Its tables are "curves" (limit state, intensity in SI units, probability, lower and upper end of the band) and,
-    where blocks were simulated, "outcomes". Its figure has the curves with their bands and the shares that were seen.
+    where blocks were simulated, "outcomes". Its figure has the curves with their bands and the observed shares.
 
     Attributes
     ----------
@@ -74,10 +74,9 @@ class Fragility(DrawnResult, TableResult):
     model : str
         Equation of motion, which says how a block's own unit counts.
     outcomes : pandas.DataFrame or None
-        What was simulated, one row each, so that the fit can be audited: motion, block (position), polarity, the
-        measure with its unit (SI, as pga_m_s2), peak_rotation_rad, peak_over_alpha (infinite where it overturned),
-        overturned, unfinished (its peak_over_alpha is NaN then), whether each limit state was exceeded, and the weight
-        of the block where it has one; None where the outcomes were given.
+        Every simulation: motion, block (position), polarity, the measure with its unit (SI, as pga_m_s2),
+        peak_rotation_rad, peak_over_alpha (infinite where it overturned, NaN where unfinished), overturned, unfinished,
+        whether each limit state was exceeded, and the weight of the block if any; None where outcomes were given.
     one_way : bool
         Whether sides that differ met motions in one polarity only: reversed, they do something else.
     with_vertical : bool
@@ -137,7 +136,7 @@ class Fragility(DrawnResult, TableResult):
                 + spelled(Message('{} "both" counts both', ("polarity",)))
             )
         if not self.curves[0].bounded:
-            notes.append(f"intervals and bands go from 0 to infinity: {self._too_few()}")
+            notes.append(f"intervals and bands go from 0 to infinity: {self._too_few}")
         independent = self.curves[0].independent
         wanted = "outcome" if independent else self.source
         notes += [
@@ -155,8 +154,8 @@ class Fragility(DrawnResult, TableResult):
             notes.append("there is no p of fit: the test needs three groups of outcomes, of five or so each")
         return tuple(notes)
 
+    @property
     def _too_few(self) -> str:
-        """Why nothing is bounded."""
         count = counted(self.curves[0].clusters, self.source)
         return f"{count} cannot tell how far {self.source}s differ; give 3 or more"
 
@@ -185,7 +184,7 @@ class Fragility(DrawnResult, TableResult):
         return f"{self.description}; {self.measure.label}; {curves}"
 
     def curve(self, limit_state: str) -> FragilityCurve:
-        """Curve of a limit state.
+        """Return the curve of a limit state.
 
         Parameters
         ----------
@@ -196,11 +195,6 @@ class Fragility(DrawnResult, TableResult):
         -------
         FragilityCurve
             Its curve.
-
-        Raises
-        ------
-        InvalidOption
-            If there is none of that name.
 
         Examples
         --------
@@ -253,7 +247,7 @@ class Fragility(DrawnResult, TableResult):
         confidence: float = 0.95,
         limit_state: str = "overturning",
     ) -> Survival:
-        """Say what follows for past shaking where a limit state was not exceeded, as of a rock that still stands.
+        """Constrain past shaking by a limit state that was not exceeded, as by a rock that still stands.
 
         Parameters
         ----------
@@ -384,47 +378,35 @@ class Fragility(DrawnResult, TableResult):
         first = self.curves[0]
         band_text = f"band: {100 * first.confidence:g} % confidence ({self.band_kind})"
         if not first.bounded:
-            band_text = f"no band: {self._too_few()}"
-
+            band_text = f"no band: {self._too_few}"
         intensity, scale = np.linspace(0.0, self.range[1], _POINTS), self.measure.scale
-        lines = []
+        lines, states = [], [curve.limit_state for curve in self.curves]
         for curve in self.curves:
-            at, seen, outcomes = _shares_seen(curve)
+            group = groups(np.log(curve.intensity), curve.trials)  # those that the fit is tested in
+            held = np.bincount(group, curve.trials).astype(np.float64)
+            at, seen = (np.bincount(group, sums) / held for sums in (curve.trials * curve.intensity, curve.exceeded))
             is_rotation = curve.limit is not None and math.isfinite(curve.limit)
             limit = f" (rotation of {curve.limit:g} of the slenderness)" if is_rotation else ""
             at_half = f"median {in_units(curve.median, self.measure)}, dispersion {curve.dispersion:.3g}"
             text = f"{curve.limit_state}{limit}: {at_half}"
             chance = curve.probability(intensity)
             band = curve.band(intensity) if curve.bounded else (chance, chance)
-            lines.append(FragilityLine(text, scale * intensity, chance, *band, scale * at, seen, outcomes))
+            lines.append(FragilityLine(text, scale * intensity, chance, *band, scale * at, seen, held))
         return fragility_figure(
             lines=lines,
             intensity_label=self.measure.label,
             band_label=band_text,
-            probability_label=_probability_of([curve.limit_state for curve in self.curves]),
+            probability_label="probability of "
+            + ("" if [*states] == ["overturning"] else "exceeding ")
+            + (states[0] if len(states) == 1 else "the limit state"),
             title=title or as_written(self.description),
             ax=ax,
             figsize=figsize,
         )
 
 
-def _probability_of(limit_states: Sequence[str]) -> str:
-    """Say what a probability is of."""
-    if [*limit_states] == ["overturning"]:
-        return "probability of overturning"
-    return f"probability of exceeding {limit_states[0] if len(limit_states) == 1 else 'the limit state'}"
-
-
-def _shares_seen(curve: FragilityCurve) -> tuple[Floats, Floats, Floats]:
-    """Mean intensities, shares and numbers of outcomes of the groups that the fit is tested in."""
-    group = groups(np.log(curve.intensity), curve.trials)
-    held = np.bincount(group, curve.trials).astype(np.float64)
-    return np.bincount(group, curve.trials * curve.intensity) / held, np.bincount(group, curve.exceeded) / held, held
-
-
-#: Intensities, in SI units, far beyond any motion; whole numbers that double precision counts exactly.
+#: Intensities, in SI units, far beyond any motion.
 _INTENSITIES: Final = (1e-50, 1e50)
-_MOST_TRIALS: Final = 2.0**53
 _LIKELIHOOD: Final = Band()
 
 #: Limit states: peak rotation over slenderness that is exceeded; infinity is overturning.
@@ -457,15 +439,12 @@ def fragility(
     motions : Motion, sequence of Motion, or mapping of str to Motion
         m motions; a mapping gives them its names.
     measure : {"pga", "pgv", "pga_ratio", "pgv_ratio"} or Measure
-        Intensity measure: peak acceleration (m/s^2), peak velocity (m/s); in each block's own units PGA and
-        p PGV over the acceleration that lifts it; or spectral acceleration (m/s^2) as
-        ``rocking.Measure("sa", period=1.0)``.
+        Intensity measure, as for `incremental_dynamic_analysis`.
     levels : array_like, optional
         Stripes: every motion scaled to each of these levels. Without them a cloud: every motion as it is.
     limits : mapping of str to float
         Limit states: peak rotation over slenderness (of the block as it stands, the smaller one of two sides) that is
-        exceeded; ``math.inf``
-        stands for overturning, the default.
+        exceeded; ``math.inf`` stands for overturning, the default.
     model : {"nonlinear", "linear"}
         Equation of motion.
     chattering : str or Treatment
@@ -483,9 +462,7 @@ def fragility(
         cluster in any case.
     band : Band
         How intervals and bands are made.
-    threads : int, optional
-        As for `simulate_many`.
-    progress : bool, optional
+    threads, progress : optional
         As for `simulate_many`.
 
     Returns
@@ -503,8 +480,7 @@ def fragility(
 
     Examples
     --------
-    >>> import numpy as np
-    >>> import rocking
+    >>> import numpy as np, rocking
     >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     >>> motions = [rocking.pulses.one_sine(1.0, f) for f in np.linspace(0.3, 1.5, 13)]
     >>> result = fragility(block, motions, measure="pga_ratio", levels=np.linspace(1.0, 9.0, 17))
@@ -521,16 +497,12 @@ def fragility(
     if stripes is not None and stripes.size < 2:
         raise InvalidOption("a fragility needs {} that differ: give two or more", "levels", value=levels)
     shaken = several_motions(motions)
-    values, together = values_of(shaken, how), clusters_of(shaken, clusters)
-    options: dict[str, Any] = {
-        "chattering": chattering,
-        "polarity": "+" if mirrored else polarity,
-        "threads": threads,
-        "progress": progress,
-    }
+    values, together, units = values_of(shaken, how), clusters_of(shaken, clusters), units_of(many, how, model)
+    options: dict[str, Any] = {"chattering": chattering, "polarity": "+" if mirrored else polarity}
+    options |= {"threads": threads, "progress": progress}
     if stripes is None:
         table = simulate_many(many, shaken, model=model, **options).expand_dims("level")
-        intensity = (values[:, None] / units_of(many, how, model)[None, :])[None, :, :, None]
+        intensity = (values[:, None] / units)[None, :, :, None]
     else:
         table = simulate_levels(many, shaken, how, stripes, model=model, **options)
         intensity = stripes[:, None, None, None]
@@ -553,10 +525,8 @@ def fragility(
     except Unfitted as refused:
         refused.outcomes = outcomes
         raise
-    scales = (
-        np.ones((1, 1, 1)) if stripes is None else stripes[:, None, None] * units_of(many, how, model) / values[:, None]
-    )
-    signs = np.array(SIGNS[options["polarity"]])
+    scales = 1.0 if stripes is None else stripes[:, None, None] * units / values[:, None]
+    factors = np.asarray(scales)[..., None] * np.array(SIGNS[options["polarity"]])
     setup = Setup(many, model, treatment(chattering))
     kind = "cloud" if levels is None else counted(len(intensity), "stripe")
     text = f"{pooled(blocks, weights)}, {motions_in_words(together, clusters)}, {kind}, {model} model"
@@ -571,7 +541,7 @@ def fragility(
         with_vertical="vertical" in table.coords,
         several_blocks=bool(np.count_nonzero(shares) > 1),
         source="motion" if clusters is None else "cluster",
-        undecided=undecided_text(setup, shaken, scales[..., None] * signs, table.overturned.values, threads),
+        undecided=undecided_text(setup, shaken, factors, table.overturned.values, threads),
         missing=missing_text(missing),
     )
 
@@ -592,18 +562,16 @@ def of_polarities(polarity: Polarity, *, is_symmetric: bool) -> str:
 def _outcomes(
     table: xr.Dataset, measure: Measure, intensity: Floats, ratio: Floats, limits: Mapping[str, float]
 ) -> pd.DataFrame:
-    """Every simulation: motion, block, polarity, intensity, peak and what it exceeded."""
     import pandas as pd
 
     def along(values: NDArray[Any]) -> NDArray[Any]:
         return np.broadcast_to(values, ratio.shape).ravel()  # of (level, motion, block, polarity)
 
     signs = table.polarity.values if "polarity" in table.coords else np.array(["+"])
-    verticals = {"vertical": along(table.vertical.values[:, None, None])} if "vertical" in table.coords else {}
+    motions = [name for name in ("motion", "vertical") if name in table.coords]
     return pd.DataFrame(
         {
-            "motion": along(table.motion.values[:, None, None]),
-            **verticals,
+            **{name: along(table[name].values[:, None, None]) for name in motions},
             "block": along(np.arange(table.sizes["block"])[:, None]),
             "polarity": along(signs),
             measure.column: intensity,
@@ -691,7 +659,7 @@ def fit_fragility(
     if x.min() < _INTENSITIES[0] or x.max() > _INTENSITIES[1]:
         low, high = _INTENSITIES
         raise InvalidOption(f"{{}} must be from {low:g} to {high:g}: check its units", "intensity", value=intensity)
-    count = _whole(trials, "trials", x.size, 1.0, _MOST_TRIALS)
+    count = _whole(trials, "trials", x.size, 1.0, 2.0**53)
     outcomes = _limit_states(exceeded if isinstance(exceeded, Mapping) else {"overturning": exceeded}, "exceeded")
     groups = None if clusters is None else groups_of(clusters, "clusters", x.size)
     _check_band(band)

@@ -96,12 +96,6 @@ _ROUNDING: Final = 1e-9
 #: What stands for labels of motions that are their stations.
 BY_STATION: Final = "station"
 
-#: Simulations of an ensemble that are repeated to see how many outcomes are undecided.
-_SAMPLE: Final = 30
-
-#: From so many changes on, no further ones are looked for in an interval of the grid.
-_MOST: Final = 64
-
 
 def described(blocks: Bodies | Body | Sequence[Body]) -> str:
     """Name blocks in a few words: one by its sizes or parameters, several by their number."""
@@ -280,7 +274,7 @@ def undecided_text(
     outcomes `overturned`.
     """
     shape = overturned.shape
-    drawn = np.random.default_rng(0).permutation(overturned.size)[:_SAMPLE]
+    drawn = np.random.default_rng(0).permutation(overturned.size)[:30]
     sample = np.unravel_index(np.sort(drawn), shape)
     near = factors_near(RELATIVE, COUNT)
     factor = np.broadcast_to(factors, shape)[sample]
@@ -362,7 +356,7 @@ def _halved(here: Boundaries, wide: Flags, found: Integers, origin: Integers) ->
 
     `origin` is the interval of the grid that each comes from.
     """
-    few = np.bincount(origin)[origin] < _MOST
+    few = np.bincount(origin)[origin] < 64
     third = wide & few & (found != here.below) & (found != here.above)
     up = wide & (found == here.below)
     low, high = bisection.halved(here.low, here.high, up, wide & ~up)

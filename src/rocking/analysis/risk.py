@@ -32,14 +32,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Relative change by which a rate's slope is taken.
-_STEP: Final = 1e-5
+#: Probabilities of exceedance of the intensities in the table of a survival, and those between which its figure is.
+_CHANCES: Final = (0.05, 0.16, 0.5, 0.84, 0.95)
+_SHOWN: Final = (0.01, 0.999)
 
-#: A figure shows what is between quantiles of a rate, and so many times as far beyond them.
-_BEYOND: Final = 2.0
-
-#: Points of a line in a figure.
-_POINTS: Final = 400
+#: An integral over a normal distribution: its farthest ends, and its points.
+_FARTHEST: Final = 38.0
 
 
 @dataclass(frozen=True)
@@ -76,7 +74,7 @@ class Rate:
         return f"<Rate: {self.limit_state}: {rate} a year ({between}), {self.in_words()}>"
 
     def in_words(self) -> str:
-        """Say the return period with its interval, to the digits that this leaves.
+        """Write the return period with its interval, to the digits that this leaves.
 
         Returns
         -------
@@ -88,7 +86,7 @@ class Rate:
         >>> Rate("overturning", 1 / 464.8, (1 / 826, 1 / 206.1), 0.0, 0.0, (1.0, 2.0, 3.0)).in_words()
         'once in 460 years (210 to 830)'
         """
-        period, between = _period_digits(self)
+        period, between = self._period_digits()
         return f"once in {period} year{'' if period == '1' else 's'} ({between})"
 
     def probability(self, years: float) -> float:
@@ -103,11 +101,6 @@ class Rate:
         -------
         float
             1 - exp(-annual_rate years).
-
-        Raises
-        ------
-        InvalidOption
-            If the time is no positive number.
 
         Examples
         --------
@@ -129,11 +122,6 @@ class Rate:
         float
             exp(-annual_rate years).
 
-        Raises
-        ------
-        InvalidOption
-            If the time is no positive number.
-
         Examples
         --------
         >>> round(Rate("overturning", 1e-3, (5e-4, 2e-3), 0.0, 0.0, (1.0, 2.0, 3.0)).survival(50.0), 4)
@@ -152,11 +140,9 @@ class Rate:
         low, high = self.interval
         return _period(high), _period(low)
 
-
-def _period_digits(rate: Rate) -> tuple[str, str]:
-    """Return period and its interval, as text."""
-    low, high = rate.bounds
-    return known_digits(rate.return_period, rate.return_interval, (_period(high), _period(low)))
+    def _period_digits(self) -> tuple[str, str]:
+        low, high = self.bounds
+        return known_digits(self.return_period, self.return_interval, (_period(high), _period(low)))
 
 
 def _period(rate: float) -> float:
@@ -200,11 +186,6 @@ class Risk(DrawnResult):
         Rate
             Its rate.
 
-        Raises
-        ------
-        InvalidOption
-            If there is none of that name.
-
         Examples
         --------
         >>> from rocking import HazardCurve, fit_fragility
@@ -216,7 +197,7 @@ class Risk(DrawnResult):
         return rates[checks.one_of(limit_state, "limit_state", InvalidOption, [*rates])]
 
     def summary(self, years: float = 50.0) -> str:
-        """Say in words what was found: rates, return periods and probabilities, in a table.
+        """Write rates, return periods and probabilities as a table.
 
         Parameters
         ----------
@@ -245,7 +226,7 @@ class Risk(DrawnResult):
                 [
                     one.limit_state,
                     *known_digits(one.annual_rate, one.interval, one.bounds),
-                    *_period_digits(one),
+                    *one._period_digits(),
                     *known_digits(chances[0], (chances[1], chances[2]), (chances[3], chances[4])),
                     ", ".join(within(scale * x, shown_range(self.hazard), "{:.3g}".format) for x in one.intensities),
                 ]
@@ -313,7 +294,13 @@ class Risk(DrawnResult):
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         from rocking.plot.risk import RiskLine, risk_figure
 
-        scale, at = self.hazard.measure.scale, self._shown()
+        scale, ends = self.hazard.measure.scale, [*self.hazard.intensity[[0, -1]]]
+        for one in self.rates:  # around where the rates come from
+            low, _, high = one.intensities
+            if low > 0.0 and high < math.inf:
+                reach = (high / low) ** 2
+                ends += [end for end in (low / reach, high * reach) if 0.0 < end < math.inf]
+        at = np.geomspace(min(ends), max(ends), 400)
         return risk_figure(
             intensity=scale * at,
             hazard=hazard_line(self.hazard, at),
@@ -326,16 +313,6 @@ class Risk(DrawnResult):
             ax=ax,
             figsize=figsize,
         )
-
-    def _shown(self) -> Floats:
-        """Intensities of a figure: of the hazard curve, and where the rates come from."""
-        ends = [*self.hazard.intensity[[0, -1]]]
-        for one in self.rates:
-            low, _, high = one.intensities
-            if low > 0.0 and high < math.inf:
-                reach = (high / low) ** _BEYOND
-                ends += [end for end in (low / reach, high * reach) if 0.0 < end < math.inf]
-        return np.geomspace(min(ends), max(ends), _POINTS)
 
     def _headline(self) -> str:
         rates = ", ".join(f"{one.limit_state}: {one.in_words()}" for one in self.rates)
@@ -379,7 +356,7 @@ def _rate(curve: FragilityCurve, hazard: HazardCurve) -> Rate:
     def logarithm(fits: Probit) -> Floats:
         return np.asarray(np.logaddexp.reduce(log_parts(fits, hazard), axis=1)[:, None])
 
-    low, high = interval_of(curve, logarithm, logarithm(curve.fitted)[0], gradient_of(logarithm, curve.fitted))
+    low, high = interval_of(curve, logarithm)
     with np.errstate(over="ignore", under="ignore"):
         rate, lower, upper = (float(np.exp(value)) for value in (total, low[0], high[0]))
     below, above = shares_beyond(curve.fitted, hazard)
@@ -389,28 +366,6 @@ def _rate(curve: FragilityCurve, hazard: HazardCurve) -> Rate:
     return Rate(
         curve.limit_state, rate, (lower, upper), below, above, intensities, (least, max(least, float(hazard.rate[0])))
     )
-
-
-def gradient_of(quantity: Any, fitted: Probit) -> Floats:
-    """Change of a quantity with intercept and slope, shape (2, n)."""
-    rows = []
-    for name in Probit._fields:
-        value = getattr(fitted, name)
-        step = _STEP * np.maximum(np.abs(value), 1.0)
-        up, down = (quantity(fitted._replace(**{name: value + sign * step}))[0] for sign in (1.0, -1.0))
-        rows.append((up - down) / (2.0 * step))
-    return np.array(rows)
-
-
-#: Probabilities of exceedance of the intensities in the table.
-_CHANCES: Final = (0.05, 0.16, 0.5, 0.84, 0.95)
-
-#: Probabilities between which a figure shows the rates, and its points.
-_SHOWN: Final = (0.01, 0.999)
-
-#: An integral over a normal distribution: its farthest ends, and its points.
-_FARTHEST: Final = 38.0
-_STEPS: Final = np.linspace(0.0, 1.0, 4001)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -506,19 +461,11 @@ class Survival(DrawnResult):
         """
         if self.rate is None or self.hazard is None:
             return math.nan
-        hazard, fitted = self.hazard, self.curve.fitted
+        hazard, years = self.hazard, self.years
         if not self.several_blocks:
-
-            def within(fits: Probit) -> Floats:
-                return _log_rate_within(fits, hazard)
-
-            low, _ = interval_of(self.curve, within, within(fitted)[0], gradient_of(within, fitted))
-            return math.exp(-math.exp(float(low[0])) * self.years)
-
-        def logarithm(fits: Probit) -> Floats:
-            return _log_standing(fits, hazard, self.years)
-
-        _, high = interval_of(self.curve, logarithm, logarithm(fitted)[0], gradient_of(logarithm, fitted))
+            low, _ = interval_of(self.curve, lambda fits: _log_rate_within(fits, hazard))
+            return math.exp(-math.exp(float(low[0])) * years)
+        _, high = interval_of(self.curve, lambda fits: _log_standing(fits, hazard, years))
         return math.exp(min(float(high[0]), 0.0))
 
     @property
@@ -552,8 +499,7 @@ class Survival(DrawnResult):
                 f"exceeded with {share}" + (", if each met another of the blocks" if self.several_blocks else ""),
                 "",
                 text_table(header, [*map(list, zip(*columns, strict=True))]),
-                *([] if self.rate is None or self.hazard is None else ["", self._verdict(self.rate, self.hazard)]),
-                *([] if self.rate is None else beyond_notes(self.rate)),
+                *([] if self.rate is None else ["", self._verdict(self.rate), *beyond_notes(self.rate)]),
             ]
         )
 
@@ -565,12 +511,11 @@ class Survival(DrawnResult):
 
     @property
     def _never(self) -> str:
-        """Say which motions have most likely never come."""
         text = in_units(min(self.unlikely, self._known[1]), self.measure)
         return f"some intensity above {text}, beyond the data" if self.unlikely > self._known[1] else f"{text} or more"
 
-    def _verdict(self, rate: Rate, hazard: HazardCurve) -> str:
-        """Say how probable the survival is under a hazard curve."""
+    def _verdict(self, rate: Rate) -> str:
+        """Write how probable the survival is under the hazard curve."""
         low, high = rate.bounds
         bounds = math.exp(-high * self.years), math.exp(-low * self.years)
         chance, between = known_digits(self.probability, self.interval, bounds)
@@ -583,9 +528,9 @@ class Survival(DrawnResult):
                 f"{mean}at most {self.most_probable:.2g} if one of the blocks has stood all the time, and {pooled} if "
                 "each motion met another of them"
             )
+        name = "" if self.hazard is None else self.hazard.name
         text = (
-            f"under the hazard curve {hazard.name!r} the probability of {counted(self.years, 'year')} without it is "
-            f"{pooled}"
+            f"under the hazard curve {name!r} the probability of {counted(self.years, 'year')} without it is {pooled}"
         )
         least = f"{1.0 - self.confidence:.3g}"
         if likely >= 1.0 - self.confidence:
@@ -688,7 +633,7 @@ def _log_standing(fits: Probit, hazard: HazardCurve, years: float) -> Floats:
     log_x, log_rate = np.log(hazard.intensity), np.log(hazard.rate)
     with np.errstate(all="ignore"):
         first, last = (np.clip(a + b * end, -_FARTHEST, _FARTHEST) for end in log_x[[0, -1]])
-        z = first + (last - first) * _STEPS
+        z = first + (last - first) * np.linspace(0.0, 1.0, 4001)
         density = -0.5 * z * z - years * np.exp(np.interp((z - a) / b, log_x, log_rate))
         between = np.logaddexp(density[:, 1:], density[:, :-1]) + np.log(np.diff(z) * math.sqrt(0.125 / math.pi))
         # Under a curve that does not rise, what falls at all falls under the weakest motions.

@@ -34,8 +34,6 @@ if TYPE_CHECKING:
 
 Abscissa = Literal["p", "period", "size"]
 
-#: Frequency parameters of an ensemble's spectrum, over its own median.
-_FACTORS: Final = np.geomspace(0.5, 2.0, 25)
 
 _HALF: Final = np.array([0.5])
 
@@ -80,9 +78,7 @@ def rocking_spectrum(
         Equation of motion.
     chattering : str or Treatment
         As for `simulate`.
-    threads : int, optional
-        As for `simulate_many`.
-    progress : bool, optional
+    threads, progress : optional
         As for `simulate_many`.
 
     Returns
@@ -133,7 +129,7 @@ def rocking_spectrum(
         return RockingSpectrum(_grid_spectrum(table, gathered.axes, gathered.gravity, shares))
     weight = mean_one(weights, len(gathered))
     median = float(weighted_fractiles(gathered.p.mean(axis=1), weight, _HALF)[0])
-    rates = median * _FACTORS
+    rates = median * np.geomspace(0.5, 2.0, 25)
     if p is not None or size is not None:
         rates = checks.positive_numbers(rates_of(p, size, gathered.gravity), "p", InvalidOption)
     found = _ensemble_spectrum(gathered, weight, shaken, rates / median, rates, shares, options)

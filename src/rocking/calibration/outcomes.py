@@ -148,9 +148,7 @@ class Calibration(DrawnResult, TableResult):
         ----------
         motions : Motion or sequence of Motion
             m motions.
-        threads : int, optional
-            As for `simulate_many`.
-        progress : bool, optional
+        threads, progress : optional
             As for `simulate_many`.
 
         Returns
@@ -391,9 +389,6 @@ def group_labels(groups: Sequence[object] | None, count: int, folds: int) -> NDA
     return labels
 
 
-#: Chance that an outcome is not that of a rocking block at all (the specimen slid, was touched, was noted wrongly).
-_LAPSE: Final = 0.005
-
 #: Central share of the posterior between an estimate's lower and upper end.
 _CENTRAL: Final = 0.9
 
@@ -407,7 +402,7 @@ def calibrate(
     alpha: Knowledge = (0.02, 0.6),
     restitution: Knowledge = (0.3, 0.999),
     two_sided: bool = True,
-    lapse: float = _LAPSE,
+    lapse: float = 0.005,
     candidates: int = 8192,
     ensemble: int = 1000,
     seed: int = 0,
@@ -443,9 +438,7 @@ def calibrate(
         Most blocks that are kept for predictions.
     seed : int
         The same seed gives the same result.
-    threads : int, optional
-        As for `simulate_many`.
-    progress : bool, optional
+    threads, progress : optional
         As for `simulate_many`.
 
     Returns

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking.arrays import Flags, Floats, Integers
+from rocking.bisection import bisected
 from rocking.calibration.space import Space
 from rocking.kernels import population as kernel
 from rocking.progress import Progress
@@ -31,8 +32,6 @@ _DISPERSION_LOG_DEVIATION: Final = 0.6
 #: Populations that are weighed at once: bounds the memory.
 _BATCH: Final = 64
 
-#: Populations that are worth a thread of their own.
-_LEAST: Final = 16
 
 #: Blocks are drawn from a guide with its dispersions wider by a factor.
 WIDENED: Final = 1.2
@@ -187,7 +186,7 @@ class Evidence:
             exponents = np.empty(powers.shape[1], np.float32)
             kernel.shares(factors[start:end], powers, overturned, exponents, found[start:end], effective[start:end])
 
-        each = max(-(-len(populations) // (self.threads or cores())), _LEAST)
+        each = max(-(-len(populations) // (self.threads or cores())), 16)
         starts = range(0, len(populations), each)
         with ThreadPoolExecutor(max(len(starts), 1)) as pool:
             list(pool.map(weigh, starts, (start + each for start in starts)))
@@ -235,17 +234,11 @@ def blurred(probabilities: Floats, lapse: float) -> Floats:
 RUNS: Final = 2
 
 #: A run's candidates come in parts of equal size: two that fill the space, then one for each exponent of the likelihood
-#: that guides it. While the runs disagree, or too few candidates speak for what they found, they go on, this many times
+#: that guides it. While the runs disagree, or too few candidates speak for what they found, they go on, `_MORE` times
 #: at most.
 _FILLING: Final = 2
 _EXPONENTS: Final = (0.03, 0.1, 0.3, 1.0, 1.0)
-_WHERE_RUNS_DISAGREE: Final = (0.1, 0.3, 1.0)
-_WHERE_CANDIDATES_ARE_FEW: Final = (1.0, 1.0, 1.0)
 _MORE: Final = 2
-
-#: Effective candidates for a typical population that make the error of its likelihood small: a lone block that happens
-#: to fit makes a population look excellent, and intervals too narrow.
-_ENOUGH: Final = 100.0
 
 #: Draws from a posterior, and rounds of moves after each step of their tempering: where they guide the search, and
 #: where they are compared.
@@ -254,15 +247,6 @@ _COMPARED: Final = (256, 4)
 
 #: Runs agree where R-hat is below this: their means then differ by less than two thirds of a standard deviation.
 AGREEMENT: Final = 1.1
-
-#: Populations at the start for each that is drawn.
-_STARTS: Final = 4
-
-#: Share of effective particles that a step keeps, share of long jumps, and the jitter that keeps moves from living in
-#: the particles' span.
-_KEPT: Final = 0.5
-_LONG_JUMPS: Final = 0.1
-_JITTER: Final = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -275,24 +259,21 @@ class Problem:
     tried: Callable[[Floats], NDArray[np.float32]]
     threads: int | None = None
 
+    def evidence(self, candidates: Candidates) -> Evidence:
+        """Compare candidates with what was observed."""
+        return Evidence(candidates, self.observed, self.lapse, self.threads)
+
     def filling(self, count: int, rng: np.random.Generator) -> Candidates:
         """Try blocks that fill the space evenly."""
         points = self.space.spread_evenly(count, rng)
         return Candidates(self.space, points, self.tried(points), count)
 
-    def guided(self, candidates: Candidates, populations: Floats, count: int, rng: np.random.Generator) -> Candidates:
-        """Try blocks that are drawn from populations as well."""
+    def guided(self, candidates: Candidates, exponent: float, count: int, rng: np.random.Generator) -> Candidates:
+        """Try blocks where populations fit, too: the lower the exponent of the likelihood, the wider around."""
+        populations = posterior(self.evidence(candidates), *_GUIDING, rng, exponent=exponent, progress=False)
         points = drawn(populations, WIDENED, count, rng)
         points = points[self.space.contains(points)]
         return candidates.joined((count, populations), points, self.tried(points))
-
-    def evidence(self, candidates: Candidates) -> Evidence:
-        """Return what candidates tell."""
-        return Evidence(candidates, self.observed, self.lapse, self.threads)
-
-    def guide(self, candidates: Candidates, rng: np.random.Generator, exponent: float) -> Floats:
-        """Draw populations around which to look next: the lower the exponent of the likelihood, the wider."""
-        return posterior(self.evidence(candidates), *_GUIDING, rng, exponent=exponent, progress=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -311,8 +292,7 @@ class Search:
     @property
     def agreement(self) -> dict[str, float]:
         """R-hat between the runs of each parameter's centre, by name."""
-        centres = [unpacked(one)[0] for one in self.posteriors]
-        named = [self.evidence.candidates.space.named(one) for one in centres]
+        named = [self.evidence.candidates.space.named(unpacked(one)[0]) for one in self.posteriors]
         return {name: r_hat(np.array([one[name] for one in named])) for name in named[0]}
 
 
@@ -320,19 +300,20 @@ def search(problem: Problem, candidates: int, rng: np.random.Generator) -> Searc
     """Try about so many candidates; up to twice as many while runs disagree or too few speak for what they found."""
     part = max(candidates // (RUNS * (_FILLING + len(_EXPONENTS))), 1)
     streams = rng.spawn(RUNS)
-    runs = [problem.filling(_FILLING * part, stream) for stream in streams]
-    found = _guided(problem, runs, _EXPONENTS, part, streams)
+    runs: Sequence[Candidates] = [problem.filling(_FILLING * part, stream) for stream in streams]
+    found = _compared(problem, runs, _EXPONENTS, part, streams)
     for _ in range(_MORE):
         if max(found.agreement.values()) >= AGREEMENT:
-            found = _guided(problem, found.runs, _WHERE_RUNS_DISAGREE, part, streams)
-        elif found.effective < _ENOUGH:
-            found = _guided(problem, found.runs, _WHERE_CANDIDATES_ARE_FEW, part, streams)
+            exponents = 0.1, 0.3, 1.0
+        elif found.effective < 100.0:  # a lone block that happens to fit would make a population look excellent
+            exponents = 1.0, 1.0, 1.0
         else:
             break
+        found = _compared(problem, found.runs, exponents, part, streams)
     return found
 
 
-def _guided(
+def _compared(
     problem: Problem,
     runs: Sequence[Candidates],
     exponents: Sequence[float],
@@ -343,7 +324,7 @@ def _guided(
     longer, posteriors = [], []
     for run, rng in zip(runs, streams, strict=True):
         for exponent in exponents:
-            run = problem.guided(run, problem.guide(run, rng, exponent), part, rng)
+            run = problem.guided(run, exponent, part, rng)
         longer.append(run)
         posteriors.append(posterior(problem.evidence(run), *_COMPARED, rng, progress=False))
     return Search(problem.evidence(Candidates.pooled(longer)), tuple(longer), tuple(posteriors))
@@ -361,21 +342,15 @@ def r_hat(runs: Floats) -> float:
     >>> r_hat(same) < 1.01, r_hat(same + [[0.0], [1.0]]) > 1.1, r_hat(same * [[1.0], [3.0]]) > 1.1
     (True, True, True)
     """
-    return max(_r_hat(_normal_scores(values)) for values in (runs, np.abs(runs - np.median(runs))))
-
-
-def _normal_scores(runs: Floats) -> Floats:
     from scipy.special import ndtri
     from scipy.stats import rankdata
 
-    return np.asarray(ndtri((rankdata(runs).reshape(runs.shape) - 0.375) / (runs.size + 0.25)))
+    def of_ranks(values: Floats) -> float:
+        scores = ndtri((rankdata(values).reshape(values.shape) - 0.375) / (values.size + 0.25))
+        within, between = float(scores.var(axis=1, ddof=1).mean()), float(scores.mean(axis=1).var(ddof=1))
+        return math.sqrt((values.shape[1] - 1) / values.shape[1] + between / within)
 
-
-def _r_hat(scores: Floats) -> float:
-    draws = scores.shape[1]
-    within = float(scores.var(axis=1, ddof=1).mean())
-    between = float(scores.mean(axis=1).var(ddof=1))
-    return math.sqrt((draws - 1) / draws + between / within)
+    return max(of_ranks(values) for values in (runs, np.abs(runs - np.median(runs))))
 
 
 def posterior(
@@ -394,76 +369,55 @@ def posterior(
     of them effective, resamples, and moves them in some rounds by differences of other particles (differential
     evolution), so that several separate optima are all followed.
     """
-    particles = _Particles.from_candidates(evidence, exponent, _STARTS * count, rng)
+    space, points = evidence.candidates.space, evidence.candidates.points
+    centres = points[rng.choice(len(points), min(4 * count, len(points)), replace=False)]
+    particles = with_dispersions(space, centres, rng)
+    start, end = _log_densities(evidence, exponent, particles)
     with Progress("fitting", 100, show=progress) as bar:
         done = 0.0
         while done < 1.0:
-            step = _step(particles.gain, 1.0 - done)
+            step = _step(end - start, 1.0 - done)
             bar.advance(round(100 * (done + step)) - round(100 * done))
             done += step
-            particles = particles.resampled(step, count, rng)
+            chosen = systematic(_tempered(end - start, step), count, rng)
+            particles, start, end = particles[chosen], start[chosen], end[chosen]
             for _ in range(rounds):
-                particles = particles.moved(done, rng)
-    return particles.populations
+                _move(evidence, exponent, done, particles, start, end, rng)
+    return particles
 
 
-@dataclass(frozen=True, eq=False)
-class _Particles:
-    """Populations, and the logarithms of two densities at each: that of the start, and the posterior."""
+def _log_densities(evidence: Evidence, exponent: float, populations: Floats) -> tuple[Floats, Floats]:
+    """Logarithms of the densities from which particles start, and of the posterior."""
+    candidates, centres = evidence.candidates, populations[:, : populations.shape[1] // 2]
+    inside = candidates.space.contains(centres)
+    end = log_prior_of_dispersions(candidates.space, populations)
+    start = end + np.where(inside, 0.0, -np.inf)
+    start[inside] += candidates.log_density(centres[inside])
+    end[inside] += exponent * evidence.log_likelihoods(populations[inside])
+    end[~inside] = -np.inf
+    return start, end
 
-    evidence: Evidence
-    exponent: float
-    populations: Floats
-    start: Floats
-    posterior: Floats
 
-    @classmethod
-    def at(cls, evidence: Evidence, exponent: float, populations: Floats) -> _Particles:
-        candidates, k = evidence.candidates, populations.shape[1] // 2
-        centres = populations[:, :k]
-        inside = candidates.space.contains(centres)
-        posterior = log_prior_of_dispersions(candidates.space, populations)
-        start = posterior + np.where(inside, 0.0, -np.inf)
-        start[inside] += candidates.log_density(centres[inside])
-        posterior[inside] += exponent * evidence.log_likelihoods(populations[inside])
-        posterior[~inside] = -np.inf
-        return cls(evidence, exponent, populations, start, posterior)
-
-    @classmethod
-    def from_candidates(cls, evidence: Evidence, exponent: float, count: int, rng: np.random.Generator) -> _Particles:
-        points = evidence.candidates.points
-        centres = points[rng.choice(len(points), min(count, len(points)), replace=False)]
-        return cls.at(evidence, exponent, with_dispersions(evidence.candidates.space, centres, rng))
-
-    @property
-    def gain(self) -> Floats:
-        """Logarithm of what a particle's density gains on the way from start to posterior."""
-        return self.posterior - self.start
-
-    def resampled(self, step: float, count: int, rng: np.random.Generator) -> _Particles:
-        chosen = systematic(_tempered(self.gain, step), count, rng)
-        return _Particles(
-            self.evidence, self.exponent, self.populations[chosen], self.start[chosen], self.posterior[chosen]
-        )
-
-    def moved(self, done: float, rng: np.random.Generator) -> _Particles:
-        """Move one half of the particles by differences within the other half, then the other way round."""
-        populations, start, posterior = self.populations.copy(), self.start.copy(), self.posterior.copy()
-        shuffled = rng.permutation(len(populations))
-        half = len(populations) // 2
-        for movers, guides in ((shuffled[:half], shuffled[half:]), (shuffled[half:], shuffled[:half])):
-            changes = _differences(populations[guides], len(movers), rng)
-            new = _Particles.at(self.evidence, self.exponent, populations[movers] + changes)
-            with np.errstate(invalid="ignore"):
-                gain = (1.0 - done) * (new.start - start[movers]) + done * (new.posterior - posterior[movers])
-            accepted = np.log(rng.random(len(movers))) < gain
-            there = movers[accepted]
-            populations[there], start[there], posterior[there] = (
-                new.populations[accepted],
-                new.start[accepted],
-                new.posterior[accepted],
-            )
-        return replace(self, populations=populations, start=start, posterior=posterior)
+def _move(
+    evidence: Evidence,
+    exponent: float,
+    done: float,
+    particles: Floats,
+    start: Floats,
+    end: Floats,
+    rng: np.random.Generator,
+) -> None:
+    """Move one half of the particles by differences within the other half, then the other way round."""
+    shuffled = rng.permutation(len(particles))
+    half = len(particles) // 2
+    for movers, guides in ((shuffled[:half], shuffled[half:]), (shuffled[half:], shuffled[:half])):
+        new = particles[movers] + _differences(particles[guides], len(movers), rng)
+        new_start, new_end = _log_densities(evidence, exponent, new)
+        with np.errstate(invalid="ignore"):
+            gain = (1.0 - done) * (new_start - start[movers]) + done * (new_end - end[movers])
+        accepted = np.log(rng.random(len(movers))) < gain
+        there = movers[accepted]
+        particles[there], start[there], end[there] = new[accepted], new_start[accepted], new_end[accepted]
 
 
 def systematic(weights: Floats, count: int, rng: np.random.Generator) -> Integers:
@@ -476,8 +430,9 @@ def _differences(guides: Floats, count: int, rng: np.random.Generator) -> Floats
     first, second = (rng.integers(len(guides), size=count) for _ in range(2))
     size = guides.shape[1]
     # 2.38/sqrt(2 d) suits a normal posterior (ter Braak 2006); whole differences jump between optima.
-    scale = np.where(rng.random(count) < _LONG_JUMPS, 1.0, 2.38 / np.sqrt(2.0 * size))
-    return scale[:, None] * (guides[first] - guides[second]) + _JITTER * rng.standard_normal((count, size))
+    scale = np.where(rng.random(count) < 0.1, 1.0, 2.38 / np.sqrt(2.0 * size))
+    # The jitter keeps moves from living in the particles' span.
+    return scale[:, None] * (guides[first] - guides[second]) + 1e-3 * rng.standard_normal((count, size))
 
 
 def _tempered(likelihood: Floats, step: float) -> Floats:
@@ -486,15 +441,9 @@ def _tempered(likelihood: Floats, step: float) -> Floats:
 
 
 def _step(likelihood: Floats, most: float) -> float:
-    """Growth of the exponent that keeps the wanted share of particles effective, by bisection."""
+    """Growth of the exponent that keeps half of the particles effective, by bisection."""
 
-    def kept(step: float) -> float:
-        return 1.0 / float((_tempered(likelihood, step) ** 2).sum()) / len(likelihood)
+    def too_few(step: float) -> bool:
+        return 1.0 / float((_tempered(likelihood, step) ** 2).sum()) / len(likelihood) < 0.5
 
-    if kept(most) >= _KEPT:
-        return most
-    low, high = 0.0, most
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if kept(middle) >= _KEPT else (low, middle)
-    return high
+    return bisected(0.0, most, too_few, halvings=50)[1] if too_few(most) else most

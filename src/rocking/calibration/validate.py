@@ -41,9 +41,6 @@ _Mean = Callable[[Integers], float]
 #: Shares of the simulations that lie below and above a band.
 _TAIL: Final = 0.05
 
-#: A chance below this is doubted in the summary.
-_DOUBTED: Final = 0.05
-
 
 @dataclass(frozen=True)
 class ShakeTest:
@@ -231,7 +228,7 @@ class ModelValidation(DrawnResult, TableResult):
             [name, *_with_error(score.value, score.error), *_with_error(score.skill, score.skill_error)]
             for name, score in (("Brier", self.brier), ("log loss", self.log_loss))
         ]
-        doubt = "not " if self.reliability_chance < _DOUBTED else ""
+        doubt = "not " if self.reliability_chance < 0.05 else ""
         parts = [
             self._headline(),
             "",
@@ -296,9 +293,7 @@ def validate(
         Draws from the predictions, for bands and their chance; each test has a block of its own.
     seed : int
         Seeds them.
-    threads : int, optional
-        As for `simulate_many`.
-    progress : bool, optional
+    threads, progress : optional
         As for `simulate_many`.
 
     Returns

@@ -165,8 +165,8 @@ def export(
     folder
         Folder where the study is kept.
     file
-        NetCDF (.nc), or a table with a row for each simulation: CSV (.csv), JSON (.json), Parquet (.parquet) or a
-        workbook (.xlsx); units are in the names of its columns.
+        NetCDF (.nc), or a table with a row for each simulation: CSV (.csv), JSON (.json) or Parquet
+        (.parquet); units are in the names of its columns.
     critical
         Write the scales between which this verdict on a block changes instead.
     """

@@ -10,7 +10,6 @@ import os
 import socket
 import sys
 import time
-import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any, Final
@@ -24,9 +23,9 @@ from rocking.ensemble import Product, setup_of
 from rocking.errors import DamagedStudy, OutputError, StudyError
 from rocking.kernels.compiled import fingerprint
 from rocking.studies import product as inputs
-from rocking.studies.product import UNNAMED, outcomes_text
+from rocking.studies.product import outcomes_text
 from rocking.studies.units import DamagedUnit, Key, UnitGrid, Work, decoded, name_of
-from rocking.tables import counted
+from rocking.tables import counted, write_bytes
 
 if sys.platform == "win32":
     import msvcrt
@@ -41,12 +40,8 @@ else:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
-#: End of the names of files that are half-written; a crash leaves them, and the next run removes them.
-_PART: Final = ".part"
-
 #: How often a lock is tried, and how long after one another, s: whoever reads its holder has it for a moment.
 _TRIES: Final = 3
-_BETWEEN_TRIES: Final = 0.02
 
 
 class Folder:
@@ -66,17 +61,20 @@ class Folder:
             raise StudyError("this is a file, and a study is kept in a folder: name that", path=str(path))
 
     def __str__(self) -> str:
-        """Name the folder."""
         return str(self.path)
 
     def put(self, name: str, data: bytes) -> None:
-        """Write beside the file, flush to the disk, rename, and flush the folder."""
+        """Write a file, whole or not at all, and its name to the disk."""
         target = self.path / name
-        with _refused("written", target, kept="; nothing of it was kept"):
+        with _refused("written", target):
             target.parent.mkdir(parents=True, exist_ok=True)
-            with _written(target.parent, data) as written:
-                written.replace(target)
-            _flush_folder(target.parent)
+            write_bytes(target, data)
+            if os.name != "nt":  # folders cannot be opened there; its file system keeps a journal of names
+                handle = os.open(target.parent, os.O_RDONLY)
+                try:
+                    os.fsync(handle)
+                finally:
+                    os.close(handle)
 
     def keep(self, name: str, data: bytes) -> None:
         """Write a file unless it has this content already."""
@@ -135,7 +133,7 @@ class Folder:
                 # On Windows nobody else can read the byte that is locked: the name begins at the second one.
                 file.write(f" {this_process()}".encode())
                 if lock == "lock":
-                    for left in self.path.rglob(f"*{_PART}"):
+                    for left in self.path.rglob(".*.part*"):  # half-written, when a process was killed
                         left.unlink(missing_ok=True)
             yield
 
@@ -157,12 +155,12 @@ def this_process() -> str:
 
 
 @contextlib.contextmanager
-def _refused(done: str, target: Path, kept: str = "") -> Iterator[None]:
+def _refused(done: str, target: Path) -> Iterator[None]:
     """Raise an OutputError where the system refuses to do something to a file."""
     try:
         yield
     except OSError as error:
-        raise OutputError(f"the file cannot be {done}: {error.strerror or error}{kept}", path=str(target)) from error
+        raise OutputError(f"the file cannot be {done}: {error.strerror or error}", path=str(target)) from error
 
 
 def _acquired(file: IO[bytes], tries: int) -> bool:
@@ -171,7 +169,7 @@ def _acquired(file: IO[bytes], tries: int) -> bool:
         try:
             _lock(file)
         except (BlockingIOError, PermissionError):
-            time.sleep(_BETWEEN_TRIES if left else 0.0)
+            time.sleep(0.02 if left else 0.0)
         else:
             return True
     return False
@@ -182,70 +180,19 @@ def _holder(file: IO[bytes]) -> str:
     return file.read().decode(errors="replace").strip()
 
 
-@contextlib.contextmanager
-def _written(folder: Path, data: bytes) -> Iterator[Path]:
-    """Give a file of these bytes, on the disk, which goes unless it is renamed; the umask decides who may read it."""
-    part = folder / f".{uuid.uuid4().hex}{_PART}"
-    try:
-        with part.open("xb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-            if hasattr(os, "posix_fadvise"):  # a copy in memory would cost more than the writing
-                os.posix_fadvise(file.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)
-        yield part
-    finally:
-        part.unlink(missing_ok=True)
-
-
-def _flush_folder(folder: Path) -> None:
-    if os.name == "nt":  # folders cannot be opened there; its file system keeps a journal of names
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
-
-
-#: Formats of a store that are read; the second one, which is written, names its outcomes.
-_FORMATS: Final = (2, 3)
-
 _ARRAY: Final = "result"
-
-#: How the file that a study was made from names its records; no result depends on it.
-_RECORDS: Final = "records.json"
-
-#: What is in the folder of a study whose creation was cut off.
-_ITS_OWN: Final = frozenset({_ARRAY, "inputs.npz", "zarr.json", "lock", "runs.jsonl"})
-
-#: Names of other things that a sentence lists.
-_LISTED: Final = 3
-
-_GROUP: Final = json.dumps({"zarr_format": 3, "node_type": "group", "attributes": {}}, indent=2).encode()
 
 
 class Store:
     """Outcomes of a product of blocks, motions, scales and polarities. A unit is done when its file exists.
 
-    Attributes
-    ----------
-    folder : Folder
-        Where it is kept.
-    about : dict
-        What `study.json` describes.
-    product : Product
-        What is simulated.
-    grid : UnitGrid
-        How it is cut into units.
+    `about` is what `study.json` describes, `product` what is simulated, and `grid` how it is cut into units.
     """
 
     def __init__(self, folder: Folder, about: dict[str, Any], product: Product) -> None:
         self.folder, self.about, self.product = folder, about, product
-        self.grid = UnitGrid(product.shape, tuple(about["unit"]), tuple(about.get("outcomes", UNNAMED)))
-        # Neighbouring units share their motions or their blocks.
-        self._factors = functools.lru_cache(1)(self._factors_of)
-        self._setup = functools.lru_cache(1)(lambda unit: setup_of(product, self.grid.ranges((0, 0, 0, unit))[-1]))
+        self.grid = UnitGrid(product.shape, tuple(about["unit"]), tuple(about["outcomes"]))
+        self._factors = functools.lru_cache(1)(self._factors_of)  # neighbouring units share their motions
 
     @classmethod
     def create(cls, folder: Folder, product: Product, unit: tuple[int, ...], outcomes: tuple[str, ...]) -> Store:
@@ -253,7 +200,7 @@ class Store:
         require_free(folder)
         archive = inputs.to_bytes(product)
         about: dict[str, Any] = {
-            "format": max(_FORMATS),
+            "format": 3,
             "version": VERSION,
             "kernels": fingerprint(),
             "unit": list(unit),
@@ -273,11 +220,9 @@ class Store:
         about = kept(folder, "study.json", "restore it, or create the study again elsewhere")
         if about is None:
             raise StudyError("there is no study here: create it first", path=str(folder))
-        if about["format"] not in _FORMATS:
+        if about["format"] != 3:
             raise StudyError(
-                f"the study is of format {about['format']}, this program reads {' and '.join(map(str, _FORMATS))}: use "
-                "its version",
-                path=str(folder),
+                f"the study is of format {about['format']}, this program reads 3: use its version", path=str(folder)
             )
         archive = folder.get("inputs.npz")
         if archive is None or hashlib.sha256(archive).hexdigest() != about["inputs"]:
@@ -289,7 +234,8 @@ class Store:
     @property
     def metadata(self) -> dict[str, bytes]:
         """Files by which any reader of Zarr knows the array, and the group that it is in."""
-        return {"zarr.json": _GROUP, f"{_ARRAY}/zarr.json": self.grid.metadata()}
+        group = json.dumps({"zarr_format": 3, "node_type": "group", "attributes": {}}, indent=2).encode()
+        return {"zarr.json": group, f"{_ARRAY}/zarr.json": self.grid.metadata()}
 
     def check_program(self) -> None:
         """Check that this program computes what the store holds, to the last bit; a StudyError if not."""
@@ -315,12 +261,12 @@ class Store:
 
     def name_records(self, records: Sequence[str]) -> None:
         """Keep the name of the record of each motion, in place of those that were; no number depends on them."""
-        self.folder.keep(_RECORDS, sealed({"records": list(records)}))
+        self.folder.keep("records.json", sealed({"records": list(records)}))
 
     def records(self) -> tuple[str, ...]:
         """Name of the record of each motion, empty of a pulse; none at all where they are not known."""
         correction, count = "create the study again from its file, in its place", len(self.product.motions)
-        about = kept(self.folder, _RECORDS, correction, lambda about: len(about["records"]) == count)
+        about = kept(self.folder, "records.json", correction, lambda about: len(about["records"]) == count)
         return () if about is None else tuple(about["records"])
 
     def done(self) -> set[Key]:
@@ -342,7 +288,7 @@ class Store:
         self.folder.put(f"{_ARRAY}/{name_of(key)}", data)
 
     def raw(self, key: Key) -> bytes | None:
-        """Bytes of a unit; None where it is not done."""
+        """Return the bytes of a unit; None where it is not done."""
         return self.folder.get(f"{_ARRAY}/{name_of(key)}")
 
     def outcomes(self, key: Key) -> Mapping[str, Floats] | None:
@@ -364,9 +310,9 @@ class Store:
 
     def work(self, key: Key) -> Work:
         """Return all that a worker needs for a unit."""
-        motions, scales, polarities, _ = self.grid.ranges(key)
-        factors = self._factors(key[0])[:, scales, polarities]
-        return Work(self._setup(key[-1]), self.product.motions[motions], factors, self.grid.unit, self.grid.outcomes)
+        motions, scales, polarities, blocks = self.grid.ranges(key)
+        setup, factors = setup_of(self.product, blocks), self._factors(key[0])[:, scales, polarities]
+        return Work(setup, self.product.motions[motions], factors, self.grid.unit, self.grid.outcomes)
 
     def _factors_of(self, unit: int) -> Floats:
         """Factors on the motions of a unit, shape (motions, scales, polarities)."""
@@ -382,9 +328,9 @@ def exists(folder: Folder) -> bool:
 
 def require_free(folder: Folder) -> None:
     """Check that there is nothing in a folder that is no study's."""
-    others = {*folder.names()} - _ITS_OWN
+    others = {*folder.names()} - {_ARRAY, "inputs.npz", "zarr.json", "lock", "runs.jsonl"}  # a creation was cut off
     if others:
-        listed = ", ".join(sorted(others)[:_LISTED]) + (" and more" if len(others) > _LISTED else "")
+        listed = ", ".join(sorted(others)[:3]) + (" and more" if len(others) > 3 else "")
         raise StudyError(f"this holds no study, but {listed}: name a new folder, or an empty one", path=str(folder))
     # A creation that was cut off has computed nothing: units of a study whose description is gone may be of another.
     if any(name.startswith("c.") for name in folder.names(_ARRAY)):
@@ -401,26 +347,15 @@ def kept(
     data = folder.get(name)
     if data is None:
         return None
-    about = _unsealed(data)
-    if about is None or not holds(about):
-        raise StudyError(f"{name} is damaged: {correction}", path=str(folder))
-    return about
-
-
-def _unsealed(data: bytes) -> dict[str, Any] | None:
-    """Return the content of a sealed file; None if it is damaged."""
-    try:
+    with contextlib.suppress(ValueError, KeyError, AttributeError, TypeError):
         about: dict[str, Any] = json.loads(data)
-        seal = about.pop("seal")
-    except (ValueError, KeyError, AttributeError, TypeError):
-        return None
-    return about if sealed(about) == data and seal == _seal(about) else None
+        del about["seal"]
+        if sealed(about) == data and holds(about):
+            return about
+    raise StudyError(f"{name} is damaged: {correction}", path=str(folder))
 
 
 def sealed(about: dict[str, Any]) -> bytes:
     """Return a description with its own hash."""
-    return json.dumps(about | {"seal": _seal(about)}, indent=2).encode()
-
-
-def _seal(about: dict[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()
+    seal = hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()
+    return json.dumps(about | {"seal": seal}, indent=2).encode()

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.analysis.curve import Band, FragilityCurve, checked_limit, fitted_curve, passed
+from rocking.analysis.curve import Band, checked_limit, fitted_curve, passed
 from rocking.analysis.fragility import OVERTURNING, Fragility, fit_fragility, of_polarities, weights_of
 from rocking.analysis.levels import clusters_of, motions_in_words, only_block, pooled, ratios_of, units_of, values_of
 from rocking.analysis.spectrum import fractiles_of, overturned_share
@@ -36,25 +36,21 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+FRACTILES: Final = (0.16, 0.5, 0.84)
+
 #: Simulations that are held in memory at a time.
 _HELD: Final = 4_000_000
 
-#: Scales that a table or a figure shows.
-_SCALES: Final = 4
 
-FRACTILES: Final = (0.16, 0.5, 0.84)
-
-
-def require_ratios(kept: Sequence[str], what: str, *arguments: str) -> None:
-    """Check that peak rotations over slenderness follow from the outcomes that are kept."""
-    require(kept, ["overturned", "peak_rotation"], what, *arguments)
+#: Outcomes that peak rotations over slenderness follow from.
+_RATIO: Final = ("overturned", "peak_rotation")
 
 
 def require_limits(kept: Sequence[str], limits: Mapping[str, float]) -> None:
     """Check that it follows from these outcomes whether limits are passed: overturning needs no peak rotation."""
     finite = [name for name, limit in limits.items() if math.isfinite(checked_limit(limit, name))]
     if finite:
-        require_ratios(kept, f"{{}}.{finite[0]}", "limits")
+        require(kept, _RATIO, f"{{}}.{finite[0]}", "limits")
     else:
         require(kept, ["overturned"], "a fragility")
 
@@ -70,21 +66,8 @@ def polarities_that_count(bodies: Bodies, polarities: int) -> Integers:
 def peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
     """Peak rotation over the slenderness, infinite where a block overturned, for a range of blocks after the other.
 
-    It is NaN where the simulation was given up. Of blocks that stand it is 0 where the study keeps no peak rotation:
-    whoever needs it asks `require_ratios` first.
-
-    Yields
-    ------
-    blocks : slice
-        Which blocks.
-    ratios : ndarray, shape (motions, scales, polarities, blocks of the range)
-        Over the smaller one of two slendernesses; where all blocks of the study are symmetric, only the first of two
-        polarities, since the second is no other outcome. Where some are, `polarities_that_count` says which.
-
-    Raises
-    ------
-    StudyError
-        If units are missing or damaged, or the study's duration stopped simulations before their end.
+    The shape is (motions, scales, polarities, blocks of the range), with one polarity where all blocks of the study are
+    symmetric. It is NaN where the simulation was given up, and 0 of blocks that stand where no peak rotation is kept.
     """
     store.require_complete()
     motions, scales, polarities, _ = store.grid.shape
@@ -138,11 +121,16 @@ class BlocksResult(DatasetResult):
         return p, alpha
 
 
-def study_spectrum(store: Store, fractiles: Sequence[float] = FRACTILES, progress: bool | None = None) -> StudySpectrum:
+def _measure_of(about: Mapping[str, Any]) -> Measure:
+    """Return the measure that attributes describe."""
+    return Measure(about["measure"], **{name: about[name] for name in ("period", "damping") if name in about})
+
+
+def study_spectrum(store: Store, fractiles: Sequence[float], progress: bool | None) -> StudySpectrum:
     """Fractiles over motions and polarities of peak rotation over slenderness, for each scale and block."""
     import xarray as xr
 
-    require_ratios(store.grid.outcomes, "a spectrum")
+    require(store.grid.outcomes, _RATIO, "a spectrum")
     shares = checked_fractiles(fractiles)
     product, count = store.product, len(store.product.bodies)
     values = np.empty((len(shares), product.scales.count, count))
@@ -170,14 +158,10 @@ def study_spectrum(store: Store, fractiles: Sequence[float] = FRACTILES, progres
                 "scale": ("scale", product.scales.values, product.scales.about),
                 **body_coordinates(product.bodies),
             },
-            {"motions": len(product.motions), "model": product.model, **missing_attribute(missing)},
+            {"motions": len(product.motions), "model": product.model}
+            | ({"missing": missing_text(missing)} if missing else {}),
         )
     )
-
-
-def missing_attribute(missing: int) -> dict[str, str]:
-    """Return what a result of a study says on simulations that were given up; nothing where there are none."""
-    return {"missing": missing_text(missing)} if missing else {}
 
 
 def checked_fractiles(fractiles: Sequence[float]) -> Floats:
@@ -245,19 +229,10 @@ class StudySpectrum(BlocksResult):
 
         Parameters
         ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw, if there is one scale.
+        ax, title, figsize : optional
+            As for `DrawnResult.plot`; `ax` only if there is one scale.
         fractile : float
             Which one; the nearest there is.
-        title : str
-            Title; by default the number of motions, the model, and how many scales are shown.
-        figsize : (float, float), optional
-            Width and height of a new figure, inches.
-
-        Raises
-        ------
-        InvalidOption
-            If there are several scales for the one `ax`.
         """
         from rocking.plot.maps import blocks_figure
 
@@ -277,26 +252,24 @@ class StudySpectrum(BlocksResult):
         return super()._table(name).rename(scale=self.data.scale.attrs["measure"])
 
     def _fractile(self, wanted: float) -> xr.DataArray:
-        """Return the fractile that is nearest to the wanted one."""
         nearest = int(np.argmin(np.abs(self.data.fractile.values - wanted)))
         found: xr.DataArray = self.data.fractile_over_alpha.isel(fractile=nearest)
         return found
 
     def _about(self) -> str:
-        """Say what the figure and the table are about, and of which scales."""
         motions, scales, shown = int(self.data.motions), self.data.sizes["scale"], len(self._some_scales())
         left_out = f"; {shown} of {scales} scales are shown" if shown < scales else ""
         missing = f"; {self.data.missing}" if "missing" in self.data.attrs else ""
         return f"{counted(motions, 'motion')}, {self.data.model} model{left_out}{missing}"
 
     def _some_scales(self) -> list[int]:
-        return evenly(self.data.sizes["scale"], _SCALES)
+        return evenly(self.data.sizes["scale"], 4)
 
     def _scale_name(self, i: int) -> str:
         value, about = float(self.data.scale.values[i]), self.data.scale.attrs
         if about["measure"] == "factor":
             return f"factor {value:.4g}"
-        measure = Measure(about["measure"], *(about[name] for name in ("period", "damping") if name in about))
+        measure = _measure_of(about)
         return f"{measure.short_name} {measure.scale * value:.4g} {measure.shown_in}"
 
 
@@ -316,8 +289,8 @@ _KEPT: Final[Mapping[str, str]] = {
 def pooled_fragility(
     store: Store,
     measure: Measure,
-    limits: Mapping[str, float] = OVERTURNING,
-    confidence: float = 0.9,
+    limits: Mapping[str, float],
+    confidence: float,
     weights: ArrayLike | None = None,
     clusters: ArrayLike | None = None,
 ) -> Fragility:
@@ -340,15 +313,9 @@ def pooled_fragility(
     found = trials.ravel() > 0
     together = clusters_of(product.motions, clusters)
     groups = np.broadcast_to(together[:, None, None], x.shape).ravel()[found]
+    x, trials = x.ravel()[found], trials.ravel()[found]
     curves = [
-        fitted_curve(
-            name,
-            (x.ravel()[found], count.ravel()[found], trials.ravel()[found]),
-            groups,
-            band,
-            measure,
-            limits[name],
-        )
+        fitted_curve(name, (x, count.ravel()[found], trials), groups, band, measure, limits[name])
         for name, count in counts.items()
     ]
     text = f"{pooled(product.bodies, weights)}, {motions_in_words(together, clusters)}, {counted(scales, 'scale')}"
@@ -371,10 +338,10 @@ def pooled_fragility(
 def block_fragilities(
     store: Store,
     measure: Measure,
-    limits: Mapping[str, float] = OVERTURNING,
-    confidence: float = 0.9,
-    clusters: ArrayLike | None = None,
-    progress: bool | None = None,
+    limits: Mapping[str, float],
+    confidence: float,
+    clusters: ArrayLike | None,
+    progress: bool | None,
 ) -> BlockFragilities:
     """Fit a curve to the outcomes of each block."""
     require_limits(store.grid.outcomes, limits)
@@ -403,7 +370,9 @@ def block_fragilities(
                 except InvalidOption as error:  # no lognormal fits outcomes that are all alike, or separated
                     faults[i, j] = str(error)
                 else:
-                    for quantity, value in _numbers(fitted.curves[0]).items():
+                    curve = fitted.curves[0]
+                    numbers = curve.median, *curve.median_interval, curve.dispersion, *curve.dispersion_interval
+                    for quantity, value in zip(_KEPT, numbers, strict=False):
                         kept[quantity][i, j] = value
                 bar.advance()
     import xarray as xr
@@ -417,13 +386,8 @@ def block_fragilities(
             }
             | {"fault": variable(dims, faults.astype(str), "why there is no curve")},
             {"limit_state": list(limits), **body_coordinates(store.product.bodies)},
-            {
-                "confidence": confidence,
-                "model": store.product.model,
-                "measure": measure.name,
-                **measure.options(),
-                **missing_attribute(missing),
-            },
+            {"confidence": confidence, "model": store.product.model, "measure": measure.name, **measure.options()}
+            | ({"missing": missing_text(missing)} if missing else {}),
         )
     )
 
@@ -446,10 +410,7 @@ class BlockFragilities(BlocksResult):
     @property
     def measure(self) -> Measure:
         """Intensity measure."""
-        return Measure(
-            self.data.measure,
-            **{name: self.data.attrs[name] for name in ("period", "damping") if name in self.data.attrs},
-        )
+        return _measure_of(self.data.attrs)
 
     @property
     def _heading(self) -> str:
@@ -489,17 +450,11 @@ class BlockFragilities(BlocksResult):
             "intensity_units": self.measure.units,
             "limit_state": data.limit_state.values,
             "blocks": self.block_parameters,
-            **{str(name): data[name].values for name in data.data_vars},
+            **{str(name): values.values for name, values in data.data_vars.items()},
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        """Draw the median of each block over its frequency parameter and slenderness, a panel for each limit state.
-
-        Raises
-        ------
-        InvalidOption
-            If there are several limit states for the one `ax`.
-        """
+        """Draw the median of each block over its frequency parameter and slenderness, a panel for each limit state."""
         from rocking.plot.maps import blocks_figure
 
         names = [str(name) for name in self.data.limit_state.values]
@@ -515,13 +470,6 @@ class BlockFragilities(BlocksResult):
         )
 
 
-def _numbers(curve: FragilityCurve) -> dict[str, float]:
-    """Return what is kept of a curve."""
-    ends = *curve.median_interval, *curve.dispersion_interval
-    names = "median_lower", "median_upper", "dispersion_lower", "dispersion_upper"
-    return {"median": curve.median, "dispersion": curve.dispersion, **dict(zip(names, ends, strict=True))}
-
-
 def _intensities(product: Product, measure: Measure) -> Floats:
     """Return what every motion measures at every scale, shape (motions, scales)."""
     scales = product.scales
@@ -532,7 +480,6 @@ def _intensities(product: Product, measure: Measure) -> Floats:
     return np.asarray(np.abs(factors) * values[:, None])
 
 
-#: What a report may hold: each with a summary, a figure and a table.
 ReportPart = Fragility | BlockFragilities | StudySpectrum
 
 _REPORT: Final = "report.json"
@@ -557,10 +504,6 @@ class FragilityPlan:
     confidence : float
         Probability of the intervals.
 
-    Raises
-    ------
-    InvalidOption
-        If one of them is out of its range.
     """
 
     measure: IntensityName = "pga"
@@ -593,10 +536,6 @@ class SpectrumPlan:
     fractiles : sequence of float
         Shares of the motions, in (0, 1), that stay below.
 
-    Raises
-    ------
-    InvalidOption
-        If one is out of its range.
     """
 
     fractiles: Sequence[float] = FRACTILES
@@ -630,7 +569,7 @@ def check_part(plan: FragilityPlan | SpectrumPlan, kept: Sequence[str]) -> None:
     if isinstance(plan, FragilityPlan):
         require_limits(kept, plan.limits)
     else:
-        require_ratios(kept, "a spectrum")
+        require(kept, _RATIO, "a spectrum")
 
 
 def made_report(store: Store, progress: bool | None) -> dict[str, ReportPart]:
@@ -649,7 +588,7 @@ def made_report(store: Store, progress: bool | None) -> dict[str, ReportPart]:
             found["fragility"] = (
                 pooled_fragility(store, measure, curves.limits, curves.confidence)
                 if curves.blocks == "together"
-                else block_fragilities(store, measure, curves.limits, curves.confidence, progress)
+                else block_fragilities(store, measure, curves.limits, curves.confidence, None, progress)
             )
         except Unfitted as error:
             refused = error

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import io
+import functools
 import itertools
 import json
-import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
@@ -34,11 +33,7 @@ FORMATS: Final[Mapping[str, str]] = {
     ".csv": "csv",
     ".json": "json",
     ".parquet": "parquet",
-    ".xlsx": "excel",
 }
-
-#: Rows of a sheet, without its heading.
-_SHEET: Final = 1_048_575
 
 
 def write_table(kind: str, path: str | Path, dataset: xr.Dataset, along: str, step: int, progress: bool | None) -> None:
@@ -52,7 +47,7 @@ def write_table(kind: str, path: str | Path, dataset: xr.Dataset, along: str, st
                 bar.advance(min(step, count - start))
 
         with whole_file(path) as beside:
-            _WRITERS[kind](frames(), table, beside)
+            {"csv": _write_csv, "json": _write_json, "parquet": _write_parquet}[kind](frames(), table, beside)
 
 
 def _for_tables(dataset: xr.Dataset) -> xr.Dataset:
@@ -97,36 +92,6 @@ def _write_parquet(frames: Iterator[pd.DataFrame], dataset: xr.Dataset, target: 
             file.write_table(table)
 
 
-def _write_excel(frames: Iterator[pd.DataFrame], dataset: xr.Dataset, target: Path) -> None:
-    try:
-        import openpyxl
-    except ImportError:
-        raise InvalidOption(f"a workbook needs openpyxl: {install('excel')}, or write CSV or NetCDF") from None
-    count = math.prod(dataset.sizes.values())
-    if count > _SHEET:
-        raise InvalidOption(f"a sheet holds {_SHEET} rows, the study has {count}: write CSV, Parquet or NetCDF")
-    book = openpyxl.Workbook(write_only=True)
-    sheet = book.create_sheet("simulations")
-    sheet.freeze_panes = "A2"
-    for k, frame in enumerate(frames):
-        if k == 0:
-            sheet.append([*frame.columns])
-        for row in frame.to_dict("records"):
-            sheet.append([*plain(row).values()])
-    content = io.BytesIO()  # what it writes itself must not fail
-    book.save(content)
-    target.write_bytes(content.getvalue())
-
-
-_Writer = Callable[[Iterator["pd.DataFrame"], "xr.Dataset", Path], None]
-_WRITERS: Final[Mapping[str, _Writer]] = {
-    "csv": _write_csv,
-    "json": _write_json,
-    "parquet": _write_parquet,
-    "excel": _write_excel,
-}
-
-
 def lazy_outcome(store: Store, name: str, complete: bool) -> xr.Variable:
     """Outcome of a store over (motion, scale, polarity, block), read when it is needed.
 
@@ -143,9 +108,7 @@ def lazy_outcome(store: Store, name: str, complete: bool) -> xr.Variable:
         dtype = OUTCOME[name] if complete else np.dtype(np.float64)
 
         def __getitem__(self, key: indexing.ExplicitIndexer) -> NDArray[Any]:
-            def selected(parts: tuple[Any, ...]) -> NDArray[Any]:
-                return _selected(store, name, complete, parts)
-
+            selected = functools.partial(_selected, store, name, complete)
             found: NDArray[Any] = indexing.explicit_indexing_adapter(
                 key, self.shape, indexing.IndexingSupport.OUTER, selected
             )
@@ -175,16 +138,18 @@ def _selected(store: Store, name: str, complete: bool, key: tuple[Any, ...]) -> 
 
 StudyVerdict = Literal["overturning", "complete_chattering"]
 
-#: How a dataset names a verdict on the higher scale, and what that means.
-_ABOVE: Final[Mapping[str, tuple[str, str]]] = {
-    "overturning": ("overturns", "whether the scale above overturns the block, and the one below does not"),
-    "complete_chattering": ("completes", "whether chattering is complete at the scale above, and not at the one below"),
-}
-
-#: Outcomes that a verdict follows from, besides those that are always kept.
-_NEEDED: Final[Mapping[str, Sequence[str]]] = {
-    "overturning": ("overturned",),
-    "complete_chattering": ("rests", "complete_chattering"),
+#: Of each verdict its name on the higher scale, what that means, and the outcomes that it follows from.
+_VERDICTS: Final[Mapping[str, tuple[str, str, Sequence[str]]]] = {
+    "overturning": (
+        "overturns",
+        "whether the scale above overturns the block, and the one below does not",
+        ("overturned",),
+    ),
+    "complete_chattering": (
+        "completes",
+        "whether chattering is complete at the scale above, and not at the one below",
+        ("rests", "complete_chattering"),
+    ),
 }
 
 
@@ -193,7 +158,8 @@ def critical_scales(store: Store, verdict: StudyVerdict) -> xr.Dataset:
     import xarray as xr
 
     checks.one_of(verdict, "verdict", InvalidOption, get_args(StudyVerdict))
-    require(store.grid.outcomes, _NEEDED[verdict], f"a critical scale of {verdict.replace('_', ' ')}")
+    above, meaning, needed = _VERDICTS[verdict]
+    require(store.grid.outcomes, needed, f"a critical scale of {verdict.replace('_', ' ')}")
     product, levels = store.product, store.product.scales.values
     if product.scales.count < 2 or not np.all(np.diff(levels) > 0.0):
         raise InvalidOption("critical scales lie between two scales or more, in increasing order: give those")
@@ -210,7 +176,6 @@ def critical_scales(store: Store, verdict: StudyVerdict) -> xr.Dataset:
     changed = (holds[:, 1:] != holds[:, :-1]) & (below[:, :-1] >= 0)
     motion, polarity, block, scale = np.nonzero(changed.transpose(0, 2, 3, 1))
     low = below[motion, scale, polarity, block]
-    above, meaning = _ABOVE[verdict]
     whole, about = dataset_of(product, {}), product.scales.about
     units = {"units": about["units"]}
     of_blocks: dict[str, Any] = {

@@ -43,6 +43,10 @@ from rocking.threads import cores
 _RUNS: Final = "runs.jsonl"
 
 
+#: How long a scheduler may take to answer, s.
+_ANSWER: Final = 5.0
+
+
 @dataclass(frozen=True)
 class Running:
     """A run that goes on, or the runs of several parts together.
@@ -62,10 +66,8 @@ class Running:
     seconds_left: float
 
     def __str__(self) -> str:
-        """Write it in one line."""
-        left = (
-            f"{self.seconds_left:.0f} s left" if math.isfinite(self.seconds_left) else "its first unit is not done yet"
-        )
+        is_known = math.isfinite(self.seconds_left)
+        left = f"{self.seconds_left:.0f} s left" if is_known else "its first unit is not done yet"
         return f"being run by {self.holder}: {self.rate:.3g} simulations a second, {left}"
 
 
@@ -100,7 +102,6 @@ class Status:
         return self.done == self.units
 
     def __str__(self) -> str:
-        """Write it in one line."""
         share = math.floor(1000.0 * self.done / self.units) / 10.0  # 100 % only where all are
         done = f"{self.done} of {counted(self.units, 'unit')} done ({share:.1f} %)"
         text = f"{done}, {counted(self.simulations, 'simulation')} in all"
@@ -118,8 +119,7 @@ def _entries(data: bytes) -> Iterator[dict[str, Any]]:
     """Give the entries of a log; a line that was cut off by a crash is passed over."""
     for line in data.splitlines():
         with contextlib.suppress(ValueError):
-            entry = json.loads(line)
-            if isinstance(entry, dict):
+            if isinstance(entry := json.loads(line), dict):
                 yield entry
 
 
@@ -198,16 +198,6 @@ def _reading(read: Callable[[Any], object], what: object) -> list[str]:
     return []
 
 
-#: Units that are handed out for each worker: one that it computes, and the next.
-_AHEAD: Final = 2
-
-#: How often the number of workers is asked for, and whether they still live, s.
-_POLL: Final = 1.0
-
-#: How long a scheduler may take to answer, s.
-_ANSWER: Final = 5.0
-
-
 @dataclass(frozen=True)
 class RunReport:
     """What one run did.
@@ -233,7 +223,6 @@ class RunReport:
     stopped: bool
 
     def __str__(self) -> str:
-        """Write it in one line."""
         rate = self.simulations / self.seconds if self.seconds > 0.0 else 0.0
         done = f"{counted(self.units, 'unit')}, {counted(self.simulations, 'simulation')}"
         text = f"{done} in {self.seconds:.1f} s ({rate:.3g} a second)"
@@ -253,9 +242,8 @@ def run(
 ) -> RunReport:
     """Compute the units of a share that are not done, in threads or by an executor, until SIGTERM asks to stop.
 
-    Units in hand are finished then.
-    `failing` gets the name of each unit that cannot be computed, and why, as it happens. A StudyError is raised if the
-    workers are gone.
+    Units in hand are finished then. `failing` gets the name of each unit that cannot be computed, and why, as it
+    happens. A StudyError is raised if the workers are gone.
     """
     start, units, simulations = time.monotonic(), 0, 0
     failed: dict[str, str] = {}
@@ -271,18 +259,20 @@ def run(
         try:
             while True:
                 if not stop.is_set():
-                    for key in itertools.islice(left, max(_AHEAD * max(1, count()) - len(pending), 0)):
+                    # Each worker has a unit in hand, and the next.
+                    for key in itertools.islice(left, max(2 * max(1, count()) - len(pending), 0)):
                         pending[submit(store.work(key))] = key
                 if not pending:
                     break
-                for future in wait(pending, timeout=_POLL, return_when=FIRST_COMPLETED).done:
+                for future in wait(pending, timeout=1.0, return_when=FIRST_COMPLETED).done:
                     key = pending.pop(future)
                     try:
                         data = future.result()
                     except (BrokenExecutor, CancelledError) as error:
                         raise _gone(error) from error
                     except Exception as error:
-                        failed[name_of(key)] = _reason(error)
+                        why, kind = " ".join(str(error).split()), type(error).__name__
+                        failed[name_of(key)] = why if isinstance(error, RockingError) else f"{kind}: {why}".rstrip(": ")
                         failing(name_of(key), failed[name_of(key)])
                         bar.note(f"{counted(len(failed), 'unit')} failed")
                         continue
@@ -348,12 +338,6 @@ def _workers(executor: Any, threads: int | None) -> Iterator[tuple[Callable[[Wor
         raise _gone("no connection to the scheduler")
 
     yield submit, count
-
-
-def _reason(error: BaseException) -> str:
-    """Return in one line why a unit was not computed."""
-    text = " ".join(str(error).split())
-    return text if isinstance(error, RockingError) else f"{type(error).__name__}: {text}".removesuffix(": ")
 
 
 def _gone(why: object) -> StudyError:
