@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rocking
-from rocking.analysis import Scores
+from rocking.calibration import Scores
 
 rng = np.random.default_rng(7)
 p, slenderness, spread = 3.0, 0.15, 0.06

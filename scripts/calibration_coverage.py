@@ -23,8 +23,8 @@ from matplotlib.figure import Figure
 from scipy.stats import binom
 
 import rocking
-from rocking.analysis.calibration import evidence as population
-from rocking.analysis.calibration.space import Space
+from rocking.calibration import search as population
+from rocking.calibration.space import Space
 
 ROOT = Path(__file__).resolve().parents[1]
 TABLE = ROOT / "docs" / "_tables" / "calibration-coverage.txt"

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 import rocking
-from rocking.analysis import Scores, Validation
+from rocking.calibration import Scores, Validation
 from rocking.constants import STANDARD_GRAVITY
 
 Floats = NDArray[np.float64]

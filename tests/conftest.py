@@ -89,7 +89,7 @@ def pytest_configure(config: pytest.Config) -> None:
 @pytest.fixture(scope="session")
 def coarsely() -> Callable[[], AbstractContextManager[None]]:
     """Calibrations within it search less and draw less, for what does not hang on how well a block is known."""
-    from rocking.analysis.calibration import history, search
+    from rocking.calibration import history, search
 
     @contextmanager
     def shortened() -> Iterator[None]:

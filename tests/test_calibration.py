@@ -9,15 +9,14 @@ from matplotlib.figure import Figure
 from scipy.stats import norm
 
 import rocking
-from rocking.analysis.calibration import evidence as population
-from rocking.analysis.calibration import search as searching
-from rocking.analysis.calibration.diagnostics import Scores, bounds_reached
-from rocking.analysis.calibration.evidence import Candidates, Evidence
-from rocking.analysis.calibration.history import HistoryCalibration
-from rocking.analysis.calibration.result import group_labels
-from rocking.analysis.calibration.search import AGREEMENT, Problem, posterior, r_hat, search
-from rocking.analysis.calibration.space import Space
-from rocking.analysis.input_tables import read_calibration, read_ensemble
+from rocking.calibration import search as population
+from rocking.calibration import search as searching
+from rocking.calibration.diagnostics import Scores, bounds_reached
+from rocking.calibration.history import HistoryCalibration
+from rocking.calibration.outcomes import group_labels
+from rocking.calibration.search import AGREEMENT, Candidates, Evidence, Problem, posterior, r_hat, search
+from rocking.calibration.space import Space
+from rocking.calibration.tables import read_calibration, read_ensemble
 
 HIDDEN = rocking.Block.from_parameters(p=(3.6, 3.5), alpha=(0.11, 0.2), restitution=(0.8, 0.82))
 STEP = 0.02
@@ -438,7 +437,7 @@ def test_a_motion_that_is_given_twice_is_simulated_once(coarse, monkeypatch):
         counted.append(len(motions))
         return rocking.simulate_many(blocks, motions, **options)
 
-    monkeypatch.setattr("rocking.analysis.calibration.result.simulate_many", spy)
+    monkeypatch.setattr("rocking.calibration.outcomes.simulate_many", spy)
     twice = motions + [rocking.Motion(one.breakpoints, one.coefficients, name="again") for one in motions]
     observed = outcomes(twice)
     found = rocking.calibrate(twice, observed, candidates=128, two_sided=False, model="linear")

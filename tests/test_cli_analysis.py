@@ -12,7 +12,7 @@ import pytest
 import rocking
 from rocking import fragility, incremental_dynamic_analysis, overturning_map, quantities, rocking_spectrum
 from rocking.analysis import Band
-from rocking.analysis.calibration.diagnostics import Scores
+from rocking.calibration.diagnostics import Scores
 from rocking.cli import calibrate as calibrating
 from rocking.tables import to_json
 

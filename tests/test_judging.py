@@ -9,7 +9,7 @@ from scipy import stats
 
 import rocking
 from rocking import Block, Blocks, InvalidOption, ShakeTest, UnreadableRecord, engine
-from rocking.analysis import Validation
+from rocking.calibration import Validation
 
 STRONG, WEAK = rocking.pulses.one_sine(6.0, 1.0), rocking.pulses.one_sine(1.0, 1.0)
 BLOCK = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
@@ -88,7 +88,7 @@ def seen_by(own, rng, monkeypatch, **options):
         variables = {"overturned": fell, "unfinished": np.zeros_like(fell)}
         return xr.Dataset({name: (("block", "motion"), values) for name, values in variables.items()})
 
-    monkeypatch.setattr("rocking.analysis.validation.simulate_many", simulated)
+    monkeypatch.setattr("rocking.calibration.validate.simulate_many", simulated)
     blocks = Blocks(np.full(len(fell), 2.0), 0.2, 0.9)
     return rocking.validate(tests, blocks, simulations=200, seed=int(rng.integers(1 << 30)), **options)
 

@@ -10,7 +10,7 @@ from scipy import stats
 
 import rocking
 from rocking import fit_fragility, fragility
-from rocking.analysis.fragility.nrml import NAMESPACE
+from rocking.analysis.nrml import NAMESPACE
 
 G = 9.80665
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)

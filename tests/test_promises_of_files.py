@@ -9,7 +9,7 @@ from promises import commands, full_disk, interrupts, reading, serving
 from promises.promise import Found
 
 import rocking
-from rocking.analysis.input_tables import read_tests
+from rocking.calibration.tables import read_tests
 from rocking.errors import InvalidOption, RockingError, UnreadableRecord
 from rocking.quantities import values
 from rocking.studies import read_study

@@ -13,7 +13,7 @@ from public_names import public_names
 
 import rocking
 from rocking import dynamics, engine
-from rocking.analysis.calibration.result import overturned_under
+from rocking.calibration.outcomes import overturned_under
 from rocking.chattering import chattering_map, critical_amplitude_nonlinear, families
 from rocking.progress import Progress
 from rocking.result import DatasetResult

@@ -19,10 +19,10 @@ from hypothesis import strategies as st
 import rocking
 from rocking import HazardCurve, InvalidOption
 from rocking.analysis import Band
-from rocking.analysis.fragility.lognormal import Probit
 from rocking.analysis.hazard import log_parts, powers
-from rocking.analysis.input_tables import read_observed
-from rocking.analysis.survival import _log_rate_within, _log_standing, mean_of_blocks
+from rocking.analysis.probit import Probit
+from rocking.analysis.risk import _log_rate_within, _log_standing, mean_of_blocks
+from rocking.calibration.tables import read_observed
 from rocking.motion.scaling import Measure
 
 G = 9.80665

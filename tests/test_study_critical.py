@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking.studies import critical
-from rocking.studies.inputs import OUTCOMES
+from rocking.studies import results as critical
+from rocking.studies.product import OUTCOMES
 
 SCALES = np.geomspace(1.6, 20.0, 16)
 MOTIONS = [rocking.pulses.one_sine(1.0, 5.0 / np.pi), rocking.pulses.ricker(1.0, 0.9)]

@@ -10,8 +10,7 @@ import pytest
 
 import rocking
 from rocking.errors import InvalidOption, StudyError
-from rocking.studies.folder import Folder, this_process
-from rocking.studies.store import Store, exists, require_free
+from rocking.studies.folder import Folder, Store, exists, require_free, this_process
 
 
 @pytest.mark.skipif(os.name == "nt", reason="folders cannot be flushed there")

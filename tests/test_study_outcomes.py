@@ -11,8 +11,7 @@ import xarray as xr
 import rocking
 from rocking.explorer.studies import StudyView
 from rocking.studies import read_study
-from rocking.studies.inputs import ALWAYS_KEPT, OUTCOMES, UNNAMED
-from rocking.studies.store import sealed
+from rocking.studies.product import ALWAYS_KEPT, OUTCOMES
 
 BLOCKS = rocking.Blocks.grid(p=np.linspace(1.0, 6.0, 130), alpha=[0.1, 0.2, 0.25, 0.3], restitution=[0.85])
 FEW = BLOCKS.select(slice(None, None, 27))
@@ -86,15 +85,6 @@ def test_without_a_choice_or_with_all_outcomes_a_study_keeps_all(few_blocks, tmp
     assert found == contents(few_blocks.place)
     about = json.loads(found["study.json"])
     assert (about["format"], about["outcomes"]) == (3, [*OUTCOMES])
-
-
-def test_a_store_from_before_blocks_could_lean_names_no_outcomes_and_is_read(tmp_path):
-    made(tmp_path, FEW, outcomes=UNNAMED).run(threads=1)
-    about = json.loads((tmp_path / "study.json").read_bytes())
-    del about["outcomes"], about["seal"]
-    (tmp_path / "study.json").write_bytes(sealed(about | {"format": 2}))
-    assert [*rocking.study(tmp_path).results().data_vars] == [*UNNAMED]
-    assert {*OUTCOMES} - {*UNNAMED} == {"leans", "residual_rotation"}
 
 
 def test_the_order_of_the_store_is_that_of_the_outcomes_and_those_always_kept_may_be_named(complete, tmp_path):

@@ -10,7 +10,7 @@ import pytest
 
 import rocking
 from rocking.studies import read_study
-from rocking.studies import spectrum as reading
+from rocking.studies import report as reading
 
 BLOCKS = rocking.Blocks.grid(p=[1.5, 2.0, 3.0], alpha=[0.1, 0.15, 0.2, 0.25], restitution=[0.9])
 MOTIONS = [rocking.pulses.one_sine(1.0, frequency) for frequency in np.linspace(0.3, 1.6, 9)]

@@ -8,7 +8,7 @@ import pytest
 import rocking
 from rocking import HazardCurve, Measure, quantities
 from rocking.analysis.hazard import HEADINGS
-from rocking.analysis.input_tables import read_observed
+from rocking.calibration.tables import read_observed
 from rocking.motion.scaling import _MEASURES
 from rocking.records import units
 from rocking.solid.mesh import UNITS as LENGTHS_OF_MESHES

@@ -1,19 +1,13 @@
-from . import analysis, chattering, dynamics, pulses, records, rules, solid, studies
-from .analysis.calibration.history import HistoryCalibration, calibrate_history
-from .analysis.calibration.outcomes import calibrate
-from .analysis.calibration.result import Calibration
+from . import analysis, calibration, chattering, dynamics, pulses, records, rules, solid, studies
 from .analysis.critical import CriticalScale, critical_scale
 from .analysis.directions import response_rose
 from .analysis.efficiency import compare_measures
-from .analysis.fragility.fit import fit_fragility, fragility
-from .analysis.fragility.result import Fragility
+from .analysis.fragility import Fragility, fit_fragility, fragility
 from .analysis.hazard import HazardCurve
 from .analysis.incremental import incremental_dynamic_analysis
-from .analysis.input_tables import read_tests
 from .analysis.overturning import overturning_map
 from .analysis.spectrum import rocking_spectrum
 from .analysis.survey import survey
-from .analysis.validation import ModelValidation, ShakeTest, validate
 from .block import (
     Block,
     Blocks,
@@ -33,6 +27,10 @@ from .block import (
     one_sided_restitution,
 )
 from .body import Bodies, Body, Coordinate
+from .calibration.history import HistoryCalibration, calibrate_history
+from .calibration.outcomes import Calibration, calibrate
+from .calibration.tables import read_tests
+from .calibration.validate import ModelValidation, ShakeTest, validate
 from .ensemble import Product, Scales, simulate_many
 from .errors import (
     DamagedStudy,
@@ -125,6 +123,7 @@ __all__ = [
     "analysis",
     "calibrate",
     "calibrate_history",
+    "calibration",
     "chattering",
     "compare_measures",
     "critical_scale",

@@ -24,8 +24,8 @@ from oracles.damaged_files import damaged
 from oracles.stated_records import READINGS, contradiction, stated
 
 from promises.promise import Found, Promise
-from rocking.analysis import input_tables
 from rocking.analysis.hazard import HazardCurve
+from rocking.calibration import tables as input_tables
 from rocking.errors import RockingError
 from rocking.records import formats
 from rocking.records.formats import through_obspy

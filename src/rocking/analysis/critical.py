@@ -16,10 +16,6 @@ from rocking.records.named import one_motion
 from rocking.response import Gradient, Response, gradient
 from rocking.simulation import simulate
 
-#: A response that comes to the balance point overturns later by more than this, s, per relative change of the scale:
-#: next to a critical scale by the inverse of some units in the last place.
-_LINGERS: Final = 1e6
-
 _NO_BALANCE: Final = (
     "the outcome changes without the block coming to the balance point: by a touch of the ground without speed, or at "
     "a rest"
@@ -123,7 +119,7 @@ def critical_scale(
     by_scale = {name: float(last.sensitivity.events[name][-1]) for name in ("motion", "p", "alpha", "restitution")}
     turned, share = gradient(last, "event", -1), -scale / by_scale["motion"]
     reason = turned.reason
-    if not abs(by_scale["motion"]) > _LINGERS:
+    if not abs(by_scale["motion"]) > 1e6:
         reason, share = _NO_BALANCE, math.nan
     by_motion = replace(
         turned,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,10 +31,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Azimuths unless others are asked for, degrees: the opposite ones see the mirror image.
-_HALF: Final = np.arange(0.0, 180.0, 15.0)
-#: Curves of a figure.
-_DRAWN: Final = 4
 
 #: Two horizontal components of one place, and maybe several such pairs by their names.
 Pair = tuple[Motion, Motion]
@@ -78,9 +74,7 @@ def response_rose(
         Equation of motion.
     chattering : str or Treatment
         As for `simulate`.
-    threads : int, optional
-        As for `simulate_many`.
-    progress : bool, optional
+    threads, progress : optional
         As for `simulate_many`.
 
     Returns
@@ -115,7 +109,7 @@ def response_rose(
     if not isinstance(solid, Solid):
         raise InvalidBlock(f"a Solid is needed, not a {type(solid).__name__}: make one with rocking.Solid.from_mesh")
     named = _named_pairs(pairs)
-    at = _HALF if azimuths is None else checked_azimuths(azimuths)
+    at = np.arange(0.0, 180.0, 15.0) if azimuths is None else checked_azimuths(azimuths)
     scales = Scales.of(levels, measure)
     blocks = [solid.block(azimuth, restitution=restitution) for azimuth in at]
     factors = np.array([_factors(scales, pair) for pair in named.values()])
@@ -222,7 +216,7 @@ class ResponseRose(DatasetResult):
         from rocking.plot.rose import shares_figure
 
         data = self.data
-        chosen = [*evenly(data.sizes["level"], _DRAWN)]
+        chosen = [*evenly(data.sizes["level"], 4)]
         azimuth = data.azimuth.values
         # Where no opposite azimuth was asked for, it does what this one does.
         opposite = np.mod(azimuth + 180.0, 360.0)

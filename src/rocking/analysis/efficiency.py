@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -36,9 +36,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-#: Probability of the interval of a dispersion.
-_CONFIDENCE: Final = 0.9
 
 
 def compare_measures(
@@ -74,9 +71,7 @@ def compare_measures(
         Which motions belong together, as for `fragility`: a cluster counts as one motion in the intervals.
     tolerance : float
         Width of the intensities at overturning, relative to them.
-    threads : int, optional
-        As for `simulate_many`.
-    progress : bool, optional
+    threads, progress : optional
         As for `simulate_many`.
 
     Returns
@@ -302,5 +297,5 @@ def _interval_factors(freedom: int) -> tuple[float, float]:
     """Return the ends of a standard deviation's interval over its estimate, for a normal sample."""
     from scipy.special import chdtri
 
-    tail = 0.5 * (1.0 - _CONFIDENCE)
+    tail = 0.5 * (1.0 - 0.9)
     return float(np.sqrt(freedom / chdtri(freedom, tail))), float(np.sqrt(freedom / chdtri(freedom, 1.0 - tail)))

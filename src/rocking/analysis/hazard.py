@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.analysis.fragility.lognormal import Probit
+from rocking.analysis.probit import Probit
 from rocking.arrays import Floats, Integers, as_asked
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
@@ -43,18 +43,8 @@ _OPENQUAKE: Final[dict[str, tuple[IntensityName, float]]] = {
     "SA": ("sa", STANDARD_GRAVITY),
 }
 
-#: Rates that a figure shows.
-_DRAWN: Final = (1e-200, 1e200)
-
-#: Shares of the risk up to an intensity: what a standard deviation leaves on either side, and half.
-_QUANTILES: Final = (0.16, 0.5, 0.84)
 
 _ROOT: Final = math.sqrt(0.5)
-
-#: Share by which the rate at the end of a plateau is lowered.
-_ALMOST: Final = 1e-9
-
-_POE: Final = re.compile(r"poe-([0-9.eE+-]+)")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -233,7 +223,7 @@ def hazard_line(hazard: HazardCurve, intensity: Floats) -> HazardLine:
     """Return rates at intensities (SI) as a figure takes them: neither 0 nor infinite."""
     from rocking.plot.risk import HazardLine
 
-    return HazardLine(np.clip(hazard.rate_of(intensity), *_DRAWN), shown_range(hazard))
+    return HazardLine(np.clip(hazard.rate_of(intensity), *(1e-200, 1e200)), shown_range(hazard))
 
 
 def _check_order(what: str, values: Floats, way: float) -> None:
@@ -293,7 +283,7 @@ def _from_openquake(lines: list[str], site: int, period: float | None) -> tuple[
     said = dict(re.findall(r"(\w+)='?([^,'\"]+)'?", lines[0]))
     kind, _, rest = said.get("imt", "").partition("(")
     rows = list(csv.reader(lines[1:]))
-    levels = [_POE.fullmatch(cell.strip()) for cell in rows[0]] if rows else []
+    levels = [re.compile(r"poe-([0-9.eE+-]+)").fullmatch(cell.strip()) for cell in rows[0]] if rows else []
     if kind not in _OPENQUAKE or not any(levels):
         raise InvalidOption(f"no hazard curve of {', '.join(_OPENQUAKE)}: imt is {said.get('imt', 'not given')}")
     if not 0 <= site < len(rows) - 1:
@@ -329,7 +319,7 @@ def _corners(rate: Floats) -> tuple[Integers, Floats]:
     falls = np.diff(lowest) < 0.0
     first, last = np.append(True, falls)[: len(rate)], np.append(falls, False)[: len(rate)]
     kept = np.flatnonzero(first | last)
-    return kept, np.where(first, lowest, lowest * (1.0 - _ALMOST))[kept]
+    return kept, np.where(first, lowest, lowest * (1.0 - 1e-9))[kept]
 
 
 def log_parts(fits: Probit, hazard: HazardCurve, until: float = math.inf) -> Floats:
@@ -430,7 +420,7 @@ def quantile_intensities(fitted: Probit, hazard: HazardCurve) -> tuple[float, fl
         return float(np.exp(brentq(excess, low, high, args=(share,), xtol=1e-13)))
 
     with np.errstate(all="ignore"):
-        sixteenth, half, rest = (found(share) for share in _QUANTILES)
+        sixteenth, half, rest = (found(share) for share in (0.16, 0.5, 0.84))
     return sixteenth, half, rest
 
 

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.analysis.labels import labels_of
 from rocking.analysis.levels import (
     REVERSED_TOO,
     Boundaries,
     boundaries,
     described,
+    labels_of,
     simulate_levels,
     undecided_text,
     units_of,
@@ -42,10 +42,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Without levels each is this times the one before; they go on to this times that by which all motions overturn.
-_STEP: Final = 1.05
-_BEYOND: Final = 3.0
-_MOST: Final = 128
 #: Levels that are simulated at once.
 _CHUNK: Final = 16
 
@@ -83,9 +79,7 @@ def incremental_dynamic_analysis(
         Equation of motion.
     tolerance : float
         Ends of bands are refined to this width, relative to the level.
-    threads : int, optional
-        As for `simulate_many`.
-    progress : bool, optional
+    threads, progress : optional
         As for `simulate_many`.
 
     Returns
@@ -115,8 +109,7 @@ def incremental_dynamic_analysis(
     --------
     A one-sine pulse overturns this block in two bands, with safety between them:
 
-    >>> import numpy as np
-    >>> import rocking
+    >>> import numpy as np, rocking
     >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     >>> pulse = rocking.pulses.one_sine(1.0, 5.0 / np.pi)
     >>> result = incremental_dynamic_analysis(block, pulse, measure="pga_ratio")
@@ -364,11 +357,11 @@ def _until_overturned(
     import xarray as xr
 
     whole: list[xr.Dataset] = []
-    for start in range(0, _MOST, _CHUNK):
-        levels = first * np.power(_STEP, np.arange(start, start + _CHUNK, dtype=np.float64))
+    for start in range(0, 128, _CHUNK):
+        levels = first * np.power(1.05, np.arange(start, start + _CHUNK, dtype=np.float64))
         whole.append(simulate_levels(blocks, motions, measure, levels, **options))
         fell = xr.concat([part.overturned for part in whole], "level")
-        last = _BEYOND * fell.level.where(fell).min("level", skipna=True).max(skipna=False)
+        last = 3.0 * fell.level.where(fell).min("level", skipna=True).max(skipna=False)
         if last <= levels[-1]:
             break
     table = xr.concat(whole, "level", data_vars="all", coords="minimal", compat="override", join="override")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -10,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import bisection, checks
-from rocking.analysis.labels import groups_of, numbered
 from rocking.arrays import Flags, Floats, Integers
 from rocking.block import Blocks
 from rocking.body import Bodies, Body, title_of
@@ -18,7 +18,7 @@ from rocking.constants import Model
 from rocking.engine import Setup, Task, missing_text, simulate_tasks
 from rocking.ensemble import body_coordinates, simulate_many
 from rocking.errors import InvalidOption, Message
-from rocking.motion.description import Origin
+from rocking.motion.description import Origin, labelled
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
 from rocking.problem import bodies_of
@@ -30,6 +30,63 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+def numbered(labels: Sequence[object]) -> Integers:
+    """Give each label that is new the next number."""
+    places: dict[object, int] = {}
+    return np.array([places.setdefault(label, len(places)) for label in labels], dtype=np.int64)
+
+
+def groups_of(labels: object, name: str, count: int, each: str = "outcome") -> Integers:
+    """Numbers of given labels, one for each of so many; what has None, NaN or no text for a label is on its own."""
+    given = checks.several(labels, name, InvalidOption)
+    if len(given) != count or not all(isinstance(label, Hashable) for label in given):
+        raise InvalidOption(f"{{}} must hold {count} labels, numbers or texts, one for each {each}", name, value=labels)
+    return numbered([(k,) if _is_missing(label) else label for k, label in enumerate(given)])
+
+
+def _is_missing(label: object) -> bool:
+    # The missing value of pandas is equal to nothing, and no truth value either.
+    return label is None or type(label).__name__ == "NAType" or label == "" or _is_nan(label)
+
+
+def _is_nan(label: object) -> bool:
+    return isinstance(label, float) and math.isnan(label)
+
+
+def labels_of(data: xr.Dataset, of: str = "motion", *, with_history: bool = True) -> list[str]:
+    """Names of the motions, or of their records, with their vertical components and with what was done to them."""
+    names = data[of].values
+    verticals = data.vertical.values if "vertical" in data.coords else [""] * len(names)
+    histories = data.histories if with_history else [""] * len(names)
+    return [
+        labelled(str(name), done.split("; ") if done else [], str(vertical))
+        for name, done, vertical in zip(names, histories, verticals, strict=True)
+    ]
+
+
+def motions_text(data: xr.Dataset) -> str:
+    """Name the motion, or count them, and those that were scaled or processed among them."""
+    labels = labels_of(data)
+    changed = sum(bool(done) for done in data.histories)
+    if len(labels) == 1:
+        return labels[0]
+    which = "all" if changed == len(labels) else f"{changed} of them"
+    return f"{len(labels)} motions" + (f", {which} scaled or processed" if changed else "")
+
+
+def curves_of(data: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
+    """Name and select each combination of slenderness and restitution; the blocks of an ensemble are one curve."""
+    if "block" in data.dims:
+        return [(data.blocks, data)]
+    stacked = data.stack(curve=[name for name in ("alpha", "restitution") if name in data.dims])
+    return [(_curve_name(one), one) for one in (stacked.isel(curve=k) for k in range(stacked.sizes["curve"]))]
+
+
+def _curve_name(one: xr.Dataset) -> str:
+    restitution = f", restitution {float(one.restitution):g}" if "restitution" in one.coords else ""
+    return f"alpha = {float(one.alpha):.5g} rad ({math.degrees(one.alpha):.4g}°){restitution}"
+
+
 #: Where only motions as they are were simulated, though the sides of a block differ.
 REVERSED_TOO: Final = "the sides differ, so motions that are reversed (scaled by -1) overturn at other levels"
 
@@ -38,12 +95,6 @@ _ROUNDING: Final = 1e-9
 
 #: What stands for labels of motions that are their stations.
 BY_STATION: Final = "station"
-
-#: Simulations of an ensemble that are repeated to see how many outcomes are undecided.
-_SAMPLE: Final = 30
-
-#: From so many changes on, no further ones are looked for in an interval of the grid.
-_MOST: Final = 64
 
 
 def described(blocks: Bodies | Body | Sequence[Body]) -> str:
@@ -223,7 +274,7 @@ def undecided_text(
     outcomes `overturned`.
     """
     shape = overturned.shape
-    drawn = np.random.default_rng(0).permutation(overturned.size)[:_SAMPLE]
+    drawn = np.random.default_rng(0).permutation(overturned.size)[:30]
     sample = np.unravel_index(np.sort(drawn), shape)
     near = factors_near(RELATIVE, COUNT)
     factor = np.broadcast_to(factors, shape)[sample]
@@ -305,7 +356,7 @@ def _halved(here: Boundaries, wide: Flags, found: Integers, origin: Integers) ->
 
     `origin` is the interval of the grid that each comes from.
     """
-    few = np.bincount(origin)[origin] < _MOST
+    few = np.bincount(origin)[origin] < 64
     third = wide & few & (found != here.below) & (found != here.above)
     up = wide & (found == here.below)
     low, high = bisection.halved(here.low, here.high, up, wide & ~up)

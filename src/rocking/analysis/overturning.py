@@ -111,10 +111,8 @@ def overturning_map(
         Equation of motion.
     tolerance : float
         Boundaries are refined to this width, relative to the amplitude.
-    threads : int, optional
-        Number of threads; by default one for every core.
-    progress : bool, optional
-        Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
+    threads, progress : optional
+        As for `simulate_many`.
     **parameters : object
         Further numbers of a pulse given by name, as the function of that name in `rocking.pulses` takes them.
 

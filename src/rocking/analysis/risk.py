@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from rocking import checks
-from rocking.analysis.fragility.curve import FragilityCurve, interval_of
-from rocking.analysis.fragility.lognormal import Probit
+from rocking.analysis.curve import FragilityCurve, in_units, interval_of
 from rocking.analysis.hazard import (
     HazardCurve,
     hazard_line,
@@ -21,6 +20,7 @@ from rocking.analysis.hazard import (
     shares_beyond,
     shown_range,
 )
+from rocking.analysis.probit import Outcomes, Probit, fit_or_limits
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
@@ -28,17 +28,16 @@ from rocking.result import Result
 from rocking.tables import as_written, counted, known_digits, text_table, within
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Relative change by which a rate's slope is taken.
-_STEP: Final = 1e-5
+#: Probabilities of exceedance of the intensities in the table of a survival, and those between which its figure is.
+_CHANCES: Final = (0.05, 0.16, 0.5, 0.84, 0.95)
+_SHOWN: Final = (0.01, 0.999)
 
-#: A figure shows what is between quantiles of a rate, and so many times as far beyond them.
-_BEYOND: Final = 2.0
-
-#: Points of a line in a figure.
-_POINTS: Final = 400
+#: An integral over a normal distribution: its farthest ends, and its points.
+_FARTHEST: Final = 38.0
 
 
 @dataclass(frozen=True)
@@ -75,7 +74,7 @@ class Rate:
         return f"<Rate: {self.limit_state}: {rate} a year ({between}), {self.in_words()}>"
 
     def in_words(self) -> str:
-        """Say the return period with its interval, to the digits that this leaves.
+        """Write the return period with its interval, to the digits that this leaves.
 
         Returns
         -------
@@ -87,7 +86,7 @@ class Rate:
         >>> Rate("overturning", 1 / 464.8, (1 / 826, 1 / 206.1), 0.0, 0.0, (1.0, 2.0, 3.0)).in_words()
         'once in 460 years (210 to 830)'
         """
-        period, between = _period_digits(self)
+        period, between = self._period_digits()
         return f"once in {period} year{'' if period == '1' else 's'} ({between})"
 
     def probability(self, years: float) -> float:
@@ -102,11 +101,6 @@ class Rate:
         -------
         float
             1 - exp(-annual_rate years).
-
-        Raises
-        ------
-        InvalidOption
-            If the time is no positive number.
 
         Examples
         --------
@@ -128,11 +122,6 @@ class Rate:
         float
             exp(-annual_rate years).
 
-        Raises
-        ------
-        InvalidOption
-            If the time is no positive number.
-
         Examples
         --------
         >>> round(Rate("overturning", 1e-3, (5e-4, 2e-3), 0.0, 0.0, (1.0, 2.0, 3.0)).survival(50.0), 4)
@@ -151,11 +140,9 @@ class Rate:
         low, high = self.interval
         return _period(high), _period(low)
 
-
-def _period_digits(rate: Rate) -> tuple[str, str]:
-    """Return period and its interval, as text."""
-    low, high = rate.bounds
-    return known_digits(rate.return_period, rate.return_interval, (_period(high), _period(low)))
+    def _period_digits(self) -> tuple[str, str]:
+        low, high = self.bounds
+        return known_digits(self.return_period, self.return_interval, (_period(high), _period(low)))
 
 
 def _period(rate: float) -> float:
@@ -199,11 +186,6 @@ class Risk(Result):
         Rate
             Its rate.
 
-        Raises
-        ------
-        InvalidOption
-            If there is none of that name.
-
         Examples
         --------
         >>> from rocking import HazardCurve, fit_fragility
@@ -215,7 +197,7 @@ class Risk(Result):
         return rates[checks.one_of(limit_state, "limit_state", InvalidOption, [*rates])]
 
     def summary(self, years: float = 50.0) -> str:
-        """Say in words what was found: rates, return periods and probabilities, in a table.
+        """Write rates, return periods and probabilities as a table.
 
         Parameters
         ----------
@@ -244,7 +226,7 @@ class Risk(Result):
                 [
                     one.limit_state,
                     *known_digits(one.annual_rate, one.interval, one.bounds),
-                    *_period_digits(one),
+                    *one._period_digits(),
                     *known_digits(chances[0], (chances[1], chances[2]), (chances[3], chances[4])),
                     ", ".join(within(scale * x, shown_range(self.hazard), "{:.3g}".format) for x in one.intensities),
                 ]
@@ -312,7 +294,13 @@ class Risk(Result):
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         from rocking.plot.risk import RiskLine, risk_figure
 
-        scale, at = self.hazard.measure.scale, self._shown()
+        scale, ends = self.hazard.measure.scale, [*self.hazard.intensity[[0, -1]]]
+        for one in self.rates:  # around where the rates come from
+            low, _, high = one.intensities
+            if low > 0.0 and high < math.inf:
+                reach = (high / low) ** 2
+                ends += [end for end in (low / reach, high * reach) if 0.0 < end < math.inf]
+        at = np.geomspace(min(ends), max(ends), 400)
         return risk_figure(
             intensity=scale * at,
             hazard=hazard_line(self.hazard, at),
@@ -325,16 +313,6 @@ class Risk(Result):
             ax=ax,
             figsize=figsize,
         )
-
-    def _shown(self) -> Floats:
-        """Intensities of a figure: of the hazard curve, and where the rates come from."""
-        ends = [*self.hazard.intensity[[0, -1]]]
-        for one in self.rates:
-            low, _, high = one.intensities
-            if low > 0.0 and high < math.inf:
-                reach = (high / low) ** _BEYOND
-                ends += [end for end in (low / reach, high * reach) if 0.0 < end < math.inf]
-        return np.geomspace(min(ends), max(ends), _POINTS)
 
     def _headline(self) -> str:
         rates = ", ".join(f"{one.limit_state}: {one.in_words()}" for one in self.rates)
@@ -378,7 +356,7 @@ def _rate(curve: FragilityCurve, hazard: HazardCurve) -> Rate:
     def logarithm(fits: Probit) -> Floats:
         return np.asarray(np.logaddexp.reduce(log_parts(fits, hazard), axis=1)[:, None])
 
-    low, high = interval_of(curve, logarithm, logarithm(curve.fitted)[0], gradient_of(logarithm, curve.fitted))
+    low, high = interval_of(curve, logarithm)
     with np.errstate(over="ignore", under="ignore"):
         rate, lower, upper = (float(np.exp(value)) for value in (total, low[0], high[0]))
     below, above = shares_beyond(curve.fitted, hazard)
@@ -390,12 +368,275 @@ def _rate(curve: FragilityCurve, hazard: HazardCurve) -> Rate:
     )
 
 
-def gradient_of(quantity: Any, fitted: Probit) -> Floats:
-    """Change of a quantity with intercept and slope, shape (2, n)."""
-    rows = []
-    for name in Probit._fields:
-        value = getattr(fitted, name)
-        step = _STEP * np.maximum(np.abs(value), 1.0)
-        up, down = (quantity(fitted._replace(**{name: value + sign * step}))[0] for sign in (1.0, -1.0))
-        rows.append((up - down) / (2.0 * step))
-    return np.array(rows)
+@dataclass(frozen=True, eq=False, repr=False)
+class Survival(Result):
+    """A limit state that was not exceeded in a time, and what that says of the shaking; from `Fragility.survival`.
+
+    Its figure has the largest rates that fit with the survival, and the hazard curve beside them.
+
+    A curve of several blocks (for example an ensemble that stands for one block which is not quite known) does not
+    separate their dispersion from that of the motions. Rates and `probability` are then those of motions that each meet
+    another of the blocks. If one of the blocks has stood all the time, the probability is `mean_probability`, and
+    `most_probable` bounds it.
+
+    Attributes
+    ----------
+    curve : FragilityCurve
+        Probabilities that the limit is exceeded.
+    measure : Measure
+        What its intensity is.
+    description : str
+        What was simulated or observed.
+    years : float
+        For how long it was not exceeded.
+    confidence : float
+        Probability with which it would have been, if shaking were any stronger or more frequent than what is said.
+    hazard : HazardCurve or None
+        Annual rates of intensities at the site.
+    rate : Rate or None
+        Annual rate of the limit state under that hazard curve.
+    several_blocks : bool
+        Whether outcomes of several blocks count together in the curve.
+    mean_probability : float
+        Probability of the survival under the hazard curve of one of several blocks: the mean, by their weights, of the
+        probabilities of the blocks, each by a fragility curve of its own. NaN of one block, without a hazard curve, and
+        where the outcomes of each block are not kept.
+    """
+
+    curve: FragilityCurve
+    measure: Measure
+    description: str
+    years: float
+    confidence: float
+    hazard: HazardCurve | None
+    rate: Rate | None
+    several_blocks: bool = False
+    mean_probability: float = math.nan
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "years", checks.positive(self.years, "years", InvalidOption))
+        checks.share(self.confidence, "confidence", InvalidOption)
+
+    @property
+    def intensity(self) -> Floats:
+        """Intensities (SI) that exceed the limit with probabilities of 0.05, 0.16, 0.5, 0.84 and 0.95."""
+        return np.array([self.curve.intensity_of(chance) for chance in _CHANCES])
+
+    @property
+    def unlikely(self) -> float:
+        """Intensity (SI) that one motion, had it come, would have exceeded the limit with the confidence asked for."""
+        return self.curve.intensity_of(self.confidence)
+
+    @property
+    def largest_rate(self) -> Floats:
+        """Annual rates of motions of each `intensity` or more above which the limit would have been exceeded.
+
+        Of several blocks, if each motion met another of them.
+        """
+        return self.curve.largest_rate(self.intensity, self.years, self.confidence)
+
+    @property
+    def probability(self) -> float:
+        """Probability, under the hazard curve, that the limit is not exceeded in the time; NaN without one.
+
+        Of several blocks the least it can be: if each motion met another of them.
+        """
+        return math.nan if self.rate is None else self.rate.survival(self.years)
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Its confidence interval, from that of the fragility."""
+        if self.rate is None:
+            return math.nan, math.nan
+        low, high = self.rate.interval
+        return math.exp(-high * self.years), math.exp(-low * self.years)
+
+    @property
+    def most_probable(self) -> float:
+        """The largest `probability` that fits with all that is known: with the interval, the hazard curve, the blocks.
+
+        It is at the upper end of the interval, and without motions below the hazard curve's first point or above its
+        last, where its lines are only extended. Of several blocks it is that of one which has stood all the time, and
+        of which the intensity alone decides whether it falls: the integral of exp(-rate(x) years) dP(x).
+        """
+        if self.rate is None or self.hazard is None:
+            return math.nan
+        hazard, years = self.hazard, self.years
+        if not self.several_blocks:
+            low, _ = interval_of(self.curve, lambda fits: _log_rate_within(fits, hazard))
+            return math.exp(-math.exp(float(low[0])) * years)
+        _, high = interval_of(self.curve, lambda fits: _log_standing(fits, hazard, years))
+        return math.exp(min(float(high[0]), 0.0))
+
+    @property
+    def contradicts(self) -> bool:
+        """Whether the survival, at its `most_probable`, is less probable than 1 - confidence."""
+        return self.most_probable < 1.0 - self.confidence
+
+    def summary(self) -> str:
+        measure, share = self.measure, f"{100.0 * self.confidence:g} %"
+        header = [measure.label, "probability", "at most a year", "at most once in (years)"]
+        columns: list[list[Any]] = [
+            [within(x, self._known, lambda end: f"{measure.scale * end:.5g}") for x in self.intensity],
+            [*_CHANCES],
+            [f"{rate:.2g}" for rate in self.largest_rate],
+            [f"{float(f'{1.0 / rate:.2g}'):.7g}" for rate in self.largest_rate],
+        ]
+        if self.hazard is not None:
+            header += ["hazard curve, a year", "survival at most"]
+            highest, lowest = self.hazard.rate[[0, -1]]
+            rates = self.hazard.rate_of(self.intensity)
+            known = np.where(rates < lowest, 0.0, np.minimum(rates, highest))
+            columns += [
+                [within(rate, (lowest, highest), "{:.2g}".format) for rate in rates],
+                [f"{chance:.2g}" for chance in np.exp(-self.years * known * _CHANCES)],
+            ]
+        return "\n".join(
+            [
+                f"{self.curve.limit_state}: not in {counted(self.years, 'year')}; intensity: {measure.label}",
+                f"most likely never {self._never}: one such motion would have exceeded the limit with {share}",
+                f"largest rates of motions of an intensity or more; with larger ones the limit would have been "
+                f"exceeded with {share}" + (", if each met another of the blocks" if self.several_blocks else ""),
+                "",
+                text_table(header, [*map(list, zip(*columns, strict=True))]),
+                *([] if self.rate is None else ["", self._verdict(self.rate), *beyond_notes(self.rate)]),
+            ]
+        )
+
+    @property
+    def _known(self) -> tuple[float, float]:
+        """Lowest and highest intensity (SI) of the data and of the hazard curve."""
+        known = np.concatenate([self.curve.intensity, [] if self.hazard is None else self.hazard.intensity])
+        return float(known.min()), float(known.max())
+
+    @property
+    def _never(self) -> str:
+        text = in_units(min(self.unlikely, self._known[1]), self.measure)
+        return f"some intensity above {text}, beyond the data" if self.unlikely > self._known[1] else f"{text} or more"
+
+    def _verdict(self, rate: Rate) -> str:
+        """Write how probable the survival is under the hazard curve."""
+        low, high = rate.bounds
+        bounds = math.exp(-high * self.years), math.exp(-low * self.years)
+        chance, between = known_digits(self.probability, self.interval, bounds)
+        pooled = f"{chance} ({100.0 * self.curve.confidence:g} % interval {between})"
+        has_mean = not math.isnan(self.mean_probability)
+        likely = self.mean_probability if has_mean else self.probability
+        if self.several_blocks:
+            mean = f"{likely:.2g} in the mean and " if has_mean else ""
+            pooled = (
+                f"{mean}at most {self.most_probable:.2g} if one of the blocks has stood all the time, and {pooled} if "
+                "each motion met another of them"
+            )
+        name = "" if self.hazard is None else self.hazard.name
+        text = (
+            f"under the hazard curve {name!r} the probability of {counted(self.years, 'year')} without it is {pooled}"
+        )
+        least = f"{1.0 - self.confidence:.3g}"
+        if likely >= 1.0 - self.confidence:
+            return f"{text}, so they do not contradict each other"
+        if not self.contradicts:
+            return f"{text}; below {least} they would contradict each other, which is not settled"
+        return (
+            f"{text}; all of that is below {least}, so they contradict each other: the hazard curve is too high, or "
+            "the block stronger than its fragility, or younger"
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        column = self.measure.column
+        found = {
+            "limit_state": self.curve.limit_state,
+            "years": self.years,
+            "confidence": self.confidence,
+            f"most_likely_never_{column}": self.unlikely,
+            "probability_of_exceedance": [*_CHANCES],
+            column: self.intensity,
+            "largest_annual_rate": self.largest_rate,
+        }
+        if self.hazard is None:
+            return found
+        return found | {
+            "hazard_annual_rate": self.hazard.rate_of(self.intensity),
+            "probability": self.probability,
+            "probability_interval": [*self.interval],
+            "most_probable": self.most_probable,
+            "mean_probability": self.mean_probability,
+            "share_below_hazard_curve": math.nan if self.rate is None else self.rate.below,
+            "share_above_hazard_curve": math.nan if self.rate is None else self.rate.above,
+            "contradicts": self.contradicts,
+        }
+
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
+        from rocking.plot.risk import survival_figure
+
+        ends = [end for end in map(self.curve.intensity_of, _SHOWN) if 0.0 < end < math.inf]
+        if len(ends) < len(_SHOWN):  # the curve is so wide that these are not numbers any more
+            ends = [self.curve.intensity.min(), self.curve.intensity.max()]
+        if self.hazard is not None:
+            ends += self.hazard.intensity[[0, -1]].tolist()
+        at = np.geomspace(min(ends), max(ends), 200)
+        at = at[self.curve.probability(at) > _SHOWN[0] * 0.1]
+        return survival_figure(
+            intensity=self.measure.scale * at,
+            largest=self.curve.largest_rate(at, self.years, self.confidence),
+            largest_label=f"at most, with {counted(self.years, 'year')} without {self.curve.limit_state} "
+            f"({100.0 * self.confidence:g} %)",
+            hazard=None if self.hazard is None else hazard_line(self.hazard, at),
+            intensity_label=self.measure.label,
+            title=title or as_written(self.description),
+            ax=ax,
+            figsize=figsize,
+        )
+
+    def _headline(self) -> str:
+        return f"{self.curve.limit_state}: not in {counted(self.years, 'year')}; most likely never {self._never}"
+
+
+def mean_of_blocks(outcomes: pd.DataFrame, column: str, limit_state: str, hazard: HazardCurve, years: float) -> float:
+    """Mean of the probabilities that blocks survive, each by a curve fitted to its own outcomes."""
+    table = outcomes.sort_values("block", kind="stable")
+    blocks = table.drop_duplicates("block")
+    intensity, exceeded = (
+        table[name].to_numpy(np.float64).reshape(len(blocks), -1) for name in (column, f"exceeded_{limit_state}")
+    )
+    fits, _ = fit_or_limits(Outcomes(np.log(intensity[0]), exceeded, np.ones_like(exceeded)))
+    # Of a curve that does not rise, motions below the hazard curve would exceed the limit as often as they come.
+    parts = np.where(fits.slope[:, None] > 0.0, log_parts(fits, hazard), -np.inf)
+    parts[fits.slope <= 0.0, :1] = _log_rate_within(fits, hazard)[fits.slope <= 0.0]
+    rates = np.exp(np.logaddexp.reduce(parts, axis=1))
+    return float(np.average(np.exp(-years * rates), weights=blocks.get("weight")))
+
+
+def _log_rate_within(fits: Probit, hazard: HazardCurve) -> Floats:
+    """Logarithms of the rates that motions between the ends of the hazard curve add, shape (fits, 1).
+
+    That is the integral of P(x) |d rate(x)|, by parts.
+    """
+    from scipy.special import ndtr
+
+    a, b = (values[:, None] for values in fits)
+    first, last = ndtr(a + b * np.log(hazard.intensity[[0, -1]])).T
+    # Of a curve that does not rise, dP is 0 on every segment.
+    between = np.where(fits.slope > 0.0, np.exp(log_parts(fits, hazard)[:, 1:-1]).sum(axis=1), 0.0)
+    rate = first * hazard.rate[0] - last * hazard.rate[-1] + between
+    return np.asarray(np.log(np.maximum(rate, np.finfo(float).tiny)))[:, None]
+
+
+def _log_standing(fits: Probit, hazard: HazardCurve, years: float) -> Floats:
+    """Logarithms of the integral of exp(-rate(x) years) dP(x), shape (fits, 1).
+
+    Motions below the hazard curve's first point, or above its last, add nothing.
+    """
+    from scipy.special import log_ndtr
+
+    a, b = (values[:, None] for values in fits)
+    log_x, log_rate = np.log(hazard.intensity), np.log(hazard.rate)
+    with np.errstate(all="ignore"):
+        first, last = (np.clip(a + b * end, -_FARTHEST, _FARTHEST) for end in log_x[[0, -1]])
+        z = first + (last - first) * np.linspace(0.0, 1.0, 4001)
+        density = -0.5 * z * z - years * np.exp(np.interp((z - a) / b, log_x, log_rate))
+        between = np.logaddexp(density[:, 1:], density[:, :-1]) + np.log(np.diff(z) * math.sqrt(0.125 / math.pi))
+        # Under a curve that does not rise, what falls at all falls under the weakest motions.
+        between = np.where(b > 0.0, between, -np.inf)
+        parts = np.column_stack([log_ndtr(first) - years * hazard.rate[0], between, log_ndtr(-last)])
+        return np.asarray(np.logaddexp.reduce(parts, axis=1)[:, None])

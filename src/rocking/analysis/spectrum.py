@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.analysis.labels import curves_of, labels_of, motions_in_words
-from rocking.analysis.levels import mean_one, pooled, ratios_of
+from rocking.analysis.levels import curves_of, labels_of, mean_one, motions_text, pooled, ratios_of
 from rocking.arrays import Floats
 from rocking.block import Blocks
 from rocking.block.bodies import rates_of
@@ -35,8 +34,6 @@ if TYPE_CHECKING:
 
 Abscissa = Literal["p", "period", "size"]
 
-#: Frequency parameters of an ensemble's spectrum, over its own median.
-_FACTORS: Final = np.geomspace(0.5, 2.0, 25)
 
 _HALF: Final = np.array([0.5])
 
@@ -81,9 +78,7 @@ def rocking_spectrum(
         Equation of motion.
     chattering : str or Treatment
         As for `simulate`.
-    threads : int, optional
-        As for `simulate_many`.
-    progress : bool, optional
+    threads, progress : optional
         As for `simulate_many`.
 
     Returns
@@ -134,7 +129,7 @@ def rocking_spectrum(
         return RockingSpectrum(_grid_spectrum(table, gathered.axes, gathered.gravity, shares))
     weight = mean_one(weights, len(gathered))
     median = float(weighted_fractiles(gathered.p.mean(axis=1), weight, _HALF)[0])
-    rates = median * _FACTORS
+    rates = median * np.geomspace(0.5, 2.0, 25)
     if p is not None or size is not None:
         rates = checks.positive_numbers(rates_of(p, size, gathered.gravity), "p", InvalidOption)
     found = _ensemble_spectrum(gathered, weight, shaken, rates / median, rates, shares, options)
@@ -205,7 +200,7 @@ class RockingSpectrum(DatasetResult):
 
     def summary(self) -> str:
         header = ["p (rad/s)", "R (m)", *(f"{100 * share:g} %" for share in self.data.fractile.values), "overturned"]
-        parts = [f"peak rotation over slenderness, {motions_in_words(self.data)}, {self.data.model} model"]
+        parts = [f"peak rotation over slenderness, {motions_text(self.data)}, {self.data.model} model"]
         for title, one in curves_of(self.data):
             fractiles = one.fractile_over_alpha.transpose("p", "fractile").values
             rows = [
@@ -309,7 +304,7 @@ class RockingSpectrum(DatasetResult):
             title=title
             or as_written(
                 ", ".join(
-                    [motions_in_words(self.data), *([named_curves[0][0]] if alone else []), f"{self.data.model} model"]
+                    [motions_text(self.data), *([named_curves[0][0]] if alone else []), f"{self.data.model} model"]
                 )
             ),
             ax=ax,

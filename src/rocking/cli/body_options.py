@@ -333,7 +333,7 @@ class EnsembleOptions(HeldOptions):
 
 def ensemble_of(file: Path, model: ModelOptions) -> dict[str, Any]:
     """Return blocks, weights and equation of motion of an ensemble as arguments."""
-    from rocking.analysis.input_tables import read_ensemble
+    from rocking.calibration.tables import read_ensemble
 
     found = read_ensemble(file)
     return {"blocks": found.blocks, "weights": found.weights, "model": model.equation or found.model}

@@ -10,13 +10,12 @@ from typing import Annotated, Any, Final
 
 from cyclopts import Parameter
 
-from rocking.analysis.calibration.history import HistoryCalibration, calibrate_history
-from rocking.analysis.calibration.outcomes import calibrate as calibrated
-from rocking.analysis.calibration.outcomes import checked_outcomes
-from rocking.analysis.calibration.result import Calibration, group_labels
-from rocking.analysis.calibration.space import HOUSNER
-from rocking.analysis.input_tables import History, Outcomes, read_calibration, read_tests
-from rocking.analysis.validation import validate as judged
+from rocking.calibration.history import HistoryCalibration, calibrate_history
+from rocking.calibration.outcomes import Calibration, checked_outcomes, group_labels
+from rocking.calibration.outcomes import calibrate as calibrated
+from rocking.calibration.space import HOUSNER
+from rocking.calibration.tables import History, Outcomes, read_calibration, read_tests
+from rocking.calibration.validate import validate as judged
 from rocking.cli.body_options import EnsembleOptions
 from rocking.cli.options import BLOCK, MODEL, WHOLE, ModelOptions
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, subfolder, write_results, write_tables

@@ -58,8 +58,7 @@ def explore(
 def _study(folder: Path) -> StudyView:
     """Study in a folder, to be shown as maps."""
     from rocking.explorer.studies import StudyView
-    from rocking.studies.folder import Folder
-    from rocking.studies.store import exists
+    from rocking.studies.folder import Folder, exists
 
     if not exists(Folder(folder)):
         sentence = "this folder holds no study; name one record, and drop the other files on the page"

@@ -12,14 +12,13 @@ from typing import TYPE_CHECKING, Annotated, Final
 from cyclopts import Parameter
 
 from rocking import checks
-from rocking.analysis.fragility import nrml
-from rocking.analysis.fragility.curve import Band
-from rocking.analysis.fragility.fit import fit_fragility
-from rocking.analysis.fragility.fit import fragility as run
-from rocking.analysis.fragility.result import Fragility
+from rocking.analysis import nrml
+from rocking.analysis.curve import Band
+from rocking.analysis.fragility import Fragility, fit_fragility
+from rocking.analysis.fragility import fragility as run
 from rocking.analysis.hazard import HazardCurve
-from rocking.analysis.input_tables import read_observed
 from rocking.analysis.risk import check_measure
+from rocking.calibration.tables import read_observed
 from rocking.cli.body_options import EnsembleOptions
 from rocking.cli.options import BLOCK, MEASURE, MODEL, WHOLE, MeasureOptions, TreatmentOptions, labels_of
 from rocking.cli.output import OUTPUT, OutputOptions, left_out, print_result, write_results

@@ -16,11 +16,10 @@ from rocking.cli.options import WHOLE
 from rocking.cli.output import OUTPUT, PrintOptions, QuietOptions, output_folder, print_result, write_results
 from rocking.errors import InvalidOption, OutputError, StudyError
 from rocking.progress import note
-from rocking.studies.critical import StudyVerdict
 from rocking.studies.file import TEMPLATE, read_study
 from rocking.studies.folder import Folder
 from rocking.studies.report import ReportPlan
-from rocking.studies.results import FORMATS
+from rocking.studies.results import FORMATS, StudyVerdict
 from rocking.studies.run import scheduler_client
 from rocking.studies.study import Study, study_of
 from rocking.tables import counted, to_json, write_text
@@ -166,8 +165,8 @@ def export(
     folder
         Folder where the study is kept.
     file
-        NetCDF (.nc), or a table with a row for each simulation: CSV (.csv), JSON (.json), Parquet (.parquet) or a
-        workbook (.xlsx); units are in the names of its columns.
+        NetCDF (.nc), or a table with a row for each simulation: CSV (.csv), JSON (.json) or Parquet
+        (.parquet); units are in the names of its columns.
     critical
         Write the scales between which this verdict on a block changes instead.
     """

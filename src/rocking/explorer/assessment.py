@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from rocking.analysis.fragility.fit import fit_fragility
+from rocking.analysis.fragility import fit_fragility
 from rocking.analysis.levels import simulate_levels
 from rocking.arrays import Flags, Floats
 from rocking.bisection import bisected

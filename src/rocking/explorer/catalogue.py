@@ -11,7 +11,7 @@ from typing import Any, Final
 from urllib.parse import parse_qsl
 
 from rocking import records
-from rocking.analysis.labels import numbered
+from rocking.analysis.levels import numbered
 from rocking.errors import InvalidOption, RockingError
 from rocking.explorer.parameters import PARAMETERS, field_label, names_of
 from rocking.explorer.phrases import phrase

@@ -1,9 +1,6 @@
 from .file import TEMPLATE, StudyFile, read_study
-from .fragility import BlockFragilities
-from .report import FragilityPlan, ReportPlan, SpectrumPlan
-from .run import RunReport
-from .spectrum import StudySpectrum
-from .status import Running, Status
+from .report import BlockFragilities, FragilityPlan, ReportPlan, SpectrumPlan, StudySpectrum
+from .run import Running, RunReport, Status
 from .study import Study, study
 
 __all__ = [

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-import io
+import functools
 import itertools
 import json
-import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rocking import checks
+from rocking.arrays import Flags, Floats
 from rocking.engine import OUTCOME
+from rocking.ensemble import body_coordinates, dataset_of, verticals_of
 from rocking.errors import InvalidOption, StudyError, install
 from rocking.progress import Progress
-from rocking.studies.store import Store
+from rocking.studies.folder import Store
+from rocking.studies.product import require
 from rocking.studies.units import name_of
 from rocking.tables import columns_of, frame_of, plain, whole_file
 
@@ -30,11 +33,7 @@ FORMATS: Final[Mapping[str, str]] = {
     ".csv": "csv",
     ".json": "json",
     ".parquet": "parquet",
-    ".xlsx": "excel",
 }
-
-#: Rows of a sheet, without its heading.
-_SHEET: Final = 1_048_575
 
 
 def write_table(kind: str, path: str | Path, dataset: xr.Dataset, along: str, step: int, progress: bool | None) -> None:
@@ -48,7 +47,7 @@ def write_table(kind: str, path: str | Path, dataset: xr.Dataset, along: str, st
                 bar.advance(min(step, count - start))
 
         with whole_file(path) as beside:
-            _WRITERS[kind](frames(), table, beside)
+            {"csv": _write_csv, "json": _write_json, "parquet": _write_parquet}[kind](frames(), table, beside)
 
 
 def _for_tables(dataset: xr.Dataset) -> xr.Dataset:
@@ -93,36 +92,6 @@ def _write_parquet(frames: Iterator[pd.DataFrame], dataset: xr.Dataset, target: 
             file.write_table(table)
 
 
-def _write_excel(frames: Iterator[pd.DataFrame], dataset: xr.Dataset, target: Path) -> None:
-    try:
-        import openpyxl
-    except ImportError:
-        raise InvalidOption(f"a workbook needs openpyxl: {install('excel')}, or write CSV or NetCDF") from None
-    count = math.prod(dataset.sizes.values())
-    if count > _SHEET:
-        raise InvalidOption(f"a sheet holds {_SHEET} rows, the study has {count}: write CSV, Parquet or NetCDF")
-    book = openpyxl.Workbook(write_only=True)
-    sheet = book.create_sheet("simulations")
-    sheet.freeze_panes = "A2"
-    for k, frame in enumerate(frames):
-        if k == 0:
-            sheet.append([*frame.columns])
-        for row in frame.to_dict("records"):
-            sheet.append([*plain(row).values()])
-    content = io.BytesIO()  # what it writes itself must not fail
-    book.save(content)
-    target.write_bytes(content.getvalue())
-
-
-_Writer = Callable[[Iterator["pd.DataFrame"], "xr.Dataset", Path], None]
-_WRITERS: Final[Mapping[str, _Writer]] = {
-    "csv": _write_csv,
-    "json": _write_json,
-    "parquet": _write_parquet,
-    "excel": _write_excel,
-}
-
-
 def lazy_outcome(store: Store, name: str, complete: bool) -> xr.Variable:
     """Outcome of a store over (motion, scale, polarity, block), read when it is needed.
 
@@ -139,9 +108,7 @@ def lazy_outcome(store: Store, name: str, complete: bool) -> xr.Variable:
         dtype = OUTCOME[name] if complete else np.dtype(np.float64)
 
         def __getitem__(self, key: indexing.ExplicitIndexer) -> NDArray[Any]:
-            def selected(parts: tuple[Any, ...]) -> NDArray[Any]:
-                return _selected(store, name, complete, parts)
-
+            selected = functools.partial(_selected, store, name, complete)
             found: NDArray[Any] = indexing.explicit_indexing_adapter(
                 key, self.shape, indexing.IndexingSupport.OUTER, selected
             )
@@ -167,3 +134,82 @@ def _selected(store: Store, name: str, complete: bool, key: tuple[Any, ...]) -> 
             raise StudyError(f"unit {name_of(unit)} is gone since these results were opened: run the study again")
     values = found.squeeze(axis=tuple(position for position, axis in enumerate(axes) if axis.ndim == 0))
     return values.astype(OUTCOME[name]) if complete else values
+
+
+StudyVerdict = Literal["overturning", "complete_chattering"]
+
+#: Of each verdict its name on the higher scale, what that means, and the outcomes that it follows from.
+_VERDICTS: Final[Mapping[str, tuple[str, str, Sequence[str]]]] = {
+    "overturning": (
+        "overturns",
+        "whether the scale above overturns the block, and the one below does not",
+        ("overturned",),
+    ),
+    "complete_chattering": (
+        "completes",
+        "whether chattering is complete at the scale above, and not at the one below",
+        ("rests", "complete_chattering"),
+    ),
+}
+
+
+def critical_scales(store: Store, verdict: StudyVerdict) -> xr.Dataset:
+    """Label the changes of a verdict in a study whose units are done, as `Study.critical_scales`."""
+    import xarray as xr
+
+    checks.one_of(verdict, "verdict", InvalidOption, get_args(StudyVerdict))
+    above, meaning, needed = _VERDICTS[verdict]
+    require(store.grid.outcomes, needed, f"a critical scale of {verdict.replace('_', ' ')}")
+    product, levels = store.product, store.product.scales.values
+    if product.scales.count < 2 or not np.all(np.diff(levels) > 0.0):
+        raise InvalidOption("critical scales lie between two scales or more, in increasing order: give those")
+    store.require_complete()
+    holds, known = np.zeros(store.grid.shape, bool), np.zeros(store.grid.shape, bool)
+    for key in store.grid:
+        here = store.grid.ranges(key)
+        holds[here], known[here] = _verdicts(verdict, store.present(key))
+    # An unknown verdict takes the last known one below: else a change with unknown verdicts inside would be lost.
+    below = np.zeros(store.grid.shape, np.int64)  # number of that scale; -1 where no verdict is known so far
+    for k in range(product.scales.count):
+        below[:, k] = np.where(known[:, k], k, below[:, k - 1] if k else -1)
+        np.copyto(holds[:, k], holds[:, k - 1], where=~known[:, k])
+    changed = (holds[:, 1:] != holds[:, :-1]) & (below[:, :-1] >= 0)
+    motion, polarity, block, scale = np.nonzero(changed.transpose(0, 2, 3, 1))
+    low = below[motion, scale, polarity, block]
+    whole, about = dataset_of(product, {}), product.scales.about
+    units = {"units": about["units"]}
+    of_blocks: dict[str, Any] = {
+        name: ("change", np.asarray(values)[block], attributes)
+        for name, (_, values, attributes) in body_coordinates(product.bodies).items()
+    }
+    return xr.Dataset(
+        {
+            "low": ("change", levels[low], units | {"long_name": "scale below the change"}),
+            "high": ("change", levels[scale + 1], units | {"long_name": "scale above the change"}),
+            above: ("change", holds[motion, scale + 1, polarity, block], {"long_name": meaning}),
+            "known": ("change", low == scale, {"long_name": "whether the verdicts of all simulations are known"}),
+        },
+        {
+            "motion": ("change", whole.motion.values[motion]),
+            **{
+                name: ("change", np.array(verticals)[motion])
+                for name, (_, verticals) in verticals_of(product.motions).items()
+            },
+            "polarity": ("change", np.where(np.array(product.signs)[polarity] > 0, "+", "-")),
+            "block": ("change", block),
+            **of_blocks,
+        },
+        whole.attrs | {name: value for name, value in about.items() if name != "units"},
+    )
+
+
+def _verdicts(verdict: str, outcomes: Mapping[str, Floats]) -> tuple[Flags, Flags]:
+    """Return whether a verdict holds in each simulation, and whether that is known.
+
+    A block that had not overturned when its simulation was given up or stopped may do so later.
+    """
+    known = (outcomes["unfinished"] == 0.0) & (outcomes["stopped"] == 0.0)
+    if verdict == "overturning":
+        return outcomes["overturned"] != 0.0, known
+    known = (known | (outcomes["rests"] != 0.0)) & (outcomes["stalled"] == 0.0)
+    return outcomes["complete_chattering"] != 0.0, known

@@ -8,7 +8,9 @@ from __future__ import annotations
 import contextlib
 import importlib
 import itertools
+import json
 import logging
+import math
 import signal
 import threading
 import time
@@ -23,24 +25,177 @@ from concurrent.futures import (
     wait,
 )
 from dataclasses import dataclass
+from datetime import datetime
 from typing import Any, Final
+
+import numpy as np
 
 from rocking import checks
 from rocking.errors import InvalidOption, RockingError, StudyError, install
 from rocking.progress import Progress, note
-from rocking.studies.store import Store
+from rocking.studies.folder import Folder, Store, this_process
+from rocking.studies.report import kept_report
 from rocking.studies.units import Key, Work, compute, name_of
 from rocking.tables import counted
 from rocking.threads import cores
 
-#: Units that are handed out for each worker: one that it computes, and the next.
-_AHEAD: Final = 2
+#: The log of all runs; one of a part has a name of its own, as its lock has ("runs.3-10.jsonl" and "lock.3-10").
+_RUNS: Final = "runs.jsonl"
 
-#: How often the number of workers is asked for, and whether they still live, s.
-_POLL: Final = 1.0
 
 #: How long a scheduler may take to answer, s.
 _ANSWER: Final = 5.0
+
+
+@dataclass(frozen=True)
+class Running:
+    """A run that goes on, or the runs of several parts together.
+
+    Attributes
+    ----------
+    holder : str
+        Process and host.
+    rate : float
+        Simulations a second since it started.
+    seconds_left : float
+        Time that it will take at this rate; infinite before its first unit.
+    """
+
+    holder: str
+    rate: float
+    seconds_left: float
+
+    def __str__(self) -> str:
+        is_known = math.isfinite(self.seconds_left)
+        left = f"{self.seconds_left:.0f} s left" if is_known else "its first unit is not done yet"
+        return f"being run by {self.holder}: {self.rate:.3g} simulations a second, {left}"
+
+
+@dataclass(frozen=True)
+class Status:
+    """How far a study has come.
+
+    Attributes
+    ----------
+    done, units : int
+        Units that are done, of how many.
+    simulations : int
+        Simulations in all units.
+    failed : mapping
+        Sentence for each unit that the last run could not compute.
+    running : Running or None
+        The run that goes on now, where there is one.
+    runs : tuple
+        What happened in every run, as `runs.jsonl` has it, and after it in those of parts.
+    """
+
+    done: int
+    units: int
+    simulations: int
+    failed: dict[str, str]
+    running: Running | None
+    runs: tuple[dict[str, Any], ...]
+
+    @property
+    def complete(self) -> bool:
+        """Whether every unit is done."""
+        return self.done == self.units
+
+    def __str__(self) -> str:
+        share = math.floor(1000.0 * self.done / self.units) / 10.0  # 100 % only where all are
+        done = f"{self.done} of {counted(self.units, 'unit')} done ({share:.1f} %)"
+        text = f"{done}, {counted(self.simulations, 'simulation')} in all"
+        text += f"; {len(self.failed)} failed in the last run" if self.failed else ""
+        return text + (f"; {self.running}" if self.running else "")
+
+
+def log_run(folder: Folder, lock: str, entry: dict[str, Any]) -> None:
+    """Append an entry to the log of the run that holds a lock, with the time and this process."""
+    who = {"time": datetime.now().astimezone().isoformat(timespec="seconds"), "by": this_process()}
+    folder.append(_RUNS.replace("runs", lock.replace("lock", "runs")), json.dumps(who | entry))
+
+
+def _entries(data: bytes) -> Iterator[dict[str, Any]]:
+    """Give the entries of a log; a line that was cut off by a crash is passed over."""
+    for line in data.splitlines():
+        with contextlib.suppress(ValueError):
+            if isinstance(entry := json.loads(line), dict):
+                yield entry
+
+
+def status_of(store: Store) -> Status:
+    """Return how far a study has come; other processes may run it."""
+    folder, done, grid = store.folder, store.done(), store.grid
+    logs = {
+        name.replace("runs", "lock").removesuffix(".jsonl"): [*_entries(folder.get(name) or b"")]
+        for name in sorted(folder.names(), key=lambda name: (name != _RUNS, name))
+        if name.startswith("runs.") and name.endswith(".jsonl")
+    }
+    last = {
+        lock: entries[max(k for k, each in enumerate(entries) if each.get("event") == "start") :]
+        for lock, entries in logs.items()
+        if any(each.get("event") == "start" for each in entries)
+    }
+    names = {*map(name_of, done)}
+    failed = {
+        each["unit"]: each["why"]
+        for entries in last.values()
+        for each in entries
+        if each.get("event") == "failed" and each["unit"] not in names
+    }
+    simulated, holders = sum(map(grid.simulations, done)), folder.holders()
+    starts = [last[lock][0] for lock in holders if lock in last]
+    running = None
+    if starts:
+        first = min(starts, key=lambda start: datetime.fromisoformat(start["time"]))
+        seconds = time.time() - datetime.fromisoformat(first["time"]).timestamp()
+        rate = max(simulated - first["done"], 0) / max(seconds, 1.0)
+        running = Running(", ".join(holders.values()), rate, (grid.total - simulated) / rate if rate else math.inf)
+    runs = tuple(entry for entries in logs.values() for entry in entries)
+    return Status(len(done), len(grid), grid.total, failed, running, runs)
+
+
+def verified(store: Store, recompute: int, repair: bool, seed: int, progress: bool | None) -> list[str]:
+    """Check all parts of a study, and perhaps compute damaged units again, as `Study.verify`."""
+    checks.whole(recompute, "recompute", InvalidOption, 0)
+    if recompute or repair:
+        store.check_program()
+    faults = [
+        *(
+            f"{name} is damaged or missing, which other programs that read Zarr need: run the study again"
+            for name, data in store.metadata.items()
+            if store.folder.get(name) != data
+        ),
+        *_reading(kept_report, store.folder),
+        *_reading(Store.records, store),
+    ]
+    done = sorted(store.done())
+    drawn = min(recompute, len(done))
+    damaged: dict[Key, str] = {}
+    with Progress("verifying", len(done) + drawn, show=progress) as bar:
+        for key in done:
+            for fault in _reading(store.outcomes, key):
+                damaged[key] = fault
+            bar.advance()
+        sound = [key for key in done if key not in damaged]
+        for k in np.random.default_rng(seed).permutation(len(sound))[:drawn]:
+            if compute(store.work(sound[k])) != store.raw(sound[k]):
+                damaged[sound[k]] = f"unit {name_of(sound[k])} is not what this program computes"
+            bar.advance()
+    if repair and damaged:
+        with store.folder.locked():
+            for key in damaged:
+                store.put(key, compute(store.work(key)))
+    return [*faults, *damaged.values()]
+
+
+def _reading(read: Callable[[Any], object], what: object) -> list[str]:
+    """Return why something cannot be read; nothing if it can."""
+    try:
+        read(what)
+    except StudyError as error:
+        return [error.text()]
+    return []
 
 
 @dataclass(frozen=True)
@@ -68,7 +223,6 @@ class RunReport:
     stopped: bool
 
     def __str__(self) -> str:
-        """Write it in one line."""
         rate = self.simulations / self.seconds if self.seconds > 0.0 else 0.0
         done = f"{counted(self.units, 'unit')}, {counted(self.simulations, 'simulation')}"
         text = f"{done} in {self.seconds:.1f} s ({rate:.3g} a second)"
@@ -88,9 +242,8 @@ def run(
 ) -> RunReport:
     """Compute the units of a share that are not done, in threads or by an executor, until SIGTERM asks to stop.
 
-    Units in hand are finished then.
-    `failing` gets the name of each unit that cannot be computed, and why, as it happens. A StudyError is raised if the
-    workers are gone.
+    Units in hand are finished then. `failing` gets the name of each unit that cannot be computed, and why, as it
+    happens. A StudyError is raised if the workers are gone.
     """
     start, units, simulations = time.monotonic(), 0, 0
     failed: dict[str, str] = {}
@@ -106,18 +259,20 @@ def run(
         try:
             while True:
                 if not stop.is_set():
-                    for key in itertools.islice(left, max(_AHEAD * max(1, count()) - len(pending), 0)):
+                    # Each worker has a unit in hand, and the next.
+                    for key in itertools.islice(left, max(2 * max(1, count()) - len(pending), 0)):
                         pending[submit(store.work(key))] = key
                 if not pending:
                     break
-                for future in wait(pending, timeout=_POLL, return_when=FIRST_COMPLETED).done:
+                for future in wait(pending, timeout=1.0, return_when=FIRST_COMPLETED).done:
                     key = pending.pop(future)
                     try:
                         data = future.result()
                     except (BrokenExecutor, CancelledError) as error:
                         raise _gone(error) from error
                     except Exception as error:
-                        failed[name_of(key)] = _reason(error)
+                        why, kind = " ".join(str(error).split()), type(error).__name__
+                        failed[name_of(key)] = why if isinstance(error, RockingError) else f"{kind}: {why}".rstrip(": ")
                         failing(name_of(key), failed[name_of(key)])
                         bar.note(f"{counted(len(failed), 'unit')} failed")
                         continue
@@ -183,12 +338,6 @@ def _workers(executor: Any, threads: int | None) -> Iterator[tuple[Callable[[Wor
         raise _gone("no connection to the scheduler")
 
     yield submit, count
-
-
-def _reason(error: BaseException) -> str:
-    """Return in one line why a unit was not computed."""
-    text = " ".join(str(error).split())
-    return text if isinstance(error, RockingError) else f"{type(error).__name__}: {text}".removesuffix(": ")
 
 
 def _gone(why: object) -> StudyError:

@@ -13,24 +13,30 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.analysis.fragility.fit import OVERTURNING
-from rocking.analysis.fragility.result import Fragility
+from rocking.analysis.fragility import OVERTURNING, Fragility
 from rocking.body import Bodies, Body
 from rocking.constants import Model
 from rocking.ensemble import Polarity, Product, dataset_of, product_of
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import IntensityName, Measure, MeasureName
 from rocking.records.named import Motions, names_of
-from rocking.studies.critical import StudyVerdict, critical_scales
-from rocking.studies.folder import Folder
-from rocking.studies.fragility import BlockFragilities, block_fragilities, pooled_fragility
-from rocking.studies.inputs import OUTCOMES, chosen_outcomes
-from rocking.studies.report import ReportPart, ReportPlan, keep_report, kept_report, made_report
-from rocking.studies.results import lazy_outcome, write_table
-from rocking.studies.run import RunReport, run
-from rocking.studies.spectrum import FRACTILES, StudySpectrum, study_spectrum
-from rocking.studies.status import Status, log_run, status_of, verified
-from rocking.studies.store import Store, exists, require_free
+from rocking.studies.folder import Folder, Store, exists, require_free
+from rocking.studies.product import OUTCOMES, chosen_outcomes
+from rocking.studies.report import (
+    FRACTILES,
+    BlockFragilities,
+    ReportPart,
+    ReportPlan,
+    StudySpectrum,
+    block_fragilities,
+    keep_report,
+    kept_report,
+    made_report,
+    pooled_fragility,
+    study_spectrum,
+)
+from rocking.studies.results import StudyVerdict, critical_scales, lazy_outcome, write_table
+from rocking.studies.run import RunReport, Status, log_run, run, status_of, verified
 from rocking.studies.units import fitting_unit, width_of
 from rocking.tables import counted, write_netcdf
 from rocking.treatment import Treatment
@@ -38,13 +44,10 @@ from rocking.treatment import Treatment
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Changes of verdicts that are held in memory at a time, where they are written to a file.
-_CHANGES = 1 << 16
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Study:
-    """Simulations of blocks, motions, scales and polarities, kept in a store; from `rocking.study`.
+    """Simulations of blocks, motions, scales and polarities, kept in a folder; from `rocking.study`.
 
     Attributes
     ----------
@@ -100,7 +103,7 @@ class Study:
             Compute a fixed share of the units only, as "3/10", the third of ten. Different shares may run at the same
             time, on machines with a common file system; a run without a part then computes what is missing.
         progress : bool, optional
-            Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
+            As for `simulate_many`.
 
         Returns
         -------
@@ -111,7 +114,7 @@ class Study:
         Raises
         ------
         InvalidOption
-            If the number of threads is not a whole number from 1, or the executor or the part is none.
+            If an argument is out of its range.
         StudyError
             If the study is being run elsewhere, was made by another version, or the workers are gone.
         OutputError
@@ -119,13 +122,10 @@ class Study:
 
         Examples
         --------
-        >>> import tempfile
-        >>> import rocking
-        >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
-        >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
-        >>> study = rocking.study(tempfile.mkdtemp(), blocks, motion, levels=[0.4, 1.0], unit_blocks=512)
-        >>> study.run().simulations
-        8
+        >>> import rocking, tempfile
+        >>> block, pulse = rocking.Block.from_parameters(2.0, 0.1, 0.9), rocking.pulses.one_sine(4.0, 1.0)
+        >>> rocking.study(tempfile.mkdtemp(), block, pulse, levels=[0.4, 1.0], unit_blocks=512).run().simulations
+        2
         """
         if threads is not None:
             threads = checks.whole(threads, "threads", InvalidOption, least=1)
@@ -151,27 +151,21 @@ class Study:
         return report
 
     def results(self) -> xr.Dataset:
-        """Outcomes so far, read from the store when they are needed.
+        """Outcomes so far, read from the folder when they are needed.
 
         Returns
         -------
         xarray.Dataset
             As from `simulate_many`: over (motion, scale, polarity, block), those that apply, with the outcomes that
             the study keeps. While units are missing every variable is of floats, NaN where its unit is not done, and a
-            variable ``done`` says which are.
-
-        Raises
-        ------
-        StudyError
-            When a damaged unit is read; the message names it.
+            variable ``done`` says which are. A StudyError names a damaged unit when it is read.
 
         Examples
         --------
-        >>> import tempfile
-        >>> import rocking
+        >>> import rocking, tempfile
         >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
-        >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
-        >>> study = rocking.study(tempfile.mkdtemp(), blocks, motion, levels=[0.4, 1.0], unit_blocks=512)
+        >>> pulse = rocking.pulses.one_sine(4.0, 1.0)
+        >>> study = rocking.study(tempfile.mkdtemp(), blocks, pulse, levels=[0.4, 1.0], unit_blocks=512)
         >>> _ = study.run()
         >>> study.results().impacts.values.tolist()
         [[[1, 0, 1, 0], [0, 1, 0, 0]]]
@@ -206,7 +200,7 @@ class Study:
         seed : int
             Seed of the draw.
         progress : bool, optional
-            Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
+            As for `simulate_many`.
 
         Returns
         -------
@@ -221,11 +215,9 @@ class Study:
 
         Examples
         --------
-        >>> import tempfile
-        >>> import rocking
-        >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
-        >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
-        >>> study = rocking.study(tempfile.mkdtemp(), blocks, motion, levels=[0.4, 1.0], unit_blocks=512)
+        >>> import rocking, tempfile
+        >>> block, pulse = rocking.Block.from_parameters(2.0, 0.1, 0.9), rocking.pulses.one_sine(4.0, 1.0)
+        >>> study = rocking.study(tempfile.mkdtemp(), block, pulse, levels=[0.4, 1.0], unit_blocks=512)
         >>> _ = study.run()
         >>> study.verify(recompute=1)
         []
@@ -260,15 +252,12 @@ class Study:
 
         Examples
         --------
-        >>> import tempfile
-        >>> import rocking
-        >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
-        >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
-        >>> study = rocking.study(tempfile.mkdtemp(), blocks, motion, levels=[0.4, 1.0], unit_blocks=512)
+        >>> import rocking, tempfile
+        >>> block, pulse = rocking.Block.from_parameters(2.0, 0.2, 0.9), rocking.pulses.one_sine(4.0, 1.0)
+        >>> study = rocking.study(tempfile.mkdtemp(), block, pulse, levels=[0.4, 1.0], unit_blocks=512)
         >>> _ = study.run()
-        >>> found = study.critical_scales()
-        >>> found.block.values.tolist(), found.low.values.tolist(), found.high.values.tolist()
-        ([1, 3], [0.4, 0.4], [1.0, 1.0])
+        >>> study.critical_scales().high.values.tolist()
+        [1.0]
         """
         return self._with_records(critical_scales(self._store, verdict))
 
@@ -285,16 +274,8 @@ class Study:
 
         Parameters
         ----------
-        measure : {"pga", "pgv", "sa", "pga_ratio", "pgv_ratio"} or Measure
-            As for `rocking.fragility`. What a motion measures at a scale is its intensity.
-        limits : mapping of str to float
-            As for `rocking.fragility`.
-        confidence : float
-            As for `rocking.fragility`.
-        weights : array_like, optional
-            As for `rocking.fragility`.
-        clusters : "station" or array_like of labels, optional
-            As for `rocking.fragility`, one for each motion of the study.
+        measure, limits, confidence, weights, clusters : optional
+            As for `rocking.fragility` and its `Band`. What a motion measures at a scale is its intensity.
 
         Returns
         -------
@@ -310,11 +291,10 @@ class Study:
 
         Examples
         --------
-        >>> import tempfile
-        >>> import rocking
+        >>> import rocking, tempfile
         >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
-        >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
-        >>> study = rocking.study(tempfile.mkdtemp(), blocks, motion, levels=[0.4, 0.6, 1.0], unit_blocks=512)
+        >>> pulse = rocking.pulses.one_sine(4.0, 1.0)
+        >>> study = rocking.study(tempfile.mkdtemp(), blocks, pulse, levels=[0.4, 0.6, 1.0], unit_blocks=512)
         >>> _ = study.run()
         >>> f"{study.fragility().curves[0].median:.3f} m/s^2"
         '1.662 m/s^2'
@@ -332,40 +312,34 @@ class Study:
     ) -> BlockFragilities:
         """Fit a fragility curve to the outcomes of each block.
 
+        A curve takes some hundredths of a second where motions were scaled to the measure (stripes), and seconds where
+        thousands of outcomes have an intensity each (a cloud).
+
         Parameters
         ----------
-        measure : {"pga", "pgv", "sa", "pga_ratio", "pgv_ratio"} or Measure
-            As for `rocking.fragility`. A curve takes some hundredths of a second where motions were scaled to the
-            measure (stripes), and seconds where thousands of outcomes have an intensity each (a cloud).
-        limits : mapping of str to float
-            As for `rocking.fragility`.
-        confidence : float
-            As for `rocking.fragility`.
-        clusters : "station" or array_like of labels, optional
-            As for `rocking.fragility`, one for each motion of the study.
+        measure, limits, confidence, clusters : optional
+            As for `Study.fragility`.
         progress : bool, optional
-            Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
+            As for `simulate_many`.
 
         Returns
         -------
         BlockFragilities
-            A curve for each block and limit, or why there is none.
+            A curve for each block and limit, or a sentence that says why no lognormal fits.
 
         Raises
         ------
         StudyError
             If units are missing or damaged.
         InvalidOption
-            If an argument is out of its range, or the study does not keep what a limit needs. A block that no lognormal
-            fits has a sentence in place of a curve.
+            If an argument is out of its range, or the study does not keep what a limit needs.
 
         Examples
         --------
-        >>> import tempfile
-        >>> import rocking
+        >>> import rocking, tempfile
         >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
-        >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
-        >>> study = rocking.study(tempfile.mkdtemp(), blocks, motion, levels=[0.4, 1.0], unit_blocks=512)
+        >>> pulse = rocking.pulses.one_sine(4.0, 1.0)
+        >>> study = rocking.study(tempfile.mkdtemp(), blocks, pulse, levels=[0.4, 1.0], unit_blocks=512)
         >>> _ = study.run()
         >>> study.block_fragilities().data.exceeded.values.tolist()
         [[2.0, 1.0, 2.0, 1.0]]
@@ -380,7 +354,7 @@ class Study:
         fractiles : sequence of float
             Shares of the motions, in (0, 1), that stay below.
         progress : bool, optional
-            Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
+            As for `simulate_many`.
 
         Returns
         -------
@@ -396,14 +370,12 @@ class Study:
 
         Examples
         --------
-        >>> import tempfile
-        >>> import rocking
-        >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
-        >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
-        >>> study = rocking.study(tempfile.mkdtemp(), blocks, motion, levels=[0.4, 1.0], unit_blocks=512)
+        >>> import rocking, tempfile
+        >>> block, pulse = rocking.Block.from_parameters(2.0, 0.2, 0.9), rocking.pulses.one_sine(4.0, 1.0)
+        >>> study = rocking.study(tempfile.mkdtemp(), block, pulse, levels=[0.4, 1.0], unit_blocks=512)
         >>> _ = study.run()
         >>> study.spectrum([0.5]).data.overturned_share.values.tolist()
-        [[1.0, 0.0, 1.0, 0.0], [1.0, 1.0, 1.0, 1.0]]
+        [[0.0], [1.0]]
         """
         return study_spectrum(self._store, fractiles, progress)
 
@@ -413,7 +385,7 @@ class Study:
         Parameters
         ----------
         progress : bool, optional
-            Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
+            As for `simulate_many`.
 
         Returns
         -------
@@ -427,12 +399,9 @@ class Study:
 
         Examples
         --------
-        >>> import tempfile
-        >>> import rocking
-        >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
-        >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
-        >>> study = rocking.study(tempfile.mkdtemp(), blocks, motion, levels=[0.4, 1.0], unit_blocks=512)
-        >>> study.report()
+        >>> import rocking, tempfile
+        >>> block, pulse = rocking.Block.from_parameters(2.0, 0.1, 0.9), rocking.pulses.one_sine(4.0, 1.0)
+        >>> rocking.study(tempfile.mkdtemp(), block, pulse, levels=[0.4, 1.0], unit_blocks=512).report()
         Traceback (most recent call last):
         ...
         rocking.errors.StudyError: ...the study says nothing of a report: add [report.fragility] to its file ...
@@ -444,30 +413,20 @@ class Study:
 
         Parameters
         ----------
-        path : path
-            File to write.
-        critical : {"overturning", "complete_chattering"}, optional
-            Write the `critical_scales` of this verdict instead, a row for each change.
+        path, critical : optional
+            As for `to_csv`.
 
         Raises
         ------
-        OutputError
-            If the file cannot be written.
-        StudyError
-            If a unit is damaged, or units are missing for critical scales.
+        OutputError, StudyError
+            As `to_csv`.
 
         Examples
         --------
-        >>> import pathlib, tempfile
-        >>> import rocking
-        >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
-        >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
-        >>> folder = pathlib.Path(tempfile.mkdtemp())
-        >>> study = rocking.study(folder / "study", blocks, motion, levels=[0.4, 1.0], unit_blocks=512)
-        >>> _ = study.run()
-        >>> study.to_netcdf(folder / "all.nc")
-        >>> (folder / "all.nc").is_file()
-        True
+        >>> import rocking, tempfile
+        >>> block, pulse = rocking.Block.from_parameters(2.0, 0.1, 0.9), rocking.pulses.one_sine(4.0, 1.0)
+        >>> study = rocking.study(tempfile.mkdtemp(), block, pulse, levels=[0.4, 1.0], unit_blocks=512)
+        >>> study.to_netcdf(f"{tempfile.mkdtemp()}/all.nc")
         """
         write_netcdf(path, self._results(critical)[0])
 
@@ -476,12 +435,12 @@ class Study:
 
         Parameters
         ----------
-        path : path
-            File to write.
+        path : str or pathlib.Path
+            File to write, whole or not at all.
         critical : {"overturning", "complete_chattering"}, optional
             Write the `critical_scales` of this verdict instead, a row for each change.
         progress : bool, optional
-            Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
+            As for `simulate_many`.
 
         Raises
         ------
@@ -492,15 +451,13 @@ class Study:
 
         Examples
         --------
-        >>> import pathlib, tempfile
-        >>> import rocking
-        >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
-        >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
-        >>> folder = pathlib.Path(tempfile.mkdtemp())
-        >>> study = rocking.study(folder / "study", blocks, motion, levels=[0.4, 1.0], unit_blocks=512)
+        >>> import pathlib, rocking, tempfile
+        >>> block, pulse = rocking.Block.from_parameters(2.0, 0.1, 0.9), rocking.pulses.one_sine(4.0, 1.0)
+        >>> study = rocking.study(tempfile.mkdtemp(), block, pulse, levels=[0.4, 1.0], unit_blocks=512)
         >>> _ = study.run()
-        >>> study.to_csv(folder / "all.csv")
-        >>> (folder / "all.csv").read_text().splitlines()[1][:40]
+        >>> table = pathlib.Path(tempfile.mkdtemp(), "all.csv")
+        >>> study.to_csv(table)
+        >>> table.read_text().splitlines()[1][:40]
         'one-sine,0.4,0,2.0,0.1,0.9,True,1.570796'
         """
         write_table("csv", path, *self._results(critical), progress)
@@ -513,33 +470,24 @@ class Study:
 
         Parameters
         ----------
-        path : path
-            File to write.
-        critical : {"overturning", "complete_chattering"}, optional
-            Write the `critical_scales` of this verdict instead, a row for each change.
-        progress : bool, optional
-            Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
+        path, critical, progress : optional
+            As for `to_csv`.
 
         Raises
         ------
-        OutputError
-            If the file cannot be written.
-        StudyError
-            If a unit is damaged, or units are missing for critical scales.
+        OutputError, StudyError
+            As `to_csv`.
 
         Examples
         --------
-        >>> import pathlib, tempfile
-        >>> import rocking
-        >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
-        >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
-        >>> folder = pathlib.Path(tempfile.mkdtemp())
-        >>> study = rocking.study(folder / "study", blocks, motion, levels=[0.4, 1.0], unit_blocks=512)
+        >>> import json, pathlib, rocking, tempfile
+        >>> block, pulse = rocking.Block.from_parameters(2.0, 0.1, 0.9), rocking.pulses.one_sine(4.0, 1.0)
+        >>> study = rocking.study(tempfile.mkdtemp(), block, pulse, levels=[0.4, 1.0], unit_blocks=512)
         >>> _ = study.run()
-        >>> study.to_json(folder / "all.json")
-        >>> import json
-        >>> len(json.loads((folder / "all.json").read_text())["simulations"])
-        8
+        >>> file = pathlib.Path(tempfile.mkdtemp(), "all.json")
+        >>> study.to_json(file)
+        >>> len(json.loads(file.read_text())["simulations"])
+        2
         """
         write_table("json", path, *self._results(critical), progress)
 
@@ -550,76 +498,29 @@ class Study:
 
         Parameters
         ----------
-        path : path
-            File to write.
-        critical : {"overturning", "complete_chattering"}, optional
-            Write the `critical_scales` of this verdict instead, a row for each change.
-        progress : bool, optional
-            Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
+        path, critical, progress : optional
+            As for `to_csv`.
 
         Raises
         ------
-        OutputError
-            If the file cannot be written.
-        StudyError
-            If a unit is damaged, or units are missing for critical scales.
+        OutputError, StudyError
+            As `to_csv`.
         InvalidOption
             If pyarrow is not installed.
 
         Examples
         --------
-        >>> import pathlib, tempfile
-        >>> import rocking
-        >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
-        >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
-        >>> folder = pathlib.Path(tempfile.mkdtemp())
-        >>> study = rocking.study(folder / "study", blocks, motion, levels=[0.4, 1.0], unit_blocks=512)
-        >>> _ = study.run()
-        >>> study.to_parquet(folder / "all.parquet")
-        >>> (folder / "all.parquet").is_file()
-        True
+        >>> import rocking, tempfile
+        >>> block, pulse = rocking.Block.from_parameters(2.0, 0.1, 0.9), rocking.pulses.one_sine(4.0, 1.0)
+        >>> study = rocking.study(tempfile.mkdtemp(), block, pulse, levels=[0.4, 1.0], unit_blocks=512)
+        >>> study.to_parquet(f"{tempfile.mkdtemp()}/all.parquet")
         """
         write_table("parquet", path, *self._results(critical), progress)
 
-    def to_excel(self, path: str | Path, *, critical: StudyVerdict | None = None, progress: bool | None = None) -> None:
-        """Write the table of `to_csv` as a workbook (.xlsx).
-
-        Parameters
-        ----------
-        path : path
-            File to write.
-        critical : {"overturning", "complete_chattering"}, optional
-            Write the `critical_scales` of this verdict instead, a row for each change.
-        progress : bool, optional
-            Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
-
-        Raises
-        ------
-        OutputError
-            If the file cannot be written.
-        StudyError
-            If a unit is damaged, or units are missing for critical scales.
-        InvalidOption
-            If openpyxl is not installed, or a sheet has too few rows.
-
-        Examples
-        --------
-        >>> import pathlib, tempfile
-        >>> import rocking
-        >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
-        >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
-        >>> folder = pathlib.Path(tempfile.mkdtemp())
-        >>> study = rocking.study(folder / "study", blocks, motion, levels=[0.4, 1.0], unit_blocks=512)
-        >>> _ = study.run()
-        >>> study.to_excel(folder / "all.xlsx")
-        >>> (folder / "all.xlsx").is_file()
-        True
-        """
-        write_table("excel", path, *self._results(critical), progress)
-
     def _results(self, critical: StudyVerdict | None) -> tuple[xr.Dataset, str, int]:
+        """Return what is written, the dimension along which it is cut, and how much of it is held in memory."""
         if critical:
-            return self.critical_scales(critical), "change", _CHANGES
+            return self.critical_scales(critical), "change", 1 << 16
         return self.results(), "motion", self._store.grid.unit[0]
 
     def __repr__(self) -> str:
@@ -648,22 +549,9 @@ def study(
     ----------
     folder : path
         Folder where the study is kept.
-    blocks : Blocks, Block, RestrainedBlock or sequence of one kind, optional
-        As for `simulate_many`; without blocks and motions, the study must be there, and needs no script nor any other
-        argument.
-    motions : Motion, sequence of Motion, or mapping of str to Motion, optional
-        As for `simulate_many`.
-    model : {"nonlinear", "linear"}
-        As for `simulate_many`.
-    chattering : str or Treatment
-        As for `simulate_many`.
-    levels : array_like, optional
-        As for `simulate_many`.
-    measure : {"factor", "pga", "pgv"} or Measure
-        As for `simulate_many`.
-    polarity : {"+", "-", "both"}
-        As for `simulate_many`.
-    duration : float, optional
+    blocks, motions : optional
+        As for `simulate_many`; without both, the study must be there, and takes no other argument.
+    model, chattering, levels, measure, polarity, duration : optional
         As for `simulate_many`.
     outcomes : sequence of str, optional
         Names of what is kept of each simulation, of the variables that `simulate_many` returns; by default all.
@@ -686,46 +574,33 @@ def study(
 
     Examples
     --------
-    >>> import tempfile
-    >>> import rocking
+    >>> import rocking, tempfile
     >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
-    >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
-    >>> folder = tempfile.mkdtemp()
-    >>> first = study(folder, blocks, motion, levels=[0.4, 1.0], unit_blocks=512)
-    >>> _ = first.run()
+    >>> folder, pulse = tempfile.mkdtemp(), rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
+    >>> _ = study(folder, blocks, pulse, levels=[0.4, 1.0], unit_blocks=512).run()
     >>> study(folder).results().overturned.sel(scale=0.4).values.tolist()
     [[True, False, True, False]]
     """
     where = Folder(folder)
-    if blocks is None or motions is None:
-        if blocks is not None or motions is not None:
-            raise InvalidOption("a new study needs {} and {}; one that is there needs neither", "blocks", "motions")
-        _refuse_inputs(
-            model=None if model == "nonlinear" else model,
-            chattering=None if chattering == "certified" else chattering,
-            levels=levels,
-            measure=None if measure == "factor" else measure,
-            polarity=None if polarity == "+" else polarity,
-            duration=duration,
-            outcomes=outcomes,
-            unit_blocks=unit_blocks,
-        )
-        return Study(Store.open(where))
-    product = product_of(blocks, motions, levels, measure, polarity, model, chattering, duration)
-    return study_of(where, product, unit_blocks, outcomes=chosen_outcomes(outcomes))
-
-
-def _refuse_inputs(**given: object) -> None:
-    """Refuse what is said of a study that is opened by its folder alone: it would be ignored."""
-    names = [name for name, value in given.items() if value is not None]
-    if names:
+    if blocks is not None and motions is not None:
+        product = product_of(blocks, motions, levels, measure, polarity, model, chattering, duration)
+        return study_of(where, product, unit_blocks, outcomes=chosen_outcomes(outcomes))
+    if blocks is not None or motions is not None:
+        raise InvalidOption("a new study needs {} and {}; one that is there needs neither", "blocks", "motions")
+    texts = {"model": (model, "nonlinear"), "chattering": (chattering, "certified"), "measure": (measure, "factor")}
+    texts |= {"polarity": (polarity, "+")}
+    others = {"levels": levels, "duration": duration, "outcomes": outcomes, "unit_blocks": unit_blocks}
+    ignored = [name for name, (value, default) in texts.items() if value != default]
+    ignored += [name for name, value in others.items() if value is not None]
+    if ignored:
         raise InvalidOption(
-            f"{', '.join(['{}'] * len(names))} belong{'s' if len(names) == 1 else ''} to {{}} and {{}}: give those as "
-            "well, or open the study by its folder alone",
-            *names,
+            f"{', '.join(['{}'] * len(ignored))} belong{'s' if len(ignored) == 1 else ''} to {{}} and {{}}: give those "
+            "as well, or open the study by its folder alone",
+            *ignored,
             "blocks",
             "motions",
         )
+    return Study(Store.open(where))
 
 
 def study_of(
@@ -738,9 +613,8 @@ def study_of(
 ) -> Study:
     """Create the study of a product in a folder, or open the one that is there and check its inputs.
 
-    Units are of `unit_blocks` blocks of one motion, scale and polarity, or else from a pilot. `plan` (what is to be
-    made of the results) and `records` (the name of the record of each motion, which results then have as well) take the
-    place of what was; `outcomes` are from `chosen_outcomes`.
+    `plan` (what is to be made of the results) and `records` (the name of the record of each motion, which results then
+    have as well) take the place of what was; `outcomes` are from `chosen_outcomes`.
     """
     found = None if exists(folder) else _created(folder, product, unit_blocks, outcomes)
     if found is None:

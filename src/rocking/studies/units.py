@@ -29,16 +29,11 @@ from rocking.motion.motion import Motion
 #: Units are multiples of so many blocks, which the engine takes through a motion together.
 _GROUP: Final = 512
 
-#: How long a unit should take, s; how many units there should be at least, and simulations in one at most.
-_SECONDS: Final = 5.0
-_FEWEST: Final = 32
+#: Simulations in one unit at most.
 LARGEST: Final = 1 << 18
 
 #: Checked, but not packed: packing would save two thirds of the bytes, and take 3 % of the time of the simulations.
 _LEVEL: Final = 0
-
-#: Outcomes that are rearranged together: some hundreds of kilobytes.
-_CACHED: Final = 4096
 
 #: What gzip writes first: no name, no time, an unknown system. Any other byte there is damage.
 _HEADER: Final = gzip.compress(b"", _LEVEL, mtime=0)[:10]
@@ -55,14 +50,8 @@ class DamagedUnit(Exception):
 class UnitGrid:
     """How simulations are cut into units.
 
-    Attributes
-    ----------
-    shape : tuple of int
-        Numbers of motions, scales, polarities and blocks.
-    unit : tuple of int
-        How many a unit holds along each axis; the last one along an axis may hold fewer.
-    outcomes : tuple of str
-        What is kept of each simulation, in the order in which the array holds it.
+    `shape` has the numbers of motions, scales, polarities and blocks, `unit` how many of them a unit holds (the last
+    along an axis may hold fewer), and `outcomes` what is kept of each simulation, in the order of the array.
     """
 
     shape: tuple[int, ...]
@@ -147,7 +136,7 @@ def fitting_unit(product: Product) -> tuple[int, int, int, int]:
     start = time.perf_counter()
     simulate_task(setup, task)
     each = (time.perf_counter() - start) / len(some)
-    most = min(_SECONDS / each, math.prod(product.shape) / _FEWEST, LARGEST)
+    most = min(5.0 / each, math.prod(product.shape) / 32, LARGEST)
     width = min(_GROUP * max(1, int(most) // _GROUP), count)
     left = most / width
     held = []
@@ -167,20 +156,8 @@ def program() -> str:
 class Work:
     """All that a worker needs for a unit.
 
-    Attributes
-    ----------
-    setup : Setup
-        The unit's blocks, and how to compute.
-    motions : tuple of Motion
-        Its motions.
-    factors : ndarray, shape (motions, scales, polarities)
-        Factors on the motions.
-    unit : tuple of int
-        What a full unit holds along each axis.
-    outcomes : tuple of str
-        What is kept of each simulation.
-    program : str
-        Who must compute it.
+    The factors on its motions have the shape (motions, scales, polarities); `unit` is what a full unit holds along each
+    axis, `outcomes` what is kept of each simulation, and `program` who must compute it.
     """
 
     setup: Setup
@@ -204,15 +181,13 @@ def compute(work: Work, cancelled: threading.Event | None = None) -> bytes:
     for m, s, k in np.ndindex(work.factors.shape):
         task = Task(blocks, work.motions[m], float(work.factors[m, s, k]))
         outcomes = simulate_task(work.setup, task, cancelled)
-        for start in range(0, blocks.stop, _CACHED):
-            some = slice(start, min(start + _CACHED, blocks.stop))
-            for one, name in zip(values[:, m, s, k], work.outcomes, strict=True):
-                one[some] = outcomes[name][some]
+        for one, name in zip(values[:, m, s, k], work.outcomes, strict=True):
+            one[blocks] = outcomes[name]
     return encoded(values)
 
 
 def encoded(values: Floats) -> bytes:
-    """Bytes of the outcomes of a full unit, however many of them are NaN."""
+    """Return the bytes of the outcomes of a full unit."""
     return gzip.compress(np.ascontiguousarray(values, "<f8").data, _LEVEL, mtime=0)
 
 

@@ -17,7 +17,7 @@ from rocking.progress import note
 from rocking.studies.file.blocks import blocks_of
 from rocking.studies.file.motions import motions_of
 from rocking.studies.file.tables import MEASURES, Tables
-from rocking.studies.inputs import OUTCOMES, chosen_outcomes
+from rocking.studies.product import OUTCOMES, chosen_outcomes
 from rocking.studies.report import PLANS, ReportPlan, check_part
 from rocking.treatment import treatment
 

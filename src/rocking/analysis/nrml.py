@@ -17,9 +17,8 @@ from typing import Final, Literal, NamedTuple, get_args
 import numpy as np
 
 from rocking import checks
-from rocking.analysis.fragility.curve import FragilityCurve
+from rocking.analysis.curve import FragilityCurve
 from rocking.analysis.levels import units_of
-from rocking.arrays import Floats
 from rocking.body import Body
 from rocking.constants import STANDARD_GRAVITY, Model
 from rocking.errors import InvalidOption
@@ -31,12 +30,6 @@ NAMESPACE: Final = "http://openquake.org/xmlns/nrml/0.5"
 
 LossCategory = Literal["structural", "nonstructural", "contents", "business_interruption"]
 Format = Literal["continuous", "discrete"]
-
-_NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,100}")
-#: Intensities of a discrete function.
-_LEVELS: Final = 40
-#: Range of intensities over the lowest, at least: they are written with eight digits.
-_NARROWEST: Final = 1e-5
 
 
 class Scale(NamedTuple):
@@ -72,7 +65,7 @@ def fragility_function(
     checks.one_of(kind, "format", InvalidOption, get_args(Format))
     low, high = (scale.factor * end for end in valid)
     low = max(low, no_damage or 0.0)
-    if not high > low * (1.0 + _NARROWEST):
+    if not high > low * (1.0 + 1e-5):
         raise InvalidOption(
             f"a fragility model needs a range of intensities, not {low:.6g} to {high:.6g}: the data are all at one "
             "intensity, or below the one that lifts the block"
@@ -90,11 +83,13 @@ def fragility_function(
     from scipy.special import ndtr
 
     # The first level must lie above the limit of no damage.
-    levels = np.geomspace(low, high, _LEVELS + 1)[1:]
-    ET.SubElement(function, "imls", measure).text = _listed(levels)
+    levels = np.geomspace(low, high, 40 + 1)[1:]
+    ET.SubElement(function, "imls", measure).text = " ".join(f"{value:.8g}" for value in levels)
     for curve in curves:
         probabilities = ndtr(np.log(levels / (scale.factor * curve.median)) / curve.dispersion)
-        ET.SubElement(function, "poes", {"ls": curve.limit_state}).text = _listed(probabilities)
+        ET.SubElement(function, "poes", {"ls": curve.limit_state}).text = " ".join(
+            f"{value:.8g}" for value in probabilities
+        )
     return function
 
 
@@ -139,10 +134,6 @@ def _moments(median: float, dispersion: float) -> tuple[float, float]:
     return mean, deviation
 
 
-def _listed(values: Floats) -> str:
-    return " ".join(f"{value:.8g}" for value in values)
-
-
 def check_names(names: Iterable[str], what: str) -> None:
     """Raise an InvalidOption unless NRML allows all these names of something."""
     for name in names:
@@ -150,7 +141,7 @@ def check_names(names: Iterable[str], what: str) -> None:
 
 
 def _name(text: str, what: str) -> str:
-    if not _NAME.fullmatch(checks.text(text, what, InvalidOption)):
+    if not re.compile(r"[A-Za-z0-9_-]{1,100}").fullmatch(checks.text(text, what, InvalidOption)):
         raise InvalidOption(
             f"{{}} of NRML may have letters, digits, dashes and underscores, and 100 of them at most, not {text!r}",
             what,

@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from rocking.analysis.fragility.lognormal import (
+from rocking.analysis.probit import (
     STEEP,
     Outcomes,
     Probit,
@@ -28,15 +28,12 @@ from rocking.arrays import Floats, Integers
 
 #: Directions in which a region is measured: between them 4e-5 of an interval's width is lost.
 _RAYS: Final = 360
-_DOUBLINGS: Final = 100
-_NEWTON: Final = 80
 
 #: Relative difference of two quantities that are the same but for rounding.
 _SAME: Final = 1e-9
 
 #: Clusters that tell how far they differ, at least; and the most that one may weigh in its own leaving out.
 FEWEST: Final = 3
-_LEVERAGE: Final = 0.9
 
 #: Level curves at 0 and 1, and steps at intensities below and above all that there are.
 _STEPS_AT: Final = 1000.0 * STEEP
@@ -177,13 +174,13 @@ def _around(data: Outcomes, best: Probit, drop: float) -> Floats:
     wide = np.linalg.cholesky(covariance(Outcomes(z, yes[0], trials[0]), best))
     directions = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ wide.T
     reach = np.ones(_RAYS)
-    for _ in range(_DOUBLINGS):
+    for _ in range(100):
         short = likelihood(rays, top + reach[:, None] * directions) > floor
         if not short.any():
             break
         reach[short] *= 2.0
     # From beyond, Newton's rule does not overshoot the root of a concave function.
-    for _ in range(_NEWTON):
+    for _ in range(80):
         here = top + reach[:, None] * directions
         above = likelihood(rays, here) - floor
         with np.errstate(over="ignore", invalid="ignore"):
@@ -214,7 +211,7 @@ def _stretch(data: Outcomes, clusters: Integers, best: Probit) -> Floats:
     root = np.linalg.cholesky(np.linalg.inv(bends.sum(axis=0)))
     # Without the cluster the information is less by its leverage, so that its score moves the parameters further.
     leverage, axes = np.linalg.eigh(root.T @ bends @ root)
-    freed = np.einsum("cij,cj,ckj->cik", axes, 1.0 / (1.0 - np.minimum(leverage, _LEVERAGE)), axes)
+    freed = np.einsum("cij,cj,ckj->cik", axes, 1.0 / (1.0 - np.minimum(leverage, 0.9)), axes)
     moved = np.einsum("cij,cj->ci", freed, pulls @ root)
     variance, axis = np.linalg.eigh(moved.T @ moved * (count - 1.0) / count)
     wide = axis * np.sqrt(np.maximum(variance, 0.0)) @ axis.T

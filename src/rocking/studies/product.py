@@ -27,14 +27,8 @@ from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
 from rocking.treatment import treatment
 
-#: A fixed time in archives, so that the same inputs make the same bytes.
-_EPOCH: Final = (1980, 1, 1, 0, 0, 0)
-
 #: All outcomes of a simulation, in the order in which a store holds them.
 OUTCOMES: Final = tuple(VARIABLES)
-
-#: Outcomes of a store that names none: all that there were before blocks could lean.
-UNNAMED: Final = tuple(name for name in OUTCOMES if name not in {"leans", "residual_rotation"})
 
 #: Kept whatever is chosen: without them nobody could tell an answer from one that was given up, stopped or not proven.
 ALWAYS_KEPT: Final = ("stalled", "unfinished", "stopped")
@@ -80,9 +74,11 @@ def outcomes_text(kept: Sequence[str]) -> str:
 
 def hashes(product: Product) -> dict[str, Any]:
     """Hash of every part of the inputs by its name; those of the motions in a list."""
-    scales = product.scales
+    scales, bodies, arrays = product.scales, product.bodies, _body_arrays(product.bodies)
+    # Others than blocks may have equal arrays and differ in kind.
+    names = [] if bodies.kind == "blocks" else [_text(json.dumps([bodies.kind, *arrays]))]
     return {
-        "blocks": _hash(_told_apart(product.bodies)),
+        "blocks": _hash([*names, *arrays.values()]),
         "motions": [_hash(_motion_arrays(motion).values()) for motion in product.motions],
         "scales": _hash([scales.values, _text(json.dumps([*_measured(scales).values()]))]),
         "rules": _hash([_text(json.dumps(_rules(product)))]),
@@ -102,7 +98,7 @@ def to_bytes(product: Product) -> bytes:
 def from_bytes(data: bytes) -> Product:
     """Read inputs from such an archive."""
     with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-        words = json.loads(_words(arrays["words"]))
+        words = json.loads(bytes(arrays["words"]))
         return Product(
             bodies=_bodies(arrays),
             motions=tuple(_motion(arrays, f"motions/{k}") for k in range(words["motions"])),
@@ -118,10 +114,10 @@ def from_bytes(data: bytes) -> Product:
 
 
 def _measured(scales: Scales) -> dict[str, Any]:
-    measure = scales.measure
-    return (
-        {"measure": None, "options": {}} if measure is None else {"measure": measure.name, "options": measure.options()}
-    )
+    return {
+        "measure": scales.measure and scales.measure.name,
+        "options": scales.measure.options() if scales.measure else {},
+    }
 
 
 def _rules(product: Product) -> dict[str, Any]:
@@ -160,13 +156,6 @@ def _body_arrays(bodies: Bodies) -> dict[str, NDArray[Any]]:
     return {name: values for name, (values, _) in bodies.parameters().items()} | {"gravity": np.array(bodies.gravity)}
 
 
-def _told_apart(bodies: Bodies) -> list[NDArray[Any]]:
-    """Return the arrays of bodies; of others than blocks their kind and names, too, without which two may be alike."""
-    arrays = _body_arrays(bodies)
-    names = [] if bodies.kind == "blocks" else [_text(json.dumps([bodies.kind, *arrays]))]
-    return [*names, *arrays.values()]
-
-
 def _bodies(arrays: Mapping[str, Floats]) -> Bodies:
     """Make the bodies again; the names of their arrays begin with their kind."""
     kind = next((folder for folder in (name.partition("/")[0] for name in arrays) if folder in KINDS), "")
@@ -197,7 +186,7 @@ def _motion_arrays(motion: Motion) -> dict[str, NDArray[Any]]:
 
 
 def _motion(arrays: Mapping[str, NDArray[Any]], place: str) -> Motion:
-    words = json.loads(_words(arrays[f"{place}/words"]))
+    words = json.loads(bytes(arrays[f"{place}/words"]))
     return Motion(
         arrays[f"{place}/breakpoints"],
         arrays[f"{place}/coefficients"],
@@ -213,10 +202,6 @@ def _text(words: str) -> NDArray[np.uint8]:
     return np.frombuffer(words.encode(), np.uint8)
 
 
-def _words(array: NDArray[Any]) -> str:
-    return bytes(array).decode()
-
-
 def archive(arrays: Mapping[str, NDArray[Any]]) -> bytes:
     """Archive of arrays (NPZ) whose bytes depend on the arrays alone."""
     buffer = io.BytesIO()
@@ -224,7 +209,7 @@ def archive(arrays: Mapping[str, NDArray[Any]]) -> bytes:
         for name, values in arrays.items():
             entry = io.BytesIO()
             np.lib.format.write_array(entry, np.asarray(values, order="C"), allow_pickle=False)
-            about = zipfile.ZipInfo(f"{name}.npy", _EPOCH)
+            about = zipfile.ZipInfo(f"{name}.npy", (1980, 1, 1, 0, 0, 0))
             about.compress_type = zipfile.ZIP_DEFLATED
             file.writestr(about, entry.getvalue())
     return buffer.getvalue()

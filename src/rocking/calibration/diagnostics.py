@@ -13,20 +13,15 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.analysis.calibration.evidence import unpacked
-from rocking.analysis.calibration.search import AGREEMENT, RUNS, Search
-from rocking.analysis.calibration.space import HIGHEST, Space, unit_of
 from rocking.arrays import Flags, Floats
+from rocking.calibration.search import AGREEMENT, RUNS, Search, unpacked
+from rocking.calibration.space import HIGHEST, Space, unit_of
 from rocking.errors import InvalidOption
 from rocking.tables import counted
 
 #: A bound is reached if more than this share of the posterior, what lies beyond one end of an estimate's interval, is
 #: within the outermost part of the range, in the logarithm: then the interval ends where the bound is.
 _OUTERMOST: Final = 0.05
-_TAIL: Final = 0.05
-
-#: Fewer effective candidates than these do not show what a population does.
-_FEW: Final = 20.0
 
 
 @dataclass(frozen=True)
@@ -161,7 +156,7 @@ class Diagnostics:
         if apart:
             held = "the estimates weigh what both found; double the candidates, or narrow the bounds to what you know"
             notes.append(f"independent runs disagree (R-hat) on {', '.join(apart)}: {held}")
-        if self.effective < _FEW:
+        if self.effective < 20.0:
             few = f"only {counted(round(self.effective), 'candidate')} can tell what a typical population does"
             notes.append(f"{few}: double the candidates, or narrow the bounds to what you know")
         return tuple(notes)
@@ -203,6 +198,6 @@ def bounds_reached(space: Space, centres: Floats) -> tuple[BoundReached, ...]:
         for end, bound, further, near in ends:
             share = float(near.mean())
             # Nothing lies beyond a bound that no block can exceed.
-            if share > _TAIL and bound < math.log(HIGHEST[parameter]) - 1e-9:
+            if share > 0.05 and bound < math.log(HIGHEST[parameter]) - 1e-9:
                 found.append(BoundReached(name, end, math.exp(bound), further, share))
     return tuple(found)

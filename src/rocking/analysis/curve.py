@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.analysis.fragility import lognormal
-from rocking.analysis.fragility.confidence import FEWEST, Confidence, Ends, LikelyRegion, Quantity, Resamples
-from rocking.analysis.fragility.lognormal import Outcomes, Probit, normal_scores, probabilities
+from rocking.analysis import probit as lognormal
+from rocking.analysis.probit import Outcomes, Probit, normal_scores, probabilities
+from rocking.analysis.regions import FEWEST, Confidence, Ends, LikelyRegion, Quantity, Resamples
 from rocking.arrays import Floats, Integers, as_asked
 from rocking.errors import InvalidOption, Unfitted
 from rocking.motion.scaling import Measure, intensities
@@ -24,8 +24,6 @@ BandKind = Literal["likelihood", "bootstrap"]
 #: Samples of a bootstrap that lie beyond the ends of an interval, in the mean, at least.
 _BEYOND_ENDS: Final = 2.0
 
-#: Share of the trials by which two sums of the same weights may differ.
-_SAME: Final = 1e-12
 
 #: How many times beyond the data a median is still believed.
 _FARTHEST: Final = 1000.0
@@ -168,7 +166,7 @@ class FragilityCurve:
         """Confidence interval of the median; 0 or infinite where the data allow a curve that does not rise."""
         logarithm = math.log(self.median)
         gradient = np.array([[-1.0 / self._slope], [-logarithm / self._slope]])
-        low, high = interval_of(self, _log_medians, np.array([logarithm]), gradient)
+        low, high = interval_of(self, _log_medians, gradient)
         with np.errstate(over="ignore"):
             return float(np.exp(low[0])), float(np.exp(high[0]))
 
@@ -176,7 +174,7 @@ class FragilityCurve:
     def dispersion_interval(self) -> tuple[float, float]:
         """Confidence interval of the dispersion; infinite where the data allow a curve that does not rise."""
         gradient = np.array([[0.0], [1.0]])
-        flattest, steepest = interval_of(self, _slopes, self.fitted.slope, gradient)
+        flattest, steepest = interval_of(self, lambda fits: fits.slope[:, None], gradient)
         return _dispersion(float(steepest[0])), _dispersion(float(flattest[0]))
 
     def probability(self, intensity: ArrayLike) -> Floats:
@@ -312,7 +310,7 @@ class FragilityCurve:
         z = _logarithm(at).ravel()
         finite = np.where(np.isfinite(z), z, 0.0)
         gradient = np.stack([np.ones_like(finite), finite])
-        ends = interval_of(self, lambda fits: normal_scores(fits, z), normal_scores(self.fitted, z)[0], gradient)
+        ends = interval_of(self, lambda fits: normal_scores(fits, z), gradient)
         low, high = (as_asked(np.asarray(ndtr(end)).reshape(at.shape)) for end in ends)
         return low, high
 
@@ -358,15 +356,14 @@ def fitted_curve(
     measure: Measure,
     limit: float | None = None,
 ) -> FragilityCurve:
-    """Curve of a limit state from intensities, outcomes that exceed it, and trials.
+    """Curve of a limit state from intensities, outcomes that exceed it, and trials; both may count in parts.
 
-    Outcomes may count in parts, as those of blocks with weights do. Without clusters every trial is on its own, also
-    where several are at one intensity.
+    Without clusters every trial is on its own, also where several are at one intensity.
     """
     intensity, exceeded, trials = data
     intensity = lognormal.levelled(intensity)
     # Both are sums of the same weights, perhaps in another order.
-    exceeded = np.where(np.abs(trials - exceeded) <= _SAME * trials, trials, exceeded)
+    exceeded = np.where(np.abs(trials - exceeded) <= 1e-12 * trials, trials, exceeded)
     z = np.log(intensity)
     outcomes = Outcomes(z, exceeded, trials)
     fault = lognormal.unidentified(outcomes, measure.shown)
@@ -404,8 +401,17 @@ def fitted_curve(
     )
 
 
-def interval_of(curve: FragilityCurve, quantity: Quantity, estimate: Floats, gradient: Floats) -> Ends:
-    """Return the confidence interval of a quantity of fits, from its estimate and its gradient at the fit."""
+def interval_of(curve: FragilityCurve, quantity: Quantity, gradient: Floats | None = None) -> Ends:
+    """Return the confidence interval of a quantity of fits, from its gradient (2, n), by default of differences."""
+    estimate = quantity(curve.fitted)[0]
+    if gradient is None:
+        rows = []
+        for name in Probit._fields:
+            value = getattr(curve.fitted, name)
+            step = 1e-5 * np.maximum(np.abs(value), 1.0)
+            up, down = (quantity(curve.fitted._replace(**{name: value + sign * step}))[0] for sign in (1.0, -1.0))
+            rows.append((up - down) / (2.0 * step))
+        gradient = np.array(rows)
     return curve._uncertainty.interval(quantity, estimate, gradient, curve.confidence)
 
 
@@ -446,10 +452,6 @@ def _log_medians(fits: Probit) -> Floats:
     with np.errstate(divide="ignore", invalid="ignore"):
         sloping = -fits.intercept / fits.slope
     return np.where(fits.slope > 0.0, sloping, np.where(fits.intercept > 0.0, -np.inf, np.inf))[:, None]
-
-
-def _slopes(fits: Probit) -> Floats:
-    return fits.slope[:, None]
 
 
 def _dispersion(slope: float) -> float:

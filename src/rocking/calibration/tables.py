@@ -14,9 +14,9 @@ import numpy as np
 from rocking import checks
 from rocking.analysis.hazard import HEADINGS, heading_of
 from rocking.analysis.levels import families_of
-from rocking.analysis.validation import ShakeTest
 from rocking.arrays import Floats
 from rocking.block import Blocks
+from rocking.calibration.validate import ShakeTest
 from rocking.constants import Model
 from rocking.errors import InvalidOption, RockingError, UnreadableRecord
 from rocking.motion.motion import Motion
@@ -25,9 +25,6 @@ from rocking.named_pulses import FAMILIES, named_pulse
 from rocking.records.named import is_there, named_motion, named_vertical
 from rocking.tables import counted, csv_rows, named
 
-_FOLDER: Final = re.compile(r"[\w-][\w. -]*(?<![. ])")
-
-_YES_OR_NO: Final = "0 or 1, no or yes, false or true"
 _ANSWERS: Final = {"1": True, "0": False, "true": True, "false": False, "yes": True, "no": False}
 
 
@@ -76,7 +73,9 @@ class _Table:
     def answers(self, column: str) -> tuple[bool, ...]:
         """Return the truth values of a column: 1 or 0, yes or no, true or false."""
         read = _ANSWERS.__getitem__
-        return tuple(self.convert(line, row[column].lower(), read, _YES_OR_NO) for line, row in self.rows)
+        return tuple(
+            self.convert(line, row[column].lower(), read, "0 or 1, no or yes, false or true") for line, row in self.rows
+        )
 
     def convert(self, line: int, text: str, how: Callable[[str], Any], what: str) -> Any:
         """Return a cell read in some way; an error says the line and what it should be."""
@@ -173,7 +172,7 @@ def _by_specimen(table: _Table) -> dict[str, _Table]:
 
 def _folder_name(text: str) -> str:
     """Name that can also be that of a folder."""
-    if not _FOLDER.fullmatch(text):
+    if not re.compile(r"[\w-][\w. -]*(?<![. ])").fullmatch(text):
         raise ValueError(text)
     return text
 

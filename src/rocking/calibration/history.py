@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.analysis.calibration.space import (
+from rocking.arrays import Floats
+from rocking.block import Block
+from rocking.calibration.space import (
     EVERYTHING_IS_KNOWN,
     HIGHEST,
     PARAMETERS,
@@ -20,8 +22,6 @@ from rocking.analysis.calibration.space import (
     unit_of,
     value_range,
 )
-from rocking.arrays import Floats
-from rocking.block import Block
 from rocking.constants import Model
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
@@ -48,8 +48,6 @@ _STAGES: Final = ((0.15, 16), (0.3, 8), (0.6, 4), (1.0, 2))
 _AROUND: Final = 64
 _WIDTHS: Final = (6.0, 3.0, 1.5)
 
-#: A release test starts above this share of the peak rotation.
-_RELEASED: Final = 0.05
 
 #: A sensitivity below this share of the largest counts as none.
 _INSENSITIVE: Final = 1e-7
@@ -57,11 +55,6 @@ _INSENSITIVE: Final = 1e-7
 #: Steps in the logarithms of the differences that standard errors are from: the first and least, simulations being good
 #: to about 1e-12, and the largest; and how often a step is refined.
 _STEP: Final = 1e-5
-_LARGEST_STEP: Final = 0.05
-_REFINED: Final = 4
-
-#: Nearer to a bound than this, in the logarithm, counts as at it.
-_AT_BOUND: Final = 1e-6
 
 
 @dataclass(frozen=True)
@@ -351,7 +344,7 @@ def _split(given: Mapping[str, float | Range], two_sided: bool) -> tuple[dict[st
 def _released_from(rotation: Floats) -> _Unknown:
     """Rotation at the release, near that of the first sample."""
     first = float(rotation[0])
-    if abs(first) < _RELEASED * np.abs(rotation).max():
+    if abs(first) < 0.05 * np.abs(rotation).max():
         text = "a release test must start at the rotation it is released from; give {}"
         raise InvalidOption(text, "initial_rotation")
     return _Unknown("initial_rotation", 0.5 * abs(first), min(2.0 * abs(first), 1.57), math.copysign(1.0, first))
@@ -405,7 +398,7 @@ def _result(problem: _Problem, logs: Floats) -> HistoryCalibration:
     low, high = problem.bounds
     estimates = {}
     for one, log, variance, bottom, top in zip(problem.unknowns, logs, np.diag(covariance), low, high, strict=True):
-        at_bound = bool(min(log - bottom, top - log) < _AT_BOUND)
+        at_bound = bool(min(log - bottom, top - log) < 1e-6)
         estimates[one.name] = Measured(one.sign * math.exp(log), math.exp(log) * math.sqrt(variance), at_bound)
     response = problem.response(logs, float(problem.times[-1]))
     return HistoryCalibration(problem.block(logs), estimates, covariance, problem.times, residuals, response)
@@ -436,11 +429,11 @@ def _slopes(problem: _Problem, logs: Floats, deviation: float) -> Floats:
     columns = []
     for k in range(len(logs)):
         step = _STEP
-        for _ in range(_REFINED):
+        for _ in range(4):
             ahead, behind = logs.copy(), logs.copy()
             ahead[k], behind[k] = min(logs[k] + step, high[k]), max(logs[k] - step, low[k])
             slope = (problem.residuals(ahead, count) - problem.residuals(behind, count)) / (ahead[k] - behind[k])
-            step = float(np.clip(deviation / max(float(np.linalg.norm(slope)), 1e-300), _STEP, _LARGEST_STEP))
+            step = float(np.clip(deviation / max(float(np.linalg.norm(slope)), 1e-300), _STEP, 0.05))
         columns.append(slope)
     return np.array(columns).T
 

@@ -28,18 +28,13 @@ HIGHEST: Final = {"p": math.inf, "alpha": 0.5 * math.pi, "restitution": 1.0}
 #: The sides of a rigid body differ in slenderness, as much as the pivots' distances from the centre of mass. Their p
 #: and restitutions differ by terms of second order in it, which outcomes do not tell.
 SIDED: Final = "alpha"
-LARGEST_RATIO: Final = 3.0
 
-#: Median of the prior of the dispersion from test to test, of each coordinate.
-_DISPERSION: Final = 0.10
 
 #: Restitution that follows from the slenderness (Housner 1963), where it is positive; of two sides, from those of a
 #: rectangle whose centre of mass is off the middle. Then p is that of the rectangle, and the sides' own differ from it.
 HOUSNER: Final = "housner"
 _HOUSNER_ENDS: Final = math.asin(math.sqrt(2.0 / 3.0))
 
-#: Points that measure the space's volume: its share of the box to about 0.1 %.
-_VOLUME_POINTS: Final = 20_000
 
 #: What to say where nothing is left to be found.
 EVERYTHING_IS_KNOWN: Final = (
@@ -90,7 +85,7 @@ class Space:
         ratio = 0.0
         if two_sided and SIDED in bounds:
             # No wider than the bounds of a side let it be: else a box around narrow bounds would be all but empty.
-            ratio = min(math.log(LARGEST_RATIO), math.log(bounds[SIDED][1] / bounds[SIDED][0]))
+            ratio = min(math.log(3.0), math.log(bounds[SIDED][1] / bounds[SIDED][0]))
         return cls(tuple(bounds), known, lower, upper, ratio)
 
     @property
@@ -101,7 +96,7 @@ class Space:
     @property
     def dispersions(self) -> Floats:
         """Median of the prior of the dispersion along each coordinate, shape (k,)."""
-        return np.full(len(self.unknown) + self.two_sided, _DISPERSION)
+        return np.full(len(self.unknown) + self.two_sided, 0.10)
 
     @property
     def box(self) -> tuple[Floats, Floats]:
@@ -127,7 +122,7 @@ class Space:
         from scipy.stats import qmc
 
         low, high = self.box
-        points = qmc.scale(qmc.Halton(len(low), scramble=False).random(_VOLUME_POINTS), low, high)
+        points = qmc.scale(qmc.Halton(len(low), scramble=False).random(20_000), low, high)
         return float(np.mean(self.contains(points)) * np.prod(high - low))
 
     def contains(self, points: Floats) -> NDArray[np.bool_]:

@@ -17,21 +17,13 @@ import numpy as np
 from rocking.arrays import Flags, Floats, Integers
 
 _ITERATIONS: Final = 100
-#: The likelihood is at its maximum when the parameters move by less than this part of themselves.
-_CONVERGED: Final = 1e-11
 
-#: Outcomes that overlap by less than this part of the intensities' range count as separated.
-_NARROW: Final = 1e-6
-
-#: Logarithms of intensities that differ by no more are one level.
-_SAME_LEVEL: Final = 1e-9
 
 #: Slope that stands for a step.
 STEEP: Final = 1e9
 
 #: Outcomes in a group of the test of fit, at least; and groups of binary outcomes, at most (Hosmer and Lemeshow).
 _GROUP: Final = 5
-_GROUPS: Final = 10
 
 
 class Outcomes(NamedTuple):
@@ -127,7 +119,7 @@ def levelled(intensity: Floats) -> Floats:
     """Return intensities of which those that differ by rounding alone, as those of scaled motions, are one."""
     order = np.argsort(intensity, kind="stable")
     ordered = intensity[order]
-    grows = np.diff(np.log(ordered), prepend=-np.inf) > _SAME_LEVEL
+    grows = np.diff(np.log(ordered), prepend=-np.inf) > 1e-9
     found = np.empty_like(ordered)
     found[order] = ordered[grows][np.cumsum(grows) - 1]
     return found
@@ -187,7 +179,7 @@ def fit(data: Outcomes) -> Probit:
         step[lost] = solved(most[lost], gradient[lost])
         step, then = _uphill(scaled, beta, step, now)
         beta, now = beta + step, then
-        if np.all(np.abs(step) <= _CONVERGED * np.abs(beta).max(axis=1, keepdims=True)):
+        if np.all(np.abs(step) <= 1e-11 * np.abs(beta).max(axis=1, keepdims=True)):
             break
     slope = beta[:, 1] / spread
     return Probit(beta[:, 0] - slope * centre, slope)
@@ -240,7 +232,7 @@ def groups(z: Floats, trials: Floats) -> Integers:
     held = np.bincount(level, trials)
     if held.min() >= _GROUP:
         return np.asarray(level, dtype=np.int64)
-    wanted = min(_GROUPS, int(trials.sum()) // _GROUP)
+    wanted = min(10, int(trials.sum()) // _GROUP)
     middle = (np.cumsum(held) - 0.5 * held) / held.sum()
     _, group = np.unique((middle * wanted).astype(np.int64), return_inverse=True)
     return np.asarray(group[level], dtype=np.int64)
@@ -291,7 +283,7 @@ def fit_or_limits(data: Outcomes) -> tuple[Probit, Flags]:
 
 def _overlap(z: Floats) -> float:
     """Overlap of the outcomes of either kind that is too narrow for a slope to be found from it."""
-    return _NARROW * float(z.max() - z.min())
+    return 1e-6 * float(z.max() - z.min())
 
 
 def _rises(data: Outcomes) -> Flags:

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.analysis import labels
-from rocking.analysis.calibration.diagnostics import Scores, log_losses
-from rocking.analysis.calibration.evidence import blurred, expected_share
-from rocking.analysis.calibration.result import Calibration, Validation
+from rocking.analysis import levels as labels
 from rocking.analysis.levels import mean_one, note_missing, pooled
 from rocking.arrays import Flags, Floats, Integers
 from rocking.body import Bodies, Body
+from rocking.calibration.diagnostics import Scores, log_losses
+from rocking.calibration.outcomes import Calibration, Validation
+from rocking.calibration.search import blurred, expected_share
 from rocking.constants import Model
 from rocking.ensemble import simulate_many
 from rocking.errors import InvalidMotion, InvalidOption
@@ -39,9 +39,6 @@ _Mean = Callable[[Integers], float]
 
 #: Shares of the simulations that lie below and above a band.
 _TAIL: Final = 0.05
-
-#: A chance below this is doubted in the summary.
-_DOUBTED: Final = 0.05
 
 
 @dataclass(frozen=True)
@@ -230,7 +227,7 @@ class ModelValidation(Result):
             [name, *_with_error(score.value, score.error), *_with_error(score.skill, score.skill_error)]
             for name, score in (("Brier", self.brier), ("log loss", self.log_loss))
         ]
-        doubt = "not " if self.reliability_chance < _DOUBTED else ""
+        doubt = "not " if self.reliability_chance < 0.05 else ""
         parts = [
             self._headline(),
             "",
@@ -293,9 +290,7 @@ def validate(
         Draws from the predictions, for bands and their chance; each test has a block of its own.
     seed : int
         Seeds them.
-    threads : int, optional
-        As for `simulate_many`.
-    progress : bool, optional
+    threads, progress : optional
         As for `simulate_many`.
 
     Returns

@@ -1,1 +1,0 @@
-"""Calibration: the block behind observed outcomes, or behind a measured rotation history."""

@@ -1,0 +1,693 @@
+"""Fragility curves against one intensity measure, and all that is made of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rocking import checks
+from rocking.analysis import nrml
+from rocking.analysis.curve import Band, FragilityCurve, fitted_curve, in_units, interval_text, median_text, passed
+from rocking.analysis.hazard import HazardCurve
+from rocking.analysis.levels import (
+    clusters_of,
+    groups_of,
+    mean_one,
+    motions_in_words,
+    only_block,
+    pooled,
+    ratios_of,
+    simulate_levels,
+    undecided_text,
+    units_of,
+    values_of,
+)
+from rocking.analysis.probit import groups
+from rocking.analysis.risk import Risk, Survival, mean_of_blocks, risk_of
+from rocking.arrays import Floats
+from rocking.body import Bodies, Body
+from rocking.constants import STANDARD_GRAVITY, Model
+from rocking.engine import Setup, missing_text
+from rocking.ensemble import SIGNS, Polarity, simulate_many
+from rocking.errors import InvalidOption, Message, Unfitted
+from rocking.motion.scaling import IntensityName, Measure
+from rocking.problem import bodies_of, slenderness_of
+from rocking.progress import spelled
+from rocking.records.named import Motions, several_motions
+from rocking.result import Result
+from rocking.tables import Column, as_written, counted, text_table
+from rocking.treatment import Treatment, treatment
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: Points of a curve in a table or a figure.
+_POINTS: Final = 201
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Fragility(Result):
+    """Fragility curves of one or several limit states against one intensity measure; from `fragility`.
+
+    Its tables are "curves" (limit state, intensity in SI units, probability, lower and upper end of the band) and,
+    where blocks were simulated, "outcomes". Its figure has the curves with their bands and the observed shares.
+
+    Attributes
+    ----------
+    curves : tuple of FragilityCurve
+        One for each limit state.
+    measure : Measure
+        Intensity measure; intensities are in its SI units.
+    description : str
+        What was simulated or observed.
+    block : Block or None
+        The block, where there is one.
+    model : str
+        Equation of motion, which says how a block's own unit counts.
+    outcomes : pandas.DataFrame or None
+        Every simulation: motion, block (position), polarity, the measure with its unit (SI, as pga_m_s2),
+        peak_rotation_rad, peak_over_alpha (infinite where it overturned, NaN where unfinished), overturned, unfinished,
+        whether each limit state was exceeded, and the weight of the block if any; None where outcomes were given.
+    one_way : bool
+        Whether sides that differ met motions in one polarity only: reversed, they do something else.
+    with_vertical : bool
+        Whether a vertical motion was simulated.
+    several_blocks : bool
+        Whether outcomes of several blocks count together.
+    source : str
+        What a cluster of outcomes comes from: a motion, or, where outcomes were given, a cluster.
+    undecided : str
+        How many outcomes of a sample change within 3e-6 of the motion; empty where outcomes were given.
+    missing : str
+        How many simulations were given up, which the curves leave out; empty where there are none.
+    """
+
+    TABLES = ("curves", "outcomes")
+
+    curves: tuple[FragilityCurve, ...]
+    measure: Measure
+    description: str
+    block: Body | None
+    model: Model
+    outcomes: pd.DataFrame | None
+    one_way: bool = False
+    with_vertical: bool = False
+    several_blocks: bool = False
+    source: str = "motion"
+    undecided: str = ""
+    missing: str = ""
+
+    def summary(self) -> str:
+        scale = self.measure.scale
+        rows = [
+            [
+                curve.limit_state,
+                f"{curve.exceeded.sum():.0f} of {curve.trials.sum():.0f}",
+                scale * curve.median,
+                median_text(curve, scale),
+                curve.dispersion,
+                interval_text(curve.dispersion_interval, 3),
+                float(f"{curve.goodness.p_value:.2g}"),
+            ]
+            for curve in self.curves
+        ]
+        between_text = f"{100 * self.curves[0].confidence:g} % between"
+        header = ["limit state", "exceeded", "median", between_text, "dispersion", between_text, "p of fit"]
+        table = text_table(header, rows)
+        notes = [f"note: {sentence}" for sentence in self.notes]
+        return "\n".join([f"{self.description}; intensity: {self.measure.label}", "", table, *notes])
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is to be known before the curves are believed, a sentence each."""
+        notes = [text for text in (self.missing, self.undecided) if text]
+        if self.one_way:
+            notes.append(
+                "the sides differ, and motions came in one polarity only: reversed ones give another curve; "
+                + spelled(Message('{} "both" counts both', ("polarity",)))
+            )
+        if not self.curves[0].bounded:
+            notes.append(f"intervals and bands go from 0 to infinity: {self._too_few}")
+        independent = self.curves[0].independent
+        wanted = "outcome" if independent else self.source
+        notes += [
+            f"{curve.limit_state}: intervals without an end say that the data allow a curve which does not rise with "
+            f"the intensity; more {wanted}s are needed"
+            for curve in self.curves
+            if curve.bounded and math.isinf(curve.dispersion_interval[1])
+        ]
+        if not independent:
+            notes.append(
+                f"there is no p of fit: the test takes all outcomes for independent, and those of one {self.source} "
+                "belong together"
+            )
+        elif self.curves[0].goodness.freedom < 1:
+            notes.append("there is no p of fit: the test needs three groups of outcomes, of five or so each")
+        return tuple(notes)
+
+    @property
+    def _too_few(self) -> str:
+        count = counted(self.curves[0].clusters, self.source)
+        return f"{count} cannot tell how far {self.source}s differ; give 3 or more"
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            "block": None if self.block is None else self.block.description,
+            "description": self.description,
+            "measure": {"name": self.measure.name, "units": self.measure.units, **self.measure.options()},
+            "model": self.model,
+            "band": self.band_kind,
+            "curves": [curve.to_dict() for curve in self.curves],
+            "notes": list(self.notes),
+            "outcomes": None if self.outcomes is None else self.outcomes.to_dict("records"),
+        }
+
+    @property
+    def band_kind(self) -> str:
+        """Where intervals and bands come from: "likelihood" or "bootstrap"."""
+        return "likelihood" if math.isnan(self.curves[0].degenerate) else "bootstrap"
+
+    def _headline(self) -> str:
+        curves = ", ".join(
+            f"{one.limit_state}: median {in_units(one.median, self.measure)}, dispersion {one.dispersion:.3g}"
+            for one in self.curves
+        )
+        return f"{self.description}; {self.measure.label}; {curves}"
+
+    def curve(self, limit_state: str) -> FragilityCurve:
+        """Return the curve of a limit state.
+
+        Parameters
+        ----------
+        limit_state : str
+            Its name.
+
+        Returns
+        -------
+        FragilityCurve
+            Its curve.
+
+        Examples
+        --------
+        >>> from rocking import fit_fragility
+        >>> fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4).curve("overturning").clusters
+        16
+        """
+        curves = {curve.limit_state: curve for curve in self.curves}
+        return curves[checks.one_of(limit_state, "limit_state", InvalidOption, list(curves))]
+
+    def annual_rate(self, hazard: HazardCurve) -> Risk:
+        """Annual rates of exceeding the limit states at a site, from its hazard curve.
+
+        Parameters
+        ----------
+        hazard : HazardCurve
+            Annual rates of the intensities that this fragility is against.
+
+        Returns
+        -------
+        Risk
+            Rate, return period and probability in a number of years, for each limit state.
+
+        Raises
+        ------
+        InvalidOption
+            If the two are not of one intensity measure.
+
+        Notes
+        -----
+        The integral of rate(x) dP(x) over all intensities x, in closed form: a lognormal against a power of x on each
+        segment of the hazard curve. For one power k all along, it is rate(median) exp((k dispersion)^2/2) (Cornell).
+
+        Examples
+        --------
+        >>> from rocking import HazardCurve, fit_fragility
+        >>> fitted = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4, measure="pga")
+        >>> risk = fitted.annual_rate(HazardCurve([0.5, 5.0], [1e-2, 1e-4]))
+        >>> one = risk.rate("overturning")
+        >>> f"{one.annual_rate:.6f} {one.probability(50.0):.4f}"
+        '0.000434 0.0215'
+        """
+        return risk_of(self.curves, hazard, self.measure, self.description)
+
+    def survival(
+        self,
+        years: float,
+        hazard: HazardCurve | None = None,
+        *,
+        confidence: float = 0.95,
+        limit_state: str = "overturning",
+    ) -> Survival:
+        """Constrain past shaking by a limit state that was not exceeded, as by a rock that still stands.
+
+        Parameters
+        ----------
+        years : float
+            For how long the block has stood, or has not exceeded the limit state.
+        hazard : HazardCurve, optional
+            Annual rates of the intensities: how probable the survival is under them.
+        confidence : float
+            Probability with which the limit would have been exceeded, were shaking any stronger or more frequent.
+        limit_state : str
+            Name of what was not exceeded.
+
+        Returns
+        -------
+        Survival
+            Intensity that was most likely never reached, largest annual rates, and the probability of surviving.
+
+        Raises
+        ------
+        InvalidOption
+            If an argument is out of its range, there is no such limit state, or the hazard curve is of another measure.
+
+        Examples
+        --------
+        >>> from rocking import HazardCurve, fit_fragility
+        >>> fitted = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4, measure="pga")
+        >>> found = fitted.survival(10_000.0, HazardCurve([0.5, 5.0], [1e-2, 1e-4]))
+        >>> found
+        <Survival: overturning: not in 10000 years; most likely never 0.4385 g or more>
+        >>> f"{found.probability:.4f}", found.contradicts
+        ('0.0131', False)
+        """
+        curve = self.curve(limit_state)
+        rate = None if hazard is None else self.annual_rate(hazard).rate(limit_state)
+        mean = math.nan
+        if hazard is not None and self.several_blocks and self.outcomes is not None:
+            mean = mean_of_blocks(self.outcomes, self.measure.column, limit_state, hazard, years)
+        return Survival(
+            curve, self.measure, self.description, years, confidence, hazard, rate, self.several_blocks, mean
+        )
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Lowest and highest intensity of the data, in SI units or a block's own."""
+        held = np.concatenate([curve.intensity for curve in self.curves])
+        return float(held.min()), float(held.max())
+
+    def _columns(self, table: str) -> list[Column]:
+        if table == "curves":
+            at = np.linspace(0.0, self.range[1], _POINTS)
+            values = np.concatenate([[at, curve.probability(at), *curve.band(at)] for curve in self.curves], axis=1)
+            names = [curve.limit_state for curve in self.curves for _ in at]
+            columns = zip((self.measure.column, "probability", "lower", "upper"), values, strict=True)
+            return [Column("limit_state", names), *(Column(name, column) for name, column in columns)]
+        if self.outcomes is None:
+            raise InvalidOption("this fragility was fitted to given outcomes: there are no simulations to write")
+        return [Column(str(name), self.outcomes[name]) for name in self.outcomes]
+
+    def to_nrml(
+        self,
+        path: str | Path,
+        *,
+        taxonomy: str = "rocking-block",
+        format: nrml.Format = "continuous",
+        block: Body | None = None,
+        model_id: str = "rocking",
+        loss_category: nrml.LossCategory = "contents",
+        asset_category: str = "contents",
+    ) -> None:
+        """Write the curves as an OpenQuake fragility model, NRML 0.5.
+
+        Parameters
+        ----------
+        path : path
+            File to write.
+        taxonomy : str
+            Identifier of the fragility function, which the exposure model refers to.
+        format : {"continuous", "discrete"}
+            Lognormals by the mean and the standard deviation of the intensity (not of its logarithm, as OpenQuake
+            wants them), or probabilities at 40 intensities.
+        block : Block, optional
+            Block whose unit a dimensionless measure counts in, where the curves come from several.
+        model_id, loss_category, asset_category : str
+            Further attributes of the model; the loss category is one of structural, nonstructural, contents and
+            business_interruption.
+
+        Raises
+        ------
+        InvalidOption
+            If a name has a character that NRML does not allow, a block is needed, a spectral acceleration is of another
+            damping than 5 % of critical, which OpenQuake's are of, or the dispersion is too wide.
+        OutputError
+            If the file cannot be written.
+
+        Notes
+        -----
+        Units become OpenQuake's: PGA and SA in g, PGV in cm/s. A measure in a block's own unit becomes PGA or PGV of
+        that block. The range of validity is that of the data. A block cannot move below its uplift acceleration, which
+        is written as the limit of no damage of PGA, unless a vertical motion was simulated, which lowers it.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from rocking import fit_fragility
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4).to_nrml(f"{folder}/model.xml")
+        """
+        chosen = self.block
+        if block is not None:
+            bodies_of(block)
+            chosen = block
+        scale = nrml.scale_of(self.measure, chosen, self.model)
+        lifting = None
+        if chosen is not None and scale.imt == "PGA" and not self.with_vertical:
+            lifting = min(chosen.uplift_thresholds(self.model)) / STANDARD_GRAVITY
+        function = nrml.fragility_function(self.curves, scale, self.range, lifting, taxonomy, format)
+        states = [curve.limit_state for curve in self.curves]
+        about = {"id": model_id, "assetCategory": asset_category, "lossCategory": loss_category}
+        nrml.write(path, function, states, self.description, **about)
+
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
+        from rocking.plot.fragility import FragilityLine, fragility_figure
+
+        first = self.curves[0]
+        band_text = f"band: {100 * first.confidence:g} % confidence ({self.band_kind})"
+        if not first.bounded:
+            band_text = f"no band: {self._too_few}"
+        intensity, scale = np.linspace(0.0, self.range[1], _POINTS), self.measure.scale
+        lines, states = [], [curve.limit_state for curve in self.curves]
+        for curve in self.curves:
+            group = groups(np.log(curve.intensity), curve.trials)  # those that the fit is tested in
+            held = np.bincount(group, curve.trials).astype(np.float64)
+            at, seen = (np.bincount(group, sums) / held for sums in (curve.trials * curve.intensity, curve.exceeded))
+            is_rotation = curve.limit is not None and math.isfinite(curve.limit)
+            limit = f" (rotation of {curve.limit:g} of the slenderness)" if is_rotation else ""
+            at_half = f"median {in_units(curve.median, self.measure)}, dispersion {curve.dispersion:.3g}"
+            text = f"{curve.limit_state}{limit}: {at_half}"
+            chance = curve.probability(intensity)
+            band = curve.band(intensity) if curve.bounded else (chance, chance)
+            lines.append(FragilityLine(text, scale * intensity, chance, *band, scale * at, seen, held))
+        return fragility_figure(
+            lines=lines,
+            intensity_label=self.measure.label,
+            band_label=band_text,
+            probability_label="probability of "
+            + ("" if [*states] == ["overturning"] else "exceeding ")
+            + (states[0] if len(states) == 1 else "the limit state"),
+            title=title or as_written(self.description),
+            ax=ax,
+            figsize=figsize,
+        )
+
+
+#: Intensities, in SI units, far beyond any motion.
+_INTENSITIES: Final = (1e-50, 1e50)
+_LIKELIHOOD: Final = Band()
+
+#: Limit states: peak rotation over slenderness that is exceeded; infinity is overturning.
+OVERTURNING: Final[Mapping[str, float]] = {"overturning": math.inf}
+
+
+def fragility(
+    blocks: Bodies | Body | Sequence[Body],
+    motions: Motions,
+    *,
+    measure: IntensityName | Measure = "pga",
+    levels: ArrayLike | None = None,
+    limits: Mapping[str, float] = OVERTURNING,
+    model: Model = "nonlinear",
+    chattering: str | Treatment = "certified",
+    polarity: Polarity = "+",
+    weights: ArrayLike | None = None,
+    clusters: ArrayLike | None = None,
+    band: Band = _LIKELIHOOD,
+    threads: int | None = None,
+    progress: bool | None = None,
+) -> Fragility:
+    """Simulate blocks under motions and fit the probability that a limit is exceeded against the intensity.
+
+    Parameters
+    ----------
+    blocks : Blocks, Block, RestrainedBlock or sequence of one kind
+        One block; or several whose outcomes are pooled: against a measure in their own units, or of an ensemble that
+        stands for one block that is not quite known, with `weights` (`Calibration.fragility` does so).
+    motions : Motion, sequence of Motion, or mapping of str to Motion
+        m motions; a mapping gives them its names.
+    measure : {"pga", "pgv", "pga_ratio", "pgv_ratio"} or Measure
+        Intensity measure, as for `incremental_dynamic_analysis`.
+    levels : array_like, optional
+        Stripes: every motion scaled to each of these levels. Without them a cloud: every motion as it is.
+    limits : mapping of str to float
+        Limit states: peak rotation over slenderness (of the block as it stands, the smaller one of two sides) that is
+        exceeded; ``math.inf`` stands for overturning, the default.
+    model : {"nonlinear", "linear"}
+        Equation of motion.
+    chattering : str or Treatment
+        As for `simulate`.
+    polarity : {"+", "-", "both"}
+        Motions as they are, reversed, or both. With both each motion counts twice, unless all blocks are symmetric:
+        they do the same under a motion and its mirror image, which is no second outcome.
+    weights : array_like, optional
+        How much the outcomes of each block count, one number for each; by default all alike. A block of weight 0 is
+        simulated, and is none of the data.
+    clusters : "station" or array_like of labels, shape (m,), optional
+        Which motions belong together: intervals then tell how far clusters differ. "station" joins components of one
+        station in one earthquake, as their files name them. By default each motion is one cluster, with all its
+        outcomes. Motions that are multiples of one another, as one record scaled to several levels beforehand, are one
+        cluster in any case.
+    band : Band
+        How intervals and bands are made.
+    threads, progress : optional
+        As for `simulate_many`.
+
+    Returns
+    -------
+    Fragility
+        Curves, and all outcomes.
+
+    Raises
+    ------
+    InvalidOption
+        If an argument is out of its range, or a lognormal cannot be fitted because the outcomes are all alike or
+        separated.
+    InvalidMotion
+        If a motion is zero throughout.
+
+    Examples
+    --------
+    >>> import numpy as np, rocking
+    >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    >>> motions = [rocking.pulses.one_sine(1.0, f) for f in np.linspace(0.3, 1.5, 13)]
+    >>> result = fragility(block, motions, measure="pga_ratio", levels=np.linspace(1.0, 9.0, 17))
+    >>> print(f"median {result.curves[0].median:.3f}, dispersion {result.curves[0].dispersion:.3f}")
+    median 1.443, dispersion 0.524
+    """
+    many, how = bodies_of(blocks), Measure.of(measure)
+    slenderness = slenderness_of(many)
+    shares = weights_of(weights, len(many))
+    mirrored = checks.one_of(polarity, "polarity", InvalidOption, get_args(Polarity)) == "both" and many.is_symmetric
+    _check_band(band)
+    states = _limit_states(limits, "limits")
+    stripes = None if levels is None else checks.increasing_numbers(levels, "levels", InvalidOption)
+    if stripes is not None and stripes.size < 2:
+        raise InvalidOption("a fragility needs {} that differ: give two or more", "levels", value=levels)
+    shaken = several_motions(motions)
+    values, together, units = values_of(shaken, how), clusters_of(shaken, clusters), units_of(many, how, model)
+    options: dict[str, Any] = {"chattering": chattering, "polarity": "+" if mirrored else polarity}
+    options |= {"threads": threads, "progress": progress}
+    if stripes is None:
+        table = simulate_many(many, shaken, model=model, **options).expand_dims("level")
+        intensity = (values[:, None] / units)[None, :, :, None]
+    else:
+        table = simulate_levels(many, shaken, how, stripes, model=model, **options)
+        intensity = stripes[:, None, None, None]
+    if "polarity" not in table.dims:
+        table = table.expand_dims("polarity")
+    table = table.transpose("level", "motion", "block", "polarity")
+    missing = table.unfinished.values
+    ratio = ratios_of(table.peak_rotation.values, table.overturned.values, missing, slenderness[:, None])
+    groups = np.broadcast_to(together[None, :, None, None], ratio.shape)
+    x, trials = (np.broadcast_to(each, ratio.shape).ravel() for each in (intensity, shares[:, None]))
+    outcomes = _outcomes(table, how, x, ratio, states)
+    if weights is not None:
+        outcomes["weight"] = trials
+    # What a block without weight does is told, but is none of the data; nor is what was given up.
+    counts = (trials > 0.0) & ~missing.ravel()
+    x, trials, groups = x[counts], trials[counts], groups.ravel()[counts]
+    data = {name: (x, trials * passed(ratio, limit, name).ravel()[counts], trials) for name, limit in states.items()}
+    try:
+        curves = [fitted_curve(name, data[name], groups, band, how, states[name]) for name in states]
+    except Unfitted as refused:
+        refused.outcomes = outcomes
+        raise
+    scales = 1.0 if stripes is None else stripes[:, None, None] * units / values[:, None]
+    factors = np.asarray(scales)[..., None] * np.array(SIGNS[options["polarity"]])
+    setup = Setup(many, model, treatment(chattering))
+    kind = "cloud" if levels is None else counted(len(intensity), "stripe")
+    text = f"{pooled(blocks, weights)}, {motions_in_words(together, clusters)}, {kind}, {model} model"
+    return Fragility(
+        curves=tuple(curves),
+        measure=how,
+        description=text + of_polarities(polarity, is_symmetric=many.is_symmetric),
+        block=only_block(blocks),
+        model=model,
+        outcomes=outcomes,
+        one_way=polarity != "both" and not many.is_symmetric,
+        with_vertical="vertical" in table.coords,
+        several_blocks=bool(np.count_nonzero(shares) > 1),
+        source="motion" if clusters is None else "cluster",
+        undecided=undecided_text(setup, shaken, factors, table.overturned.values, threads),
+        missing=missing_text(missing),
+    )
+
+
+def weights_of(weights: ArrayLike | None, count: int) -> Floats:
+    """Weights of blocks, 1 in the mean of those that have any: outcomes are as many as without the others."""
+    shares = mean_one(weights, count)
+    return np.asarray(shares / shares[shares > 0.0].mean())
+
+
+def of_polarities(polarity: Polarity, *, is_symmetric: bool) -> str:
+    """Say, behind a description, which polarities outcomes come from where both were asked for."""
+    if polarity != "both":
+        return ""
+    return ", one polarity, since a symmetric block does the same in both" if is_symmetric else ", both polarities"
+
+
+def _outcomes(
+    table: xr.Dataset, measure: Measure, intensity: Floats, ratio: Floats, limits: Mapping[str, float]
+) -> pd.DataFrame:
+    import pandas as pd
+
+    def along(values: NDArray[Any]) -> NDArray[Any]:
+        return np.broadcast_to(values, ratio.shape).ravel()  # of (level, motion, block, polarity)
+
+    signs = table.polarity.values if "polarity" in table.coords else np.array(["+"])
+    motions = [name for name in ("motion", "vertical") if name in table.coords]
+    return pd.DataFrame(
+        {
+            **{name: along(table[name].values[:, None, None]) for name in motions},
+            "block": along(np.arange(table.sizes["block"])[:, None]),
+            "polarity": along(signs),
+            measure.column: intensity,
+            "peak_rotation_rad": table.peak_rotation.values.ravel(),
+            "peak_over_alpha": ratio.ravel(),
+            "overturned": table.overturned.values.ravel(),
+            "unfinished": table.unfinished.values.ravel(),
+            **{f"exceeded_{name}": passed(ratio, limit, name).ravel().astype(bool) for name, limit in limits.items()},
+        }
+    )
+
+
+def fit_fragility(
+    intensity: ArrayLike,
+    exceeded: ArrayLike | Mapping[str, ArrayLike],
+    *,
+    trials: ArrayLike = 1,
+    clusters: ArrayLike | None = None,
+    measure: IntensityName | Measure = "pga",
+    band: Band = _LIKELIHOOD,
+    block: Body | None = None,
+    description: str = "observed outcomes",
+) -> Fragility:
+    """Fit a lognormal fragility to outcomes by maximum likelihood: a cloud (one outcome each) or stripes (counts).
+
+    Parameters
+    ----------
+    intensity : array_like, shape (n,)
+        Positive intensities, in SI units.
+    exceeded : array_like, shape (n,), or mapping of str to array_like
+        At each intensity, whether the limit was exceeded, or in how many trials; for several limit states a mapping
+        from their names. One without a name is called "overturning".
+    trials : array_like
+        Number of trials at each intensity.
+    clusters : array_like of labels, shape (n,), optional
+        Which outcomes belong together (the motion, for instance), for the bands; by default each is on its own, as is
+        one whose label is NaN, None or empty. Fewer
+        than three clusters of several outcomes bound nothing: then intervals go from 0 to infinity.
+    measure : {"pga", "pgv", "pga_ratio", "pgv_ratio"} or Measure
+        What the intensity is, as for `fragility`.
+    band : Band
+        How intervals and bands are made.
+    block : Block, optional
+        What was tested, for the units of `Fragility.to_nrml`.
+    description : str
+        What was observed.
+
+    Returns
+    -------
+    Fragility
+        A curve for each limit state.
+
+    Raises
+    ------
+    InvalidOption
+        If an argument is out of its range, or no rising lognormal fits best: no outcome exceeds the limit, or all do,
+        or they are separated (none up to some intensity and all from there on), or all at one intensity, or exceed the
+        limit no more often at higher intensities, or put the median at more than 1000 times any intensity.
+
+    Notes
+    -----
+    The likelihood of P = Phi(ln(x/median)/dispersion) is that of independent binomial counts (Baker 2015). It has one
+    maximum, or none where the outcomes are separated.
+
+    References
+    ----------
+    Chandler, R. E. and Bate, S. (2007). Inference for clustered data using the independence loglikelihood. Biometrika
+    94(1), 167-183.
+
+    Efron, B. (1987). Better bootstrap confidence intervals. Journal of the American Statistical Association 82(397),
+    171-185.
+
+    Baker, J. W. (2015). Efficient analytical fragility function fitting using dynamic structural analysis. Earthquake
+    Spectra 31(1), 579-599.
+
+    Examples
+    --------
+    >>> result = fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10)
+    >>> curve = result.curves[0]
+    >>> print(f"median {curve.median:.4f} m/s^2, dispersion {curve.dispersion:.4f}")
+    median 3.1509 m/s^2, dispersion 0.3042
+    """
+    how = Measure.of(measure)
+    x = checks.positive_numbers(intensity, "intensity", InvalidOption)
+    if x.min() < _INTENSITIES[0] or x.max() > _INTENSITIES[1]:
+        low, high = _INTENSITIES
+        raise InvalidOption(f"{{}} must be from {low:g} to {high:g}: check its units", "intensity", value=intensity)
+    count = _whole(trials, "trials", x.size, 1.0, 2.0**53)
+    outcomes = _limit_states(exceeded if isinstance(exceeded, Mapping) else {"overturning": exceeded}, "exceeded")
+    groups = None if clusters is None else groups_of(clusters, "clusters", x.size)
+    _check_band(band)
+    curves = [
+        fitted_curve(name, (x, _whole(values, "exceeded", x.size, 0.0, count), count), groups, band, how)
+        for name, values in outcomes.items()
+    ]
+    return Fragility(tuple(curves), how, description, block, "nonlinear", None, source="cluster")
+
+
+def _check_band(band: object) -> None:
+    if not isinstance(band, Band):
+        raise InvalidOption(
+            f'{{}} must be a Band, as Band("bootstrap", samples=500), not {checks.shown(band)}', "band", value=band
+        )
+
+
+def _limit_states(given: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    """Return what is given for each limit state by its name, of which there is one at least."""
+    for state in checks.mapping(given, name, InvalidOption, "{'overturning': inf}"):
+        checks.text(state, f"name of a limit state in {name}", InvalidOption)
+    return given
+
+
+def _whole(values: ArrayLike, name: str, size: int, least: float, most: ArrayLike) -> Floats:
+    """Whole numbers, one for each intensity, between two bounds."""
+    given = checks.answers_or_numbers(values, name, InvalidOption)
+    try:
+        numbers = np.broadcast_to(given, size)
+    except ValueError:
+        raise InvalidOption(f"{{}} must hold one number for each of the {size} intensities", name) from None
+    if not np.all((numbers >= least) & (numbers <= np.asarray(most)) & (numbers == np.floor(numbers))):
+        bound = f"{most:g}" if isinstance(most, float) else "the trials"
+        raise InvalidOption(f"{{}} must be whole numbers, at least {least:g} and no more than {bound}", name)
+    return numbers

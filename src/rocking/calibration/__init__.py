@@ -1,0 +1,5 @@
+"""Calibration: the block behind observed outcomes, or behind a measured rotation history."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)
