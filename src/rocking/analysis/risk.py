@@ -310,7 +310,7 @@ class Risk(Result):
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.risk import RiskLine, risk_figure
+        from rocking.plot.curves import RiskLine, risk_figure
 
         scale, at = self.hazard.measure.scale, self._shown()
         return risk_figure(
