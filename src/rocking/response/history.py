@@ -18,6 +18,7 @@ from rocking.kernels import state
 from rocking.kernels.march import march
 from rocking.kernels.state import Records
 from rocking.kernels.trace import Trail, own, trace
+from rocking.tables import counted
 
 #: Times at which each step of the last arc is looked at for its last passage of the balance point.
 _LOOKS: Final = 33
@@ -55,6 +56,9 @@ class Solution(NamedTuple):
     sequences: NDArray[np.void]
     residual: float
     again: Callable[[float], Any]
+
+    def __repr__(self) -> str:
+        return f"<Solution: {counted(len(self.trail.nodes), 'node')}>"
 
 
 @dataclass(frozen=True, eq=False)

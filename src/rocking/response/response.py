@@ -480,6 +480,11 @@ class Response(Result):
         friction : float
             Coefficient of friction between block and ground, positive and at most 3.
 
+        Returns
+        -------
+        float
+            Time, s.
+
         Raises
         ------
         InvalidOption
