@@ -137,7 +137,7 @@ class Page:
     def __init__(self, figure: Figure, ax: Axes | None) -> None:
         self.figure, self.ax = figure, ax
         self.drawn: list[Axes] = []
-        self.handles: Sequence[Artist] | None = None
+        self.handles: list[Any] | None = None
 
     def panels(self, rows: int = 1, columns: int = 1, **options: Any) -> list[Axes]:
         """Make panels, the main one first, or return the caller's axes alone."""

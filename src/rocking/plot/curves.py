@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, Unpack
 
 import numpy as np
@@ -68,12 +68,7 @@ def fragility_figure(
 
 
 def dispersions_figure(
-    *,
-    names: Sequence[str],
-    dispersion: Floats,
-    low: Floats,
-    high: Floats,
-    **place: Unpack[Place],
+    *, names: Sequence[str], dispersion: Floats, low: Floats, high: Floats, **place: Unpack[Place]
 ) -> Figure:
     """Draw the dispersion of the intensity at overturning, with its interval, for each measure by name."""
     with page_for((5.6, 0.8 + 0.32 * len(names)), **place) as page:
@@ -120,12 +115,7 @@ class RiskLine(NamedTuple):
 
 
 def risk_figure(
-    *,
-    intensity: Floats,
-    hazard: HazardLine,
-    lines: Sequence[RiskLine],
-    intensity_label: str,
-    **place: Unpack[Place],
+    *, intensity: Floats, hazard: HazardLine, lines: Sequence[RiskLine], intensity_label: str, **place: Unpack[Place]
 ) -> Figure:
     """Draw a hazard curve, dotted where it is extended, and below it where each limit state's rate comes from.
 
@@ -245,10 +235,11 @@ def spectrum_figure(
 
     One curve alone needs no label, and of more than eight some are named. Two motions are named, more are counted, and
     drawn with up to four curves. Of two motions or fewer no fractile is drawn, and of three curves or more only the
-    middle one. A line of a named motion, and a
-    fractile, ends in a cross where the block of the next point overturns; of a fractile that means that so many motions
-    overturn it that there is none. In `ax`, the peak rotations are drawn without the shares.
+    middle one. A line of a named motion, and a fractile, ends in a cross where the block of the next point overturns.
+    In `ax`, the peak rotations are drawn without the shares.
     """
+    from matplotlib.lines import Line2D
+
     few = len(motions) <= _FEW
     middle = _middle(fractiles)
     chosen = {share: k for k, share in enumerate(fractiles) if share == middle or len(curves) <= _WITH_ALL_FRACTILES}
@@ -256,10 +247,13 @@ def spectrum_figure(
         peaks, *shares = panels = page.panels(2, sharex=True, height_ratios=(3.2, 1.0))
         for style, curve in zip(styles_of(len(curves)), curves, strict=True):
             if few:
-                _draw_named(peaks, x, curve, style)
+                for width, single in zip(_WIDTHS, curve.singles, strict=False):
+                    _draw(peaks, x, single, width, style)
             else:
-                singles = curve.singles if len(curves) <= _WITH_ALL_MOTIONS else ()
-                _draw_family(peaks, x, curve, singles, chosen, style)
+                for single in curve.singles if len(curves) <= _WITH_ALL_MOTIONS else ():
+                    peaks.plot(x, single, color=style["color"], linewidth=0.5, alpha=0.35)
+                for share, row in chosen.items():
+                    _draw(peaks, x, curve.fractiles[row], _MIDDLE if share == middle else _OTHER, style)
             for panel in shares:
                 panel.step(x, curve.overturned, where="mid", linewidth=1.2, **style)
         for panel in panels:
@@ -270,53 +264,23 @@ def spectrum_figure(
         for panel in shares:
             panel.set_ylim(-0.03, 1.03)
             add_labels(panel, x_label, "share overturned")
-        page.handles = [*_handles(curves, motions, chosen), *_ends_handle(peaks)]
+        page.handles = _handles(curves, motions, chosen)
+        if any(line.get_marker() == _END["marker"] for line in peaks.lines):
+            page.handles.append(Line2D([], [], color=INK, label="beyond: overturns", **_END))
     return page.figure
 
 
-def _draw_named(axes: Axes, x: Floats, curve: SpectrumCurves, style: dict[str, Any]) -> None:
-    for width, single in zip(_WIDTHS, curve.singles, strict=False):
-        _draw(axes, x, single, {**style, "linewidth": width})
-
-
-def _draw_family(
-    axes: Axes,
-    x: Floats,
-    curve: SpectrumCurves,
-    singles: Iterable[Floats],
-    fractiles: Mapping[float, int],
-    style: dict[str, Any],
-) -> None:
-    """Draw the motions given thin, and the fractiles whose rows are given thicker."""
-    for single in singles:
-        axes.plot(x, _cut(single), color=style["color"], linewidth=0.5, alpha=0.35)
-    for share, row in fractiles.items():
-        width = _MIDDLE if share == _middle(fractiles) else _OTHER
-        _draw(axes, x, curve.fractiles[row], {**style, "linewidth": width})
-
-
-def _draw(axes: Axes, x: Floats, values: Floats, style: dict[str, Any]) -> None:
+def _draw(axes: Axes, x: Floats, values: Floats, width: float, style: dict[str, Any]) -> None:
     """Draw a line with gaps where its values are infinite, and mark its ends there."""
-    axes.plot(x, _cut(values), marker="o" if x.size == 1 else "", markersize=4.0, **style)
-    ends = _ends(np.isfinite(values))
+    axes.plot(x, values, marker="o" if x.size == 1 else "", markersize=4.0, linewidth=width, **style)
+    finite = np.isfinite(values)
+    ends = finite & ~(np.append(True, finite[:-1]) & np.append(finite[1:], True))
     if ends.any():
         axes.plot(x[ends], values[ends], color=style["color"], **_END)
 
 
-def _ends(finite: Flags) -> Flags:
-    """Points with a value beside which there is one without."""
-    before, after = np.append(True, finite[:-1]), np.append(finite[1:], True)
-    ends: Flags = finite & ~(before & after)
-    return ends
-
-
 def _middle(fractiles: Iterable[float]) -> float:
     return min(fractiles, key=lambda share: abs(share - 0.5))
-
-
-def _cut(values: Floats) -> Floats:
-    """Values with gaps where they are infinite."""
-    return np.where(np.isfinite(values), values, np.nan)
 
 
 def _handles(curves: Sequence[SpectrumCurves], motions: Sequence[str], fractiles: Iterable[float]) -> list[Line2D]:
@@ -341,14 +305,6 @@ def _handles(curves: Sequence[SpectrumCurves], motions: Sequence[str], fractiles
     if others:
         each.append(Line2D([], [], color=INK, linewidth=_OTHER, label=_named(others)))
     return each
-
-
-def _ends_handle(axes: Axes) -> list[Line2D]:
-    """Make the handle of the crosses, if there are any."""
-    from matplotlib.lines import Line2D
-
-    crosses = any(line.get_marker() == _END["marker"] for line in axes.lines)
-    return [Line2D([], [], color=INK, label="beyond: overturns", **_END)] if crosses else []
 
 
 def _named(percent: str) -> str:
@@ -402,13 +358,7 @@ def outcomes_figure(
 
 
 def measured_figure(
-    *,
-    time: Floats,
-    measured: Floats,
-    residual: Floats,
-    fitted_time: Floats,
-    fitted: Floats,
-    **place: Unpack[Place],
+    *, time: Floats, measured: Floats, residual: Floats, fitted_time: Floats, fitted: Floats, **place: Unpack[Place]
 ) -> Figure:
     """Draw a measured rotation history (rad, over s), that of the fitted block, and what is left between them.
 
@@ -462,12 +412,7 @@ def _draw_parameter(axes: Axes, parameter: Parameter, weights: Floats) -> None:
 
 
 def reliability_figure(
-    *,
-    predicted: Floats,
-    observed: Floats,
-    band_lower: Floats,
-    band_upper: Floats,
-    **place: Unpack[Place],
+    *, predicted: Floats, observed: Floats, band_lower: Floats, band_upper: Floats, **place: Unpack[Place]
 ) -> Figure:
     """Draw observed shares against predicted ones (bins,), with the bands of right predictions."""
     with page_for((3.7, 3.7), **place) as page:

@@ -62,12 +62,7 @@ class ScaledMotion(NamedTuple):
     bands: Floats
 
 
-def ida_figure(
-    *,
-    motions: Sequence[ScaledMotion],
-    level_label: str,
-    **place: Unpack[Place],
-) -> Figure:
+def ida_figure(*, motions: Sequence[ScaledMotion], level_label: str, **place: Unpack[Place]) -> Figure:
     """Draw the level of scaled motions against the peak rotation, and beside it the levels that overturn.
 
     Up to four motions have a style of their own. More are drawn alike, with the fractiles (16, 50, 84 %) of the lowest

@@ -160,12 +160,7 @@ _JOINED: Final = 100
 _MARGIN: Final = 0.03
 
 
-def intervals_figure(
-    *,
-    intervals: Floats,
-    eta: float,
-    **place: Unpack[Place],
-) -> Figure:
+def intervals_figure(*, intervals: Floats, eta: float, **place: Unpack[Place]) -> Figure:
     """Draw the dimensionless intervals between the impacts of a chattering sequence, and the ratios of every second.
 
     The first interval is that from the uplift; there may be none. The ratios of a complete sequence tend to eta^2. In

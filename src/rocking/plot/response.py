@@ -276,11 +276,7 @@ def _draw_sequence(axes: Axes, sequence: DrawnSequence) -> None:
 
 
 def motion_figure(
-    *,
-    time: Floats,
-    acceleration_g: Floats,
-    vertical_g: Floats | None = None,
-    **place: Unpack[Place],
+    *, time: Floats, acceleration_g: Floats, vertical_g: Floats | None = None, **place: Unpack[Place]
 ) -> Figure:
     """Draw a ground acceleration (g) over time (s), and a vertical one below it; in `ax`, the horizontal one alone."""
     traces = {"ground acceleration (g)": acceleration_g}

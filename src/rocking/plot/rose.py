@@ -60,13 +60,7 @@ def rose_figure(
     return page.figure
 
 
-def shares_figure(
-    *,
-    azimuth: Floats,
-    shares: Floats,
-    labels: Sequence[str],
-    **place: Unpack[Place],
-) -> Figure:
+def shares_figure(*, azimuth: Floats, shares: Floats, labels: Sequence[str], **place: Unpack[Place]) -> Figure:
     """Draw shares, shape (curves, azimuths), over the azimuth: towards the north up, and the full circle is all."""
     with page_for((4.8, 4.8), **place) as page:
         (axes,) = page.panels()

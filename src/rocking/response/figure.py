@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, Unpack, get_args
 
 import numpy as np
 
-from rocking import checks
+from rocking import checks, svg
 from rocking.arrays import Floats, Integers
 from rocking.body import title_of
 from rocking.constants import STANDARD_GRAVITY
@@ -80,6 +80,17 @@ def drawing_times(response: Response, start: float, end: float) -> Floats:
 
 def _within(times: Floats, start: float, end: float) -> Floats:
     return times[(times >= start) & (times <= end)]
+
+
+def picture(response: Response) -> str:
+    """Draw the rotation for a notebook, cut at twice the slenderness: past it a block only falls."""
+    times = drawing_times(response, *active_span(response))
+    coordinate, (plus, minus) = response.body.coordinate, response.balance
+    drawn, label = response.states(times)[:, 0], f"{coordinate.name} ({coordinate.unit})"
+    if coordinate.limit and math.isfinite(min(plus, minus)):
+        drawn = drawn / np.where((drawn >= 0.0) & math.isfinite(plus) | (not math.isfinite(minus)), plus, minus)
+        drawn, label = np.clip(drawn, -2.0, 2.0), f"{coordinate.name} / {coordinate.limit}"
+    return svg.captioned(f"Response: {response._headline()}", svg.history(times, drawn, label))
 
 
 def histories(

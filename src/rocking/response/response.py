@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rocking import checks, svg
+from rocking import checks
 from rocking.arrays import Floats, as_asked
 from rocking.block import Block, RestrainedBlock
 from rocking.body import Body
@@ -40,9 +40,6 @@ if TYPE_CHECKING:
 
 #: Letters of the column of names in a summary.
 _WIDTH = 20
-
-#: Rotations beyond this multiple of the slenderness are cut in a notebook's picture: past it a block only falls.
-_HIGHEST_PICTURED = 2.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -114,20 +111,14 @@ class Response(Result):
 
     @property
     def block(self) -> Block:
-        """The body, for what only blocks can answer.
-
-        Raises
-        ------
-        InvalidOption
-            If it is of another kind.
-        """
+        """The body; raises `InvalidOption` if it is no block."""
         if not isinstance(self.body, Block):
             raise InvalidOption(f"this is known of blocks alone, not of a {type(self.body).__name__}")
         return self.body
 
     @cached_property
     def _history(self) -> History:
-        """Its course, with the impacts that follow where a proof has closed a sequence."""
+        """Course in time, with the impacts that follow where a proof has closed a sequence."""
         trail, sequences = self.solution.trail, self.solution.sequences
         if int(trail.rules["treatment"]) == state.RestRule.CERTIFIED:
             closed = bool(len(sequences)) and bool(sequences["end"][-1] >= self.duration)
@@ -146,11 +137,9 @@ class Response(Result):
             raise InvalidOption(f"the forces of the ground are not known of this body: {self.body.description}")
         return Contact(self._history, law, self.duration if math.isnan(self.tipping_time) else self.tipping_time)
 
-    # What became of the body
-
     @cached_property
     def chattering(self) -> NDArray[np.void]:
-        """Sequences of impacts that ended at rest, a row for each: see `Response`."""
+        """Sequences of impacts that ended at rest: see `Response`."""
         found = self.solution.sequences.copy()
         error = carried_errors(self.solution.trail, np.isfinite(found["lower"]), max(map(abs, self.body.stops)))
         found["lower"] -= error
@@ -159,7 +148,7 @@ class Response(Result):
 
     @cached_property
     def balance(self) -> tuple[float, float]:
-        """Rotation of the unstable balance on each side, rad, in the model of this response; infinite without one.
+        """Rotation of the unstable balance on each side in this model, rad; infinite without one.
 
         Of a free block it is the slenderness in both models.
         """
@@ -170,7 +159,7 @@ class Response(Result):
 
     @cached_property
     def peak_over_slenderness(self) -> float:
-        """Peak rotation over the slenderness of the side where it is reached; infinite where the block overturns.
+        """Peak rotation over the slenderness of its side; infinite where the block overturns.
 
         Of a restrained block over its balance; NaN where there is none.
         """
@@ -192,7 +181,7 @@ class Response(Result):
 
     @cached_property
     def tendons(self) -> NDArray[np.void]:
-        """Largest elongation (m) and force (N), and plastic elongation (m) at the end, of each tendon of the body."""
+        """Largest elongation and force of each tendon: see `Response`."""
         rows = []
         if isinstance(self.body, RestrainedBlock):
             plus, minus = self._history.largest()
@@ -216,8 +205,8 @@ class Response(Result):
     def outcome(self) -> str:
         """What becomes of the body, as a verb: "overturns", "stands", "leans", "does not move".
 
-        Also "has not overturned" where the simulation is `stopped`, "is given up" where it is `unfinished`, and "comes
-        to rest" of a body that cannot overturn.
+        Also "comes to rest" (of a body that cannot overturn), "has not overturned" (`stopped`) and "is given up"
+        (`unfinished`).
         """
         if self.overturned:
             return OVERTURNS
@@ -241,19 +230,15 @@ class Response(Result):
 
     @property
     def stopped(self) -> bool:
-        """Whether `duration` ended the simulation before a verdict: the block still moved, or the motion went on.
-
-        What became of the block is then not known, and `overturned` says no more than "not by then".
-        """
+        """Whether `duration` ended the simulation before a verdict: the block still moved, or the motion went on."""
         over = self.motion is None or self.duration >= self.motion.end
         return not (self.overturned or self.unfinished or self.leans) and (self.moves_at_end or not over)
 
     @cached_property
     def tipping_time(self) -> float:
-        """Last time, s, at which the block passes its `balance`, of a free block alpha; NaN if it ends within it.
+        """Last time, s, at which the block passes its `balance`; NaN if it ends within it.
 
-        From then on a block that overturns only falls; one that is beyond it where the simulation was `stopped` may yet
-        be caught by the motion.
+        From then on a block that overturns only falls.
         """
         return self._history.tipping_time(self.balance)
 
@@ -268,11 +253,9 @@ class Response(Result):
         starts, ends = self.rest_intervals.T
         return float(np.sum(ends - starts))
 
-    # How certain it is
-
     @cached_property
     def sensitivity(self) -> Sensitivity:
-        """How the peak and the times of events and impacts change with the motion, the initial state and the block."""
+        """Derivatives of the peak and of the times of events and impacts by the motion, the start and the block."""
         return Sensitivity(self)
 
     @property
@@ -282,13 +265,10 @@ class Response(Result):
 
     @cached_property
     def ambiguities(self) -> tuple[str, ...]:
-        """What makes the response ambiguous: "peak", "events" (a time of one, or of an impact) and "touch".
+        """What one ulp of the input changes visibly: "peak", "events" (a time of one, or of an impact) and "touch".
 
-        With the last, the last digits decide whether the motion passes a threshold of uplift, whether the body touches
-        the ground, or whether it falls from its balance.
-
-        An ambiguous response is one of those that are possible. Scale the motion, or the initial state, by 1 plus some
-        millionths, simulate each, and take the spread of the results for the answer.
+        With the last, rounding decides whether the motion passes a threshold of uplift, whether the body touches the
+        ground, or whether it falls from its balance. `perturbed` has the spread of such results.
         """
         start, velocity, acceleration = self.states(0.0)
         balanced = velocity == acceleration == 0.0 and bool(np.any(np.isclose(abs(start), self.balance)))
@@ -317,18 +297,9 @@ class Response(Result):
 
         Notes
         -----
-        An initial rotation and velocity are scaled with the motion, or alone where there is no motion; of a body with
-        a stop it is the initial distance from the stop. Ground motions are known to three digits or so: an outcome
-        that changes within a few millionths is undecided for every practical purpose. Conversely, an outcome that is
-        the same in a few simulations may still change between them.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> block, record = rocking.Block(width=0.24, height=1.1), rocking.records.load("ridgecrest-clc-090")
-        >>> found = rocking.simulate(block, record.scaled_to(0.53 * 9.80665)).perturbed()
-        >>> found.overturned.tolist(), found.is_decided
-        ([True, False, False, False, True], False)
+        An initial rotation (of a body with a stop its distance from the stop) and velocity are scaled with the motion,
+        or alone where there is no motion. An outcome that changes within a few millionths is undecided for every
+        practical purpose; one that is the same in a few simulations may still change between them.
         """
         if (relative, count) not in self._repeated:
             scaled = "initial states" if self.motion is None else "motions"
@@ -355,8 +326,6 @@ class Response(Result):
             factor, self.outcome, self.peak_rotation, self.peak_time, self.overturn_time, last_rest, self.events
         )
 
-    # At any time
-
     def states(self, time: ArrayLike) -> Floats:
         """Coordinate of the body, its velocity and its acceleration at any time: of a block those of its rotation.
 
@@ -368,8 +337,7 @@ class Response(Result):
         Returns
         -------
         ndarray
-            One more dimension, of length 3, in the unit of the coordinate, over s and over s^2; NaN at times outside
-            [0, duration], and where a time is NaN.
+            One more dimension, of length 3; NaN at times outside [0, duration], and where a time is NaN.
 
         Raises
         ------
@@ -402,18 +370,14 @@ class Response(Result):
         -------
         ndarray
             Over the energy that takes the block, without ground motion, from rest to the unstable balance of the side
-            where that is less; NaN outside [0, duration]. Velocities are relative to the ground.
+            where that is less, m g R (1 - cos alpha) of a free block (m g R alpha^2/2 in the linear model); NaN outside
+            [0, duration]. Velocities are relative to the ground.
 
         Raises
         ------
         InvalidOption
             If `time` contains anything but numbers, the body is no block, one of its tendons yields, or its restraints
             hold it back at any rotation.
-
-        Notes
-        -----
-        Of a free block m g R (1 - cos alpha) overturns it, or m g R alpha^2/2 in the linear model. (Derived in the
-        documentation.)
 
         Examples
         --------
@@ -447,13 +411,8 @@ class Response(Result):
         return as_asked(self._contact.forces(time)[1])
 
     def friction_demand(self, time: ArrayLike) -> Floats:
-        """Friction coefficient that sticking needs at any time: infinite where the normal force is not positive.
-
-        NaN outside [0, duration].
-        """
+        """Friction coefficient that sticking needs: infinite without normal force, NaN outside the response."""
         return as_asked(friction_demand(*self._contact.forces(time)))
-
-    # Forces of the ground
 
     @cached_property
     def _extremes(self) -> tuple[float, float]:
@@ -461,7 +420,7 @@ class Response(Result):
 
     @property
     def required_friction(self) -> float:
-        """Largest friction coefficient that sticking needs, between impacts and until the block tips (`tipping_time`).
+        """Largest friction coefficient that sticking needs, between impacts and until `tipping_time`.
 
         Infinite if the normal force does not stay positive.
         """
@@ -469,7 +428,7 @@ class Response(Result):
 
     @property
     def minimum_normal_force(self) -> float:
-        """Smallest normal force over the weight, between impacts and until the block tips (`tipping_time`)."""
+        """Smallest normal force over the weight, between impacts and until `tipping_time`."""
         return self._extremes[1]
 
     def sliding_time(self, friction: float) -> float:
@@ -483,17 +442,13 @@ class Response(Result):
         Returns
         -------
         float
-            Time, s.
+            Time, s, before the block tips (`tipping_time`), without the impulses at impacts. What happens after a slip
+            is not part of the model.
 
         Raises
         ------
         InvalidOption
             If it is no such number.
-
-        Notes
-        -----
-        Only until the block tips (`tipping_time`), and without the impulses at impacts, at which a block may slip by
-        itself. What happens after a slip is not part of the model: the response goes on as if the block stuck.
 
         Examples
         --------
@@ -510,15 +465,13 @@ class Response(Result):
 
     @cached_property
     def lift_off_time(self) -> float:
-        """First time, s, at which the normal force is no longer positive, so that the base would leave the ground.
+        """First time, s, at which the normal force is not positive, so that the base leaves the ground; NaN if never.
 
-        NaN if that never happens; as for `sliding_time`, until the block tips and between impacts.
+        As for `sliding_time`, until the block tips and between impacts.
         """
         if self.minimum_normal_force > 0.0:
             return math.nan
         return self._contact.first(pull, lambda pulled: pulled >= 0.0)
-
-    # In words, as plain values, as tables
 
     def _headline(self) -> str:
         return summary.line(self)
@@ -575,7 +528,7 @@ class Response(Result):
         return dictionary_of(self.facts(friction, precision=precision))
 
     def to_xarray(self, dt: float | None = None) -> xr.Dataset:
-        """Time histories and events as a dataset.
+        """Return time histories and events as a dataset; its ``to_dataframe`` multiplies all dimensions.
 
         Parameters
         ----------
@@ -586,20 +539,12 @@ class Response(Result):
         -------
         xarray.Dataset
             rotation, angular_velocity and ground_acceleration over time; one dimension each for events, impacts and
-            chattering sequences; units with each variable; the block and the verdict as attributes. Its own
-            ``to_dataframe`` multiplies all these dimensions: use `Response.to_dataframe`.
+            chattering sequences; units with each variable; the block and the verdict as attributes.
 
         Raises
         ------
         InvalidOption
             If `dt` is not positive.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
-        >>> dict(response.to_xarray(dt=0.1).sizes)
-        {'time': 16, 'event': 2, 'impact': 1, 'sequence': 0}
         """
         return tables.dataset(self, dt)
 
@@ -626,60 +571,20 @@ class Response(Result):
         ------
         InvalidOption
             If there is no such table, `dt` is not positive, or it is given for another table than the histories.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
-        >>> list(response.to_dataframe(dt=0.01).columns)
-        ['rotation_rad', 'angular_velocity_rad_s', 'ground_acceleration_m_s2']
         """
         frame = frame_of(self._columns(table or "histories", dt))
         return frame.set_index("time_s") if table in (None, "histories") else frame
 
     def to_netcdf(self, path: str | Path, dt: float | None = None) -> None:
-        """Write `to_xarray` to a NetCDF file, whole or not at all.
-
-        Raises
-        ------
-        OutputError
-            If the file cannot be written.
-        """
+        """Write `to_xarray` to a NetCDF file, whole or not at all; raises `OutputError` if it cannot be written."""
         write_netcdf(path, self.to_xarray(dt))
 
     def to_csv(self, path: str | Path, table: str | None = None, *, dt: float | None = None) -> None:
-        """Write one of the tables of `to_dataframe` as text columns with a header, whole or not at all.
-
-        Raises
-        ------
-        InvalidOption
-            As `to_dataframe`.
-        OutputError
-            If the file cannot be written.
-
-        Examples
-        --------
-        >>> import pathlib, tempfile
-        >>> import rocking
-        >>> response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
-        >>> file = pathlib.Path(tempfile.mkdtemp()) / "impacts.csv"
-        >>> response.to_csv(file, "impacts")
-        >>> file.read_text().splitlines()[0]
-        'time_s,side,speed_before_rad_s,speed_after_rad_s'
-        """
+        """Write a table of `to_dataframe` as text columns with a header, as `Result.to_csv`."""
         write_csv(path, frame_of(self._columns(table or "histories", dt)))
 
-    # Drawn
-
     def _repr_html_(self) -> str:
-        times = figure.drawing_times(self, *figure.active_span(self))
-        coordinate, (plus, minus) = self.body.coordinate, self.balance
-        drawn, label = self.states(times)[:, 0], f"{coordinate.name} ({coordinate.unit})"
-        if coordinate.limit and math.isfinite(min(plus, minus)):
-            drawn = drawn / np.where((drawn >= 0.0) & math.isfinite(plus) | (not math.isfinite(minus)), plus, minus)
-            drawn = np.clip(drawn, -_HIGHEST_PICTURED, _HIGHEST_PICTURED)
-            label = f"{coordinate.name} / {coordinate.limit}"
-        return svg.captioned(f"Response: {self._headline()}", svg.history(times, drawn, label))
+        return figure.picture(self)
 
     def plot(
         self,
@@ -691,23 +596,24 @@ class Response(Result):
         title: str = "",
         figsize: tuple[float, float] | None = None,
     ) -> Figure:
-        """Figure of the rotation with impacts and rests, and of the motion with thresholds.
+        """Draw the rotation with impacts and rests, and the motion with thresholds, as `Result.plot`.
 
         Parameters
         ----------
-        ax : matplotlib.axes.Axes, optional
-            Draw the rotation here, without the other panels.
+        ax, title, figsize
+            As of `Result.plot`.
         units : {"slenderness", "rad", "deg"}
-            What rotations are drawn in: over the slenderness of their side (of a restrained block over its balance, if
-            it has one), or as they are.
+            Rotations over the slenderness of their side (of a restrained block over its balance, if it has one), or as
+            they are.
         window : (start, end), optional
-            Stretch of time to draw, s; by default from a little before the first event to a little after the last.
+            Stretch of time, s; by default from a little before the first event to a little after the last.
         longest_sequence : bool
             Whether to show the longest chattering sequence, impact by impact, in a panel of its own.
-        title : str
-            Title; by default what was simulated.
-        figsize : (float, float), optional
-            Width and height of a new figure, inches.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The new figure, or that of `ax`.
 
         Raises
         ------
@@ -727,15 +633,10 @@ class Response(Result):
         title: str = "",
         figsize: tuple[float, float] | None = None,
     ) -> Figure:
-        """Figure of the velocity against the rotation, with impacts as jumps and the energy of the balance.
+        """Draw the velocity against the rotation, with impacts as jumps and the energy of the balance; as `plot`.
 
         Rotations are over the slenderness of their side (of a restrained block over its balance), velocities over p
-        times that; where a side has no balance, rotations are in rad. Arguments are those of `plot`.
-
-        Raises
-        ------
-        InvalidOption
-            As `kinetic_energy`, and if the window is not a stretch of the response, or the size is not one.
+        times that; where a side has no balance, rotations are in rad. `InvalidOption` also as of `kinetic_energy`.
 
         Examples
         --------
@@ -754,8 +655,5 @@ class Response(Result):
         title: str = "",
         figsize: tuple[float, float] | None = None,
     ) -> Figure:
-        """Figure of kinetic, potential and total energy over time, over the least energy that overturns the block.
-
-        Arguments are those of `plot`, errors those of `plot_phase_plane`.
-        """
+        """Draw kinetic, potential and total energy over time, as `plot_phase_plane` and in its units."""
         return figure.energies(self, window, title=title or figure.titled(self), ax=ax, figsize=figsize)

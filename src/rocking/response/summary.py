@@ -48,15 +48,18 @@ def summary_rows(response: Response, friction: float | None, precision: float) -
     rows = [
         Row("block" if isinstance(body, Block) else "body", body.description),
         Row("parameters", in_line(body.sides)),
-        *_balance_rows(response),
+        *([Row("balance", _balance_text(response))] if isinstance(body, RestrainedBlock) else []),
         Row("motion", _motion_text(response)),
         Row("uplift above", _thresholds_text(response)),
         *_event_rows(response),
         Row("impacts resolved", f"{len(response.impacts)}"),
         *_peak_rows(response),
         *([Row(f"residual {body.coordinate.name}", _residual_text(response))] if response.leans else []),
-        *_tendon_rows(response),
     ]
+    for row in response.tendons:
+        stays = f", {1e3 * row['plastic_elongation']:.4g} mm of it for good" if row["plastic_elongation"] else ""
+        text = f"longer by {1e3 * row['elongation']:.4g} mm at most{stays}"
+        rows.append(Row("tendon", text, note=f", force {1e-3 * row['force']:.4g} kN at most"))
     if isinstance(body, RestrainedBlock) and body.contact is None:
         rows.append(Row("friction, lift-off", "not judged: the forces of the ground are not known"))
     if body.contact is not None:
@@ -64,8 +67,13 @@ def summary_rows(response: Response, friction: float | None, precision: float) -
         rows += [
             Row("friction needed", f"{response.required_friction:.4f}", note=tips),
             Row("least normal force", f"{response.minimum_normal_force:.4f}", "of the weight", tips),
-            *_contact_rows(response, friction, sliding),
         ]
+        if friction is not None:
+            slides = f"is not enough: the block slides, first at {sliding:.4f} s; what follows is not this response"
+            enough = "is enough: the block does not slide"
+            rows.append(Row(f"friction {friction:g}", enough if math.isnan(sliding) else slides))
+        if not math.isnan(response.lift_off_time):
+            rows.append(Row("base lifts off", f"at {response.lift_off_time:.4f} s; what follows is not this response"))
     near = response.perturbed()
     if (
         np.max(np.nan_to_num(near.event_spreads, nan=math.inf), initial=0.0) >= _SHOWN
@@ -105,11 +113,11 @@ def in_words(response: Response, overturn_time: str) -> str:
         goes_on = motion is not None and response.duration < motion.end
         to_come = f"; the motion goes on to {motion.end:.6g} s" if motion is not None and goes_on else ""
         return f"{_when_stopped(response)}, where the simulation was stopped{to_come}"
-    if response.leans and _can_overturn(response):
+    if response.leans and response.body.coordinate.limit:
         return f"does not overturn: it stays leaning, at {_residual_text(response)}"
     if not response.moved:
         return "does not move"
-    return "rocks and does not overturn" if _can_overturn(response) else "moves, and comes to rest"
+    return "rocks and does not overturn" if response.body.coordinate.limit else "moves, and comes to rest"
 
 
 def in_brief(response: Response, precision: float) -> str:
@@ -150,32 +158,18 @@ def known_ratio(response: Response) -> float:
 
 
 def time_text(time: float, low: float, high: float) -> str:
-    """Return a time in s with the digits that repeated simulations leave, or the range where that is wide.
-
-    Parameters
-    ----------
-    time : float
-        Time, s.
-    low, high : float
-        Earliest and latest time in repeated simulations, s.
+    """Return a time, s, with the digits that its range in repeated simulations leaves, or the range where it is wide.
 
     Examples
     --------
-    >>> time_text(230.726244377, 230.726244377, 230.726244377), time_text(230.726244377, 230.72624, 230.72625)
-    ('230.726244377 s', '230.72624 s')
-    >>> time_text(230.726244377, 230.3, 231.1)
-    '230.3 to 231.1 s'
+    >>> time_text(230.726244377, 230.72624, 230.72625), time_text(230.726244377, 230.3, 231.1)
+    ('230.72624 s', '230.3 to 231.1 s')
     """
     unknown = _unknown(time, low, high)
     decimals = _decimals(unknown)
     if unknown < _SHOWN:
         return f"{time:.{decimals}f} s"
     return f"{low:.{decimals}f} to {high:.{decimals}f} s"
-
-
-def overturn_text(response: Response) -> str:
-    """Time at which the block overturns, as far as it is known."""
-    return time_text(response.overturn_time, *response.perturbed().overturn_range)
 
 
 def tipping_text(response: Response) -> str:
@@ -280,45 +274,18 @@ def _peak_rows(response: Response) -> list[Row]:
     return [Row(f"peak {name}", value, unit, note)]
 
 
-def _balance_rows(response: Response) -> list[Row]:
+def _balance_text(response: Response) -> str:
     """Unstable balance of a block that is not free, which its slenderness does not tell."""
-    body = response.body
-    if not isinstance(body, RestrainedBlock):
-        return []
     plus, minus = (f"{value:.5g} rad" if math.isfinite(value) else "none" for value in response.balance)
-    text = plus if plus == minus or body.is_one_sided else f"{plus} (side +), {minus} (side -)"
-    return [Row("balance", text, note=": restraints hold it at any rotation" if text == "none" else "")]
-
-
-def _tendon_rows(response: Response) -> list[Row]:
-    """Largest elongation and force of each tendon, and what stays of the elongation."""
-    rows = []
-    for row in response.tendons:
-        stays = f", {1e3 * row['plastic_elongation']:.4g} mm of it for good" if row["plastic_elongation"] else ""
-        text = f"longer by {1e3 * row['elongation']:.4g} mm at most{stays}"
-        rows.append(Row("tendon", text, note=f", force {1e-3 * row['force']:.4g} kN at most"))
-    return rows
-
-
-def _contact_rows(response: Response, friction: float | None, sliding: float) -> list[Row]:
-    """Return whether the body slides at a coefficient of friction, and when its base leaves the ground if it does."""
-    rows = []
-    if friction is not None:
-        text = (
-            "is enough: the block does not slide"
-            if math.isnan(sliding)
-            else f"is not enough: the block slides, first at {sliding:.4f} s; what follows is not this response"
-        )
-        rows.append(Row(f"friction {friction:g}", text))
-    if not math.isnan(response.lift_off_time):
-        rows.append(Row("base lifts off", f"at {response.lift_off_time:.4f} s; what follows is not this response"))
-    return rows
+    if plus != minus and not (isinstance(response.body, RestrainedBlock) and response.body.is_one_sided):
+        return f"{plus} (side +), {minus} (side -)"
+    return "none: restraints hold it at any rotation" if plus == "none" else plus
 
 
 def _outcome(response: Response) -> str:
     text = response.perturbed().sentence()
     if response.overturned:
-        text += f", at {overturn_text(response)}"
+        text += f", at {time_text(response.overturn_time, *response.perturbed().overturn_range)}"
     elif response.unfinished or response.stopped:
         text += f"; {in_words(response, '')}"
     if response.stalled:
@@ -334,13 +301,8 @@ def _when_stopped(response: Response) -> str:
     if not math.isnan(response.tipping_time):
         return f"beyond its balance point since {response.tipping_time:.4f} s and not yet fallen at {end}"
     if response.moves_at_end:
-        return f"still {'rocking' if _can_overturn(response) else 'moving'} at {end}"
+        return f"still {'rocking' if response.body.coordinate.limit else 'moving'} at {end}"
     return f"at rest at {end}" if response.moved else f"has not moved by {end}"
-
-
-def _can_overturn(response: Response) -> bool:
-    """Whether the body is one that rocks, and not a ball or a mass between stops."""
-    return bool(response.body.coordinate.limit)
 
 
 def _peak_digits(response: Response) -> int:
