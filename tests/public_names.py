@@ -30,7 +30,8 @@ PROTOCOLS: dict[Any, tuple[Any, ...]] = {
 #: Checks of numpydoc: form and order of sections; parameters, returns and yields without a name, a type or a word.
 CHECKS = frozenset({"GL01", "GL03", "GL05", "GL06", "GL07", "GL08", "PR02", "PR03", "PR04", "PR07", "RT03"})
 
-#: Those of functions and methods, which also need parameters, results and an example.
+#: Those of functions and methods, which also need parameters and results, and functions an example. A method whose
+#: docstring has no section of parameters points to another method, which has one.
 CHECKS_OF_FUNCTIONS = CHECKS | {"PR01", "RT01", "YD01", "EX01"}
 
 
@@ -89,6 +90,9 @@ def faults() -> list[str]:
     for name, own in public_members().items():
         member = _described(name, own)
         wanted = CHECKS_OF_FUNCTIONS if inspect.isfunction(member) else CHECKS
+        if inspect.isclass(public_names().get(name.rpartition(".")[0])):
+            points = "Parameters\n" not in (inspect.getdoc(member) or "")
+            wanted = wanted - ({"PR01", "RT01", "EX01"} if points else {"EX01"})
         # What a property is, its one line says; and a class that only the package makes has attributes.
         if isinstance(member, property) or "Attributes\n" in (inspect.getdoc(member) or ""):
             wanted = wanted - {"PR02", "PR03"}

@@ -57,7 +57,7 @@ def test_a_bracket_is_hardly_wider_where_nothing_is_magnified() -> None:
     for number in range(60):
         response = random_case(7, number, vertical=False).simulate()
         if not response.ambiguous:
-            added += (response.chattering["upper"] - response._sequences["upper"]).tolist()
+            added += (response.chattering["upper"] - response.solution.sequences["upper"]).tolist()
     assert len(added) >= 30 and np.nanmin(added) >= 0.0
     assert np.nanmedian(added) < 1e-13
 

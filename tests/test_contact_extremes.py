@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 import rocking
 from rocking import Block, Motion, Response, simulate
-from rocking.response import trail_of
 from rocking.response.contact import friction_demand
 
 GRAVITY = 9.80665
@@ -74,7 +73,7 @@ def instants(response: Response) -> NDArray[np.float64]:
     """Densely within every stretch without impact, event or corner of the motion, and just before its end."""
     assert response.motion is not None
     corners = [
-        trail_of(response).nodes["time"],
+        response.solution.trail.nodes["time"],
         response.impacts["time"],
         response.events["time"],
         response.motion.breakpoints,

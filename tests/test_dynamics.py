@@ -259,7 +259,7 @@ def test_a_rest_at_the_first_impact_is_proven(restitution):
         found = dynamics.simulate(body, motion, duration=motion.end)
         rests = found.chattering
         assert len(rests) >= 2 and found.stalled == 0 and "not proven" not in found.summary()
-        proven = found._sequences
+        proven = found.solution.sequences
         assert np.all(proven["upper"] - proven["lower"] <= 64.0 * np.spacing(rests["end"]))
         assert np.all((rests["lower"] <= rests["end"]) & (rests["end"] <= rests["upper"]))
 

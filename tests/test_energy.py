@@ -9,8 +9,7 @@ from scipy.integrate import quad
 
 import rocking
 from rocking import Block, Damper, InvalidOption, RestrainedBlock, Spring, Tendon, simulate
-from rocking.response.answers import energy_in
-from rocking.response.phase import boundary_of, course_of
+from rocking.response.figure import boundary_of, course_of
 
 COLUMN = Block(width=0.4, height=2.0, mass=2000.0)
 BODIES = {
@@ -116,7 +115,7 @@ def test_shaking_does_the_work_that_the_energy_gains():
 def test_the_boundary_is_where_the_energy_just_overturns(name, model):
     body = BODIES[name]
     response = simulate(body, None, model=model, initial_rotation=0.01, duration=1.0)
-    energy, judged = energy_in(response), 0
+    energy, judged = response._energy, 0
     x, y = boundary_of(response)
     for sign, side in ((1.0, 0), (-1.0, 1)):
         here = (sign * x > 0.0) & (sign * x < 1.0)

@@ -12,18 +12,25 @@ from matplotlib.text import Text
 
 import rocking
 from rocking import dynamics
-from rocking.plot.basins import basins_figure
-from rocking.plot.calibration import Parameter, measured_figure, outcomes_figure, reliability_figure
-from rocking.plot.fragility import FragilityLine, fragility_figure
+from rocking.plot.curves import (
+    FragilityLine,
+    HazardLine,
+    Parameter,
+    RiskLine,
+    SpectrumCurves,
+    fragility_figure,
+    measured_figure,
+    outcomes_figure,
+    reliability_figure,
+    risk_figure,
+    spectrum_figure,
+    survival_figure,
+)
 from rocking.plot.ida import ScaledMotion, ida_figure, levels_reaching
-from rocking.plot.intervals import intervals_figure
-from rocking.plot.maps import outcome_figure, regions_figure
-from rocking.plot.orbits import bifurcation_figure, branch_figure, orbit_figure
-from rocking.plot.phase import energy_figure, phase_figure
-from rocking.plot.response import DrawnSequence, response_figure
-from rocking.plot.risk import HazardLine, RiskLine, risk_figure, survival_figure
+from rocking.plot.maps import basins_figure, outcome_figure, regions_figure
+from rocking.plot.orbits import bifurcation_figure, branch_figure, intervals_figure, orbit_figure
+from rocking.plot.response import DrawnSequence, energy_figure, phase_figure, response_figure
 from rocking.plot.rose import rose_figure, shares_figure
-from rocking.plot.spectrum import SpectrumCurves, spectrum_figure
 
 COLUMN, PAGE = 86.0 / 25.4, 174.0 / 25.4
 LONG = "rectangular block, 0.24 m x 1.1 m, restitution = 0.9318234567890123, under ridgecrest-clc-090, nonlinear model"

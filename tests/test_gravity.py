@@ -121,7 +121,7 @@ def test_a_level_in_the_unit_of_a_block_lifts_it_under_more_gravity(name, model)
 @pytest.mark.parametrize("k", [1.0, K])
 def test_a_figure_has_the_thresholds_of_both_sides_under_the_weight_of_the_moment(k, model, monkeypatch):
     response, drawn = rocking.simulate(body_of("free", k), motion_of(k), model=model), {}
-    monkeypatch.setattr("rocking.plot.response.response_figure", lambda **given: drawn.update(given))
+    monkeypatch.setattr("rocking.response.figure.response_figure", lambda **given: drawn.update(given))
     response.plot()
     weight = 1.0 + drawn["vertical_acceleration_g"] / k
     for threshold, side in zip(drawn["thresholds_g"], response.body.sides, strict=True):

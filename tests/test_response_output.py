@@ -129,7 +129,7 @@ def test_each_sensitivity_is_one_pass_when_asked_for_and_a_share_of_nothing_is_n
     for quantity, name in ((1, "initial_rotation"), (2, "initial_velocity")):
         changes = np.ones(1), np.ones(len(found.impacts)), np.ones(len(found.events))
         scratch, work = state.new_scratch(), state.record(state.VARIATION)
-        vary(shaken._trail, scratch, work, quantity, np.array([shaken.peak_time]), *changes)
+        vary(shaken.solution.trail, scratch, work, quantity, np.array([shaken.peak_time]), *changes)
         assert not np.any(np.concatenate(changes))
         assert not np.any(found.events[name]) and not np.any(found.impacts[name]) and not found.peak[name][0]
 

@@ -7,7 +7,6 @@ import pytest
 
 import rocking
 from rocking import Block, Damper, InvalidOption, Load, RestrainedBlock, Spring, Tendon, Thrust
-from rocking.response.answers import trail_of
 from rocking.response.history import plastic_elongations
 
 MASS, G = 4e3, 9.80665
@@ -124,7 +123,7 @@ def test_a_tendon_yields_in_the_linear_model_where_its_response_says_so():
     (row,) = response.tendons
     assert row["elongation"] == pytest.approx(elongation, rel=1e-12)
     assert row["plastic_elongation"] == pytest.approx(elongation - 1e3 / 3e5, rel=1e-9)
-    assert row["plastic_elongation"] == pytest.approx(plastic_elongations(trail_of(response))[-1], rel=1e-9)
+    assert row["plastic_elongation"] == pytest.approx(plastic_elongations(response.solution.trail)[-1], rel=1e-9)
 
 
 def test_a_summary_names_restraints_balance_and_the_forces_of_tendons():
@@ -375,11 +374,11 @@ def test_reading_a_response_leaves_the_law_of_its_tendon_alone():
     block = Block(width=0.6, height=3.0, mass=3000.0, restitution=0.8)
     body = RestrainedBlock(block, Tendon(5e6, prestress=5e3, strength=2e4))
     response = rocking.simulate(body, rocking.records.load("ridgecrest-clc-090").scaled(2.0))
-    before = trail_of(response).block.tobytes()
+    before = response.solution.trail.block.tobytes()
     response.rotation(np.linspace(0.0, 0.5 * response.duration, 500))
     assert np.isfinite(response.sensitivity.peak["motion"][0])
     rocking.gradient(response, "rotation", 0.5 * response.duration)
-    assert trail_of(response).block.tobytes() == before
+    assert response.solution.trail.block.tobytes() == before
 
 
 @pytest.mark.parametrize("model", ["linear", "nonlinear"])

@@ -152,7 +152,7 @@ LITTLE = pytest.mark.parametrize("little", [10.0**-n for n in (2, 4, 5, 6, 7, 8,
 
 def assert_bracket_holds(case: Case) -> None:
     response = case.simulate()
-    sequence, last = response._sequences[0], response.impacts[-1]
+    sequence, last = response.solution.sequences[0], response.impacts[-1]
     state = float(last["time"]), int(last["side"]), float(last["speed_after"])
     rest = multiprecision.rest_time(case.problem, *state)
     assert sequence["lower"] <= rest <= sequence["upper"], float(rest - sequence["end"])

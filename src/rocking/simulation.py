@@ -19,7 +19,7 @@ from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
 from rocking.problem import ground_of, highest, one_body, rules_of, set_start
 from rocking.records.named import one_motion
-from rocking.response import Response
+from rocking.response import Response, Solution
 from rocking.treatment import Treatment, treatment
 
 _EVENT = np.dtype([("time", "f8"), ("kind", "U8"), ("side", "i1")])
@@ -139,12 +139,14 @@ def response_to(
         duration=float(start["end"]),
         events=_events(events),
         impacts=_public(table["impact"][: start["impacts"]], _IMPACT),
-        _sequences=_public(table["sequence"][: start["sequences"]], _CHATTERING),
         stalled=int(start["stalled"]),
         near_ties=int(start["near_ties"]),
-        _residual=float(block.stops[int(start["side"] in (1, -2))] + (1 - 2 * start["side"]) * start["leaning"]),
-        _trail=trail._replace(nodes=state.attributed(np.array(table["node"][: start["nodes"]]))),
-        _again=functools.partial(response_to, block, motion, model, how, duration, initial, name),
+        solution=Solution(
+            trail=trail._replace(nodes=state.attributed(np.array(table["node"][: start["nodes"]]))),
+            sequences=_public(table["sequence"][: start["sequences"]], _CHATTERING),
+            residual=float(block.stops[int(start["side"] in (1, -2))] + (1 - 2 * start["side"]) * start["leaning"]),
+            again=functools.partial(response_to, block, motion, model, how, duration, initial, name),
+        ),
     )
 
 

@@ -93,7 +93,7 @@ def _judge_case(number: int, found: Found) -> None:
         after = [(float(each["time"]), float(each["speed_after"]), int(each["side"] < 0)) for each in last]
         time, speed, side = after[0] if after else (0.0, abs(velocity), int(velocity < 0.0))
         proven = time + rest(sides, push, speed, side)
-        narrow = response._sequences[
+        narrow = response.solution.sequences[
             0
         ]  # the proof alone, which holds from the last impact as it is in double precision
         for bracket, rested in ((narrow, proven), (sequence, true)):

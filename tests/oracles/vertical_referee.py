@@ -454,7 +454,7 @@ class _Judge:
             self.value("peak", response.peak_rotation, course.peak, self.peak[0])
         if self.given.rotation == self.given.velocity == 0.0:
             self.ensemble()
-        for sequence in response._sequences:
+        for sequence in response.solution.sequences:
             self.bracket(sequence)
         mine, theirs = self.found_rockings(), self.true_rockings()
         visible = [[rocking for rocking in side if rocking.height > self.nothing] for side in (mine, theirs)]

@@ -129,7 +129,7 @@ def critical_scale(
         initial_rotation=share * turned.initial_rotation,
         initial_velocity=share * turned.initial_velocity,
         reason=reason,
-        _motion=motion,
+        motion=motion,
     )
     p, alpha, restitution = (share * by_scale[name] for name in ("p", "alpha", "restitution"))
     return CriticalScale(scale, by_motion, p, alpha, restitution)

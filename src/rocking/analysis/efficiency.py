@@ -224,7 +224,7 @@ class MeasureComparison(DatasetResult):
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.fragility import dispersions_figure
+        from rocking.plot.curves import dispersions_figure
 
         data, order = self.data, self._order()
         return dispersions_figure(

@@ -369,7 +369,7 @@ class Fragility(Result):
         nrml.write(path, function, states, self.description, **about)
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.fragility import FragilityLine, fragility_figure
+        from rocking.plot.curves import FragilityLine, fragility_figure
 
         first = self.curves[0]
         band_text = f"band: {100 * first.confidence:g} % confidence ({self.band_kind})"

@@ -22,7 +22,7 @@ from rocking.result import Result
 from rocking.tables import csv_rows, text_table
 
 if TYPE_CHECKING:
-    from rocking.plot.risk import HazardLine
+    from rocking.plot.curves import HazardLine
 
 #: Headings of an intensity in a table, with its measure and the factor to SI units.
 HEADINGS: Final[dict[str, tuple[IntensityName, float]]] = {
@@ -221,7 +221,7 @@ def shown_range(hazard: HazardCurve) -> tuple[float, float]:
 
 def hazard_line(hazard: HazardCurve, intensity: Floats) -> HazardLine:
     """Return rates at intensities (SI) as a figure takes them: neither 0 nor infinite."""
-    from rocking.plot.risk import HazardLine
+    from rocking.plot.curves import HazardLine
 
     return HazardLine(np.clip(hazard.rate_of(intensity), *(1e-200, 1e200)), shown_range(hazard))
 

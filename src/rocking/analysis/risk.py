@@ -292,7 +292,7 @@ class Risk(Result):
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.risk import RiskLine, risk_figure
+        from rocking.plot.curves import RiskLine, risk_figure
 
         scale, ends = self.hazard.measure.scale, [*self.hazard.intensity[[0, -1]]]
         for one in self.rates:  # around where the rates come from
@@ -567,7 +567,7 @@ class Survival(Result):
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.risk import survival_figure
+        from rocking.plot.curves import survival_figure
 
         ends = [end for end in map(self.curve.intensity_of, _SHOWN) if 0.0 < end < math.inf]
         if len(ends) < len(_SHOWN):  # the curve is so wide that these are not numbers any more

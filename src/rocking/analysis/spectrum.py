@@ -279,7 +279,7 @@ class RockingSpectrum(DatasetResult):
         >>> spectrum.plot(against="size", title="pulse").axes[-1].get_xlabel()
         'half diagonal R (m)'
         """
-        from rocking.plot.spectrum import SpectrumCurves, spectrum_figure
+        from rocking.plot.curves import SpectrumCurves, spectrum_figure
 
         checks.one_of(against, "against", InvalidOption, get_args(Abscissa))
         # A line goes along its abscissa, in whatever order p was given.

@@ -27,7 +27,6 @@ from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.progress import Progress
 from rocking.response import Response, drawing_times
-from rocking.response.answers import history_of
 from rocking.response.sensitivity import changes_along
 from rocking.result import Result
 from rocking.simulation import simulate
@@ -127,7 +126,7 @@ class HistoryCalibration(Result):
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.calibration import measured_figure
+        from rocking.plot.curves import measured_figure
 
         simulated = self.response.rotation(np.minimum(self.times, self.response.duration))
         end = min(float(self.times[-1]), self.response.duration)
@@ -318,7 +317,7 @@ class _Problem:
         times = self.times[:count]
         response = self.response(logs, float(times[-1]))
         fallen = times > response.duration
-        changes = changes_along(history_of(response), times[~fallen], [one.name for one in self.unknowns])
+        changes = changes_along(response._history, times[~fallen], [one.name for one in self.unknowns])
         found = np.zeros((count, len(logs)))
         found[~fallen] = -np.column_stack([changes[one.name] for one in self.unknowns])
         return found

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from rocking.plot.calibration import Parameter
+    from rocking.plot.curves import Parameter
 
 #: Rounds of moves of draws from the posterior over populations, and draws for a fit without a fold.
 ROUNDS: Final = 4
@@ -342,7 +342,7 @@ class Calibration(Result):
         return [*columns, Column("weight", self.weights), Column("model", [self.model] * len(self.weights))]
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.calibration import outcomes_figure
+        from rocking.plot.curves import outcomes_figure
 
         return outcomes_figure(
             probabilities=self.probabilities,
@@ -356,7 +356,7 @@ class Calibration(Result):
 
     def _parameter(self, name: str) -> Parameter:
         """One parameter for a figure: of both sides where they may differ."""
-        from rocking.plot.calibration import Parameter
+        from rocking.plot.curves import Parameter
 
         estimates = [one for key, one in self.estimates.items() if key.partition("_")[0] == name]
         values = getattr(self.blocks, name)[:, : len(estimates)]

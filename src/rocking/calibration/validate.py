@@ -244,7 +244,7 @@ class ModelValidation(Result):
         return columns_with_skipped([asdict(test) for test in self.tests], {})
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.calibration import reliability_figure
+        from rocking.plot.curves import reliability_figure
 
         columns = ("predicted", "observed", "band_lower", "band_upper")
         return reliability_figure(

@@ -23,7 +23,7 @@ from rocking.kernels import state
 from rocking.motion.exceedance import exceedances
 from rocking.motion.motion import Motion
 from rocking.progress import Progress
-from rocking.response import Response, trail_of
+from rocking.response import Response
 from rocking.result import DatasetResult
 from rocking.simulation import simulate
 from rocking.tables import as_written, text_table
@@ -345,7 +345,8 @@ def _is_complete(response: Response, rests: int, uplift: float, rest: float) -> 
         return False
     states = state.new_states(1, 0)
     states["rests"], states["first_uplift"], states["first_rest"] = rests, uplift, rest
-    return bool(complete_chattering(trail_of(response).ground, np.array([trail_of(response).block]), states)[0])
+    trail = response.solution.trail
+    return bool(complete_chattering(trail.ground, np.array([trail.block]), states)[0])
 
 
 def _is_swapped(family: Family, first: str, second: str) -> bool:

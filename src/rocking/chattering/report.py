@@ -136,7 +136,7 @@ class ChatteringReport(Result):
         return text_table(header, rows)
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.intervals import intervals_figure
+        from rocking.plot.orbits import intervals_figure
 
         values = self.values
         rest = values["chattering_time"]["exact"]

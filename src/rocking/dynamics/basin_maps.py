@@ -126,7 +126,7 @@ class Basins(DatasetResult):
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.basins import basins_figure
+        from rocking.plot.maps import basins_figure
 
         data = self.data
         x, v = (data[name] for name in (str(data.outcome.dims[1]), str(data.outcome.dims[0])))

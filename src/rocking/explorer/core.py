@@ -32,7 +32,7 @@ from rocking.explorer.windows import (
     lines_in,
     lines_of,
 )
-from rocking.response import Response, active_span, trail_of
+from rocking.response import Response, active_span
 
 #: Responses that are kept; their steps and the samples of their motions, some hundreds of MB at most.
 _KEPT: Final = 48
@@ -220,7 +220,7 @@ class Explorer:
             for motion in (shown.case.motion, shown.case.motion and shown.case.motion.vertical):
                 if motion is not None:
                     motions[id(motion)] = len(motion.breakpoints)
-        return sum(motions.values()) + sum(len(trail_of(shown.response).nodes) for shown in self._kept.values())
+        return sum(motions.values()) + sum(len(shown.response.solution.trail.nodes) for shown in self._kept.values())
 
 
 def _changed(texts: Texts, changed: Texts) -> dict[str, str]:

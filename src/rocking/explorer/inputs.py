@@ -21,7 +21,7 @@ from rocking.explorer.texts import BLOCK_NAMES, NAMES, Texts, Values, given_text
 from rocking.explorer.uploads import UploadStore
 from rocking.motion.motion import Motion
 from rocking.motion.piecewise import STRONGEST, TOO_STRONG
-from rocking.response import Response, trail_of
+from rocking.response import Response
 from rocking.simulation import simulate
 from rocking.treatment import Treatment, treatment
 
@@ -152,7 +152,7 @@ def texts_of(response: Response, uploads: UploadStore) -> dict[str, str]:
         texts["model"] = response.model
     if str(response.treatment) != str(treatment("certified")):
         texts["chattering"] = str(response.treatment)
-    rules = trail_of(response).rules
+    rules = response.solution.trail.rules
     if not rules["endless"]:
         texts["duration"] = repr(float(rules["stop"]))
     rotation, velocity = float(response.rotation(0.0)), float(response.angular_velocity(0.0))

@@ -18,7 +18,7 @@ from rocking.explorer.simulated import Simulated
 from rocking.explorer.texts import Texts
 from rocking.explorer.windows import checked_window, extremes
 from rocking.response import Response, active_span
-from rocking.response.phase import boundary_of, course_of, marked, needed_of
+from rocking.response.figure import boundary_of, course_of, marked
 
 #: Points of a thumbnail, and times at which its rotation is evaluated.
 _POINTS: Final = 300
@@ -41,7 +41,7 @@ def phase(explorer: Explorer, texts: Texts, window: tuple[float, float]) -> Payl
     course = course_of(response, start, end)
     x, y = boundary_of(response)
     seen = marked(response, start, end)
-    header = {"window": {"from": start, "to": end}, "needed": needed_of(response)}
+    header = {"window": {"from": start, "to": end}, "needed": response._energy.needed.tolist()}
     arrays = {
         "time": course.time - start,
         "rotation": course.rotation,

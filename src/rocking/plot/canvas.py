@@ -11,7 +11,7 @@ import textwrap
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypedDict, Unpack
 
 import numpy as np
 
@@ -121,6 +121,39 @@ def figure_for(
         interactive = mpl.is_interactive()
     # The context undoes what a notebook chose if pyplot was loaded in it: to show figures at the end of a cell.
     mpl.interactive(interactive)
+
+
+class Place(TypedDict, total=False):
+    """Where and under which title a figure is drawn: options of every figure."""
+
+    title: str
+    ax: Axes | None
+    figsize: tuple[float, float] | None
+
+
+class Page:
+    """Figure that is being drawn: its panels, and the handles of its legend where labels do not tell them all."""
+
+    def __init__(self, figure: Figure, ax: Axes | None) -> None:
+        self.figure, self.ax = figure, ax
+        self.drawn: list[Axes] = []
+        self.handles: list[Any] | None = None
+
+    def panels(self, rows: int = 1, columns: int = 1, **options: Any) -> list[Axes]:
+        """Make panels, the main one first, or return the caller's axes alone."""
+        grid: Any = self.ax or self.figure.subplots(rows, columns, **options)
+        self.drawn = np.ravel(grid).tolist()
+        return self.drawn
+
+
+@contextmanager
+def page_for(default: tuple[float, float], **place: Unpack[Place]) -> Iterator[Page]:
+    """Yield a page on a figure as of `figure_for`, whose legend names all that has a label in its panels."""
+    ax = place.get("ax")
+    with figure_for(ax, default, place.get("figsize"), place.get("title", "")) as figure:
+        page = Page(figure, ax)
+        yield page
+        add_legend(figure, ax, handles_of(*page.drawn) if page.handles is None else page.handles)
 
 
 def _add_title(figure: Figure, ax: Axes | None, title: str) -> None:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Unpack
 
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.plot.canvas import ABOVE, CURVES, GROUND, INK, add_labels, add_legend, figure_for
+from rocking.plot.canvas import ABOVE, CURVES, GROUND, INK, Place, add_labels, page_for
 from rocking.tables import as_written
 
 if TYPE_CHECKING:
@@ -62,14 +62,7 @@ class ScaledMotion(NamedTuple):
     bands: Floats
 
 
-def ida_figure(
-    *,
-    motions: Sequence[ScaledMotion],
-    level_label: str,
-    title: str = "",
-    ax: Axes | None = None,
-    figsize: tuple[float, float] | None = None,
-) -> Figure:
+def ida_figure(*, motions: Sequence[ScaledMotion], level_label: str, **place: Unpack[Place]) -> Figure:
     """Draw the level of scaled motions against the peak rotation, and beside it the levels that overturn.
 
     Up to four motions have a style of their own. More are drawn alike, with the fractiles (16, 50, 84 %) of the lowest
@@ -77,8 +70,8 @@ def ida_figure(
     """
     few = len(motions) <= _FEW
     styles = [*CURVES[: len(motions)]] if few else [{"color": GROUND, "linestyle": "-"}] * len(motions)
-    with figure_for(ax, (7.0, 4.2), figsize, title) as figure:
-        curves, *strips = figure.subplots(1, 2, sharey=True, width_ratios=(2.0, 1.0)).tolist() if ax is None else [ax]
+    with page_for((7.0, 4.2), **place) as page:
+        curves, *strips = page.panels(1, 2, sharey=True, width_ratios=(2.0, 1.0))
         for motion, style in zip(motions, styles, strict=True):
             _draw_motion(curves, motion, style | (_OWN if few else _ALIKE))
         if not few:
@@ -93,8 +86,8 @@ def ida_figure(
             _draw_strips(panel, motions, styles if few else [{"color": INK}] * len(motions))
             _name_strips(panel, motions, few=few)
         named = motions if few else []
-        add_legend(figure, ax, _handles(named, with_strips=ax is None, with_arrows=_go_on(motions)))
-    return figure
+        page.handles = _handles(named, with_strips=bool(strips), with_arrows=_go_on(motions))
+    return page.figure
 
 
 def levels_reaching(motion: ScaledMotion, peaks: Floats) -> Floats:

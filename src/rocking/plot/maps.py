@@ -1,11 +1,11 @@
-"""Maps over two parameters: outcomes of points, regions between boundaries, a number for each of many blocks."""
+"""Maps over two parameters: outcomes of points, regions between boundaries, basins, a number for each block."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.plot.boundaries import Stack, runs
-from rocking.plot.canvas import ABOVE, INK, add_labels, add_legend, cell_edges, figure_for, handles_of
+from rocking.plot.canvas import ABOVE, INK, Place, add_labels, cell_edges, page_for
 from rocking.tables import as_written
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+    from matplotlib.artist import Artist
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch
 
@@ -62,9 +62,7 @@ def outcome_figure(
     later: NDArray[np.bool_],
     x_label: str,
     y_label: str,
-    title: str = "",
-    ax: Axes | None = None,
-    figsize: tuple[float, float] | None = None,
+    **place: Unpack[Place],
 ) -> Figure:
     """Draw which of up to six outcomes each point of a grid has: numbers of shape (len(y), len(x)).
 
@@ -75,8 +73,8 @@ def outcome_figure(
     from matplotlib.colors import BoundaryNorm, ListedColormap
 
     count = len(meanings)
-    with figure_for(ax, (5.4, 4.2), figsize, title) as figure:
-        axes = ax or figure.add_subplot()
+    with page_for((5.4, 4.2), **place) as page:
+        (axes,) = page.panels()
         colours, norm = ListedColormap(_COLOURS[:count]), BoundaryNorm(np.arange(count + 1) - 0.5, count)
         axes.pcolormesh(cell_edges(x), cell_edges(y), outcome, cmap=colours, norm=norm, rasterized=True)
         present = sorted(set(np.unique(outcome).tolist()))
@@ -91,8 +89,8 @@ def outcome_figure(
                     )  # fmt: skip
             handles.append(_patch(("#ffffff", "////"), "overturns later"))
         add_labels(axes, x_label, y_label)
-        add_legend(figure, ax, handles)
-    return figure
+        page.handles = handles
+    return page.figure
 
 
 def regions_figure(
@@ -104,9 +102,7 @@ def regions_figure(
     names: Mapping[int, str],
     x_label: str,
     y_label: str,
-    title: str = "",
-    ax: Axes | None = None,
-    figsize: tuple[float, float] | None = None,
+    **place: Unpack[Place],
 ) -> Figure:
     """Draw regions between boundaries that are known at increasing abscissae x, shape (n,).
 
@@ -137,8 +133,8 @@ def regions_figure(
             tallest[region] = max(height, tallest.get(region, 0.0))
         seen = np.flatnonzero(heights > _SPECK)
         lines += [curves[j + 1] for j, k in pairwise(seen) if min(heights[j], heights[k]) > _STRIP]
-    with figure_for(ax, (5.6, 4.6), figsize, title) as figure:
-        axes = ax or figure.add_subplot()
+    with page_for((5.6, 4.6), **place) as page:
+        (axes,) = page.panels()
         for region, corners in specks.items():
             axes.add_collection(PolyCollection(corners, facecolors=_look(region)[0], linewidths=0.0))
         for region, corners in polygons.items():
@@ -152,8 +148,8 @@ def regions_figure(
         axes.set(xlim=(x[0], x[-1]), ylim=(low, high))
         add_labels(axes, x_label, y_label)
         strips = {region: f"{name} (a strip)" for region, name in names.items() if tallest.get(region, 1.0) < _STRIP}
-        add_legend(figure, ax, _patches(polygons, {**names, **strips}, (x[-1] - x[0]) * (high - low)))
-    return figure
+        page.handles = _patches(polygons, {**names, **strips}, (x[-1] - x[0]) * (high - low))
+    return page.figure
 
 
 def _look(region: int) -> tuple[str, str]:
@@ -205,24 +201,22 @@ def blocks_figure(
     panels: Mapping[str, Floats],
     value_label: str,
     missing_label: str,
-    title: str = "",
-    ax: Axes | None = None,
-    figsize: tuple[float, float] | None = None,
+    **place: Unpack[Place],
 ) -> Figure:
     """Draw a number for each block as the colour of a mark, in one panel or several with the same colours.
 
     Blocks are given by p (rad/s) and alpha (rad), `panels` by their names: arrays of shape (n,). Where a value is not
     finite, the block has a cross, and `missing_label` says why. In `ax` one panel is drawn.
     """
-    if ax is not None and len(panels) > 1:
+    if place.get("ax") is not None and len(panels) > 1:
         raise InvalidOption(f"{len(panels)} panels need a figure of their own: leave ax out, or select one of them")
     columns = min(len(panels), _BESIDE)
     rows = math.ceil(len(panels) / columns)
     finite = np.concatenate([values[np.isfinite(values)] for values in panels.values()])
     low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
     area = float(np.clip(_AREA / len(p), *_MARK))
-    with figure_for(ax, (columns * _PANEL[0] + 0.6, rows * _PANEL[1] + 0.4), figsize, title) as figure:
-        axes = [ax] if ax is not None else list(np.ravel(figure.subplots(rows, columns, squeeze=False)))
+    with page_for((columns * _PANEL[0] + 0.6, rows * _PANEL[1] + 0.4), **place) as page:
+        axes = page.panels(rows, columns)
         for each, (name, values) in zip(axes, panels.items(), strict=False):
             there = np.isfinite(values)
             x, y = p[there], np.degrees(alpha[there])
@@ -234,8 +228,72 @@ def blocks_figure(
             add_labels(each, "p (rad/s)", "slenderness (degrees)")
             if len(panels) > 1:
                 each.set_title(as_written(name), color=INK)
+        page.drawn = axes[: len(panels)]
         for spare in axes[len(panels) :]:
             spare.remove()
-        figure.colorbar(marks, ax=axes[: len(panels)], label=value_label, shrink=0.9)
-        add_legend(figure, ax, handles_of(*axes[: len(panels)]))
-    return figure
+        page.figure.colorbar(marks, ax=page.drawn, label=value_label, shrink=0.9)
+    return page.figure
+
+
+#: Shades by kind, each of another luminance; those of orbits from the largest basin on, of which the last is repeated.
+_SHADES: Final = {
+    "orbit": ("#f4f7fb", "#c3d3e6", "#8fabcd", "#6488b3", "#e8d9a8", "#bda55d"),
+    "overturns": ("#8c3410", "#3f1404"),
+    "unsettled": ("#7a7f85",),
+    "missing": ("#ffffff",),
+}
+
+#: Marks of the points of orbits, those of one orbit alike.
+_MARKS: Final = ("o", "^", "s", "D", "v", "P")
+
+
+def basins_figure(
+    *,
+    x: Floats,
+    y: Floats,
+    outcome: NDArray[np.integer],
+    names: Sequence[str],
+    kinds: Sequence[str],
+    orbits: Floats,
+    x_label: str,
+    y_label: str,
+    **place: Unpack[Place],
+) -> Figure:
+    """Draw which attractor each state of a grid goes to: numbers of shape (len(y), len(x)), -1 where it is not known.
+
+    A kind is "orbit", "overturns" or "unsettled"; `orbits` has shape (attractors, points, 2), NaN where there is none.
+    """
+    from matplotlib.colors import BoundaryNorm, ListedColormap
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    shades = [_SHADES["missing"][0]]
+    for k, kind in enumerate(kinds):
+        among = _SHADES[kind]
+        shades.append(among[min(kinds[:k].count(kind), len(among) - 1)])
+    colours, norm = ListedColormap(shades), BoundaryNorm(np.arange(len(shades) + 1) - 1.5, len(shades))
+    with page_for((5.4, 4.6), **place) as page:
+        (axes,) = page.panels()
+        axes.pcolormesh(cell_edges(x), cell_edges(y), outcome, cmap=colours, norm=norm, rasterized=True)
+        handles: list[Artist] = []
+        if np.any(outcome < 0):
+            handles.append(Patch(facecolor=shades[0], edgecolor=INK, linewidth=0.5, hatch="....", label="not reached"))
+        marked = 0
+        for k, (name, kind) in enumerate(zip(names, kinds, strict=True)):
+            handles.append(Patch(facecolor=shades[k + 1], edgecolor=INK, linewidth=0.5, label=name))
+            if kind != "orbit":
+                continue
+            look: dict[str, Any] = {
+                "marker": _MARKS[marked % len(_MARKS)],
+                "color": "white",
+                "markeredgecolor": INK,
+                "markersize": 4.5,
+            }
+            inside = (orbits[k] >= [x[0], y[0]]).all(axis=1) & (orbits[k] <= [x[-1], y[-1]]).all(axis=1)
+            if inside.any():
+                axes.plot(*orbits[k][inside].T, linestyle="", markeredgewidth=0.8, **look)
+                handles.append(Line2D([], [], linestyle="", label=f"{name}: its points", **look))
+            marked += 1
+        add_labels(axes, x_label, y_label)
+        page.handles = handles
+    return page.figure

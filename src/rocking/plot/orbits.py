@@ -1,14 +1,14 @@
-"""Periodic orbits in the phase plane and over time, branches of them along a parameter, and bifurcation diagrams."""
+"""Periodic orbits, branches of them, bifurcation diagrams, and intervals between the impacts of a sequence."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Unpack
 
 import numpy as np
 
-from rocking.arrays import Flags, Floats
-from rocking.plot.canvas import ABOVE, GROUND, INK, add_labels, add_legend, figure_for, handles_of
+from rocking.arrays import Flags, Floats, Integers
+from rocking.plot.canvas import ABOVE, GROUND, INK, Place, add_labels, page_for
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 #: How stable and unstable orbits are drawn.
 _STABLE: Final[dict[str, Any]] = {"color": INK, "linewidth": 1.4, "linestyle": "-"}
+_IMPACT: Final[dict[str, Any]] = {"color": ABOVE, "linewidth": 0.8, "linestyle": (0, (1, 1.5))}
 _UNSTABLE: Final[dict[str, Any]] = {"color": ABOVE, "linewidth": 1.2, "linestyle": (0, (4, 2))}
 
 #: Marks of bifurcations by their names, and what marks others.
@@ -41,46 +42,31 @@ def orbit_figure(
     impact_times: Floats,
     states: Floats,
     labels: tuple[str, str],
-    title: str = "",
-    ax: Axes | None = None,
-    figsize: tuple[float, float] | None = None,
+    **place: Unpack[Place],
 ) -> Figure:
     """Draw a periodic orbit: velocity against coordinate with its impacts, and the coordinate over time.
 
     Times are in periods of the motion, with one just before and one at each impact; `states` are those at the starts of
     periods; `labels` name coordinate and velocity. In `ax`, the phase plane is drawn alone.
     """
-    with figure_for(ax, (7.0, 3.2), figsize, title) as figure:
-        plane, history = (ax, None) if ax is not None else figure.subplots(1, 2)
+    with page_for((7.0, 3.2), **place) as page:
+        plane, *histories = page.panels(1, 2)
         # Arcs end at impacts: a jump of the velocity is no part of the course.
         at = np.searchsorted(time, impact_times, side="right") - 1  # division may have made two times one
         x, v = (np.insert(each, at, np.nan) for each in (coordinate, velocity))
         plane.plot(x, v, label="orbit", **_STABLE)
         before = np.maximum(at - 1, 0)
-        for k, (first, second) in enumerate(zip(before, np.minimum(at, len(time) - 1), strict=True)):
-            look: dict[str, Any] = {
-                "color": ABOVE,
-                "linewidth": 0.8,
-                "linestyle": (0, (1, 1.5)),
-                "label": "impact" if k == 0 else None,
-            }
-            plane.plot(coordinate[[first, second]], velocity[[first, second]], **look)
-        start: dict[str, Any] = {
-            "color": INK,
-            "markersize": 5.0,
-            "markerfacecolor": "white",
-            "label": "start of a period",
-        }
-        plane.plot(states[:, 0], states[:, 1], "o", zorder=4, **start)
+        for k, jump in enumerate(np.column_stack([before, np.minimum(at, len(time) - 1)])):
+            plane.plot(coordinate[jump], velocity[jump], label="" if k else "impact", **_IMPACT)
+        plane.plot(*states.T, "o", color=INK, markersize=5.0, mfc="white", label="start of a period", zorder=4)
         add_labels(plane, *labels)
-        if history is not None:
+        for history in histories:
             history.plot(time, coordinate, **_STABLE)
             heights = np.interp(impact_times, time, coordinate)
             history.plot(impact_times, heights, "|", color=ABOVE, markersize=8.0, markeredgewidth=1.0)
             history.set_xlim(time[0], time[-1])
             add_labels(history, "time (periods of the motion)", labels[0])
-        add_legend(figure, ax, handles_of(plane))
-    return figure
+    return page.figure
 
 
 def branch_figure(
@@ -90,17 +76,15 @@ def branch_figure(
     stable: Flags,
     marks: Sequence[tuple[str, float, float]],
     labels: tuple[str, str],
-    title: str = "",
-    ax: Axes | None = None,
-    figsize: tuple[float, float] | None = None,
+    **place: Unpack[Place],
 ) -> Figure:
     """Draw branches of periodic orbits: stable ones as full lines, unstable ones dashed, and bifurcations by marks.
 
     A value that is not a number parts a branch from the next. `marks` are names of bifurcations, with the parameter and
     the height there.
     """
-    with figure_for(ax, (5.2, 3.6), figsize, title) as figure:
-        axes = figure.add_subplot() if ax is None else ax
+    with page_for((5.2, 3.6), **place) as page:
+        (axes,) = page.panels()
         for chosen, name, style in ((stable, "stable", _STABLE), (~stable, "unstable", _UNSTABLE)):
             # Dashes reach to the points where full lines begin.
             joined = chosen | np.append(chosen[1:], False) | np.insert(chosen[:-1], 0, False)
@@ -119,8 +103,7 @@ def branch_figure(
             axes.plot(at[:, 0], at[:, 1], marker=_MARKS.get(kind, _OTHER), label=kind, **look)
         axes.margins(x=0.04, y=0.06)
         add_labels(axes, *labels)
-        add_legend(figure, ax, handles_of(axes))
-    return figure
+    return page.figure
 
 
 #: Colour of each way through the values, and area of its marks, points squared; of two the first is the larger, so that
@@ -139,9 +122,7 @@ def bifurcation_figure(
     not_followed: Flags | None = None,
     x_label: str,
     y_label: str,
-    title: str = "",
-    ax: Axes | None = None,
-    figsize: tuple[float, float] | None = None,
+    **place: Unpack[Place],
 ) -> Figure:
     """Draw states, shape (len(value), n), of each direction against a parameter; NaN where there is none.
 
@@ -149,8 +130,8 @@ def bifurcation_figure(
     """
     from matplotlib.lines import Line2D
 
-    with figure_for(ax, (5.6, 3.8), figsize, title) as figure:
-        axes = ax or figure.add_subplot()
+    with page_for((5.6, 3.8), **place) as page:
+        (axes,) = page.panels()
         handles: list[Artist] = []
         looks = _ALONE if len(states) == 1 else _LOOKS
         for (way, kept), (colour, area) in zip(states.items(), looks, strict=True):
@@ -161,11 +142,61 @@ def bifurcation_figure(
         for gone, marker, label in ((overturned, "|", "overturned"), (not_followed, "x", "not followed")):
             if gone is None or not gone.any():
                 continue
-            places = value[gone]
             look: dict[str, Any] = {"linestyle": "", "marker": marker, "color": GROUND}
-            axes.plot(places, np.full(places.size, 0.015), transform=axes.get_xaxis_transform(), **look)
+            axes.plot(value[gone], 0.015 + 0.0 * value[gone], transform=axes.get_xaxis_transform(), **look)
             handles.append(Line2D([], [], label=label, **look))
         axes.set_xlim(value[0], value[-1] if value.size > 1 else None)
         add_labels(axes, x_label, y_label)
-        add_legend(figure, ax, handles)
-    return figure
+        page.handles = handles
+    return page.figure
+
+
+_DOTS: Final[dict[str, Any]] = {"linestyle": "", "marker": "o", "color": INK, "markersize": 3.2, "markeredgewidth": 0.6}
+
+#: Up to so many intervals are joined by a line, which shows how they take turns.
+_JOINED: Final = 100
+
+#: Space beside the first and the last impact, over their number.
+_MARGIN: Final = 0.03
+
+
+def intervals_figure(*, intervals: Floats, eta: float, **place: Unpack[Place]) -> Figure:
+    """Draw the dimensionless intervals between the impacts of a chattering sequence, and the ratios of every second.
+
+    The first interval is that from the uplift; there may be none. The ratios of a complete sequence tend to eta^2. In
+    `ax`, the intervals are drawn without the ratios.
+    """
+    from matplotlib.ticker import MaxNLocator
+
+    with page_for((7.0, 3.2), **place) as page:
+        # Panels are beside each other where the figure is wider than high.
+        panels = page.panels(*((1, 2) if page.figure.get_figwidth() > page.figure.get_figheight() else (2, 1)))
+        number = np.arange(1, intervals.size + 1)
+        margin = max(0.5, _MARGIN * intervals.size)
+        _draw(panels[0], number, intervals)
+        add_labels(panels[0], "impact", "interval before the impact, p t")
+        if intervals.size:
+            panels[0].set_yscale("log")
+        for panel in panels[1:]:
+            _draw(panel, number[2:], intervals[2:] / intervals[:-2])
+            panel.axhline(eta**2, color=ABOVE, linewidth=1.2, linestyle=(0, (5, 1.5)), label=f"η² = {eta**2:.5g}")
+            add_labels(panel, "impact", "interval over that two impacts before")
+        for panel in panels:
+            panel.grid(True)
+            if intervals.size:
+                panel.set_xlim(1.0 - margin, intervals.size + margin)
+                panel.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+    return page.figure
+
+
+def _draw(axes: Axes, number: Integers, values: Floats) -> None:
+    """Draw values by the number of the impact; those of the first side filled, those of the second open."""
+    if values.size <= _JOINED:
+        axes.plot(number, values, color=INK, linewidth=0.4, alpha=0.6, label="_in turn")
+    for first, face, label in ((1, INK, "impacts 1, 3, ..."), (0, "white", "impacts 2, 4, ...")):
+        chosen = number % 2 == first
+        if chosen.any():
+            axes.plot(number[chosen], values[chosen], markerfacecolor=face, label=label, **_DOTS)
+    if not values.size:
+        axes.annotate("no such impacts", (0.5, 0.7), xycoords="axes fraction", ha="center", color=INK)
+        axes.set_xticks([])

@@ -1,25 +1,14 @@
-"""Histories of a ground motion, and of a rotation above it with impacts, rests and one chattering sequence."""
+"""Histories of a ground motion and of a response, its course in the phase plane, its energy over time."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, Unpack
 
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.plot.canvas import (
-    ABOVE,
-    GROUND,
-    INK,
-    REST,
-    add_labels,
-    add_legend,
-    add_ticks,
-    figure_for,
-    handles_of,
-    write,
-)
+from rocking.plot.canvas import ABOVE, GROUND, INK, REST, Page, Place, add_labels, add_ticks, page_for, write
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -81,9 +70,7 @@ def response_figure(
     units: RotationUnits = "slenderness",
     limit: str = "slenderness",
     label: str = "",
-    title: str = "",
-    ax: Axes | None = None,
-    figsize: tuple[float, float] | None = None,
+    **place: Unpack[Place],
 ) -> Figure:
     """Draw a response above the ground motion that caused it.
 
@@ -101,10 +88,10 @@ def response_figure(
     shown = float(time[0]), float(time[-1])
     scale = _scale("rad" if label else units, slenderness)
     drawn = scale.of(rotation)
-    zoom = chattering if ax is None and chattering and _can_be_zoomed(chattering) else None
+    zoom = chattering if place.get("ax") is None and chattering and _can_be_zoomed(chattering) else None
     histories = 1 if not motion_time.size else 2 if vertical_acceleration_g is None else 3
-    with figure_for(ax, (7.0, 4.4 if histories < 3 else 5.4), figsize, title) as figure:
-        (main, *grounds), sequence = _panels(figure, ax, histories, zoomed=zoom is not None)
+    with page_for((7.0, 4.4 if histories < 3 else 5.4), **place) as page:
+        (main, *grounds), sequence = _panels(page, histories, zoomed=zoom is not None)
         _shade_rest(main, np.clip(rest_intervals, *shown))
         _draw_rotation(main, time, drawn, scale.of(np.array([-slenderness[1], slenderness[0]])), limit)
         if units != "deg" and not label:
@@ -129,14 +116,14 @@ def response_figure(
         if zoom and sequence is not None:
             _mark_sequence(main, zoom)
             _draw_sequence(sequence, zoom)
-        add_legend(figure, ax, handles_of(main, *grounds))
-    return figure
+    return page.figure
 
 
-def _panels(figure: Figure, ax: Axes | None, histories: int, *, zoomed: bool) -> tuple[list[Axes], Axes | None]:
+def _panels(page: Page, histories: int, *, zoomed: bool) -> tuple[list[Axes], Axes | None]:
     """Panels of the rotation and of the motion, and of the chattering sequence: beside the others, or below them."""
-    if ax is not None:
-        return [ax], None
+    if page.ax is not None:
+        return page.panels(), None
+    figure = page.figure
     beside = zoomed and figure.get_figwidth() >= _WIDE
     below = zoomed and not beside
     heights = (1.3, 1.0, 0.7)[:histories] + (1.0,) * below
@@ -145,7 +132,8 @@ def _panels(figure: Figure, ax: Axes | None, histories: int, *, zoomed: bool) ->
     rotation = figure.add_subplot(grid[0, 0])
     grounds = [figure.add_subplot(grid[k, 0], sharex=rotation) for k in range(1, histories)]
     sequence = figure.add_subplot(grid[:, 1] if beside else grid[-1, 0]) if zoomed else None
-    return [rotation, *grounds], sequence
+    page.drawn = [rotation, *grounds]
+    return page.drawn, sequence
 
 
 def _can_be_zoomed(sequence: DrawnSequence) -> bool:
@@ -288,22 +276,98 @@ def _draw_sequence(axes: Axes, sequence: DrawnSequence) -> None:
 
 
 def motion_figure(
-    *,
-    time: Floats,
-    acceleration_g: Floats,
-    vertical_g: Floats | None = None,
-    title: str = "",
-    ax: Axes | None = None,
-    figsize: tuple[float, float] | None = None,
+    *, time: Floats, acceleration_g: Floats, vertical_g: Floats | None = None, **place: Unpack[Place]
 ) -> Figure:
     """Draw a ground acceleration (g) over time (s), and a vertical one below it; in `ax`, the horizontal one alone."""
     traces = {"ground acceleration (g)": acceleration_g}
-    if vertical_g is not None and ax is None:
+    if vertical_g is not None and place.get("ax") is None:
         traces["vertical acceleration (g)"] = vertical_g
-    with figure_for(ax, (7.0, 0.6 + 1.8 * len(traces)), figsize, title) as figure:
-        panels = [ax] if ax else figure.subplots(len(traces), 1, sharex=True, squeeze=False)[:, 0].tolist()
+    with page_for((7.0, 0.6 + 1.8 * len(traces)), **place) as page:
+        panels = page.panels(len(traces), sharex=True)
         for axes, (label, trace) in zip(panels, traces.items(), strict=True):
             _draw_ground(axes, time, trace, 0.8)
             axes.set_xlim(time[0], time[-1])
             add_labels(axes, "time (s)" if axes is panels[-1] else "", label)
-    return figure
+        page.handles = []
+    return page.figure
+
+
+#: Rotations and velocities beyond this leave the frame: past it a block only falls.
+_FARTHEST: Final = 2.0
+
+_BOUNDARY: Final[dict[str, Any]] = {"color": ABOVE, "linewidth": 0.9, "linestyle": (0, (6, 2, 1, 2))}
+_JUMP: Final[dict[str, Any]] = {"color": GROUND, "linewidth": 1.1, "linestyle": (0, (1, 1.5))}
+
+
+def phase_figure(
+    *,
+    rotation: Floats,
+    velocity: Floats,
+    jumps: Floats,
+    boundary: tuple[Floats, Floats],
+    uplifts: bool = False,
+    rests: bool = False,
+    limit: str = "slenderness",
+    **place: Unpack[Place],
+) -> Figure:
+    """Draw velocity over p times what `limit` names, against the rotation over that.
+
+    Both have gaps (NaN) at impacts, which are dotted lines between the velocities of `jumps`, shape (n, 2), at no
+    rotation; uplift and rest are at the origin. `boundary` has the states with as much energy as at the balance.
+    """
+    with page_for((4.6, 4.2), **place) as page:
+        (axes,) = page.panels()
+        axes.axhline(0.0, color=INK, linewidth=0.4)
+        axes.axvline(0.0, color=INK, linewidth=0.4)
+        axes.plot(*boundary, label="as much energy as at the balance", **_BOUNDARY)
+        if len(jumps):
+            x = np.zeros(3 * len(jumps))
+            axes.plot(x, np.insert(jumps, 2, np.nan, axis=1).ravel(), label="impact", **_JUMP)
+        axes.plot(rotation, velocity, color=INK, linewidth=0.8, label="response")
+        if uplifts or rests:
+            name = " and ".join(word for word, seen in (("uplift", uplifts), ("rest", rests)) if seen)
+            look: dict[str, Any] = {"color": INK, "markersize": 5.0, "markerfacecolor": REST, "zorder": 4}
+            axes.plot(0.0, 0.0, "o", label=name, **look)
+        for values, set_limits in ((rotation, axes.set_xlim), (velocity, axes.set_ylim)):
+            reach = float(np.nanmax(np.abs(values), initial=0.0))
+            reach = 1.1 * min(max(reach, 1e-12), _FARTHEST)
+            set_limits(-reach, reach)
+        add_labels(axes, f"rotation / {limit}", f"velocity / (p × {limit})")
+    return page.figure
+
+
+def energy_figure(
+    *,
+    time: Floats,
+    kinetic: Floats,
+    potential: Floats,
+    needed: tuple[float, float],
+    impact_times: Floats,
+    rest_intervals: Floats,
+    **place: Unpack[Place],
+) -> Figure:
+    """Draw kinetic, potential and total energy over time, s, over the least energy that overturns the body.
+
+    `needed` is what overturns it to side + and side -; a level is drawn where the energy comes near it.
+    `rest_intervals` have shape (k, 2).
+    """
+    with page_for((7.0, 3.0), **place) as page:
+        (axes,) = page.panels()
+        label = "at rest"
+        for start, end in np.clip(rest_intervals, time[0], time[-1]):
+            if start < end:
+                axes.axvspan(start, end, color=REST, linewidth=0.0, label=label)
+                label = ""
+        total = kinetic + potential
+        top = float(np.max(total, initial=0.0)) or 1.0
+        axes.plot(time, total, color=INK, linewidth=1.4, label="total, which drops at impacts")
+        axes.plot(time, potential, color=GROUND, linewidth=1.0, label="potential")
+        axes.plot(time, kinetic, color="#3c6aa0", linewidth=0.8, linestyle=(0, (4, 1.5)), label="kinetic")
+        axes.plot(impact_times, np.zeros(impact_times.size), "|", color=INK, markersize=6, markeredgewidth=0.5)
+        levels = sorted({level for level in needed if math.isfinite(level) and level < 1.6 * top})
+        for level in levels:
+            axes.axhline(level, label="" if level != levels[0] else "as much energy as at the balance", **_BOUNDARY)
+        axes.set_xlim(time[0], time[-1])
+        axes.set_ylim(0.0, 1.08 * max([min(top, 2.0 * max([1.0, *levels])), *levels]))
+        add_labels(axes, "time (s)", "energy / least that overturns")
+    return page.figure

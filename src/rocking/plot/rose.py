@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
 from rocking.arrays import Floats
-from rocking.plot.canvas import ABOVE, GROUND, INK, REST, add_labels, add_legend, figure_for, handles_of, styles_of
+from rocking.plot.canvas import ABOVE, GROUND, INK, REST, Place, add_labels, page_for, styles_of
 from rocking.tables import as_written
 
 if TYPE_CHECKING:
@@ -24,9 +24,7 @@ def rose_figure(
     p: Floats,
     support: Floats,
     weakest: tuple[float, float],
-    title: str = "",
-    ax: Axes | None = None,
-    figsize: tuple[float, float] | None = None,
+    **place: Unpack[Place],
 ) -> Figure:
     """Draw the acceleration that lifts a body in each direction, g, around its support; slenderness and p beside it.
 
@@ -35,14 +33,12 @@ def rose_figure(
     """
     from matplotlib.patches import Polygon
 
-    with figure_for(ax, (6.8, 4.0), figsize, title) as figure:
-        if ax is not None:
-            main = ax
-        else:
-            grid = figure.add_gridspec(2, 2, width_ratios=(1.6, 1.0))
-            main = figure.add_subplot(grid[:, 0])
-            upper = figure.add_subplot(grid[0, 1])
-            lower = figure.add_subplot(grid[1, 1], sharex=upper)
+    with page_for((6.8, 4.0), **place) as page:
+        if page.ax is None:
+            grid = page.figure.add_gridspec(2, 2, width_ratios=(1.6, 1.0))
+            page.drawn = [page.figure.add_subplot(grid[:, 0])]
+            upper = page.figure.add_subplot(grid[0, 1])
+            lower = page.figure.add_subplot(grid[1, 1], sharex=upper)
             for axes, values, label in ((upper, slenderness, "slenderness (deg)"), (lower, p, "p (rad/s)")):
                 axes.plot(*_closed(azimuth, values), color=INK, linewidth=1.2)
                 axes.grid(True)
@@ -51,47 +47,29 @@ def rose_figure(
             lower.set_xlim(0.0, 360.0)
             lower.set_xticks([0.0, 180.0, 360.0])
             lower.set_xticks([90.0, 270.0], minor=True)
+        (main,) = page.drawn or page.panels()
         _draw_circles(main, float(max(acceleration.max(), np.abs(support).max())))
-        main.add_patch(
-            Polygon(
-                support, facecolor=REST, edgecolor=GROUND, linewidth=1.0, label="support over height of centre of mass"
-            )
-        )
+        label = "support over height of centre of mass"
+        main.add_patch(Polygon(support, facecolor=REST, edgecolor=GROUND, linewidth=1.0, label=label))
         main.plot(*_around(azimuth, acceleration), color=INK, linewidth=1.4, label="ground acceleration that lifts it")
         main.plot(0.0, 0.0, "o", color=INK, markersize=4.0)
         end = weakest[1] * _unit(weakest[0])
-        main.plot(
-            *np.column_stack([np.zeros(2), end]),
-            color=ABOVE,
-            linewidth=1.6,
-            linestyle=(0, (4, 1.5)),
-            label=f"least: {weakest[1]:.3g} g at {weakest[0]:.3g} deg",
-        )
+        label = f"least: {weakest[1]:.3g} g at {weakest[0]:.3g} deg"
+        main.plot([0.0, end[0]], [0.0, end[1]], color=ABOVE, linewidth=1.6, linestyle=(0, (4, 1.5)), label=label)
         add_labels(main, "towards west and east (g)", "towards south and north (g)")
-        add_legend(figure, ax, handles_of(main))
-    return figure
+    return page.figure
 
 
-def shares_figure(
-    *,
-    azimuth: Floats,
-    shares: Floats,
-    labels: Sequence[str],
-    title: str = "",
-    ax: Axes | None = None,
-    figsize: tuple[float, float] | None = None,
-) -> Figure:
+def shares_figure(*, azimuth: Floats, shares: Floats, labels: Sequence[str], **place: Unpack[Place]) -> Figure:
     """Draw shares, shape (curves, azimuths), over the azimuth: towards the north up, and the full circle is all."""
-    with figure_for(ax, (4.8, 4.8), figsize, title) as figure:
-        axes = ax or figure.add_subplot()
+    with page_for((4.8, 4.8), **place) as page:
+        (axes,) = page.panels()
         _draw_circles(axes, 1.0)
         for share, label, style in zip(shares, labels, styles_of(len(labels)), strict=True):
-            axes.plot(
-                *_around(azimuth, share), linewidth=1.4, marker="o", markersize=2.0, label=as_written(label), **style
-            )
+            look = {"linewidth": 1.4, "marker": "o", "markersize": 2.0, "label": as_written(label), **style}
+            axes.plot(*_around(azimuth, share), **look)
         add_labels(axes, "share towards west and east", "share towards south and north")
-        add_legend(figure, ax, handles_of(axes))
-    return figure
+    return page.figure
 
 
 def _unit(azimuth: Any) -> Floats:
@@ -121,7 +99,7 @@ def _draw_circles(axes: Axes, most: float) -> None:
     reach = places[-1]
     for azimuth, name in ((0.0, "N"), (90.0, "E"), (180.0, "S"), (270.0, "W")):
         end = reach * _unit(azimuth)
-        axes.plot(*np.column_stack([np.zeros(2), end]), color=REST, linewidth=0.7, zorder=0)
+        axes.plot([0.0, end[0]], [0.0, end[1]], color=REST, linewidth=0.7, zorder=0)
         axes.annotate(name, tuple(1.1 * end), ha="center", va="center", fontsize=7.5, color=INK)
     axes.set_aspect("equal")
     axes.set_xlim(-1.2 * reach, 1.2 * reach)

@@ -1,8 +1,8 @@
 """What one simulation found, and what a practitioner asks of it."""
 
-from rocking.response.answers import trail_of
-from rocking.response.derivatives import Gradient, gradient
-from rocking.response.export import active_span, drawing_times
+from rocking.response.figure import active_span, drawing_times
+from rocking.response.gradient import Gradient, gradient
+from rocking.response.history import Solution
 from rocking.response.perturbed import (
     COUNT,
     PRECISION,
@@ -28,6 +28,7 @@ __all__ = [
     "Repeat",
     "Response",
     "Sensitivity",
+    "Solution",
     "active_span",
     "drawing_times",
     "factors_near",
@@ -38,5 +39,4 @@ __all__ = [
     "percent",
     "ratio_text",
     "steps_within",
-    "trail_of",
 ]

@@ -58,14 +58,14 @@ class Energy:
         return np.array(self.body.balance) if self.nonlinear else linear_balance(self.body)
 
     @cached_property
-    def counts_by_balance(self) -> bool:
+    def has_balances(self) -> bool:
         """Whether rotations can be counted in balances: each side to which the body leans has one."""
         return bool(np.all(np.isfinite(self.balance[: len(self.body.sides)])))
 
     @property
-    def counted_in(self) -> Floats:
+    def unit_of_rotation(self) -> Floats:
         """What rotations to each side are counted in, rad: the balance; one radian where they cannot be so counted."""
-        return np.where(np.isfinite(self.balance), self.balance, 1.0) if self.counts_by_balance else np.ones(2)
+        return np.where(np.isfinite(self.balance), self.balance, 1.0) if self.has_balances else np.ones(2)
 
     @cached_property
     def highest(self) -> Floats:

@@ -1,13 +1,14 @@
-"""What the steps of a march tell: the rotation at any time, rests, when a body tips, and the impacts beyond a proof."""
+"""States, rests and tipping from the nodes of a solution, and the impacts beyond a proof."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
 from rocking.arrays import Flags, Floats, Integers
@@ -17,6 +18,7 @@ from rocking.kernels import state
 from rocking.kernels.march import march
 from rocking.kernels.state import Records
 from rocking.kernels.trace import Trail, own, trace
+from rocking.tables import counted
 
 #: Times at which each step of the last arc is looked at for its last passage of the balance point.
 _LOOKS: Final = 33
@@ -33,6 +35,30 @@ _TURNINGS: Final = 30
 _SLOWEST: Final = 1e-10
 _MOST_IMPACTS: Final = 10_000
 _LEAST_SHARE: Final = 1e-9
+
+
+class Solution(NamedTuple):
+    """What the integration returned, from which a response computes everything else.
+
+    Attributes
+    ----------
+    trail : Trail
+        Ground, body and settings as kernels take them, and the nodes of the series.
+    sequences : structured array
+        Chattering sequences as they were proven, without the rounding before the proof.
+    residual : float
+        Coordinate at the end.
+    again : callable
+        Repeats the simulation with the motion and the start multiplied by a factor.
+    """
+
+    trail: Trail
+    sequences: NDArray[np.void]
+    residual: float
+    again: Callable[[float], Any]
+
+    def __repr__(self) -> str:
+        return f"<Solution: {counted(len(self.trail.nodes), 'node')}>"
 
 
 @dataclass(frozen=True, eq=False)

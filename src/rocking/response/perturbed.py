@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +14,7 @@ from rocking.arrays import Flags, Floats
 from rocking.body import Coordinate
 from rocking.errors import InvalidOption
 from rocking.result import Result
-from rocking.tables import Column, columns_with_skipped, named, text_table
-
-if TYPE_CHECKING:
-    pass
+from rocking.tables import Column, records_of, text_of_columns
 
 #: Relative step of the factors, and their number, in summaries and tables.
 RELATIVE: Final = 1e-6
@@ -162,65 +159,33 @@ class Perturbed(Result):
         >>> response.perturbed().share()
         'overturns in 5 of 5 motions within 3e-6'
         """
-        return _counted(self.outcome, len(self.alike), self)
+        return f"{self.outcome} in {len(self.alike)} of {self.sample}"
 
     def sentence(self) -> str:
-        """Return the outcome in words: "undecided" where it is not the same for all factors.
-
-        Returns
-        -------
-        str
-            As `share`; where the outcomes differ, how many simulations overturn.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> block, record = rocking.Block(width=0.24, height=1.1), rocking.records.load("ridgecrest-clc-090")
-        >>> rocking.simulate(block, record.scaled_to(0.53 * 9.80665)).perturbed().sentence()
-        'undecided: overturns in 2 of 5 motions within 3e-6'
-        """
+        """Return the outcome in words: `share`, or "undecided" and how many overturn where outcomes differ."""
         if self.is_decided:
             return self.share()
         overturned = int(np.count_nonzero(self.overturned))
-        return f"undecided: {_counted(OVERTURNS, overturned, self) if overturned else self.share()}"
+        return f"undecided: {f'{OVERTURNS} in {overturned} of {self.sample}' if overturned else self.share()}"
 
-    def summary(self) -> str:
-        names = {
-            "factor": "factor - 1",
-            "outcome": "outcome",
-            named(f"peak_{self.coordinate.name}", self.coordinate.unit): f"peak, {self.coordinate.unit}",
-            named("peak_time", "s"): "peak time, s",
-            named("last_rest", "s"): "last rest, s",
-        }
-        rows = [row | {"factor": f"{row['factor'] - 1.0:+.2g}"} for row in self.rows()]
-        return f"{self.sentence()}\n\n{text_table([*names.values()], [[row[name] for name in names] for row in rows])}"
+    def _columns(self, table: str) -> list[Column]:
+        (name, _, _, unit, _), each = self.coordinate, list(zip(*self.repeats, strict=True))
+        return [
+            Column("factor", each[0]),
+            Column("outcome", each[1], label="outcome"),
+            Column(f"peak_{name}", each[2], unit, f"peak, {unit}"),
+            Column("peak_time", each[3], "s", "peak time, s"),
+            Column("overturn_time", each[4], "s"),
+            Column("last_rest", each[5], "s", "last rest, s"),
+        ]
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return a row for each factor.
+        """Return a mapping for each factor, with units in the names: the rows of `to_dataframe`."""
+        return records_of(self._columns("repeats"))
 
-        Returns
-        -------
-        list of dict
-            Values by name, with units in the names.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
-        >>> [row["outcome"] for row in response.perturbed(count=3).rows()]
-        ['overturns', 'overturns', 'overturns']
-        """
-        return [
-            {
-                "factor": repeat.factor,
-                "outcome": repeat.outcome,
-                named(f"peak_{self.coordinate.name}", self.coordinate.unit): repeat.peak,
-                named("peak_time", "s"): repeat.peak_time,
-                named("overturn_time", "s"): repeat.overturn_time,
-                named("last_rest", "s"): repeat.last_rest,
-            }
-            for repeat in self.repeats
-        ]
+    def summary(self) -> str:
+        away = Column("away", [f"{factor - 1.0:+.2g}" for factor in self.factors], label="factor - 1")
+        return f"{self.sentence()}\n\n{text_of_columns([away, *self._columns('repeats')])}"
 
     def to_dict(self) -> dict[str, Any]:
         return {
@@ -231,9 +196,6 @@ class Perturbed(Result):
             "count": len(self.repeats),
             "repeats": self.rows(),
         }
-
-    def _columns(self, table: str) -> list[Column]:
-        return columns_with_skipped(self.rows(), {})
 
 
 def repeated(
@@ -271,10 +233,6 @@ def percent(share: float) -> str:
         return f"{100.0 * share:.3g} %"
     mantissa, _, exponent = f"{share:.1e}".partition("e")
     return f"{float(mantissa):g}e{int(exponent)}"
-
-
-def _counted(outcome: str, number: int, found: Perturbed) -> str:
-    return f"{outcome} in {number} of {found.sample}"
 
 
 def _kind(outcome: str) -> str:

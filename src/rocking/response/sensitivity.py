@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +19,9 @@ from rocking.kernels.trace import Quantity, Trail, own, vary
 from rocking.kernels.uplift import next_uplifts
 from rocking.response.history import History
 from rocking.tables import counted
+
+if TYPE_CHECKING:
+    from rocking.response.response import Response
 
 #: A response is ambiguous when changes of the motion, the initial state and the block by one unit in the last place
 #: move its peak by more than this fraction, or one of its events or impacts by more than this many seconds.
@@ -46,57 +48,57 @@ _MOST_NONLINEAR: Final = 0.5
 Changes = tuple[Floats, Floats, Floats]
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class Sensitivity:
     """Changes of a response per unit of relative change of what it was computed from, found when first asked for.
 
     Structured arrays with the fields motion, initial_rotation, initial_velocity, p, alpha and restitution (of both
     sides together): a field times 1e-3 is what 0.1 % more of that quantity changes, to first order. NaN throughout
-    where the simulation was not finished.
+    where the simulation was not finished. Made by `Response.sensitivity`.
     """
 
-    _trail: Trail
-    _history: History
-    _peak_time: float
-    _sizes: tuple[int, int]
-    _fixed: bool
-    _unfinished: bool
-    _found: dict[int, Changes] = field(default_factory=dict)
+    def __init__(self, response: Response) -> None:
+        self._trail = trail = response.solution.trail
+        drawn = int(trail.block["seed"]) >= 0 and bool(trail.block["varying"])
+        # What is drawn goes by the number of the impact, which those beyond a proof do not count in.
+        self._history = History(trail, response.duration, response.body.stops) if drawn else response._history
+        self._peak_time = np.array([response.peak_time])
+        self._peak_time.flags.writeable = False
+        self._sizes = len(response.impacts), len(response.events)
+        self._is_peak_fixed = response.overturned or response._reaches_second_stop
+        self._unfinished = response.unfinished
 
     @cached_property
     def peak(self) -> NDArray[np.void]:
         """Of the peak rotation, rad, shape (1,); 0 when overturned."""
-        return self._public(0)
+        return self._table(0)
 
     @cached_property
     def impacts(self) -> NDArray[np.void]:
         """Of the times of the response's impacts, s."""
-        return self._public(1)
+        return self._table(1)
 
     @cached_property
     def events(self) -> NDArray[np.void]:
         """Of the times of the response's events, s."""
-        return self._public(2)
+        return self._table(2)
 
-    def _public(self, which: int) -> NDArray[np.void]:
+    def _table(self, which: int) -> NDArray[np.void]:
         """Return changes of peak, impacts or events, in a field for each quantity."""
-        values = self._along(QUANTITIES)[which]
+        values = self._all[which]
         table = np.empty(values.shape[1], dtype=[(name, "f8") for name in QUANTITIES])
         for name, row in zip(QUANTITIES, values, strict=True):
             table[name] = np.nan if self._unfinished else row
         return table
 
-    def _along(self, names: tuple[str, ...]) -> Changes:
+    @cached_property
+    def _all(self) -> Changes:
+        return self._along(QUANTITIES)
+
+    def _along(self, names: Iterable[str]) -> Changes:
         """Return changes of peak, impacts and events, in a row for each name: one pass along the steps for each."""
-        at = np.array([self._peak_time])
-        at.flags.writeable = False
-        quantities = [_NAMES.index(name) for name in names]
-        for each in quantities:
-            if each not in self._found:
-                self._found[each] = _varied(self._trail, each, at, *self._sizes)
-        rows = zip(*(self._found[each] for each in quantities), strict=True)
-        peak, impacts, events = (np.array(values) for values in rows)
-        return np.zeros_like(peak) if self._fixed else peak, impacts, events
+        rows = [_varied(self._trail, _NAMES.index(name), self._peak_time, *self._sizes) for name in names]
+        peak, impacts, events = (np.array(values) for values in zip(*rows, strict=True))
+        return np.zeros_like(peak) if self._is_peak_fixed else peak, impacts, events
 
     def rotation(self, time: ArrayLike, of: Iterable[str] = QUANTITIES) -> dict[str, Floats]:
         """Return the change of the rotation at given times with each quantity.
@@ -158,14 +160,14 @@ def _varied(trail: Trail, quantity: int, times: Floats, impacts: int, events: in
     return heights, at_impacts, at_events
 
 
-def ambiguities(found: Sensitivity, height: float, near_ties: int) -> tuple[str, ...]:
+def ambiguities(changes: Sensitivity, trail: Trail, height: float, near_ties: int) -> tuple[str, ...]:
     """Which of "peak", "events" and "touch" one unit in the last place of everything changes visibly.
 
     ``height`` is that of the peak above the stop; ``near_ties``: those that are known otherwise.
     """
-    early, late = (_uplifts(found._trail, share) for share in (1.0 - _TIE, 1.0 + _TIE))
+    early, late = (_uplifts(trail, share) for share in (1.0 - _TIE, 1.0 + _TIE))
     near_ties += int(np.any(late > early + AMBIGUITY))
-    peak, *times = (_ULP * np.sum(np.abs(rows), axis=0) for rows in found._along(QUANTITIES))
+    peak, *times = (_ULP * np.sum(np.abs(rows), axis=0) for rows in changes._all)
     known = {
         "peak": bool(np.all(peak <= AMBIGUITY * max(height, 1e-300))),
         "events": bool(np.all(np.concatenate(times) <= AMBIGUITY)),

@@ -1,9 +1,9 @@
-"""A response in words for people, to the digits that are known, and in plain values for machines."""
+"""A response in words for people, to the digits that are known."""
 
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -11,11 +11,12 @@ from rocking.block import Block, RestrainedBlock
 from rocking.block.sides import in_line
 from rocking.constants import STANDARD_GRAVITY
 from rocking.problem import thresholds_of
-from rocking.response.answers import Answers
-from rocking.response.export import records
 from rocking.response.perturbed import percent, steps_within
 from rocking.result import Row
-from rocking.tables import counted, named
+from rocking.tables import counted
+
+if TYPE_CHECKING:
+    from rocking.response.response import Response
 
 #: Decimals of a time at most; digits of a peak, at most and where its range is shown.
 _MOST_DECIMALS: Final = 9
@@ -40,22 +41,25 @@ _AFFECTED: Final = {
 }
 
 
-def summary_rows(response: Answers, friction: float | None, precision: float) -> list[Row]:
+def summary_rows(response: Response, friction: float | None, precision: float) -> list[Row]:
     """Return what happened, line by line; with a coefficient of friction, whether it is enough."""
     body = response.body
     sliding = math.nan if friction is None else response.sliding_time(friction)
     rows = [
         Row("block" if isinstance(body, Block) else "body", body.description),
         Row("parameters", in_line(body.sides)),
-        *_balance_rows(response),
+        *([Row("balance", _balance_text(response))] if isinstance(body, RestrainedBlock) else []),
         Row("motion", _motion_text(response)),
         Row("uplift above", _thresholds_text(response)),
         *_event_rows(response),
         Row("impacts resolved", f"{len(response.impacts)}"),
         *_peak_rows(response),
         *([Row(f"residual {body.coordinate.name}", _residual_text(response))] if response.leans else []),
-        *_tendon_rows(response),
     ]
+    for row in response.tendons:
+        stays = f", {1e3 * row['plastic_elongation']:.4g} mm of it for good" if row["plastic_elongation"] else ""
+        text = f"longer by {1e3 * row['elongation']:.4g} mm at most{stays}"
+        rows.append(Row("tendon", text, note=f", force {1e-3 * row['force']:.4g} kN at most"))
     if isinstance(body, RestrainedBlock) and body.contact is None:
         rows.append(Row("friction, lift-off", "not judged: the forces of the ground are not known"))
     if body.contact is not None:
@@ -63,8 +67,13 @@ def summary_rows(response: Answers, friction: float | None, precision: float) ->
         rows += [
             Row("friction needed", f"{response.required_friction:.4f}", note=tips),
             Row("least normal force", f"{response.minimum_normal_force:.4f}", "of the weight", tips),
-            *_contact_rows(response, friction, sliding),
         ]
+        if friction is not None:
+            slides = f"is not enough: the block slides, first at {sliding:.4f} s; what follows is not this response"
+            enough = "is enough: the block does not slide"
+            rows.append(Row(f"friction {friction:g}", enough if math.isnan(sliding) else slides))
+        if not math.isnan(response.lift_off_time):
+            rows.append(Row("base lifts off", f"at {response.lift_off_time:.4f} s; what follows is not this response"))
     near = response.perturbed()
     if (
         np.max(np.nan_to_num(near.event_spreads, nan=math.inf), initial=0.0) >= _SHOWN
@@ -79,7 +88,7 @@ def summary_rows(response: Answers, friction: float | None, precision: float) ->
     ]
 
 
-def line(response: Answers) -> str:
+def line(response: Response) -> str:
     """Return what happened, in one line."""
     motion, limit = response.motion, response.body.coordinate.limit
     peak = ""
@@ -93,65 +102,7 @@ def line(response: Answers) -> str:
     )
 
 
-def facts(response: Answers, friction: float | None, precision: float) -> list[Row]:
-    """Return the result for machines, by name."""
-    body, motion, (name, _, _, unit, limit) = response.body, response.motion, response.body.coordinate
-    block = {
-        "description": body.description,
-        **{named(key, of): values[0] for key, (values, of) in body.alone().parameters().items()},
-        named("gravity", "m/s^2"): body.gravity,
-    }
-    shaken = motion and {
-        "name": motion.name,
-        named("duration", "s"): motion.duration,
-        named("pga", "m/s^2"): motion.pga,
-        "history": motion.history,
-        "vertical": motion.vertical and {"name": motion.vertical.name, named("pga", "m/s^2"): motion.vertical.pga},
-    }
-    rows = [
-        Row("block", block),
-        Row("motion", shaken),
-        Row("model", response.model),
-        Row("chattering_treatment", repr(response.treatment)),
-        Row("overturned", response.overturned),
-        Row("unfinished", response.unfinished),
-        Row("stopped", response.stopped),
-        Row("leans", response.leans),
-        Row("overturn_time", response.overturn_time, "s"),
-        Row("tipping_time", response.tipping_time, "s"),
-        Row(f"peak_{name}", response.peak_rotation, unit),
-        Row(f"residual_{name}", response.residual_rotation, unit),
-    ]
-    if limit:
-        rows.append(Row(f"peak_over_{limit}", response.peak_over_slenderness))
-    if isinstance(body, RestrainedBlock):
-        rows += [Row("balance", list(response.balance), unit), Row("tendons", records(response, "tendons"))]
-    rows.append(Row("peak_time", response.peak_time, "s"))
-    if body.contact is not None:
-        rows += [
-            Row("required_friction", response.required_friction),
-            Row("minimum_normal_force_over_weight", response.minimum_normal_force),
-            Row("lift_off_time", response.lift_off_time, "s"),
-        ]
-    if friction is not None:
-        rows += [Row("friction", friction), Row("sliding_time", response.sliding_time(friction), "s")]
-    return [
-        *rows,
-        Row("impacts_resolved", len(response.impacts)),
-        Row("duration", response.duration, "s"),
-        Row("time_at_rest", response.time_at_rest, "s"),
-        Row(
-            "perturbed",
-            [each.to_dict() for each in (response.perturbed(), response.perturbed(*steps_within(precision)))],
-        ),
-        Row("ambiguous", response.ambiguous),
-        Row("ambiguities", response.ambiguities),
-        Row("events", records(response, "events")),
-        Row("chattering", records(response, "chattering")),
-    ]
-
-
-def in_words(response: Answers, overturn_time: str) -> str:
+def in_words(response: Response, overturn_time: str) -> str:
     """Return what became of the body, for its summary; the time at which it overturns is given as text."""
     if response.overturned:
         return f"overturns at {overturn_time}"
@@ -162,14 +113,14 @@ def in_words(response: Answers, overturn_time: str) -> str:
         goes_on = motion is not None and response.duration < motion.end
         to_come = f"; the motion goes on to {motion.end:.6g} s" if motion is not None and goes_on else ""
         return f"{_when_stopped(response)}, where the simulation was stopped{to_come}"
-    if response.leans and _can_overturn(response):
+    if response.leans and response.body.coordinate.limit:
         return f"does not overturn: it stays leaning, at {_residual_text(response)}"
     if not response.moved:
         return "does not move"
-    return "rocks and does not overturn" if _can_overturn(response) else "moves, and comes to rest"
+    return "rocks and does not overturn" if response.body.coordinate.limit else "moves, and comes to rest"
 
 
-def in_brief(response: Answers, precision: float) -> str:
+def in_brief(response: Response, precision: float) -> str:
     """Return what became of the body, for a row of a table."""
     near, further = response.perturbed(), response.perturbed(*steps_within(precision))
     if not near.is_decided and near.overturned.any():
@@ -191,37 +142,28 @@ def in_brief(response: Answers, precision: float) -> str:
     return f"{text} in {', '.join(parts)}{', AMBIGUOUS' if response.ambiguous else ''}"
 
 
-def _residual_text(response: Answers) -> str:
+def _residual_text(response: Response) -> str:
     """Rotation about which the block leans; it depends on the peak where a tendon has yielded."""
     return f"{response.residual_rotation:.{_peak_digits(response)}g} {response.body.coordinate.unit}"
 
 
-def ratio_text(response: Answers) -> str:
+def ratio_text(response: Response) -> str:
     """Peak rotation over slenderness, to the digits that are known."""
     return f"{response.peak_over_slenderness:.{min(_peak_digits(response), 4)}g}"
 
 
-def known_ratio(response: Answers) -> float:
+def known_ratio(response: Response) -> float:
     """Peak rotation over slenderness, rounded where fewer than four digits are known: to show it in fewer still."""
     return response.peak_over_slenderness if _peak_digits(response) >= _SHORT else float(ratio_text(response))
 
 
 def time_text(time: float, low: float, high: float) -> str:
-    """Return a time in s with the digits that repeated simulations leave, or the range where that is wide.
-
-    Parameters
-    ----------
-    time : float
-        Time, s.
-    low, high : float
-        Earliest and latest time in repeated simulations, s.
+    """Return a time, s, with the digits that its range in repeated simulations leaves, or the range where it is wide.
 
     Examples
     --------
-    >>> time_text(230.726244377, 230.726244377, 230.726244377), time_text(230.726244377, 230.72624, 230.72625)
-    ('230.726244377 s', '230.72624 s')
-    >>> time_text(230.726244377, 230.3, 231.1)
-    '230.3 to 231.1 s'
+    >>> time_text(230.726244377, 230.72624, 230.72625), time_text(230.726244377, 230.3, 231.1)
+    ('230.72624 s', '230.3 to 231.1 s')
     """
     unknown = _unknown(time, low, high)
     decimals = _decimals(unknown)
@@ -230,12 +172,7 @@ def time_text(time: float, low: float, high: float) -> str:
     return f"{low:.{decimals}f} to {high:.{decimals}f} s"
 
 
-def overturn_text(response: Answers) -> str:
-    """Time at which the block overturns, as far as it is known."""
-    return time_text(response.overturn_time, *response.perturbed().overturn_range)
-
-
-def tipping_text(response: Answers) -> str:
+def tipping_text(response: Response) -> str:
     """Time at which the block tips, as far as it is known: it falls as late or as early as it tips."""
     unknown = 0.0
     if response.overturned:
@@ -244,7 +181,7 @@ def tipping_text(response: Answers) -> str:
     return f"{about}{response.tipping_time:.{min(_decimals(unknown), _SHORT)}f} s"
 
 
-def peak_time_text(response: Answers) -> str:
+def peak_time_text(response: Response) -> str:
     """Time of the peak, as far as it is known."""
     return _short_text(response.peak_time, *response.perturbed().peak_time_range)
 
@@ -258,7 +195,7 @@ def digits_of(value: float, unknown: float) -> int:
     return min(max(math.floor(-math.log10(unknown / abs(value))), 1), _MOST_DIGITS)
 
 
-def _motion_text(response: Answers) -> str:
+def _motion_text(response: Response) -> str:
     """Say what shakes the body; here and below a g is the standard one, as wherever accelerations are given in g."""
     motion = response.motion
     if motion is None:
@@ -269,7 +206,7 @@ def _motion_text(response: Answers) -> str:
     return "; ".join(parts)
 
 
-def _thresholds_text(response: Answers) -> str:
+def _thresholds_text(response: Response) -> str:
     """Return what lifts the body; under a vertical motion it changes with the weight."""
     motion = response.motion
     (pair,), (own,) = thresholds_of(response.body.alone(), response.model)
@@ -285,7 +222,7 @@ def _thresholds_text(response: Answers) -> str:
     return f"{text}; from {least:.4f} to {most:.4f} g with the weight{'' if one else ', to side +'}"
 
 
-def _event_rows(response: Answers) -> list[Row]:
+def _event_rows(response: Response) -> list[Row]:
     sequences = {float(row["end"]): row for row in response.chattering}
     near = response.perturbed()
     rows: list[Row] = []
@@ -317,7 +254,7 @@ def _rest_note(unknown: float, sequence: np.void) -> str:
     return f", complete chattering proven{start}{bracket}"
 
 
-def _peak_rows(response: Answers) -> list[Row]:
+def _peak_rows(response: Response) -> list[Row]:
     """Peak and its time, each as far as it is known."""
     near, (name, _, _, unit, limit) = response.perturbed(), response.body.coordinate
     (low, high), digits, balance = near.peak_range, _peak_digits(response), response._balance_at_peak
@@ -337,45 +274,18 @@ def _peak_rows(response: Answers) -> list[Row]:
     return [Row(f"peak {name}", value, unit, note)]
 
 
-def _balance_rows(response: Answers) -> list[Row]:
+def _balance_text(response: Response) -> str:
     """Unstable balance of a block that is not free, which its slenderness does not tell."""
-    body = response.body
-    if not isinstance(body, RestrainedBlock):
-        return []
     plus, minus = (f"{value:.5g} rad" if math.isfinite(value) else "none" for value in response.balance)
-    text = plus if plus == minus or body.is_one_sided else f"{plus} (side +), {minus} (side -)"
-    return [Row("balance", text, note=": restraints hold it at any rotation" if text == "none" else "")]
+    if plus != minus and not (isinstance(response.body, RestrainedBlock) and response.body.is_one_sided):
+        return f"{plus} (side +), {minus} (side -)"
+    return "none: restraints hold it at any rotation" if plus == "none" else plus
 
 
-def _tendon_rows(response: Answers) -> list[Row]:
-    """Largest elongation and force of each tendon, and what stays of the elongation."""
-    rows = []
-    for row in response.tendons:
-        stays = f", {1e3 * row['plastic_elongation']:.4g} mm of it for good" if row["plastic_elongation"] else ""
-        text = f"longer by {1e3 * row['elongation']:.4g} mm at most{stays}"
-        rows.append(Row("tendon", text, note=f", force {1e-3 * row['force']:.4g} kN at most"))
-    return rows
-
-
-def _contact_rows(response: Answers, friction: float | None, sliding: float) -> list[Row]:
-    """Return whether the body slides at a coefficient of friction, and when its base leaves the ground if it does."""
-    rows = []
-    if friction is not None:
-        text = (
-            "is enough: the block does not slide"
-            if math.isnan(sliding)
-            else f"is not enough: the block slides, first at {sliding:.4f} s; what follows is not this response"
-        )
-        rows.append(Row(f"friction {friction:g}", text))
-    if not math.isnan(response.lift_off_time):
-        rows.append(Row("base lifts off", f"at {response.lift_off_time:.4f} s; what follows is not this response"))
-    return rows
-
-
-def _outcome(response: Answers) -> str:
+def _outcome(response: Response) -> str:
     text = response.perturbed().sentence()
     if response.overturned:
-        text += f", at {overturn_text(response)}"
+        text += f", at {time_text(response.overturn_time, *response.perturbed().overturn_range)}"
     elif response.unfinished or response.stopped:
         text += f"; {in_words(response, '')}"
     if response.stalled:
@@ -386,21 +296,16 @@ def _outcome(response: Answers) -> str:
     return text
 
 
-def _when_stopped(response: Answers) -> str:
+def _when_stopped(response: Response) -> str:
     end = f"{response.duration:.6g} s"
     if not math.isnan(response.tipping_time):
         return f"beyond its balance point since {response.tipping_time:.4f} s and not yet fallen at {end}"
     if response.moves_at_end:
-        return f"still {'rocking' if _can_overturn(response) else 'moving'} at {end}"
+        return f"still {'rocking' if response.body.coordinate.limit else 'moving'} at {end}"
     return f"at rest at {end}" if response.moved else f"has not moved by {end}"
 
 
-def _can_overturn(response: Answers) -> bool:
-    """Whether the body is one that rocks, and not a ball or a mass between stops."""
-    return bool(response.body.coordinate.limit)
-
-
-def _peak_digits(response: Answers) -> int:
+def _peak_digits(response: Response) -> int:
     unknown = _unknown(response.peak_rotation, *response.perturbed().peak_range)
     return digits_of(response.peak_rotation - response.body.stops[0], unknown)
 

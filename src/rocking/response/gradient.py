@@ -1,4 +1,4 @@
-"""How what a response tells changes with every coefficient, and so with every sample, of its motion."""
+"""Derivatives of a number of a response by every coefficient, and so by every sample, of its motion."""
 
 from __future__ import annotations
 
@@ -18,12 +18,11 @@ from rocking.kernels.state import Records
 from rocking.kernels.trace import Trail, own
 from rocking.motion import piecewise
 from rocking.motion.motion import Motion
-from rocking.response.answers import history_of, trail_of
 from rocking.response.history import steps_to_events, steps_to_impacts
 from rocking.response.response import Response
 
 #: What a gradient is of.
-Told = Literal["peak", "rotation", "velocity", "event", "impact"]
+Quantity = Literal["peak", "rotation", "velocity", "event", "impact"]
 
 #: To so long before a rest, s, its impacts are followed: what is left is to first order, and rounding counts for less.
 _CLOSE: Final = 1e-5
@@ -52,13 +51,15 @@ class Gradient:
     coefficients : ndarray, shape (n, degree + 1)
         By the coefficients of the motion's n pieces: units of the value per m/s^2, per m/s^3, and so on; of a peak rad
         per m/s^2, of a time s per m/s^2. Exactly zero for all pieces that end before the last uplift in front of what
-        is asked for, or begin after it.
+        is differentiated, or begin after it.
     vertical : ndarray or None
         The same, of the vertical component.
     initial_rotation, initial_velocity : float
         By the start: units of the value per rad, and per rad/s.
     reason : str
         Why numbers are NaN, one sentence; empty where none is.
+    motion : Motion or None
+        The motion.
     """
 
     value: float
@@ -67,7 +68,7 @@ class Gradient:
     initial_rotation: float
     initial_velocity: float
     reason: str
-    _motion: Motion | None
+    motion: Motion | None
 
     @property
     def samples(self) -> Floats:
@@ -78,7 +79,7 @@ class Gradient:
         InvalidOption
             If the motion is not linear between samples.
         """
-        return _by_samples(self._motion, self.coefficients)
+        return _by_samples(self.motion, self.coefficients)
 
     @property
     def vertical_samples(self) -> Floats:
@@ -89,9 +90,9 @@ class Gradient:
         InvalidOption
             If there is none, or if it is not linear between samples.
         """
-        if self._motion is None or self._motion.vertical is None or self.vertical is None:
+        if self.motion is None or self.motion.vertical is None or self.vertical is None:
             raise InvalidOption("the motion has no vertical component; give it one by `with_vertical`")
-        return _by_samples(self._motion.vertical, self.vertical)
+        return _by_samples(self.motion.vertical, self.vertical)
 
     def __repr__(self) -> str:
         if np.isnan(self.coefficients).any():
@@ -101,7 +102,7 @@ class Gradient:
         return f"<Gradient: {'; '.join(filter(None, [text, self.reason]))}>"
 
 
-def gradient(response: Response, of: Told = "peak", at: float | None = None) -> Gradient:
+def gradient(response: Response, of: Quantity = "peak", at: float | None = None) -> Gradient:
     """Differentiate what a response tells by its motion, sample by sample, and by the start.
 
     Parameters
@@ -148,38 +149,38 @@ def gradient(response: Response, of: Told = "peak", at: float | None = None) -> 
     """
     if not isinstance(response, Response):
         raise InvalidOption("{} must be a response, as `rocking.simulate` returns it", "response", value=response)
-    checks.one_of(of, "of", InvalidOption, get_args(Told))
+    checks.one_of(of, "of", InvalidOption, get_args(Quantity))
     if of == "peak":
-        asked = _peak(response, at)
+        target = _peak(response, at)
     elif of in ("rotation", "velocity"):
-        asked = _state(response, of, at)
+        target = _state(response, of, at)
     else:
-        asked = _time(response, of, at)
-    trail = trail_of(response)
+        target = _time(response, of, at)
+    trail = response.solution.trail
     out = np.zeros((len(trail.ground.pieces), trail.ground.columns * trail.ground.stretches.shape[1]))
     change = np.zeros(3)
-    reason = _UNFINISHED if response.unfinished else asked.reason
-    if response.near_ties and not reason and _ties_before(trail, asked.instant):
+    reason = _UNFINISHED if response.unfinished else target.reason
+    if response.near_ties and not reason and _ties_before(trail, target.instant):
         reason = _REASONS[Ends.GRAZES]
-    reason = reason or _taken_back(asked, change, out)
+    reason = reason or _by_adjoint(target, change, out)
     if reason and reason != _FROM_REST:
         change[:] = math.nan
         out[:] = math.nan
     horizontal, vertical = _by_components(response.motion, trail, response.body.gravity, out)
     sign = _sign(int(trail.nodes["side"][0]))
     return Gradient(
-        value=asked.value,
+        value=target.value,
         coefficients=horizontal,
         vertical=vertical,
         initial_rotation=float(sign * change[0]),
         initial_velocity=float(sign * change[1]),
         reason=reason,
-        _motion=response.motion,
+        motion=response.motion,
     )
 
 
 @dataclass(frozen=True, eq=False)
-class _Asked:
+class _Target:
     """A number: where in the steps it is told, how it changes with the state there, and why perhaps it has no gradient.
 
     ``since`` is the time after the node of ``row``. ``by_state`` is None of the time at which the step of that row
@@ -196,10 +197,10 @@ class _Asked:
     is_height: bool = False
 
 
-def _peak(response: Response, at: float | None) -> _Asked:
+def _peak(response: Response, at: float | None) -> _Target:
     if at is not None:
         raise InvalidOption('{} is for other quantities: a "peak" is where it is', "at", value=at)
-    trail, value, instant = trail_of(response), response.peak_rotation, response.peak_time
+    trail, value, instant = response.solution.trail, response.peak_rotation, response.peak_time
     reason = _NO_REASON
     if response.overturned:
         reason = _OVERTURNS
@@ -207,15 +208,15 @@ def _peak(response: Response, at: float | None) -> _Asked:
         reason = _AT_STOP
     row = max(0, int(np.searchsorted(trail.nodes["time"], instant)) - 1)
     since = instant - float(trail.nodes["time"][row])
-    return _Asked(value, instant, trail, row, since, (1.0, 0.0), reason, is_height=True)
+    return _Target(value, instant, trail, row, since, (1.0, 0.0), reason, is_height=True)
 
 
-def _state(response: Response, of: Told, at: float | None) -> _Asked:
+def _state(response: Response, of: Quantity, at: float | None) -> _Target:
     """Rotation or velocity at a time."""
     if at is None:
         raise InvalidOption(f"a {of} needs the time, {{}}, at which it is asked for, s", "at")
     time = checks.within(at, "at", InvalidOption, 0.0, response.duration, "s")
-    trail, history = trail_of(response), history_of(response)
+    trail, history = response.solution.trail, response._history
     found = history.states(time)
     row = int(np.searchsorted(trail.nodes["time"], time, side="right")) - 1
     nodes = state.attributed(np.concatenate([trail.nodes[: row + 1], _later(response, row, time)]))
@@ -224,12 +225,12 @@ def _state(response: Response, of: Told, at: float | None) -> _Asked:
     by_state = (sign, 0.0) if of == "rotation" else (0.0, sign)
     since = max(0.0, time - float(nodes["time"][row]))
     value = float(found[0 if of == "rotation" else 1])
-    return _Asked(value, time, trail._replace(nodes=nodes), row, since, by_state)
+    return _Target(value, time, trail._replace(nodes=nodes), row, since, by_state)
 
 
-def _time(response: Response, of: Told, at: float | None) -> _Asked:
+def _time(response: Response, of: Quantity, at: float | None) -> _Target:
     """Time of an event or of an impact."""
-    trail, rows = trail_of(response), response.events if of == "event" else response.impacts
+    trail, rows = response.solution.trail, response.events if of == "event" else response.impacts
     if not len(rows):
         raise InvalidOption(f"the response has no {of}; ask for another quantity, {{}}", "of", value=of)
     k = checks.whole(at, "at", InvalidOption, -len(rows), len(rows) - 1)
@@ -244,13 +245,13 @@ def _time(response: Response, of: Told, at: float | None) -> _Asked:
         later = later[: int(np.max(np.flatnonzero(later["u"] == 0.0), initial=-1)) + 1]
         trail = trail._replace(nodes=state.attributed(np.concatenate([nodes[: row + 1], later, nodes[row + 1 :]])))
         row += len(later)
-    return _Asked(instant, instant, trail, row, since)
+    return _Target(instant, instant, trail, row, since)
 
 
 def _later(response: Response, row: int, until: float) -> Records:
     """Nodes after that of a row up to a time, of impacts that follow where a sequence is closed."""
-    nodes: Records = history_of(response).trail.nodes
-    found: Records = nodes[(nodes["time"] > trail_of(response).nodes["time"][row]) & (nodes["time"] <= until)]
+    nodes: Records = response._history.trail.nodes
+    found: Records = nodes[(nodes["time"] > response.solution.trail.nodes["time"][row]) & (nodes["time"] <= until)]
     return found
 
 
@@ -266,22 +267,22 @@ def _ties_before(trail: Trail, instant: float) -> bool:
     return bool(start["near_ties"] > 0)
 
 
-def _taken_back(asked: _Asked, change: Floats, out: Floats) -> str:
+def _by_adjoint(target: _Target, change: Floats, out: Floats) -> str:
     """Write derivatives by the state at the start and by pieces of the ground; returns why there are none."""
-    nodes, scratch = asked.trail.nodes, state.new_scratch()
+    nodes, scratch = target.trail.nodes, state.new_scratch()
     starts_at_rest, begin = int(nodes["side"][0]) < 0, float(nodes["time"][0])
     ends = Ends.START
-    if asked.by_state is None:
-        ends = Ends(of_ending(own(asked.trail), scratch, asked.row, change, out))
+    if target.by_state is None:
+        ends = Ends(of_ending(own(target.trail), scratch, target.row, change, out))
     else:
-        change[:2] = asked.by_state
-        if not np.any(change) or (asked.instant == begin and not asked.is_height):
+        change[:2] = target.by_state
+        if not np.any(change) or (target.instant == begin and not target.is_height):
             return _NO_REASON  # at rest, or the start itself
     if ends in _REASONS:
         return _REASONS[ends]
-    if asked.instant > begin:
+    if target.instant > begin:
         work = state.record(state.VARIATION)
-        ends = Ends(adjoint(own(asked.trail), scratch, work, asked.row, asked.since, change, out))
+        ends = Ends(adjoint(own(target.trail), scratch, work, target.row, target.since, change, out))
         if ends in _REASONS:
             return _REASONS[ends]
         waits = starts_at_rest and (len(nodes) == 1 or nodes["time"][1] > begin)

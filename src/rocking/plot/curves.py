@@ -1,0 +1,427 @@
+"""Curves with bands and dots: fragility, risk, spectra, calibrations."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Unpack
+
+import numpy as np
+
+from rocking.arrays import Flags, Floats, evenly
+from rocking.plot.canvas import ABOVE, CURVES, GROUND, INK, Place, add_labels, page_for, scale_by_ratio, styles_of
+from rocking.tables import as_written
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+_DOT: Final[dict[str, Any]] = {"markersize": 4.0, "markerfacecolor": "none"}
+
+
+class FragilityLine(NamedTuple):
+    """A fitted curve with its confidence band, and the shares seen among outcomes of about one intensity.
+
+    seen_at, seen (groups,) : mean intensity of each group of outcomes, and the share of them that exceeds the limit
+    outcomes (groups,) : how many outcomes a group has
+    """
+
+    label: str
+    intensity: Floats
+    probability: Floats
+    lower: Floats
+    upper: Floats
+    seen_at: Floats
+    seen: Floats
+    outcomes: Floats
+
+
+def fragility_figure(
+    *,
+    lines: Sequence[FragilityLine],
+    intensity_label: str,
+    band_label: str,
+    probability_label: str = "probability",
+    **place: Unpack[Place],
+) -> Figure:
+    """Draw fitted fragility curves with their confidence bands, and the shares that were seen.
+
+    `band_label` says what the bands are, or why there is none.
+    """
+    with page_for((5.6, 4.2), **place) as page:
+        (axes,) = page.panels()
+        for k, line in enumerate(lines):
+            style = CURVES[k % len(CURVES)]
+            axes.fill_between(line.intensity, line.lower, line.upper, color=style["color"], alpha=0.18, linewidth=0.0)
+            axes.plot(line.intensity, line.probability, linewidth=1.5, label=as_written(line.label), **style)
+            # Every limit state has a mark of its own.
+            axes.plot(line.seen_at, line.seen, "os^D"[k % 4], color=style["color"], clip_on=False, **_DOT)
+        if any(np.any(line.lower < line.upper) for line in lines):
+            axes.fill_between([], [], [], color=GROUND, alpha=0.4, linewidth=0.0, label=band_label)
+        else:
+            axes.plot([], [], linestyle="none", label=band_label)
+        axes.plot([], [], "o", color=GROUND, label=_dots(lines), **_DOT)
+        axes.set(xlim=(0.0, float(lines[0].intensity[-1])), ylim=(0.0, 1.0))
+        axes.grid(True)
+        add_labels(axes, intensity_label, probability_label)
+    return page.figure
+
+
+def dispersions_figure(
+    *, names: Sequence[str], dispersion: Floats, low: Floats, high: Floats, **place: Unpack[Place]
+) -> Figure:
+    """Draw the dispersion of the intensity at overturning, with its interval, for each measure by name."""
+    with page_for((5.6, 0.8 + 0.32 * len(names)), **place) as page:
+        (axes,) = page.panels()
+        row = np.arange(len(names))
+        axes.hlines(row, low, high, color=INK, linewidth=1.0)
+        axes.plot(dispersion, row, color=INK, linestyle="none", marker="o", markersize=4.5)
+        axes.set_yticks(row, list(names))
+        axes.set_ylim(len(names) - 0.5, -0.5)
+        axes.set_xlim(left=0.0)
+        axes.grid(axis="x", linewidth=0.4, color="0.85")
+        add_labels(axes, "dispersion of the intensity at overturning (90 % interval)", "")
+        page.handles = []
+    return page.figure
+
+
+def _dots(lines: Sequence[FragilityLine]) -> str:
+    """Say what one dot pools."""
+    held = np.concatenate([line.outcomes for line in lines])
+    fewest, most = round(float(held.min())), round(float(held.max()))
+    count = f"{fewest}" if fewest == most else f"{fewest} to {most}"
+    return f"dot: share of {count} outcome{'' if most == 1 else 's'} at about its intensity"
+
+
+#: Shares of a rate are shown from this part of the highest one on.
+_LEAST = 1e-3
+
+#: Rates are shown from this part of the lowest of the hazard curve to so many times its highest.
+_MARGIN = 10.0
+
+
+class HazardLine(NamedTuple):
+    """Annual rates at which intensities are exceeded, and the ends of the curve, beyond which it is extended."""
+
+    rate: Floats
+    known: tuple[float, float]
+
+
+class RiskLine(NamedTuple):
+    """Which share of a limit state's rate comes from about each intensity, for each factor of e in intensity."""
+
+    label: str
+    share: Floats
+
+
+def risk_figure(
+    *, intensity: Floats, hazard: HazardLine, lines: Sequence[RiskLine], intensity_label: str, **place: Unpack[Place]
+) -> Figure:
+    """Draw a hazard curve, dotted where it is extended, and below it where each limit state's rate comes from.
+
+    In `ax`, the shares of the rates are drawn without the hazard curve.
+    """
+    with page_for((5.6, 5.2), **place) as page:
+        *curves, shares = page.panels(2, sharex=True)
+        for axes in curves:
+            _draw_hazard(axes, intensity, hazard)
+        for k, line in enumerate(lines):
+            style = CURVES[k % len(CURVES)]
+            shares.plot(intensity, line.share, linewidth=1.5, label=as_written(line.label), **style)
+            shares.fill_between(intensity, 0.0, line.share, color=style["color"], alpha=0.12, linewidth=0.0)
+        shown = _inside(intensity, hazard.known)
+        for line in lines:
+            shown |= line.share > _LEAST * line.share.max()
+        for axes in curves:
+            axes.set_ylim(0.5 * float(hazard.rate[shown].min()), 2.0 * float(hazard.rate[shown].max()))
+        scale_by_ratio(shares, intensity[shown])
+        shares.set(xlim=(float(intensity[shown][0]), float(intensity[shown][-1])))
+        shares.set_ylim(bottom=0.0)
+        shares.grid(True)
+        add_labels(shares, intensity_label, "share of the rate per factor of e")
+    return page.figure
+
+
+def survival_figure(
+    *,
+    intensity: Floats,
+    largest: Floats,
+    largest_label: str,
+    hazard: HazardLine | None,
+    intensity_label: str,
+    **place: Unpack[Place],
+) -> Figure:
+    """Draw the largest annual rates of motions that fit with a block that still stands, and a hazard curve."""
+    with page_for((5.6, 3.6), **place) as page:
+        (axes,) = page.panels()
+        scale_by_ratio(axes, intensity)
+        if hazard is not None:
+            _draw_hazard(axes, intensity, hazard)
+            above = hazard.rate > largest
+            axes.fill_between(
+                intensity, largest, hazard.rate, where=above.tolist(), color=ABOVE, alpha=0.2, linewidth=0.0,
+                label="more often than the block allows" if above.any() else "",
+            )  # fmt: skip
+        axes.plot(intensity, largest, label=largest_label, linewidth=1.5, **CURVES[1])
+        axes.set_yscale("log")
+        lowest, highest = float(largest.min()), float(largest[largest < np.inf].max())
+        if hazard is not None:
+            lowest, highest = min(lowest, float(hazard.rate.min())), float(hazard.rate.max())
+        axes.set(xlim=(float(intensity[0]), float(intensity[-1])), ylim=(0.5 * lowest, min(_MARGIN * highest, 10.0)))
+        axes.grid(True)
+        add_labels(axes, intensity_label, "exceeded, times a year")
+    return page.figure
+
+
+def _inside(intensity: Floats, known: tuple[float, float]) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    return np.asarray((intensity >= known[0]) & (intensity <= known[1]))
+
+
+def _draw_hazard(axes: Axes, intensity: Floats, hazard: HazardLine) -> None:
+    """Draw a hazard curve, dotted where it is extended."""
+    inside = _inside(intensity, hazard.known)
+    label = "hazard curve (dotted: extended)" if not inside.all() else "hazard curve"
+    axes.plot(intensity, hazard.rate, color=GROUND, linewidth=1.0, linestyle=":")
+    axes.plot(intensity[inside], hazard.rate[inside], color=GROUND, linewidth=2.0, label=label)
+    axes.set_yscale("log")
+    axes.grid(True)
+    add_labels(axes, "", "exceeded, times a year")
+
+
+#: Up to so many motions are named; of so few there is nothing to take fractiles of, either.
+_FEW: Final = 2
+
+#: So many curves leave space for all of their fractiles, and so many for every motion.
+_WITH_ALL_FRACTILES: Final = 2
+_WITH_ALL_MOTIONS: Final = 4
+
+#: Most curves that the legend names.
+_NAMED: Final = 8
+
+#: Widths of the lines of up to two motions, of the fractile nearest to the median, and of the others.
+_WIDTHS: Final = (1.6, 0.7)
+_MIDDLE: Final = 1.8
+_OTHER: Final = 0.9
+
+#: What marks an end of a line beyond which blocks overturn.
+_END: Final[dict[str, Any]] = {"marker": "x", "linestyle": "none", "markersize": 4.0, "markeredgewidth": 1.0}
+
+
+class SpectrumCurves(NamedTuple):
+    """Curves of one slenderness and restitution over the spectrum's abscissa; infinite where the block overturns.
+
+    label : what the legend says of them; none if empty
+    singles (motions, points) : peak rotation over slenderness of every motion
+    fractiles (fractiles, points) : their fractiles, the middle one drawn thickest
+    overturned (points,) : share of the motions that overturn the block
+    """
+
+    label: str
+    singles: Floats
+    fractiles: Floats
+    overturned: Floats
+
+
+def spectrum_figure(
+    *,
+    x: Floats,
+    curves: Sequence[SpectrumCurves],
+    fractiles: Sequence[float],
+    motions: Sequence[str],
+    x_label: str,
+    **place: Unpack[Place],
+) -> Figure:
+    """Draw peak rotations over the abscissa, and below them the share of motions that overturn the block.
+
+    One curve alone needs no label, and of more than eight some are named. Two motions are named, more are counted, and
+    drawn with up to four curves. Of two motions or fewer no fractile is drawn, and of three curves or more only the
+    middle one. A line of a named motion, and a fractile, ends in a cross where the block of the next point overturns.
+    In `ax`, the peak rotations are drawn without the shares.
+    """
+    from matplotlib.lines import Line2D
+
+    few = len(motions) <= _FEW
+    middle = _middle(fractiles)
+    chosen = {share: k for k, share in enumerate(fractiles) if share == middle or len(curves) <= _WITH_ALL_FRACTILES}
+    with page_for((5.6, 4.8), **place) as page:
+        peaks, *shares = panels = page.panels(2, sharex=True, height_ratios=(3.2, 1.0))
+        for style, curve in zip(styles_of(len(curves)), curves, strict=True):
+            if few:
+                for width, single in zip(_WIDTHS, curve.singles, strict=False):
+                    _draw(peaks, x, single, width, style)
+            else:
+                for single in curve.singles if len(curves) <= _WITH_ALL_MOTIONS else ():
+                    peaks.plot(x, single, color=style["color"], linewidth=0.5, alpha=0.35)
+                for share, row in chosen.items():
+                    _draw(peaks, x, curve.fractiles[row], _MIDDLE if share == middle else _OTHER, style)
+            for panel in shares:
+                panel.step(x, curve.overturned, where="mid", linewidth=1.2, **style)
+        for panel in panels:
+            panel.grid(True, which="both")
+        scale_by_ratio(panels[-1], x)
+        peaks.set_ylim(bottom=0.0)
+        add_labels(peaks, "" if shares else x_label, "peak rotation / slenderness")
+        for panel in shares:
+            panel.set_ylim(-0.03, 1.03)
+            add_labels(panel, x_label, "share overturned")
+        page.handles = _handles(curves, motions, chosen)
+        if any(line.get_marker() == _END["marker"] for line in peaks.lines):
+            page.handles.append(Line2D([], [], color=INK, label="beyond: overturns", **_END))
+    return page.figure
+
+
+def _draw(axes: Axes, x: Floats, values: Floats, width: float, style: dict[str, Any]) -> None:
+    """Draw a line with gaps where its values are infinite, and mark its ends there."""
+    axes.plot(x, values, marker="o" if x.size == 1 else "", markersize=4.0, linewidth=width, **style)
+    finite = np.isfinite(values)
+    ends = finite & ~(np.append(True, finite[:-1]) & np.append(finite[1:], True))
+    if ends.any():
+        axes.plot(x[ends], values[ends], color=style["color"], **_END)
+
+
+def _middle(fractiles: Iterable[float]) -> float:
+    return min(fractiles, key=lambda share: abs(share - 0.5))
+
+
+def _handles(curves: Sequence[SpectrumCurves], motions: Sequence[str], fractiles: Iterable[float]) -> list[Line2D]:
+    from matplotlib.lines import Line2D
+
+    styles, shown = styles_of(len(curves)), evenly(len(curves), _NAMED)
+    each = [
+        Line2D([], [], linewidth=1.4, label=as_written(curves[k].label), **styles[k]) for k in shown if curves[k].label
+    ]
+    if len(shown) < len(curves):
+        each.append(Line2D([], [], linestyle="none", label=f"({len(shown)} of {len(curves)} curves are named)"))
+    if len(motions) == 1:
+        return each
+    if len(motions) <= _FEW:
+        named = zip(motions, _WIDTHS, strict=False)
+        return each + [Line2D([], [], color=INK, linewidth=width, label=as_written(name)) for name, width in named]
+    if len(curves) <= _WITH_ALL_MOTIONS:
+        each.append(Line2D([], [], color=GROUND, linewidth=0.5, label=f"each of {len(motions)} motions"))
+    middle = _middle(fractiles)
+    others = ", ".join(f"{100 * share:g}" for share in sorted(fractiles) if share != middle)
+    each.append(Line2D([], [], color=INK, linewidth=_MIDDLE, label=_named(f"{100 * middle:g}")))
+    if others:
+        each.append(Line2D([], [], color=INK, linewidth=_OTHER, label=_named(others)))
+    return each
+
+
+def _named(percent: str) -> str:
+    return "median" if percent == "50" else f"{percent} % of the motions are below"
+
+
+#: Bars of a histogram of blocks.
+_BINS: Final = 24
+
+_DOTS: Final[dict[str, Any]] = {"linestyle": "", "markersize": 3.2, "markeredgewidth": 0.6, "clip_on": False}
+
+
+class Parameter(NamedTuple):
+    """One parameter of the blocks that explain the outcomes: values (blocks, sides), and what is known of each side.
+
+    estimates (sides, 3) : median, lower and upper end of its interval
+    bounds : lowest and highest value that was thinkable
+    """
+
+    label: str
+    values: Floats
+    estimates: Floats
+    bounds: tuple[float, float]
+
+
+def outcomes_figure(
+    *,
+    probabilities: Floats,
+    overturned: Flags,
+    parameters: Sequence[Parameter],
+    weights: Floats,
+    **place: Unpack[Place],
+) -> Figure:
+    """Draw what happened in every test against its fitted probability, and the blocks behind that by their parameters.
+
+    Probabilities and outcomes have shape (tests,), weights (blocks,). In `ax`, the tests are drawn without the blocks.
+    """
+    with page_for((7.0, 4.6), **place) as page:
+        if page.ax is None:
+            grid = page.figure.add_gridspec(2, len(parameters), height_ratios=(1.2, 1.0))
+            page.drawn = [
+                page.figure.add_subplot(at) for at in (grid[0, :], *(grid[1, k] for k in range(len(parameters))))
+            ]
+        tests, *panels = page.drawn or page.panels()
+        _draw_tests(tests, probabilities, overturned)
+        for panel, parameter in zip(panels, parameters, strict=False):
+            _draw_parameter(panel, parameter, weights)
+        if panels:
+            add_labels(panels[0], parameters[0].label, "share of blocks")
+    return page.figure
+
+
+def measured_figure(
+    *, time: Floats, measured: Floats, residual: Floats, fitted_time: Floats, fitted: Floats, **place: Unpack[Place]
+) -> Figure:
+    """Draw a measured rotation history (rad, over s), that of the fitted block, and what is left between them.
+
+    In `ax`, the histories are drawn without the residuals.
+    """
+    with page_for((7.0, 4.0), **place) as page:
+        main, *others = page.panels(2, sharex=True, height_ratios=(2.4, 1.0))
+        main.plot(time, measured, ".", color=GROUND, markersize=3.5, markeredgewidth=0.0, label="measured")
+        main.plot(fitted_time, fitted, color=ABOVE, linewidth=0.9, label="fitted")
+        main.set_xlim(time[0], time[-1])
+        add_labels(main, "" if others else "time (s)", "rotation (rad)")
+        for panel in others:
+            panel.plot(time, residual, color=INK, linewidth=0.6)
+            add_labels(panel, "time (s)", "residual (rad)")
+        for panel in (main, *others):
+            panel.axhline(0.0, color=INK, linewidth=0.4)
+    return page.figure
+
+
+def _draw_tests(axes: Axes, probabilities: Floats, overturned: Flags) -> None:
+    """Draw the probabilities in increasing order, and each outcome where a sure prediction would put it."""
+    order = np.argsort(probabilities, kind="stable")
+    number, fell = np.arange(1, order.size + 1), overturned[order]
+    axes.plot(number, probabilities[order], color=INK, linewidth=1.2, label="fitted probability")
+    axes.plot(number[fell], np.ones(fell.sum()), "v", color=ABOVE, label="overturned", **_DOTS)
+    axes.plot(number[~fell], np.zeros((~fell).sum()), "o", color=INK, mfc="white", label="did not overturn", **_DOTS)
+    axes.set_ylim(0.0, 1.0)
+    axes.grid(True)
+    add_labels(axes, "test, by its probability", "probability of overturning")
+
+
+def _draw_parameter(axes: Axes, parameter: Parameter, weights: Floats) -> None:
+    """Draw how the blocks are distributed, and above that the median of the population's centre and its interval."""
+    sides = parameter.values.shape[1]
+    drawn = {"side +": CURVES[3], "side -": CURVES[1]} if sides > 1 else {"both sides": CURVES[2] | {"linestyle": "-"}}
+    edges = np.histogram_bin_edges(parameter.values, _BINS)
+    for bound in parameter.bounds:
+        axes.axvline(bound, color=GROUND, linewidth=1.0, linestyle=(0, (3, 2)), label="bound")
+    for k, (name, style) in enumerate(drawn.items()):
+        shares = np.histogram(parameter.values[:, k], edges, weights=weights)[0]
+        axes.stairs(shares, edges, linewidth=1.1, label=name, **style)
+        median, low, high = parameter.estimates[k]
+        at = axes.get_xaxis_transform()
+        height = 0.97 - 0.07 * k
+        axes.plot([low, high], [height] * 2, color=style["color"], linewidth=1.0, transform=at)
+        axes.plot(median, height, "|", color=style["color"], markersize=7.0, transform=at)
+    axes.plot([], [], "|-", color=GROUND, linewidth=1.0, markersize=7.0, label="centre: median and 90 %")
+    axes.set_ylim(0.0, 1.3 * axes.get_ylim()[1])
+    axes.set_yticks([])
+    add_labels(axes, parameter.label, "")
+
+
+def reliability_figure(
+    *, predicted: Floats, observed: Floats, band_lower: Floats, band_upper: Floats, **place: Unpack[Place]
+) -> Figure:
+    """Draw observed shares against predicted ones (bins,), with the bands of right predictions."""
+    with page_for((3.7, 3.7), **place) as page:
+        (axes,) = page.panels()
+        axes.plot([0.0, 1.0], [0.0, 1.0], color=GROUND, linewidth=0.8, linestyle=(0, (4, 2)))
+        label = "90 % of what right predictions would show"
+        axes.vlines(predicted, band_lower, band_upper, color=GROUND, linewidth=5.0, alpha=0.55, label=label)
+        axes.plot(predicted, observed, "o-", color=INK, linewidth=0.9, markersize=4.0, clip_on=False, label="observed")
+        axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
+        axes.grid(True)
+        add_labels(axes, "predicted probability of overturning", "share that overturned")
+    return page.figure
