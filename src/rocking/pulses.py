@@ -78,7 +78,7 @@ def rectangular(amplitude: float, duration: float) -> Motion:
     """
     amplitude, duration = _amplitude(amplitude), checks.positive(duration, "duration", InvalidMotion, "s")
     description = Description("rectangular", {"amplitude": amplitude, "duration": duration}, "constant")
-    return Motion([0.0, duration], [[amplitude]], name="rectangular", description=description)
+    return Motion(np.array([0.0, duration]), np.array([[amplitude]]), name="rectangular", description=description)
 
 
 def triangular(amplitude: float, duration: float) -> Motion:

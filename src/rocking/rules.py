@@ -197,8 +197,8 @@ def housner(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     -----
     The mean energy of a block under white noise is set equal to that at its balance point, m g R alpha^2/2. Housner
     concluded that one block in two overturns there. White noise itself contradicts this: of 300 noises (p = 2 rad/s,
-    alpha = 0.2, restitution 0.925) 1 % overturn the block at a ratio of 1, 28 % at 1.5 and 80 % at 2. S_v is the mean of
-    2 pi S_d/T over periods T of 0.1 to 2.5 s, Housner's spectrum intensity divided by its range.
+    alpha = 0.2, restitution 0.925) 1 % overturn the block at a ratio of 1, 28 % at 1.5 and 80 % at 2. S_v is the mean
+    of 2 pi S_d/T over periods T of 0.1 to 2.5 s, Housner's spectrum intensity divided by its range.
 
     References
     ----------

@@ -403,14 +403,16 @@ class Motion(Processable):
         if not isinstance(other, Motion):
             return NotImplemented
         breakpoints, (mine, theirs) = piecewise.together(self, other)
-        both = self.vertical is not None and other.vertical is not None
+        vertical = self.vertical or other.vertical
+        if self.vertical is not None and other.vertical is not None:
+            vertical = self.vertical + other.vertical
         return Motion(
             breakpoints,
             mine + theirs,
             name=f"{self.name} + {other.name}",
             description=Description("sum", text=f"{self._origin()}; plus {other._origin()}"),
             error=self.error + other.error,
-            vertical=self.vertical + other.vertical if both else self.vertical or other.vertical,
+            vertical=vertical,
         )
 
     def _times(self, factor: float, done: str) -> Motion:
