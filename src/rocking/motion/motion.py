@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +14,7 @@ from rocking.arrays import Floats
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion
 from rocking.motion import piecewise
-from rocking.motion.description import Description, check_description, checked_history, labelled
+from rocking.motion.description import Description, labelled
 from rocking.motion.processing import Processable
 from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
 from rocking.tables import as_written
@@ -80,8 +81,14 @@ class Motion(Processable):
     def __post_init__(self) -> None:
         breakpoints, coefficients = piecewise.checked_pieces(self.breakpoints, self.coefficients)
         checks.text(self.name, "name of a motion", InvalidMotion)
-        check_description(self.description)
-        history = checked_history(self.history)
+        if not isinstance(self.description, Description):
+            given = type(self.description).__name__
+            sentence = f"the description of a motion must be a Description(family, parameters, text), not a {given}"
+            raise InvalidMotion(sentence, value=self.description)
+        if isinstance(self.history, str) or not isinstance(self.history, Iterable):
+            sentence = f"the history of a motion must be a sequence of sentences, not {self.history!r}"
+            raise InvalidMotion(sentence, value=self.history)
+        history = tuple(checks.text(each, "sentence of a motion's history", InvalidMotion) for each in self.history)
         error = checks.within(self.error, "approximation error of a motion", InvalidMotion, 0.0, piecewise.STRONGEST)
         if self.vertical is not None and not isinstance(self.vertical, Motion):
             given = type(self.vertical).__name__

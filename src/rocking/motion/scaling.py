@@ -14,6 +14,7 @@ from rocking.arrays import Floats
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion.measures import DAMPING, Measured, checked_damping
+from rocking.tables import named
 
 #: What an analysis may count motions by.
 IntensityName = Literal["pga", "pgv", "sa", "pga_ratio", "pgv_ratio"]
@@ -124,7 +125,7 @@ class Measure:
     @property
     def column(self) -> str:
         """Name with units for a table."""
-        return {"m/s^2": f"{self.name}_m_s2", "m/s": f"{self.name}_m_s"}.get(self.units, self.name)
+        return named(self.name, self.units)
 
     @property
     def scale(self) -> float:

@@ -240,7 +240,9 @@ def _unit(source: Source, request: Request, heading: Heading, place: int, at: in
             raise source.error(f"{said} an acceleration; give a table of accelerations", heading.at)
         known = f"acceleration that is known here; give {{}} as one of {', '.join(CHOICES)}"
         raise source.error(f"{said} {known}", heading.at, "units")
-    return request.units_by_heading(source, column.unit, at)
+    if request.several and column.unit is not None:
+        return column.unit
+    return request.units(source, column.unit if request.unit is None else None, at)  # what is given overrules it
 
 
 def _check_step(source: Source, dt: float | None, shape: _Shape) -> None:
