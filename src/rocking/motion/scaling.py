@@ -99,11 +99,6 @@ class Measure:
         Measure
             One of them.
 
-        Raises
-        ------
-        InvalidOption
-            If it is no measure, or none of them, or a spectral acceleration by its name alone.
-
         Examples
         --------
         >>> Measure.of("pgv")
@@ -216,7 +211,7 @@ class Measure:
         return motion.pga if self.of_motion == "pga" else motion.pgv
 
     def positive(self, motion: Measured, name: str) -> float:
-        """Return what the motion alone measures, as `value`, of a motion that can be scaled.
+        """Return what the motion alone measures, as `value`, or refuse a motion that is zero throughout.
 
         Parameters
         ----------
@@ -229,11 +224,6 @@ class Measure:
         -------
         float
             In SI units.
-
-        Raises
-        ------
-        InvalidMotion
-            If the motion is zero throughout.
 
         Examples
         --------
