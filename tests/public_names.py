@@ -71,7 +71,10 @@ def public_members() -> dict[str, Any]:
     for name, value in public_names().items():
         found[name] = value
         if inspect.isclass(value):
-            own = {key: member for key, member in vars(value).items() if not key.startswith("_")}
+            # Parts of a class that have no public name, as those of Motion, belong to it.
+            parts = [each for each in inspect.getmro(value) if each in (value, *rocking.Motion.__mro__[1:-1])]
+            every = {key: member for each in reversed(parts) for key, member in vars(each).items()}
+            own = {key: member for key, member in every.items() if not key.startswith("_")}
             found |= {f"{name}.{key}": _plain(member) for key, member in own.items() if _is_member(member)}
     return found
 

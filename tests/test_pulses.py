@@ -238,35 +238,26 @@ def test_a_sine_keeps_what_it_was_made_of():
 
 
 @pytest.mark.parametrize(
-    "make",
+    ("pulse", "given"),
     [
-        lambda: pulses.sine(np.nan, 1.0, cycles=1),
-        lambda: pulses.sine("1 g", 1.0, cycles=1),
-        lambda: pulses.sine(1.0, 0.0, cycles=1),
-        lambda: pulses.sine(1.0, -1.0, cycles=1),
-        lambda: pulses.sine(1.0, 1.0, cycles=0),
-        lambda: pulses.sine(1.0, 1.0, cycles=1e9),
-        lambda: pulses.sine(1.0, 1.0, cycles=1, phase=np.inf),
-        lambda: pulses.sine(1.0, 1e-13, cycles=100),
-        lambda: pulses.sine(1.0, 1e300, cycles=1),
-        lambda: pulses.half_sine(np.inf, 1.0),
-        lambda: pulses.n_lobe(1.0, 1.0),
-        lambda: pulses.n_lobe(1.0, 1.0, lobes=0),
-        lambda: pulses.n_lobe(1.0, 1.0, lobes=2.5),
-        lambda: pulses.n_lobe([1.0, 2.0], 1.0, lobes=3),
-        lambda: pulses.n_lobe([], 1.0),
-        lambda: pulses.n_lobe([[1.0]], 1.0),
-        lambda: pulses.n_lobe([1.0, np.nan], 1.0),
-        lambda: pulses.ricker(1.0, 1.0, kind="third"),
-        lambda: pulses.ricker(1.0, 1.0, duration=0.0),
-        lambda: pulses.ricker(1.0, 1.0, duration=100.0),
-        lambda: pulses.mavroeidis_papageorgiou(1.0, 1.0, phase=0.0, gamma=0.9),
-        lambda: pulses.mavroeidis_papageorgiou(1.0, 1.0, phase=0.0, gamma=1e9),
-        lambda: pulses.mavroeidis_papageorgiou(1.0, 1.0, phase=np.nan, gamma=2.0),
-        lambda: pulses.rectangular(1.0, 0.0),
-        lambda: pulses.triangular(np.nan, 1.0),
+        *((pulses.sine, {"amplitude": each, "frequency": 1.0, "cycles": 1}) for each in (np.nan, "1 g")),
+        *((pulses.sine, {"amplitude": 1.0, "frequency": each, "cycles": 1}) for each in (0.0, -1.0, 1e-13, 1e300)),
+        *((pulses.sine, {"amplitude": 1.0, "frequency": 1.0, "cycles": each}) for each in (0, 1e9)),
+        (pulses.sine, {"amplitude": 1.0, "frequency": 1.0, "cycles": 1, "phase": np.inf}),
+        (pulses.half_sine, {"amplitude": np.inf, "frequency": 1.0}),
+        *((pulses.n_lobe, {"amplitude": 1.0, "frequency": 1.0, "lobes": each}) for each in (None, 0, 2.5)),
+        *((pulses.n_lobe, {"amplitude": each, "frequency": 1.0}) for each in ([], [[1.0]], [1.0, np.nan])),
+        (pulses.n_lobe, {"amplitude": [1.0, 2.0], "frequency": 1.0, "lobes": 3}),
+        (pulses.ricker, {"amplitude": 1.0, "frequency": 1.0, "kind": "third"}),
+        *((pulses.ricker, {"amplitude": 1.0, "frequency": 1.0, "duration": each}) for each in (0.0, 100.0)),
+        *(
+            (pulses.mavroeidis_papageorgiou, {"amplitude": 1.0, "frequency": 1.0, "phase": phase, "gamma": gamma})
+            for phase, gamma in ((0.0, 0.9), (0.0, 1e9), (np.nan, 2.0))
+        ),
+        (pulses.rectangular, {"amplitude": 1.0, "duration": 0.0}),
+        (pulses.triangular, {"amplitude": np.nan, "duration": 1.0}),
     ],
 )
-def test_unusable_parameters_are_refused(make):
+def test_unusable_parameters_are_refused(pulse, given):
     with pytest.raises(InvalidMotion):
-        make()
+        pulse(**given)

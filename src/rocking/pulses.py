@@ -78,7 +78,7 @@ def rectangular(amplitude: float, duration: float) -> Motion:
     """
     amplitude, duration = _amplitude(amplitude), checks.positive(duration, "duration", InvalidMotion, "s")
     description = Description("rectangular", {"amplitude": amplitude, "duration": duration}, "constant")
-    return Motion([0.0, duration], [[amplitude]], name="rectangular", description=description)
+    return Motion(np.array([0.0, duration]), np.array([[amplitude]]), name="rectangular", description=description)
 
 
 def triangular(amplitude: float, duration: float) -> Motion:
@@ -155,11 +155,6 @@ def half_sine(amplitude: float, frequency: float) -> Motion:
     Motion
         It lasts ``1 / (2 frequency)``.
 
-    Raises
-    ------
-    InvalidMotion
-        As `sine`.
-
     Examples
     --------
     >>> round(half_sine(2.0, 0.5).pgv * math.pi, 12)
@@ -181,11 +176,6 @@ def one_sine(amplitude: float, frequency: float) -> Motion:
     Motion
         It ends at rest.
 
-    Raises
-    ------
-    InvalidMotion
-        As `sine`.
-
     Examples
     --------
     >>> abs(one_sine(2.0, 0.5).velocity(2.0)) < 1e-15
@@ -206,11 +196,6 @@ def one_cosine(amplitude: float, frequency: float) -> Motion:
     -------
     Motion
         It jumps at both ends.
-
-    Raises
-    ------
-    InvalidMotion
-        As `sine`.
 
     Examples
     --------
@@ -465,7 +450,7 @@ class _Angle(NamedTuple):
 
 
 def _sine_and_cosine(turns: Floats, rest: Floats, phase: float) -> _Angle:
-    """_Angle ``2 pi (turns + rest) + phase``, `rest` far below `turns`, without the rounding of a large angle.
+    """Angle ``2 pi (turns + rest) + phase``, `rest` far below `turns`, without the rounding of a large angle.
 
     Whole quarter turns are taken off exactly, and the phase is added by the addition theorem.
     """
@@ -513,10 +498,7 @@ def _sine_series(angle: _Angle, rate: float) -> Floats:
 
 
 def _gaussian_derivative(order: int, times: Floats, rate: float) -> Floats:
-    """Taylor coefficients in t of the derivative in x of ``exp(-x^2 / 2)``, ``x = rate t``, about each time.
-
-    The n-th derivative of the Gaussian is ``(-1)^n He_n(x) exp(-x^2 / 2)``, He_n Hermite's polynomials.
-    """
+    """Taylor coefficients in t of ``(-1)^n He_n(x) exp(-x^2/2)``, ``x = rate t``, n the order, about each time."""
     x = rate * times
     powers = np.arange(_GAUSSIAN_DEGREE + 1)
     hermite = hermite_e.hermevander(x, order + _GAUSSIAN_DEGREE)[:, order:]

@@ -173,10 +173,9 @@ def ishiyama(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     Notes
     -----
     V = 2 g sin(alpha/2)/(p cos(alpha)) is the sudden velocity of the ground after which a block at rest just reaches
-    its balance point: the momentum about the pivot, m V R cos(alpha) = I theta', gives it the energy
-    I theta'^2/2 = m g R (1 - cos(alpha)), with I = m g R/p^2. For a rectangle that is Ishiyama's
-    V^2 = 8 g R (1 - cos(alpha))/(3 cos(alpha)^2), and 0.4 V is close to 10 B/sqrt(H) cm/s, with width B and height H in
-    cm. The factor 0.4 comes from his simulations; both criteria are lower limits.
+    its balance point. For a rectangle that is Ishiyama's V^2 = 8 g R (1 - cos(alpha))/(3 cos(alpha)^2), and 0.4 V is
+    close to 10 B/sqrt(H) cm/s, with width B and height H in cm. The factor 0.4 comes from his simulations; both
+    criteria are lower limits.
 
     References
     ----------
@@ -202,18 +201,12 @@ def housner(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     Rating
         p S_v/g, rad, over alpha.
 
-    Raises
-    ------
-    InvalidMotion
-        As `Motion.spectral_acceleration`.
-
     Notes
     -----
-    The mean energy of a block under white noise is set equal to what takes it to its balance point, m g R alpha^2/2 of
-    a slender one. Housner concluded that one block in two overturns there. White noise itself contradicts this: of 300
-    noises (p = 2 rad/s, alpha = 0.2, restitution 0.925) 1 % overturn the block at a ratio of 1, 28 % at 1.5 and 80 % at
-    2. The undamped velocity spectrum S_v of white noise does not depend on the period. For other motions the mean of
-    2 pi S_d/T over periods T of 0.1 to 2.5 s is used, Housner's spectrum intensity divided by its range.
+    The mean energy of a block under white noise is set equal to that at its balance point, m g R alpha^2/2. Housner
+    concluded that one block in two overturns there. White noise itself contradicts this: of 300 noises (p = 2 rad/s,
+    alpha = 0.2, restitution 0.925) 1 % overturn the block at a ratio of 1, 28 % at 1.5 and 80 % at 2. S_v is the mean
+    of 2 pi S_d/T over periods T of 0.1 to 2.5 s, Housner's spectrum intensity divided by its range.
 
     References
     ----------
@@ -242,11 +235,6 @@ def asce_43_05(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     Rating
         Spectral acceleration over the block's capacity, both m/s^2, at the balance point.
 
-    Raises
-    ------
-    InvalidMotion
-        As `Motion.spectral_acceleration`.
-
     Notes
     -----
     For a rotation theta_0, with a = tan(alpha), f_1 = cos(theta_0) + a sin(theta_0) - 1 and C_I = I/(m h^2):
@@ -257,10 +245,9 @@ def asce_43_05(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     - damping gamma/sqrt(4 pi^2 + gamma^2), gamma = -2 ln C_R: an oscillator that loses in one cycle what two impacts
       take. C_R is the block's restitution; the standard's 1 - 2 a^2/C_I is Housner's.
 
-    The rocking angle is the largest at which the spectrum meets the capacity, that of the lowest frequency. Where the
-    spectrum is above the capacity at the balance point, theta_0 = alpha, there is none: by the method the block
-    overturns. The motion is horizontal alone, and the mass that is shaken is the mass that resists, so the standard's
-    correction for vertical motion and its ratio of masses are 1. No factor of safety is applied.
+    The rocking angle is the largest at which the spectrum meets the capacity. Where the spectrum is above the capacity
+    at the balance point, theta_0 = alpha, the block overturns by the method. The standard's correction for vertical
+    motion and its ratio of masses are 1. No factor of safety is applied.
 
     References
     ----------
@@ -534,8 +521,7 @@ def check(
     Notes
     -----
     The simulated margin comes from `incremental_dynamic_analysis`, whose levels are 5 % apart: a thinner band of levels
-    that overturn may lie below it. The factor that overturns is known to 1e-4. Where 1 is within that of it, the
-    response to the motion as it is decides on which side of 1 the margin is.
+    that overturn may lie below it.
 
     Examples
     --------

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Final
@@ -99,10 +99,8 @@ class Description:
     def __post_init__(self) -> None:
         checks.text(self.family, "family of a description", InvalidMotion)
         checks.text(self.text, "text of a description", InvalidMotion)
-        numbers = {
-            name: checks.number(value, f"{name} of a description", InvalidMotion)
-            for name, value in self.parameters.items()
-        }
+        given = self.parameters.items()
+        numbers = {name: checks.number(value, f"{name} of a description", InvalidMotion) for name, value in given}
         object.__setattr__(self, "parameters", MappingProxyType(numbers))
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -186,18 +184,3 @@ def labelled(name: str, history: Sequence[str], vertical: str = "") -> str:
     """
     both = f"{name} with vertical {vertical}" if vertical else name
     return ", ".join((both, *(_SCALED.sub(r"\1", done) for done in history)))
-
-
-def check_description(given: Description) -> None:
-    """Refuse what is no description."""
-    if not isinstance(given, Description):
-        raise InvalidMotion(
-            f"the description of a motion must be a Description(family, parameters, text), not a {type(given).__name__}"
-        )
-
-
-def checked_history(given: Iterable[str]) -> tuple[str, ...]:
-    """Sentences on what was done to a motion."""
-    if isinstance(given, str) or not isinstance(given, Iterable):
-        raise InvalidMotion(f"the history of a motion must be a sequence of sentences, not {given!r}")
-    return tuple(checks.text(sentence, "sentence of a motion's history", InvalidMotion) for sentence in given)

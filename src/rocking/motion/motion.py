@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any
 
@@ -13,9 +13,9 @@ from rocking import checks, svg
 from rocking.arrays import Floats
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion
-from rocking.motion import piecewise, processing
-from rocking.motion.description import Description, Origin, check_description, checked_history, labelled
-from rocking.motion.measures import DAMPING, Measured
+from rocking.motion import piecewise
+from rocking.motion.description import Description, labelled
+from rocking.motion.processing import Processable
 from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
 from rocking.tables import as_written
 
@@ -23,12 +23,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: A step of processing.
-_Step = Callable[[piecewise.Piecewise], processing.Processed]
-
 
 @dataclass(frozen=True, eq=False)
-class Motion(Measured):
+class Motion(Processable):
     """A ground acceleration that is a polynomial on each of its pieces, and zero outside ``[0, duration]``.
 
     Pieces may jump. A record is piecewise linear, exactly; a pulse is approximated to 1e-15 of its amplitude. Motions
@@ -84,8 +81,14 @@ class Motion(Measured):
     def __post_init__(self) -> None:
         breakpoints, coefficients = piecewise.checked_pieces(self.breakpoints, self.coefficients)
         checks.text(self.name, "name of a motion", InvalidMotion)
-        check_description(self.description)
-        history = checked_history(self.history)
+        if not isinstance(self.description, Description):
+            given = type(self.description).__name__
+            sentence = f"the description of a motion must be a Description(family, parameters, text), not a {given}"
+            raise InvalidMotion(sentence, value=self.description)
+        if isinstance(self.history, str) or not isinstance(self.history, Iterable):
+            sentence = f"the history of a motion must be a sequence of sentences, not {self.history!r}"
+            raise InvalidMotion(sentence, value=self.history)
+        history = tuple(checks.text(each, "sentence of a motion's history", InvalidMotion) for each in self.history)
         error = checks.within(self.error, "approximation error of a motion", InvalidMotion, 0.0, piecewise.STRONGEST)
         if self.vertical is not None and not isinstance(self.vertical, Motion):
             given = type(self.vertical).__name__
@@ -311,241 +314,6 @@ class Motion(Measured):
             vertical = vertical._times(-1.0, f"turned upwards, as its channel is called {origin.channel!r}")
         return self if vertical is self.vertical else replace(self, vertical=vertical)
 
-    def rotated(self, other: Motion, azimuth: float, *, recorded: tuple[float, float] | None = None) -> Motion:
-        """Return the component along any azimuth of the horizontal motion whose two components are this and another.
-
-        Parameters
-        ----------
-        other : Motion
-            Second horizontal component of the same place, which starts at the same time.
-        azimuth : float
-            Direction in which the result is positive, degrees clockwise from north.
-        recorded : pair of float, optional
-            Azimuths of this component and the other, degrees clockwise from north; by default as their records say.
-
-        Returns
-        -------
-        Motion
-            With the vertical component of either.
-
-        Raises
-        ------
-        InvalidMotion
-            If an azimuth is not known or no number, both components lie nearly along one line, begin at different
-            times by the clock of their files, or each brings a vertical component of its own.
-
-        Notes
-        -----
-        a(phi) = (a_1 sin(phi_2 - phi) + a_2 sin(phi - phi_1))/sin(phi_2 - phi_1), exactly, piece by piece; of
-        perpendicular components a_1 cos(phi - phi_1) + a_2 cos(phi - phi_2).
-
-        Examples
-        --------
-        >>> import rocking
-        >>> west, north = (rocking.records.load(f"el-centro-meloland-{azimuth}") for azimuth in (270, 360))
-        >>> [f"{west.rotated(north, azimuth).pga:.3f}" for azimuth in (270, 0, 315)]
-        ['2.927', '3.050', '2.322']
-        """
-        if not isinstance(other, Motion):
-            sentence = f"{{}} must be a Motion, the other horizontal component, not {type(other).__name__}"
-            raise InvalidMotion(sentence, "other", value=other)
-        first, second = processing.recorded_azimuths(self, other, recorded)
-        processing.check_start(self, other)
-        wanted = checks.finite(azimuth, "azimuth", InvalidMotion)
-        if self.vertical is not None and other.vertical not in (None, self.vertical):
-            raise InvalidMotion("each component has a vertical one: give it to one of the two with with_vertical")
-        mine, theirs = processing.shares((first, second), wanted)
-        breakpoints, (one, two) = piecewise.together(self, other)
-        along = {"channel": f"{wanted:g} deg", "number": None, "azimuth": wanted, "reversed": False}
-        origin = replace(self.description.origin or Origin(), **along)
-        text = f"at {wanted:g} deg, from {first:g} deg: {self._origin()}; and {second:g} deg: {other._origin()}"
-        described = replace(self.description.changed("rotated"), parameters={}, text=text, origin=origin)
-        return replace(
-            self,
-            breakpoints=breakpoints,
-            coefficients=mine * one + theirs * two,
-            description=described,
-            history=(*self.history, f"with {other.name} rotated to {wanted:g} deg"),
-            error=abs(mine) * self.error + abs(theirs) * other.error,
-            vertical=self.vertical or other.vertical,
-        )
-
-    def delayed(self, delay: float) -> Motion:
-        """Return the motion after a time of no acceleration.
-
-        Parameters
-        ----------
-        delay : float
-            That time, s.
-
-        Returns
-        -------
-        Motion
-            With a piece more, both components.
-
-        Raises
-        ------
-        InvalidMotion
-            If `delay` is not a positive number (an early part is cut off by ``processed(trim=...)``).
-
-        Examples
-        --------
-        >>> Motion([0.0, 2.0], [[1.0]]).delayed(1.0).acceleration([0.5, 1.5, 3.5])
-        array([0., 1., 0.])
-        """
-        wait = checks.positive(delay, "delay", InvalidMotion, "s")
-        return replace(
-            self,
-            breakpoints=np.concatenate([[0.0], self.breakpoints + wait]),
-            coefficients=np.vstack([np.zeros((1, self.coefficients.shape[1])), self.coefficients]),
-            vertical=None if self.vertical is None else self.vertical.delayed(wait),
-            description=self.description.changed("delayed"),
-            history=(*self.history, f"delayed by {wait:.6g} s"),
-        )
-
-    def floor(self, period: float, damping: float = DAMPING, *, ringing: float | None = None) -> Motion:
-        """Return the motion of a floor: the absolute acceleration of a linear oscillator that the motion shakes.
-
-        Parameters
-        ----------
-        period : float
-            Natural period of the building, s.
-        damping : float
-            Its fraction of critical damping.
-        ringing : float, optional
-            For how long after the motion the floor is followed, s; by default until a free oscillation has faded to a
-            thousandth.
-
-        Returns
-        -------
-        Motion
-            Polynomials of degree 9 on pieces of a quarter radian at most; the vertical component as it is.
-
-        Raises
-        ------
-        InvalidMotion
-            If the period or the damping is out of its range, or there is no damping and no `ringing`.
-
-        Notes
-        -----
-        In a building with one mode this is the motion of the floor where the mode's shape times its participation
-        factor is 1; on a floor below, ``ground + (floor + -ground) * 0.6`` has a share of 0.6. What stands on the floor
-        does not act back on it. A fragility against the floor's `pga`, `pgv` or spectra has no hazard curve of the
-        ground.
-
-        Examples
-        --------
-        A floor whose period is that of the shaking moves more than the ground, and goes on after it:
-
-        >>> import rocking
-        >>> ground = rocking.pulses.sine(1.0, 2.0, cycles=10)
-        >>> floor = ground.floor(0.5)
-        >>> round(floor.pga, 2), round(floor.duration, 1)
-        (9.62, 16.0)
-        """
-        pieces, error = processing.floor_pieces(self, period, damping, ringing, self.error)
-        return replace(
-            self,
-            breakpoints=pieces.breakpoints,
-            coefficients=pieces.coefficients,
-            description=self.description.changed("floor"),
-            history=(*self.history, f"on a floor of period {period:.6g} s, damping {damping:.6g}"),
-            error=error,
-        )
-
-    def processed(
-        self,
-        *,
-        trim: tuple[float, float] | None = None,
-        baseline: int | None = None,
-        band_pass: tuple[float | None, float | None] | None = None,
-        order: int | None = None,
-        resample: float | None = None,
-    ) -> Motion:
-        """Return a processed motion; the steps go in the order of the arguments, each noted in `history`.
-
-        Parameters
-        ----------
-        trim : (start, end)
-            Part to keep, s; its start becomes time 0. For even samples the ends move to the nearest sample. A vertical
-            component is cut at the same instants, whatever its own step.
-        baseline : int
-            Degree of the polynomial in time that is fitted to the samples by least squares and subtracted.
-        band_pass : (low, high)
-            Corner frequencies of a Butterworth filter, Hz, run forwards and backwards (no phase shift) with
-            zeros added before and after and removed again; None leaves that side open.
-        order : int
-            Order of the filter in each direction, 4 by default; only with `band_pass`.
-        resample : float
-            New sampling step, s: the motion's values at its multiples, joined by straight lines; a jump becomes a
-            slope of one step. To a coarser step, remove what lies above its Nyquist frequency with `band_pass`.
-
-        Returns
-        -------
-        Motion
-            Of the same name, both components processed alike.
-
-        Raises
-        ------
-        InvalidMotion
-            If nothing is asked for, an argument is not usable or out of place, or `baseline` or `band_pass` is asked
-            of a motion that is not linear between even samples, or jumps (resample it first, in a call of its own).
-
-        Examples
-        --------
-        >>> record = Motion.from_samples([1.0, 2.0, 1.0, 0.0, 1.0], 0.5)
-        >>> done = record.processed(trim=(0.5, 2.0), baseline=0)
-        >>> done.samples[1]
-        array([ 1.,  0., -1.,  0.])
-        >>> done.history
-        ('trimmed to 0.5-2 s', 'baseline of degree 0 removed')
-        """
-        steps: list[_Step] = []
-        kept = None if trim is None else processing.ends(self, *processing.pair(trim, "trim"))
-        if baseline is not None:
-            steps.append(lambda motion: processing.baseline(motion, baseline))
-        if band_pass is not None:
-            low, high = processing.pair(band_pass, "band_pass")
-            steps.append(lambda motion: processing.band_pass(motion, low, high, order=4 if order is None else order))
-        elif order is not None:
-            raise InvalidMotion("{} belongs to {}; give that as well, or neither", "order", "band_pass")
-        if resample is not None:
-            steps.append(lambda motion: processing.resample(motion, resample))
-        if kept is None and not steps:
-            raise InvalidMotion("name what to do: trim, baseline, band_pass or resample")
-        vertical = self.vertical
-        if vertical is not None and kept is not None and kept[0] > vertical.duration - piecewise.SHORTEST:
-            vertical = None  # it is over by then
-        if vertical is not None:
-            vertical = vertical._processed(kept, steps, self.step)
-        return replace(self._processed(kept, steps), vertical=vertical)
-
-    def _processed(
-        self,
-        kept: tuple[float, float] | None,
-        steps: list[_Step],
-        grid: float | None = None,
-    ) -> Motion:
-        """Return the part between two times (s; even samples stay even on a finer `grid`), after these steps."""
-        motion: piecewise.Piecewise = self
-        history = self.history
-        if kept is not None:
-            start, end = kept[0], min(kept[1], self.duration)
-            steps = [lambda motion: processing.cut(motion, start, end, grid), *steps]
-        for step in steps:
-            motion = done = step(motion)
-            history = (*history, done.done)
-        # What is made of samples is the motion from then on: the lines between them are exact.
-        cut_only = len(steps) == (kept is not None)
-        return replace(
-            self,
-            breakpoints=motion.breakpoints,
-            coefficients=motion.coefficients,
-            description=self.description.changed("processed"),
-            history=history,
-            error=self.error if cut_only else 0.0,
-        )
-
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         """Draw the ground acceleration in g over time, and below it the vertical one.
 
@@ -642,20 +410,17 @@ class Motion(Measured):
         if not isinstance(other, Motion):
             return NotImplemented
         breakpoints, (mine, theirs) = piecewise.together(self, other)
-        both = self.vertical is not None and other.vertical is not None
+        vertical = self.vertical or other.vertical
+        if self.vertical is not None and other.vertical is not None:
+            vertical = self.vertical + other.vertical
         return Motion(
             breakpoints,
             mine + theirs,
             name=f"{self.name} + {other.name}",
             description=Description("sum", text=f"{self._origin()}; plus {other._origin()}"),
             error=self.error + other.error,
-            vertical=self.vertical + other.vertical if both else self.vertical or other.vertical,
+            vertical=vertical,
         )
-
-    def _origin(self) -> str:
-        """Return name, parameters, formula and history in one line, for the description of a sum."""
-        described = (self.description.family, self.description.numbers, self.description.text)
-        return ", ".join(part for part in (self.name, *described, *self.history) if part)
 
     def _times(self, factor: float, done: str) -> Motion:
         """Return both components times a factor, the vertical one by its size."""

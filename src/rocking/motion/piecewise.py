@@ -181,22 +181,18 @@ def root_candidates(widths: Floats, coefficients: Floats) -> Floats:
         if degree == 1:
             roots = -coefficients[:, :1] / coefficients[:, 1:]
         elif degree == 2:
-            roots = _quadratic_roots(coefficients)
+            c, b, a = coefficients.T
+            q = -0.5 * (b + np.copysign(np.sqrt(np.maximum(b * b - 4.0 * a * c, 0.0)), b))
+            roots = np.column_stack([q / a, c / q])
         else:
             roots = _numerical_roots(widths, coefficients)
     roots = np.where(np.isfinite(roots), roots, 0.0)
     return np.sort(np.clip(roots, 0.0, widths[:, np.newaxis]), axis=1)
 
 
-def _quadratic_roots(coefficients: Floats) -> Floats:
-    c, b, a = coefficients.T
-    q = -0.5 * (b + np.copysign(np.sqrt(np.maximum(b * b - 4.0 * a * c, 0.0)), b))
-    return np.column_stack([q / a, c / q])
-
-
 def _numerical_roots(widths: Floats, coefficients: Floats) -> Floats:
     roots = np.zeros((len(coefficients), coefficients.shape[1] - 1))
-    scaled = coefficients * _powers(widths, coefficients.shape[1])
+    scaled = coefficients * widths[:, np.newaxis] ** np.arange(float(coefficients.shape[1]))
     control = _control_points(widths, coefficients)
     rounding = 1e-14 * np.sum(np.abs(scaled), axis=1)
     may_vanish = (np.min(control, axis=1) <= rounding) & (np.max(control, axis=1) >= -rounding)
@@ -229,7 +225,7 @@ def _polynomial_roots(pieces: Floats) -> Floats:
 def _control_points(widths: Floats, coefficients: Floats) -> Floats:
     """Bernstein coefficients of each piece: they enclose its values."""
     columns = coefficients.shape[1]
-    control: Floats = (coefficients * _powers(widths, columns)) @ _bernstein_shares(columns)
+    control: Floats = (coefficients * widths[:, np.newaxis] ** np.arange(float(columns))) @ _bernstein_shares(columns)
     return control
 
 
@@ -237,11 +233,6 @@ def _control_points(widths: Floats, coefficients: Floats) -> Floats:
 def _bernstein_shares(columns: int) -> Floats:
     """Share of each power in each Bernstein coefficient."""
     return np.array([[math.comb(i, j) / math.comb(columns - 1, j) for i in range(columns)] for j in range(columns)])
-
-
-def _powers(widths: Floats, columns: int) -> Floats:
-    powers: Floats = widths[:, np.newaxis] ** np.arange(float(columns))
-    return powers
 
 
 def bounds(widths: Floats, coefficients: Floats) -> Floats:
@@ -306,10 +297,9 @@ def checked_pieces(breakpoints: ArrayLike, coefficients: ArrayLike) -> tuple[Flo
             f"a motion must last from {SHORTEST:g} to {_LONGEST:g} s, not {ends[-1]:g} s: check its units"
         )
     with np.errstate(over="ignore"):
-        # Longer pieces reach no less, so that one look says of most motions that they are not too strong.
+        if not np.all(value(np.abs(rows), widths) <= STRONGEST):
+            raise InvalidMotion(TOO_STRONG)
         if not np.all(value(np.abs(rows), np.maximum(widths, SHORTEST)) <= STRONGEST):
-            if not np.all(value(np.abs(rows), widths) <= STRONGEST):
-                raise InvalidMotion(TOO_STRONG)
             raise InvalidMotion(
                 f"a piece of a motion is too steep: shorter than {SHORTEST:g} s, it would pass {STRONGEST:g} m/s^2 "
                 "within that time: check units and times"

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Final, NamedTuple, Protocol, TypeVar
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, Final, NamedTuple, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,9 +14,9 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidMotion
 from rocking.motion import piecewise
-from rocking.motion.description import Description, begins_later
-from rocking.motion.measures import checked_damping
-from rocking.motion.piecewise import Pieces, Piecewise
+from rocking.motion.description import Description, Origin, begins_later
+from rocking.motion.measures import DAMPING, Measured, checked_damping
+from rocking.motion.piecewise import Piecewise
 
 T = TypeVar("T")
 
@@ -33,7 +35,247 @@ class Processed(NamedTuple):
     done: str
 
 
-def pair(values: tuple[T, T], what: str) -> tuple[T, T]:
+#: A step of processing.
+_Step = Callable[[Piecewise], Processed]
+
+
+class Processable(Measured):
+    """What makes other motions of a motion; `Motion` is the only one."""
+
+    name: str
+    description: Description
+    history: tuple[str, ...]
+    error: float
+    vertical: Self | None
+    step: float | None
+
+    def _changed(self, how: str, done: str, **fields: Any) -> Self:
+        """Return the motion with other fields, and with what was done."""
+        fields = {"description": self.description.changed(how), "history": (*self.history, done)} | fields
+        return replace(self, **fields)  # type: ignore[type-var]
+
+    def _origin(self) -> str:
+        """Return name, parameters, formula and history in one line, for the description of a sum."""
+        described = (self.description.family, self.description.numbers, self.description.text)
+        return ", ".join(part for part in (self.name, *described, *self.history) if part)
+
+    def rotated(self, other: Self, azimuth: float, *, recorded: tuple[float, float] | None = None) -> Self:
+        """Return the component along any azimuth of the horizontal motion whose two components are this and another.
+
+        Parameters
+        ----------
+        other : Motion
+            Second horizontal component of the same place, which starts at the same time.
+        azimuth : float
+            Direction in which the result is positive, degrees clockwise from north.
+        recorded : pair of float, optional
+            Azimuths of this component and the other, degrees clockwise from north; by default as their records say.
+
+        Returns
+        -------
+        Motion
+            With the vertical component of either.
+
+        Raises
+        ------
+        InvalidMotion
+            If an azimuth is not known or no number, both components lie nearly along one line, begin at different
+            times by the clock of their files, or each brings a vertical component of its own.
+
+        Notes
+        -----
+        a(phi) = (a_1 sin(phi_2 - phi) + a_2 sin(phi - phi_1))/sin(phi_2 - phi_1), exactly, piece by piece.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> west, north = (rocking.records.load(f"el-centro-meloland-{azimuth}") for azimuth in (270, 360))
+        >>> [f"{west.rotated(north, azimuth).pga:.3f}" for azimuth in (270, 0, 315)]
+        ['2.927', '3.050', '2.322']
+        """
+        if not isinstance(other, Processable):
+            sentence = f"{{}} must be a Motion, the other horizontal component, not {type(other).__name__}"
+            raise InvalidMotion(sentence, "other", value=other)
+        first, second = _recorded_azimuths(self, other, recorded)
+        if later := begins_later(self.description, other.description, self.step):
+            early, late = (self, other) if later > 0.0 else (other, self)
+            raise InvalidMotion(
+                f"by their files {checks.shown(late.name)} begins {abs(later):.6g} s after {checks.shown(early.name)}: "
+                f"cut what comes first with processed(trim=({abs(later):.6g}, {early.duration:.6g})) of the latter"
+            )
+        wanted = checks.finite(azimuth, "azimuth", InvalidMotion)
+        if self.vertical is not None and other.vertical not in (None, self.vertical):
+            raise InvalidMotion("each component has a vertical one: give it to one of the two with with_vertical")
+        mine, theirs = shares((first, second), wanted)
+        breakpoints, (one, two) = piecewise.together(self, other)
+        along: dict[str, Any] = {"channel": f"{wanted:g} deg", "number": None, "azimuth": wanted, "reversed": False}
+        origin = replace(self.description.origin or Origin(), **along)
+        text = f"at {wanted:g} deg, from {first:g} deg: {self._origin()}; and {second:g} deg: {other._origin()}"
+        return self._changed(
+            "rotated",
+            f"with {other.name} rotated to {wanted:g} deg",
+            breakpoints=breakpoints,
+            coefficients=mine * one + theirs * two,
+            description=replace(self.description.changed("rotated"), parameters={}, text=text, origin=origin),
+            error=abs(mine) * self.error + abs(theirs) * other.error,
+            vertical=self.vertical or other.vertical,
+        )
+
+    def delayed(self, delay: float) -> Self:
+        """Return the motion after a time of no acceleration.
+
+        Parameters
+        ----------
+        delay : float
+            That time, s.
+
+        Returns
+        -------
+        Motion
+            With a piece more, both components.
+
+        Raises
+        ------
+        InvalidMotion
+            If `delay` is not a positive number (an early part is cut off by ``processed(trim=...)``).
+
+        Examples
+        --------
+        >>> import rocking
+        >>> rocking.Motion([0.0, 2.0], [[1.0]]).delayed(1.0).acceleration([0.5, 1.5, 3.5])
+        array([0., 1., 0.])
+        """
+        wait = checks.positive(delay, "delay", InvalidMotion, "s")
+        return self._changed(
+            "delayed",
+            f"delayed by {wait:.6g} s",
+            breakpoints=np.concatenate([[0.0], self.breakpoints + wait]),
+            coefficients=np.vstack([np.zeros((1, self.coefficients.shape[1])), self.coefficients]),
+            vertical=None if self.vertical is None else self.vertical.delayed(wait),
+        )
+
+    def floor(self, period: float, damping: float = DAMPING, *, ringing: float | None = None) -> Self:
+        """Return the motion of a floor: the absolute acceleration of a linear oscillator under the motion.
+
+        Parameters
+        ----------
+        period : float
+            Natural period of the building, s.
+        damping : float
+            Its fraction of critical damping.
+        ringing : float, optional
+            Time for which the floor is followed after the motion, s; by default until a free oscillation has faded to a
+            thousandth.
+
+        Returns
+        -------
+        Motion
+            Polynomials of degree 9 on pieces of a quarter radian at most; the vertical component as it is.
+
+        Raises
+        ------
+        InvalidMotion
+            If the period or the damping is out of its range, or there is no damping and no `ringing`.
+
+        Notes
+        -----
+        In a building with one mode this is the motion of the floor where the mode's shape times its participation
+        factor is 1; ``ground + (floor + -ground) * 0.6`` is that of a floor where it is 0.6. What stands on the floor
+        does not act back on it. A fragility against measures of the floor has no hazard curve of the ground.
+
+        Examples
+        --------
+        >>> import rocking
+        >>> floor = rocking.pulses.sine(1.0, 2.0, cycles=10).floor(0.5)
+        >>> round(floor.pga, 2), round(floor.duration, 1)
+        (9.62, 16.0)
+        """
+        breakpoints, coefficients, error = _floor_pieces(self, period, damping, ringing, self.error)
+        done = f"on a floor of period {period:.6g} s, damping {damping:.6g}"
+        return self._changed("floor", done, breakpoints=breakpoints, coefficients=coefficients, error=error)
+
+    def processed(
+        self,
+        *,
+        trim: tuple[float, float] | None = None,
+        baseline: int | None = None,
+        band_pass: tuple[float | None, float | None] | None = None,
+        order: int | None = None,
+        resample: float | None = None,
+    ) -> Self:
+        """Return a processed motion; the steps go in the order of the arguments, each noted in `history`.
+
+        Parameters
+        ----------
+        trim : (start, end)
+            Part to keep, s; its start becomes time 0. For even samples the ends move to the nearest sample.
+        baseline : int
+            Degree of the polynomial in time that is fitted to the samples by least squares and subtracted.
+        band_pass : (low, high)
+            Corner frequencies of a Butterworth filter, Hz, run forwards and backwards (no phase shift) with
+            zeros added before and after and removed again; None leaves that side open.
+        order : int
+            Order of the filter in each direction, 4 by default; only with `band_pass`.
+        resample : float
+            New sampling step, s: the motion's values at its multiples, joined by straight lines. To a coarser step,
+            remove what lies above its Nyquist frequency with `band_pass`.
+
+        Returns
+        -------
+        Motion
+            Of the same name, both components processed alike.
+
+        Raises
+        ------
+        InvalidMotion
+            If no step is named, an argument is not usable or out of place, or `baseline` or `band_pass` is applied
+            to a motion that is not linear between even samples, or jumps (resample it first, in a call of its own).
+
+        Examples
+        --------
+        >>> import rocking
+        >>> record = rocking.Motion.from_samples([1.0, 2.0, 1.0, 0.0, 1.0], 0.5)
+        >>> done = record.processed(trim=(0.5, 2.0), baseline=0)
+        >>> done.samples[1], done.history
+        (array([ 1.,  0., -1.,  0.]), ('trimmed to 0.5-2 s', 'baseline of degree 0 removed'))
+        """
+        steps: list[_Step] = []
+        kept = None if trim is None else _ends(self, *_pair(trim, "trim"))
+        if baseline is not None:
+            steps.append(lambda motion: _baseline(motion, baseline))
+        if band_pass is not None:
+            low, high = _pair(band_pass, "band_pass")
+            steps.append(lambda motion: _band_pass(motion, low, high, 4 if order is None else order))
+        elif order is not None:
+            raise InvalidMotion("{} belongs to {}; give that as well, or neither", "order", "band_pass")
+        if resample is not None:
+            steps.append(lambda motion: _resample(motion, resample))
+        if kept is None and not steps:
+            raise InvalidMotion("name what to do: trim, baseline, band_pass or resample")
+        vertical = self.vertical
+        if vertical is not None and kept is not None and kept[0] > vertical.duration - piecewise.SHORTEST:
+            vertical = None  # it is over by then
+        if vertical is not None:
+            vertical = vertical._processed(kept, steps, self.step)
+        return replace(self._processed(kept, steps), vertical=vertical)  # type: ignore[type-var]
+
+    def _processed(self, kept: tuple[float, float] | None, steps: list[_Step], grid: float | None = None) -> Self:
+        """Return the part between two times (s; even samples stay even on a finer `grid`), after these steps."""
+        motion: Piecewise = self
+        history = self.history
+        # What is made of samples is the motion from then on: the lines between them are exact.
+        error = 0.0 if steps else self.error
+        if kept is not None:
+            start, end = kept[0], min(kept[1], self.duration)
+            steps = [lambda motion: _cut(motion, start, end, grid), *steps]
+        for step in steps:
+            motion = done = step(motion)
+            history = (*history, done.done)
+        pieces = {"breakpoints": motion.breakpoints, "coefficients": motion.coefficients}
+        return self._changed("processed", "", **pieces, history=history, error=error)
+
+
+def _pair(values: tuple[T, T], what: str) -> tuple[T, T]:
     """Return the two values of the argument `what`."""
     try:
         first, second = values
@@ -42,7 +284,7 @@ def pair(values: tuple[T, T], what: str) -> tuple[T, T]:
     return first, second
 
 
-def ends(motion: Piecewise, start: float, end: float) -> tuple[float, float]:
+def _ends(motion: Piecewise, start: float, end: float) -> tuple[float, float]:
     """Return the ends (s) of the part to keep; those of even samples are moved to the nearest sample."""
     first = checks.finite(start, "start of the part to keep", InvalidMotion)
     last = checks.finite(end, "end of the part to keep", InvalidMotion)
@@ -61,12 +303,8 @@ def ends(motion: Piecewise, start: float, end: float) -> tuple[float, float]:
     return round(first / step) * step, round(last / step) * step
 
 
-def cut(motion: Piecewise, start: float, end: float, grid: float | None = None) -> Processed:
-    """Keep the part from `start` to `end` (s), exactly; it starts at 0 then.
-
-    Even samples stay even where both ends are samples, or where they are multiples of a step `grid` (s) that divides
-    the samples' own: the part has that step then.
-    """
+def _cut(motion: Piecewise, start: float, end: float, grid: float | None = None) -> Processed:
+    """Keep the part from `start` to `end` (s); even samples stay even, where needed with a step `grid` (s)."""
     done = f"trimmed to {start:.6g}-{end:.6g} s"
     step = piecewise.even_step(motion)
     if step is not None:
@@ -88,7 +326,7 @@ def _whole(ratio: float) -> int | None:
     return round(ratio) if abs(ratio - round(ratio)) <= 1e-8 else None
 
 
-def baseline(motion: Piecewise, degree: int) -> Processed:
+def _baseline(motion: Piecewise, degree: int) -> Processed:
     """Subtract the polynomial of the given degree that fits the samples best (least squares)."""
     step = _step(motion, "baseline")
     times, samples = piecewise.samples(motion)
@@ -97,12 +335,8 @@ def baseline(motion: Piecewise, degree: int) -> Processed:
     return _joined(samples - fitted, step, f"baseline of degree {degree} removed")
 
 
-def band_pass(motion: Piecewise, low: float | None, high: float | None, *, order: int) -> Processed:
-    """Filter with a Butterworth band-pass, forwards and backwards, zeros added at both ends meanwhile.
-
-    The zeros last ``1.5 order / low`` on each side (Converse and Brady 1992); without `low`, ``1.5 order / high``.
-    They are cut off again, and with them what the filter spread there, so the displacement may keep a slow drift.
-    """
+def _band_pass(motion: Piecewise, low: float | None, high: float | None, order: int) -> Processed:
+    """Filter with a Butterworth band-pass, forwards and backwards, and zeros at both ends (Converse and Brady 1992)."""
     from scipy import signal  # half a second: loaded only where it is used
 
     step = _step(motion, "band_pass")
@@ -127,7 +361,7 @@ def band_pass(motion: Piecewise, low: float | None, high: float | None, *, order
     return _joined(filtered, step, f"band-passed {span}, order {order} forwards and backwards")
 
 
-def resample(motion: Piecewise, step: float) -> Processed:
+def _resample(motion: Piecewise, step: float) -> Processed:
     """Take the motion's values at the multiples of `step` (s) up to its end, joined by straight lines."""
     new = checks.positive(step, "new sampling step", InvalidMotion, "s")
     duration = float(motion.breakpoints[-1])
@@ -156,9 +390,9 @@ def _joined(samples: Floats, step: float, done: str) -> Processed:
     return Processed(times, piecewise.linear(times, samples), done)
 
 
-def floor_pieces(
+def _floor_pieces(
     motion: Piecewise, period: float, damping: float, ringing: float | None, error: float = 0.0
-) -> tuple[Pieces, float]:
+) -> tuple[Floats, Floats, float]:
     """Absolute acceleration of an oscillator that starts at rest, and a bound on the error of its pieces, m/s^2.
 
     With u'' + 2 z w u' + w^2 u = -a(t) it is -(2 z w u' + w^2 u). On each piece u is the Taylor series of the exact
@@ -206,7 +440,7 @@ def floor_pieces(
     largest = float(np.max(np.abs(acceleration[:, 0]), initial=0.0))
     own = 4.0 * largest * _RADIANS**columns / math.factorial(columns)
     grown = error * (2.0 / ratio if ratio > 0.0 else rate * (end + after))  # the sum of all that an error can do
-    return Pieces(breakpoints, acceleration), own + grown
+    return breakpoints, acceleration, own + grown
 
 
 def _series(given: Floats, rate: float, ratio: float, terms: int) -> Floats:
@@ -234,26 +468,6 @@ def _marched(ends: Floats) -> Floats:
     return found
 
 
-class Component(Protocol):
-    """What is known of a horizontal component."""
-
-    @property
-    def name(self) -> str:
-        """Its name."""
-
-    @property
-    def description(self) -> Description:
-        """How it was made, and of a record its azimuth and the instant when it begins."""
-
-    @property
-    def duration(self) -> float:
-        """Its end, s."""
-
-    @property
-    def step(self) -> float | None:
-        """Step of its samples, s; None if they are uneven."""
-
-
 def sine_cosine(degrees: ArrayLike) -> tuple[Floats, Floats]:
     """Return sine and cosine of angles in degrees, exact at multiples of a right angle.
 
@@ -268,17 +482,7 @@ def sine_cosine(degrees: ArrayLike) -> tuple[Floats, Floats]:
     return sine + 0.0, cosine + 0.0  # no negative zeros
 
 
-def check_start(one: Component, other: Component) -> None:
-    """Refuse two components that begin at different times, by the clock of their files."""
-    if later := begins_later(one.description, other.description, one.step):
-        early, late = (one, other) if later > 0.0 else (other, one)
-        raise InvalidMotion(
-            f"by their files {checks.shown(late.name)} begins {abs(later):.6g} s after {checks.shown(early.name)}: cut "
-            f"what comes first with processed(trim=({abs(later):.6g}, {early.duration:.6g})) of the latter"
-        )
-
-
-def recorded_azimuths(one: Component, other: Component, recorded: Any) -> tuple[float, float]:
+def _recorded_azimuths(one: Processable, other: Processable, recorded: Any) -> tuple[float, float]:
     """Return the azimuths of two components, as they are given, or else as their records say; or refuse them."""
     if recorded is None:
         known = [(each, each.description.origin) for each in (one, other)]
@@ -307,10 +511,7 @@ def recorded_azimuths(one: Component, other: Component, recorded: Any) -> tuple[
 
 
 def shares(recorded: tuple[float, float], azimuth: float) -> tuple[float, float]:
-    """Return the factors on two components, at their azimuths, whose sum is the component along another azimuth.
-
-    With a vector a, its components a_1 = a n_1 and a_2 = a n_2 along two directions determine the one along n, even
-    where the two are not perpendicular.
+    """Return the factors on two components whose sum is the component along another azimuth.
 
     Examples
     --------

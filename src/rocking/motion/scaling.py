@@ -14,6 +14,7 @@ from rocking.arrays import Floats
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion.measures import DAMPING, Measured, checked_damping
+from rocking.tables import named
 
 #: What an analysis may count motions by.
 IntensityName = Literal["pga", "pgv", "sa", "pga_ratio", "pgv_ratio"]
@@ -98,11 +99,6 @@ class Measure:
         Measure
             One of them.
 
-        Raises
-        ------
-        InvalidOption
-            If it is no measure, or none of them, or a spectral acceleration by its name alone.
-
         Examples
         --------
         >>> Measure.of("pgv")
@@ -124,7 +120,7 @@ class Measure:
     @property
     def column(self) -> str:
         """Name with units for a table."""
-        return {"m/s^2": f"{self.name}_m_s2", "m/s": f"{self.name}_m_s"}.get(self.units, self.name)
+        return named(self.name, self.units)
 
     @property
     def scale(self) -> float:
@@ -215,7 +211,7 @@ class Measure:
         return motion.pga if self.of_motion == "pga" else motion.pgv
 
     def positive(self, motion: Measured, name: str) -> float:
-        """Return what the motion alone measures, as `value`, of a motion that can be scaled.
+        """Return what the motion alone measures, as `value`, or refuse a motion that is zero throughout.
 
         Parameters
         ----------
@@ -228,11 +224,6 @@ class Measure:
         -------
         float
             In SI units.
-
-        Raises
-        ------
-        InvalidMotion
-            If the motion is zero throughout.
 
         Examples
         --------

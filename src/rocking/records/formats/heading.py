@@ -7,7 +7,6 @@ units below the names or above them.
 from __future__ import annotations
 
 import csv
-import functools
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -19,13 +18,10 @@ from rocking.records.units import SECOND, Unit, find_time_unit, find_unit
 #: What a column holds: times, numbers of rows, periods or ordinates of a spectrum, or values of a channel.
 Kind = Literal["time", "count", "spectrum", "channel"]
 
-_LONGEST: Final = 10_000
-_COMMENT_SIGNS: Final = "#%!/"
 #: What is in brackets, unless a value follows, as in "PGA (g) = 0.3".
 _BRACKETS: Final = re.compile(r"[(\[{<]\s*([^()\[\]{}<>]{1,40}?)\s*[)\]}>](?!\s*[=:]\s*[+-]?[\d.])")
 #: What stands before the unit of a value, as in "PGA = 8.2 m/s2".
 _VALUE: Final = re.compile(r"[=:]\s*[+-]?[\d.,]+(?:[eE][+-]?\d+)?$")
-_BRACKET_SIGNS: Final = "()[]{}<> "
 _UP_TO_BRACKET: Final = re.compile(r"[^()\[\]]*[(\[][^()\[\]]*[)\]]")
 _WORD_WITH_BRACKETS: Final = re.compile(r'"[^"]*"|(?:[^\s()\[\]]+\s*)?[(\[][^()\[\]]*[)\]]|[^\s()\[\]]+')
 _WORD: Final = re.compile(r"[^\W\d_]+")
@@ -86,10 +82,10 @@ def heading_of(source: Source, end: int, count: int, delimiter: str) -> Heading:
     Without names the first of several columns holds times, in seconds. The delimiter is "," or ";", or " " for blanks
     and tabs.
     """
-    at = max(0, end - _LONGEST)
+    at = max(0, end - 10_000)
     lines: list[tuple[str, int]] = []
     for line in source.data[at:end].split(b"\n"):
-        text = _without_comment_sign(_decoded(line))
+        text = _uncommented(line)
         if not RULE.fullmatch(text):
             lines.append((text, at))
         at += len(line) + 1
@@ -107,7 +103,7 @@ def heading_of(source: Source, end: int, count: int, delimiter: str) -> Heading:
 
 def names_columns(line: bytes, count: int, delimiter: str) -> bool:
     """Return whether a line names `count` columns, one of them so that it is understood: times, or a known unit."""
-    return _Names(_cells(_without_comment_sign(_decoded(line)), count, delimiter), (), "").understood()
+    return _Names(_cells(_uncommented(line), count, delimiter), (), "").understood()
 
 
 @dataclass(frozen=True)
@@ -140,11 +136,10 @@ class _Names:
 
     def understood(self) -> bool:
         """Whether a name is that of times, row numbers or a spectrum, or has a unit of acceleration."""
-        for place, name in enumerate(self.names):
-            known = _WORD.search(name) if self._kind(place) != "channel" else self._acceleration_unit(place)[0]
-            if known is not None:
-                return True
-        return False
+        return any(
+            (_WORD.search(name) if self._kind(place) != "channel" else self._acceleration_unit(place)[0]) is not None
+            for place, name in enumerate(self.names)
+        )
 
     def _kind(self, place: int) -> Kind:
         name = _without_brackets(self._label(place))
@@ -249,15 +244,11 @@ def _ways(delimiter: str) -> Iterator[tuple[Callable[[str], list[str]], bool]]:
     What single blanks or brackets divide may as well be a sentence; names begin with that of the times.
     """
     for sign in ["\t", ";", ","] if delimiter == " " else [delimiter, ";", ",", "\t"]:
-        yield functools.partial(_divided, sign), True
+        yield lambda line, sign=sign: next(csv.reader([line], delimiter=sign, skipinitialspace=True), []), True
     yield lambda line: re.split(r"\t+|\s{2,}", line.strip()), True
     yield lambda line: _UP_TO_BRACKET.findall(line) if line.rstrip().endswith((")", "]")) else [], False
     if delimiter == " ":
         yield _WORD_WITH_BRACKETS.findall, False
-
-
-def _divided(sign: str, line: str) -> list[str]:
-    return next(csv.reader([line], delimiter=sign, skipinitialspace=True), [])
 
 
 def _texts(name: str) -> list[str]:
@@ -279,7 +270,7 @@ def _ends(name: str) -> Iterator[str]:
 
 
 def _bare(name: str) -> str:
-    return name.strip(_BRACKET_SIGNS)
+    return name.strip("()[]{}<> ")
 
 
 def _without_brackets(name: str) -> str:
@@ -303,13 +294,10 @@ def _acceleration_unit_in(text: str) -> Unit | None:
     return units.pop() if len(units) == 1 else None
 
 
-def _without_comment_sign(line: str) -> str:
-    text = line.strip(" ")
-    return text if text.startswith("%g") else text.lstrip(_COMMENT_SIGNS).strip(" ")
-
-
-def _decoded(line: bytes) -> str:
+def _uncommented(line: bytes) -> str:
+    """Return the text of a line without the sign of a comment."""
     try:
-        return line.decode("utf-8")
+        text = line.decode("utf-8").strip(" ")
     except UnicodeDecodeError:
-        return line.decode("latin-1")
+        text = line.decode("latin-1").strip(" ")
+    return text if text.startswith("%g") else text.lstrip("#%!/").strip(" ")

@@ -125,6 +125,7 @@ def _read_knet(source: Source, request: Request) -> list[Channel]:
             scaled,
             unit,
             scale_at,
+            spelling="gal",
             facts={"record time": entries["Record Time"].value, "offset": offset},
             name=name,
             number=1,

@@ -246,9 +246,3 @@ class Request:
                 value=self.unit.name,
             )
         return unit
-
-    def units_by_heading(self, source: Source, heading: Unit | None, at: int | None) -> Unit:
-        """Return the unit that a heading in the file's own words names, or the one asked for, which overrules it."""
-        if self.several and heading is not None:
-            return heading
-        return self.units(source, None if self.unit is not None else heading, at)

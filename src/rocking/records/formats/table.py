@@ -31,18 +31,15 @@ from rocking.records.formats.channel import (
     missing_value,
     prints_as,
 )
-from rocking.records.formats.heading import RULE, Column, Heading, heading_of, names_columns
+from rocking.records.formats.heading import RULE, Heading, heading_of, names_columns
 from rocking.records.formats.source import Line, Request, Source
 from rocking.records.formats.values import NUMBER, convert, not_a_number, parse
 from rocking.records.units import CHOICES, Unit
 
 _DELIMITERS = {",": "a comma", ";": "a semicolon", " ": "a blank"}
 
-#: Headings are no longer; as many lines are looked through for the second and third row.
+#: Headings are no longer.
 HEADING_LINES = 1000
-_LINES_BELOW = 64
-#: So many rows, as Python keeps them, take some twenty times the memory of their text.
-_LINES_AT_ONCE = 5_000
 
 #: What spreadsheets write after a # where they have no number.
 _ERRORS = r"(?:(?:n/?a|nv)(?!\w)|div/0!|value!|ref!|num!|name\?|null!|wert!|zahl!)"
@@ -56,16 +53,10 @@ _MISTAKEN = str.maketrans("OolI", "0011")
 _DIGIT_OR_POINT = re.compile(r"[\d.]|[Oo]$")
 _DATE = re.compile(r"\d+[-/:]\d+[-/:T]\S*|\d{1,2}\.\d{1,2}\.\d{2}(?:\d\d)?")
 
-#: No word of a heading is longer.
-_LONGEST_WORD = 300
-
 #: No row of numbers is longer; what is, is refused before it is split.
 _ROW_LIMIT = 1024
 _WITHOUT_POINT = re.compile(r"[+-]?\d+(?:,\d+)?(?:[EeDd][+-]?\d+)?")
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+(?:[EeDd][+-]?\d+)?")
-
-#: A line before the first row is one itself if its time is one step earlier, up to this share of the step.
-_SAME_STEP = 0.5
 
 #: What a unit of another quantity has.
 _OF_OTHER_QUANTITY = re.compile(r".*[/%].*|m|cm|mm|in|ft|m?v|counts?|rad|deg", re.IGNORECASE)
@@ -79,12 +70,8 @@ _STATES_STEP = re.compile(
     r"(?:[^:=]*[:=])?(.*)",
     re.IGNORECASE,
 )
-#: A stated step may be rounded by this share of it, and by half a unit of its last digit.
-_ROUNDED = 0.03
-_SHOWN = 100
-
-#: Titles of other formats' tables, which ObsPy reads.
-_OTHER_TITLES = ("TIMESERIES ",)
+#: Title of a table that ObsPy reads.
+_OTHER_TITLE = "TIMESERIES "
 
 
 class _Row(NamedTuple):
@@ -158,7 +145,7 @@ def refusal(source: Source) -> UnreadableRecord | None:
 
 def is_foreign(source: Source) -> bool:
     """Whether the first line is the title of another format's table."""
-    return any(line.text.startswith(_OTHER_TITLES) for line in source.lines(0, HEADING_LINES))
+    return any(line.text.startswith(_OTHER_TITLE) for line in source.lines(0, HEADING_LINES))
 
 
 def _read(source: Source, shape: _Shape, heading: Heading, request: Request) -> list[Channel]:
@@ -171,8 +158,7 @@ def _read(source: Source, shape: _Shape, heading: Heading, request: Request) -> 
             "decimal points, or blanks between two numbers",
             shape.start,
         )
-    values = _values(source, shape)
-    table = values.reshape(-1, shape.columns)
+    table = _values(source, shape).reshape(-1, shape.columns)
     if heading.assumed and (fault := first_fault(table[:, 0])) is not None:
         heading = _without_times(source, request, shape, heading, fault)
     held = _channels(source, heading)
@@ -181,35 +167,40 @@ def _read(source: Source, shape: _Shape, heading: Heading, request: Request) -> 
         raise source.error(f"{text}; give accelerations at times, or name their column so", heading.at)
     if not heading.places("time"):
         _check_step(source, request.dt, shape)
-    for place in heading.places("time"):
-        _refuse_strange_times(source, heading, place)
+    _check_columns(source, shape, heading, table)
     units = [_unit(source, request, heading, place, shape.start) for place in held]
-    for place in heading.places("count"):
-        _check_count(source, shape, table[:, place])
     channels = []
     for number, (place, unit) in enumerate(zip(held, units, strict=True), 1):
         column = heading.columns[place]
-        dt, times = _timing(source, request, shape, heading, table, place)
-        name = source.stem if shape.columns <= 2 and len(held) == 1 else column.name
-        known: dict[str, Any] = {
-            "name": name,
-            "number": number,
-            "dt": dt,
-            "times": times,
-            "start": _start(heading, table, place),
-        }
-        channel = channel_of(
-            source,
-            "text table",
-            table[:, place],
-            unit,
-            shape.start,
-            facts=_heading_units(column),
-            row_at=lambda index: shape.row_at(source, index),
-            **known,
+        known = _timing(source, request, shape, heading, table, place)
+        known |= {"name": source.stem if shape.columns <= 2 and len(held) == 1 else column.name, "number": number}
+        named = column.strange if _OF_OTHER_QUANTITY.fullmatch(column.strange) else ""
+        facts = {"heading units": column.unit.name if column.unit is not None else named}
+        row_at = functools.partial(shape.row_at, source)
+        values = table[:, place]
+        channels.append(
+            channel_of(source, "text table", values, unit, shape.start, facts=facts, row_at=row_at, **known)
         )
-        channels.append(channel)
     return channels
+
+
+def _check_columns(source: Source, shape: _Shape, heading: Heading, table: Floats) -> None:
+    """Refuse times in an unclear unit, and row numbers that do not follow each other."""
+    for place in heading.places("time"):
+        column = heading.columns[place]
+        if column.unit is None:
+            raise source.error(
+                f"the unit of the times is not clear from {column.strange!r} in the heading; name it in their column, "
+                "as 'time (ms)': s, ms, us, ns, min, h or d",
+                heading.at,
+            )
+    for place in heading.places("count"):
+        steps = np.diff(table[:, place])
+        if len(odd := np.flatnonzero(steps != steps[:1])):
+            raise source.error(
+                "the number of this row does not follow that of the row before; get a record without gaps",
+                shape.row_at(source, int(odd[0]) + 1),
+            )
 
 
 def _without_times(source: Source, request: Request, shape: _Shape, heading: Heading, fault: int) -> Heading:
@@ -234,47 +225,24 @@ def _channels(source: Source, heading: Heading) -> list[int]:
         raise source.error(
             f"the column {name!r} is that of a spectrum; give a table of accelerations at times", heading.at
         )
-    known = [place for place in channels if heading.columns[place].unit]
-    plain = [place for place in channels if not heading.columns[place].strange]
     if not channels:
         raise source.error("the heading names no column of accelerations; name it so", heading.at)
-    return known or plain or channels
+    known = [place for place in channels if heading.columns[place].unit]
+    return known or [place for place in channels if not heading.columns[place].strange] or channels
 
 
 def _unit(source: Source, request: Request, heading: Heading, place: int, at: int) -> Unit:
     """Return the unit of a column of accelerations."""
     column = heading.columns[place]
-    asked = None if request.several else request.unit  # for several files: for those that do not say
-    if asked is None and _LENGTH_OR_SPEED.fullmatch(column.strange):
-        raise source.error(
-            f"the heading says {column.strange!r}, which is no unit of an acceleration; give a table of accelerations",
-            heading.at,
-        )
-    if asked is None and column.strange:
-        raise source.error(
-            f"the heading says {column.strange!r}, which is no unit of acceleration that is known here; give {{}} as "
-            f"one of {', '.join(CHOICES)}",
-            heading.at,
-            "units",
-        )
-    return request.units_by_heading(source, column.unit, at)
-
-
-def _heading_units(column: Column) -> dict[str, str]:
-    """Return the unit that a heading names, for notes on what overrules it."""
-    if column.unit is not None:
-        return {"heading units": column.unit.name}
-    return {"heading units": column.strange} if _OF_OTHER_QUANTITY.fullmatch(column.strange) else {}
-
-
-def _refuse_strange_times(source: Source, heading: Heading, place: int) -> None:
-    column = heading.columns[place]
-    if column.unit is None:
-        raise source.error(
-            f"the unit of the times is not clear from {column.strange!r} in the heading; name it in their column, as "
-            "'time (ms)': s, ms, us, ns, min, h or d",
-            heading.at,
-        )
+    if column.strange and (request.unit is None or request.several):  # for several files: for those that do not say
+        said = f"the heading says {column.strange!r}, which is no unit of"
+        if _LENGTH_OR_SPEED.fullmatch(column.strange):
+            raise source.error(f"{said} an acceleration; give a table of accelerations", heading.at)
+        known = f"acceleration that is known here; give {{}} as one of {', '.join(CHOICES)}"
+        raise source.error(f"{said} {known}", heading.at, "units")
+    if request.several and column.unit is not None:
+        return column.unit
+    return request.units(source, column.unit if request.unit is None else None, at)  # what is given overrules it
 
 
 def _check_step(source: Source, dt: float | None, shape: _Shape) -> None:
@@ -283,10 +251,10 @@ def _check_step(source: Source, dt: float | None, shape: _Shape) -> None:
     for line in itertools.takewhile(lambda line: line.start < shape.start, source.lines(0, HEADING_LINES)):
         found = _STATES_STEP.search(line.text)
         numbers = re.findall(NUMBER, found[1] or found[2]) if found else []
-        stated = literal(repr(line.text.strip()[:_SHOWN]))
+        stated = literal(repr(line.text.strip()[:100]))
         if dt is not None and numbers and not any(_is_step(number, dt) for number in numbers):
-            text = f"the heading says {stated}, not {{}} {dt:g} s; correct one of them"
-            raise source.error(text, line.start, "dt", value=dt)
+            sentence = f"the heading says {stated}, not {{}} {dt:g} s; correct one of them"
+            raise source.error(sentence, line.start, "dt", value=dt)
         said = f"no column holds times, but the heading says {stated}" if numbers else said
     if dt is None:
         raise source.error(f"{said}; give {{}} in seconds", shape.start, "dt")
@@ -295,32 +263,23 @@ def _check_step(source: Source, dt: float | None, shape: _Shape) -> None:
 def _is_step(number: str, dt: float) -> bool:
     """Whether a number may be a step (s): in s or ms, or as a rate, rounded as it is printed."""
     printed = Decimal(number.upper().replace("D", "E"))
-    rounded = min(float(f"0.5e{printed.as_tuple().exponent}"), _ROUNDED * abs(float(printed)))
+    rounded = min(float(f"0.5e{printed.as_tuple().exponent}"), 0.03 * abs(float(printed)))
     return any(abs(each - float(printed)) <= rounded for each in (dt, 1e3 * dt, 1.0 / dt))
-
-
-def _check_count(source: Source, shape: _Shape, numbers: Floats) -> None:
-    """Refuse rows whose numbers do not follow each other: one is missing."""
-    steps = np.diff(numbers)
-    odd = np.flatnonzero(steps != steps[0]) if len(steps) else steps
-    if len(odd):
-        raise source.error(
-            "the number of this row does not follow that of the row before; get a record without gaps",
-            shape.row_at(source, int(odd[0]) + 1),
-        )
 
 
 def _shape(source: Source) -> _Shape | None:
     lines = [] if source.is_binary else source.lines(0, HEADING_LINES)
     for k, line in enumerate(lines):
-        if line.text.startswith(_OTHER_TITLES):
+        if line.text.startswith(_OTHER_TITLE):
             return None
         translation, delimiter = _delimiter(line)
         tokens = _row(line, translation).tokens
         if tokens and not _is_comment(line) and all(parse(token) is not None for token in tokens):
-            following = _filled(source.lines(line.next, _LINES_BELOW))
+            following = _filled(source.lines(line.next, 64))
             if delimiter == " " and len(tokens) > 1:
-                translation = _with_decimal_commas(following) or translation
+                # Between blanks commas may be decimal signs, in rows below the first one that has any.
+                ways = (_delimiter(each) for each in following if "," in each.text)
+                translation = next((way for way, sign in ways if sign == " "), translation)
             rows = [_row(each, translation) for each in (line, *following[:2])]
             counts = [len(row.tokens) for row in rows]
             odd = len(counts) == 3 and counts[0] != counts[1] == counts[2]
@@ -348,12 +307,6 @@ def _row(line: Line, translation: bytes) -> _Row:
     return _Row(line.text.encode("latin-1").translate(translation).split(), line.start)
 
 
-def _with_decimal_commas(lines: Sequence[Line]) -> bytes | None:
-    """Return what turns rows with blanks between numbers into numbers, if commas are their decimal signs."""
-    ways = (_delimiter(line) for line in lines if "," in line.text)
-    return next((translation for translation, delimiter in ways if delimiter == " "), None)
-
-
 def _fault_before(source: Source, before: Sequence[Line], rows: list[_Row], shape: _Shape) -> UnreadableRecord | None:
     """Return what is wrong with the first of the rows that end where numbers alone begin, or None if there are none."""
     fault = None
@@ -375,16 +328,14 @@ def _damaged_in(tokens: list[bytes], columns: int = 0) -> bytes:
     damaged = [token for token in tokens if parse(token) is None]
     numbers = len(tokens) - len(damaged)
     # What is that long is a number or nothing, and what follows it on its line is not seen.
-    fits = numbers > 0 or len(tokens) == columns or max(map(len, tokens), default=0) > _LONGEST_WORD
+    fits = numbers > 0 or len(tokens) == columns or max(map(len, tokens), default=0) > 300
     return damaged[0] if damaged and fits and all(map(_like_number, damaged)) else b""
 
 
 def _like_number(token: bytes) -> bool:
     text = token.decode("latin-1")
-    mistaken = (
-        _DIGIT_OR_POINT.search(text) is not None and parse(text.translate(_MISTAKEN).encode("latin-1")) is not None
-    )
-    return mistaken or _LIKE_NUMBER.fullmatch(text) is not None
+    is_mistaken = _DIGIT_OR_POINT.search(text) and parse(text.translate(_MISTAKEN).encode("latin-1")) is not None
+    return bool(is_mistaken or _LIKE_NUMBER.fullmatch(text))
 
 
 def _damaged_before(tokens: list[bytes], rows: list[_Row], columns: int) -> bytes:
@@ -395,7 +346,7 @@ def _damaged_before(tokens: list[bytes], rows: list[_Row], columns: int) -> byte
     if columns == 1 or len(times) < 3:
         return b""
     before, first, second = times
-    follows = second > first and abs((first - before) - (second - first)) <= _SAME_STEP * (second - first)
+    follows = second > first and abs((first - before) - (second - first)) <= 0.5 * (second - first)
     return next((token for token in tokens if parse(token) is None), b"") if follows else b""
 
 
@@ -444,11 +395,11 @@ def _delimiter(line: Line) -> tuple[bytes, str]:
 
 def _values(source: Source, shape: _Shape) -> Floats:
     """Return all numbers, row by row."""
-    parts = []
-    for rows in _groups(_rows(source, shape), shape.columns):
-        values = convert([token for row in rows for token in row.tokens])
-        if values is None or any(len(row.tokens) != shape.columns for row in rows):
-            raise _first_bad(source, rows, shape)
+    rows, parts = _rows(source, shape), []
+    while group := list(itertools.islice(rows, 5000)):
+        values = convert([token for row in group for token in row.tokens])
+        if values is None or any(len(row.tokens) != shape.columns for row in group):
+            raise _first_bad(source, group, shape)
         parts.append(values)
     return np.concatenate(parts)
 
@@ -468,18 +419,6 @@ def _rows(source: Source, shape: _Shape) -> Iterator[_Row]:
         start = end + 1
 
 
-def _groups(rows: Iterator[_Row], columns: int) -> Iterator[list[_Row]]:
-    """Rows in groups, each of which ends with the first row that is not like the others."""
-    group: list[_Row] = []
-    for row in rows:
-        group.append(row)
-        if len(group) == _LINES_AT_ONCE or len(row.tokens) != columns:
-            yield group
-            group = []
-    if group:
-        yield group
-
-
 def _first_bad(source: Source, rows: list[_Row], shape: _Shape) -> UnreadableRecord:
     for row in rows:
         for token in row.tokens:
@@ -493,36 +432,25 @@ def _first_bad(source: Source, rows: list[_Row], shape: _Shape) -> UnreadableRec
     raise AssertionError("among rows that do not convert one is bad")
 
 
-def _time_column(heading: Heading, place: int) -> int | None:
-    """Column of times of a channel: the nearest before it, or else the first; None without one."""
-    columns = heading.places("time")
-    return max((each for each in columns if each < place), default=columns[0]) if columns else None
-
-
-def _start(heading: Heading, table: Floats, place: int) -> float | None:
-    column = _time_column(heading, place)
-    unit = None if column is None else heading.columns[column].unit
-    return None if unit is None or column is None else float(unit.to_si(table[:1, column])[0])
-
-
 def _timing(
     source: Source, request: Request, shape: _Shape, heading: Heading, table: Floats, place: int
-) -> tuple[float | None, Floats | None]:
-    """Return step or times (s) of a column: those in the nearest column of times before it, or else the first one."""
-    column = _time_column(heading, place)
-    if column is None:
-        return request.dt, None
-    unit = heading.columns[column].unit
+) -> dict[str, Any]:
+    """Return step or times, and start (s), from the nearest column of times before a channel, or else the first one."""
+    columns = heading.places("time")
+    if not columns:
+        return {"dt": request.dt}
+    column = max((each for each in columns if each < place), default=columns[0])
+    unit, written = heading.columns[column].unit, table[:, column]
     assert unit is not None
-    written = table[:, column]
     times = unit.to_si(written)
+    start = float(times[0])
     fault = first_fault(times)
     step = even_step(written) if fault is None and len(written) > 1 else None
     if step is not None:
-        return request.step(source, step * unit.multiplier / unit.divisor, shape.start), None
+        return {"dt": request.step(source, step * unit.multiplier / unit.divisor, shape.start), "start": start}
     given = None if request.several else request.dt
     if given is not None and prints_as(written, given * unit.divisor / unit.multiplier):
-        return given, None
+        return {"dt": given, "start": start}
     if fault is not None:
         same = "; if the times are even, but printed with too few digits, give {}" if given is None else ""
         raise source.error(
@@ -535,4 +463,4 @@ def _timing(
         raise missing_value(source, written[gap], shape.row_at(source, gap))
     if given is not None:
         raise source.error(f"the times are not evenly {given:g} s apart; leave {{}} out", shape.start, "dt")
-    return None, times
+    return {"times": times, "start": start}
