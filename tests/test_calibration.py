@@ -694,7 +694,7 @@ def test_rows_without_a_group_belong_to_none(tmp_path):
     rows = [f"ridgecrest-clc-090,{scale},1,{group}" for scale, group in scales]
     table.write_text("\n".join(["motion,scale,overturned,group", *rows]))
     read = read_calibration(table, channel=None, dt=None, units=None)
-    assert group_labels(read.groups, 4, folds=3).tolist() == [0, 1, 2, 0]
+    assert group_labels([test.group for test in read], 4, folds=3).tolist() == [0, 1, 2, 0]
 
 
 def test_a_pair_of_equal_numbers_is_known_and_nothing_unknown_says_what_to_call(shaken):
