@@ -4,7 +4,6 @@ import csv
 import json
 import re
 from importlib import import_module
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,8 +11,6 @@ import pytest
 import rocking
 from rocking import fragility, incremental_dynamic_analysis, overturning_map, quantities, rocking_spectrum
 from rocking.analysis import Band
-from rocking.calibration.diagnostics import Scores
-from rocking.cli import calibrate as calibrating
 from rocking.tables import to_json
 
 RECORD = "el-centro-meloland-270"
@@ -143,15 +140,10 @@ def test_what_is_wrong_with_what_is_given_is_said_before_the_work(run, tmp_path,
 
 
 @pytest.mark.usefixtures("no_work")
-@pytest.mark.parametrize("specimens", [False, True])
-def test_more_folds_than_groups_are_refused_before_the_calibration(run, outcomes_table, specimens):
-    if specimens:
-        header, *rows = outcomes_table.read_text().splitlines()
-        named = [f"{row},{name}" for name, each in (("A", rows), ("B", rows[:6] + rows[-4:])) for row in each]
-        outcomes_table.write_text("\n".join([f"{header},specimen", *named]))
-    code, _, err = run("calibrate", outcomes_table, *CALIBRATED, "--folds", "6" if specimens else "40")
+def test_more_folds_than_groups_are_refused_before_the_calibration(run, outcomes_table):
+    code, _, err = run("calibrate", outcomes_table, *CALIBRATED, "--folds", "40")
     assert code == 2
-    assert "--folds must be a whole number" in err and ("specimen B" in err) == specimens
+    assert "--folds must be a whole number" in err
 
 
 @pytest.mark.thorough
@@ -239,48 +231,6 @@ def test_calibrate_json_is_the_calibration(run, outcomes_table):
     assert set(result["cross_validated"]) == {"accuracy", "log_loss", "brier"}
     predicted = found.predict([rocking.records.load(name) for name in (RECORD, OTHER)])
     assert list(result["predicted"].values()) == pytest.approx(predicted.tolist(), rel=1e-12)
-
-
-@pytest.mark.parametrize("folds", [0, 2])
-def test_every_specimen_is_said_with_its_own_numbers(run, outcomes_table, tmp_path, monkeypatch, folds):
-    def calibrated(motions, overturned, **how):
-        fallen = int(np.sum(overturned))
-        scores = Scores.of(np.full(2, 0.5), np.array([0, 1]))
-        return SimpleNamespace(
-            summary=lambda: f"{fallen} of {len(motions)} fell",
-            to_dict=lambda: {"fallen": fallen},
-            predict=lambda motions: [],
-            cross_validate=lambda **_: SimpleNamespace(scores=scores),
-        )
-
-    monkeypatch.setattr(calibrating, "calibrated", calibrated)
-    header, *rows = outcomes_table.read_text().splitlines()
-    fell = [sum(row.split(",")[2] == "1" for row in rows[k::2]) for k in range(2)]
-    names = [f"{row},{'AB'[k % 2]}" for k, row in enumerate(rows)]
-    outcomes_table.write_text("\n".join([f"{header},specimen", *names]))
-    arguments = ("calibrate", outcomes_table, *CALIBRATED, "--folds", str(folds))
-    code, out, err = run(*arguments, "--json")
-    assert (code, err) == (0, "")
-    found = json.loads(out)["specimens"]
-    assert {name: each["fallen"] for name, each in found.items()} == dict(zip("AB", fell, strict=True))
-    assert all(("cross_validated" in each) == bool(folds) for each in found.values())
-    text = run(*arguments)[1]
-    assert all(f"specimen {name}\n{count} of 10 fell" in text for name, count in zip("AB", fell, strict=True))
-    assert text.count("left-out motions: ") == text.count("(2 folds)") == folds
-
-
-def test_a_specimen_that_cannot_be_calibrated_is_named_before_any_work(run, outcomes_table, tmp_path):
-    header, *rows = outcomes_table.read_text().splitlines()
-    stood = [",".join((*row.split(",")[:2], "0", row.split(",")[3])) for row in rows]
-    table = tmp_path / "both.csv"
-    for name, word in (("B", "specimen B: the outcomes are all the same"), ("../B", "line 22: '../B' is not the name")):
-        table.write_text(
-            "\n".join([header + ",specimen", *(f"{row},A" for row in rows), *(f"{r},{name}" for r in stood)])
-        )
-        code, _, err = run("calibrate", table, *CALIBRATED, "--out", tmp_path / "out")
-        assert code == 2
-        assert word in err and len(err.splitlines()) == 1
-        assert not (tmp_path / "out" / "A").exists()
 
 
 @pytest.mark.parametrize(

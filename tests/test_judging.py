@@ -88,7 +88,7 @@ def seen_by(own, rng, monkeypatch, **options):
         variables = {"overturned": fell, "unfinished": np.zeros_like(fell)}
         return xr.Dataset({name: (("block", "motion"), values) for name, values in variables.items()})
 
-    monkeypatch.setattr("rocking.calibration.validate.simulate_many", simulated)
+    monkeypatch.setattr("rocking.calibration.outcomes.simulate_many", simulated)
     blocks = Blocks(np.full(len(fell), 2.0), 0.2, 0.9)
     return rocking.validate(tests, blocks, simulations=200, seed=int(rng.integers(1 << 30)), **options)
 

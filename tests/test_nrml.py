@@ -200,8 +200,3 @@ def test_data_below_the_blocks_uplift_have_no_range_of_validity(tmp_path):
     for form in ("continuous", "discrete"):
         with pytest.raises(rocking.InvalidOption, match="below the one that lifts the block"):
             below.to_nrml(tmp_path / "model.xml", format=form)
-
-
-def test_a_place_that_cannot_be_written_to_is_refused(result, tmp_path):
-    with pytest.raises(rocking.OutputError, match="cannot be written"):
-        result.to_nrml(tmp_path / "nowhere" / "model.xml")

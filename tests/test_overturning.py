@@ -214,14 +214,6 @@ def test_blocks_that_each_have_their_own_scaling_do_what_simulate_says():
                 assert outcome["rests"] == len(response.chattering)
 
 
-def test_a_map_has_units_names_and_provenance():
-    dataset = overturning_map(BLOCK, "half-sine", amplitudes=[0.5, 3.0], frequencies=[1.0, 2.0])
-    assert dataset.data.pulse.startswith("half sine: ")
-    assert dataset.data.alpha_rad == [0.2, 0.2]
-    assert dataset.data.tolerance == 1e-9
-    assert all(dataset.data[name].attrs for name in ("mode", "peak_rotation", "overturning_amplitude", "amplitude"))
-
-
 def test_a_map_that_never_overturns_has_no_overturning_amplitude():
     dataset = overturning_map(BLOCK, "half-sine", amplitudes=[0.5, 1.01], frequencies=[5.0])
     assert np.isnan(dataset.data.overturning_amplitude.values).all()

@@ -23,7 +23,7 @@ from rocking.studies import folder as folders
 from rocking.studies import units
 from rocking.studies.file import read_study
 from rocking.studies.product import OUTCOMES
-from rocking.studies.units import DamagedUnit, UnitGrid, decoded, encoded, name_of
+from rocking.studies.units import DamagedUnit, UnitGrid, decoded, name_of
 
 BLOCKS = rocking.Blocks(p=np.linspace(1.0, 6.0, 1300), alpha=0.2, restitution=0.7)
 MOTIONS = [rocking.pulses.one_sine(4.0, frequency) for frequency in (0.5, 1.0, 2.0)]
@@ -203,17 +203,6 @@ def test_what_a_crash_left_half_written_is_removed(complete, tmp_path):
     (tmp_path / "result" / ".abc.part").write_bytes(b"half")
     study.run()
     assert digest(tmp_path) == digest(complete)
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(os.name == "nt", reason="signals are sent the POSIX way")
-def test_a_hundred_kills(complete, tmp_path):
-    rng = np.random.default_rng(1)
-    for k in range(10):
-        folder = tmp_path / str(k)
-        kill_again_and_again(folder, 10, rng)
-        made(folder).run()
-        assert digest(folder) == digest(complete)
 
 
 def after_the_first_unit(monkeypatch, study, action):
@@ -608,13 +597,6 @@ def test_units_have_names_of_their_own_and_other_files_are_none(tmp_path):
     for name in ("c.0.1.2.3", "c.1.0.0.0.0", "c.0.a.0.0.0", "c.0.0.2.0.0", "c.0.0.0.0.0.0", "c.0."):
         (tmp_path / "result" / name).touch()
     assert study.status.done == 0
-
-
-def test_the_bytes_of_a_unit_are_the_same_whenever_it_is_encoded(monkeypatch):
-    outcomes = np.zeros((len(OUTCOMES), 1, 1, 1, 512))
-    first = encoded(outcomes)
-    monkeypatch.setattr(time, "time", lambda: 2e9)
-    assert encoded(outcomes) == first
 
 
 @pytest.mark.parametrize("width", [0, 100, 513, 1.5])

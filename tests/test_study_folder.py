@@ -35,17 +35,6 @@ def test_a_file_is_on_the_disk_before_it_has_its_name(tmp_path: Path, monkeypatc
     assert (tmp_path / "c.0.1").read_bytes() == b"outcomes"
 
 
-@pytest.mark.parametrize("when", ["fsync", "replace"])
-def test_an_interrupt_leaves_no_part_of_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, when: str) -> None:
-    def interrupted(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(*((os, "fsync") if when == "fsync" else (Path, "replace")), interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        Folder(tmp_path).put("c.0.1", b"outcomes")
-    assert not [*tmp_path.iterdir()]
-
-
 @pytest.mark.skipif(os.name == "nt", reason="there the folder decides who may read its files")
 @pytest.mark.parametrize(("umask", "mode"), [(0o022, 0o644), (0o002, 0o664), (0o077, 0o600)])
 def test_the_umask_decides_who_may_read_a_study(tmp_path: Path, umask: int, mode: int) -> None:
@@ -105,11 +94,6 @@ def test_a_lock_goes_with_its_process_and_the_next_run_removes_half_written_file
             assert part.exists() == (lock != "lock")
         with Folder(tmp_path).locked():
             assert not part.exists()
-
-
-def test_an_error_while_a_lock_is_held_is_its_own(tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError), Folder(tmp_path).locked():
-        raise FileNotFoundError
 
 
 def test_a_file_with_the_same_content_is_not_written_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

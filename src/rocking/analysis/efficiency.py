@@ -253,13 +253,16 @@ def _dataset(
     intervals have so many degrees of `freedom`.
     """
     import xarray as xr
+    from scipy.special import chdtri
 
     logarithm = np.where(is_first[:, None], np.log(intensity), np.nan)
     weight = np.where(np.isfinite(logarithm[0]), shares, 0.0)
     count = np.isfinite(logarithm[0]).sum(axis=0)
     # Motions are what is drawn: those of several blocks are the same.
     others = np.sum(shares * (count - 1))
-    low, high = _interval_factors(freedom)
+    # Ends of a standard deviation's interval over its estimate, for a normal sample.
+    tail = 0.5 * (1.0 - 0.9)
+    low, high = (float(np.sqrt(freedom / chdtri(freedom, share))) for share in (tail, 1.0 - tail))
     within = logarithm - np.nansum(logarithm, axis=1, keepdims=True) / np.maximum(count, 1)
     about_own = np.sqrt(np.nansum(weight * within**2, axis=(1, 2)) / others)
     mean = np.nansum(weight * logarithm, axis=(1, 2)) / weight.sum()
@@ -291,11 +294,3 @@ def _check_enough(count: int, clusters: object) -> None:
         raise InvalidOption(
             f"fewer than two {{}}{which} overturn a block, however strong; a dispersion needs more", kind
         )
-
-
-def _interval_factors(freedom: int) -> tuple[float, float]:
-    """Return the ends of a standard deviation's interval over its estimate, for a normal sample."""
-    from scipy.special import chdtri
-
-    tail = 0.5 * (1.0 - 0.9)
-    return float(np.sqrt(freedom / chdtri(freedom, tail))), float(np.sqrt(freedom / chdtri(freedom, 1.0 - tail)))

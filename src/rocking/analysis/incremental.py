@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -129,10 +129,8 @@ def incremental_dynamic_analysis(
     if levels is None:
         table = _until_overturned(many, shaken, how, first, options)
     else:
-        table = simulate_levels(
-            many, shaken, how, checks.increasing_numbers(levels, "levels", InvalidOption), **options
-        )
-
+        wanted = checks.increasing_numbers(levels, "levels", InvalidOption)
+        table = simulate_levels(many, shaken, how, wanted, **options)
     factors = units_of(many, how, model)[None, :] / values[:, None]
 
     def overturned(column: Integers, level: Floats) -> Integers:
@@ -150,14 +148,13 @@ def incremental_dynamic_analysis(
     grid = table.overturned.transpose("level", "motion", "block").values
     flat = grid.reshape(len(grid), -1).astype(np.int64)
     edges = boundaries(table.level.values, flat, overturned, tolerance=width, progress=progress)
-    found = _dataset(table, _Bands.of(flat, edges), slenderness, how)
+    found = _dataset(table, flat, edges, slenderness, how)
     scales = (table.level.values[:, None, None] * factors)[..., None]
-    outcomes = table.overturned.transpose("level", "motion", "block").values[..., None]
     about = {
         "blocks": described(blocks),
         "lowest_uplift": first,
         "sides_differ": int(not many.is_symmetric),
-        "undecided": undecided_text(Setup(many, model, Certified()), shaken, scales, outcomes, threads),
+        "undecided": undecided_text(Setup(many, model, Certified()), shaken, scales, grid[..., None], threads),
     }
     return IncrementalDynamicAnalysis(found.assign_attrs(about))
 
@@ -237,7 +234,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
     def summary(self) -> str:
         data = self.data
         many = data.sizes["block"] > 1
-        looked_at = _Levels.of(data)
+        looked_at = _Levels(data.level)
         what = "record" if "record" in data.coords else "motion"
         rows = [
             [
@@ -292,24 +289,15 @@ class IncrementalDynamicAnalysis(DatasetResult):
 
         Parameters
         ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; by default in a new figure.
+        ax, title, figsize : optional
+            As for `DrawnResult.plot`.
         block : int
             Position of the block.
-        title : str
-            Title; by default the block and the model.
-        figsize : (float, float), optional
-            Width and height of a new figure, inches.
 
         Returns
         -------
         matplotlib.figure.Figure
             The new figure, or that of `ax`.
-
-        Raises
-        ------
-        InvalidOption
-            If there is no such block.
 
         Examples
         --------
@@ -369,34 +357,20 @@ def _until_overturned(
     return table.isel(level=slice(0, beyond[0] + 1 if beyond.size else None))
 
 
-class _Bands(NamedTuple):
-    """Bands that overturn: column of the grid, start and end; NaN where the grid begins or ends inside one."""
-
-    column: Integers
-    start: Floats
-    end: Floats
-
-    @classmethod
-    def of(cls, flat: Integers, edges: Boundaries) -> _Bands:
-        """Pair the levels at which verdicts of a grid of (level, column) change."""
-        columns: list[int] = []
-        starts: list[float] = []
-        ends: list[float] = []
-        for column in range(flat.shape[1]):
-            mine = edges.column == column
-            above, level = edges.above[mine] == 1, edges.level[mine]
-            starts += [*([np.nan] if flat[0, column] else []), *level[above]]
-            ends += [*level[~above], *([np.nan] if flat[-1, column] else [])]
-            columns += [column] * (len(starts) - len(columns))
-        return cls(np.array(columns, dtype=np.int64), np.array(starts, dtype=float), np.array(ends, dtype=float))
-
-
-def _dataset(table: xr.Dataset, bands: _Bands, alpha: Floats, measure: Measure) -> xr.Dataset:
+def _dataset(table: xr.Dataset, flat: Integers, edges: Boundaries, alpha: Floats, measure: Measure) -> xr.Dataset:
+    """Pair the levels at which verdicts of a grid of (level, column) change; NaN where it begins or ends in a band."""
     import xarray as xr
 
-    motion, block = np.divmod(bands.column, len(alpha))
+    columns, starts, ends = list[int](), list[float](), list[float]()
+    for column in range(flat.shape[1]):
+        mine = edges.column == column
+        above, level = edges.above[mine] == 1, edges.level[mine]
+        starts += [*([np.nan] if flat[0, column] else []), *level[above]]
+        ends += [*level[~above], *([np.nan] if flat[-1, column] else [])]
+        columns += [column] * (len(starts) - len(columns))
+    motion, block = np.divmod(np.array(columns, dtype=np.int64), len(alpha))
     lowest = np.full((table.sizes["motion"], len(alpha)), np.inf)
-    np.minimum.at(lowest, (motion, block), bands.start)
+    np.minimum.at(lowest, (motion, block), np.array(starts, dtype=float))
     lowest[np.isinf(lowest)] = np.nan
     level = {"units": measure.units, "long_name": measure.quantity, "label": measure.label, "scale": measure.scale}
     level |= measure.options()
@@ -408,24 +382,17 @@ def _dataset(table: xr.Dataset, bands: _Bands, alpha: Floats, measure: Measure) 
         overturning_level=(("motion", "block"), lowest, level),
         band_motion=("band", motion, {"units": "1", "long_name": "position of the motion"}),
         band_block=("band", block, {"units": "1", "long_name": "position of the block"}),
-        band_start=("band", bands.start, level),
-        band_end=("band", bands.end, level),
+        band_start=("band", np.array(starts, dtype=float), level),
+        band_end=("band", np.array(ends, dtype=float), level),
     )
 
 
-@dataclass(frozen=True, eq=False)
 class _Levels:
     """Levels that motions were scaled to as people read them, and bands of them, in words: only what was looked at."""
 
-    at: Floats
-    unit: str
-    scale: float
-
-    @classmethod
-    def of(cls, data: xr.Dataset) -> _Levels:
-        level = data.level
-        unit = {"m/s^2": " g", "m/s": " m/s", "1": ""}[level.units]
-        return cls(level.scale * level.values, unit, level.scale)
+    def __init__(self, level: xr.DataArray) -> None:
+        self.scale, self.at = level.scale, level.scale * level.values
+        self.unit = {"m/s^2": " g", "m/s": " m/s", "1": ""}[level.units]
 
     def summary(self, lowest_uplift: float) -> str:
         """Say what was looked at, and whether it is all below the level (SI) from which on a motion lifts a block."""

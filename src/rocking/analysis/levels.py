@@ -46,11 +46,8 @@ def groups_of(labels: object, name: str, count: int, each: str = "outcome") -> I
 
 def _is_missing(label: object) -> bool:
     # The missing value of pandas is equal to nothing, and no truth value either.
-    return label is None or type(label).__name__ == "NAType" or label == "" or _is_nan(label)
-
-
-def _is_nan(label: object) -> bool:
-    return isinstance(label, float) and math.isnan(label)
+    is_none = label is None or type(label).__name__ == "NAType"
+    return is_none or label == "" or (isinstance(label, float) and math.isnan(label))
 
 
 def labels_of(data: xr.Dataset, of: str = "motion", *, with_history: bool = True) -> list[str]:
@@ -79,12 +76,11 @@ def curves_of(data: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
     if "block" in data.dims:
         return [(data.blocks, data)]
     stacked = data.stack(curve=[name for name in ("alpha", "restitution") if name in data.dims])
-    return [(_curve_name(one), one) for one in (stacked.isel(curve=k) for k in range(stacked.sizes["curve"]))]
-
-
-def _curve_name(one: xr.Dataset) -> str:
-    restitution = f", restitution {float(one.restitution):g}" if "restitution" in one.coords else ""
-    return f"alpha = {float(one.alpha):.5g} rad ({math.degrees(one.alpha):.4g}°){restitution}"
+    curves = []
+    for one in (stacked.isel(curve=k) for k in range(stacked.sizes["curve"])):
+        restitution = f", restitution {float(one.restitution):g}" if "restitution" in one.coords else ""
+        curves.append((f"alpha = {float(one.alpha):.5g} rad ({math.degrees(one.alpha):.4g}°){restitution}", one))
+    return curves
 
 
 #: Where only motions as they are were simulated, though the sides of a block differ.
@@ -148,7 +144,8 @@ def clusters_of(motions: Sequence[Motion], labels: object = None) -> Integers:
 
     "station" stands for labels that are the earthquake and the station that records name.
     """
-    families, stations = families_of(motions), stations_of(motions)
+    families, origins = families_of(motions), [motion.description.origin or Origin() for motion in motions]
+    stations = [f"{one.event}, {one.station}" if one.station else "" for one in origins]
     if labels is None:
         of_records = {family: station for family, station in zip(families, stations, strict=True) if station}
         if len(of_records) > len(set(of_records.values())):
@@ -166,12 +163,6 @@ def clusters_of(motions: Sequence[Motion], labels: object = None) -> Integers:
     given = groups_of(labels, "clusters", count, "motion")
     links = coo_array((np.ones(count), (families, count + given)), shape=(2 * count, 2 * count))
     return numbered(connected_components(links, directed=False)[1][families].tolist())
-
-
-def stations_of(motions: Sequence[Motion]) -> list[str]:
-    """Earthquake and station of each motion; nothing where its file names no station."""
-    origins = [motion.description.origin or Origin() for motion in motions]
-    return [f"{each.event}, {each.station}" if each.station else "" for each in origins]
 
 
 def motions_in_words(clusters: Integers, labels: object) -> str:
@@ -327,7 +318,8 @@ def boundaries(
     neighbours to within the tolerance. Only where an interval of the grid holds 64 changes or more, one is followed up
     for all that lie between two outcomes. Outcomes between two levels of the grid with the same outcome are not seen.
     """
-    here = _on_grid(levels, outcome)
+    row, column = np.nonzero(outcome[1:] != outcome[:-1])
+    here = Boundaries(column, levels[row], levels[row + 1], outcome[row, column], outcome[row + 1, column])
     origin = np.arange(len(here.level))
     left = _halvings(here, tolerance)
     with Progress("refining", left, show=progress) as bar:
@@ -338,17 +330,13 @@ def boundaries(
             # A third outcome makes more of them: the bar waits until these are done, too.
             before, left = left, min(left, _halvings(here, tolerance))
             bar.advance(before - left)
-    return _ordered(here)
+    order = np.lexsort((here.low, here.column))
+    return Boundaries(*(values[order] for values in vars(here).values()))
 
 
 def _halvings(here: Boundaries, tolerance: float) -> int:
     """Count the bisections that are left, as far as is known."""
     return int(np.ceil(np.log2(np.maximum(1.0, (here.high - here.low) / (tolerance * here.high)))).sum())
-
-
-def _on_grid(levels: Floats, outcome: Integers) -> Boundaries:
-    row, column = np.nonzero(outcome[1:] != outcome[:-1])
-    return Boundaries(column, levels[row], levels[row + 1], outcome[row, column], outcome[row + 1, column])
 
 
 def _halved(here: Boundaries, wide: Flags, found: Integers, origin: Integers) -> tuple[Boundaries, Integers]:
@@ -364,8 +352,3 @@ def _halved(here: Boundaries, wide: Flags, found: Integers, origin: Integers) ->
     upper = Boundaries(here.column[third], here.level[third], here.high[third], found[third], here.above[third])
     both = (np.concatenate(pair) for pair in zip(vars(lower).values(), vars(upper).values(), strict=True))
     return Boundaries(*both), np.concatenate([origin, origin[third]])
-
-
-def _ordered(here: Boundaries) -> Boundaries:
-    order = np.lexsort((here.low, here.column))
-    return Boundaries(*(values[order] for values in vars(here).values()))

@@ -70,13 +70,8 @@ _NAMES: Final = {
 #: given as functions.
 PULSES: Final = ("sine", "half-sine", "one-sine", "one-cosine", "ricker", "mavroeidis-papageorgiou")
 
-#: Times at which two motions are compared to know whether they are of one shape, and by which share they may differ:
-#: those of samples at a constant step do.
-_PHASES: Final = 400
+#: By which share two motions of one shape may differ: those of samples at a constant step do.
 _SAME: Final = 0.02
-
-#: Share of a map that is written as a number.
-_LEAST_SHARE: Final = 1e-3
 
 
 def overturning_map(
@@ -168,7 +163,12 @@ def overturning_map(
     for ratio in {ratios[0], ratios[-1]}:
         _check_shape(unit, made, own, float(ratio))
     chattering = Certified(width * unit.end)
-    setup = Setup(_resized(block, ratios), model, chattering)
+    p, alpha, restitution = (
+        np.array([getattr(side, name) for side in block.sides]) for name in ("p", "alpha", "restitution")
+    )
+    # Blocks of one shape, and of p such that the pulse, of the block's own frequency, has these ratios to it.
+    blocks = Blocks(p / ratios[:, None], alpha[None, :], restitution[None, :], gravity=block.gravity)
+    setup = Setup(blocks, model, chattering)
     count = None if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
     problem = _PulseProblem(setup, unit, min(block.uplift_thresholds(model)), count)
     modes, peaks = problem.grid(levels, progress)
@@ -257,9 +257,10 @@ class OverturningMap(DatasetResult):
 
     def summary(self) -> str:
         modes, counts = np.unique(self.data.mode, return_counts=True)
+        percents = 100.0 * counts / self.data.mode.size
         shares = [
-            (mode_name(int(mode)), _percent(count / self.data.mode.size))
-            for mode, count in zip(modes, counts, strict=True)
+            (mode_name(int(mode)), f"{percent:.1f} %" if percent >= 0.1 else "below 0.1 %")
+            for mode, percent in zip(modes, percents, strict=True)
         ]
         rows = [(float(ratio), self._lowest(k)) for k, ratio in enumerate(self.data.frequency)]
         return "\n\n".join(
@@ -323,10 +324,6 @@ class OverturningMap(DatasetResult):
             for name in (named("alpha", "rad"), "restitution")
         )
         return f"alpha = {alpha} rad, restitution = {restitution}"
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.1f} %" if share >= _LEAST_SHARE else f"below {100.0 * _LEAST_SHARE:.1g} %"
 
 
 @dataclass(frozen=True)
@@ -412,17 +409,9 @@ def _is_alike(first: Motion | None, second: Motion | None, factor: float, ratio:
         return first is second
     if abs(ratio * second.duration - first.duration) > _SAME * first.duration:
         return False
-    phases = (np.arange(_PHASES) + 0.5) / _PHASES
+    phases = (np.arange(400) + 0.5) / 400
     one, other = first.acceleration(phases * first.duration), second.acceleration(phases * second.duration) / factor
     return bool(np.abs(other - one).mean() <= _SAME * np.abs(one).max())
-
-
-def _resized(block: Block, ratios: Floats) -> Blocks:
-    """Blocks of the same shape, and of p such that the pulse, of the block's own frequency, has these ratios to it."""
-    p, alpha, restitution = (
-        np.array([getattr(side, name) for side in block.sides]) for name in ("p", "alpha", "restitution")
-    )
-    return Blocks(p / ratios[:, None], alpha[None, :], restitution[None, :], gravity=block.gravity)
 
 
 def _dataset(

@@ -251,25 +251,15 @@ class RockingSpectrum(DatasetResult):
 
         Parameters
         ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; by default in a new figure.
+        ax, title, figsize : optional
+            As for `DrawnResult.plot`.
         against : {"p", "period", "size"}
             Abscissa.
-        title : str
-            Title; by default the motion or the number of motions, the block's slenderness (and restitution) if it is
-            one, and the model.
-        figsize : (float, float), optional
-            Width and height of a new figure, inches.
 
         Returns
         -------
         matplotlib.figure.Figure
             The new figure, or that of `ax`.
-
-        Raises
-        ------
-        InvalidOption
-            If there is no such abscissa.
 
         Examples
         --------
@@ -295,18 +285,14 @@ class RockingSpectrum(DatasetResult):
             )
             for name, one in named_curves
         ]
+        shown = [motions_text(self.data), *([named_curves[0][0]] if alone else []), f"{self.data.model} model"]
         return spectrum_figure(
             x=data[against].values,
             curves=curves,
             fractiles=self.data.fractile.values.tolist(),
             motions=labels_of(self.data),
             x_label={"p": "p (rad/s)", "period": "2π/p (s)", "size": "half diagonal R (m)"}[against],
-            title=title
-            or as_written(
-                ", ".join(
-                    [motions_text(self.data), *([named_curves[0][0]] if alone else []), f"{self.data.model} model"]
-                )
-            ),
+            title=title or as_written(", ".join(shown)),
             ax=ax,
             figsize=figsize,
         )
@@ -343,15 +329,11 @@ def _ensemble_spectrum(
         table[name].transpose("motion", "block").values.reshape(-1, n, count) for name in _SIMULATED
     )
     over_alpha = ratios_of(peak, overturned, unfinished, blocks.alpha.min(axis=1)[:, None])
-    weights_of_all = np.tile(weight, len(peak))
-    found = (
-        ("p",),
-        weighted_fractiles(over_alpha.reshape(-1, count), weights_of_all, shares),
-        overturned_share(over_alpha.reshape(-1, count), weights_of_all),
-    )
+    flat, weights = over_alpha.reshape(-1, count), np.tile(weight, len(peak))
+    found = ("p",), weighted_fractiles(flat, weights, shares), overturned_share(flat, weights)
     axes, peaks = {"p": rates, "fractile": shares}, (peak, over_alpha, overturned)
-    described = _described_spectrum(table, ("block", "p"), peaks, found, axes, blocks.gravity)
-    return described.assign_coords(weight=xr.DataArray(weight, dims="block"))
+    spectrum = _described_spectrum(table, ("block", "p"), peaks, found, axes, blocks.gravity)
+    return spectrum.assign_coords(weight=xr.DataArray(weight, dims="block"))
 
 
 def _grid_spectrum(table: xr.Dataset, axes: dict[str, Floats], gravity: float, shares: Floats) -> xr.Dataset:

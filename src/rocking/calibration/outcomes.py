@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence, Sized
 from dataclasses import asdict, astuple, dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final
@@ -15,6 +16,7 @@ from rocking.analysis.levels import groups_of, note_missing
 from rocking.analysis.spectrum import RockingSpectrum, rocking_spectrum
 from rocking.arrays import Flags, Floats
 from rocking.block import Blocks
+from rocking.body import Bodies
 from rocking.calibration.diagnostics import Diagnostics, Scores, diagnosed
 from rocking.calibration.search import Evidence as _Evidence
 from rocking.calibration.search import Problem, blurred, expected_share, posterior, search, systematic, unpacked
@@ -155,11 +157,6 @@ class Calibration(Result):
         ndarray, shape (m,)
             Weighted share of the ensemble that overturns, within the lapse of 0 and 1.
 
-        Raises
-        ------
-        InvalidMotion
-            If one is no motion.
-
         Examples
         --------
         >>> import rocking
@@ -170,8 +167,8 @@ class Calibration(Result):
         """
         if isinstance(motions, Sized) and not isinstance(motions, Motion) and not len(motions):
             return np.empty(0)
-        outcomes = overturned_under(self.blocks, motions, self.model, threads, progress)
-        return blurred(expected_share(self.weights @ outcomes, self.diagnostics.effective), self.lapse)
+        fell = overturned_under(self.blocks, motions, self.model, threads, progress)
+        return chances_of(self.weights @ fell, self.diagnostics.effective, self.lapse)
 
     def cross_validate(
         self,
@@ -184,8 +181,6 @@ class Calibration(Result):
         progress: bool | None = None,
     ) -> Validation:
         """Predict every test from fits without it.
-
-        The candidates' simulations are used again, so a fold costs a second; the fit is made anew for each.
 
         Parameters
         ----------
@@ -210,10 +205,6 @@ class Calibration(Result):
         ------
         InvalidOption
             If there are fewer groups than folds, or labels do not match the motions.
-
-        See Also
-        --------
-        rocking.calibration.Scores : accuracy, log loss and Brier score.
 
         Examples
         --------
@@ -245,7 +236,7 @@ class Calibration(Result):
         motions : Motion, sequence of Motion, or mapping of str to Motion
             m motions.
         model : {"linear", "nonlinear"}, optional
-            Equation of motion, if not that of the calibration.
+            By default that of the calibration.
         **options : object
             Further arguments of `rocking.fragility`: measure, levels, limits, polarity, band, ...
 
@@ -256,11 +247,6 @@ class Calibration(Result):
             the motions. The lapse of `predict`, chance that a test is not that of a rocking block at all, is not in it:
             a weak motion does not overturn what it cannot lift.
 
-        Raises
-        ------
-        InvalidOption, InvalidMotion
-            As `rocking.fragility`.
-
         Examples
         --------
         >>> import rocking
@@ -269,8 +255,7 @@ class Calibration(Result):
         >>> found.fragility(pulses, levels=[2.0, 3.0, 4.0, 6.0]).model
         'nonlinear'
         """
-        chosen = self.model if model is None else model
-        return fragility(self.blocks, motions, weights=self.weights, model=chosen, **options)
+        return fragility(self.blocks, motions, weights=self.weights, model=model or self.model, **options)
 
     def spectrum(self, motions: Motions, *, model: Model | None = None, **options: Any) -> RockingSpectrum:
         """Peak rotation of the specimen, and of larger and smaller ones of its shape, with the ensemble's weights.
@@ -280,7 +265,7 @@ class Calibration(Result):
         motions : Motion, sequence of Motion, or mapping of str to Motion
             m motions.
         model : {"linear", "nonlinear"}, optional
-            Equation of motion, if not that of the calibration.
+            By default that of the calibration.
         **options : object
             Further arguments of `rocking.rocking_spectrum`: p (rad/s, to which the ensemble's median is moved; by
             default half to twice its own) or size, fractiles, ...
@@ -290,11 +275,6 @@ class Calibration(Result):
         RockingSpectrum
             Fractiles of the motions and of the ensemble's weight together.
 
-        Raises
-        ------
-        InvalidOption, InvalidMotion
-            As `rocking.rocking_spectrum`.
-
         Examples
         --------
         >>> import rocking
@@ -303,8 +283,7 @@ class Calibration(Result):
         >>> found.spectrum(pulses, p=[1.0, 2.0]).data.sizes["p"]
         2
         """
-        chosen = self.model if model is None else model
-        return rocking_spectrum(self.blocks, motions, weights=self.weights, model=chosen, **options)
+        return rocking_spectrum(self.blocks, motions, weights=self.weights, model=model or self.model, **options)
 
     def _headline(self) -> str:
         overturned = int(self.observed.sum())
@@ -370,7 +349,7 @@ class Calibration(Result):
 
 
 def overturned_under(
-    blocks: Blocks, motions: Motions, model: Model, threads: int | None, progress: bool | None
+    blocks: Bodies, motions: Motions, model: Model, threads: int | None, progress: bool | None
 ) -> NDArray[np.float32]:
     """1 where a block overturns under a motion, else 0, and 0.5 where the simulation was given up; shape (n, m)."""
     simulated = simulate_many(blocks, motions, model=model, threads=threads, progress=progress)
@@ -379,15 +358,17 @@ def overturned_under(
     return np.asarray(known.transpose("block", "motion").values, dtype=np.float32)
 
 
+def chances_of(share: Floats, effective: float, lapse: float) -> Floats:
+    """Probabilities of recorded outcomes, from a share of so many effective blocks; a known block counts as certain."""
+    expected = share if math.isinf(effective) else expected_share(share, effective)
+    return np.clip(blurred(expected, lapse), 0.0, 1.0)  # a sum of weights may be a rounding above 1
+
+
 def group_labels(groups: Sequence[object] | None, count: int, folds: int) -> NDArray[np.int64]:
     """Give each group a number from 0; without groups each motion is its own."""
     labels = groups_of(range(count) if groups is None else groups, "groups", count)
     checks.whole(folds, "folds", InvalidOption, 2, int(labels.max()) + 1)
     return labels
-
-
-#: Central share of the posterior between an estimate's lower and upper end.
-_CENTRAL: Final = 0.9
 
 
 def calibrate(
@@ -451,16 +432,14 @@ def calibrate(
 
     Notes
     -----
-    A specimen differs a little from test to test, and no rigid plane block is a real rock. So each test is taken to
-    have its own block, drawn from a population that is lognormal in p, alpha, restitution and in the ratio of the
-    sides' slendernesses. The probability of an outcome is the share of the population that behaves so (and a small
-    lapse). The posterior over populations is drawn by sequential Monte Carlo (Del Moral, Doucet and Jasra 2006), with
-    the prior that is given by the bounds and a lognormal prior on each dispersion (median 10 %).
+    Each test is taken to have its own block, drawn from a population that is lognormal in p, alpha, restitution and in
+    the ratio of the sides' slendernesses. The probability of an outcome is the share of the population that behaves so
+    (and a small lapse). The posterior over populations is drawn by sequential Monte Carlo (Del Moral, Doucet and Jasra
+    2006), with the prior that is given by the bounds and a lognormal prior on each dispersion (median 10 %).
 
-    The search is global. Two independent runs each fill the bounds evenly, then try blocks where their own fits say. A
-    candidate weighs what the density of candidates lacks, so that the prior stays what it was (deterministic mixture;
-    Owen and Zhou 2000). What is left of a disagreement between the runs, few effective candidates, or a posterior that
-    reaches a bound, is said in the summary.
+    Two independent runs each fill the bounds evenly, then try blocks where their own fits are good. A candidate weighs
+    what the density of candidates lacks, so that the prior does not change (deterministic mixture; Owen and Zhou 2000).
+    The summary reports runs that disagree, few effective candidates, and a posterior that reaches a bound.
 
     Two mirrored blocks often explain the outcomes equally well; then the estimates of each side are wide while the
     predictions are not.
@@ -479,13 +458,6 @@ def calibrate(
     >>> bool(np.mean((found.predict(motions) > 0.5) == overturned) > 0.9)
     True
 
-    Where p and the restitution are known, the same tests tell the one angle that is not:
-
-    >>> found = rocking.calibrate(
-    ...     motions, overturned, model="linear", p=3.0, restitution=0.9, candidates=512, two_sided=False)
-    >>> angle = found.estimates["alpha"]
-    >>> angle.lower < hidden.alpha < angle.upper, angle.upper / angle.lower < 1.3
-    (True, True)
     """
     tested = several_motions(motions)
     observed = checked_outcomes(overturned, len(tested))
@@ -527,7 +499,8 @@ def _estimates(space: Space, populations: Floats) -> dict[str, Estimate]:
         sided = space.unknown.index(SIDED)
         sides[:, sided] = np.hypot(sides[:, sided], 0.5 * dispersions[:, -1])
     dispersion = dict(zip(space.unknown, sides.mean(axis=0).tolist(), strict=True))
-    tails = (0.5, 0.5 * (1.0 - _CENTRAL), 0.5 * (1.0 + _CENTRAL))
+    central = 0.9  # of the posterior between an estimate's lower and upper end
+    tails = (0.5, 0.5 * (1.0 - central), 0.5 * (1.0 + central))
     estimates = {}
     for name, values in space.named(centres).items():
         median, lower, upper = np.quantile(values, tails).tolist()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -26,15 +25,6 @@ from rocking.records.named import is_there, named_motion, named_vertical
 from rocking.tables import counted, csv_rows, named
 
 _ANSWERS: Final = {"1": True, "0": False, "true": True, "false": False, "yes": True, "no": False}
-
-
-@dataclass(frozen=True)
-class Outcomes:
-    """Tests of one specimen: motions, whether each overturned it, and what to leave out together."""
-
-    motions: tuple[Motion, ...]
-    overturned: tuple[bool, ...]
-    groups: tuple[str, ...] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,23 +81,14 @@ class _Table:
 
 def read_calibration(
     path: Path, *, channel: str | None, dt: float | None, units: str | None
-) -> Outcomes | dict[str, Outcomes] | History:
-    """Read a table; its columns say what it is.
-
-    Outcomes: `motion` (a record file, relative to the table's folder, or a shipped record) and `overturned` (1 or 0,
-    yes or no); also, if there are such columns, `group` (a row without a label belongs to none) and those of a motion
-    as `read_tests` has them. With a column `specimen`, outcomes of several specimens by their names. A history:
-    `time_s`, and `rotation_rad` or `rotation_deg`.
-    """
+) -> list[ShakeTest] | History:
+    """Read a table of tests, as `read_tests`, or of a history: `time_s`, and `rotation_rad` or `rotation_deg`."""
     table = read_table(path)
     both = ["rotation_rad", "rotation_deg"]
     if doubled := table.doubled(table.columns) or both * ({*both} <= {*table.columns}):
         raise table.error(f"each column must be there once, and one rotation, but there is more: {', '.join(doubled)}")
     if {"motion", "overturned"} <= set(table.columns):
-        about = {"channel": channel, "dt": dt, "units": units}
-        if "specimen" not in table.columns:
-            return outcomes_of(table, **about)
-        return {name: outcomes_of(each, **about) for name, each in _by_specimen(table).items()}
+        return _tests_of(table, channel=channel, dt=dt, units=units)
     for column, unit in (("rotation_rad", 1.0), ("rotation_deg", np.pi / 180.0)):
         if {"time_s", column} <= set(table.columns):
             return History(table.numbers("time_s"), unit * table.numbers(column))
@@ -161,28 +142,14 @@ def read_table(path: Path) -> _Table:
     return _Table(path, tuple(columns), tuple((line, dict(zip(columns, row, strict=True))) for line, row in rows))
 
 
-def _by_specimen(table: _Table) -> dict[str, _Table]:
-    """Rows of each specimen, in the order in which the specimens come."""
-    rows: dict[str, list[tuple[int, dict[str, str]]]] = {}
-    for line, row in table.rows:
-        name = table.convert(line, row["specimen"], _folder_name, "the name of a specimen (letters, digits, . _ -)")
-        rows.setdefault(name, []).append((line, row))
-    return {name: replace(table, rows=tuple(some)) for name, some in rows.items()}
-
-
-def _folder_name(text: str) -> str:
-    """Name that can also be that of a folder."""
-    if not re.compile(r"[\w-][\w. -]*(?<![. ])").fullmatch(text):
-        raise ValueError(text)
-    return text
-
-
-def outcomes_of(table: _Table, *, channel: Any, dt: Any, units: Any) -> Outcomes:
-    """Return motions and outcomes of a table with these columns; an error says the line."""
-    overturned = table.answers("overturned")
-    motions = _motions_of(table, channel=channel, dt=dt, units=units)
-    groups = tuple(row["group"] for _, row in table.rows) if "group" in table.columns else None
-    return Outcomes(motions, overturned, groups)
+def _tests_of(table: _Table, **about: Any) -> list[ShakeTest]:
+    """Return the tests of a table with these columns; an error has the line."""
+    specimens = dict.fromkeys(row.get("specimen") or "" for _, row in table.rows)
+    if len(specimens) > 1:
+        raise table.error(f"the tests are of {counted(len(specimens), 'specimen')}: give each a table of its own")
+    overturned, motions = table.answers("overturned"), _motions_of(table, **about)
+    names, groups = ([row.get(column) or "" for _, row in table.rows] for column in ("name", "group"))
+    return [ShakeTest(*each) for each in zip(motions, overturned, names, groups, strict=True)]
 
 
 def _motions_of(table: _Table, *, channel: Any, dt: Any, units: Any) -> tuple[Motion, ...]:
@@ -277,15 +244,7 @@ def read_tests(
     table = read_table(checks.path(path, "path of a table", UnreadableRecord))
     if not {"motion", "overturned"} <= {*table.columns} or table.doubled(table.columns):
         raise table.error(f"the columns must be motion and overturned, each once, not {','.join(table.columns)}")
-    specimens = dict.fromkeys(row.get("specimen") or "" for _, row in table.rows)
-    if len(specimens) > 1:
-        raise table.error(f"the tests are of {counted(len(specimens), 'specimen')}: give each a table of its own")
-    motions = _motions_of(table, channel=channel, dt=dt, units=units)
-    names, groups = ([row.get(column) or "" for _, row in table.rows] for column in ("name", "group"))
-    return [
-        ShakeTest(motion, fell, name=name, group=group)
-        for motion, fell, name, group in zip(motions, table.answers("overturned"), names, groups, strict=True)
-    ]
+    return _tests_of(table, channel=channel, dt=dt, units=units)
 
 
 def read_observed(

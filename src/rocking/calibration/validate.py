@@ -5,21 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
 from rocking.analysis import levels as labels
-from rocking.analysis.levels import mean_one, note_missing, pooled
+from rocking.analysis.levels import mean_one, pooled
 from rocking.arrays import Flags, Floats, Integers
 from rocking.body import Bodies, Body
 from rocking.calibration.diagnostics import Scores, log_losses
-from rocking.calibration.outcomes import Calibration, Validation
-from rocking.calibration.search import blurred, expected_share
+from rocking.calibration.outcomes import Calibration, Validation, chances_of, overturned_under
 from rocking.constants import Model
-from rocking.ensemble import simulate_many
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion.motion import Motion
 from rocking.problem import bodies_of, slenderness_of
@@ -33,12 +31,6 @@ if TYPE_CHECKING:
 
 #: What can predict the tests of a specimen.
 Source = Calibration | Validation | Bodies | Body | Sequence[Body]
-
-#: A mean over some of the tests, whose positions are given.
-_Mean = Callable[[Integers], float]
-
-#: Shares of the simulations that lie below and above a band.
-_TAIL: Final = 0.05
 
 
 @dataclass(frozen=True)
@@ -56,13 +48,6 @@ class ShakeTest:
     group : str
         Tests that belong together, as those with one command or one source motion: standard errors allow for it. By
         default those under the same motion do.
-
-    Raises
-    ------
-    InvalidMotion
-        If the motion is none.
-    InvalidOption
-        If the outcome is neither true nor false, or a label is not text.
 
     Examples
     --------
@@ -360,11 +345,20 @@ def validate(
         probabilities = _left_out(blocks, len(given), weights, lapse)
     else:
         if isinstance(blocks, Calibration):
+            if weights is not None:
+                raise InvalidOption("a calibration has {} of its own: leave them out", "weights")
             description, how = f"calibration, {counted(len(blocks.blocks), 'block')}", model or blocks.model
+            bodies: Bodies = blocks.blocks
+            shares, effective = blocks.weights / blocks.weights.sum(), blocks.diagnostics.effective
+            lapse = blocks.lapse if lapse is None else lapse
         else:
             description, how = pooled(blocks, weights), model or "nonlinear"
-        shares = _shares(blocks, distinct, weights, lapse, model=how, threads=threads, progress=progress)
-        probabilities = shares[which]
+            bodies = bodies_of(blocks)
+            slenderness_of(bodies)  # refused before the work
+            shares = mean_one(weights, len(bodies)) / len(bodies)
+            effective = math.inf if len(bodies) == 1 else 1.0 / float((shares**2).sum())
+        fell = overturned_under(bodies, distinct, how, threads, progress)
+        probabilities = chances_of(shares @ fell, effective, lapse or 0.0)[which]
     outcomes = rng.random((simulations, len(given))) < probabilities
     places = np.minimum((probabilities * bins).astype(np.int64), bins - 1)
     term = miscalibration(probabilities, np.vstack([observed, outcomes]), places)
@@ -380,34 +374,6 @@ def validate(
         description=description,
         model=how,
     )
-
-
-def _shares(
-    source: Calibration | Bodies | Body | Sequence[Body],
-    motions: Sequence[Motion],
-    weights: ArrayLike | None,
-    lapse: float | None,
-    **how: Any,
-) -> Floats:
-    """Probability that each motion is noted to overturn the specimen, from simulations of the blocks."""
-    if isinstance(source, Calibration):
-        if weights is not None:
-            raise InvalidOption("a calibration has {} of its own: leave them out", "weights")
-        bodies: Bodies = source.blocks
-        shares, effective = source.weights / source.weights.sum(), source.diagnostics.effective
-        lapse = source.lapse if lapse is None else lapse
-    else:
-        bodies = bodies_of(source)
-        slenderness_of(bodies)  # refused before the work
-        shares = mean_one(weights, len(bodies)) / len(bodies)
-        effective = math.inf if len(bodies) == 1 else 1.0 / float((shares**2).sum())
-    simulated = simulate_many(bodies, motions, **how)
-    fell, missing = (simulated[name].transpose("block", "motion").values for name in ("overturned", "unfinished"))
-    note_missing(missing)
-    share = shares @ np.where(missing, 0.5, fell.astype(np.float64))
-    expected = share if math.isinf(effective) else expected_share(share, effective)
-    # A sum of weights may be a rounding above 1.
-    return np.clip(blurred(expected, lapse or 0.0), 0.0, 1.0)
 
 
 def _left_out(source: Validation, count: int, weights: object, lapse: float | None) -> Floats:
@@ -439,7 +405,7 @@ def score_of(each: Floats, observed: Flags, base: Callable[[float], float], clus
     return Score(mean(whole), errors[0], skill(whole), errors[1], len(each), len(np.unique(clusters)))
 
 
-def _jackknife(statistic: _Mean, clusters: Integers) -> float:
+def _jackknife(statistic: Callable[[Integers], float], clusters: Integers) -> float:
     """Find the standard error of a statistic of tests, from what it is without each of the clusters."""
     each = np.unique(clusters)
     if len(each) < 2:
@@ -463,8 +429,8 @@ def miscalibration(probabilities: Floats, observed: Flags, bins: Integers) -> Fl
 
 
 def _bin(k: int, bins: int, chosen: Flags, probabilities: Floats, observed: Flags, drawn: Flags) -> ShareInBin:
-    """Share of the tests in bin k, and the band of simulated shares: at most a tail of them lies beyond each end."""
-    band = np.quantile(drawn[:, chosen].mean(axis=1), (_TAIL, 1.0 - _TAIL), method="inverted_cdf").tolist()
+    """Share of the tests in bin k, and the band of simulated shares: at most 5 % of them lie beyond each end."""
+    band = np.quantile(drawn[:, chosen].mean(axis=1), (0.05, 0.95), method="inverted_cdf").tolist()
     shares = float(probabilities[chosen].mean()), float(observed[chosen].mean())
     return ShareInBin(k / bins, (k + 1) / bins, int(chosen.sum()), *shares, *band)
 

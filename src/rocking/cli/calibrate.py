@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -14,14 +13,15 @@ from rocking.calibration.history import HistoryCalibration, calibrate_history
 from rocking.calibration.outcomes import Calibration, checked_outcomes, group_labels
 from rocking.calibration.outcomes import calibrate as calibrated
 from rocking.calibration.space import HOUSNER
-from rocking.calibration.tables import History, Outcomes, read_calibration, read_tests
+from rocking.calibration.tables import History, read_calibration, read_tests
+from rocking.calibration.validate import ShakeTest
 from rocking.calibration.validate import validate as judged
 from rocking.cli.body_options import EnsembleOptions
 from rocking.cli.options import BLOCK, MODEL, WHOLE, ModelOptions
-from rocking.cli.output import OUTPUT, OutputOptions, print_result, subfolder, write_results, write_tables
+from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results, write_tables
 from rocking.cli.records import RECORDS, FileOptions, ScaledPulseOptions
 from rocking.constants import Model
-from rocking.errors import InvalidOption, RockingError, literal
+from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.quantities import bounds, number, tilt
 from rocking.tables import counted, text_table
@@ -50,10 +50,9 @@ def calibrate(
     """Find the block behind observed outcomes (overturned or not), or behind a measured rotation history.
 
     DATA is a CSV table with a header. Outcomes: columns motion (a record file, a shipped record, or a pulse) and
-    overturned (1 or 0), and where wanted scale, vertical, channel, dt_s, units, group, and specimen: each specimen is
-    then calibrated by itself. A history: columns time_s and rotation_rad (or rotation_deg). The motions of --predict,
-    --motion and --pulse may be scaled. --out holds calibration.png, .pdf, result.json and, of outcomes, ensemble.csv;
-    of several specimens a folder each.
+    overturned (1 or 0), and where wanted scale, vertical, channel, dt_s, units and group. A history: columns time_s and
+    rotation_rad (or rotation_deg). The motions of --predict, --motion and --pulse may be scaled. --out holds
+    calibration.png, .pdf, result.json and, of outcomes, ensemble.csv.
 
     Parameters
     ----------
@@ -100,7 +99,7 @@ def calibrate(
                 _refuse_without("predict", file)
             others = {name: file.read(name) for name in predict} | file.pulses()
             how = _How(seed, folds, others, {"candidates": candidates, **choices})
-            results = _of_specimens(table, how, folder) if isinstance(table, dict) else _of_outcomes(table, how)
+            results = _of_outcomes(table, how)
         else:
             _refuse("outcomes", predict=predict or None, folds=folds or None)
             _refuse("outcomes", candidates=candidates if candidates != _CANDIDATES else None)
@@ -128,9 +127,9 @@ class _How:
 
 @dataclass(frozen=True)
 class _Results:
-    """A calibration, or of several specimens none that could be drawn; numbers and words."""
+    """A calibration, its numbers and words."""
 
-    found: Calibration | HistoryCalibration | None
+    found: Calibration | HistoryCalibration
     numbers: dict[str, Any]
     text: str
 
@@ -138,7 +137,7 @@ class _Results:
         """Write numbers, and figure and ensemble of a calibration."""
         if isinstance(self.found, Calibration):
             self.found.to_csv(folder / "ensemble.csv")
-        write_results(folder, figures={"calibration": self.found.plot} if self.found else {}, result=self.numbers)
+        write_results(folder, figures={"calibration": self.found.plot}, result=self.numbers)
 
 
 def _refuse(belong_to: str, **given: object) -> None:
@@ -162,46 +161,18 @@ def _shaking(record: str | None, file: ScaledPulseOptions) -> Motion | None:
     return next(iter(motions.values()), None)
 
 
-def _of_specimens(tables: Mapping[str, Outcomes], how: _How, folder: Path | None) -> _Results:
-    """Calibrate each specimen by itself, and write each as soon as it is done."""
-    for name, table in tables.items():
-        with _naming(name):
-            _check(table, how)
-    results = {}
-    for name, table in tables.items():
-        with _naming(name):
-            results[name] = _of_outcomes(table, how)
-        if folder is not None:
-            results[name].write(subfolder(folder, name))
-    numbers = {"specimens": {name: one.numbers for name, one in results.items()}}
-    return _Results(None, numbers, "\n\n".join(f"specimen {name}\n{one.text}" for name, one in results.items()))
-
-
-def _check(table: Outcomes, how: _How) -> None:
-    """Refuse outcomes that cannot be calibrated, and more folds than groups, before the work."""
-    checked_outcomes(table.overturned, len(table.overturned))
+def _of_outcomes(tests: Sequence[ShakeTest], how: _How) -> _Results:
+    fell, groups = [test.overturned for test in tests], [test.group for test in tests]
+    # Outcomes that cannot be calibrated, and more folds than groups, are refused before the work.
+    checked_outcomes(fell, len(tests))
     if how.folds:
-        group_labels(table.groups, len(table.overturned), how.folds)
-
-
-@contextlib.contextmanager
-def _naming(specimen: str) -> Iterator[None]:
-    """Add the specimen's name to an error."""
-    try:
-        yield
-    except RockingError as error:
-        error.message = replace(error.message, template=f"specimen {literal(specimen)}: {error.message.template}")
-        raise
-
-
-def _of_outcomes(table: Outcomes, how: _How) -> _Results:
-    _check(table, how)
-    found = calibrated(table.motions, table.overturned, seed=how.seed, **how.choices)
+        group_labels(groups, len(tests), how.folds)
+    found = calibrated([test.motion for test in tests], fell, seed=how.seed, **how.choices)
     predicted = dict(zip(how.others, found.predict([*how.others.values()]), strict=True))
     numbers = {**found.to_dict(), "predicted": predicted}
     parts = [found.summary()]
     if how.folds:
-        scores = found.cross_validate(groups=table.groups, folds=how.folds).scores
+        scores = found.cross_validate(groups=groups, folds=how.folds).scores
         numbers["cross_validated"] = asdict(scores)
         parts.append(f"left-out motions: {scores} ({counted(how.folds, 'fold')})")
     if predicted:
