@@ -9,7 +9,7 @@ from numpy.random import default_rng
 from rocking import Block, InvalidMotion, InvalidOption, dynamics, pulses
 from rocking.dynamics import basin_maps
 from rocking.dynamics.attractors import KnownAttractors
-from rocking.dynamics.bifurcation import period_of, settled_states
+from rocking.dynamics.bifurcation import period_of, states_after
 
 BLOCK = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
 SHAKING = pulses.sine(3.5, 1.2, cycles=1)
@@ -125,7 +125,7 @@ def test_a_state_at_any_point_of_a_long_orbit_has_settled_on_it():
     """A few points of a long orbit have a neighbourhood; a cell may end at another one, before or after it is known."""
     strobe = dynamics.stroboscopic_map(dynamics.BouncingBall(0.5, gravity=10.0), pulses.sine(16.92, 5.0, cycles=1))
     states = np.stack(np.meshgrid(np.linspace(0.05, 0.15, 5), np.linspace(0.3, 0.7, 5)), axis=-1).reshape(-1, 2)
-    kept = settled_states(strobe, states, 400, 64)
+    kept = states_after(strobe, states, 400, 64)[0]
     periods = [period_of(each) for each in kept]
     assert sorted(set(periods)) == [4, 23]
     known = KnownAttractors(strobe, np.array([0.1, 0.4]))
