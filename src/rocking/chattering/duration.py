@@ -12,13 +12,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
 from rocking.arrays import Floats
-from rocking.chattering.expansions import HIGHEST_ORDER, asymptotic_times, series_times
-from rocking.chattering.parameters import (
+from rocking.chattering.expansions import (
+    HIGHEST_ORDER,
+    asymptotic_times,
     broadcast,
     checked_amplitude,
     checked_frequency,
     checked_restitution,
     lifting_amplitude,
+    series_times,
     single,
 )
 from rocking.errors import InvalidOption

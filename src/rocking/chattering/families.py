@@ -85,8 +85,8 @@ def lobes(block: Block, *, omega: float = 2.0, count: int = 5, model: Model = "n
         Frequency of the lobes.
     count : int
         How many there are.
-    model : {"nonlinear", "linear"}
-        Equation of motion.
+    model : str
+        As for `sine`.
 
     Returns
     -------
@@ -122,8 +122,8 @@ def ricker(
         What rocks.
     kind : {"symmetric", "antisymmetric"}
         Second or third derivative of a Gaussian.
-    model : {"nonlinear", "linear"}
-        Equation of motion.
+    model : str
+        As for `sine`.
 
     Returns
     -------
@@ -151,8 +151,8 @@ def mavroeidis_papageorgiou(
         What rocks.
     phase, gamma : float
         As for `rocking.pulses.mavroeidis_papageorgiou`.
-    model : {"nonlinear", "linear"}
-        Equation of motion.
+    model : str
+        As for `sine`.
 
     Returns
     -------
@@ -189,8 +189,8 @@ def record(
         Slenderness of the blocks, rad.
     restitution : float, optional
         Their restitution; by default Housner's.
-    model : {"nonlinear", "linear"}
-        Equation of motion.
+    model : str
+        As for `sine`.
 
     Returns
     -------
