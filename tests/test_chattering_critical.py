@@ -5,7 +5,6 @@ import pytest
 from oracles.sine_chattering import rest_time
 
 from rocking import chattering
-from rocking.errors import InvalidOption
 
 
 def test_critical_amplitudes_of_the_reference(reference):
@@ -77,17 +76,3 @@ def test_the_approximation_keeps_its_stated_error():
         omega, eta
     )
     assert np.abs(error).max() <= 1.02 * 3.2e-8
-
-
-@pytest.mark.parametrize(("omega", "eta"), [(0.39, 0.9), (10.1, 0.9), (2.0, 0.49), (2.0, 0.98)])
-def test_the_approximation_refuses_what_it_was_not_made_for(omega, eta):
-    with pytest.raises(InvalidOption, match="holds for omega"):
-        chattering.critical_amplitude(omega, eta, method="approximation")
-
-
-def test_unusable_arguments_are_refused():
-    with pytest.raises(InvalidOption, match="method must be"):
-        chattering.critical_amplitude(2.0, 0.92, method="eq78")
-    with pytest.raises(InvalidOption, match="eta must be"):
-        chattering.critical_amplitude(2.0, np.nan)
-    assert chattering.critical_amplitude(np.ones((3, 1)), np.full(4, 0.9), method="eq77").shape == (3, 4)
