@@ -135,12 +135,8 @@ def asymptotic_table(a: float, omega: float, eta: float) -> NDArray[np.void]:
 
     Parameters
     ----------
-    a : float
-        Amplitude over g alpha, at least 1.
-    omega : float
-        Forcing frequency over p.
-    eta : float
-        Coefficient of restitution, below 1.
+    a, omega, eta : float
+        As in `chattering_time`, with a at least 1 and eta below 1.
 
     Returns
     -------
@@ -247,7 +243,7 @@ def first_impact_speed(a: ArrayLike, omega: ArrayLike) -> Floats:
     Raises
     ------
     InvalidOption
-        If a parameter is NaN, infinite or out of range.
+        As `first_interval`.
 
     Notes
     -----
@@ -309,8 +305,7 @@ def series_coefficients(omega: ArrayLike, eta: ArrayLike, *, order: int = 4) -> 
     Notes
     -----
     The exact impact map acts on truncated power series, and the infinite sum of its intervals is extrapolated
-    coefficient by coefficient; nothing is fitted. The paper's Eq. 65 has the same C1 and part of C3. C1 omega depends
-    on eta alone, C3 omega = A + B/omega^2.
+    coefficient by coefficient. The paper's Eq. 65 has the same C1 and part of C3.
 
     Examples
     --------
@@ -365,10 +360,8 @@ def series_diagnosis(a: ArrayLike, omega: ArrayLike, eta: ArrayLike, *, order: i
     -----
     Error: the next terms, and a geometric sum with the limit of their ratio. Radius: the ratios c_{k-1}/c_k are
     extrapolated linearly in 1/k (Domb and Sykes). Proven: the radius is not larger than a_cr - 1, where the chattering
-    time has its branch point; and it is a_cr - 1 exactly, so that the series converges wherever chattering is
-    complete, if no more than finitely many coefficients are negative. That they are not is observed of the first 40
-    and not proven. Observed, too: the estimate agrees with a_cr - 1, for eta from 0.5 up and omega from 0.5 to 8, to
-    1.2 per cent from the 16 coefficients that are formed at least, and to 0.12 per cent from 40.
+    time has its branch point; it is a_cr - 1 if finitely many coefficients are negative, which is observed of the
+    first 40. For eta from 0.5 up and omega from 0.5 to 8 the estimate agrees with a_cr - 1 to 1.2 per cent.
 
     Examples
     --------

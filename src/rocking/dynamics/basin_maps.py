@@ -160,20 +160,16 @@ def basins(
 
     Parameters
     ----------
-    body : Block, or a body of `rocking.dynamics`
-        What moves.
-    motion : Motion
-        One period, which repeats for ever.
+    body, motion : Body, Motion
+        As for `stroboscopic_map`.
     positions : array_like, shape (n,)
         Increasing coordinates at the start of a period: rotations of a block (rad), positions of other bodies (m).
     velocities : array_like, shape (m,)
         Increasing velocities, rad/s or m/s.
     periods : int
         Most periods that a state is followed for.
-    model : {"nonlinear", "linear"}, optional
+    model, chattering : str, optional
         As for `stroboscopic_map`.
-    chattering : str or treatment
-        As for `rocking.simulate`.
     threads, progress : int or bool, optional
         As for `rocking.simulate_many`.
 
@@ -185,10 +181,8 @@ def basins(
 
     Raises
     ------
-    InvalidMotion
-        If the motion is none, or has no length.
-    InvalidOption
-        If an argument is out of its range.
+    InvalidMotion, InvalidOption
+        As `stroboscopic_map`, and if an argument is out of its range.
 
     Notes
     -----

@@ -198,10 +198,8 @@ def bifurcation_diagram(
         Periods whose states are kept.
     parameter : str
         What the parameter is, with its unit, for tables and figures.
-    model : {"nonlinear", "linear"}, optional
+    model, chattering : str, optional
         As for `stroboscopic_map`.
-    chattering : str or treatment
-        As for `rocking.simulate`.
     progress : bool, optional
         Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
 
