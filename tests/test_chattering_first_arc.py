@@ -9,7 +9,6 @@ from oracles.sine_chattering import BITS, Arc
 
 from rocking.chattering import chattering_report, sequence
 from rocking.chattering.duration import first_arc
-from rocking.errors import InvalidOption
 
 #: Looks at each half period for the first change of sign.
 LOOKS = 40
@@ -61,8 +60,3 @@ def test_the_report_tells_the_first_interval_beyond_half_a_period(run):
     assert "1.92228949 exact" in out and "1.03212611 exact" in out
     values = chattering_report(1.5, 2.0, 0.92).to_dict()
     assert (values["first_interval"]["exact"], values["first_impact_speed"]["exact"]) == first_arc(1.5, 2.0)
-
-
-def test_a_block_that_does_not_lift_off_is_refused():
-    with pytest.raises(InvalidOption, match="a must be at least 1"):
-        first_arc(0.9, 2.0)

@@ -97,10 +97,6 @@ def test_a_part_of_the_array_may_hold_nothing_that_rocks():
     assert times[-1] == pytest.approx(1.1259476769338108721, rel=1e-14)
 
 
-def test_slots_are_whole_groups():
-    assert [lanes.groups_of(n) for n in (0, 1, lanes.WIDTH, lanes.WIDTH + 1)] == [0, 1, 1, 2]
-
-
 def test_power_series_multiply_and_divide_as_polynomials():
     rng = np.random.default_rng(0)
     a, b = rng.uniform(0.5, 2.0, (2, 6, 3))

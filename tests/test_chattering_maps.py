@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 
 import rocking
 from rocking.chattering import chattering_time, critical_amplitude, families
-from rocking.chattering.episodes import chattering_episodes
 from rocking.chattering.families import SimulationInput
-from rocking.chattering.maps import Outcome, chattering_map
+from rocking.chattering.maps import Outcome, chattering_episodes, chattering_map
 from rocking.motion.exceedance import exceedances
 
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.92)
@@ -150,22 +149,6 @@ def test_a_map_tells_its_outcomes_and_units_and_can_be_stored(tmp_path):
         np.testing.assert_array_equal(stored.outcome, dataset.data.outcome)
 
 
-@pytest.mark.parametrize(
-    "parameters",
-    [
-        {"a": [1.0]},
-        {"a": [1.0], "b": [1.0], "c": [1.0]},
-        {"a": [], "b": [1.0]},
-        {"a": [1.0, math.nan], "b": [1.0]},
-        {"a": [2.0, 1.0], "b": [1.0]},
-        {"a": 1.0, "b": [1.0]},
-    ],
-)
-def test_unusable_parameters_are_refused(parameters):
-    with pytest.raises(rocking.InvalidOption):
-        chattering_map(families.sine(BLOCK), parameters)
-
-
 @pytest.mark.parametrize("names", [("omega", "a"), ("omega", "amplitude"), ("frequency", "a")])
 def test_parameters_that_a_family_has_by_name_may_stand_in_any_order(names):
     frequencies, amplitudes = [1.0, 2.0, 4.0], [1.02, 1.05]
@@ -180,26 +163,6 @@ def test_names_that_a_family_does_not_have_keep_their_order():
     usual = chattering_map(families.sine(BLOCK), {"a": [1.02, 1.05], "omega": [1.0, 2.0]})
     named = chattering_map(families.sine(BLOCK), {"amplitude": [1.02, 1.05], "frequency": [1.0, 2.0]})
     np.testing.assert_array_equal(named.data.outcome.values, usual.data.outcome.values)
-
-
-@pytest.mark.parametrize(
-    ("make", "error", "words"),
-    [
-        (lambda: chattering_map("sine", ONE), rocking.InvalidOption, "family must be a function"),
-        (lambda: chattering_map(lambda a, b: (BLOCK, None, "linear"), ONE), rocking.InvalidOption, "SimulationInput"),
-        (lambda: chattering_map(lambda a, b: SimulationInput(BLOCK, None), ONE), rocking.InvalidOption, "a Motion"),
-        (lambda: families.sine("block"), rocking.InvalidBlock, "not a str"),
-        (lambda: families.ricker(None), rocking.InvalidBlock, "not a NoneType"),
-        (lambda: families.lobes(BLOCK, count=2.5), rocking.InvalidOption, "count must be a whole number"),
-        (lambda: families.lobes(BLOCK, omega="fast"), rocking.InvalidOption, "omega must be"),
-        (lambda: families.record(None, 0.2), rocking.InvalidMotion, "not None"),
-        (lambda: families.record("a.csv", 0.2), rocking.InvalidMotion, "rocking.read"),
-    ],
-)
-def test_what_makes_no_case_is_refused_in_one_sentence(make, error, words):
-    with pytest.raises(error, match=words) as caught:
-        make()
-    assert "\n" not in str(caught.value)
 
 
 def test_a_map_is_the_same_in_one_thread_and_in_several():

@@ -2,13 +2,10 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from oracles.sine_chattering import rest_time
 
 from rocking import chattering
 from rocking.chattering import duration
-from rocking.errors import InvalidOption
 from rocking.kernels.sine import Verdict
 from rocking.kernels.sine.sequence import semianalytical_phases
 
@@ -133,27 +130,6 @@ def test_semianalytical_scheme_converges_like_the_square_of_what_remains():
     assert rates == pytest.approx(2.0 * np.log(0.92), rel=0.1)
 
 
-@settings(deadline=None, max_examples=40)
-@given(
-    st.floats(0.01, 0.99),
-    st.floats(0.05, 50.0),
-    st.floats(0.3, 0.97),
-    st.floats(1e-3, 0.1),
-)
-def test_stronger_shaking_chatters_longer(share, omega, eta, more):
-    critical = float(chattering.critical_amplitude(omega, eta)) - 1.0
-    weaker, stronger = chattering.chattering_time(
-        [1.0 + share * critical, 1.0 + min(1.0, share * (1.0 + more)) * critical * (1.0 - 1e-9)], omega, eta
-    )
-    assert 0.0 < weaker < stronger < np.pi / omega
-
-
-def test_weak_shaking_approaches_the_square_root_law():
-    eps = 1e-9
-    time = chattering.chattering_time(1.0 + eps, [0.5, 2.0, 9.0], 0.92)
-    assert time * [0.5, 2.0, 9.0] / np.sqrt((1.0 + eps) - 1.0) == pytest.approx(EPS_SERIES_C1, rel=1e-6)
-
-
 def test_edges_of_the_definition():
     times = chattering.chattering_time([0.5, 1.0, 1.03, 1.05, 1e300], 2.0, 0.92)
     assert np.isnan(times[[0, 3, 4]]).all() and times[1] == 0.0 and times[2] > 0.0
@@ -190,33 +166,3 @@ def test_threads_give_the_same_bits(monkeypatch):
     shared_out = chattering.chattering_time(a, omega, eta)
     monkeypatch.setattr(duration, "cores", lambda: 1)
     assert np.array_equal(shared_out, chattering.chattering_time(a, omega, eta), equal_nan=True)
-
-
-@pytest.mark.parametrize(
-    ("given_parameters", "message"),
-    [
-        ((np.nan, 2.0, 0.92), "a must be finite"),
-        (([1.0, np.inf], 2.0, 0.92), r"at index \(1,\)"),
-        ((1.03, 0.0, 0.92), "omega must be between"),
-        ((1.03, -2.0, 0.92), "omega must be between"),
-        ((1.03, 1e7, 0.92), "omega must be between"),
-        ((1.03, 2.0, 0.0), "eta must be above 0"),
-        ((1.03, 2.0, 1.1), "eta must be above 0"),
-        ((1.03, 2.0, 0.9999999), "eta must be above 0"),
-        (("fast", 2.0, 0.92), "must be a number"),
-        (([1.0, 1.1], [1.0, 2.0, 3.0], 0.92), "do not broadcast"),
-    ],
-)
-def test_unusable_parameters_are_refused_in_one_sentence(given_parameters, message):
-    with pytest.raises(InvalidOption, match=message) as refusal:
-        chattering.chattering_time(*given_parameters)
-    assert "\n" not in str(refusal.value)
-
-
-@pytest.mark.parametrize(
-    "options",
-    [{"method": "euler"}, {"method": "series", "order": 0}, {"method": "series", "order": 2.5}, {"resolved": 0}],
-)
-def test_unusable_options_are_refused(options):
-    with pytest.raises(InvalidOption, match="must be"):
-        chattering.chattering_time(1.03, 2.0, 0.92, **options)

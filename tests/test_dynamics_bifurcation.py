@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from test_dynamics_exponents import start_of_one_bounce
 
-from rocking import Block, InvalidMotion, InvalidOption, dynamics, pulses
+from rocking import Block, dynamics, pulses
 from rocking.dynamics import bifurcation
 
 G = 9.80665
@@ -47,55 +47,6 @@ def test_an_orbit_that_is_still_settling_has_no_period():
     states = found.data.velocity.values[0, 1, 0]
     assert abs(states[-1] - states[-3]) < 1e-6 * abs(states[-1]) < abs(states[-1] - states[-2])
     assert found.data.period.values[0, 1, 0] == 0
-
-
-def symmetric_states(p, alpha, e, amplitude, omega):
-    """States at the start of a period on the linear block's two orbits of one impact in each half period.
-
-    On side + it is alpha + C cosh(p s) + D sinh(p s) + K sin(omega t), s since the impact at the phase phi; half a
-    period later it is on side - and the same with other signs. Both conditions there are linear in X = K sin(phi) and
-    Y = K omega cos(phi), which lie on an ellipse.
-    """
-    K = p * p * amplitude / G / (p * p + omega * omega)
-    S = math.pi / omega
-    ch, sh = math.cosh(p * S), math.sinh(p * S)
-    # D = (X (1 + ch) + alpha (ch - 1))/sh; (1 - e) Y = e p (alpha + X) sh - p D (1 + e ch)
-    slope = (e * p * sh - p * (1.0 + ch) / sh * (1.0 + e * ch)) / (1.0 - e)
-    offset = (e * p * alpha * sh - p * alpha * (ch - 1.0) / sh * (1.0 + e * ch)) / (1.0 - e)
-    roots = np.roots([slope**2 + omega**2, 2.0 * slope * offset, offset**2 - (K * omega) ** 2])
-    states = []
-    for X in roots[np.isreal(roots)].real:
-        Y = slope * X + offset
-        start = (math.atan2(X, Y / omega) % (2.0 * math.pi)) / omega
-        D = (X * (1.0 + ch) + alpha * (ch - 1.0)) / sh
-        s, t, sign = 2.0 * S - start, 2.0 * S, 1.0
-        if s > S:
-            s, t, sign = s - S, t - S, -1.0
-        C = -alpha - X
-        theta = alpha + C * math.cosh(p * s) + D * math.sinh(p * s) + K * math.sin(omega * t)
-        rate = p * (C * math.sinh(p * s) + D * math.cosh(p * s)) + K * omega * math.cos(omega * t)
-        states.append((sign * theta, sign * rate))
-    return np.array(states)
-
-
-def test_a_linear_block_follows_its_symmetric_orbit():
-    p, alpha, e, omega = 2.0, 0.2, 0.9, 7.5
-    block = Block.from_parameters(p=p, alpha=alpha, restitution=e)
-    values = np.linspace(0.5, 6.0, 40)
-    found = dynamics.bifurcation_diagram(
-        lambda ratio: (block, pulses.sine(ratio * G * alpha, omega / (2.0 * math.pi), cycles=1)),
-        values, [0.02, 0.1], transient=400, kept=4, model="linear", direction="both",
-    )  # fmt: skip
-    judged = 0
-    for way in range(2):
-        for k, ratio in enumerate(values):
-            if found.data.period.values[way, k, 0] != 1 or found.data.impacts.values[way, k, 0] != 2:
-                continue
-            state = [found.data.coordinate.values[way, k, 0, -1], found.data.velocity.values[way, k, 0, -1]]
-            closed = symmetric_states(p, alpha, e, ratio * G * alpha, omega)
-            assert np.abs(closed - state).max(axis=1).min() < 1e-10
-            judged += 1
-    assert judged > 50
 
 
 def test_going_up_and_down_keep_what_they_are_on():
@@ -186,24 +137,3 @@ def test_a_stop_that_moves_takes_the_body_with_it():
         [-0.3, -0.2, 0.0], [0.4, 0.0], direction="down", transient=50,
     )  # fmt: skip
     assert np.all(found.data.coordinate.values[0, :, 0].min(axis=-1) >= np.array([0.3, 0.2, 0.0]))
-
-
-@pytest.mark.parametrize(
-    ("change", "error", "words"),
-    [
-        ({"case": 3}, InvalidOption, "function of the parameter"),
-        ({"case": lambda value: value}, InvalidOption, "must return a body"),
-        ({"case": lambda value: (dynamics.BouncingBall(0.5), None)}, InvalidMotion, "one period"),
-        ({"values": [2.0, 1.0]}, InvalidOption, "increasing"),
-        ({"starts": [0.1]}, InvalidOption, "pair"),
-        ({"starts": [-0.1, 0.0]}, InvalidOption, "in front"),
-        ({"direction": "sideways"}, InvalidOption, "direction"),
-        ({"kept": 1}, InvalidOption, "kept"),
-        ({"transient": -1}, InvalidOption, "transient"),
-    ],
-)
-def test_wrong_input_gets_one_sentence(change, error, words):
-    given = {"case": ball_case(0.5), "values": [1.0, 2.0], "starts": [0.1, 0.5]} | change
-    with pytest.raises(error, match=words) as caught:
-        dynamics.bifurcation_diagram(given.pop("case"), given.pop("values"), given.pop("starts"), **given)
-    assert "\n" not in str(caught.value)

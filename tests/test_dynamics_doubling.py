@@ -83,17 +83,6 @@ def test_the_doubled_orbits_of_a_ball_are_those_of_its_own_equations(once, twice
     assert judged >= 4
 
 
-def test_orbits_leave_a_flip_as_the_square_root_of_the_distance(once, twice):
-    flip = once.bifurcations[0].value
-    beyond = twice.values - flip
-    parted = np.array([np.ptp(twice.orbit(k).states[:, 1]) for k in np.flatnonzero(beyond < 0.02)])
-    ratio = parted**2 / beyond[beyond < 0.02]
-    # The square is a multiple of the distance, and what is of the next order.
-    slope, limit = np.polyfit(beyond[beyond < 0.02], ratio, 1)
-    assert len(ratio) >= 4 and np.max(np.abs(ratio / (limit + slope * beyond[beyond < 0.02]) - 1.0)) < 1e-3
-    assert abs(slope) * 0.02 < 0.2 * limit
-
-
 def test_a_period_doubles_again_where_a_long_simulation_says(twice):
     flip = twice.bifurcations[1].value
     found = dynamics.bifurcation_diagram(table, [flip - 0.004, flip + 0.004], twice.states[-1], transient=1500)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from oracles import closed_orbits
 
-from rocking import Block, InvalidMotion, InvalidOption, dynamics, pulses, records
+from rocking import Block, InvalidOption, dynamics, pulses, records
 from rocking.chattering import critical_amplitude
 from rocking.dynamics.maps import distances
 
@@ -218,34 +218,6 @@ def test_orbits_of_an_oscillator_that_hits_once_are_those_of_shaw_and_holmes(sha
     assert found == pytest.approx([value], abs=1e-10)
 
 
-@pytest.mark.slow
-def test_a_linear_block_that_hits_once_every_half_period_loses_stability_where_hogans_orbits_do():
-    judged = 0
-    for e, shaking, m in ((0.5, 0.8, 1), (0.8, 1.2, 3)):
-        exact = closed_orbits.Block(2.0, 0.2, e, shaking, BLOCK.gravity, m)
-        body = Block.from_parameters(p=2.0, alpha=0.2, restitution=e)
-        fold, breaking = exact.amplitude(exact.fold), exact.amplitude(exact.breaking)
-
-        def family(amplitude, body=body, shaking=shaking):
-            return body, pulses.sine(amplitude, shaking, cycles=1)
-
-        near = 0.5 * (fold + breaking)
-        orbits = dynamics.periodic_orbits(*family(near), period=m, model="linear")
-        (start,) = [each for each in orbits if each.period == m and each.symmetric and each.is_stable]
-        assert start.impacts == 2.0
-        speed = start.response.impacts["speed_after"][0]
-        assert exact.amplitude(speed) == pytest.approx(near, rel=1e-11)
-        trace = exact.trace(speed)
-        assert complex(start.multipliers.sum()) == pytest.approx(trace**2 - 2.0 * e * e, abs=1e-9)
-        branch = dynamics.continue_orbit(start, family, near, (0.9 * fold, 1.1 * breaking))
-        kinds = {each.kind: each for each in branch.bifurcations}
-        assert kinds["fold"].value == pytest.approx(fold, abs=1e-10)
-        assert kinds["symmetry breaking"].value == pytest.approx(breaking, abs=1e-10)
-        assert kinds["symmetry breaking"].orbit.symmetric
-        judged += 1
-    assert judged == 2
-
-
 def test_grazing_is_found_from_both_sides():
     """The linear response touches the stop at a known amplitude; orbits with an impact begin there, too."""
     body = dynamics.ImpactOscillator(1.0, 0.8, damping_ratio=0.05, stop=0.01)
@@ -388,46 +360,6 @@ def test_the_peak_of_an_orbit_between_walls_is_where_they_are():
     axes = branch.plot().axes[0]  # which would be a flat line
     assert axes.get_ylabel() == "position at the start of a period (m)"
     assert np.nanmax(axes.lines[0].get_ydata()) == pytest.approx(branch.states[:, 0].max())
-
-
-@pytest.mark.parametrize(
-    ("make", "error", "words"),
-    [
-        (lambda: dynamics.periodic_orbits(BLOCK, None), InvalidMotion, "one period"),
-        (lambda: dynamics.periodic_orbits(BLOCK, pulses.sine(1.0, 1.0, cycles=1), period=0), InvalidOption, "period"),
-        (lambda: dynamics.periodic_orbits(BLOCK, pulses.sine(1.0, 1.0, cycles=1), starts=0), InvalidOption, "starts"),
-        (
-            lambda: dynamics.periodic_orbits(CASES["ball"][0], pulses.sine(1.0, 1.0, cycles=1), starts=[[-1.0, 0.0]]),
-            InvalidOption,
-            "in front of",
-        ),
-    ],
-)
-def test_wrong_input_gets_one_sentence(make, error, words):
-    with pytest.raises(error) as caught:
-        make()
-    assert words in str(caught.value) and "\n" not in str(caught.value)
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"value": 2.0}, "within|from|must"),
-        ({"limits": (2.0, 1.0)}, "lower, higher"),
-        ({"limits": (1.0, 1.2, 3.0)}, "lower, higher"),
-        ({"value": 1.3}, "none of what"),
-        ({"step": 0.0}, "step"),
-        ({"most": 0}, "most"),
-    ],
-)
-def test_a_branch_is_refused_in_one_sentence(branch, changes, words):
-    orbit = branch.orbit(0)
-    family = table_of(orbit.body)
-    given = {"value": float(branch.values[0]), "limits": (0.9, 1.7), "step": 0.05, "most": 5} | changes
-    with pytest.raises(InvalidOption, match=words) as caught:
-        dynamics.continue_orbit(orbit, family, given.pop("value"), given.pop("limits"), **given)
-    assert "\n" not in str(caught.value)
 
 
 def test_distances_in_a_period_are_those_of_all_pairs() -> None:

@@ -124,30 +124,6 @@ def test_an_orbit_that_sticks_forgets_everything():
     assert judged == 10
 
 
-@pytest.mark.parametrize(("restitution", "about"), [(0.5, 0.61), pytest.param(0.8, 0.34, marks=pytest.mark.thorough)])
-def test_the_time_of_sticking_vanishes_with_the_exponent_of_its_scale(restitution, about):
-    known = boundary(restitution, 0.0, about)
-    factor, h = sticking_oscillator.growth(restitution), 1e-7
-    long, short = (sticking(restitution, 0.0, known - d).time for d in (h * factor, h))
-    assert math.log(long / short) / math.log(factor) == pytest.approx(
-        sticking_oscillator.exponent(restitution), abs=5e-5
-    )
-
-
-def test_beyond_that_boundary_attractors_come_in_a_cascade_with_one_impact_more_each():
-    """At distances whose ratio is the factor of the scale, as Dankowicz and Fotsch (2017) predict a cascade."""
-    known = boundary(0.5, 0.0, 0.61)
-    impacts = []
-    for k in range(12):
-        beyond = 6e-4 * sticking_oscillator.growth(0.5) ** -k
-        strobe = dynamics.stroboscopic_map(oscillator(0.5, 0.0), forcing(known + beyond))
-        (state,) = strobe([[0.0, 0.0]], 100)
-        after, _, count = strobe.followed(state, 1)
-        assert np.max(np.abs(after - state)) < 1e-10
-        impacts.append(count)
-    assert impacts == list(range(10, 22))
-
-
 # --- Hogan's orbits of a slender block --------------------------------------------------------------------------
 
 P, ALPHA = 1.0, 0.1
@@ -204,40 +180,6 @@ def test_branches_of_a_slender_block_bifurcate_where_closed_forms_say(ratio, res
     kinds = {each.kind: each.value for each in other.bifurcations}
     assert kinds["symmetry breaking"] == pytest.approx(breaking, rel=1e-9)
     assert kinds["flip"] == pytest.approx(flip, rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("ratio", "restitution"),
-    [
-        (3.0, 0.925),
-        *(pytest.param(*each, marks=pytest.mark.thorough) for each in ((5.0, 0.9), (2.0, 0.8), (8.0, 0.95))),
-    ],
-)
-def test_courses_lead_from_one_balance_to_the_other_from_the_heteroclinic_amplitude_on(ratio, restitution):
-    """Blocks start on the unstable manifold of the orbit at the balance of side +, and hit the ground at all phases."""
-    exact, _, _ = slender(ratio, restitution, 1)
-    block = rocking.Block.from_parameters(p=P, alpha=ALPHA, restitution=restitution)
-    w, frequency, before = ratio * P, ratio * P * UNIT, 3.0 / P
-    best = math.atan2(1.0 + restitution, ratio * (1.0 - restitution))
-    phases = best + np.concatenate([np.linspace(-0.2, 0.2, 41), np.linspace(0.3, 2.0 * math.pi - 0.3, 20)])
-    found = {}
-    for change in (-1e-4, 1e-4):
-        amplitude = exact.heteroclinic * (1.0 + change)
-        forced = P * P * amplitude / (block.gravity * (w * w + P * P))
-        overturned = 0
-        for phase in phases:
-            start = phase - w * before
-            away = (ALPHA + forced * math.sin(phase)) * math.exp(-P * before)
-            response = rocking.simulate(
-                block, pulses.sine(amplitude, frequency, cycles=25.0 * frequency / P, phase=start), model="linear",
-                initial_rotation=ALPHA + forced * math.sin(start) - away,
-                initial_velocity=forced * w * math.cos(start) - P * away,
-            )  # fmt: skip
-            times = response.impacts["time"]
-            assert times[0] == pytest.approx(before, abs=1e-6)
-            overturned += bool(response.overturned) and len(times) == 1
-        found[change] = overturned
-    assert found[-1e-4] == 0 < found[1e-4]
 
 
 # --- the tables of the pages ------------------------------------------------------------------------------------

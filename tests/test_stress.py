@@ -16,7 +16,6 @@ FOLDER = Path(__file__).parents[1] / "stress"
     [
         ("kills.py", ["--kills", "20"], "studies with the one digest"),
         ("damage.py", ["--trials", "40"], "unit: reported by verify"),
-        ("walls.py", ["--pairs", "50"], "of processor time, seed 1"),
     ],
 )
 def test_a_trial_finds_what_is_promised(tmp_path, program, arguments, says):

@@ -16,7 +16,7 @@ from rocking.arrays import Floats
 from rocking.block import Block
 from rocking.chattering.amplitude import critical_amplitude
 from rocking.chattering.duration import chattering_time
-from rocking.chattering.parameters import (
+from rocking.chattering.expansions import (
     checked_frequency,
     checked_loss,
     checked_slenderness,

@@ -28,8 +28,7 @@ from rocking.arrays import Floats
 from rocking.bisection import bisected
 from rocking.chattering.amplitude import critical_amplitude
 from rocking.chattering.duration import chattering_time, interval_ratios, resolved_by_default, sequence
-from rocking.chattering.expansions import first_impact_speed, first_interval
-from rocking.chattering.parameters import checked_loss, single
+from rocking.chattering.expansions import checked_loss, first_impact_speed, first_interval, single
 from rocking.errors import InvalidOption
 
 #: Amplitudes of Fig. 5, gathered towards both of its vertical tangents, and how far it goes past the second.

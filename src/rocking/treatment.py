@@ -25,7 +25,7 @@ FITTED_FREQUENCIES: Final = (0.5, 8.0)
 FITTED_RESTITUTIONS: Final = (0.5, 0.97)
 
 #: Critical amplitudes that one call of a kernel computes, in a third of a second.
-CRITICAL_TOGETHER: Final = 512
+_CRITICAL_TOGETHER: Final = 512
 
 _BY_NAME: dict[str, type[Treatment]] = {}
 
@@ -200,20 +200,9 @@ class AsymptoticTime(Treatment):
         return np.where(complete, times / bodies.p, np.inf)
 
     def _critical(self, frequency: Floats, restitution: Floats) -> Floats:
-        from rocking.kernels.sine.sequence import critical_amplitudes, fitted_amplitudes
-
-        found = np.ones(frequency.size)
-        lossy = np.flatnonzero(restitution.ravel() < 1.0)
-        omega, eta = frequency.ravel()[lossy], restitution.ravel()[lossy]
-        there = np.zeros(lossy.size)
-        if self.critical == "exact":
-            for some in ranges(lossy.size, CRITICAL_TOGETHER):
-                critical_amplitudes(omega[some], eta[some], there[some])
-        else:
-            warn_outside_fit(self.critical, omega, eta)
-            fitted_amplitudes(omega, eta, self.critical == "eq76", there)
-        found[lossy] = there
-        return found.reshape(frequency.shape)
+        found, lossy = np.ones(frequency.shape), restitution < 1.0
+        found[lossy] = critical_amplitudes_by(self.critical, frequency[lossy], restitution[lossy])
+        return found
 
 
 @dataclass(frozen=True)
@@ -386,6 +375,23 @@ def treatment(chattering: str | Treatment) -> Treatment:
     except InvalidOption as error:
         sentence = f'{{}} "{chattering}": {error.message.template}'
         raise InvalidOption(sentence, "chattering", *error.message.arguments) from None
+
+
+def critical_amplitudes_by(method: str, omega: Floats, eta: Floats) -> Floats:
+    """Critical amplitudes over g alpha, flat: "exact", or by the paper's fits "eq76" and "eq77"."""
+    from rocking.kernels.sine.sequence import critical_amplitudes, fitted_amplitudes
+
+    found = np.ones(omega.size)
+    if method != "exact":
+        warn_outside_fit(method, omega, eta)
+        fitted_amplitudes(omega, eta, method == "eq76", found)
+        return found
+    lossy = np.flatnonzero(eta < 1.0)
+    for some in ranges(lossy.size, _CRITICAL_TOGETHER):
+        here = np.zeros(lossy[some].size)
+        critical_amplitudes(omega[lossy[some]], eta[lossy[some]], here)
+        found[lossy[some]] = here
+    return found
 
 
 def warn_outside_fit(fit: str, omega: Floats, eta: Floats) -> None:

@@ -8,7 +8,6 @@ arcs have heights of s^3, so that double precision ends at s = 1e-5.
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import mpmath as mp
@@ -100,28 +99,3 @@ class Oscillator(NamedTuple):
     def is_complete(self):
         """Whether the sequence dies out before the end: what is left of it is short beside the time to the end."""
         return any(self.remaining(time, speed) < _SHORT * (self.end - time) for time, speed in self.impacts())
-
-
-def _repeated(restitution):
-    """Length of an arc over the time left where a sequence repeats itself at ever smaller scales.
-
-    Near the end the push is c s with the time s that is left. In units of c s^2 a speed is v = z/2 - z^2/6 where the
-    arc takes z s, and that after the next impact r (z/2 - z^2/3)/(1 - z)^2.
-    """
-    low, high = 0.0, 1.0
-    for _ in range(60):
-        z = 0.5 * (low + high)
-        low, high = (z, high) if (0.5 - z / 6) * (1 - z) ** 2 > restitution * (0.5 - z / 3) else (low, z)
-    return z
-
-
-def growth(restitution):
-    """Factor by which a deviation from the sequence that repeats itself grows with each impact."""
-    z = _repeated(restitution)
-    v = z / 2 - z * z / 6
-    return v / (0.5 - z / 3) * ((0.5 - 2 * z / 3) / (z / 2 - z * z / 3) + 2 / (1 - z))
-
-
-def exponent(restitution):
-    """Power of the distance from the boundary with which the time of sticking vanishes there."""
-    return -math.log(1 - _repeated(restitution)) / math.log(growth(restitution))

@@ -1,7 +1,6 @@
 from . import families
 from .amplitude import critical_amplitude, critical_amplitude_nonlinear
 from .duration import ChatteringSequence, chattering_time, interval_ratios, is_complete, sequence
-from .episodes import ChatteringEpisodes, chattering_episodes
 from .expansions import (
     SeriesDiagnosis,
     asymptotic_table,
@@ -10,7 +9,7 @@ from .expansions import (
     series_coefficients,
     series_diagnosis,
 )
-from .maps import ChatteringMap, Outcome, chattering_map
+from .maps import ChatteringEpisodes, ChatteringMap, Outcome, chattering_episodes, chattering_map
 from .report import ChatteringReport, CriticalReport, chattering_report, critical_report
 
 __all__ = [

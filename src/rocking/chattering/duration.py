@@ -12,13 +12,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
 from rocking.arrays import Floats
-from rocking.chattering.expansions import HIGHEST_ORDER, asymptotic_times, series_times
-from rocking.chattering.parameters import (
+from rocking.chattering.expansions import (
+    HIGHEST_ORDER,
+    asymptotic_times,
     broadcast,
     checked_amplitude,
     checked_frequency,
     checked_restitution,
     lifting_amplitude,
+    series_times,
     single,
 )
 from rocking.errors import InvalidOption
@@ -108,10 +110,9 @@ def chattering_time(
     Source: "Chattering: An overlooked peculiarity of rocking motion", Eqs 4 to 13 (problem), 65 and 75. Large
     arrays are shared among the processor's cores.
 
-    Close to the critical amplitude a_cr a time tau is as steep as nu (pi/omega - tau)/(a_cr - a), with an exponent nu
-    of eta alone: 0.600 at 0.92 and above, 0.612 at 0.5, to 1 towards 0. So besides those 1e-13 the relative error of
-    "exact" is at most 2^-51 nu (pi/omega - tau)/((a_cr - a) tau): 3e-12 at 1e-8 below a_cr for omega = 2 and eta =
-    0.92, and 3e-10 for omega = 0.1 (documentation, "The critical amplitude, and how it is approached").
+    Close to the critical amplitude a_cr the relative error of "exact" is at most 2^-51 nu (pi/omega - tau)/((a_cr - a)
+    tau) besides those 1e-13, with an exponent nu of eta alone (`critical_amplitude`): 3e-12 at 1e-8 below a_cr for
+    omega = 2 and eta = 0.92 (documentation, "The critical amplitude, and how it is approached").
 
     Examples
     --------
@@ -153,7 +154,7 @@ def is_complete(a: ArrayLike, omega: ArrayLike, eta: ArrayLike) -> NDArray[np.bo
     Raises
     ------
     InvalidOption
-        If a parameter is NaN, infinite or out of range.
+        As `chattering_time`.
 
     Examples
     --------
@@ -196,10 +197,8 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
 
     Parameters
     ----------
-    a : float
-        Amplitude over g alpha, at least 1.
-    omega, eta : float
-        As in `chattering_time`.
+    a, omega, eta : float
+        As in `chattering_time`, with a at least 1.
     tolerance : float
         Width of the bracket over the time of rest at which to stop, 1e-15 or more.
 
@@ -270,10 +269,8 @@ def interval_ratios(a: float, omega: float, eta: float, n: int) -> Floats:
 
     Parameters
     ----------
-    a : float
-        Amplitude over g alpha, above 1.
-    omega, eta : float
-        As in `chattering_time`.
+    a, omega, eta : float
+        As in `chattering_time`, with a above 1.
     n : int
         How many ratios, 1 to 100,000.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -10,19 +11,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
-from rocking.arrays import Floats
-from rocking.chattering.parameters import (
-    broadcast,
-    checked_amplitude,
-    checked_frequency,
-    checked_loss,
-    checked_restitution,
-    lifting_amplitude,
-    single,
-)
+from rocking.arrays import Flags, Floats
 from rocking.errors import InvalidOption
 from rocking.kernels.sine.eq65 import eq65_sums, eq65_terms
 from rocking.kernels.sine.series import phase_coefficients
+
+#: Frequencies (forcing over the block's p) for which double precision resolves the problem.
+LOWEST_FREQUENCY: Final = 1e-6
+HIGHEST_FREQUENCY: Final = 1e6
+
+#: Closer to one a sequence takes more than a million impacts; at one it never ends.
+LARGEST_RESTITUTION: Final = 0.99999
 
 #: Terms of the consistent expansion.
 HIGHEST_ORDER: Final = 40
@@ -35,18 +34,85 @@ LOOK_AHEAD: Final = 6
 _FEWEST: Final = 16
 
 CYCLE: Final = np.dtype(
-    [
-        ("n", np.int64),
-        ("sign", np.int8),
-        ("order", np.int8),
-        ("term", float),
-        ("interval", float),
-        ("time", float),
-        ("phase", float),
-        ("speed_before", float),
-        ("speed_after", float),
-    ]
+    [("n", np.int64), ("sign", np.int8), ("order", np.int8)]
+    + [(name, float) for name in ("term", "interval", "time", "phase", "speed_before", "speed_after")]
 )
+
+
+def _checked(given: ArrayLike, name: str, meaning: str, allowed: Callable[[Floats], Flags], bounds: str) -> Floats:
+    """Return values of a parameter as an array, or raise an error about the first that is not allowed."""
+    values = checks.numbers(given, name, InvalidOption)
+    finite = np.isfinite(values)
+    usable = finite & allowed(values)
+    if usable.all():
+        return values
+    index = tuple(map(int, np.argwhere(~(usable if finite.all() else finite))[0]))
+    condition = bounds if finite.all() else f"finite ({meaning})"
+    where, value = f" at index {index}" if values.ndim else "", float(values[index])
+    raise InvalidOption(f"{{}} must be {condition}, not {value:g}{where}", name, value=value)
+
+
+def checked_amplitude(a: ArrayLike) -> Floats:
+    """Return amplitudes as an array; any finite number is one."""
+    return _checked(a, "a", "the acceleration amplitude over g alpha", np.isfinite, "")
+
+
+def checked_frequency(omega: ArrayLike) -> Floats:
+    """Return frequencies as an array."""
+    bounds = f"between {LOWEST_FREQUENCY:g} and {HIGHEST_FREQUENCY:g}"
+    return _checked(
+        omega, "omega", "the forcing frequency over p",
+        lambda values: (values >= LOWEST_FREQUENCY) & (values <= HIGHEST_FREQUENCY), bounds,
+    )  # fmt: skip
+
+
+def checked_restitution(eta: ArrayLike) -> Floats:
+    """Return coefficients of restitution as an array."""
+    bounds = f"above 0 and at most {LARGEST_RESTITUTION:g}, or exactly 1"
+    return _checked(
+        eta, "eta", "the coefficient of restitution",
+        lambda values: (values > 0.0) & ((values <= LARGEST_RESTITUTION) | (values == 1.0)), bounds,
+    )  # fmt: skip
+
+
+def checked_loss(eta: ArrayLike) -> Floats:
+    """Return coefficients of restitution below one as an array."""
+    values = checked_restitution(eta)
+    if (values == 1.0).any():
+        raise InvalidOption("{} must be below 1 here: without loss at impacts chattering never ends", "eta", value=eta)
+    return values
+
+
+def checked_slenderness(alpha: ArrayLike) -> Floats:
+    """Return slenderness angles as an array."""
+    meaning = "the slenderness angle in rad"
+    return _checked(alpha, "alpha", meaning, lambda a: (a > 0.0) & (a < 0.5 * np.pi), "between 0 and pi/2 rad")
+
+
+def single(values: Floats, name: str) -> float:
+    """Return the one value of a parameter that may not be an array."""
+    if values.ndim:
+        raise InvalidOption(f"{{}} must be a single number here, not an array of shape {values.shape}", name)
+    return float(values)
+
+
+def lifting_amplitude(a: ArrayLike, *, above: bool = False) -> float:
+    """Return one amplitude that lifts the block; where it must be above 1, one that also makes it rock."""
+    amplitude = single(checked_amplitude(a), "a")
+    if amplitude < 1.0 or (above and amplitude == 1.0):
+        bound = "above" if above else "at least"
+        raise InvalidOption(f"{{}} must be {bound} 1, or the block does not lift off, not {amplitude:g}", "a", value=a)
+    return amplitude
+
+
+def broadcast(*parameters: Floats) -> tuple[tuple[int, ...], list[Floats]]:
+    """Return the common shape of the parameters, and each as a flat array of that size."""
+    try:
+        shape = np.broadcast_shapes(*(parameter.shape for parameter in parameters))
+    except ValueError:
+        shapes = ", ".join(str(parameter.shape) for parameter in parameters)
+        raise InvalidOption(f"the parameters' shapes {shapes} do not broadcast: make them compatible") from None
+    return shape, [np.broadcast_to(parameter, shape).ravel() for parameter in parameters]
 
 
 @_BEYOND_RANGE
@@ -69,12 +135,8 @@ def asymptotic_table(a: float, omega: float, eta: float) -> NDArray[np.void]:
 
     Parameters
     ----------
-    a : float
-        Amplitude over g alpha, at least 1.
-    omega : float
-        Forcing frequency over p.
-    eta : float
-        Coefficient of restitution, below 1.
+    a, omega, eta : float
+        As in `chattering_time`, with a at least 1 and eta below 1.
 
     Returns
     -------
@@ -181,7 +243,7 @@ def first_impact_speed(a: ArrayLike, omega: ArrayLike) -> Floats:
     Raises
     ------
     InvalidOption
-        If a parameter is NaN, infinite or out of range.
+        As `first_interval`.
 
     Notes
     -----
@@ -243,8 +305,7 @@ def series_coefficients(omega: ArrayLike, eta: ArrayLike, *, order: int = 4) -> 
     Notes
     -----
     The exact impact map acts on truncated power series, and the infinite sum of its intervals is extrapolated
-    coefficient by coefficient; nothing is fitted. The paper's Eq. 65 has the same C1 and part of C3. C1 omega depends
-    on eta alone, C3 omega = A + B/omega^2.
+    coefficient by coefficient. The paper's Eq. 65 has the same C1 and part of C3.
 
     Examples
     --------
@@ -299,10 +360,8 @@ def series_diagnosis(a: ArrayLike, omega: ArrayLike, eta: ArrayLike, *, order: i
     -----
     Error: the next terms, and a geometric sum with the limit of their ratio. Radius: the ratios c_{k-1}/c_k are
     extrapolated linearly in 1/k (Domb and Sykes). Proven: the radius is not larger than a_cr - 1, where the chattering
-    time has its branch point; and it is a_cr - 1 exactly, so that the series converges wherever chattering is
-    complete, if no more than finitely many coefficients are negative. That they are not is observed of the first 40
-    and not proven. Observed, too: the estimate agrees with a_cr - 1, for eta from 0.5 up and omega from 0.5 to 8, to
-    1.2 per cent from the 16 coefficients that are formed at least, and to 0.12 per cent from 40.
+    time has its branch point; it is a_cr - 1 if finitely many coefficients are negative, which is observed of the
+    first 40. For eta from 0.5 up and omega from 0.5 to 8 the estimate agrees with a_cr - 1 to 1.2 per cent.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Where chattering is complete: maps over the two parameters of any family of cases, by certified simulation."""
+"""Where chattering is complete, by certified simulation: maps over two parameters, and episodes in one response."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
-from rocking.arrays import Floats, Integers
+from rocking.arrays import Integers, without_dust
 from rocking.chattering.families import Family, SimulationInput
 from rocking.constants import VERSION
 from rocking.engine import OUTCOME, complete_chattering
@@ -24,9 +24,9 @@ from rocking.motion.exceedance import exceedances
 from rocking.motion.motion import Motion
 from rocking.progress import Progress
 from rocking.response import Response
-from rocking.result import DatasetResult
+from rocking.result import DatasetResult, Result
 from rocking.simulation import simulate
-from rocking.tables import as_written, text_table
+from rocking.tables import as_written, rows_of, text_table
 from rocking.threads import in_threads
 
 if TYPE_CHECKING:
@@ -71,6 +71,11 @@ class Outcome(IntEnum):
 #: Four ulp: by so much of itself a peak that was meant to be the threshold may exceed it.
 _ROUNDING: Final = 2.0**-50
 
+_EPISODE: Final = np.dtype(
+    [(name, float) for name in ("uplift", "proven", "rest", "lower", "upper", "duration")]
+    + [("impacts", np.int64), ("ground", float)]
+)
+
 
 class _Point(NamedTuple):
     """One point of a map; times that do not exist are NaN."""
@@ -85,16 +90,14 @@ class _Point(NamedTuple):
 
 
 #: Units and meanings of the variables of a map.
-_ATTRIBUTES: Final[Mapping[str, dict[str, Any]]] = MappingProxyType(
-    {
-        "outcome": {
-            "flag_values": [outcome.value for outcome in Outcome],
-            "flag_meanings": " ".join(outcome.name.lower() for outcome in Outcome),
-        },
-        **{name: {"units": "s"} for name in ("uplift", "rest", "lower", "upper")},
-        "rests": {"units": "1", "long_name": "times the block comes to rest"},
-    }
-)
+_ATTRIBUTES: Final[dict[str, dict[str, Any]]] = {
+    "outcome": {
+        "flag_values": [outcome.value for outcome in Outcome],
+        "flag_meanings": " ".join(outcome.name.lower() for outcome in Outcome),
+    },
+    **{name: {"units": "s"} for name in ("uplift", "rest", "lower", "upper")},
+    "rests": {"units": "1", "long_name": "times the block comes to rest"},
+}
 
 
 def chattering_map(
@@ -114,10 +117,8 @@ def chattering_map(
     parameters : mapping
         Names and values of the two parameters, the first of them upwards in the figure. A family whose first two
         parameters have these names the other way round gets them so; else they are given to it in this order.
-    threads : int, optional
-        Number of threads; by default one for every core.
-    progress : bool, optional
-        Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
+    threads, progress : int or bool, optional
+        As for `rocking.simulate_many`.
 
     Returns
     -------
@@ -158,7 +159,7 @@ def chattering_map(
             "family",
             value=family,
         )
-    (first, x), (second, y) = ((name, _axis(values, name)) for name, values in parameters.items())
+    (first, x), (second, y) = ((k, checks.axis(values, k, InvalidOption)) for k, values in parameters.items())
     swapped = _is_swapped(family, str(first), str(second))
     inputs = [family(*map(float, (other, one) if swapped else (one, other))) for one in x for other in y]
     for each in inputs:
@@ -166,16 +167,16 @@ def chattering_map(
             raise InvalidOption(
                 "{} must return a SimulationInput of a block and a Motion for each pair", "family", value=each
             )
-    points = []
+    points: list[_Point] = []
     with Progress("mapping", len(inputs), show=progress) as bar:
         for point in in_threads(_simulated, inputs, threads=count):
             points.append(point)
             bar.advance()
-    columns = {name: np.array(column) for name, column in zip(_Point._fields, zip(*points, strict=True), strict=True)}
+    columns = zip(_Point._fields, zip(*points, strict=True), strict=True)
     dataset = xr.Dataset(
         {
-            name: ((first, second), column.reshape(x.size, y.size), _ATTRIBUTES.get(name, {}))
-            for name, column in columns.items()
+            name: ((first, second), np.reshape(column, (x.size, y.size)), _ATTRIBUTES.get(name, {}))
+            for name, column in columns
         },
         {first: x, second: y},
         {"program": f"rocking {VERSION}", "case": _in_common(inputs[0], inputs[-1])},
@@ -213,8 +214,7 @@ class ChatteringMap(DatasetResult):
 
     def _later(self) -> NDArray[np.bool_]:
         """Whether a block overturns after its first rocking has ended otherwise."""
-        found: NDArray[np.bool_] = (self.data.overturned & (self.data.outcome != Outcome.OVERTURNS)).values
-        return found
+        return np.asarray(self.data.overturned & (self.data.outcome != Outcome.OVERTURNS))
 
     def to_dict(self) -> dict[str, Any]:
         columns = {str(name): self.data[name].values for name in (*self.data.outcome.dims, *self.data.data_vars)}
@@ -307,18 +307,15 @@ def outcomes_of(ends: NDArray[np.void], last: float | None) -> Integers:
 
 def _in_common(one: SimulationInput, other: SimulationInput) -> str:
     """Say what two inputs have in common: the motion's name, the proportions and the size of the block, the model."""
-    what = [
-        ("{}", *(each.motion.name for each in (one, other))),
-        ("alpha = {} rad", *(_of_sides(each, "alpha") for each in (one, other))),
-        ("restitution = {}", *(_of_sides(each, "restitution") for each in (one, other))),
-        ("{} model", one.model, other.model),
-    ]
-    return ", ".join(words.format(first) for words, first, last in what if first == last)
 
+    def described(given: SimulationInput) -> list[str]:
+        alpha, restitution = (
+            ", ".join(dict.fromkeys(f"{getattr(side, name):.5g}" for side in given.block.sides))
+            for name in ("alpha", "restitution")
+        )
+        return [given.motion.name, f"alpha = {alpha} rad", f"restitution = {restitution}", f"{given.model} model"]
 
-def _of_sides(given: SimulationInput, name: str) -> str:
-    """Return a parameter of a block, once where both sides have the same."""
-    return ", ".join(dict.fromkeys(f"{getattr(side, name):.5g}" for side in given.block.sides))
+    return ", ".join(a for a, b in zip(described(one), described(other), strict=True) if a == b)
 
 
 def _simulated(given: SimulationInput) -> _Point:
@@ -336,17 +333,11 @@ def _simulated(given: SimulationInput) -> _Point:
         times = {"rest": float(first["end"]), "lower": float(first["lower"]), "upper": float(first["upper"])}
         # What the motion must not pass a threshold before is the upper bound on the rest.
         ends["first_rest"], ends["stalled"] = times["upper"], math.isnan(times["upper"])
-        ends["complete_chattering"] = _is_complete(response, rests, uplift, times["upper"])
+        if not math.isnan(times["upper"]):
+            states, trail = state.new_states(1, 0), trail_of(response)
+            states["rests"], states["first_uplift"], states["first_rest"] = rests, uplift, times["upper"]
+            ends["complete_chattering"] = complete_chattering(trail.ground, np.array([trail.block]), states)
     return _Point(int(outcomes_of(ends, last)[0]), uplift, **times, rests=rests, overturned=response.overturned)
-
-
-def _is_complete(response: Response, rests: int, uplift: float, rest: float) -> bool:
-    if math.isnan(rest):
-        return False
-    states = state.new_states(1, 0)
-    states["rests"], states["first_uplift"], states["first_rest"] = rests, uplift, rest
-    trail = response.solution.trail
-    return bool(complete_chattering(trail.ground, np.array([trail.block]), states)[0])
 
 
 def _is_swapped(family: Family, first: str, second: str) -> bool:
@@ -358,8 +349,127 @@ def _is_swapped(family: Family, first: str, second: str) -> bool:
     return len(taken) > 1 and (first == taken[1] or second == taken[0])
 
 
-def _axis(values: ArrayLike, name: str) -> Floats:
-    axis = checks.numbers(values, name, InvalidOption)
-    if axis.ndim != 1 or not axis.size or not np.isfinite(axis).all() or not (np.diff(axis) > 0.0).all():
-        raise InvalidOption("{} must be finite numbers in increasing order", name, value=values)
-    return axis
+@dataclass(frozen=True, eq=False, repr=False)
+class ChatteringEpisodes(Result):
+    """The episodes of a response, from `chattering_episodes`; ``print`` it for a table.
+
+    Attributes
+    ----------
+    episodes : structured array
+        One row for each stretch of rocking that complete chattering ends: uplift (s; 0 where the block was already
+        moving); proven (time of the impact from which chattering is proven to be complete, s); rest, and lower and
+        upper bound on it (s); duration from uplift to rest (s); impacts resolved in it; ground (acceleration at the
+        rest, m/s^2).
+    shaking : tuple of float
+        Bracketed duration: when the motion first passes a threshold of the block, and when it falls below one for the
+        last time or the block has overturned, s; NaN where it never does before the simulation ends.
+    at_rest : float
+        Time at rest within the bracketed duration, s.
+    """
+
+    episodes: NDArray[np.void]
+    shaking: tuple[float, float]
+    at_rest: float
+
+    def _headline(self) -> str:
+        return f"{len(self.episodes)}, at rest for {self.at_rest:.3f} s of the shaking"
+
+    @property
+    def share_at_rest(self) -> float:
+        """Share of the bracketed duration during which the block is at rest; NaN where there is none."""
+        start, end = self.shaking
+        return self.at_rest / (end - start) if end > start else math.nan
+
+    @property
+    def amid_shaking(self) -> NDArray[np.bool_]:
+        """Whether each episode ends before the motion passes a threshold for the last time."""
+        return np.asarray(self.episodes["upper"] < self.shaking[1])
+
+    def __str__(self) -> str:
+        return self.summary()
+
+    def summary(self) -> str:
+        header = ["uplift, s", "rest, s", "bracket, s", "duration, s", "impacts", "ground, m/s^2"]
+        rows = [
+            [
+                f"{row['uplift']:.6f}",
+                f"{row['rest']:.9f}",
+                f"{row['upper'] - row['lower']:.1e}",
+                f"{row['duration']:.6f}",
+                int(row["impacts"]),
+                f"{row['ground']:+.4f}",
+            ]
+            for row in self.episodes
+        ]
+        start, end = self.shaking
+        about = (
+            "the motion never passes a threshold of the block before the simulation ends"
+            if math.isnan(start)
+            else f"at rest for {self.share_at_rest:.1%} of the shaking from {start:.3f} s to {end:.3f} s"
+        )
+        return f"{text_table(header, rows)}\n{about}"
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            "episodes": rows_of(self.episodes),
+            "shaking_s": self.shaking,
+            "at_rest_s": self.at_rest,
+            "share_at_rest": self.share_at_rest,
+        }
+
+
+def chattering_episodes(response: Response) -> ChatteringEpisodes:
+    """List the episodes of complete chattering in a response.
+
+    Parameters
+    ----------
+    response : Response
+        From `rocking.simulate` with certified chattering. Rests that are not proven are no episodes.
+
+    Returns
+    -------
+    ChatteringEpisodes
+        The episodes with duration and bracket, and the share of the shaking during which the block is at rest. The
+        shaking is the bracketed duration for this block: from the first to the last time that the motion is beyond one
+        of the block's own thresholds.
+
+    Raises
+    ------
+    InvalidOption
+        If it is given anything but the `Response` of a block without restraints.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.records.load("ridgecrest-clc-090"))
+    >>> found = chattering_episodes(response)
+    >>> len(found.episodes), bool((found.episodes["upper"] - found.episodes["lower"] < 1e-11).all())
+    (6, True)
+    >>> print(f"{found.share_at_rest:.3f}")
+    0.498
+    """
+    if not isinstance(response, Response):
+        raise InvalidOption(
+            f"{{}} must be a Response, not a {type(response).__name__}: simulate(block, motion) makes one", "response"
+        )
+    proven = response.chattering[np.isfinite(response.chattering["upper"])]
+    starts = response.events["time"][response.events["kind"] == "uplift"]
+    impacts = response.impacts["time"]
+    episodes = np.zeros(len(proven), _EPISODE)
+    before = np.searchsorted(starts, proven["end"], side="left") - 1
+    episodes["uplift"] = np.where(before >= 0, np.append(starts, 0.0)[before], 0.0)
+    for name, source in (("proven", "start"), ("rest", "end"), ("lower", "lower"), ("upper", "upper")):
+        episodes[name] = proven[source]
+    episodes["duration"] = episodes["rest"] - episodes["uplift"]
+    impacts_before = np.searchsorted(impacts, episodes["uplift"], "left")
+    episodes["impacts"] = np.searchsorted(impacts, proven["end"], "right") - impacts_before
+    if response.motion is None:
+        return ChatteringEpisodes(episodes, (math.nan, math.nan), 0.0)
+    episodes["ground"] = response.motion.acceleration(proven["end"])
+    beyond = exceedances(response.motion, response.block.uplift_thresholds(response.model), response.block.gravity)
+    if not len(beyond) or beyond[0, 0] >= response.duration:
+        return ChatteringEpisodes(episodes, (math.nan, math.nan), 0.0)
+    start, end = float(beyond[0, 0]), min(float(beyond[-1, 1]), response.duration)
+    # The shaking starts with an uplift, to rounding.
+    at_rest = without_dust(np.diff(np.clip(response.rest_intervals, start, end)), end).sum()
+    return ChatteringEpisodes(episodes, (start, end), float(at_rest))

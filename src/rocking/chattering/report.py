@@ -33,9 +33,6 @@ if TYPE_CHECKING:
 #: Rows of a table for people, of which the last is the last.
 _SHOWN: Final = 12
 
-#: What is wrong with a time by a formula that cannot know.
-_TAKES_FOR_COMPLETE: Final = ", worthless: it takes chattering for complete"
-
 _AMPLITUDES: Final = {"exact": "exact", "eq76": "Eq. 76", "eq77": "Eq. 77", "approximation": "Chebyshev expansion"}
 
 
@@ -75,21 +72,17 @@ class ChatteringReport(Result):
 
     def summary(self) -> str:
         result = self.values
-        times, bracket, critical = result["chattering_time"], result["bracket"], result["critical_amplitude"]
+        times, series, resolved = result["chattering_time"], result["series"], result["resolved"]
+        impacts = "" if resolved is None else f", {counted(resolved, 'impact')}"
+        worth = "" if result["complete"] else ", worthless: it takes chattering for complete"
         lines = [
             ("chattering", self._verdict()),
-            ("critical amplitude", f"{critical:.9g}"),
+            ("critical amplitude", f"{result['critical_amplitude']:.9g}"),
             ("time of rest, exact", self._time(times["exact"])),
-            ("  proven bracket", self._bracket(bracket)),
-            (
-                "  by Eq. 75" + ("" if result["resolved"] is None else f", {counted(result['resolved'], 'impact')}"),
-                self._time(times["semianalytical"]),
-            ),
-            ("  by Eq. 65", f"{self._time(times['asymptotic'])}{'' if result['complete'] else _TAKES_FOR_COMPLETE}"),
-            (
-                f"  by a series, {result['series']['order']} terms",
-                _trust(self._time(times["series"]), result["series"]),
-            ),
+            ("  proven bracket", self._bracket(result["bracket"])),
+            (f"  by Eq. 75{impacts}", self._time(times["semianalytical"])),
+            ("  by Eq. 65", f"{self._time(times['asymptotic'])}{worth}"),
+            (f"  by a series, {series['order']} terms", _trust(self._time(times["series"]), series)),
             ("first interval", self._pair(result["first_interval"], "eq32", time=True)),
             ("speed at first impact", self._pair(result["first_impact_speed"], "eq34", time=False)),
         ]
@@ -119,17 +112,11 @@ class ChatteringReport(Result):
         header = ["n", "sign", "term", "interval, p t", "time, p t", "phase, rad", "speed before", "speed after"]
         rows: list[list[Any]] = [
             [
-                c["n"],
-                f"{c['sign']:+d}",
-                f"T_{c['n']};{c['order']} = {c['term']:.6g}",
-                f"{c['interval']:.6e}",
-                f"{c['time']:.9f}",
-                f"{c['phase']:.6f}",
-                f"{c['speed_before']:.6e}",
-                f"{c['speed_after']:.6e}",
+                c["n"], f"{c['sign']:+d}", f"T_{c['n']};{c['order']} = {c['term']:.6g}", f"{c['interval']:.6e}",
+                f"{c['time']:.9f}", f"{c['phase']:.6f}", f"{c['speed_before']:.6e}", f"{c['speed_after']:.6e}",
             ]
             for c in shown
-        ]
+        ]  # fmt: skip
         left_out = len(cycles) - len(shown)
         if left_out:
             rows.insert(-1, ["...", "", f"({left_out} more)", "", "", "", "", ""])
@@ -217,19 +204,18 @@ def chattering_report(
     impacts = [(row["interval"], row["speed_before"]) for row in exact.impacts[:1]]
     interval, speed = impacts[0] if impacts else first_arc(a, omega)
     series = _series(a, omega, eta, order)
+    times = {
+        method: float(chattering_time(a, omega, eta, method=method, resolved=resolved))
+        for method in ("exact", "asymptotic", "semianalytical")
+    }
     values: dict[str, Any] = {
         "a": a,
         "omega": omega,
         "eta": eta,
         "complete": exact.complete,
         "half_period": math.pi / omega,
-        "chattering_time": {
-            "exact": float(chattering_time(a, omega, eta)),
-            "asymptotic": float(chattering_time(a, omega, eta, method="asymptotic")),
-            "semianalytical": float(chattering_time(a, omega, eta, method="semianalytical", resolved=resolved)),
-            "series": series["time"],
-        },
-        "series": {name: series[name] for name in ("order", "error", "radius")},
+        "chattering_time": {**times, "series": series.pop("time")},
+        "series": series,
         "resolved": resolved,
         "bracket": {"lower": exact.lower, "upper": exact.upper, "impacts": int(exact.impacts.size)},
         "critical_amplitude": float(critical_amplitude(omega, eta)),
@@ -267,17 +253,13 @@ class CriticalReport(Result):
         return {"omega": self.omega, "eta": self.eta, "critical_amplitude": self.amplitudes}
 
     def summary(self) -> str:
-        exact = self.amplitudes["exact"]
+        exact, *others = self.amplitudes.values()
         assert exact is not None
-        lines = []
-        for method, name in _AMPLITUDES.items():
-            amplitude = self.amplitudes[method]
-            if amplitude is None:
-                lines.append(f"{name:<24}none here: it holds for fewer omega and eta")
-            elif method == "exact":
-                lines.append(f"{name:<24}{amplitude:.9g}")
-            else:
-                lines.append(f"{name:<24}{amplitude:<16.9g}off by {amplitude - exact:+.2e}")
+        texts = [f"{exact:.9g}"] + [
+            "none here: it holds for fewer omega and eta" if a is None else f"{a:<16.9g}off by {a - exact:+.2e}"
+            for a in others
+        ]
+        lines = [f"{name:<24}{text}" for name, text in zip(_AMPLITUDES.values(), texts, strict=True)]
         return "\n".join([*lines, "", "amplitudes of the ground acceleration over g alpha"])
 
 
@@ -304,19 +286,14 @@ def critical_report(omega: float, eta: float) -> CriticalReport:
     >>> critical_report(20.0, 0.92).amplitudes["eq76"] is None
     True
     """
-    exact = float(critical_amplitude(omega, eta))
-    others = {method: _amplitude(omega, eta, method) for method in _AMPLITUDES if method != "exact"}
-    return CriticalReport(omega, eta, {"exact": exact, **others})
-
-
-def _amplitude(omega: float, eta: float, method: str) -> float | None:
-    """Amplitude by an approximation; None where it does not hold. The exact method has checked the parameters."""
+    amplitudes: dict[str, float | None] = dict.fromkeys(_AMPLITUDES)
+    amplitudes["exact"] = float(critical_amplitude(omega, eta))
     with warnings.catch_warnings():
         warnings.simplefilter("error", OutsideFit)
-        try:
-            return float(critical_amplitude(omega, eta, method=method))
-        except (InvalidOption, OutsideFit):
-            return None
+        for method in [*_AMPLITUDES][1:]:  # an approximation that does not hold has none
+            with suppress(InvalidOption, OutsideFit):
+                amplitudes[method] = float(critical_amplitude(omega, eta, method=method))
+    return CriticalReport(omega, eta, amplitudes)
 
 
 def _series(a: float, omega: float, eta: float, order: int) -> dict[str, float]:

@@ -20,6 +20,7 @@ from rocking.errors import InvalidOption
 from rocking.kernels.periodic import TRAP, settle
 from rocking.kernels.state import Records, new_scratch
 from rocking.tables import counted
+from rocking.threads import in_threads
 
 #: Longest period of an attractor, in periods of the motion, and how near a state must come back to be on one, over the
 #: size of the states.
@@ -268,11 +269,19 @@ class KnownAttractors:
 
         Of a long orbit some points have a trap, and what has settled on it may be at another point.
         """
-        setting, passing = self.strobe._setting(), made.copy()
+        return np.append(self.owner, -1)[self.settled(made.copy(), periods, threads=1)[0]]
+
+    def settled(self, made: Records, periods: int, threads: int) -> tuple[Integers, Integers]:
+        """Trap in which each of some states, which are moved on, comes within so many periods, or -1; and how many."""
+        setting, traps = self.strobe._setting(), self.traps
         found, taken = np.empty(len(made), dtype=np.int64), np.empty(len(made), dtype=np.int64)
-        for part in parts_of(len(made), periods):
-            settle(setting, new_scratch(), passing[part], periods, self.traps, found[part], taken[part])
-        return np.append(self.owner, -1)[found]
+
+        def follow(part: slice) -> None:
+            settle(setting, new_scratch(), made[part], periods, traps, found[part], taken[part])
+
+        for _ in in_threads(follow, parts_of(len(made), periods), threads=threads):
+            pass
+        return found, taken
 
     def _owner_of(self, made: Records) -> Integers:
         found = np.full(len(made), -1)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
@@ -11,20 +10,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.arrays import Floats, Integers
+from rocking.arrays import Floats, Integers, ranges
 from rocking.body import Body
 from rocking.constants import VERSION, Model
 from rocking.dynamics.attractors import KnownAttractors
-from rocking.dynamics.forcing import described, parts_of, scale_of, sensible
+from rocking.dynamics.forcing import described, scale_of, sensible
 from rocking.dynamics.maps import StroboscopicMap
 from rocking.errors import InvalidOption
-from rocking.kernels import state
-from rocking.kernels.periodic import Fate, settle
+from rocking.kernels.periodic import Fate
 from rocking.motion.motion import Motion
 from rocking.progress import Progress, note
 from rocking.result import DatasetResult, variable
 from rocking.tables import as_written, counted, text_table
-from rocking.threads import cores, in_threads
+from rocking.threads import cores
 from rocking.treatment import Treatment
 
 if TYPE_CHECKING:
@@ -162,20 +160,16 @@ def basins(
 
     Parameters
     ----------
-    body : Block, or a body of `rocking.dynamics`
-        What moves.
-    motion : Motion
-        One period, which repeats for ever.
+    body, motion : Body, Motion
+        As for `stroboscopic_map`.
     positions : array_like, shape (n,)
         Increasing coordinates at the start of a period: rotations of a block (rad), positions of other bodies (m).
     velocities : array_like, shape (m,)
         Increasing velocities, rad/s or m/s.
     periods : int
         Most periods that a state is followed for.
-    model : {"nonlinear", "linear"}, optional
+    model, chattering : str, optional
         As for `stroboscopic_map`.
-    chattering : str or treatment
-        As for `rocking.simulate`.
     threads, progress : int or bool, optional
         As for `rocking.simulate_many`.
 
@@ -187,10 +181,8 @@ def basins(
 
     Raises
     ------
-    InvalidMotion
-        If the motion is none, or has no length.
-    InvalidOption
-        If an argument is out of its range.
+    InvalidMotion, InvalidOption
+        As `stroboscopic_map`, and if an argument is out of its range.
 
     Notes
     -----
@@ -292,60 +284,42 @@ class _Grid:
         self.strobe, self.x, self.v, self.periods, self.threads = strobe, x, v, periods, threads
         # What becomes of a small grid's states is as large as that of others: to compare them more closely than by
         # rounding would find no attractor.
-        self.size = np.maximum([float(np.ptp(each) or abs(each[0]) or 1.0) for each in (x, v)], scale_of(strobe))
-        self.outcome = np.full(len(x) * len(v), _NOT_REACHED, dtype=np.int16)
-        self.taken = np.zeros(len(x) * len(v), dtype=np.int32)
-        self.known = KnownAttractors(strobe, self.size)
-        corners = self._states(np.array([0, len(x) * len(v) - 1]))
-        strobe._states(corners, "positions", "velocities")  # a start behind a stop, or into one, is refused at once
+        size = np.maximum([float(np.ptp(each) or abs(each[0]) or 1.0) for each in (x, v)], scale_of(strobe))
+        self.states = np.stack(np.meshgrid(x, v), axis=-1).reshape(-1, 2)
+        self.outcome = np.full(len(self.states), _NOT_REACHED, dtype=np.int16)
+        self.taken = np.zeros(len(self.states), dtype=np.int32)
+        self.known = KnownAttractors(strobe, size)
+        # A start behind a stop, or into one, is refused at once.
+        strobe._states(self.states[[0, -1]], "positions", "velocities")
 
     def run(self, progress: bool | None) -> None:
-        """Follow all cells."""
-        with Progress("basins", self.outcome.size, show=progress) as bar:
-            for cells in self._batches():
-                self._follow(cells)
-                bar.advance(len(cells))
-
-    def _batches(self) -> Iterator[Integers]:
-        """Cells, coarse to fine."""
+        """Follow all cells, coarse to fine."""
         stride = 1
         while self.outcome.size // (4 * stride * stride) >= _COARSEST:
             stride *= 2
         row, column = (each.ravel() for each in np.indices((len(self.v), len(self.x))))
         level = np.zeros(self.outcome.size, dtype=np.int64)
-        first = stride
+        passes = int(np.log2(stride)) + 1
         while stride > 1:
             stride //= 2
             level[(row % (2 * stride) != 0) | (column % (2 * stride) != 0)] += 1
-        for pass_ in range(int(np.log2(first)) + 1):
-            # Those of a pass in a mixed order: what an interrupt leaves out is then left out all over the grid.
-            cells = np.random.default_rng(pass_).permutation(np.flatnonzero(level == pass_))
-            for start in range(0, len(cells), _BATCH):
-                yield cells[start : start + _BATCH]
-
-    def _states(self, cells: Integers) -> Floats:
-        row, column = np.divmod(cells, len(self.x))
-        return np.stack([self.x[column], self.v[row]], axis=-1)
+        with Progress("basins", self.outcome.size, show=progress) as bar:
+            for number in range(passes):
+                # Those of a pass in a mixed order: what an interrupt leaves out is then left out all over the grid.
+                cells = np.random.default_rng(number).permutation(np.flatnonzero(level == number))
+                for some in ranges(len(cells), _BATCH):
+                    self._follow(cells[some])
+                    bar.advance(len(cells[some]))
 
     def _follow(self, cells: Integers) -> None:
         strobe = self.strobe
-        _, made = strobe._states(self._states(cells))
-        found, taken = np.empty(len(cells), dtype=np.int64), np.empty(len(cells), dtype=np.int64)
-        setting, traps = strobe._setting(), self.known.traps
-
-        def settled(part: slice) -> None:
-            settle(setting, state.new_scratch(), made[part], self.periods, traps, found[part], taken[part])
-
-        for _ in in_threads(settled, parts_of(len(cells), self.periods), threads=self.threads):
-            pass
-        outcome = np.full(len(cells), _UNSETTLED)
-        inside = found >= 0
-        outcome[inside] = _FIRST + self.known.owner[found[inside]]
+        _, made = strobe._states(self.states[cells])
+        traps, taken = self.known.settled(made, self.periods, self.threads)
+        outcome = np.where(traps >= 0, _FIRST + np.append(self.known.owner, 0)[traps], _UNSETTLED)
         over = made["ending"] == Fate.OVERTURNED
         outcome[over] = np.where(made["side"][over] > 0, _TO_MINUS, _TO_PLUS)
-        left = np.flatnonzero(~inside & ~over & (made["ending"] != Fate.UNFINISHED))
-        ends = strobe._coordinates(made["u"][left], made["v"][left], made["side"][left])
-        later = self.known.settle(ends)
+        left = np.flatnonzero((traps < 0) & ~over & (made["ending"] != Fate.UNFINISHED))
+        later = self.known.settle(strobe._coordinates(made["u"][left], made["v"][left], made["side"][left]))
         outcome[left] = np.where(later >= 0, _FIRST + later, _UNSETTLED)
         self.taken[cells], self.outcome[cells] = taken, outcome
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
@@ -28,7 +28,6 @@ from rocking.threads import in_threads
 from rocking.treatment import Treatment
 
 if TYPE_CHECKING:
-    import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -47,7 +46,7 @@ OVERTURNED: Final = -1
 NOT_FOLLOWED: Final = -2
 
 #: Values of the parameter that are done between two looks at the progress bar.
-_PORTION: Final = 10
+_CHUNK: Final = 10
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -121,11 +120,11 @@ class BifurcationDiagram(DatasetResult):
                     for before, after, old, new in self.changes(way, start)
                 ]
                 which = f"{way}, start {start + 1}" if data.sizes["start"] > 1 else way
-                parts.append(
-                    f"{which}: changes of the period\n{table_of_some(['from', 'to', 'before', 'after'], rows)}"
-                    if rows
-                    else f"{which}: {_throughout(int(data.period.sel(direction=way).values[0, start]))} throughout"
-                )
+                period = int(data.period.sel(direction=way).values[0, start])
+                said = f"{'period ' if period >= 0 else ''}{_in_words(period)} throughout"
+                if rows:
+                    said = f"changes of the period\n{table_of_some(['from', 'to', 'before', 'after'], rows)}"
+                parts.append(f"{which}: {said}")
         return "\n\n".join(parts)
 
     def to_dict(self) -> dict[str, Any]:
@@ -199,10 +198,8 @@ def bifurcation_diagram(
         Periods whose states are kept.
     parameter : str
         What the parameter is, with its unit, for tables and figures.
-    model : {"nonlinear", "linear"}, optional
+    model, chattering : str, optional
         As for `stroboscopic_map`.
-    chattering : str or treatment
-        As for `rocking.simulate`.
     progress : bool, optional
         Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
 
@@ -247,115 +244,68 @@ def bifurcation_diagram(
     name = checks.text(parameter, "parameter", InvalidOption)
     checks.grid_size({"values": levels.size, "starts": len(first), "kept": count}, InvalidOption)
 
-    work = _Work(case, levels, first, way, (before, count), model, chattering)
-    work.run(progress)
-    return BifurcationDiagram(work.dataset(name))
+    afresh, ways = way == "afresh", ("up", "down") if way == "both" else (way,)
+    order = {w: range(levels.size)[:: -1 if each == "down" else 1] for w, each in enumerate(ways)}
+    shape = len(ways), levels.size, len(first)
+    states, period, impacts = np.full((*shape, count, 2), np.nan), np.full(shape, OVERTURNED), np.full(shape, -1.0)
 
-
-class _Work:
-    """Orbits at all values of a parameter."""
-
-    def __init__(
-        self,
-        case: Callable[[float], tuple[Body, Motion]],
-        levels: Floats,
-        first: Floats,
-        direction: str,
-        counts: tuple[int, int],
-        model: Model | None,
-        chattering: str | Treatment,
-    ) -> None:
-        self.case, self.levels, self.first, self.model, self.chattering = case, levels, first, model, chattering
-        self.afresh = direction == "afresh"
-        self.ways = ("up", "down") if direction == "both" else (direction,)
-        self.transient, self.kept = counts
-        shape = len(self.ways), levels.size, len(first)
-        self.states = np.full((*shape, self.kept, 2), np.nan)
-        self.period, self.impacts = np.full(shape, OVERTURNED), np.full(shape, -1.0)
-        self.ends = [self.mapped(0), self.mapped(levels.size - 1)]
-        for strobe in self.ends:
-            strobe.checked_starts(first, "starts")  # a start behind a stop is refused
-
-    def run(self, progress: bool | None) -> None:
-        """Follow the orbits at all values."""
-        with Progress("bifurcation diagram", len(self.ways) * self.levels.size, show=progress) as bar:
-            for items in self.items():
-                for done in in_threads(self.follow, items):
-                    bar.advance(done)
-
-    def before(self, w: int, k: int) -> Floats:
-        """States at the value before one, in one direction; at the first value the initial ones."""
-        last = k + (1 if self.ways[w] == "down" else -1)
-        return self.states[w, last, :, -1] if 0 <= last < self.levels.size else self.first
-
-    def mapped(self, k: int) -> StroboscopicMap:
-        """Map at a value of the parameter."""
-        pair = self.case(float(self.levels[k]))
-        if not isinstance(pair, tuple) or len(pair) != 2:
-            raise InvalidOption("{} must return a body and one period of a motion", "case")
-        return stroboscopic_map(*pair, model=self.model, chattering=self.chattering)
-
-    def items(self) -> Iterator[list[tuple[int, Sequence[int]]]]:
-        """Values that may be done at once, each with the number of its direction."""
-        order = np.arange(self.levels.size)
-        for start in range(0, order.size, _PORTION):
-            if self.afresh:
-                yield [(0, [k]) for k in order[start : start + _PORTION].tolist()]
-            else:
-                yield [
-                    (w, (order if way == "up" else order[::-1])[start : start + _PORTION].tolist())
-                    for w, way in enumerate(self.ways)
-                ]
-
-    def follow(self, item: tuple[int, Sequence[int]]) -> int:
+    def follow(item: tuple[int, Sequence[int]]) -> int:
         """Follow the orbits of one direction through some values; returns how many."""
-        w, values = item
-        for k in values:
-            strobe = self.mapped(k)
-            at = self.first if self.afresh else self.before(w, k)
-            at = _in_front(strobe, np.where(np.isnan(at), self.first, at))
-            self.states[w, k], fates = settled(strobe, at, self.transient, self.kept)
-            now, scale = self.states[w, k, :, -1], scale_of(strobe)
-            self.period[w, k, fates == Fate.UNFINISHED] = NOT_FOLLOWED
+        w, some = item
+        for k in some:
+            strobe, last = _map_of(case(float(levels[k])), model, chattering), k - order[w].step
+            at = first if afresh or not 0 <= last < levels.size else states[w, last, :, -1]
+            at = _in_front(strobe, np.where(np.isnan(at), first, at))
+            states[w, k], fates = states_after(strobe, at, before, count)
+            now, scale = states[w, k, :, -1], scale_of(strobe)
+            period[w, k, fates == Fate.UNFINISHED] = NOT_FOLLOWED
             for s in np.flatnonzero(~np.isnan(now[:, 0])):
-                period = period_of(self.states[w, k, s], scale)
-                self.period[w, k, s] = period
-                if period:
-                    self.impacts[w, k, s] = impacts_of(strobe, now[s], period, strobe.derivative(now[s], period)[1])
-        return len(values)
+                n = period[w, k, s] = period_of(states[w, k, s], scale)
+                if n:
+                    impacts[w, k, s] = impacts_of(strobe, now[s], n, strobe.derivative(now[s], n)[1])
+        return len(some)
 
-    def dataset(self, parameter: str) -> xr.Dataset:
-        """Everything that was found."""
-        import xarray as xr
+    ends = [_map_of(case(float(each)), model, chattering) for each in levels[[0, -1]]]
+    for strobe in ends:
+        strobe.checked_starts(first, "starts")  # a start behind a stop is refused
+    with Progress("bifurcation diagram", len(ways) * levels.size, show=progress) as bar:
+        for start in range(0, levels.size, _CHUNK):
+            chunks = [(w, each[start : start + _CHUNK]) for w, each in order.items()]
+            for done in in_threads(follow, [(0, [k]) for k in chunks[0][1]] if afresh else chunks):
+                bar.advance(done)
 
-        coordinate = self.ends[0].body.coordinate
-        orbits, over = ("direction", "value", "start"), ("direction", "value", "start", "iterate")
-        said = [
-            _common([described(strobe.body) for strobe in self.ends]),
-            _common([described(each.motion) for each in self.ends]),
-        ]
-        return xr.Dataset(
-            {
-                "coordinate": variable(over, self.states[..., 0], coordinate.name, coordinate.unit),
-                "velocity": variable(over, self.states[..., 1], coordinate.rate, f"{coordinate.unit}/s"),
-                "period": variable(
-                    orbits, self.period, "periods of the motion, 0: none found, -1: overturned, -2: not followed"
-                ),
-                "impacts": variable(
-                    orbits, self.impacts, "impacts in one period of the orbit, infinite: chattering, -1: not known"
-                ),
-                "start_coordinate": variable("start", self.first[:, 0], "initial state", coordinate.unit),
-                "start_velocity": variable("start", self.first[:, 1], "initial state", f"{coordinate.unit}/s"),
-            },
-            {"direction": list(self.ways), "value": variable("value", self.levels, parameter, "1")},
-            {
-                "program": f"rocking {VERSION}",
-                "parameter": parameter,
-                "cases": " under ".join(said),
-                "model": self.ends[0].model,
-                "transient": self.transient,
-            },
-        )
+    import xarray as xr
+
+    coordinate = ends[0].body.coordinate
+    orbits, over = ("direction", "value", "start"), ("direction", "value", "start", "iterate")
+    said = (_common([described(each.body) for each in ends]), _common([described(each.motion) for each in ends]))
+    meaning = "periods of the motion, 0: none found, -1: overturned, -2: not followed"
+    meaning_of_impacts = "impacts in one period of the orbit, infinite: chattering, -1: not known"
+    found = xr.Dataset(
+        {
+            "coordinate": variable(over, states[..., 0], coordinate.name, coordinate.unit),
+            "velocity": variable(over, states[..., 1], coordinate.rate, f"{coordinate.unit}/s"),
+            "period": variable(orbits, period, meaning),
+            "impacts": variable(orbits, impacts, meaning_of_impacts),
+            "start_coordinate": variable("start", first[:, 0], "initial state", coordinate.unit),
+            "start_velocity": variable("start", first[:, 1], "initial state", f"{coordinate.unit}/s"),
+        },
+        {"direction": list(ways), "value": variable("value", levels, name, "1")},
+        {
+            "program": f"rocking {VERSION}",
+            "parameter": name,
+            "cases": " under ".join(said),
+            "model": ends[0].model,
+            "transient": before,
+        },
+    )
+    return BifurcationDiagram(found)
+
+
+def _map_of(pair: Any, model: Model | None, chattering: str | Treatment) -> StroboscopicMap:
+    if not isinstance(pair, tuple) or len(pair) != 2:
+        raise InvalidOption("{} must return a body and one period of a motion", "case")
+    return stroboscopic_map(*pair, model=model, chattering=chattering)
 
 
 def _in_front(strobe: StroboscopicMap, states: Floats) -> Floats:
@@ -368,7 +318,7 @@ def _in_front(strobe: StroboscopicMap, states: Floats) -> Floats:
     return np.stack([inside, np.where(held, 0.0, states[:, 1])], axis=-1)
 
 
-def settled(strobe: StroboscopicMap, at: Floats, transient: int, kept: int) -> tuple[Floats, Integers]:
+def states_after(strobe: StroboscopicMap, at: Floats, transient: int, kept: int) -> tuple[Floats, Integers]:
     """States at the starts of some periods after others, shape (n, kept, 2), and what became of each: a `Fate`.
 
     NaN from where a body overturns, or cannot be followed.
@@ -383,11 +333,6 @@ def settled(strobe: StroboscopicMap, at: Floats, transient: int, kept: int) -> t
     if lost.any():
         fates[lost] = strobe.followed(now[lost], kept)[1]
     return states, fates
-
-
-def settled_states(strobe: StroboscopicMap, at: Floats, transient: int, kept: int) -> Floats:
-    """States of `settled`."""
-    return settled(strobe, at, transient, kept)[0]
 
 
 def period_of(states: Floats, scale: Scale | None = None) -> int:
@@ -419,10 +364,6 @@ def _common(texts: Sequence[str]) -> str:
     """Return the parts, between commas, that two texts share."""
     first, last = (text.split(", ") for text in texts)
     return ", ".join(part for part in first if part in last)
-
-
-def _throughout(period: int) -> str:
-    return f"period {_in_words(period)}" if period >= 0 else _in_words(period)
 
 
 def _in_words(period: int) -> str:

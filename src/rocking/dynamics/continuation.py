@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Final, NamedTuple
+from dataclasses import replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -165,85 +165,69 @@ def continue_orbit(
     count = checks.whole(most, "most", InvalidOption, least=1)
     equations = OrbitEquations.of(orbit, family, start, (low, high))
     z = np.append(orbit.state, start) / equations.sizes
-    backward = _followed(equations, z, -1.0, longest, count)
-    # What has come back to where it began is all there is.
-    onwards = backward.end != ends.CLOSED
-    forward = _followed(equations, z, 1.0, longest, count) if onwards else _Path([], [], ends.CLOSED)
+    backward, forward = (_Walk(equations, z, direction, longest) for direction in (-1.0, 1.0))
+    backward.run(count)
+    if backward.end == ends.CLOSED:  # what has come back to where it began is all there is
+        forward.end = ends.CLOSED
+    else:
+        forward.run(count)
     points = [*reversed(backward.points), *forward.points[1:]]
+    values, states, multipliers, peaks = (np.array(column) for column in zip(*points, strict=True))
     return Branch(
-        family, name, unit, orbit.model, orbit.treatment, (low, high), orbit.period,
-        np.array([each.value for each in points]),
-        np.array([each.state for each in points]),
-        np.array([each.multipliers for each in points]),
-        orbit.impacts,
-        np.array([each.peak for each in points]),
-        (*reversed(backward.bifurcations), *forward.bifurcations),
-        (backward.end, forward.end),
+        family, name, unit, orbit.model, orbit.treatment, (low, high), orbit.period, values, states, multipliers,
+        orbit.impacts, peaks, (*reversed(backward.bifurcations), *forward.bifurcations), (backward.end, forward.end),
     )  # fmt: skip
 
 
-class _Point(NamedTuple):
-    """A point of a branch, with the state at the start of the period of the motion as it was given."""
-
-    value: float
-    state: Floats
-    multipliers: NDArray[np.complex128]
-    peak: float
-
-
-class _Path(NamedTuple):
-    """A branch in one direction."""
-
-    points: list[_Point]
-    bifurcations: list[Bifurcation]
-    end: str
-
-
-def _followed(equations: OrbitEquations, z: Floats, direction: float, longest: float, most: int) -> _Path:
-    """Follow the branch in one direction of the parameter, as it leaves the orbit."""
-    trajectory = equations.trajectory(z)
-    equations, z = equations.moved(z, trajectory)
-    path = _Path([_point(equations, z, trajectory.peak)], [], ends.SHORT)
-    if path.points[0].value == equations.limits[0 if direction < 0.0 else 1]:
-        return path._replace(end=ends.LIMIT)
-    step = min(_FIRST_STEP, longest)
-    equations.for_step(step)
-    found = equations.solved(z, AT_VALUE)
-    if found is None:
-        return path._replace(end=ends.LOST)
-    tangent = tangent_of(found.jacobian, direction * AT_VALUE)
-    walk = _Walk(equations, found.z, tangent, found.tests(tangent), trajectory, step, longest)
-    for _ in range(_TRIALS * most):
-        if len(path.points) >= most:
-            break
-        end = walk.advance(path)
-        walk.equations.for_step(walk.step)
-        if end:
-            return path._replace(end=end)
-    return path
-
-
-@dataclass(eq=False)
 class _Walk:
-    """Where a branch has been followed to (equations, point, tangent, test functions, orbit), and the next step."""
+    """A branch that is followed in one direction of the parameter: its points, where it is now, and the next step."""
 
-    equations: OrbitEquations
-    z: Floats
-    tangent: Floats
-    tests: Tests
-    trajectory: OrbitTrajectory
-    step: float
-    longest: float
-    #: How far ahead there is no point of this kind, as far as is known, and successful steps since that was found.
-    ahead: float = math.inf
-    successes: int = 0
-    #: Whether the last step failed only as it led too far from the tangent.
-    turned: bool = False
+    def __init__(self, equations: OrbitEquations, z: Floats, direction: float, longest: float) -> None:
+        self.trajectory = equations.trajectory(z)
+        self.equations, self.z = equations.moved(z, self.trajectory)
+        self.direction, self.step, self.longest = direction, min(_FIRST_STEP, longest), longest
+        #: Of each point the parameter, the state at the start of the motion's period, multipliers and greatest size.
+        self.points: list[tuple[float, Floats, NDArray[np.complex128], float]] = []
+        self.bifurcations: list[Bifurcation] = []
+        self.end = ends.SHORT
+        #: How far ahead there is no point of this kind, as far as is known, and successful steps since that was found.
+        self.ahead, self.successes = math.inf, 0
+        #: Whether the last step failed only as it led too far from the tangent.
+        self.turned = False
+        self.add_point(self.z)
 
-    def __post_init__(self) -> None:
+    def add_point(self, z: Floats) -> None:
+        """Add a point to the branch."""
+        equations, peak = self.equations, self.trajectory.peak
+        self.points.append((equations.physical(z)[1], equations.state(z), equations.multipliers(z), peak))
+
+    def run(self, most: int) -> None:
+        """Follow the branch over so many points, or until it ends."""
+        if self.points[0][0] == self.equations.limits[0 if self.direction < 0.0 else 1]:
+            self.end = ends.LIMIT
+            return
+        self.equations.for_step(self.step)
+        found = self.equations.solved(self.z, AT_VALUE)
+        if found is None:
+            self.end = ends.LOST
+            return
+        self.go_to(found, self.direction * AT_VALUE)
         self.written = self.z
         #: Speed of the slowest impact and parameter, over its size, at all points so far.
         self.slowest = [(self.trajectory.slowest, self.z[2])]
+        for _ in range(_TRIALS * most):
+            if len(self.points) >= most:
+                break
+            end = self.advance()
+            self.equations.for_step(self.step)
+            if end:
+                self.end = end
+                break
+
+    def go_to(self, found: Solved, like: Floats) -> None:
+        """Go to a point, with its tangent in the direction of another."""
+        self.z, self.tangent = found.z, tangent_of(found.jacobian, like)
+        self.tests = found.tests(self.tangent)
 
     def bifurcation(self, kind: str, z: Floats, values: Sequence[float]) -> Bifurcation:
         """Bifurcation at a point near this one, between values of the parameter over its size."""
@@ -251,36 +235,38 @@ class _Walk:
         value, orbit = self.equations.physical(z)[1], self.equations.orbit(z)
         return Bifurcation(kind, value, (bracket[0], bracket[-1]), orbit)
 
-    def advance(self, path: _Path) -> str:
+    def advance(self) -> str:
         """Take a step along the branch, or find that it is too long; returns why the branch ends, if it does."""
         equations = self.equations
         if self.ahead < _LEAST_STEP:
-            return self.end(path)
+            reason = reason_of_end(equations, self.trajectory, self.z, self.tangent)
+            values = [(self.z + step * self.tangent)[2] for step in (0.0, self.ahead)]
+            self.bifurcations += [] if reason == ends.LOST else [self.bifurcation(reason, self.z, values)]
+            return reason
         found = self.next()
         if found is None:
             self.shorten()
             return ""
         solved, at_limit = found
-        new, tangent = solved.z, tangent_of(solved.jacobian, self.tangent)
-        tests = solved.tests(tangent)
+        new, tests = solved.z, solved.tests(tangent_of(solved.jacobian, self.tangent))
         if self.turns(tests) or equations.is_parent(new):
-            path.bifurcations.append(_joined(self, new))
-            return path.bifurcations[-1].kind
-        path.bifurcations.extend(_passed(self, new, tests))
-        trajectory, before = equations.trajectory(new), self.trajectory
-        if len(path.points) > 1 and np.max(np.abs(new - self.written)) < _NEAR:
-            path.points.pop()
+            self.bifurcations.append(_joined(self, new))
+            return self.bifurcations[-1].kind
+        self.bifurcations.extend(_passed(self, new, tests))
+        before, self.trajectory = self.trajectory, equations.trajectory(new)
+        if len(self.points) > 1 and np.max(np.abs(new - self.written)) < _NEAR:
+            self.points.pop()
         else:
             self.written = new
-        path.points.append(_point(equations, new, trajectory.peak))
-        self.z, self.tangent, self.tests = new, tangent, tests
-        self.trajectory, self.successes = trajectory, self.successes + 1
+        self.add_point(new)
+        self.go_to(solved, self.tangent)
+        self.successes += 1
         self.ahead = math.inf if self.successes > _SUCCESSES else self.ahead - self.step
         if at_limit:
             return ends.LIMIT
-        if self.comes_to_graze(path, before):
+        if self.comes_to_graze(before):
             return ends.GRAZING
-        if self.has_returned(path):
+        if self.has_returned():
             return ends.CLOSED
         self.move_start()
         if self.ahead < math.inf:
@@ -289,14 +275,6 @@ class _Walk:
             self.step = min(self.step * _LONGER, self.longest)
         return ""
 
-    def end(self, path: _Path) -> str:
-        """Say why the branch ends just ahead, and note the bifurcation there, if there is one."""
-        reason = reason_of_end(self.equations, self.trajectory, self.z, self.tangent)
-        if reason != ends.LOST:
-            values = [(self.z + step * self.tangent)[2] for step in (0.0, self.ahead)]
-            path.bifurcations.append(self.bifurcation(reason, self.z, values))
-        return reason
-
     def shorten(self) -> None:
         """Try half the step that failed; there is no point of this kind at its end, unless the branch bends."""
         if not (self.turned and self.step > _SHARP):
@@ -304,23 +282,22 @@ class _Walk:
         self.step *= 0.5
         self.tangent = self.equations.tangent(self.z, self.tangent)
 
-    def comes_to_graze(self, path: _Path, before: OrbitTrajectory) -> bool:
+    def comes_to_graze(self, before: OrbitTrajectory) -> bool:
         """Whether the slowest impact comes to have no speed, and where."""
         equations, speed = self.equations, self.trajectory.slowest
         self.slowest.append((speed, self.z[2]))
         if equations.kind.rests or speed >= min(_SLOW * equations.sizes[1], before.slowest):
             return False
         grazing = _vanishing(self)
-        path.bifurcations.extend([] if grazing is None else [grazing])
+        self.bifurcations += [] if grazing is None else [grazing]
         return grazing is not None
 
-    def has_returned(self, path: _Path) -> bool:
+    def has_returned(self) -> bool:
         """Whether the branch has passed its first point again, in the direction in which it left it."""
-        if len(path.points) <= _ROUND:
+        if len(self.points) <= _ROUND:
             return False
         first, second, before, last = (
-            np.append(each.state, each.value) / self.equations.sizes
-            for each in (path.points[0], path.points[1], path.points[-2], path.points[-1])
+            np.append(self.points[k][1], self.points[k][0]) / self.equations.sizes for k in (0, 1, -2, -1)
         )
         step, left = last - before, second - first
         size = float(np.linalg.norm(step))
@@ -374,13 +351,8 @@ class _Walk:
         onwards /= np.linalg.norm(onwards)
         found = equations.solved(z, onwards)
         if found is not None:
-            self.equations, self.z, self.tangent = equations, found.z, tangent_of(found.jacobian, onwards)
-            self.tests = found.tests(self.tangent)
-
-
-def _point(equations: OrbitEquations, z: Floats, peak: float) -> _Point:
-    """Point of a branch."""
-    return _Point(equations.physical(z)[1], equations.state(z), equations.multipliers(z), peak)
+            self.equations = equations
+            self.go_to(found, onwards)
 
 
 def _passed(here: _Walk, new: Floats, after: Tests) -> Iterator[Bifurcation]:

@@ -1,9 +1,4 @@
-"""Lyapunov exponents of a body under periodic motion, from the variational equation and the saltation of each impact.
-
-Each period's derivative is multiplied with a frame of two directions that is made orthonormal again; the logarithms of
-the stretches add up (Benettin and others 1980, Mueller 1995 through impacts). Means are weighted: the weights vanish at
-both ends of the orbit, so that a frame which turns (complex multipliers) leaves next to nothing in them.
-"""
+"""Lyapunov exponents of a body under periodic motion, from the variational equation and saltation at each impact."""
 
 from __future__ import annotations
 
@@ -111,20 +106,16 @@ def lyapunov_exponents(
 
     Parameters
     ----------
-    body : Block, or a body of `rocking.dynamics`
-        What moves.
-    motion : Motion
-        One period, which repeats for ever.
+    body, motion : Body, Motion
+        As for `stroboscopic_map`.
     state : array_like, shape (2,)
         Coordinate and velocity at the start of a period.
     periods : int
         Number of periods that are averaged over.
     transient : int
         Number of periods before these, in which the direction turns to the one that grows fastest.
-    model : {"nonlinear", "linear"}, optional
+    model, chattering : str, optional
         As for `stroboscopic_map`.
-    chattering : str or treatment
-        As for `rocking.simulate`.
 
     Returns
     -------

@@ -66,9 +66,8 @@ class StroboscopicMap(PeriodicForcing):
         --------
         A ball on a table that shakes gently comes to rest:
 
-        >>> import rocking
-        >>> from rocking import dynamics
-        >>> ball, table = dynamics.BouncingBall(0.5), rocking.pulses.sine(5.0, 2.0, cycles=1)
+        >>> from rocking import dynamics, pulses
+        >>> ball, table = dynamics.BouncingBall(0.5), pulses.sine(5.0, 2.0, cycles=1)
         >>> dynamics.stroboscopic_map(ball, table)([[0.0, 0.0], [0.05, 0.1]], periods=5).tolist()
         [[0.0, 0.0], [0.0, 0.0]]
         """
@@ -92,9 +91,8 @@ class StroboscopicMap(PeriodicForcing):
 
         Examples
         --------
-        >>> import rocking
-        >>> from rocking import dynamics
-        >>> ball, table = dynamics.BouncingBall(0.5), rocking.pulses.sine(5.0, 2.0, cycles=1)
+        >>> from rocking import dynamics, pulses
+        >>> ball, table = dynamics.BouncingBall(0.5), pulses.sine(5.0, 2.0, cycles=1)
         >>> dynamics.stroboscopic_map(ball, table).orbit([0.05, 0.1], 5).shape
         (6, 2)
         """
@@ -128,9 +126,8 @@ class StroboscopicMap(PeriodicForcing):
 
         Examples
         --------
-        >>> import rocking
-        >>> from rocking import dynamics
-        >>> ball, table = dynamics.BouncingBall(0.5), rocking.pulses.sine(5.0, 2.0, cycles=1)
+        >>> from rocking import dynamics, pulses
+        >>> ball, table = dynamics.BouncingBall(0.5), pulses.sine(5.0, 2.0, cycles=1)
         >>> _, fates, impacts = dynamics.stroboscopic_map(ball, table).followed([0.05, 0.1], periods=5)
         >>> dynamics.Fate(fates).name, int(impacts) > 5
         ('RESTS_FOR_EVER', True)
@@ -166,10 +163,9 @@ class StroboscopicMap(PeriodicForcing):
 
         Examples
         --------
-        >>> import rocking
-        >>> from rocking import dynamics
+        >>> from rocking import dynamics, pulses
         >>> ball = dynamics.BouncingBall(0.5, gravity=10.0)
-        >>> table = rocking.pulses.sine(15.0, 5.0, cycles=1)
+        >>> table = pulses.sine(15.0, 5.0, cycles=1)
         >>> _, change = dynamics.stroboscopic_map(ball, table).derivative([0.1, 0.5])
         >>> f"{np.linalg.det(change):.12f}"
         '0.250000000000'
@@ -207,9 +203,8 @@ class StroboscopicMap(PeriodicForcing):
 
         Examples
         --------
-        >>> import rocking
-        >>> from rocking import dynamics
-        >>> ball, table = dynamics.BouncingBall(0.5, gravity=10.0), rocking.pulses.sine(15.0, 5.0, cycles=1)
+        >>> from rocking import dynamics, pulses
+        >>> ball, table = dynamics.BouncingBall(0.5, gravity=10.0), pulses.sine(15.0, 5.0, cycles=1)
         >>> dynamics.stroboscopic_map(ball, table).from_impacts([0.05, 1.0]).shape
         (2,)
         """
@@ -275,9 +270,8 @@ class ImpactMap(PeriodicForcing):
 
         Examples
         --------
-        >>> import rocking
-        >>> from rocking import dynamics
-        >>> ball, table = dynamics.BouncingBall(0.5, gravity=10.0), rocking.pulses.sine(15.0, 5.0, cycles=1)
+        >>> from rocking import dynamics, pulses
+        >>> ball, table = dynamics.BouncingBall(0.5, gravity=10.0), pulses.sine(15.0, 5.0, cycles=1)
         >>> dynamics.impact_map(ball, table)([0.05, 1.0]).round(12).tolist()
         [0.05, 0.5]
         """
@@ -300,9 +294,8 @@ class ImpactMap(PeriodicForcing):
 
         Examples
         --------
-        >>> import rocking
-        >>> from rocking import dynamics
-        >>> ball, table = dynamics.BouncingBall(0.5, gravity=10.0), rocking.pulses.sine(15.0, 5.0, cycles=1)
+        >>> from rocking import dynamics, pulses
+        >>> ball, table = dynamics.BouncingBall(0.5, gravity=10.0), pulses.sine(15.0, 5.0, cycles=1)
         >>> dynamics.impact_map(ball, table).derivative([0.05, 1.0])[1].shape
         (2, 2)
         """
@@ -401,10 +394,9 @@ def stroboscopic_map(
 
     Examples
     --------
-    >>> import rocking
-    >>> from rocking import dynamics
-    >>> block = rocking.Block.from_parameters(p=1.0, alpha=0.2, restitution=0.8)
-    >>> shaking = rocking.pulses.sine(6.0, 0.8, cycles=1)
+    >>> from rocking import Block, dynamics, pulses
+    >>> block = Block.from_parameters(p=1.0, alpha=0.2, restitution=0.8)
+    >>> shaking = pulses.sine(6.0, 0.8, cycles=1)
     >>> rock = dynamics.stroboscopic_map(block, shaking, model="linear")
     >>> rock([0.05, 0.0]).round(6).tolist()
     [-0.085002, 0.087054]
@@ -432,9 +424,8 @@ def impact_map(body: Body, motion: Motion, *, model: Model | None = None) -> Imp
 
     Examples
     --------
-    >>> import rocking
-    >>> from rocking import dynamics
-    >>> ball, table = dynamics.BouncingBall(0.5, gravity=10.0), rocking.pulses.sine(15.0, 5.0, cycles=1)
+    >>> from rocking import dynamics, pulses
+    >>> ball, table = dynamics.BouncingBall(0.5, gravity=10.0), pulses.sine(15.0, 5.0, cycles=1)
     >>> dynamics.impact_map(ball, table)([[0.05, 1.0], [0.1, 0.8]]).shape
     (2, 2)
     """

@@ -21,9 +21,9 @@ from rocking.dynamics.simulation import in_positions
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.response import Response
-from rocking.result import Result, Row, dictionary_of, text_of
+from rocking.result import Result, Row, text_of
 from rocking.simulation import response_to
-from rocking.tables import Column, as_written, counted
+from rocking.tables import Column, as_written, counted, named, plain
 from rocking.treatment import Treatment
 
 if TYPE_CHECKING:
@@ -42,9 +42,8 @@ _NEUTRAL_PAIR: Final = 1e-6
 _SCAN_POINTS: Final = 64
 _BISECTIONS: Final = 40
 
-#: Points of a figure for each period, and letters of the column of names in a summary.
+#: Points of a figure for each period.
 _DRAWN: Final = 400
-_WIDTH: Final = 20
 
 
 #: Starts of a search, where none are given; periods after which every so many-th is given once more: it is then near
@@ -160,26 +159,26 @@ class PeriodicOrbit(Result):
             Row("velocity", f"{v:.12g}", f"{coordinate.unit}/s"),
             Row("multipliers", self._multipliers),
         ]
-        return text_of(rows, _WIDTH)
+        return text_of(rows, 20)
 
     def to_dict(self) -> dict[str, Any]:
         coordinate = self.body.coordinate
-        rows = [
-            Row("body", self.body.description),
-            Row("motion", self.motion.label),
-            Row("model", self.model),
-            Row("period", self.period),
-            Row("duration", self.duration, "s"),
-            Row(coordinate.name, float(self.state[0]), coordinate.unit),
-            Row("velocity", float(self.state[1]), f"{coordinate.unit}/s"),
-            Row("impacts", self.impacts),
-            Row("complete_chattering", math.isinf(self.impacts)),
-            Row("rests", self.rests),
-            Row("symmetric", self.symmetric),
-            Row("stable", self.is_stable),
-            Row("multipliers", [[float(each.real), float(each.imag)] for each in self.multipliers]),
-        ]
-        return dictionary_of(rows)
+        x, v = map(float, self.state)
+        return {
+            "body": self.body.description,
+            "motion": self.motion.label,
+            "model": self.model,
+            "period": self.period,
+            "duration_s": self.duration,
+            named(coordinate.name, coordinate.unit): x,
+            named("velocity", f"{coordinate.unit}/s"): v,
+            "impacts": plain(self.impacts),
+            "complete_chattering": math.isinf(self.impacts),
+            "rests": self.rests,
+            "symmetric": self.symmetric,
+            "stable": self.is_stable,
+            "multipliers": [[float(each.real), float(each.imag)] for each in self.multipliers],
+        }
 
     def _columns(self, table: str) -> list[Column]:
         if table == "impacts":
@@ -327,16 +326,12 @@ def periodic_orbits(
 
     Parameters
     ----------
-    body : Block, or a body of `rocking.dynamics`
-        What moves.
-    motion : Motion
-        One period, which repeats for ever: as ``pulses.sine(a, f, cycles=1)``.
+    body, motion : Body, Motion
+        As for `stroboscopic_map`.
     period : int
         Periods of the motion after which orbits repeat. Those of a shorter period that divides it are found as well.
-    model : {"nonlinear", "linear"}, optional
-        Equation of motion; by default nonlinear of a body that rocks.
-    chattering : str or treatment
-        As for `rocking.simulate`.
+    model, chattering : str, optional
+        As for `stroboscopic_map`.
     starts : int or array_like, shape (..., 2), optional
         Number of states from which orbits are looked for, or these states; by default about a thousand: impacts at all
         phases and speeds, states between them, rests, and what becomes of some of these.
@@ -349,10 +344,8 @@ def periodic_orbits(
 
     Raises
     ------
-    InvalidMotion
-        If the motion is none, or has no length.
-    InvalidOption
-        If the period is no whole number from 1, the model is not one of the body's, or a start is behind a stop.
+    InvalidMotion, InvalidOption
+        As `stroboscopic_map`, and if the period is no whole number from 1, or a start is behind a stop.
 
     Notes
     -----
@@ -447,45 +440,46 @@ class _Search:
             fine &= (x <= high) & ~((x == high) & (v > 0.0))
         return np.asarray(fine & (x >= low) & ~((x == low) & (v < 0.0)))
 
-    def _mapped(self, states: Floats, count: int) -> tuple[Floats, Floats]:
-        """States after periods and their derivatives; NaN of those that no body may have."""
-        after, change = np.full(states.shape, np.nan), np.full((*states.shape, 2), np.nan)
-        fine = self._possible(states)
-        after[fine], change[fine] = self.strobe.derivative(states[fine], count)
-        return after, change
+    def mapped(self, states: Floats, count: int) -> Floats:
+        """Rows of states, states after periods and the derivative, shape (n, 8); NaN for states that no body may have."""
+        rows, fine = np.full((len(states), 8), np.nan), self._possible(states)
+        after, change = self.strobe.derivative(states[fine], count)
+        rows[:, :2], rows[fine, 2:4], rows[fine, 4:] = states, after, change.reshape(-1, 4)
+        return rows
+
+    def residuals(self, rows: Floats) -> tuple[Floats, Flags]:
+        """How far states are from where they come to, over the scale, and whether that is only rounding.
+
+        Rounding grows with the derivative, to a limit.
+        """
+        size = self.size(rows[:, 2:4] - rows[:, :2])
+        allowed = _RESIDUAL * np.maximum(1.0, np.max(np.abs(rows[:, 4:]), axis=1))
+        return size, size < np.minimum(allowed, _LARGEST_RESIDUAL)
 
     def converged(self, states: Floats, count: int) -> Floats:
         """States that come back after so many periods, to which Newton's method leads from others."""
-        x = states.copy()
-        after, change = self._mapped(x, count)
-        done = np.zeros(len(x), dtype=bool)
+        rows, done = self.mapped(states, count), np.zeros(len(states), dtype=bool)
         for _ in range(_NEWTON_STEPS):
-            residual = self.size(after - x)
-            sharp = residual < _tolerance(change)
-            finished = done & sharp
-            open_ = np.flatnonzero(~finished & np.isfinite(residual))
+            residual, sharp = self.residuals(rows)
+            open_ = np.flatnonzero(~(done & sharp) & np.isfinite(residual))
             if not len(open_):
                 break
             done |= sharp  # One more step after the first that is sharp.
-            step = _newton_step(x[open_], after[open_], change[open_])
-            new, new_after, new_change = x[open_].copy(), after[open_].copy(), change[open_].copy()
-            better = np.zeros(len(open_), dtype=bool)
+            new, step, better = rows[open_], _newton_step(rows[open_]), np.zeros(len(open_), dtype=bool)
             for halving in range(_HALVINGS):
                 left = np.flatnonzero(~better)
-                tried = x[open_[left]] + 0.5**halving * step[left]
-                tried_after, tried_change = self._mapped(tried, count)
+                tried = self.mapped(rows[open_[left], :2] + 0.5**halving * step[left], count)
                 # A step that is sharp already need not come nearer: it only rounds in another way.
-                better[left] = near = self.size(tried_after - tried) < residual[open_[left]]
-                chosen = left[near]
-                new[chosen], new_after[chosen], new_change[chosen] = tried[near], tried_after[near], tried_change[near]
+                better[left] = near = self.residuals(tried)[0] < residual[open_[left]]
+                new[left[near]] = tried[near]
             stuck = ~better & ~sharp[open_]
             if np.any(stuck):  # The map itself leads to what attracts.
-                new[stuck] = new_after[stuck]
-                new_after[stuck], new_change[stuck] = self._mapped(new[stuck], count)
-            x[open_], after[open_], change[open_] = new, new_after, new_change
-        return x[self.size(after - x) < _tolerance(change)]
+                new[stuck] = self.mapped(new[stuck, 2:4], count)
+            rows[open_] = new
+        return rows[self.residuals(rows)[1], :2]
 
     def size(self, differences: Floats) -> Floats:
+        """Sizes of differences between states, over the scale."""
         with np.errstate(invalid="ignore", over="ignore"):
             return np.asarray(np.max(np.abs(differences) / self.scale, axis=-1))
 
@@ -501,20 +495,11 @@ class _Search:
         return orbit_at(self.strobe, state, self.count)
 
 
-def _tolerance(change: Floats) -> Floats:
-    """Residual, over the scale, up to which a state comes back: rounding grows with the derivative, to a limit."""
-    size = np.max(np.abs(change), axis=(-2, -1))
-    return np.asarray(np.minimum(_RESIDUAL * np.maximum(1.0, size), _LARGEST_RESIDUAL))
-
-
-def _newton_step(x: Floats, after: Floats, change: Floats) -> Floats:
+def _newton_step(rows: Floats) -> Floats:
     """Newton's steps towards fixed points; where that is none, a step of the map."""
-    jacobian, residual = change - np.eye(2), after - x
+    jacobian, residual = rows[:, 4:].reshape(-1, 2, 2) - np.eye(2), rows[:, 2:4] - rows[:, :2]
     with np.errstate(all="ignore"):
-        determinant = np.linalg.det(jacobian)
-        a, b, c, d = (jacobian[:, i, j] for i in (0, 1) for j in (0, 1))
+        (a, b), (c, d) = jacobian.transpose(1, 2, 0)
         r, s = residual.T
-        step: Floats = np.stack([b * s - d * r, c * r - a * s], axis=-1) / determinant[:, None]
-    plain = ~np.all(np.isfinite(step), axis=1)
-    step[plain] = residual[plain]
-    return step
+        step = np.stack([b * s - d * r, c * r - a * s], axis=-1) / np.linalg.det(jacobian)[:, None]
+    return np.where(np.all(np.isfinite(step), axis=1)[:, None], step, residual)

@@ -10,7 +10,7 @@ import numpy as np
 
 from rocking.arrays import Floats
 from rocking.block import Block
-from rocking.chattering.episodes import chattering_episodes
+from rocking.chattering.maps import chattering_episodes
 from rocking.constants import STANDARD_GRAVITY
 from rocking.explorer.phrases import phrase
 from rocking.explorer.simulated import Simulated, drifts

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from rocking import pulses
 from rocking.arrays import Floats
-from rocking.dynamics.bifurcation import period_of, settled_states
+from rocking.dynamics.bifurcation import period_of, states_after
 from rocking.dynamics.forcing import scale_of
 from rocking.dynamics.maps import Fate, StroboscopicMap, stroboscopic_map
 from rocking.dynamics.orbits import multipliers_at
@@ -123,7 +123,7 @@ def map_of(case: Case, sine: Sine) -> StroboscopicMap:
 def settled(rock: StroboscopicMap, start: ArrayLike, periods: int, kept: int = KEPT) -> Settled:
     """Return what a state becomes within so many periods."""
     first, count = np.asarray(start, dtype=float), min(kept, periods)
-    last = settled_states(rock, first[None], periods - count, count)[0]
+    last = states_after(rock, first[None], periods - count, count)[0][0]
     if np.isnan(last[-1, 0]):
         orbit = rock.orbit(first, periods)
         after = int(np.argmax(np.isnan(orbit[:, 0])))

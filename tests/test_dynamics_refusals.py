@@ -1,0 +1,169 @@
+"""What no body, map, orbit or chattering sequence is, is refused in one sentence."""
+
+import functools
+import math
+
+import numpy as np
+import pytest
+
+from rocking import Block, InvalidBlock, InvalidMotion, InvalidOption, RockingError, chattering, dynamics, pulses
+from rocking.chattering import chattering_map, chattering_time, families
+from rocking.chattering.duration import first_arc
+from rocking.dynamics import BouncingBall, ImpactOscillator, InvertedPendulum, simulate, simulate_many
+
+BLOCK = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.8)
+BALL = BouncingBall(0.5)
+STOPPED = ImpactOscillator(1.0, 0.7, damping_ratio=0.1, stop=0.02, second_stop=0.03)
+PULSE, TABLE = pulses.one_sine(1.0, 1.0), pulses.sine(12.0, 5.0, cycles=1)
+ONE = {"a": [1.03], "omega": [2.0]}
+
+orbits, basins, strobe = dynamics.periodic_orbits, dynamics.basins, dynamics.stroboscopic_map
+exponents = functools.partial(dynamics.lyapunov_exponents, BALL, TABLE)
+
+
+def family(level):
+    return BALL, TABLE.scaled(level)
+
+
+@functools.cache
+def orbit():
+    return orbits(*family(1.0), starts=16)[0]
+
+
+def diagram(case=family, values=(1.0, 2.0), starts=(0.1, 0.5), **options):
+    return dynamics.bifurcation_diagram(case, values, starts, **options)
+
+
+def continued(value=1.0, limits=(0.9, 1.7), start=None, **options):
+    return dynamics.continue_orbit(start or orbit(), family, value, limits, **options)
+
+
+def chattered(a=1.03, omega=2.0, eta=0.92, **options):
+    return chattering_time(a, omega, eta, **options)
+
+
+CALLS = [
+    (lambda: BouncingBall(1.2), InvalidBlock, "restitution must be from 0 to 1"),
+    (lambda: BouncingBall(0.5, gravity=0.0), InvalidBlock, "gravity"),
+    (lambda: ImpactOscillator(0.0, 0.5), InvalidBlock, "frequency"),
+    (lambda: ImpactOscillator(1.0, 0.5, damping_ratio=1.0), InvalidBlock, "damping_ratio"),
+    (lambda: ImpactOscillator(1.0, 0.5, stop=0.1, second_stop=-0.2), InvalidBlock, "must be above -stop"),
+    (lambda: InvertedPendulum(2.0, -0.1, 0.5), InvalidBlock, "gap"),
+    (lambda: simulate(BouncingBall(1.0), None, initial_position=1.0), InvalidOption, "as this bouncing ball, never"),
+    (lambda: simulate_many(InvertedPendulum(3.0, 0.1, 1.0), PULSE), InvalidOption, "as this inverted pendulum, never"),
+    (lambda: simulate(BALL, None, initial_position=-1.0), InvalidOption, "in front"),
+    (lambda: simulate(InvertedPendulum(2.0, 0.1, 0.5), None, initial_position=0.2), InvalidOption, "-0.1 to 0.1 m"),
+    (lambda: simulate(BALL, None, initial_velocity=-1.0), InvalidOption, "into it"),
+    (lambda: simulate(BALL, None, chattering="velocity=-1"), InvalidOption, "a positive number, in m/s, or of a block"),
+    (lambda: simulate_many(3, None), InvalidBlock, "of rocking.dynamics is needed, not int"),
+    (lambda: simulate(ImpactOscillator(1.0, 0.5, stop=0.1), None), InvalidOption, "duration"),
+    (lambda: simulate(Block(width=0.2, height=1.0), None), InvalidBlock, "rocking.simulate"),
+    (lambda: simulate_many(BALL, PULSE, initial_position=math.nan), InvalidOption, "initial_position"),
+    (lambda: simulate_many([], PULSE), InvalidBlock, "same kind"),
+    (lambda: simulate(BALL, PULSE.with_vertical(PULSE)), InvalidMotion, "one line"),
+    (lambda: strobe(BLOCK, None), InvalidMotion, "one period"),
+    (lambda: strobe(BLOCK, [0.1]), InvalidMotion, "Motion"),
+    (lambda: strobe(BLOCK, TABLE)([0.1]), InvalidOption, "pairs"),
+    (lambda: strobe(BLOCK, TABLE)([0.1, 0], 0), InvalidOption, "periods"),
+    (lambda: strobe(BALL, TABLE, model="nonlinear"), InvalidOption, "linear"),
+    (lambda: strobe(BLOCK, TABLE, model="cubic"), InvalidOption, "model must be one of nonlinear, linear"),
+    (lambda: strobe(BALL, TABLE)([0.0, -1.0]), InvalidOption, "^states must not lead into a stop"),
+    (lambda: strobe(BALL, TABLE)([-1.0, 0.0]), InvalidOption, "^states must be at least 0 m, in front of"),
+    (lambda: dynamics.impact_map(BALL, TABLE)([0.0, -1.0]), InvalidOption, "away"),
+    (lambda: dynamics.impact_map(BLOCK, TABLE, model="cubic"), InvalidOption, "one of nonlinear, linear"),
+    (lambda: orbits(BLOCK, None), InvalidMotion, "one period"),
+    (lambda: orbits(BLOCK, TABLE, period=0), InvalidOption, "period"),
+    (lambda: orbits(BLOCK, TABLE, starts=0), InvalidOption, "starts"),
+    (lambda: orbits(BALL, TABLE, starts=[[math.nan, 0.0]]), InvalidOption, "starts must be finite"),
+    (lambda: orbits(BALL, TABLE, starts=[]), InvalidOption, "starts must hold pairs"),
+    (lambda: orbits(BALL, TABLE, starts=[[-1.0, 0.0]]), InvalidOption, "starts must be at least 0 m"),
+    (lambda: orbits(BALL, TABLE, starts=[[0.0, -1.0]]), InvalidOption, "^starts must not lead into a stop"),
+    (lambda: orbits(BALL, pulses.sine(1e29, 5.0, cycles=1)), InvalidMotion, "beyond all sense"),
+    (lambda: continued(start="none"), InvalidOption, "periodic_orbits"),
+    (lambda: continued(2.0), InvalidOption, "value must be"),
+    (lambda: continued(limits=(2.0, 1.0)), InvalidOption, "lower, higher"),
+    (lambda: continued(limits=(1.0, 1.2, 3.0)), InvalidOption, "lower, higher"),
+    (lambda: continued(1.3), InvalidOption, "none of what"),
+    (lambda: continued(step=0.0), InvalidOption, "step"),
+    (lambda: continued(most=0), InvalidOption, "most"),
+    (lambda: diagram(3), InvalidOption, "function of the parameter"),
+    (lambda: diagram(lambda value: value), InvalidOption, "must return a body"),
+    (lambda: diagram(lambda value: (BALL, None)), InvalidMotion, "one period"),
+    (lambda: diagram(values=[2.0, 1.0]), InvalidOption, "increasing"),
+    (lambda: diagram(values=[1.0, math.nan]), InvalidOption, "increasing"),
+    (lambda: diagram(starts=[0.1]), InvalidOption, "pair"),
+    (lambda: diagram(starts=[-0.1, 0.0]), InvalidOption, "in front"),
+    (lambda: diagram(starts=[0.0, 1e308]), InvalidOption, "starts must be finite"),
+    (lambda: diagram(direction="sideways"), InvalidOption, "direction"),
+    (lambda: diagram(kept=1), InvalidOption, "kept"),
+    (lambda: diagram(transient=-1), InvalidOption, "transient"),
+    (lambda: exponents([[0.1, 0.0]]), InvalidOption, "pair"),
+    (lambda: exponents([0.1, 0.5], 3), InvalidOption, "periods"),
+    (lambda: exponents([0.1, 0.5], transient=-1), InvalidOption, "transient"),
+    (lambda: exponents([0.0, math.inf]), InvalidOption, "state must be finite"),
+    (lambda: exponents([0.0, -1.0]), InvalidOption, "^state must not lead into a stop"),
+    (lambda: basins(BLOCK, None, [0.1], [0.0]), InvalidMotion, "one period"),
+    (lambda: basins(BLOCK, TABLE, [0.1, 0.0], [0.0]), InvalidOption, "positions must be increasing"),
+    (lambda: basins(BALL, TABLE, [0.0, math.nan], [0.0, 1.0]), InvalidOption, "positions must be increasing finite"),
+    (lambda: basins(BALL, TABLE, [0.0, 1.0], [0.0, 1e308]), InvalidOption, "velocities must be finite"),
+    (lambda: basins(BALL, TABLE, [0.0, 1.0], [-1.0, 1.0]), InvalidOption, "^velocities must not lead into a stop"),
+    (lambda: basins(STOPPED, TABLE, [0.0, 0.03], [0.0, 1.0]), InvalidOption, "^velocities .* 1 m/s at 0.03 m does"),
+    (lambda: basins(BALL, TABLE, [-1.0, 1.0], [0.0, 1.0]), InvalidOption, "^positions must be at least 0 m"),
+    (lambda: basins(BLOCK, TABLE, [0.1], []), InvalidOption, "velocities"),
+    (lambda: basins(BLOCK, TABLE, [0.1], [0.0], 0), InvalidOption, "periods"),
+    (lambda: dynamics.basin_entropy([0, 1]), InvalidOption, "outcomes"),
+    (lambda: dynamics.basin_entropy(np.zeros((3, 3), dtype=int)), InvalidOption, "at least one box"),
+    (lambda: chattered(np.nan), InvalidOption, "a must be finite"),
+    (lambda: chattered([1.0, np.inf]), InvalidOption, r"at index \(1,\)"),
+    (lambda: chattered(omega=0.0), InvalidOption, "omega must be between"),
+    (lambda: chattered(omega=-2.0), InvalidOption, "omega must be between"),
+    (lambda: chattered(omega=1e7), InvalidOption, "omega must be between"),
+    (lambda: chattered(eta=0.0), InvalidOption, "eta must be above 0"),
+    (lambda: chattered(eta=1.1), InvalidOption, "eta must be above 0"),
+    (lambda: chattered(eta=0.9999999), InvalidOption, "eta must be above 0"),
+    (lambda: chattered("fast"), InvalidOption, "must be a number"),
+    (lambda: chattered([1.0, 1.1], [1.0, 2.0, 3.0]), InvalidOption, "do not broadcast"),
+    (lambda: chattered(method="euler"), InvalidOption, "method must be"),
+    (lambda: chattered(method="series", order=0), InvalidOption, "order must be"),
+    (lambda: chattered(method="series", order=2.5), InvalidOption, "order must be"),
+    (lambda: chattered(resolved=0), InvalidOption, "resolved must be"),
+    (lambda: chattering.sequence([1.03, 1.04], 2.0, 0.92), InvalidOption, "single number"),
+    (lambda: chattering.sequence(0.99, 2.0, 0.92), InvalidOption, "does not lift off"),
+    (lambda: chattering.sequence(1.03, 2.0, 0.92, tolerance=0.0), InvalidOption, "tolerance"),
+    (lambda: chattering.sequence(1.03, 2.0, 0.92, tolerance=np.nan), InvalidOption, "tolerance"),
+    (lambda: chattering.interval_ratios(1.03, 2.0, 0.92, 0), InvalidOption, "n must be"),
+    (lambda: first_arc(0.9, 2.0), InvalidOption, "a must be at least 1"),
+    (lambda: chattering.critical_amplitude(2.0, 0.92, method="eq78"), InvalidOption, "method must be"),
+    (lambda: chattering.critical_amplitude(2.0, np.nan), InvalidOption, "eta must be"),
+    *(
+        (lambda omega=omega, eta=eta: chattering.critical_amplitude(omega, eta, method="approximation"),
+         InvalidOption, "holds for omega")
+        for omega, eta in ((0.39, 0.9), (10.1, 0.9), (2.0, 0.49), (2.0, 0.98))
+    ),
+    *(
+        (lambda given=given: chattering_map(families.sine(BLOCK), given), InvalidOption, words)
+        for given, words in (
+            ({"a": [1.0]}, "must be two"),
+            ({"a": [1.0], "b": [1.0], "c": [1.0]}, "must be two"),
+            ({"a": [], "b": [1.0]}, "a must be increasing"),
+            ({"a": [1.0, math.nan], "b": [1.0]}, "a must be increasing"),
+            ({"a": [2.0, 1.0], "b": [1.0]}, "a must be increasing"),
+        )
+    ),
+    (lambda: chattering_map("sine", ONE), InvalidOption, "family must be a function"),
+    (lambda: chattering_map(lambda a, b: (BLOCK, None, "linear"), ONE), InvalidOption, "SimulationInput"),
+    (lambda: chattering_map(lambda a, b: families.SimulationInput(BLOCK, None), ONE), InvalidOption, "a Motion"),
+    (lambda: families.sine("block"), InvalidBlock, "not a str"),
+    (lambda: families.ricker(None), InvalidBlock, "not a NoneType"),
+    (lambda: families.lobes(BLOCK, count=2.5), InvalidOption, "count must be a whole number"),
+    (lambda: families.lobes(BLOCK, omega="fast"), InvalidOption, "omega must be"),
+    (lambda: families.record(None, 0.2), InvalidMotion, "not None"),
+    (lambda: families.record("a.csv", 0.2), InvalidMotion, "rocking.read"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("call", "error", "words"), CALLS)
+def test_it_is_refused_in_one_sentence(call, error, words):
+    with pytest.raises(RockingError, match=words) as caught:
+        call()
+    assert isinstance(caught.value, error) and "\n" not in str(caught.value)
