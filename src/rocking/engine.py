@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, replace
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,6 +78,38 @@ class Setup:
     treatment: Treatment
     duration: float | None = None
     start: tuple[float | None, float] = (None, 0.0)
+
+    def run(
+        self,
+        motion: Motion | None,
+        factor: float = 1.0,
+        *,
+        record: bool = False,
+        ground: Ground | None = None,
+        name: str | None = None,
+    ) -> Run:
+        """Return all that kernels need for the bodies under a motion times a factor; all arguments are checked.
+
+        ``ground`` takes the place of that of the motion; ``name`` is what a caller calls the initial coordinate.
+        """
+        bodies = self.bodies
+        check_components(bodies, motion)
+        rules = rules_of(bodies, self.model, self.treatment, self.duration, record=record)
+        records = bodies.kernel_records(self.model, self.treatment.limits(bodies, motion, self.model, factor))
+        if ground is None:
+            ground = ground_of(motion, bodies.gravity, factor)
+        states = state.new_states(len(bodies), 0)
+        set_start(states, records, bodies, *self.start, name)
+        return Run(ground, records, rules, states)
+
+
+class Run(NamedTuple):
+    """Bodies under a motion as kernels take them: the ground, a record and a state of each body, and the rules."""
+
+    ground: Ground
+    records: Records
+    rules: Record
+    states: Records
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,13 +218,8 @@ def check_components(bodies: Bodies, motion: Motion | None) -> None:
 def simulate_task(setup: Setup, task: Task, cancelled: threading.Event | None = None) -> NDArray[np.void]:
     """Outcomes of one task; where it is ``cancelled`` on the way, of no use."""
     bodies = setup.bodies.select(task.bodies)
-    check_components(bodies, task.motion)
-    limits = setup.treatment.limits(bodies, task.motion, setup.model, task.factor)
-    rules = rules_of(bodies, setup.model, setup.treatment, setup.duration, record=False)
-    ground = ground_of(task.motion, bodies.gravity, task.factor)
-    records = bodies.kernel_records(setup.model, limits)
-    states = state.new_states(len(bodies), _FIRST_SLICE + _BUDGET_OF_A_PIECE * len(ground.pieces))
-    set_start(states, records, bodies, *setup.start)
+    ground, records, rules, states = replace(setup, bodies=bodies).run(task.motion, task.factor)
+    states["budget"] = _FIRST_SLICE + _BUDGET_OF_A_PIECE * len(ground.pieces)
     step = step_of(task.motion)
     for chosen, substeps in _groups(ground, records, task.motion, setup.model):
         if cancelled is not None and cancelled.is_set():

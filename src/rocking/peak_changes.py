@@ -14,7 +14,7 @@ from rocking.arrays import Flags, Floats, Integers
 from rocking.engine import Setup, Task
 from rocking.kernels import state
 from rocking.kernels.trace import NO_NODES, Quantity, Trail, vary
-from rocking.problem import ground_of, highest, rules_of, set_start
+from rocking.problem import highest
 from rocking.progress import Progress
 from rocking.simulation import marched
 from rocking.threads import in_threads
@@ -77,12 +77,7 @@ def peak_changes(
 def _changes(setup: Setup, task: Task, overturned: Flags, quantities: Sequence[Quantity]) -> Floats:
     """Find the changes of the peaks of a task's bodies by each quantity, shape (bodies, quantities)."""
     bodies = setup.bodies.select(task.bodies)
-    limits = setup.treatment.limits(bodies, task.motion, setup.model, task.factor)
-    rules = rules_of(bodies, setup.model, setup.treatment, setup.duration, record=True)
-    ground = ground_of(task.motion, bodies.gravity, task.factor)
-    records = bodies.kernel_records(setup.model, limits)
-    states = state.new_states(len(bodies), 0)
-    set_start(states, records, bodies, *setup.start)
+    ground, records, rules, states = replace(setup, bodies=bodies).run(task.motion, task.factor, record=True)
     scratch, work = state.new_scratch(), state.record(state.VARIATION)
     changes = np.full((len(bodies), len(quantities)), math.nan)
     for k in np.flatnonzero(~overturned):

@@ -16,6 +16,7 @@ from rocking.body import Body
 from rocking.constants import Model
 from rocking.dynamics.linear_bodies import LinearBody
 from rocking.dynamics.simulation import model_of
+from rocking.engine import Setup
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
 from rocking.kernels import state
 from rocking.kernels.ground import Ground, ground_of
@@ -23,7 +24,7 @@ from rocking.kernels.periodic import Fate, Setting, step_rows
 from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
 from rocking.motion.named import one_motion
-from rocking.problem import FASTEST, one_body, rules_of, set_start
+from rocking.problem import FASTEST, one_body, set_start
 from rocking.treatment import Treatment, treatment
 
 #: Ground acceleration, g, that lifts any body: it stands behind the second period.
@@ -53,8 +54,10 @@ class Repeated:
         self.period = float(self.motion.breakpoints[-1] - self.motion.breakpoints[0])
         if not np.max(np.abs(self.motion.coefficients[:, 0])) < _BEYOND_ALL * self.body.gravity:
             raise InvalidMotion(f"the motion is beyond all sense; maps take accelerations below {_BEYOND_ALL:g} g")
-        limits = self.treatment.limits(self.bodies, self.motion, self.model)
-        self._records = self.bodies.kernel_records(self.model, limits)
+        self._ground = repeated(self.motion, self.body.gravity)
+        run = Setup(self.bodies, self.model, self.treatment, self.period).run(self.motion, ground=self._ground)
+        self._records, self._settings = run.records, run.rules
+        self._settings["stop"], self._settings["endless"] = np.inf, True
         if np.any(self._records["yielding"]):
             raise InvalidBlock("a tendon that yields remembers; maps know what position and velocity tell")
         if np.any(self._records["varying"] & (self._records["seed"] >= 0)):
@@ -62,7 +65,6 @@ class Repeated:
                 "a map takes a state to the same one each time, but this body draws its restitution at each impact: "
                 "give it a number, or one that falls with the speed"
             )
-        self._ground = repeated(self.motion, self.body.gravity)
         rows = step_rows(self._ground, self._records[0])
         self._steps = rows if self.model == "linear" else rows[:, :0]
 
@@ -70,8 +72,8 @@ class Repeated:
         return f"<{type(self).__name__}: {described(self.body)} under {described(self.motion)}; {self.model} model>"
 
     def _rules(self, *, record: bool) -> state.Record:
-        rules = rules_of(self.bodies, self.model, self.treatment, self.period, record=record)
-        rules["stop"], rules["endless"] = np.inf, True
+        rules = self._settings.copy()
+        rules["record"] = record
         return rules
 
     def _setting(self) -> Setting:

@@ -186,6 +186,15 @@ def new_states(count: int, budget: int) -> Records:
     return states
 
 
+def state_at(node: Record, plastic: float = 0.0, budget: int = np.iinfo(np.int64).max) -> Record:
+    """State of a march that starts at a node, with the plastic elongation of a tendon there."""
+    made = new_states(1, budget)[0]
+    for name in ("piece", "offset", "side", "u", "v", "law"):
+        made[name] = node[name]
+    made["peak"], made["plastic"] = node["u"], plastic
+    return made
+
+
 def new_scratch() -> Record:
     """Scratch space for one march at a time."""
     return record(SCRATCH)

@@ -256,11 +256,7 @@ def _later(response: Response, row: int, until: float) -> Records:
 
 def _ties_before(trail: Trail, instant: float) -> bool:
     """Whether the last digits decided on a touch up to an instant: the march is followed once more, as far as that."""
-    rules, start = trail.rules.copy(), state.new_states(1, np.iinfo(np.int64).max)[0]
-    first = trail.nodes[0]
-    for name in ("piece", "offset", "side", "u", "v"):
-        start[name] = first[name]
-    start["peak"] = first["u"]
+    rules, start = trail.rules.copy(), state.state_at(trail.nodes[0])
     rules["stop"], rules["endless"], rules["record"] = math.nextafter(instant, math.inf), False, False
     march(trail.ground, own(trail).block, rules, state.new_table(0), state.new_scratch(), start)
     return bool(start["near_ties"] > 0)

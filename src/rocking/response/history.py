@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from rocking import checks
 from rocking.arrays import Flags, Floats, Integers
-from rocking.bisection import bisected
+from rocking.bisection import bisected, halved, middle
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.march import march
@@ -122,9 +122,8 @@ class History:
         step, part = np.nonzero((rate[:, :-1] >= 0.0) & (rate[:, 1:] <= 0.0))
         low, high, rows, sign = times[step, part], times[step, part + 1], moving[step], 1.0 - 2.0 * side[step]
         for _ in range(_TURNINGS if len(step) else 0):
-            middle = 0.5 * (low + high)
-            out = sign * self.states_in(middle, rows)[:, 1] > 0.0
-            low, high = np.where(out, middle, low), np.where(out, high, middle)
+            out = sign * self.states_in(middle(low, high), rows)[:, 1] > 0.0
+            low, high = halved(low, high, out, ~out)
         np.maximum.at(found, step, np.abs(self.states_in(low, rows)[:, 0]))
         plus, minus = (float(np.max(found[side == k], initial=0.0)) for k in range(2))
         return plus, minus
@@ -169,10 +168,7 @@ def with_all_impacts(trail: Trail, *, cut: bool) -> Trail:
     table = state.new_table(1024)
     parts, done, plastic = [], 0, plastic_elongations(trail)
     for row in closing:
-        start = state.new_states(1, _MOST_IMPACTS)[0]
-        for name in ("piece", "offset", "side", "u", "v", "law"):
-            start[name] = nodes[name][row]
-        start["plastic"] = plastic[row]
+        start = state.state_at(nodes[row], plastic[row], _MOST_IMPACTS)
         body["limit"] = np.maximum(slowest, _LEAST_SHARE * start["v"])
         start["peak"] = math.inf  # nobody asks for the highest rotation; weight presses down where a rest is proven
         rules["stop"] = nodes["time"][row + 1] if row + 1 < len(nodes) else trail.rules["stop"]
