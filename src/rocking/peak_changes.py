@@ -77,14 +77,14 @@ def peak_changes(
 def _changes(setup: Setup, task: Task, overturned: Flags, quantities: Sequence[Quantity]) -> Floats:
     """Find the changes of the peaks of a task's bodies by each quantity, shape (bodies, quantities)."""
     bodies = setup.bodies.select(task.bodies)
-    ground, records, rules, states = replace(setup, bodies=bodies).run(task.motion, task.factor, record=True)
+    ground, records, settings, states = replace(setup, bodies=bodies).run(task.motion, task.factor, record=True)
     scratch, work = state.new_scratch(), state.record(state.VARIATION)
     changes = np.full((len(bodies), len(quantities)), math.nan)
     for k in np.flatnonzero(~overturned):
-        start, trail = states[k], Trail(ground, records[k], rules, NO_NODES)
+        start, trail = states[k], Trail(ground, records[k], settings, NO_NODES)
         ending, table = marched(trail, start)
-        known = ending in (state.Ending.DONE, state.Ending.LEANS) and start["near_ties"] == 0
-        if not known or (records["facing"][k] and highest(start, records[k], bodies.stops[k]) == bodies.stops[k, 1]):
+        known = ending in (state.Ending.DONE, state.Ending.LEANS) and start["rounding_decisions"] == 0
+        if not known or (records["two_stops"][k] and highest(start, records[k], bodies.stops[k]) == bodies.stops[k, 1]):
             continue
         trail = trail._replace(nodes=state.attributed(np.array(table["node"][: start["nodes"]])))
         at, impacts, events = np.array([start["peak_time"]]), np.empty(start["impacts"]), np.empty(start["events"])

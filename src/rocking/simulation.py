@@ -119,7 +119,7 @@ def response_to(
     run = setup.run(motion, factor, record=True, ground=ground, name=name)
     if factor != 1.0:
         set_start(run.states, run.records, alone, *_scaled(initial, factor, run.records, alone.stops[0]), name)
-    trail, start = Trail(run.ground, run.records[0], run.rules, NO_NODES), run.states[0]
+    trail, start = Trail(run.ground, run.records[0], run.settings, NO_NODES), run.states[0]
     ending, table = marched(trail, start)
     if ending == state.Ending.BALANCED:
         raise InvalidOption("the block balances on its corner for ever; give {} or another initial state", "duration")
@@ -140,8 +140,8 @@ def response_to(
         events=_events(events),
         impacts=_public(table["impact"][: start["impacts"]], _IMPACT),
         _sequences=_public(table["sequence"][: start["sequences"]], _CHATTERING),
-        stalled=int(start["stalled"]),
-        near_ties=int(start["near_ties"]),
+        stalled=int(start["rests_by_rounding"]),
+        near_ties=int(start["rounding_decisions"]),
         _residual=float(block.stops[int(start["side"] in (1, -2))] + (1 - 2 * start["side"]) * start["leaning"]),
         _trail=trail._replace(nodes=state.attributed(np.array(table["node"][: start["nodes"]]))),
         _again=functools.partial(response_to, block, motion, model, how, duration, initial, name),
@@ -153,23 +153,23 @@ def _scaled(initial: tuple[float, float], factor: float, records: state.Records,
     coordinate, rate = initial
     if coordinate in stops:
         return coordinate, factor * rate
-    fallen = math.nextafter(float(records["fallen"].min()), 0.0)
+    fallen = math.nextafter(float(records["overturn_angle"].min()), 0.0)
     distance = factor * (coordinate - float(stops[0]))
     return float(stops[0]) + min(max(distance, -fallen), fallen), factor * rate
 
 
 def marched(trail: Trail, start: state.Record) -> tuple[int, state.Records]:
     """How a march ends, in slices so that an interrupt is seen; and its table, which grows as it is filled."""
-    ground, block, rules, _ = trail
+    ground, block, settings, _ = trail
     table = state.new_table(128 + int(_FIRST_ROWS * len(ground.pieces)))
     scratch = state.new_scratch()
     ending: int = state.Ending.PAUSED
     for _ in range(slices(ground)):
         start["budget"] = SLICE
-        ending = march(ground, block, rules, table, scratch, start)
+        ending = march(ground, block, settings, table, scratch, start)
         while ending == state.Ending.FULL:
             table = state.grown(table)
-            ending = march(ground, block, rules, table, scratch, start)
+            ending = march(ground, block, settings, table, scratch, start)
         if ending != state.Ending.PAUSED:
             return ending, table
     start["end"] = table["node"]["time"][start["nodes"] - 1]

@@ -21,8 +21,7 @@ from rocking.chattering.parameters import (
     single,
 )
 from rocking.errors import InvalidOption
-from rocking.kernels.sine.eq65 import eq65_sums, eq65_terms
-from rocking.kernels.sine.series import phase_coefficients
+from rocking.kernels.sine.series import eq65_sums, eq65_terms, phase_coefficients
 
 #: Terms of the consistent expansion.
 HIGHEST_ORDER: Final = 40

@@ -107,7 +107,9 @@ class ImpactMap(Repeated):
         for column in pieces[:, :1:-1].T:
             push = push * made["offset"] + column
         sign = np.where(side > 0, -1.0, 1.0)
-        restoring = record["gain"][side] * (record["threshold"][side] + record["hold"][side] + sign * push)
+        restoring = record["threshold_slope"][side] * (
+            record["threshold"][side] + record["restraint_threshold"][side] + sign * push
+        )
         with np.errstate(invalid="ignore"):  # a velocity may be infinite
             return np.stack([made["v"], -restoring - record["damping"][side] * made["v"]], axis=-1)
 

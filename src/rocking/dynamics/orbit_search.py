@@ -137,7 +137,7 @@ class _Search:
         if both:
             impacts = np.concatenate([impacts, impacts * [1.0, -1.0]])
         few = np.linspace(-0.9, 0.9, max(2, side // 4))
-        width = high - low if strobe._records[0]["facing"] else self.scale.coordinate
+        width = high - low if strobe._records[0]["two_stops"] else self.scale.coordinate
         at = 0.5 * (low + high) + 0.5 * width * few if both else low + width * (1.0 + few)
         between = np.stack(np.meshgrid(at, speed * few), axis=-1).reshape(-1, 2)
         rests = np.array([[stop, 0.0] for stop in {low, high}])
@@ -157,7 +157,7 @@ class _Search:
         if not math.isinf(min(strobe.body.balance)):
             return min(speed, _BLOCK_SPEED * self.scale.velocity + push)
         if float(record["stiffness"][0]) == 0.0:  # A ball flies for as long as its speed lets it.
-            pull = float(record["gain"][0] * record["threshold"][0])
+            pull = float(record["threshold_slope"][0] * record["threshold"][0])
             return min(speed, 0.5 * self.count * strobe.period * pull + push)
         return speed
 
@@ -166,10 +166,10 @@ class _Search:
         record, (low, high) = self.strobe._records[0], self.strobe.body.stops
         x, v = states.T
         fine: Flags = np.all(np.isfinite(states), axis=-1)
-        if self.strobe._is_two_sided and not record["facing"]:
-            fine &= np.abs(x) < record["fallen"]
+        if self.strobe._is_two_sided and not record["two_stops"]:
+            fine &= np.abs(x) < record["overturn_angle"]
             return fine
-        if record["facing"]:
+        if record["two_stops"]:
             fine &= (x <= high) & ~((x == high) & (v > 0.0))
         fine &= (x >= low) & ~((x == low) & (v < 0.0))
         return fine

@@ -225,7 +225,7 @@ def multipliers_at(strobe: StroboscopicMap, change: Floats) -> NDArray[np.comple
     if not np.any(change):
         return np.ones(2, dtype=np.complex128)
     record = strobe._records[0]
-    keeps_areas = not (record["varying"] or np.any(record["damping"]))
+    keeps_areas = not (record["variable_restitution"] or np.any(record["damping"]))
     # By the rounding of many impacts the product of both would differ from 1, as if the orbit attracted.
     return multipliers_of(change / np.sqrt(np.abs(np.linalg.det(change)))) if keeps_areas else multipliers_of(change)
 

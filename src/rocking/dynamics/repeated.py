@@ -56,11 +56,11 @@ class Repeated:
             raise InvalidMotion(f"the motion is beyond all sense; maps take accelerations below {_BEYOND_ALL:g} g")
         self._ground = repeated(self.motion, self.body.gravity)
         run = Setup(self.bodies, self.model, self.treatment, self.period).run(self.motion, ground=self._ground)
-        self._records, self._settings = run.records, run.rules
-        self._settings["stop"], self._settings["endless"] = np.inf, True
+        self._records, self._settings = run.records, run.settings
+        self._settings["stop"], self._settings["no_end_time"] = np.inf, True
         if np.any(self._records["yielding"]):
             raise InvalidBlock("a tendon that yields remembers; maps know what position and velocity tell")
-        if np.any(self._records["varying"] & (self._records["seed"] >= 0)):
+        if np.any(self._records["variable_restitution"] & (self._records["seed"] >= 0)):
             raise InvalidOption(
                 "a map takes a state to the same one each time, but this body draws its restitution at each impact: "
                 "give it a number, or one that falls with the speed"
@@ -72,9 +72,9 @@ class Repeated:
         return f"<{type(self).__name__}: {described(self.body)} under {described(self.motion)}; {self.model} model>"
 
     def _rules(self, *, record: bool) -> state.Record:
-        rules = self._settings.copy()
-        rules["record"] = record
-        return rules
+        settings = self._settings.copy()
+        settings["record"] = record
+        return settings
 
     def _setting(self) -> Setting:
         return Setting(self._ground, self._records[0], self._rules(record=False), state.new_table(0), self._steps)
@@ -104,16 +104,16 @@ class Repeated:
         self._refuse_into_stop(flat[:, 0], flat[:, 1], velocities or name)
         made = state.new_states(len(flat), 0)
         set_start(made, self._records, self.bodies, flat[:, 0], flat[:, 1], name)
-        fallen = float(self._records["fallen"][0])
+        fallen = float(self._records["overturn_angle"][0])
         made["peak"] = fallen if np.isinf(fallen) else fallen * _ALMOST
         return given, made
 
     def _refuse_into_stop(self, at: Floats, speed: Floats, name: str) -> None:
         """Refuse states at a stop that lead into it."""
         record, (low, high) = self._records[0], self.body.stops
-        if record["entered"][0] != 0:  # no stop, but the ground on both sides
+        if record["next_side"][0] != 0:  # no stop, but the ground on both sides
             return
-        wrong = (at == low) & (speed < 0.0) | (bool(record["facing"]) & (at == high) & (speed > 0.0))
+        wrong = (at == low) & (speed < 0.0) | (bool(record["two_stops"]) & (at == high) & (speed > 0.0))
         if np.any(wrong):
             x, v = float(at[wrong][0]), float(speed[wrong][0])
             raise InvalidOption(
@@ -145,7 +145,7 @@ class Repeated:
     def _is_two_sided(self) -> bool:
         """Whether the coordinate passes zero, or there is a second stop."""
         record = self._records[0]
-        return bool(record["facing"] or record["entered"][0] == 1)
+        return bool(record["two_stops"] or record["next_side"][0] == 1)
 
     @property
     def _loses_nothing(self) -> bool:
@@ -168,7 +168,9 @@ class Repeated:
         made["v"] = np.where(np.isnan(phase), np.nan, np.abs(flat[:, 1]))
         if np.any(flat[:, 1] == 0.0) or (not self._is_two_sided and np.any(flat[:, 1] < 0.0)):
             raise InvalidOption("every velocity in {} must lead away from the stop that was hit", "impacts")
-        made["peak"] = record["fallen"] if np.isinf(record["fallen"]) else record["fallen"] * _ALMOST
+        made["peak"] = (
+            record["overturn_angle"] if np.isinf(record["overturn_angle"]) else record["overturn_angle"] * _ALMOST
+        )
         return made
 
     def _directions(self, velocity: Floats) -> Floats:
@@ -188,11 +190,11 @@ def scale_of(strobe: Repeated) -> Scale:
     if not isinstance(strobe.body, LinearBody):
         alpha = float(np.max(record["slenderness"]))
         return Scale(alpha, alpha * math.sqrt(float(np.max(np.abs(record["stiffness"])))))
-    pull = float(np.max(np.abs(record["gain"] * record["threshold"])[: 2 if record["facing"] else 1]))
+    pull = float(np.max(np.abs(record["threshold_slope"] * record["threshold"])[: 2 if record["two_stops"] else 1]))
     speed = period * max(mean_size(strobe.motion), pull, 1e-300)
     rate = math.sqrt(abs(float(record["stiffness"][0])))
-    if record["facing"]:
-        width = float(record["fallen"])
+    if record["two_stops"]:
+        width = float(record["overturn_angle"])
         return Scale(width, max(width * rate, width / period))
     return Scale(speed / max(rate, 1.0 / period), speed)
 

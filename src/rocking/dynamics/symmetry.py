@@ -39,7 +39,8 @@ class HalfMap(StroboscopicMap):
 
 #: Fields of a body's record that are a side's own.
 _OF_SIDES: Final = (
-    "stiffness", "gain", "threshold", "slenderness", "restitution", "least", "slope", "hold", "added_weight",
+    "stiffness", "threshold_slope", "threshold", "slenderness", "restitution", "min_restitution", "restitution_slope",
+    "restraint_threshold", "added_weight",
     "added_push", "prestress", "spring", "damping",
 )  # fmt: skip
 

@@ -67,7 +67,7 @@ class Answers:
     @cached_property
     def _history(self) -> History:
         """Its course, with the impacts that follow where a proof has closed a sequence."""
-        if int(self._trail.rules["treatment"]) != state.RestRule.CERTIFIED:
+        if int(self._trail.settings["treatment"]) != state.RestRule.CERTIFIED:
             return History(self._trail, self.duration, self.body.stops)
         closed = bool(len(self._sequences)) and bool(self._sequences["end"][-1] >= self.duration)
         trail = with_all_impacts(self._trail, cut=closed and self.moves_at_end)
@@ -88,7 +88,7 @@ class Answers:
 
         Of a free block it is the slenderness in both models.
         """
-        if isinstance(self.body, RestrainedBlock) and not self._trail.rules["nonlinear"]:
+        if isinstance(self.body, RestrainedBlock) and not self._trail.settings["nonlinear"]:
             plus, minus = linear_balance(self.body).tolist()
             return plus, minus
         return self.body.balance
@@ -123,7 +123,7 @@ class Answers:
             if self.overturned:  # the last step ends there
                 side = int(self._trail.nodes["side"][-1])
                 plus, minus = (self.peak_rotation, minus) if side == 0 else (plus, self.peak_rotation)
-            rows = self.body.tendons_at((plus, minus), "nonlinear" if self._trail.rules["nonlinear"] else "linear")
+            rows = self.body.tendons_at((plus, minus), "nonlinear" if self._trail.settings["nonlinear"] else "linear")
         return np.array(rows, dtype=[("elongation", "f8"), ("force", "f8"), ("plastic_elongation", "f8")])
 
     @property
@@ -184,7 +184,7 @@ class Answers:
     @cached_property
     def sensitivity(self) -> Sensitivity:
         """How the peak and the times of events and impacts change with the motion, the initial state and the block."""
-        drawn = int(self._trail.block["seed"]) >= 0 and bool(self._trail.block["varying"])
+        drawn = int(self._trail.block["seed"]) >= 0 and bool(self._trail.block["variable_restitution"])
         return Sensitivity(
             self._trail,
             # What is drawn goes by the number of the impact, which those beyond a proof do not count in.
@@ -198,7 +198,7 @@ class Answers:
     @property
     def _reaches_second_stop(self) -> bool:
         """Whether the peak is where the second of two stops is."""
-        return bool(self._trail.block["facing"]) and self.peak_rotation == self.body.stops[1]
+        return bool(self._trail.block["two_stops"]) and self.peak_rotation == self.body.stops[1]
 
     @property
     def ambiguous(self) -> bool:
@@ -472,7 +472,7 @@ class Answers:
 
     @cached_property
     def _energy(self) -> Energy:
-        return energy_of(self.body, self._trail.block, nonlinear=bool(self._trail.rules["nonlinear"]))
+        return energy_of(self.body, self._trail.block, nonlinear=bool(self._trail.settings["nonlinear"]))
 
     @cached_property
     def _contact(self) -> Contact:

@@ -12,10 +12,10 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.kernels import state
-from rocking.kernels.adjoint import Ends, adjoint, of_ending
+from rocking.kernels.adjoint import Ends, adjoint, adjoint_of_final_state
 from rocking.kernels.march import march
 from rocking.kernels.state import Records
-from rocking.kernels.trace import Trail, own
+from rocking.kernels.trace import Trail, copy_trail
 from rocking.motion import piecewise
 from rocking.motion.motion import Motion
 from rocking.response.answers import history_of, trail_of
@@ -256,10 +256,10 @@ def _later(response: Response, row: int, until: float) -> Records:
 
 def _ties_before(trail: Trail, instant: float) -> bool:
     """Whether the last digits decided on a touch up to an instant: the march is followed once more, as far as that."""
-    rules, start = trail.rules.copy(), state.state_at(trail.nodes[0])
-    rules["stop"], rules["endless"], rules["record"] = math.nextafter(instant, math.inf), False, False
-    march(trail.ground, own(trail).block, rules, state.new_table(0), state.new_scratch(), start)
-    return bool(start["near_ties"] > 0)
+    rules, start = trail.settings.copy(), state.state_at(trail.nodes[0])
+    rules["stop"], rules["no_end_time"], rules["record"] = math.nextafter(instant, math.inf), False, False
+    march(trail.ground, copy_trail(trail).block, rules, state.new_table(0), state.new_scratch(), start)
+    return bool(start["rounding_decisions"] > 0)
 
 
 def _taken_back(asked: _Asked, change: Floats, out: Floats) -> str:
@@ -268,7 +268,7 @@ def _taken_back(asked: _Asked, change: Floats, out: Floats) -> str:
     starts_at_rest, begin = int(nodes["side"][0]) < 0, float(nodes["time"][0])
     ends = Ends.START
     if asked.by_state is None:
-        ends = Ends(of_ending(own(asked.trail), scratch, asked.row, change, out))
+        ends = Ends(adjoint_of_final_state(copy_trail(asked.trail), scratch, asked.row, change, out))
     else:
         change[:2] = asked.by_state
         if not np.any(change) or (asked.instant == begin and not asked.is_height):
@@ -277,7 +277,7 @@ def _taken_back(asked: _Asked, change: Floats, out: Floats) -> str:
         return _REASONS[ends]
     if asked.instant > begin:
         work = state.record(state.VARIATION)
-        ends = Ends(adjoint(own(asked.trail), scratch, work, asked.row, asked.since, change, out))
+        ends = Ends(adjoint(copy_trail(asked.trail), scratch, work, asked.row, asked.since, change, out))
         if ends in _REASONS:
             return _REASONS[ends]
         waits = starts_at_rest and (len(nodes) == 1 or nodes["time"][1] > begin)

@@ -16,7 +16,7 @@ from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.march import march
 from rocking.kernels.state import Records
-from rocking.kernels.trace import Trail, own, trace
+from rocking.kernels.trace import Trail, copy_trail, trace
 
 #: Times at which each step of the last arc is looked at for its last passage of the balance point.
 _LOOKS: Final = 33
@@ -62,7 +62,7 @@ class History:
         found = np.empty((len(times), 3))
         given = times.view()
         given.flags.writeable = False  # one type, whatever the caller may do: `trace` is compiled once
-        trace(own(self.trail), state.new_scratch(), given, rows, found)
+        trace(copy_trail(self.trail), state.new_scratch(), given, rows, found)
         if any(self.stops):
             side = self.trail.nodes["side"][rows]
             found[:, 0] += np.array(self.stops)[np.where(side < 0, -1 - side, side)]
@@ -163,15 +163,15 @@ def with_all_impacts(trail: Trail, *, cut: bool) -> Trail:
     closing = closing[nodes["v"][closing] > slowest[nodes["side"][closing]]]
     if not len(closing):
         return trail
-    body, rules, scratch = trail.block.copy(), trail.rules.copy(), state.new_scratch()
-    rules["treatment"], rules["endless"], rules["record"] = state.RestRule.VELOCITY, False, True
+    body, rules, scratch = trail.block.copy(), trail.settings.copy(), state.new_scratch()
+    rules["treatment"], rules["no_end_time"], rules["record"] = state.RestRule.VELOCITY, False, True
     table = state.new_table(1024)
     parts, done, plastic = [], 0, plastic_elongations(trail)
     for row in closing:
         start = state.state_at(nodes[row], plastic[row], _MOST_IMPACTS)
         body["limit"] = np.maximum(slowest, _LEAST_SHARE * start["v"])
         start["peak"] = math.inf  # nobody asks for the highest rotation; weight presses down where a rest is proven
-        rules["stop"] = nodes["time"][row + 1] if row + 1 < len(nodes) else trail.rules["stop"]
+        rules["stop"] = nodes["time"][row + 1] if row + 1 < len(nodes) else trail.settings["stop"]
         while march(trail.ground, body, rules, table, scratch, start) == state.Ending.FULL:
             table = state.grown(table)
         found = table["node"][1 : start["nodes"]]
@@ -182,8 +182,8 @@ def with_all_impacts(trail: Trail, *, cut: bool) -> Trail:
 
 def elongation(trail: Trail, rotations: Floats, side: Integers) -> Floats:
     """Elongation of the tendon that may yield at rotations to each side, m."""
-    bend = 2.0 * np.sin(0.5 * rotations) if trail.rules["nonlinear"] else rotations
-    return np.asarray(trail.block["opening"][np.maximum(side, 0)] * bend)
+    bend = 2.0 * np.sin(0.5 * rotations) if trail.settings["nonlinear"] else rotations
+    return np.asarray(trail.block["lever_arm"][np.maximum(side, 0)] * bend)
 
 
 def plastic_elongations(trail: Trail) -> Floats:
