@@ -20,7 +20,7 @@ import numpy as np
 import rocking
 from rocking.constants import Model
 from rocking.kernels import lanes, state
-from rocking.problem import ground_of, rules_of
+from rocking.problem import ground_of, settings_of
 from rocking.treatment import Certified
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -94,7 +94,7 @@ def one_by_one(model: Model, motion: rocking.Motion, blocks: rocking.Blocks) -> 
     bodies = blocks.kernel_records(model, how.limits(blocks, motion, model))
     states = state.new_states(len(blocks), state.TO_THE_END)
     whole = lanes.pool_of(bodies, states, len(ground.pieces) - 1, 1.0, 0)
-    lanes.march_each(ground, rules_of(blocks, model, how, None, record=False), state.new_scratch(), whole)
+    lanes.march_each(ground, settings_of(blocks, model, how, None, record=False), state.new_scratch(), whole)
 
 
 def shortest(work: Callable[[], object]) -> float:

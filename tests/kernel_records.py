@@ -53,11 +53,11 @@ def rocking_block(
         sine=np.sin(alpha),
         cosine=np.cos(alpha),
         threshold=np.tan(alpha) if nonlinear else alpha,
-        gain=p * p * np.cos(alpha) if nonlinear else p * p,
+        threshold_slope=p * p * np.cos(alpha) if nonlinear else p * p,
         restitution=e,
         limit=limit,
-        entered=(1, 0),
-        fallen=fallen,
+        next_side=(1, 0),
+        overturn_angle=fallen,
     )
 
 
@@ -67,10 +67,10 @@ def one_sided(stiffness: float, gain: float, threshold: float, e: float) -> Reco
         state.BLOCK,
         stiffness=stiffness,
         threshold=(threshold, math.inf),
-        gain=gain,
+        threshold_slope=gain,
         restitution=e,
-        entered=(0, 0),
-        fallen=math.inf,
+        next_side=(0, 0),
+        overturn_angle=math.inf,
     )
 
 
@@ -83,12 +83,12 @@ def rules_for(
     record: bool = True,
 ) -> Record:
     return state.record(
-        state.RULES,
+        state.SETTINGS,
         nonlinear=nonlinear,
         treatment=treatment,
         tolerance=tolerance,
         stop=stop,
-        endless=stop == math.inf,
+        no_end_time=stop == math.inf,
         record=record,
     )
 

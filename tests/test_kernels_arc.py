@@ -9,9 +9,8 @@ from kernel_records import in_units_of_g, one_sided, rocking_block, rules_for, s
 from oracles.taylor import System, after, coefficients, mp
 
 from rocking.kernels.arc import converged, evaluate, expand, expand_nonlinear, linear_order, step_length
-from rocking.kernels.recurrences import linear_coefficients
+from rocking.kernels.series import NEGLIGIBLE, linear_coefficients, shortened_linear
 from rocking.kernels.state import ORDER, Record, new_scratch
-from rocking.kernels.truncation import NEGLIGIBLE, shortened_linear
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 

@@ -176,7 +176,7 @@ def test_a_step_after_an_impact_is_sized_by_the_arc_under_weak_and_violent_motio
 @pytest.mark.parametrize("v", [-0.7, -0.0, 0.3])
 def test_an_impact_slows_down_and_enters_the_next_side(entered: tuple[int, int], v: float) -> None:
     block = rocking_block(e=(0.5, 0.8))
-    block["entered"] = entered
+    block["next_side"] = entered
     for side in (PLUS, MINUS):
         hit = state_of(side, 1e-18, v)
         speed = apply_impact(block, hit)

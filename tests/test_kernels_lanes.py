@@ -25,7 +25,7 @@ from rocking.kernels.lanes import (
     stumpff,
     unload,
 )
-from rocking.kernels.recurrences import Line
+from rocking.kernels.series import Line
 from rocking.kernels.state import Record, Records, new_scratch
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
@@ -133,7 +133,7 @@ def drawn(random: np.random.Generator, nonlinear: bool, h: float, stiffness: flo
 def linear_end(step: Step, row: tuple[float, float], t: float) -> tuple[mpmath.mpf, mpmath.mpf]:
     """Rotation and velocity in 60 digits."""
     side = int(step.start["side"])
-    lam, gain, threshold = (float(step.block[name][side]) for name in ("stiffness", "gain", "threshold"))
+    lam, gain, threshold = (float(step.block[name][side]) for name in ("stiffness", "threshold_slope", "threshold"))
     push = [(1 - 2 * side) * x for x in row]
     return after(System(lam, threshold, gain=gain), step.start["u"], step.start["v"], t, push)
 
@@ -162,7 +162,9 @@ def test_a_quiet_linear_step_is_exact(stiffness: float, late: float, rounds: flo
             quiet += 1
             u, v = linear_end(step, row, h * (1.0 + late))
             side = int(step.start["side"])
-            push = float(step.block["gain"][side]) * (step.block["threshold"][side] + abs(row[0]) + abs(row[1]) * h)
+            push = float(step.block["threshold_slope"][side]) * (
+                step.block["threshold"][side] + abs(row[0]) + abs(row[1]) * h
+            )
             size = max(abs(step.start["u"]), abs(step.start["v"]) * h, abs(u), abs(v) * h, push * h * h)
             assert abs(step.end["u"] - u) <= 4.0 * ULP * size
             assert abs(step.end["v"] - v) * h <= 8.0 * ULP * size

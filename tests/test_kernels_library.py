@@ -97,7 +97,7 @@ def test_records_of_another_layout_are_not_taken_for_the_same() -> None:
 
 
 def test_numbers_are_converted_only_without_loss() -> None:
-    kernel = library._caller("sine.eq65.eq65_sums", library.opened())
+    kernel = library._caller("sine.series.eq65_sums", library.opened())
     assert kernel(np.float64(0.5)) == kernel(0.5)
     for wrong in ("0.5", None, 1j):
         with pytest.raises(TypeError):

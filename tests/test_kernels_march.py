@@ -184,7 +184,7 @@ def test_a_march_from_piece_to_piece_is_the_march_in_one(nonlinear: bool) -> Non
     whole = run(ground, nonlinear=nonlinear)
     table, at, scratch = state.new_table(4096), started(), new_scratch()
     for until in [*range(1, len(ground.pieces)), state.TO_THE_END]:
-        at["until"] = until
+        at["stop_piece"] = until
         ending = march(ground, block, rules, table, scratch, at)
         assert ending == (state.Ending.RUNNING if until < state.TO_THE_END and at["piece"] >= until else whole.ending)
         if ending != state.Ending.RUNNING:
@@ -322,7 +322,7 @@ def test_a_block_on_its_corner_balances() -> None:
 def test_intervals_that_time_can_no_longer_tell_apart_end_a_sequence() -> None:
     found = run(NO_GROUND, velocity=0.1, treatment=state.RestRule.TIME, limit=math.inf)
     exact = run(NO_GROUND, velocity=0.1)
-    assert found.at["stalled"] == 1
+    assert found.at["rests_by_rounding"] == 1
     assert np.isnan(found.sequences["lower"][0])
     assert np.isnan(found.sequences["upper"][0])
     assert found.events["time"][-1] == pytest.approx(exact.events["time"][-1], abs=1e-12)
@@ -333,7 +333,7 @@ def test_intervals_that_time_can_no_longer_tell_apart_end_a_sequence() -> None:
 )
 def test_other_treatments_end_a_sequence_at_their_threshold(treatment: int, limit: float) -> None:
     found = run(NO_GROUND, velocity=0.1, treatment=treatment, limit=limit)
-    assert (found.ending, found.kinds, found.at["stalled"]) == (state.Ending.DONE, [state.EventKind.REST], 0)
+    assert (found.ending, found.kinds, found.at["rests_by_rounding"]) == (state.Ending.DONE, [state.EventKind.REST], 0)
     measure = {
         state.RestRule.VELOCITY: -found.impacts["speed_after"],
         state.RestRule.INTERVAL: -np.diff(found.impacts["time"], prepend=0.0),
@@ -353,7 +353,7 @@ def test_an_impact_on_a_breakpoint_is_struck_once_and_with_full_speed() -> None:
     impact = whole.impacts["time"][0]
     for ulps in range(-6, 7):
         found = run(in_units_of_g([0.0, impact * (1.0 + ulps * ULP), 9.0], [[0.02, 0.0]] * 2), velocity=0.1)
-        assert found.at["stalled"] == 0
+        assert found.at["rests_by_rounding"] == 0
         assert len(found.impacts) == len(whole.impacts)
         assert found.impacts["speed_before"][0] == pytest.approx(whole.impacts["speed_before"][0], rel=1e-12)
         assert found.events["time"][-1] == pytest.approx(whole.events["time"][-1], abs=1e-11)

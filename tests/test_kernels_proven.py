@@ -32,7 +32,7 @@ def passed(ground: Ground, start: Record, *, rows: int = 100, left: float = 9.0,
 
 def proven(v: float, *, peak: float = 1.0, proof_speed: float = 1e-5, offset: float = 0.0) -> Record:
     """Just after an impact from which chattering has been proven."""
-    return state_of(0, 0.0, v, peak=peak, proof_speed=proof_speed, run=1, offset=offset)
+    return state_of(0, 0.0, v, peak=peak, certificate_speed=proof_speed, proven_impacts=1, offset=offset)
 
 
 STEADY = in_units_of_g([0.0, 9.0], [[0.02, 0.01]])
@@ -64,7 +64,7 @@ def test_a_rest_within_the_piece_is_that_of_the_impacts_taken_one_by_one() -> No
 def test_impacts_are_passed_down_to_the_speed_that_is_worth_a_proof() -> None:
     found = passed(STEADY, proven(1e-3))
     assert found["impacts"] > 30
-    assert found["run"] == found["impacts"] + 1
+    assert found["proven_impacts"] == found["impacts"] + 1
     assert found["budget"] == 10**6 - found["impacts"]
     assert 1e-5 < found["v"] < 1.2e-5
     assert found["last_impact_time"] == found["offset"]

@@ -10,7 +10,7 @@ from oracles.taylor import Line, Number, System, coefficients, mp
 
 from rocking.arrays import Floats
 from rocking.kernels import state
-from rocking.kernels.recurrences import (
+from rocking.kernels.series import (
     angle_coefficients,
     linear_coefficients,
     linear_ten,

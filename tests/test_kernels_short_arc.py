@@ -15,7 +15,7 @@ from oracles.taylor import System, after
 
 from rocking.kernels.arc import evaluate, expand
 from rocking.kernels.events import StepEnd, advance
-from rocking.kernels.recurrences import Line
+from rocking.kernels.series import Line
 from rocking.kernels.short_arc import short_step
 from rocking.kernels.state import Outcome, Record, new_scratch
 
@@ -47,7 +47,7 @@ class Case:
     def long(self, start: Record, left: float) -> tuple[StepEnd, float]:
         """StepEnd, and how far the series reaches."""
         order, h, _ = expand(self.ground, self.block, self.rules, self.scratch, start, left)
-        return advance(start, self.scratch, order, h, self.block["fallen"]), h
+        return advance(start, self.scratch, order, h, self.block["overturn_angle"]), h
 
     def pulls(self, t: float) -> float:
         """Size of what is added up in t^2 u'': where weight and push cancel, their rounding stays."""

@@ -124,7 +124,7 @@ def test_draws_are_those_of_philox():
 
 def test_draws_are_even_between_their_bounds():
     block = rocking_block(e=(0.9, 0.8))
-    block["varying"], block["seed"], block["least"] = True, 7, (0.5, 0.6)
+    block["variable_restitution"], block["seed"], block["min_restitution"] = True, 7, (0.5, 0.6)
     draws = np.array([factor(block, 0, 1.0, n) for n in range(2_000)])
     assert draws.min() >= 0.5
     assert draws.max() <= 0.9

@@ -28,7 +28,7 @@ BODIES = {
 BY_SIDE = tuple(f"{name}_{side}" for name in ("p", "alpha", "restitution") for side in ("plus", "minus"))
 
 #: What is proportional to p^2 where every moment over the moment of inertia is.
-WITH_P = ("stiffness", "gain", "prestress", "base_prestress", "spring", "damping", "tendon")
+WITH_P = ("stiffness", "threshold_slope", "prestress", "base_prestress", "spring", "damping", "tendon")
 
 
 def change(made, name, nonlinear, strength):
@@ -39,23 +39,26 @@ def change(made, name, nonlinear, strength):
         for field in WITH_P:
             made[field][:, j] *= (1.0 + strength) ** 2
     elif kind == "restitution":
-        for field in ("restitution", "least", "slope"):
+        for field in ("restitution", "min_restitution", "restitution_slope"):
             made[field][:, j] *= 1.0 + strength
     elif np.isfinite(made["threshold"][0, j]):
-        at_zero = made["hold"][:, j] * made["gain"][:, j]
+        at_zero = made["restraint_threshold"][:, j] * made["threshold_slope"][:, j]
         added = [made["stiffness"][:, j] * made[f"added_{field}"][:, j] for field in ("weight", "push")]
         before = [made[field][:, j].copy() for field in ("sine", "cosine")]
         made["slenderness"][:, j] *= 1.0 + strength
         alpha = made["slenderness"][:, j]
         if nonlinear:
             made["sine"][:, j], made["cosine"][:, j] = np.sin(alpha), np.cos(alpha)
-            made["threshold"][:, j], made["gain"][:, j] = np.tan(alpha), made["stiffness"][:, j] * np.cos(alpha)
+            made["threshold"][:, j], made["threshold_slope"][:, j] = (
+                np.tan(alpha),
+                made["stiffness"][:, j] * np.cos(alpha),
+            )
             after = [made[field][:, j] for field in ("sine", "cosine")]
             at_zero += sum(each * (new - old) for each, new, old in zip(added, after, before, strict=True))
         else:
             at_zero += added[0] * (alpha - made["threshold"][:, j])
             made["threshold"][:, j] = alpha
-        made["hold"][:, j] = at_zero / made["gain"][:, j]
+        made["restraint_threshold"][:, j] = at_zero / made["threshold_slope"][:, j]
     return made
 
 

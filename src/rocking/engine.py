@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, replace
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ from rocking.kernels.march import march
 from rocking.kernels.state import Record, Records
 from rocking.kernels.uplift import note_complete
 from rocking.motion.motion import Motion
-from rocking.problem import ground_of, highest, rules_of, set_start, step_of
+from rocking.problem import ground_of, highest, set_start, settings_of, step_of
 from rocking.tables import counted
 from rocking.threads import in_threads
 from rocking.treatment import Treatment
@@ -79,6 +79,38 @@ class Setup:
     duration: float | None = None
     start: tuple[float | None, float] = (None, 0.0)
 
+    def run(
+        self,
+        motion: Motion | None,
+        factor: float = 1.0,
+        *,
+        record: bool = False,
+        ground: Ground | None = None,
+        name: str | None = None,
+    ) -> Run:
+        """Return all that kernels need for the bodies under a motion times a factor; all arguments are checked.
+
+        ``ground`` takes the place of that of the motion; ``name`` is what a caller calls the initial coordinate.
+        """
+        bodies = self.bodies
+        check_components(bodies, motion)
+        settings = settings_of(bodies, self.model, self.treatment, self.duration, record=record)
+        records = bodies.kernel_records(self.model, self.treatment.limits(bodies, motion, self.model, factor))
+        if ground is None:
+            ground = ground_of(motion, bodies.gravity, factor)
+        states = state.new_states(len(bodies), 0)
+        set_start(states, records, bodies, *self.start, name)
+        return Run(ground, records, settings, states)
+
+
+class Run(NamedTuple):
+    """Bodies under a motion as kernels take them: the ground, a record and a state of each body, and the settings."""
+
+    ground: Ground
+    records: Records
+    settings: Record
+    states: Records
+
 
 @dataclass(frozen=True, eq=False)
 class Task:
@@ -110,7 +142,7 @@ def simulate_tasks(
     Parameters
     ----------
     setup : Setup
-        Bodies and rules.
+        Bodies and settings.
     tasks : iterable of Task
         Taken as they are needed, some ahead of the results.
     threads : int, optional
@@ -186,19 +218,14 @@ def check_components(bodies: Bodies, motion: Motion | None) -> None:
 def simulate_task(setup: Setup, task: Task, cancelled: threading.Event | None = None) -> NDArray[np.void]:
     """Outcomes of one task; where it is ``cancelled`` on the way, of no use."""
     bodies = setup.bodies.select(task.bodies)
-    check_components(bodies, task.motion)
-    limits = setup.treatment.limits(bodies, task.motion, setup.model, task.factor)
-    rules = rules_of(bodies, setup.model, setup.treatment, setup.duration, record=False)
-    ground = ground_of(task.motion, bodies.gravity, task.factor)
-    records = bodies.kernel_records(setup.model, limits)
-    states = state.new_states(len(bodies), _FIRST_SLICE + _BUDGET_OF_A_PIECE * len(ground.pieces))
-    set_start(states, records, bodies, *setup.start)
+    ground, records, settings, states = replace(setup, bodies=bodies).run(task.motion, task.factor)
+    states["budget"] = _FIRST_SLICE + _BUDGET_OF_A_PIECE * len(ground.pieces)
     step = step_of(task.motion)
     for chosen, substeps in _groups(ground, records, task.motion, setup.model):
         if cancelled is not None and cancelled.is_set():
             break
-        _march_together(ground, rules, (records, states), chosen, step, substeps)
-    _march_on(ground, rules, records, states, cancelled)
+        _march_together(ground, settings, (records, states), chosen, step, substeps)
+    _march_on(ground, settings, records, states, cancelled)
     outcomes = _outcomes(states, task.motion.end)
     outcomes["peak_rotation"] = highest(states, records, bodies.stops)
     known, side = ~(outcomes["overturned"] | outcomes["unfinished"] | outcomes["stopped"]), states["side"]
@@ -216,7 +243,7 @@ def _groups(ground: Ground, records: Records, motion: Motion, model: Model) -> I
         substeps = np.where(
             width <= lanes.LONGEST_STEP, _substeps(width, model, motion.vertical is not None), -1.0
         ).astype(np.int64)
-    substeps[records["restrained"] | records["facing"]] = -1
+    substeps[records["restrained"] | records["two_stops"]] = -1
     size = min(_TOGETHER, max(1, _PIECES // (len(ground.pieces) * WIDTH)) * WIDTH)
     for count in np.unique(substeps):
         chosen = np.flatnonzero(substeps == count)
@@ -233,7 +260,7 @@ def _substeps(width: Floats, model: Model, with_vertical: bool) -> Floats:
 
 def _march_together(
     ground: Ground,
-    rules: Record,
+    settings: Record,
     whole: tuple[Records, Records],
     chosen: Integers,
     step: float | None,
@@ -242,28 +269,28 @@ def _march_together(
     """Take some of the bodies through the motion in lanes, or one after the other where they cannot."""
     records, states = whole
     pieces = len(ground.pieces) - 1
-    finer = max(substeps, 0) if rules["nonlinear"] else 0
+    finer = max(substeps, 0) if settings["nonlinear"] else 0
     together = lanes.pool_of(records[chosen], states[chosen], pieces, step or 1.0, finer)
     if substeps < 0:
-        lanes.march_each(ground, rules, state.new_scratch(), together)
+        lanes.march_each(ground, settings, state.new_scratch(), together)
     else:
-        lanes.run_lanes(ground, rules, state.new_scratch(), together, substeps)
+        lanes.run_lanes(ground, settings, state.new_scratch(), together, substeps)
     states[chosen] = together.states
 
 
 def _march_on(
-    ground: Ground, rules: Record, records: Records, states: Records, cancelled: threading.Event | None
+    ground: Ground, settings: Record, records: Records, states: Records, cancelled: threading.Event | None
 ) -> None:
     """Take those on that have used up their first slice of steps, until their budget is spent."""
     nothing, scratch = state.new_table(0), state.new_scratch()
     for k in np.flatnonzero(np.isin(states["ending"], (state.Ending.RUNNING, state.Ending.PAUSED))):
         one = states[k]
-        one["until"] = state.TO_THE_END
+        one["stop_piece"] = state.TO_THE_END
         for _ in range(slices(ground)):
             if cancelled is not None and cancelled.is_set():
                 return
             one["budget"] = SLICE
-            one["ending"] = march(ground, records[k], rules, nothing, scratch, one)
+            one["ending"] = march(ground, records[k], settings, nothing, scratch, one)
             if int(one["ending"]) != state.Ending.PAUSED:
                 break
         else:
@@ -293,8 +320,9 @@ def _outcomes(states: Records, motion_end: float) -> NDArray[np.void]:
     outcomes["stopped"] = undecided & early
     for name, field in (
         ("peak_rotation", "peak"), ("peak_time", "peak_time"), ("impacts", "impacts"), ("uplifts", "uplifts"),
-        ("rests", "rests"), ("time_at_rest", "resting"), ("first_uplift", "first_uplift"),
-        ("first_rest", "first_rest"), ("last_rest", "rested"), ("stalled", "stalled"), ("duration", "end"),
+        ("rests", "rests"), ("time_at_rest", "time_at_rest"), ("first_uplift", "first_uplift"),
+        ("first_rest", "first_rest"), ("last_rest", "last_rest_time"), ("stalled", "rests_by_rounding"),
+        ("duration", "end"),
     ):  # fmt: skip
         outcomes[name] = states[field]
     return outcomes

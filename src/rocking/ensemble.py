@@ -22,7 +22,7 @@ from rocking.motion.motion import Motion
 from rocking.motion.piecewise import STRONGEST
 from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
 from rocking.peak_changes import BETWEEN_STOPS, OF_BLOCKS, By, peak_changes
-from rocking.problem import bodies_of, rules_of
+from rocking.problem import bodies_of, settings_of
 from rocking.progress import Progress
 from rocking.records.named import Motions, names_of, several_motions
 from rocking.response import COUNT, RELATIVE, factors_near
@@ -183,7 +183,7 @@ class Product:
 
     def __post_init__(self) -> None:
         checks.one_of(self.polarity, "polarity", InvalidOption, list(SIGNS))
-        rules_of(self.bodies, self.model, self.treatment, self.duration, record=False)  # checked before any work
+        settings_of(self.bodies, self.model, self.treatment, self.duration, record=False)  # checked before any work
         for motion in self.motions:
             check_components(self.bodies, motion)
 

@@ -14,7 +14,7 @@ from rocking.arrays import Flags, Floats, Integers
 from rocking.engine import Setup, Task
 from rocking.kernels import state
 from rocking.kernels.trace import NO_NODES, Quantity, Trail, vary
-from rocking.problem import ground_of, highest, rules_of, set_start
+from rocking.problem import highest
 from rocking.progress import Progress
 from rocking.simulation import marched
 from rocking.threads import in_threads
@@ -77,19 +77,14 @@ def peak_changes(
 def _changes(setup: Setup, task: Task, overturned: Flags, quantities: Sequence[Quantity]) -> Floats:
     """Find the changes of the peaks of a task's bodies by each quantity, shape (bodies, quantities)."""
     bodies = setup.bodies.select(task.bodies)
-    limits = setup.treatment.limits(bodies, task.motion, setup.model, task.factor)
-    rules = rules_of(bodies, setup.model, setup.treatment, setup.duration, record=True)
-    ground = ground_of(task.motion, bodies.gravity, task.factor)
-    records = bodies.kernel_records(setup.model, limits)
-    states = state.new_states(len(bodies), 0)
-    set_start(states, records, bodies, *setup.start)
+    ground, records, settings, states = replace(setup, bodies=bodies).run(task.motion, task.factor, record=True)
     scratch, work = state.new_scratch(), state.record(state.VARIATION)
     changes = np.full((len(bodies), len(quantities)), math.nan)
     for k in np.flatnonzero(~overturned):
-        start, trail = states[k], Trail(ground, records[k], rules, NO_NODES)
+        start, trail = states[k], Trail(ground, records[k], settings, NO_NODES)
         ending, table = marched(trail, start)
-        known = ending in (state.Ending.DONE, state.Ending.LEANS) and start["near_ties"] == 0
-        if not known or (records["facing"][k] and highest(start, records[k], bodies.stops[k]) == bodies.stops[k, 1]):
+        known = ending in (state.Ending.DONE, state.Ending.LEANS) and start["rounding_decisions"] == 0
+        if not known or (records["two_stops"][k] and highest(start, records[k], bodies.stops[k]) == bodies.stops[k, 1]):
             continue
         trail = trail._replace(nodes=state.attributed(np.array(table["node"][: start["nodes"]])))
         at, impacts, events = np.array([start["peak_time"]]), np.empty(start["impacts"]), np.empty(start["events"])

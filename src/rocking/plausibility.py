@@ -62,16 +62,6 @@ _ALIKE: Final = 0.75
 def motion_notes(motion: Motion) -> tuple[str, ...]:
     """Return what looks like a mistake in a motion that shakes a block; empty if nothing does.
 
-    Parameters
-    ----------
-    motion : Motion
-        A record, for what its file says; or any motion, for its peak. Its vertical component counts, too.
-
-    Returns
-    -------
-    tuple of str
-        Sentences.
-
     Examples
     --------
     >>> from rocking import Motion
@@ -178,16 +168,6 @@ def hazard_notes(intensity: Floats, measure: Measure) -> tuple[str, ...]:
 def block_notes(block: Block) -> tuple[Message | str, ...]:
     """Return what looks like a mistake in the sizes or the sides of a block; empty if nothing does.
 
-    Parameters
-    ----------
-    block : Block
-        The block.
-
-    Returns
-    -------
-    tuple of Message or str
-        Sentences.
-
     Examples
     --------
     >>> from rocking import Block
@@ -235,18 +215,6 @@ def density_notes(densities: Sequence[float | None]) -> tuple[str, ...]:
 
 def restraint_notes(body: RestrainedBlock, top: float | None = None) -> tuple[str, ...]:
     """Return what looks like a mistake in the restraints of a block; empty if nothing does.
-
-    Parameters
-    ----------
-    body : RestrainedBlock
-        The block.
-    top : float, optional
-        Its height, m, where it is known.
-
-    Returns
-    -------
-    tuple of str
-        Sentences.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Bodies, a motion and the rules of a simulation, as the records and arrays that kernels take."""
+"""Bodies, a motion and the settings of a simulation, as the records and arrays that kernels take."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def thresholds_of(bodies: Bodies, model: Model) -> tuple[Floats, Floats]:
     """
     made = bodies.kernel_records(model, np.zeros((len(bodies), 2)))
     own = bodies.gravity * made["threshold"]
-    return own + bodies.gravity * made["hold"], own
+    return own + bodies.gravity * made["restraint_threshold"], own
 
 
 def one_body(body: Body) -> Body:
@@ -127,7 +127,7 @@ def set_start(
         and not np.count_nonzero(stops)
     ):
         return
-    facing, one_sided = records["facing"], records["entered"][:, 0] == 0
+    facing, one_sided = records["two_stops"], records["next_side"][:, 0] == 0
     if coordinate is None:
         coordinate = np.clip(0.0, stops[:, 0], np.where(facing, stops[:, 1], np.inf))
     if not isinstance(rate, np.ndarray):  # arrays have been checked; in them a body may have fallen
@@ -137,13 +137,13 @@ def set_start(
     sign = np.where(one_sided, 1.0, np.sign(np.where(from_plus == 0.0, speed, from_plus)))
     at_other = facing & (at == stops[:, 1])
     u, v = np.where(at_other, 0.0, sign * from_plus), np.where(at_other, -speed, sign * speed)
-    wrong = one_sided & ((u < 0.0) | (facing & (u > records["fallen"])) | ((u == 0.0) & (v < 0.0)))
+    wrong = one_sided & ((u < 0.0) | (facing & (u > records["overturn_angle"])) | ((u == 0.0) & (v < 0.0)))
     if np.any(wrong):
         _refuse_behind(bodies, int(np.argmax(wrong)), at, speed, u, name)
     side = np.where((sign < 0.0) | at_other, 1, 0)
     at_rest = (u == 0.0) & (v == 0.0)
     states["side"] = np.where(at_rest, np.where(facing, -1 - side, state.AT_REST), side)
-    states["u"], states["v"], states["peak"] = u, v, np.where(at_other, records["fallen"], u)
+    states["u"], states["v"], states["peak"] = u, v, np.where(at_other, records["overturn_angle"], u)
 
 
 def highest(states: state.Records, records: state.Records, stops: Floats) -> Floats:
@@ -152,9 +152,9 @@ def highest(states: state.Records, records: state.Records, stops: Floats) -> Flo
     One at the second stop has been across from the first.
     """
     peaks: Floats = states["peak"] + stops[..., 0]
-    if not records["facing"].any():
+    if not records["two_stops"].any():
         return peaks
-    return np.where(records["facing"] & (states["peak"] >= records["fallen"]), stops[..., 1], peaks)
+    return np.where(records["two_stops"] & (states["peak"] >= records["overturn_angle"]), stops[..., 1], peaks)
 
 
 def _check_start(
@@ -162,7 +162,7 @@ def _check_start(
 ) -> None:
     """Check the coordinate and the rate of one body, or of all; numbers of Python's own are the quickest to check."""
     plain = type(coordinate) is float and type(rate) is float and math.isfinite(coordinate) and abs(rate) <= FASTEST
-    fallen = np.where(records["facing"], np.inf, records["fallen"]).min()
+    fallen = np.where(records["two_stops"], np.inf, records["overturn_angle"]).min()
     if plain and abs(coordinate) < fallen:
         return
     kind = bodies[0].coordinate
@@ -206,10 +206,10 @@ def never_rests(bodies: Bodies) -> bool:
     return bool(np.count_nonzero(e[:, 0] * e[:, 1] == 1.0))
 
 
-def rules_of(
+def settings_of(
     bodies: Bodies, model: Model, treatment: Treatment, duration: float | None, *, record: bool
 ) -> state.Record:
-    """Return the rules of a simulation, checked; its end must be given where nothing comes to rest."""
+    """Return the settings of a simulation, checked; its end must be given where nothing comes to rest."""
     checks.one_of(model, "model", InvalidOption, MODELS)
     if duration is None:
         if never_rests(bodies):
@@ -219,12 +219,12 @@ def rules_of(
     else:
         duration = checks.positive(duration, "duration", InvalidOption, "s")
     return state.record(
-        state.RULES,
+        state.SETTINGS,
         nonlinear=model == "nonlinear",
         treatment=treatment.code,
         tolerance=treatment.bracket,
         stop=math.inf if duration is None else duration,
-        endless=duration is None,
+        no_end_time=duration is None,
         record=record,
     )
 

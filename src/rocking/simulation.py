@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.arrays import Floats
-from rocking.body import Bodies, Body
+from rocking.body import Body
 from rocking.constants import Model
-from rocking.engine import SLICE, check_components, slices
+from rocking.engine import SLICE, Setup, slices
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.march import march
 from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
-from rocking.problem import ground_of, highest, one_body, rules_of, set_start
+from rocking.problem import ground_of, highest, one_body, set_start
 from rocking.records.named import one_motion
 from rocking.response import Response, Solution
 from rocking.treatment import Treatment, treatment
@@ -113,13 +113,13 @@ def response_to(
     A ``factor`` scales the motion and the initial state; the response keeps the motion as it is.
     """
     how, alone, motion = treatment(chattering), one_body(block).alone(), one_motion(motion)
-    check_components(alone, motion)
-    rules = rules_of(alone, model, how, duration, record=True)
-    records = alone.kernel_records(model, how.limits(alone, motion, model, factor))
-    lay_out = ground_of if factor == 1.0 else ground_of.__wrapped__  # repeated simulations leave the cache as it is
-    trail = Trail(lay_out(motion, block.gravity, factor), records[0], rules, NO_NODES)
-    at = initial if factor == 1.0 else _scaled(initial, factor, records, alone.stops[0])
-    start = started(alone, records, *at, name)
+    setup, ground = Setup(alone, model, how, duration, initial), None
+    if factor != 1.0:  # repeated simulations leave the cache as it is
+        ground = ground_of.__wrapped__(motion, block.gravity, factor)
+    run = setup.run(motion, factor, record=True, ground=ground, name=name)
+    if factor != 1.0:
+        set_start(run.states, run.records, alone, *_scaled(initial, factor, run.records, alone.stops[0]), name)
+    trail, start = Trail(run.ground, run.records[0], run.settings, NO_NODES), run.states[0]
     ending, table = marched(trail, start)
     if ending == state.Ending.BALANCED:
         raise InvalidOption("the block balances on its corner for ever; give {} or another initial state", "duration")
@@ -139,8 +139,8 @@ def response_to(
         duration=float(start["end"]),
         events=_events(events),
         impacts=_public(table["impact"][: start["impacts"]], _IMPACT),
-        stalled=int(start["stalled"]),
-        near_ties=int(start["near_ties"]),
+        stalled=int(start["rests_by_rounding"]),
+        near_ties=int(start["rounding_decisions"]),
         solution=Solution(
             trail=trail._replace(nodes=state.attributed(np.array(table["node"][: start["nodes"]]))),
             sequences=_public(table["sequence"][: start["sequences"]], _CHATTERING),
@@ -155,37 +155,28 @@ def _scaled(initial: tuple[float, float], factor: float, records: state.Records,
     coordinate, rate = initial
     if coordinate in stops:
         return coordinate, factor * rate
-    fallen = math.nextafter(float(records["fallen"].min()), 0.0)
+    fallen = math.nextafter(float(records["overturn_angle"].min()), 0.0)
     distance = factor * (coordinate - float(stops[0]))
     return float(stops[0]) + min(max(distance, -fallen), fallen), factor * rate
 
 
 def marched(trail: Trail, start: state.Record) -> tuple[int, state.Records]:
     """How a march ends, in slices so that an interrupt is seen; and its table, which grows as it is filled."""
-    ground, block, rules, _ = trail
+    ground, block, settings, _ = trail
     table = state.new_table(128 + int(_FIRST_ROWS * len(ground.pieces)))
     scratch = state.new_scratch()
     ending: int = state.Ending.PAUSED
     for _ in range(slices(ground)):
         start["budget"] = SLICE
-        ending = march(ground, block, rules, table, scratch, start)
+        ending = march(ground, block, settings, table, scratch, start)
         while ending == state.Ending.FULL:
             table = state.grown(table)
-            ending = march(ground, block, rules, table, scratch, start)
+            ending = march(ground, block, settings, table, scratch, start)
         if ending != state.Ending.PAUSED:
             return ending, table
     start["end"] = table["node"]["time"][start["nodes"] - 1]
     start["ending"] = state.Ending.UNFINISHED
     return state.Ending.UNFINISHED, table
-
-
-def started(
-    bodies: Bodies, records: state.Records, rotation: float, velocity: float, name: str | None = None
-) -> state.Record:
-    """State at time zero of one body, of which there are ``bodies`` and ``records``; ``name`` as of `set_start`."""
-    states = state.new_states(1, 0)
-    set_start(states, records, bodies, rotation, velocity, name)
-    return states[0]
 
 
 def _public(rows: state.Records, dtype: np.dtype[np.void]) -> NDArray[np.void]:

@@ -177,7 +177,7 @@ class AsymptoticTime(Treatment):
 
     def limits(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
         """Chattering time of every side, s; infinite where chattering is not complete."""
-        from rocking.kernels.sine.eq65 import eq65_time
+        from rocking.kernels.sine.series import eq65_time
 
         if motion is None or motion.description.family != "sine":
             raise InvalidOption(

@@ -244,11 +244,11 @@ class Blocks:
         made["slenderness"] = alpha
         made["sine"], made["cosine"] = np.sin(alpha), np.cos(alpha)
         made["threshold"] = alpha if model == "linear" else np.tan(alpha)
-        made["gain"] = p * p if model == "linear" else p * p * np.cos(alpha)
+        made["threshold_slope"] = p * p if model == "linear" else p * p * np.cos(alpha)
         made["restitution"] = self.restitution
         made["limit"] = limits
-        made["entered"] = (1, 0)
-        made["fallen"] = 0.5 * math.pi
+        made["next_side"] = (1, 0)
+        made["overturn_angle"] = 0.5 * math.pi
         if self.terms:
             self._add_terms(made, model)
         return made
@@ -257,11 +257,11 @@ class Blocks:
         """Add what restraints do to records of free blocks."""
         term, p, sine, cosine = self.terms, self.p, made["sine"], made["cosine"]
         one_way = term["one_sided"] > 0.0
-        made["entered"][one_way] = 0
+        made["next_side"][one_way] = 0
         made["threshold"][:, 1] = np.where(one_way[:, 1], math.inf, made["threshold"][:, 1])
-        made["least"], made["slope"] = term["restitution_least"], term["restitution_slope"]
+        made["min_restitution"], made["restitution_slope"] = term["restitution_least"], term["restitution_slope"]
         made["seed"] = term["restitution_seed"][:, 0]
-        made["varying"] = (made["seed"] >= 0) | np.any(made["slope"] > 0.0, axis=1)
+        made["variable_restitution"] = (made["seed"] >= 0) | np.any(made["restitution_slope"] > 0.0, axis=1)
         made["prestress"], made["spring"], made["damping"] = (
             p * p * term["prestress"],
             p * p * term["spring"],
@@ -272,7 +272,7 @@ class Blocks:
         # A moment that only a tendon without prestress makes is zero there, whatever rounding says.
         at_zero[np.abs(at_zero) <= 1e-14 * (np.abs(term["sine"] * sine) + np.abs(term["cosine"] * cosine))] = 0.0
         across = 1.0 if model == "linear" else cosine  # of the gain over p^2
-        made["hold"] = (at_zero + term["prestress"]) / across
+        made["restraint_threshold"] = (at_zero + term["prestress"]) / across
         if model == "linear":
             made["added_weight"], made["added_push"] = slope, at_zero - self.alpha * slope
         else:
@@ -283,19 +283,23 @@ class Blocks:
                 ("weight", "added_weight"),
                 ("push", "added_push"),
                 ("prestress", "prestress"),
-                ("hold", "hold"),
+                ("restraint_threshold", "restraint_threshold"),
             ):
                 made[f"base_{name}"] = made[field]
             made["tendon"] = p * p * term["stiffness"]
-            made["opening"], made["yields"], made["slack"] = term["opening"], term["yields"][:, 0], term["slack"][:, 0]
+            made["lever_arm"], made["yields"], made["slack"] = (
+                term["opening"],
+                term["yields"][:, 0],
+                term["slack"][:, 0],
+            )
             stiff, at_rest = term["stiffness"] * term["opening"], -term["stiffness"] * term["slack"]
             made["tendon_weight"] = -stiff * (1.0 if model == "linear" else cosine)
             made["tendon_push"] = stiff * (self.alpha if model == "linear" else sine)
             made["added_weight"] += made["tendon_weight"]
             made["added_push"] += made["tendon_push"]
             made["prestress"] += p * p * at_rest
-            made["hold"] += at_rest / across
-        names = ("hold", "added_weight", "added_push", "prestress", "spring", "damping", "tendon")
+            made["restraint_threshold"] += at_rest / across
+        names = ("restraint_threshold", "added_weight", "added_push", "prestress", "spring", "damping", "tendon")
         made["restrained"] = np.any([np.any(made[name] != 0.0, axis=1) for name in names], axis=0)
 
     @property

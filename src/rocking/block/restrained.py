@@ -183,7 +183,7 @@ class RestrainedBlock:
         """Ground accelerations, m/s^2, that lift it to side + (when -a passes the first) and to side -."""
         checks.one_of(model, "model", InvalidOption, MODELS)
         made = self.alone().kernel_records(model, np.zeros((1, 2)))
-        plus, minus = (self.gravity * (made["threshold"] + made["hold"])[0]).tolist()
+        plus, minus = (self.gravity * (made["threshold"] + made["restraint_threshold"])[0]).tolist()
         return plus, minus
 
     @property

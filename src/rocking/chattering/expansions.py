@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from rocking import checks
 from rocking.arrays import Flags, Floats
 from rocking.errors import InvalidOption
-from rocking.kernels.sine.eq65 import eq65_sums, eq65_terms
-from rocking.kernels.sine.series import phase_coefficients
+from rocking.kernels.sine.series import eq65_sums, eq65_terms, phase_coefficients
 
 #: Frequencies (forcing over the block's p) for which double precision resolves the problem.
 LOWEST_FREQUENCY: Final = 1e-6

@@ -204,7 +204,7 @@ def _stays(
 ) -> bool:
     """Whether states off the middle of a neighbourhood come nearer to it, on the same side and as it does itself."""
     side, u, v = middle
-    if np.any(u + offsets[:, 0] >= strobe._records["fallen"][0]):
+    if np.any(u + offsets[:, 0] >= strobe._records["overturn_angle"][0]):
         return False
     here = offsets[u + offsets[:, 0] > 0.0]
     if len(here) == 0:

@@ -173,12 +173,12 @@ class LinearBodies:
         made["stiffness"] = laws[:, :1]
         made["damping"] = laws[:, 1:2]
         made["restrained"] = laws[:, 1] > 0.0
-        made["gain"] = self.gravity
+        made["threshold_slope"] = self.gravity
         made["threshold"] = np.array([each.uplift_thresholds() for each in self.members]) / self.gravity
         made["restitution"] = self.restitution
-        made["facing"] = facing
-        made["entered"][:, 1] = facing
-        made["fallen"] = laws[:, 4] - laws[:, 3]
+        made["two_stops"] = facing
+        made["next_side"][:, 1] = facing
+        made["overturn_angle"] = laws[:, 4] - laws[:, 3]
         made["limit"] = limits
         return made
 

@@ -15,13 +15,14 @@ from rocking.block.sides import in_line
 from rocking.body import Body
 from rocking.constants import MODELS, Model
 from rocking.dynamics.bodies import LinearBody
+from rocking.engine import Setup
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
 from rocking.kernels import state
 from rocking.kernels.ground import Ground, ground_of
 from rocking.kernels.periodic import Fate, Setting, step_rows
 from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
-from rocking.problem import FASTEST, one_body, rules_of, set_start
+from rocking.problem import FASTEST, one_body, set_start
 from rocking.records.named import one_motion
 from rocking.treatment import Treatment, treatment
 
@@ -60,16 +61,17 @@ class PeriodicForcing:
         self.period = float(self.motion.breakpoints[-1] - self.motion.breakpoints[0])
         if not np.max(np.abs(self.motion.coefficients[:, 0])) < _BEYOND_ALL * self.body.gravity:
             raise InvalidMotion(f"the motion is beyond all sense; maps take accelerations below {_BEYOND_ALL:g} g")
-        limits = self.treatment.limits(self.bodies, self.motion, self.model)
-        self._records = self.bodies.kernel_records(self.model, limits)
+        self._ground = repeated(self.motion, self.body.gravity)
+        run = Setup(self.bodies, self.model, self.treatment, self.period).run(self.motion, ground=self._ground)
+        self._records, self._settings = run.records, run.settings
+        self._settings["stop"], self._settings["no_end_time"] = np.inf, True
         if np.any(self._records["yielding"]):
             raise InvalidBlock("a tendon that yields remembers; maps know what position and velocity tell")
-        if np.any(self._records["varying"] & (self._records["seed"] >= 0)):
+        if np.any(self._records["variable_restitution"] & (self._records["seed"] >= 0)):
             raise InvalidOption(
                 "a map takes a state to the same one each time, but this body draws its restitution at each impact: "
                 "give it a number, or one that falls with the speed"
             )
-        self._ground = repeated(self.motion, self.body.gravity)
         rows = step_rows(self._ground, self._records[0])
         self._steps = rows if self.model == "linear" else rows[:, :0]
 
@@ -77,9 +79,9 @@ class PeriodicForcing:
         return f"<{type(self).__name__}: {described(self.body)} under {described(self.motion)}; {self.model} model>"
 
     def _rules(self, *, record: bool) -> state.Record:
-        rules = rules_of(self.bodies, self.model, self.treatment, self.period, record=record)
-        rules["stop"], rules["endless"] = np.inf, True
-        return rules
+        settings = self._settings.copy()
+        settings["record"] = record
+        return settings
 
     def _setting(self) -> Setting:
         return Setting(self._ground, self._records[0], self._rules(record=False), state.new_table(0), self._steps)
@@ -101,8 +103,8 @@ class PeriodicForcing:
         given = self._pairs(states, name, self.body.coordinate.name)
         flat = given.reshape(-1, 2)
         (at, speed), record, (low, high) = flat.T, self._records[0], self.body.stops
-        if record["entered"][0] == 0:  # a stop, no ground on its other side
-            into = (at == low) & (speed < 0.0) | (bool(record["facing"]) & (at == high) & (speed > 0.0))
+        if record["next_side"][0] == 0:  # a stop, no ground on its other side
+            into = (at == low) & (speed < 0.0) | (bool(record["two_stops"]) & (at == high) & (speed > 0.0))
             if np.any(into):
                 x, v = float(at[into][0]), float(speed[into][0])
                 raise InvalidOption(
@@ -117,7 +119,7 @@ class PeriodicForcing:
     @property
     def _no_peak(self) -> float:
         """A highest rotation that asks for none: below the one at which a body has fallen by no more than rounding."""
-        fallen = float(self._records["fallen"][0])
+        fallen = float(self._records["overturn_angle"][0])
         return fallen if np.isinf(fallen) else fallen * _ALMOST
 
     def _pairs(self, values: ArrayLike, name: str, first: str) -> Floats:
@@ -148,7 +150,7 @@ class PeriodicForcing:
     def _is_two_sided(self) -> bool:
         """Whether the coordinate passes zero, or there is a second stop."""
         record = self._records[0]
-        return bool(record["facing"] or record["entered"][0] == 1)
+        return bool(record["two_stops"] or record["next_side"][0] == 1)
 
     @property
     def _loses_nothing(self) -> bool:
@@ -182,11 +184,11 @@ def scale_of(strobe: PeriodicForcing) -> Scale:
     if not isinstance(strobe.body, LinearBody):
         alpha = float(np.max(record["slenderness"]))
         return Scale(alpha, alpha * math.sqrt(float(np.max(np.abs(record["stiffness"])))))
-    pull = float(np.max(np.abs(record["gain"] * record["threshold"])[: 2 if record["facing"] else 1]))
+    pull = float(np.max(np.abs(record["threshold_slope"] * record["threshold"])[: 2 if record["two_stops"] else 1]))
     speed = period * max(mean_size(strobe.motion), pull, 1e-300)
     rate = math.sqrt(abs(float(record["stiffness"][0])))
-    if record["facing"]:
-        width = float(record["fallen"])
+    if record["two_stops"]:
+        width = float(record["overturn_angle"])
         return Scale(width, max(width * rate, width / period))
     return Scale(speed / max(rate, 1.0 / period), speed)
 

@@ -25,7 +25,8 @@ _NO_SPEED: Final = 1e-300
 
 #: Fields of a body's record that are a side's own.
 _OF_SIDES: Final = (
-    "stiffness", "gain", "threshold", "slenderness", "restitution", "least", "slope", "hold", "added_weight",
+    "stiffness", "threshold_slope", "threshold", "slenderness", "restitution", "min_restitution", "restitution_slope",
+    "restraint_threshold", "added_weight",
     "added_push", "prestress", "spring", "damping",
 )  # fmt: skip
 
@@ -324,7 +325,9 @@ class ImpactMap(PeriodicForcing):
         push = np.zeros(len(made))
         for column in self._ground.pieces[made["piece"]][:, :1:-1].T:
             push = push * made["offset"] + column
-        restoring = record["gain"][side] * (record["threshold"][side] + record["hold"][side] + _signs(side) * push)
+        restoring = record["threshold_slope"][side] * (
+            record["threshold"][side] + record["restraint_threshold"][side] + _signs(side) * push
+        )
         with np.errstate(invalid="ignore"):  # a velocity may be infinite
             return np.stack([made["v"], -restoring - record["damping"][side] * made["v"]], axis=-1)
 

@@ -299,7 +299,7 @@ def multipliers_at(strobe: StroboscopicMap, change: Floats) -> NDArray[np.comple
     record = strobe._records[0]
     if strobe._loses_nothing and not np.any(change):
         return np.ones(2, dtype=np.complex128)
-    if strobe._loses_nothing and not (record["varying"] or np.any(record["damping"])):
+    if strobe._loses_nothing and not (record["variable_restitution"] or np.any(record["damping"])):
         # By the rounding of many impacts the product of both would differ from 1, as if the orbit attracted.
         change = change / np.sqrt(np.abs(np.linalg.det(change)))
     found = np.linalg.eigvals(change).astype(np.complex128)
@@ -405,7 +405,7 @@ class _Search:
         if both:
             impacts = np.concatenate([impacts, impacts * [1.0, -1.0]])
         few = np.linspace(-0.9, 0.9, max(2, side // 4))
-        width = high - low if strobe._records[0]["facing"] else self.scale.coordinate
+        width = high - low if strobe._records[0]["two_stops"] else self.scale.coordinate
         at = 0.5 * (low + high) + 0.5 * width * few if both else low + width * (1.0 + few)
         between = np.stack(np.meshgrid(at, speed * few), axis=-1).reshape(-1, 2)
         rests = np.array([[stop, 0.0] for stop in {low, high}])
@@ -425,7 +425,7 @@ class _Search:
         if not math.isinf(min(strobe.body.balance)):
             return min(speed, _BLOCK_SPEED * self.scale.velocity + push)
         if float(record["stiffness"][0]) == 0.0:  # A ball flies for as long as its speed lets it.
-            pull = float(record["gain"][0] * record["threshold"][0])
+            pull = float(record["threshold_slope"][0] * record["threshold"][0])
             return min(speed, 0.5 * self.count * strobe.period * pull + push)
         return speed
 
@@ -434,14 +434,14 @@ class _Search:
         record, (low, high) = self.strobe._records[0], self.strobe.body.stops
         x, v = states.T
         fine: Flags = np.all(np.isfinite(states), axis=-1)
-        if self.strobe._is_two_sided and not record["facing"]:
-            return np.asarray(fine & (np.abs(x) < record["fallen"]))
-        if record["facing"]:
+        if self.strobe._is_two_sided and not record["two_stops"]:
+            return np.asarray(fine & (np.abs(x) < record["overturn_angle"]))
+        if record["two_stops"]:
             fine &= (x <= high) & ~((x == high) & (v > 0.0))
         return np.asarray(fine & (x >= low) & ~((x == low) & (v < 0.0)))
 
     def mapped(self, states: Floats, count: int) -> Floats:
-        """Rows of states, states after periods and the derivative, shape (n, 8); NaN for states that no body may have."""
+        """Rows of states, states after periods and the derivative, shape (n, 8); NaN where no body may be."""
         rows, fine = np.full((len(states), 8), np.nan), self._possible(states)
         after, change = self.strobe.derivative(states[fine], count)
         rows[:, :2], rows[fine, 2:4], rows[fine, 4:] = states, after, change.reshape(-1, 4)

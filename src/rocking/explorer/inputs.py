@@ -152,8 +152,8 @@ def texts_of(response: Response, uploads: UploadStore) -> dict[str, str]:
         texts["model"] = response.model
     if str(response.treatment) != str(treatment("certified")):
         texts["chattering"] = str(response.treatment)
-    rules = response.solution.trail.rules
-    if not rules["endless"]:
+    rules = response.solution.trail.settings
+    if not rules["no_end_time"]:
         texts["duration"] = repr(float(rules["stop"]))
     rotation, velocity = float(response.rotation(0.0)), float(response.angular_velocity(0.0))
     if rotation or velocity:

@@ -14,10 +14,10 @@ from rocking.arrays import Floats
 from rocking.kernels.arc import evaluate, expand, restoring, sign_of
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.ground import absolute_sums, has_vertical, vertical_of
-from rocking.kernels.recurrences import variation_coefficients
 from rocking.kernels.restitution import middle_factor
+from rocking.kernels.series import variation_coefficients
 from rocking.kernels.state import Record, Records, TendonLaw
-from rocking.kernels.tendon import adopt, plastic_after
+from rocking.kernels.tendon import apply_tendon_law, plastic_after
 from rocking.kernels.trace import (
     Quantity,
     Trail,
@@ -80,8 +80,8 @@ def adjoint(trail: Trail, scratch: Record, work: Record, row: int, time: float, 
                 change[0] += elongation_rate(trail, node.side, nodes[k + 1].u) * change[2]
                 change[2] = 0.0
                 plastic = plastic_at(trail, k)
-            adopt(block, node.law, plastic)
-        order, _, degree = expand(trail.ground, block, trail.rules, scratch, node, t)
+            apply_tendon_law(block, node.law, plastic)
+        order, _, degree = expand(trail.ground, block, trail.settings, scratch, node, t)
         if k < row and nodes[k + 1].u == 0.0 and t > 0.0:
             number -= is_impact(nodes, k)
             _, v, _ = evaluate(scratch.rotation, order, t)
@@ -112,10 +112,12 @@ def add_rounding(trail: Trail, scratch: Record, k: int, order: int, t: float, ch
     weight = 1.0 + abs(block.added_weight[side])
     if has_vertical(ground):
         weight += 0.5 * ground.columns * absolute_sums(vertical_of(ground), node.piece, end)[0]
-    force = block.gain[side] * (abs(block.threshold[side]) * weight + abs(block.hold[side]) + push)
+    force = block.threshold_slope[side] * (
+        abs(block.threshold[side]) * weight + abs(block.restraint_threshold[side]) + push
+    )
     force += (abs(block.stiffness[side]) * (weight + push) + abs(block.spring[side])) * height
     force = _ROUNDING * (force + abs(block.prestress[side]) + block.damping[side] * speed)
-    force += block.gain[side] * ground.error
+    force += block.threshold_slope[side] * ground.error
     change[3] += abs(change[0]) * (0.5 * _ROUNDING * (height + speed * t) + 0.5 * force * t * t)
     change[3] += abs(change[1]) * (0.5 * _ROUNDING * speed + force * t)
     change[3] += abs(change[0] * v + change[1] * w) * _ROUNDING * end
@@ -148,7 +150,7 @@ def back_through_impact(trail: Trail, k: int, v: float, number: int, change: Flo
     if change[0] == 0.0 and change[1] == 0.0:
         return True
     node, following = trail.nodes[k], trail.nodes[k + 1]
-    away = -1.0 if trail.block.facing and following.side != node.side else 1.0  # the other stop
+    away = -1.0 if trail.block.two_stops and following.side != node.side else 1.0  # the other stop
     if not (is_impact(trail.nodes, k) and away * v < 0.0):
         return False
     by_u = saltation(trail, node, following, Quantity.ROTATION, -1.0 / v, (0.0, -away * v), number)
@@ -158,7 +160,7 @@ def back_through_impact(trail: Trail, k: int, v: float, number: int, change: Flo
 
 
 @kernel
-def of_ending(trail: Trail, scratch: Record, row: int, change: Floats, out: Floats) -> int:
+def adjoint_of_final_state(trail: Trail, scratch: Record, row: int, change: Floats, out: Floats) -> int:
     """Write how the time at which the step of a row ends changes with the state before it; returns the `Ends`.
 
     That is at the end of the step, before an impact or an overturning, else at its node. What the time of an uplift or
@@ -168,7 +170,7 @@ def of_ending(trail: Trail, scratch: Record, row: int, change: Floats, out: Floa
     node, following = nodes[row], nodes[row + 1]
     plastic = plastic_at(trail, row)
     if block.yielding:
-        adopt(block, node.law, plastic)
+        apply_tendon_law(block, node.law, plastic)
     if node.side < 0:
         side, rate = following.side, -push_rate(trail.ground, block, following.side, following.piece, following.offset)
         if row > 0 and following.time == node.time:
@@ -177,13 +179,13 @@ def of_ending(trail: Trail, scratch: Record, row: int, change: Floats, out: Floa
             return Ends.START
         if not rate > 0.0:
             return Ends.TOUCHES_THRESHOLD
-        change[2] = restoring_by_tendon(block, side, plastic, 1.0) / (block.gain[side] * rate)
+        change[2] = restoring_by_tendon(block, side, plastic, 1.0) / (block.threshold_slope[side] * rate)
         add_instant(trail, following, (sign_of(side) / rate, block.threshold[side] / rate), out)
     elif following.side < 0:
         by_rest(trail, node, plastic, change, out)
     else:
         t = elapsed(trail, node, following)
-        order, _, _ = expand(trail.ground, block, trail.rules, scratch, node, t)
+        order, _, _ = expand(trail.ground, block, trail.settings, scratch, node, t)
         _, v, _ = evaluate(scratch.rotation, order, t)
         if v == 0.0:
             return Ends.GRAZES
@@ -195,7 +197,7 @@ def of_ending(trail: Trail, scratch: Record, row: int, change: Floats, out: Floa
 def by_rest(trail: Trail, node: Record, plastic: float, change: Floats, out: Floats) -> None:
     """Write the change of the time of rest after the impact with which a node begins: `trace.rest_shift`, by parts."""
     block, i = trail.block, node.side
-    j = block.entered[i]
+    j = block.next_side[i]
     g_i = restoring(trail.ground, block, i, node.piece, node.offset)
     g_j = restoring(trail.ground, block, j, node.piece, node.offset)
     e_i, e_j = middle_factor(block, i, node.v), middle_factor(block, j, node.v)
@@ -203,13 +205,13 @@ def by_rest(trail: Trail, node: Record, plastic: float, change: Floats, out: Flo
     by_speed = share * (1.0 / g_i + e_i / g_j)
     by_g_i, by_g_j = -share * node.v / (g_i * g_i), -share * node.v * e_i / (g_j * g_j)
     later = 1.0 - by_speed * g_i  # by the shift of the impact
-    later += by_g_i * block.gain[i] * push_rate(trail.ground, block, i, node.piece, node.offset)
-    later += by_g_j * block.gain[j] * push_rate(trail.ground, block, j, node.piece, node.offset)
+    later += by_g_i * block.threshold_slope[i] * push_rate(trail.ground, block, i, node.piece, node.offset)
+    later += by_g_j * block.threshold_slope[j] * push_rate(trail.ground, block, j, node.piece, node.offset)
     change[0], change[1] = -later / node.v, by_speed
     change[2] = by_g_i * restoring_by_tendon(block, i, plastic, 1.0) + by_g_j * restoring_by_tendon(
         block, j, plastic, 1.0
     )
-    by_i, by_j = by_g_i * block.gain[i], by_g_j * block.gain[j]
+    by_i, by_j = by_g_i * block.threshold_slope[i], by_g_j * block.threshold_slope[j]
     push = by_i * sign_of(i) + by_j * sign_of(j)
     add_instant(trail, node, (push, by_i * block.threshold[i] + by_j * block.threshold[j]), out)
 
@@ -240,7 +242,7 @@ def plastic_at(trail: Trail, row: int) -> float:
         return 0.0
     while row > 0 and not turns_back(trail.nodes, row):
         row -= 1
-    return plastic_after(trail.block, trail.rules, trail.nodes, row, 0.0)
+    return plastic_after(trail.block, trail.settings, trail.nodes, row, 0.0)
 
 
 @inlined
@@ -283,20 +285,20 @@ def back_through(
         return
     x[0], x[1] = change[1], drag * change[1] - change[0]
     variation_coefficients(work, -drag, order)
-    lam, gain, threshold = block.stiffness[node.side], block.gain[node.side], block.threshold[node.side]
+    lam, gain, threshold = block.stiffness[node.side], block.threshold_slope[node.side], block.threshold[node.side]
     m = work.forcing
     for k in range(order - 1):  # times d u'' / d A, of the horizontal motion in the frame of the side
         m[k] = -gain * x[k]
-        if trail.rules.nonlinear:
+        if trail.settings.nonlinear:
             m[k] = 0.0
             for j in range(k + 1):
                 m[k] -= lam * x[j] * scratch.cosine[k - j]
     add_moments(scratch.other, m, order, node.offset, t, sign_of(node.side), out[node.piece, : ground.columns])
     if has_vertical(ground):
         for k in range(order - 1):  # times d u'' / d W
-            m[k] = 0.0 if trail.rules.nonlinear else -gain * threshold * x[k]
+            m[k] = 0.0 if trail.settings.nonlinear else -gain * threshold * x[k]
             for j in range(k + 1):
-                m[k] += lam * x[j] * (-scratch.sine[k - j] if trail.rules.nonlinear else scratch.rotation[k - j])
+                m[k] += lam * x[j] * (-scratch.sine[k - j] if trail.settings.nonlinear else scratch.rotation[k - j])
         add_moments(scratch.other, m, order, node.offset, t, 1.0, out[node.piece, ground.columns :])
     if block.yielding and node.law == TendonLaw.ELASTIC:
         plastic_series(trail, scratch, node.side, x, order, m)
@@ -308,8 +310,8 @@ def plastic_series(trail: Trail, scratch: Record, side: int, x: Floats, order: i
     """Write x times d u'' / d plastic into m."""
     stiffness = trail.block.tendon[side]
     for k in range(order - 1):
-        m[k] = 0.0 if trail.rules.nonlinear else stiffness * x[k]
-        for j in range(k + 1 if trail.rules.nonlinear else 0):
+        m[k] = 0.0 if trail.settings.nonlinear else stiffness * x[k]
+        for j in range(k + 1 if trail.settings.nonlinear else 0):
             m[k] += stiffness * x[j] * scratch.half_cosine[k - j]
 
 

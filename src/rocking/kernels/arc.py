@@ -11,25 +11,23 @@ import numpy as np
 from rocking.arrays import Floats
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.ground import Ground, acceleration, has_vertical, local_series, vertical_of
-from rocking.kernels.recurrences import (
-    INTEGRATED_TWICE,
-    angle_coefficients,
-    linear_coefficients,
-    nonlinear_coefficient,
-    weighted_coefficient,
-)
 from rocking.kernels.restrained import expand_restrained, restrained_step
-from rocking.kernels.state import ORDER, Record
-from rocking.kernels.truncation import (
+from rocking.kernels.series import (
+    INTEGRATED_TWICE,
     NEGLIGIBLE,
     SHORTENINGS,
     SMALLEST,
     TRUNCATION,
+    angle_coefficients,
+    linear_coefficients,
+    nonlinear_coefficient,
     shortened_linear,
     shortening,
     truncation_linear,
     truncation_nonlinear,
+    weighted_coefficient,
 )
+from rocking.kernels.state import ORDER, Record
 
 #: First step from an impact, over the arc's duration under constant acceleration.
 _FIRST_STEP = 1.3
@@ -44,8 +42,8 @@ def sign_of(side: int) -> float:
 @inlined
 def restoring(ground: Ground, block: Record, side: int, piece: int, offset: float) -> float:
     """Restoring acceleration of a side at zero rotation."""
-    standing = block.threshold[side] * weight_at(ground, piece, offset) + block.hold[side]
-    return block.gain[side] * (standing + sign_of(side) * acceleration(ground, piece, offset))
+    standing = block.threshold[side] * weight_at(ground, piece, offset) + block.restraint_threshold[side]
+    return block.threshold_slope[side] * (standing + sign_of(side) * acceleration(ground, piece, offset))
 
 
 @inlined
@@ -65,7 +63,7 @@ def weight_series(ground: Ground, piece: int, offset: float, W: Floats) -> int:
 
 @shared
 def expand(
-    ground: Ground, block: Record, rules: Record, scratch: Record, state: Record, left: float
+    ground: Ground, block: Record, settings: Record, scratch: Record, state: Record, left: float
 ) -> tuple[int, float, int]:
     """Series of the arc from a state into scratch, for a time of at most ``left``; returns (order, step, degree).
 
@@ -78,9 +76,9 @@ def expand(
     if has_vertical(ground):
         degree = raise_degree(scratch.ground, degree, scratch.weight, changes)
     if block.restrained:
-        order, h = expand_restrained(block, rules, state, scratch, (degree, changes), h)
+        order, h = expand_restrained(block, settings, state, scratch, (degree, changes), h)
         return order, h, degree
-    if rules.nonlinear:
+    if settings.nonlinear:
         order, h = expand_nonlinear(block, state, scratch, (degree, changes), h)
         return order, h, degree
     if has_vertical(ground):

@@ -129,10 +129,10 @@ def unproven() -> Proof:
 
 
 @shared
-def prove_rest(ground: Ground, block: Record, rules: Record, scratch: Record, state: Record) -> Proof:
+def prove_rest(ground: Ground, block: Record, settings: Record, scratch: Record, state: Record) -> Proof:
     """Bracket on the time to rest from the state after an impact; all NaN: no proof."""
     v, i = state.v, state.side
-    j = block.entered[i]
+    j = block.next_side[i]
     e_i, e_j = block.restitution[i], block.restitution[j]
     g_i = restoring(ground, block, i, state.piece, state.offset)
     g_j = restoring(ground, block, j, state.piece, state.offset)
@@ -142,8 +142,8 @@ def prove_rest(ground: Ground, block: Record, rules: Record, scratch: Record, st
     # The rounding of the times decides on which side of a jump of the motion the window ends.
     rounding = ROUNDING * (start_of(ground, state.piece) + state.offset)
     motion = bounds_on_motion(ground, block, state, window + rounding, scratch)
-    first = side_bounds(block, rules, i, motion)
-    second = side_bounds(block, rules, j, motion)
+    first = side_bounds(block, settings, i, motion)
+    second = side_bounds(block, settings, j, motion)
     drag = max(block.damping[i], block.damping[j]) * _FASTEST * v * (1.0 + ROUNDING)
     if drag > 0.0:
         first, second = with_drag(first, drag), with_drag(second, drag)
@@ -151,7 +151,7 @@ def prove_rest(ground: Ground, block: Record, rules: Record, scratch: Record, st
         fastest = e_i * math.sqrt(gained) * v
         if not (gained <= _GAINED and e_i * e_i * gained * (1.0 + arc_bounds(fastest, second)[0]) <= _GAINED):
             return unproven()
-    fastest = fastest_impact(v, first, second, e_i) if block.varying else v
+    fastest = fastest_impact(v, first, second, e_i) if block.variable_restitution else v
     least_e = least_factor(block, i, fastest), least_factor(block, j, fastest)
     lower, upper = geometric_bracket(v, first, second, (e_i, e_j), least_e)
     if not upper <= window:
@@ -160,19 +160,19 @@ def prove_rest(ground: Ground, block: Record, rules: Record, scratch: Record, st
     height = v * v * (1.0 + 2.0 * change / least) / least
     if has_vertical(ground) and not is_greatest_at_zero(block, height):
         return unproven()
-    if (block.facing and height >= block.fallen) or (
-        block.yielding and may_change_below(block, rules, state.plastic, height)
+    if (block.two_stops and height >= block.overturn_angle) or (
+        block.yielding and may_change_below(block, settings, state.plastic, height)
     ):
         return unproven()
-    local_series(ground, state.piece, state.offset, 1.0, clear(scratch.ground))
-    weight_series(ground, state.piece, state.offset, clear(scratch.weight))
+    local_series(ground, state.piece, state.offset, 1.0, set_zero(scratch.ground))
+    weight_series(ground, state.piece, state.offset, set_zero(scratch.weight))
     horizon = Horizon(motion, ground.error, ground.columns, upper, height, drag)
-    side_i = restoring_parabola(block, rules, i, scratch, horizon)
-    side_j = restoring_parabola(block, rules, j, scratch, horizon)
-    if block.varying:
+    side_i = restoring_parabola(block, settings, i, scratch, horizon)
+    side_j = restoring_parabola(block, settings, j, scratch, horizon)
+    if block.variable_restitution:
         side_i = with_restitution(side_i, middle_factor(block, i, fastest))
         side_j = with_restitution(side_j, middle_factor(block, j, fastest))
-    elif upper - lower > rules.tolerance and upper + rounding <= length_of(ground, state.piece) - state.offset:
+    elif upper - lower > settings.tolerance and upper + rounding <= length_of(ground, state.piece) - state.offset:
         refined = refined_bracket(v, side_i, side_j, upper)
         if refined[1] >= refined[0]:
             lower, upper = max(lower, refined[0]), min(upper, refined[1])
@@ -196,8 +196,11 @@ def bounds_on_motion(ground: Ground, block: Record, state: Record, window: float
         exact = bounds_over(vertical_of(ground), state.piece, state.offset, window, limits, scratch.ground)
         vertical = widened(exact, ground.error)
     weight = 1.0 + vertical.high
-    limits = (-block.threshold[0] * weight - block.hold[0], block.threshold[1] * weight + block.hold[1])
-    if block.facing:  # the other stop is out of reach
+    limits = (
+        -block.threshold[0] * weight - block.restraint_threshold[0],
+        block.threshold[1] * weight + block.restraint_threshold[1],
+    )
+    if block.two_stops:  # the other stop is out of reach
         limits = (limits[0], np.inf) if state.side == 0 else (-np.inf, limits[1])
     horizontal = bounds_over(ground, state.piece, state.offset, window, limits, scratch.ground)
     return MotionBounds(widened(horizontal, ground.error), vertical)
@@ -235,22 +238,24 @@ def with_drag(bounds: Bounds, drag: float) -> Bounds:
 
 
 @inlined
-def restoring_parabola(block: Record, rules: Record, j: int, scratch: Record, horizon: Horizon) -> Restoring:
+def restoring_parabola(block: Record, settings: Record, j: int, scratch: Record, horizon: Horizon) -> Restoring:
     """Side j from an impact on: its restoring acceleration as a parabola in time, its stiffness, and their error.
 
     ``scratch`` holds the ground acceleration and the weight about the impact.
     """
     A, W = scratch.ground, scratch.weight
-    sign, gain, threshold, lam = sign_of(j), block.gain[j], block.threshold[j], block.stiffness[j]
+    sign, gain, threshold, lam = sign_of(j), block.threshold_slope[j], block.threshold[j], block.stiffness[j]
     weight, push = W[0] + block.added_weight[j], sign * A[0] + block.added_push[j]
     horizontal, vertical = horizon.motion
     error = horizon.error + beyond_parabola(A, horizon)
     # Where almost no weight presses the block down, weight and push cancel, and the rounding of both remains.
-    error += ROUNDING * (abs(threshold) * (1.0 + largest(vertical)) + abs(block.hold[j]) + largest(horizontal))
+    error += ROUNDING * (
+        abs(threshold) * (1.0 + largest(vertical)) + abs(block.restraint_threshold[j]) + largest(horizontal)
+    )
     weight_changes = vertical.high > vertical.low
     weight_error = horizon.error + beyond_parabola(W, horizon) if weight_changes else 0.0
     weight_change = vertical.slope * horizon.window + 2.0 * horizon.error if weight_changes else 0.0
-    if not rules.nonlinear:
+    if not settings.nonlinear:
         stiffness = lam * weight - block.spring[j]
         error = gain * (error + abs(threshold) * weight_error) + horizon.drag
         if weight_changes:
@@ -261,10 +266,10 @@ def restoring_parabola(block: Record, rules: Record, j: int, scratch: Record, ho
         push_change = horizontal.slope * horizon.window + 2.0 * horizon.error
         change = lam * (sine * push_change + cosine * weight_change)
         curvature = (
-            lam * diagonal(heaviest(block, j, vertical), hardest(block, j, horizontal)) + 0.25 * block.prestress[j]
+            lam * diagonal(max_weight(block, j, vertical), max_push(block, j, horizontal)) + 0.25 * block.prestress[j]
         )
         error = deviation(lam * (error + weight_error) + horizon.drag, change, curvature, horizon.height)
-    g = gain * (threshold * W[0] + block.hold[j] + sign * A[0])
+    g = gain * (threshold * W[0] + block.restraint_threshold[j] + sign * A[0])
     rate, half_curvature = gain * (sign * A[1]), gain * (sign * A[2]) if horizon.columns > 2 else 0.0
     if weight_changes:
         rate += gain * threshold * W[1]
@@ -282,7 +287,7 @@ def beyond_parabola(A: Floats, horizon: Horizon) -> float:
 
 
 @inlined
-def clear(A: Floats) -> Floats:
+def set_zero(A: Floats) -> Floats:
     """Set the lowest coefficients of a polynomial to zero, and return it."""
     A[0] = A[1] = A[2] = 0.0
     return A
@@ -307,13 +312,13 @@ def largest_weight(vertical: Window) -> float:
 
 
 @inlined
-def heaviest(block: Record, j: int, vertical: Window) -> float:
+def max_weight(block: Record, j: int, vertical: Window) -> float:
     """Largest absolute value of the weight on side j with what restraints add to it."""
     return largest_weight(vertical) + abs(block.added_weight[j])
 
 
 @inlined
-def hardest(block: Record, j: int, horizontal: Window) -> float:
+def max_push(block: Record, j: int, horizontal: Window) -> float:
     """Largest absolute value of the push on side j with what restraints add to it."""
     return largest(horizontal) + abs(block.added_push[j])
 
@@ -325,27 +330,31 @@ def diagonal(a: float, b: float) -> float:
 
 
 @inlined
-def side_bounds(block: Record, rules: Record, j: int, motion: MotionBounds) -> Bounds:
+def side_bounds(block: Record, settings: Record, j: int, motion: MotionBounds) -> Bounds:
     """Bounds on side j, rounding included, for bounds on the motion."""
     horizontal, vertical = motion
     sign, threshold = sign_of(j), block.threshold[j]
     from_weight = (threshold * (1.0 + vertical.low), threshold * (1.0 + vertical.high))
     from_push = (sign * horizontal.low, sign * horizontal.high)
     push, weight = largest(horizontal), largest_weight(vertical)
-    rounding = ROUNDING * (abs(threshold) * weight + abs(block.hold[j]) + push)
+    rounding = ROUNDING * (abs(threshold) * weight + abs(block.restraint_threshold[j]) + push)
     # A rotation changes both models' stiffness and, in the nonlinear one, what the motion adds (at most p^2 a/g).
-    bend = heaviest(block, j, vertical)
+    bend = max_weight(block, j, vertical)
     spring = abs(block.spring[j])
-    if rules.nonlinear:
-        bend = diagonal(bend, hardest(block, j, horizontal))
+    if settings.nonlinear:
+        bend = diagonal(bend, max_push(block, j, horizontal))
         spring += 0.5 * abs(block.prestress[j])
     stiffness = (abs(block.stiffness[j]) * bend + spring) * (1.0 + ROUNDING)
-    per_push = (block.stiffness[j] if rules.nonlinear else block.gain[j]) * (1.0 + ROUNDING)
-    per_weight = block.gain[j] * threshold * (1.0 + ROUNDING)  # largest at zero rotation: `is_greatest_at_zero`
+    per_push = (block.stiffness[j] if settings.nonlinear else block.threshold_slope[j]) * (1.0 + ROUNDING)
+    per_weight = (
+        block.threshold_slope[j] * threshold * (1.0 + ROUNDING)
+    )  # largest at zero rotation: `is_greatest_at_zero`
     return Bounds(
         stiffness,
-        block.gain[j] * (from_weight[0] + block.hold[j] + min(from_push[0], from_push[1]) - rounding),
-        block.gain[j] * (from_weight[1] + block.hold[j] + max(from_push[0], from_push[1]) + rounding),
+        block.threshold_slope[j]
+        * (from_weight[0] + block.restraint_threshold[j] + min(from_push[0], from_push[1]) - rounding),
+        block.threshold_slope[j]
+        * (from_weight[1] + block.restraint_threshold[j] + max(from_push[0], from_push[1]) + rounding),
         per_push * (horizontal.high - horizontal.low) + per_weight * (vertical.high - vertical.low),
         per_push * horizontal.slope + per_weight * vertical.slope,
         per_push * horizontal.jumps + per_weight * vertical.jumps,

@@ -209,11 +209,11 @@ def apply_impact(block: Record, state: Record) -> float:
     """Impact: the angular speed drops and the side changes; returns the speed before."""
     left = state.side
     speed = max(0.0, -state.v)
-    state.side = block.entered[left]
-    if block.facing and state.u > 0.0:  # at the stop on the other side
+    state.side = block.next_side[left]
+    if block.two_stops and state.u > 0.0:  # at the stop on the other side
         left = state.side = 1 - left
         speed = max(0.0, state.v)
-        state.proof_speed = np.inf
+        state.certificate_speed = np.inf
     state.u = 0.0
     state.v = factor(block, left, speed, state.impacts) * speed
     state.impacts += 1

@@ -9,9 +9,8 @@ from typing import TypeVar
 import numpy as np
 
 from rocking.kernels.compiled import inlined, shared
-from rocking.kernels.recurrences import Line, nonlinear_rates, weighted_rates
+from rocking.kernels.series import Line, nonlinear_rates, strength_of, truncation_is_negligible, weighted_rates
 from rocking.kernels.state import Record
-from rocking.kernels.truncation import strength_of, truncation_is_negligible
 
 #: Lanes that step together. A constant, so that their loops have a fixed length.
 WIDTH = 32

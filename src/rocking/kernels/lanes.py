@@ -73,7 +73,8 @@ def pool_of(blocks: Records, states: Records, pieces: int, h: float, substeps: i
     first[0] = 0
     return Pool(
         blocks, states, step_constants(blocks, h, substeps), groups, first, following,
-        np.zeros(count, dtype=np.int64), record(COUNTS, waiting=count), new_table(0), float(blocks["fallen"].min()),
+        np.zeros(count, dtype=np.int64), record(COUNTS, waiting=count), new_table(0),
+        float(blocks["overturn_angle"].min()),
     )  # fmt: skip
 
 
@@ -96,8 +97,8 @@ def step_constants(blocks: Records, h: float, substeps: int) -> Records:
         return steps
     q = lam * h * h
     steps["stiffness"] = lam
-    steps["pull"] = blocks["gain"] * blocks["threshold"]
-    steps["push"] = blocks["gain"] * sign
+    steps["pull"] = blocks["threshold_slope"] * blocks["threshold"]
+    steps["push"] = blocks["threshold_slope"] * sign
     steps["first"] = h * stumpff(1, q)
     steps["second"] = h * h * stumpff(2, q)
     steps["third"] = h * h * h * stumpff(3, q)
@@ -116,7 +117,7 @@ def stumpff(k: int, q: Any) -> Floats:
 
 
 @inlined
-def load(pool: Pool, lane: int, index: int) -> None:
+def fill_lane(pool: Pool, lane: int, index: int) -> None:
     """Write a block's state and constants into a lane, but for its sine and cosine."""
     group, slot = pool.groups[lane // WIDTH], lane % WIDTH
     state, steps = pool.states[index], pool.steps[index]
@@ -145,7 +146,7 @@ def set_angles(pool: Pool, lane: int, index: int) -> None:
 
 
 @inlined
-def unload(ground: Ground, pool: Pool, lane: int, piece: int) -> int:
+def write_lane(ground: Ground, pool: Pool, lane: int, piece: int) -> int:
     """Write a lane's numbers into its block's state, at the start of a piece; returns the block's index.
 
     The highest rotation of a block that still rises is not in its state yet.
@@ -186,7 +187,7 @@ def move_block(pool: Pool, lane: int, to: int) -> None:
     peak = source.peak[i]
     target.sine[j] = source.sine[i]
     target.cosine[j] = source.cosine[i]
-    load(pool, to, index)
+    fill_lane(pool, to, index)
     target.peak[j] = peak
     empty(pool, lane)
 
@@ -195,34 +196,34 @@ def move_block(pool: Pool, lane: int, to: int) -> None:
 
 
 @kernel
-def run_lanes(ground: Ground, rules: Record, scratch: Record, pool: Pool, substeps: int) -> None:
+def run_lanes(ground: Ground, settings: Record, scratch: Record, pool: Pool, substeps: int) -> None:
     """March every block of a pool through a record of even samples, and on to its own end.
 
     ``substeps`` divide a sample: 0 in the linear model under a constant weight. Afterwards ``ending`` of every state
     is an `Ending`; RUNNING and PAUSED ones can be continued one by one.
     """
     piece = next_waited_for(pool, 0)
-    while piece < last_piece(ground) and start_of(ground, piece + 1) <= rules.stop:
-        step_groups(ground, rules, scratch, pool, piece, substeps)
-        compact(pool)
-        admit_waiting(ground, rules, scratch, pool, piece)
+    while piece < last_piece(ground) and start_of(ground, piece + 1) <= settings.stop:
+        step_groups(ground, settings, scratch, pool, piece, substeps)
+        drop_finished(pool)
+        admit_waiting(ground, settings, scratch, pool, piece)
         piece += 1
         if pool.counts.active == 0:
             if pool.counts.waiting == 0:
                 return
             piece = next_waited_for(pool, piece)
     for lane in range(pool.counts.active):
-        unload(ground, pool, lane, piece)
+        write_lane(ground, pool, lane, piece)
     for index in range(pool.blocks.shape[0]):
         if pool.states[index].ending == Ending.RUNNING:
-            march_until(ground, rules, scratch, pool, index, TO_THE_END)
+            march_until(ground, settings, scratch, pool, index, TO_THE_END)
 
 
 @kernel
-def march_each(ground: Ground, rules: Record, scratch: Record, pool: Pool) -> None:
+def march_each(ground: Ground, settings: Record, scratch: Record, pool: Pool) -> None:
     """March every block of a pool to its end, one after the other; ``ending`` of every state is then an `Ending`."""
     for index in range(pool.blocks.shape[0]):
-        march_until(ground, rules, scratch, pool, index, TO_THE_END)
+        march_until(ground, settings, scratch, pool, index, TO_THE_END)
 
 
 @inlined
@@ -234,41 +235,41 @@ def next_waited_for(pool: Pool, piece: int) -> int:
 
 
 @inlined
-def step_groups(ground: Ground, rules: Record, scratch: Record, pool: Pool, piece: int, substeps: int) -> None:
+def step_groups(ground: Ground, settings: Record, scratch: Record, pool: Pool, piece: int, substeps: int) -> None:
     """Move all lanes through one sample: together, or by a march where that may hold an event."""
     for first in range(0, pool.counts.active, WIDTH):
         group = pool.groups[first // WIDTH]
-        events = step_group(ground, rules, group, piece, substeps, pool.fallen)
+        events = step_group(ground, settings, group, piece, substeps, pool.fallen)
         slot = 0
         while events > 0:
             if group.event[slot] != 0:
-                march_sample(ground, rules, scratch, pool, piece, first + slot)
+                march_sample(ground, settings, scratch, pool, piece, first + slot)
                 events -= 1
             slot += 1
 
 
 @inlined
-def step_group(ground: Ground, rules: Record, group: Record, piece: int, substeps: int, fallen: float) -> int:
+def step_group(ground: Ground, settings: Record, group: Record, piece: int, substeps: int, fallen: float) -> int:
     """Step a group through one sample; returns in how many lanes that may hold an event."""
     push = (coefficient(ground, piece, 0), coefficient(ground, piece, 1))
     length, h = length_of(ground, piece), length_of(ground, 0)
     if has_vertical(ground):
         lift = vertical_of(ground)
         weight = (1.0 + coefficient(lift, piece, 0), coefficient(lift, piece, 1))
-        if rules.nonlinear:
+        if settings.nonlinear:
             return step_nonlinear(group, push, weight, length, h, substeps, fallen)
         return step_weighted(group, push, weight, length, substeps, fallen)
-    if rules.nonlinear:
+    if settings.nonlinear:
         return step_nonlinear(group, push, None, length, h, substeps, fallen)
     return step_linear(group, push, h, length - h, fallen)
 
 
 @inlined
-def march_sample(ground: Ground, rules: Record, scratch: Record, pool: Pool, piece: int, lane: int) -> None:
+def march_sample(ground: Ground, settings: Record, scratch: Record, pool: Pool, piece: int, lane: int) -> None:
     """March the block of a lane through one sample; it keeps its lane if it rocks on."""
-    index = unload(ground, pool, lane, piece)
-    if march_until(ground, rules, scratch, pool, index, piece + 1):
-        admit(rules, pool, lane, index)
+    index = write_lane(ground, pool, lane, piece)
+    if march_until(ground, settings, scratch, pool, index, piece + 1):
+        start_lane(settings, pool, lane, index)
     else:
         empty(pool, lane)
         pool.free[pool.counts.free] = lane
@@ -276,19 +277,19 @@ def march_sample(ground: Ground, rules: Record, scratch: Record, pool: Pool, pie
 
 
 @inlined
-def admit(rules: Record, pool: Pool, lane: int, index: int) -> None:
+def start_lane(settings: Record, pool: Pool, lane: int, index: int) -> None:
     """Let a lane carry a block."""
-    load(pool, lane, index)
-    if rules.nonlinear:
+    fill_lane(pool, lane, index)
+    if settings.nonlinear:
         set_angles(pool, lane, index)
 
 
 @inlined
-def march_until(ground: Ground, rules: Record, scratch: Record, pool: Pool, index: int, until: int) -> bool:
+def march_until(ground: Ground, settings: Record, scratch: Record, pool: Pool, index: int, until: int) -> bool:
     """March a block up to a piece; returns whether it rocks there, else it waits for the piece in which it does."""
     state = pool.states[index]
-    state.until = until
-    state.ending = march(ground, pool.blocks[index], rules, pool.table, scratch, state)
+    state.stop_piece = until
+    state.ending = march(ground, pool.blocks[index], settings, pool.table, scratch, state)
     if state.ending != Ending.RUNNING:
         return False
     if state.side >= 0 and state.piece == until and state.offset == 0.0:
@@ -300,7 +301,7 @@ def march_until(ground: Ground, rules: Record, scratch: Record, pool: Pool, inde
 
 
 @inlined
-def compact(pool: Pool) -> None:
+def drop_finished(pool: Pool) -> None:
     """Fill the lanes that have become free with the last ones."""
     while pool.counts.free > 0:
         pool.counts.free -= 1
@@ -311,13 +312,13 @@ def compact(pool: Pool) -> None:
 
 
 @inlined
-def admit_waiting(ground: Ground, rules: Record, scratch: Record, pool: Pool, piece: int) -> None:
+def admit_waiting(ground: Ground, settings: Record, scratch: Record, pool: Pool, piece: int) -> None:
     """March the blocks that wait for a piece through it, and admit those that rock at its end."""
     index = pool.first[piece]
     while index >= 0:
         following = pool.following[index]
         pool.counts.waiting -= 1
-        if march_until(ground, rules, scratch, pool, index, piece + 1):
-            admit(rules, pool, pool.counts.active, index)
+        if march_until(ground, settings, scratch, pool, index, piece + 1):
+            start_lane(settings, pool, pool.counts.active, index)
             pool.counts.active += 1
         index = following

@@ -32,14 +32,14 @@ _RULE = (
 
 
 @shared
-def leaning_at(block: Record, rules: Record, state: Record, rate: float) -> float:
+def leaning_at(block: Record, settings: Record, state: Record, rate: float) -> float:
     """Return the rotation about which a body leans for ever, at which nothing turns it; NaN where that is not proven.
 
     The highest rotation so far will not be exceeded by more than `PEAK` of itself. The body has the acceleration
     ``rate`` and goes out though it is pushed out, as where it has turned back in front of the ground, which no body
     that rocks does below its balance; or it has crept back to within `PEAK` of the rotation, with the speed of that.
     """
-    side, u, nonlinear = state.side, state.u, rules.nonlinear
+    side, u, nonlinear = state.side, state.u, settings.nonlinear
     drag = block.damping[side]
     if rate + drag * state.v <= 0.0 if state.v > 0.0 else rate < 0.0 or -state.v > PEAK * drag * u:
         return np.nan
@@ -51,7 +51,7 @@ def leaning_at(block: Record, rules: Record, state: Record, rate: float) -> floa
     below, low = barrier(block, body, u, 0.0)
     above, high = barrier(block, body, u, highest)
     least = min(rise(block, body, u, low), rise(block, body, u, high))
-    if math.isnan(below + above) or not (high < block.fallen and 0.5 * state.v * state.v < least):
+    if math.isnan(below + above) or not (high < block.overturn_angle and 0.5 * state.v * state.v < least):
         return np.nan
     middle = last_before(block, body, below, above)
     return np.nan if state.v < 0.0 and u > middle * (1.0 + PEAK) else middle
@@ -100,7 +100,7 @@ def rise(block: Record, body: tuple[bool, int, float], start: float, end: float)
             total += half * weight * moment_at(block, body, middle + half * node)
         low = upper
     size = abs(block.spring[side]) + abs(block.prestress[side]) + abs(block.base_prestress[side])
-    size += block.tendon[side] * (block.opening[side] + plastic + abs(block.slack))
+    size += block.tendon[side] * (block.lever_arm[side] + plastic + abs(block.slack))
     weight = 1.0 + abs(block.added_weight[side]) + abs(block.base_weight[side])
     size += block.stiffness[side] * (weight + abs(block.added_push[side]) + abs(block.base_push[side]))
     return math.copysign(1.0, end - start) * total - _ROUNDING * size * abs(end - start)
@@ -119,6 +119,6 @@ def moment_at(block: Record, body: tuple[bool, int, float], u: float) -> float:
         psi, pull = block.slenderness[side] - u, pull * math.cos(0.5 * u)
         own = block.stiffness[side] * ((1.0 + weight) * math.sin(psi) + push * math.cos(psi))
     else:
-        standing = block.gain[side] * (block.threshold[side] * (1.0 + weight) + push)
+        standing = block.threshold_slope[side] * (block.threshold[side] * (1.0 + weight) + push)
         own = standing - block.stiffness[side] * (1.0 + weight) * u
     return own + pull + block.spring[side] * u

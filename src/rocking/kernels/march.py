@@ -38,7 +38,7 @@ from rocking.kernels.state import (
     write_node,
     write_sequence,
 )
-from rocking.kernels.tendon import adopt, change_law, elongation_at, next_law
+from rocking.kernels.tendon import apply_tendon_law, change_law, elongation_at, next_law
 from rocking.kernels.uplift import is_hardly_pushed, next_uplift
 
 #: Distance from zero rotation that is within rounding, over the highest rotation so far.
@@ -49,50 +49,50 @@ _NEAR_TIE = 2.0**-36
 
 
 @kernel
-def march(ground: Ground, block: Record, rules: Record, table: Records, scratch: Record, state: Record) -> int:
+def march(ground: Ground, block: Record, settings: Record, table: Records, scratch: Record, state: Record) -> int:
     """Follow one block through one motion, from its state on; returns how it ended (`Ending`), as a plain integer.
 
-    RUNNING: the piece ``state.until`` is reached; a block at rest may be at its next uplift. PAUSED: the budget is
+    RUNNING: the piece ``state.stop_piece`` is reached; a block at rest may be at its next uplift. PAUSED: the budget is
     spent. FULL: the table has no space left. After each of them, call again with the same state.
     """
     if block.yielding:
-        take_up(ground, block, rules, state)
-    while state.piece < state.until:
+        initialise_tendon(ground, block, settings, state)
+    while state.piece < state.stop_piece:
         if state.budget <= 0:
             return Ending.PAUSED.value
-        if not has_space(rules, table, state):
+        if not has_space(settings, table, state):
             return Ending.FULL.value
         state.budget -= 1
-        ending = march_step(ground, block, rules, table, scratch, state)
+        ending = march_step(ground, block, settings, table, scratch, state)
         if ending != Ending.RUNNING:
             return ending.value
     return Ending.RUNNING.value
 
 
 @inlined
-def take_up(ground: Ground, block: Record, rules: Record, state: Record) -> None:
+def initialise_tendon(ground: Ground, block: Record, settings: Record, state: Record) -> None:
     """Give a body's tendon the law of its state; one that starts too far from rest has stretched it for good."""
     if time_of(ground, state) == 0.0 and state.side >= 0:
-        stretched = elongation_at(block, rules.nonlinear, state.side, state.u) - block.yields
+        stretched = elongation_at(block, settings.nonlinear, state.side, state.u) - block.yields
         state.plastic = max(state.plastic, stretched)
-    adopt(block, state.law, state.plastic)
+    apply_tendon_law(block, state.law, state.plastic)
 
 
 @inlined
-def march_step(ground: Ground, block: Record, rules: Record, table: Records, scratch: Record, state: Record) -> Any:
+def march_step(ground: Ground, block: Record, settings: Record, table: Records, scratch: Record, state: Record) -> Any:
     """One iteration of a march: to the next uplift of a block at rest, or along an arc to its first event."""
-    write_node(ground, rules, table, state)
+    write_node(ground, settings, table, state)
     if state.side < 0:
-        return rest_until_uplift(ground, block, rules, table, scratch, state)
-    if state.run > 0 and state.u == 0.0 and may_pass(ground, block, rules):
-        pass_proven_impacts(ground, block, rules, table, state, time_left(ground, rules, state))
-    outcome = follow_arc(ground, block, rules, scratch, state)
-    if outcome == Outcome.IMPACT or (outcome == Outcome.OVERTURN and block.facing):
-        return pass_impact(ground, block, rules, table, scratch, state)
+        return rest_until_uplift(ground, block, settings, table, scratch, state)
+    if state.proven_impacts > 0 and state.u == 0.0 and may_pass(ground, block, settings):
+        pass_proven_impacts(ground, block, settings, table, state, time_left(ground, settings, state))
+    outcome = follow_arc(ground, block, settings, scratch, state)
+    if outcome == Outcome.IMPACT or (outcome == Outcome.OVERTURN and block.two_stops):
+        return pass_impact(ground, block, settings, table, scratch, state)
     if outcome == Outcome.OVERTURN:
-        return end_by_overturning(ground, block, rules, table, state)
+        return end_by_overturning(ground, block, settings, table, state)
     if outcome == Outcome.STOPPED:
-        return end_by_stopping(ground, rules, table, state)
+        return end_by_stopping(ground, settings, table, state)
     if outcome == Outcome.LEANS:
         state.end = time_of(ground, state)
         return Ending.LEANS
@@ -100,102 +100,102 @@ def march_step(ground: Ground, block: Record, rules: Record, table: Records, scr
 
 
 @inlined
-def may_pass(ground: Ground, block: Record, rules: Record) -> bool:
+def may_pass(ground: Ground, block: Record, settings: Record) -> bool:
     """Whether `pass_proven_impacts` applies: linear, unrestrained, a constant weight, a motion linear in time."""
-    plain = not (block.restrained or block.varying)
-    return not rules.nonlinear and is_straight(ground) and not has_vertical(ground) and plain
+    plain = not (block.restrained or block.variable_restitution)
+    return not settings.nonlinear and is_straight(ground) and not has_vertical(ground) and plain
 
 
 @inlined
 def rest_until_uplift(
-    ground: Ground, block: Record, rules: Record, table: Records, scratch: Record, state: Record
+    ground: Ground, block: Record, settings: Record, table: Records, scratch: Record, state: Record
 ) -> int:
     """Stay at rest until the motion passes a threshold; DONE when it never does, and the response is over."""
-    found = next_uplift(ground, block, scratch, state.side, state.piece, state.offset, rules.stop)
-    if found.side == AT_REST or start_of(ground, found.piece) + found.offset >= rules.stop:
+    found = next_uplift(ground, block, scratch, state.side, state.piece, state.offset, settings.stop)
+    if found.side == AT_REST or start_of(ground, found.piece) + found.offset >= settings.stop:
         over = start_of(ground, last_piece(ground))
-        state.end = max(state.rested, over) if rules.endless else rules.stop
-        state.resting += state.end - state.rested
+        state.end = max(state.last_rest_time, over) if settings.no_end_time else settings.stop
+        state.time_at_rest += state.end - state.last_rest_time
         return Ending.DONE
     state.piece = found.piece
     state.offset = found.offset
     state.side = found.side
-    state.smooth = not found.jump
+    state.continuous_uplift = not found.jump
     state.u = state.v = 0.0
-    state.uplifted = state.last_impact_time = time_of(ground, state)
-    state.proof_speed = np.inf
-    state.resting += state.uplifted - state.rested
+    state.last_uplift_time = state.last_impact_time = time_of(ground, state)
+    state.certificate_speed = np.inf
+    state.time_at_rest += state.last_uplift_time - state.last_rest_time
     if state.uplifts == 0:
-        state.first_uplift = state.uplifted
+        state.first_uplift = state.last_uplift_time
     state.uplifts += 1
     if has_vertical(ground) and is_weightless(ground, block, state, state.offset):
         left = length_of(ground, state.piece) - state.offset
         A, d = scratch.ground, scratch.other
-        if block.entered[0] != 0 and is_hardly_pushed(ground, block, state.piece, state.offset, left, A, d):
-            state.near_ties += 1
-        elif state.rests > 0 and state.uplifted - state.rested <= _NEAR_TIE * state.uplifted:
-            state.near_ties += 1  # the last of its impacts may have come too late
-    write_event(rules, table, state, state.uplifted, EventKind.UPLIFT)
+        if block.next_side[0] != 0 and is_hardly_pushed(ground, block, state.piece, state.offset, left, A, d):
+            state.rounding_decisions += 1
+        elif state.rests > 0 and state.last_uplift_time - state.last_rest_time <= _NEAR_TIE * state.last_uplift_time:
+            state.rounding_decisions += 1  # the last of its impacts may have come too late
+    write_event(settings, table, state, state.last_uplift_time, EventKind.UPLIFT)
     return Ending.RUNNING
 
 
 @inlined
-def follow_arc(ground: Ground, block: Record, rules: Record, scratch: Record, state: Record) -> int:
+def follow_arc(ground: Ground, block: Record, settings: Record, scratch: Record, state: Record) -> int:
     """One Taylor step along the arc, up to its first event at most; returns what ended it (`Outcome`)."""
-    left = time_left(ground, rules, state)
+    left = time_left(ground, settings, state)
     if left <= 0.0:
         return Outcome.STOPPED
     end = undecided()
-    if not state.smooth:
-        end = short_step(ground, block, rules, state, left)
+    if not state.continuous_uplift:
+        end = short_step(ground, block, settings, state, left)
     if end.outcome == Outcome.UNDECIDED:
-        end = long_step(ground, block, rules, scratch, state, left)
+        end = long_step(ground, block, settings, scratch, state, left)
     if state.v < 0.0 <= end.v and end.outcome == Outcome.STEP:
-        state.near_ties += nearly_touches(ground, block, rules, scratch, state, end.time)
-    return finish_step(ground, rules, state, end, left)
+        state.rounding_decisions += nearly_touches(ground, block, settings, scratch, state, end.time)
+    return finish_step(ground, settings, state, end, left)
 
 
 @inlined
-def long_step(ground: Ground, block: Record, rules: Record, scratch: Record, state: Record, left: float) -> StepEnd:
+def long_step(ground: Ground, block: Record, settings: Record, scratch: Record, state: Record, left: float) -> StepEnd:
     """Step along the full series of the arc."""
-    order, h, _ = expand(ground, block, rules, scratch, state, left)
-    if state.smooth:  # rounding may say that the body is pushed back at an uplift
+    order, h, _ = expand(ground, block, settings, scratch, state, left)
+    if state.continuous_uplift:  # rounding may say that the body is pushed back at an uplift
         scratch.rotation[2] = max(0.0, scratch.rotation[2])
-    if block.restrained and rules.endless and state.piece == last_piece(ground):
-        leaning = leaning_at(block, rules, state, 2.0 * scratch.rotation[2])
+    if block.restrained and settings.no_end_time and state.piece == last_piece(ground):
+        leaning = leaning_at(block, settings, state, 2.0 * scratch.rotation[2])
         if leaning > 0.0:
             state.leaning = leaning
             return StepEnd(Outcome.LEANS, 0.0, state.u, state.v, 0.0, state.u)
     if block.yielding:
-        return yielding_step(block, rules, scratch, state, order, h)
+        return yielding_step(block, settings, scratch, state, order, h)
     balanced = state.v == 0.0 and scratch.rotation[2] == 0.0
-    if balanced and state.piece == last_piece(ground) and rules.endless:
+    if balanced and state.piece == last_piece(ground) and settings.no_end_time:
         return StepEnd(Outcome.BALANCED, 0.0, state.u, 0.0, 0.0, 0.0)
-    return advance(state, scratch, order, h, block.fallen)
+    return advance(state, scratch, order, h, block.overturn_angle)
 
 
 @shared
-def yielding_step(block: Record, rules: Record, scratch: Record, state: Record, order: int, h: float) -> StepEnd:
+def yielding_step(block: Record, settings: Record, scratch: Record, state: Record, order: int, h: float) -> StepEnd:
     """Step along a series up to its first event, or to where the law of the tendon changes."""
-    change, law = next_law(block, rules, scratch, state, order, h)
-    end = advance(state, scratch, order, min(h, change), block.fallen)
+    change, law = next_law(block, settings, scratch, state, order, h)
+    end = advance(state, scratch, order, min(h, change), block.overturn_angle)
     if end.outcome == Outcome.STEP and end.time >= change:
         turns = state.law == TendonLaw.PLASTIC
-        change_law(block, rules, state, law, end.u)
+        change_law(block, settings, state, law, end.u)
         return StepEnd(end.outcome, end.time, end.u, 0.0 if turns else end.v, end.peak_time, end.peak)
     return end
 
 
 @inlined
-def finish_step(ground: Ground, rules: Record, state: Record, end: StepEnd, left: float) -> int:
+def finish_step(ground: Ground, settings: Record, state: Record, end: StepEnd, left: float) -> int:
     """Move the state to the end of a step; returns what ended it (`Outcome`)."""
     if end.peak > state.peak:
         raise_peak(state, end.peak, time_of(ground, state) + end.peak_time)
-    stopped = end.outcome == Outcome.STEP and end.time >= left and is_last(ground, rules, state)
+    stopped = end.outcome == Outcome.STEP and end.time >= left and is_last(ground, settings, state)
     advance_time(state, end.time)
     state.u = end.u
     state.v = end.v
-    state.smooth = False
+    state.continuous_uplift = False
     if stopped:
         return Outcome.STOPPED
     if end.outcome == Outcome.STEP:
@@ -204,46 +204,46 @@ def finish_step(ground: Ground, rules: Record, state: Record, end: StepEnd, left
 
 
 @inlined
-def pass_impact(ground: Ground, block: Record, rules: Record, table: Records, scratch: Record, state: Record) -> int:
+def pass_impact(ground: Ground, block: Record, settings: Record, table: Records, scratch: Record, state: Record) -> int:
     """Pass an impact, and come to rest where it is so decided; DONE when the march ends there."""
     normalize_offset(ground, state)
     if has_vertical(ground) and is_weightless(ground, block, state, state.offset):
         pushed = abs(restoring(ground, block, state.side, state.piece, state.offset))
         depth = 0.5 * state.v * state.v / pushed  # distance below zero rotation, if there were no ground
-        state.near_ties += depth <= _NEAR_TIE * state.peak
+        state.rounding_decisions += depth <= _NEAR_TIE * state.peak
         if depth <= _TOUCH * state.peak:  # no impact: after one the block would be on the other side
             state.v = 0.0
             return Ending.RUNNING
     time = time_of(ground, state)
     speed = apply_impact(block, state)
-    write_impact(rules, table, state, time, speed)
+    write_impact(settings, table, state, time, speed)
     count_impact(state)
     proof = unproven()
-    if rules.treatment == RestRule.CERTIFIED and state.v <= state.proof_speed:
-        proof = proven_bounds(ground, block, rules, scratch, state)
-        record_proof(ground, block, rules, state, proof)
-    rest = rest_after_impact(ground, block, rules, state, proof)
+    if settings.treatment == RestRule.CERTIFIED and state.v <= state.certificate_speed:
+        proof = proven_bounds(ground, block, settings, scratch, state)
+        record_proof(ground, block, settings, state, proof)
+    rest = rest_after_impact(ground, block, settings, state, proof)
     state.last_impact_time = time
     if math.isnan(rest.time):
         return Ending.RUNNING
-    return come_to_rest(ground, block, rules, table, state, rest)
+    return come_to_rest(ground, block, settings, table, state, rest)
 
 
 @inlined
 def is_weightless(ground: Ground, block: Record, state: Record, offset: float) -> bool:
     """Whether a block at zero rotation is pushed off to both sides at an offset of its piece."""
     here = restoring(ground, block, state.side, state.piece, offset)
-    other = restoring(ground, block, block.entered[state.side], state.piece, offset)
+    other = restoring(ground, block, block.next_side[state.side], state.piece, offset)
     return bool(here < 0.0 and other < 0.0)
 
 
 @shared
-def nearly_touches(ground: Ground, block: Record, rules: Record, scratch: Record, state: Record, h: float) -> bool:
+def nearly_touches(ground: Ground, block: Record, settings: Record, scratch: Record, state: Record, h: float) -> bool:
     """Whether the arc from a state has within h a minimum so near zero that rounding may hide an impact.
 
     With a positive weight the motion is the same with the impact and without, and the number of impacts is not.
     """
-    order, _, _ = expand(ground, block, rules, scratch, state, h)
+    order, _, _ = expand(ground, block, settings, scratch, state, h)
     c, d = scratch.rotation, scratch.other
     for k in range(order):
         d[k] = -(k + 1) * c[k + 1]
@@ -254,61 +254,61 @@ def nearly_touches(ground: Ground, block: Record, rules: Record, scratch: Record
 
 
 @inlined
-def come_to_rest(ground: Ground, block: Record, rules: Record, table: Records, state: Record, rest: Rest) -> int:
+def come_to_rest(ground: Ground, block: Record, settings: Record, table: Records, state: Record, rest: Rest) -> int:
     """Close a sequence of impacts; DONE when the march stops before the block is at rest."""
     time = time_of(ground, state)
-    state.stalled += rest.stalled
-    if state.run == 0 or not rest.upper >= 0.0:
-        state.run = 1
+    state.rests_by_rounding += rest.stalled
+    if state.proven_impacts == 0 or not rest.upper >= 0.0:
+        state.proven_impacts = 1
         state.run_start = time
-    write_node(ground, rules, table, state)
-    write_sequence(rules, table, state, time, (rest.lower, rest.upper, rest.time))
-    state.run = 0
-    if time + rest.time >= rules.stop:
-        state.end = rules.stop
+    write_node(ground, settings, table, state)
+    write_sequence(settings, table, state, time, (rest.lower, rest.upper, rest.time))
+    state.proven_impacts = 0
+    if time + rest.time >= settings.stop:
+        state.end = settings.stop
         return Ending.DONE
     state.side = resting_side(block, state.side)
     state.u = state.v = 0.0
-    state.rested = time + rest.time
+    state.last_rest_time = time + rest.time
     if state.rests == 0:
-        state.first_rest = state.rested
+        state.first_rest = state.last_rest_time
     state.rests += 1
-    write_event(rules, table, state, state.rested, EventKind.REST)
+    write_event(settings, table, state, state.last_rest_time, EventKind.REST)
     state.offset += rest.time
     normalize_offset(ground, state)
     return Ending.RUNNING
 
 
 @inlined
-def end_by_overturning(ground: Ground, block: Record, rules: Record, table: Records, state: Record) -> int:
+def end_by_overturning(ground: Ground, block: Record, settings: Record, table: Records, state: Record) -> int:
     """End a march in overturning."""
     state.end = state.peak_time = time_of(ground, state)
-    state.peak = block.fallen
-    write_node(ground, rules, table, state)
-    write_event(rules, table, state, state.end, EventKind.OVERTURN)
+    state.peak = block.overturn_angle
+    write_node(ground, settings, table, state)
+    write_event(settings, table, state, state.end, EventKind.OVERTURN)
     return Ending.OVERTURNED
 
 
 @inlined
-def end_by_stopping(ground: Ground, rules: Record, table: Records, state: Record) -> int:
-    """End a march in the middle of an arc, at the time given by the rules; a peak there may be a rounding later."""
-    state.end = rules.stop
-    state.peak_time = min(state.peak_time, rules.stop)
-    write_node(ground, rules, table, state)
+def end_by_stopping(ground: Ground, settings: Record, table: Records, state: Record) -> int:
+    """End a march in the middle of an arc, at the time given by the settings; a peak there may be a rounding later."""
+    state.end = settings.stop
+    state.peak_time = min(state.peak_time, settings.stop)
+    write_node(ground, settings, table, state)
     return Ending.DONE
 
 
 @inlined
-def time_left(ground: Ground, rules: Record, state: Record) -> float:
+def time_left(ground: Ground, settings: Record, state: Record) -> float:
     """Time to the end of the piece, or of the response where that comes first."""
-    until_stop = rules.stop - start_of(ground, state.piece) - state.offset
+    until_stop = settings.stop - start_of(ground, state.piece) - state.offset
     return min(length_of(ground, state.piece) - state.offset, until_stop)
 
 
 @inlined
-def is_last(ground: Ground, rules: Record, state: Record) -> bool:
+def is_last(ground: Ground, settings: Record, state: Record) -> bool:
     """Whether the response ends within the piece."""
-    until_stop = rules.stop - start_of(ground, state.piece) - state.offset
+    until_stop = settings.stop - start_of(ground, state.piece) - state.offset
     return bool(until_stop <= length_of(ground, state.piece) - state.offset)
 
 

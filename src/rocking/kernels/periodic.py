@@ -16,8 +16,8 @@ from rocking.kernels.arc import evaluate, expand, restoring, sign_of
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.ground import ROUNDING, Ground, length_of, start_of
 from rocking.kernels.march import march
-from rocking.kernels.recurrences import variation_coefficients
 from rocking.kernels.restitution import factor, relative_slope
+from rocking.kernels.series import variation_coefficients
 from rocking.kernels.state import AT_REST, Ending, Record, Records
 from rocking.kernels.trace import Trail, add_restraints, expand_coefficients
 from rocking.kernels.uplift import next_uplift
@@ -48,7 +48,7 @@ class Setting(NamedTuple):
 
     ground: Ground
     block: Record
-    rules: Record
+    settings: Record
     table: Records
     steps: Floats
 
@@ -99,7 +99,7 @@ def settle(
             fate = pass_period(setting, scratch, state)
             if fate != Fate.OVERTURNED and fate != Fate.UNFINISHED:
                 rests = fate == Fate.RESTS or fate == Fate.RESTS_FOR_EVER
-                found[k] = trap_of(traps, state, rests, setting.block.facing)
+                found[k] = trap_of(traps, state, rests, setting.block.two_stops)
             if found[k] >= 0 or (fate != Fate.MOVES and fate != Fate.RESTS):
                 taken[k] = n + 1
                 break
@@ -131,17 +131,17 @@ def write_state(row: Floats, state: Record) -> None:
 @shared
 def pass_period(setting: Setting, scratch: Record, state: Record) -> int:
     """Take a state through one period; returns its `Fate`."""
-    ground, block, rules, table, steps = setting
+    ground, block, settings, table, steps = setting
     pieces = pieces_of(ground)
     state.budget = turns_from(state)
     ending = Ending.RUNNING.value
     while ending == Ending.RUNNING and state.piece < pieces:
-        state.until = pieces
+        state.stop_piece = pieces
         if state.side >= 0 and state.offset == 0.0 and steps.shape[1] > 0:
-            if not state.smooth and steps_over(steps[state.side, state.piece], block.fallen, state):
+            if not state.continuous_uplift and steps_over(steps[state.side, state.piece], block.overturn_angle, state):
                 continue
-            state.until = state.piece + 1
-        ending = march(ground, block, rules, table, scratch, state)
+            state.stop_piece = state.piece + 1
+        ending = march(ground, block, settings, table, scratch, state)
     return put_back(ground, block, state, ending)
 
 
@@ -189,10 +189,10 @@ def step_rows(ground: Ground, block: Record) -> Floats:
     pieces = (len(ground.pieces) - 3) // 2
     rows = np.zeros((2, pieces, _COLUMNS))
     length, coefficients = ground.pieces[:pieces, 1], ground.pieces[:pieces, 2 : 2 + ground.columns]
-    if any(np.any(block[name]) for name in ("hold", "added_weight", "spring")):
+    if any(np.any(block[name]) for name in ("restraint_threshold", "added_weight", "spring")):
         return np.zeros((2, 0, _COLUMNS))
     for side in range(2):
-        lam, gain, threshold = (float(block[name][side]) for name in ("stiffness", "gain", "threshold"))
+        lam, gain, threshold = (float(block[name][side]) for name in ("stiffness", "threshold_slope", "threshold"))
         if not np.isfinite(threshold):
             continue
         root, drag = np.sqrt(abs(lam)), float(block["damping"][side])
@@ -237,7 +237,7 @@ def put_back(ground: Ground, block: Record, state: Record, ending: int) -> int:
     if ending == Ending.DONE or (ending == Ending.RUNNING and state.piece >= 2 * pieces):
         # Not even the second period lifts it; the march may have followed a lift by the pieces behind that.
         if state.u == 0.0 and state.v == 0.0:
-            state.side = AT_REST if state.side < 0 or not block.facing else -1 - state.side
+            state.side = AT_REST if state.side < 0 or not block.two_stops else -1 - state.side
             return Fate.RESTS_FOR_EVER
         return Fate.UNFINISHED
     if ending == Ending.BALANCED:
@@ -247,8 +247,8 @@ def put_back(ground: Ground, block: Record, state: Record, ending: int) -> int:
         return Fate.UNFINISHED
     period = start_of(ground, pieces)
     state.piece -= pieces
-    state.uplifted -= period
-    state.rested -= period
+    state.last_uplift_time -= period
+    state.last_rest_time -= period
     state.run_start -= period
     state.last_impact_time -= period
     return Fate.RESTS if state.side < 0 or (state.u == 0.0 and state.v == 0.0) else Fate.MOVES
@@ -262,7 +262,7 @@ def differentiate(trail: Trail, scratch: Record, work: Record, table: Records, s
     """Write the derivative of each state after one period by the state before it, in the frames of their sides.
 
     It is exactly zero where the body has come to rest on the way, for any time, and where it is held at rest at the
-    start. From a stop that does not hold it, it is that of the states off the stop. The rules of the trail have the
+    start. From a stop that does not hold it, it is that of the states off the stop. The settings of the trail have the
     march write its table, whose rows are used again and again. The states are those after the period; ``ending`` is
     their `Fate`.
     """
@@ -279,21 +279,21 @@ def differentiate_period(
     Returns the number of impacts, and the logarithm of the determinant's size where the derivative is not zero. That is
     a sum over steps: from the derivative itself it could not be had, whose columns become parallel to rounding.
     """
-    ground, block, rules, _ = trail
+    ground, block, settings, _ = trail
     one = 1.0
     if state.side < 0:
-        lifted = next_uplift(ground, block, scratch, state.side, state.piece, state.offset, rules.stop)
+        lifted = next_uplift(ground, block, scratch, state.side, state.piece, state.offset, settings.stop)
         held = lifted.side < 0 or lifted.piece > state.piece or lifted.offset > state.offset
         # A body at rest has forgotten what was before; the frame of one that leaves at once is that of no side.
         one = 0.0 if held else sign_of(lifted.side)
     M[0, 0], M[0, 1], M[1, 0], M[1, 1] = one, 0.0, 0.0, one
-    state.until = pieces_of(ground)
+    state.stop_piece = pieces_of(ground)
     state.budget = turns_from(state)
     ending = Ending.FULL.value
     impacts, area = 0, 0.0
     while ending == Ending.FULL:
         state.nodes = state.impacts = state.events = state.sequences = 0
-        ending = march(ground, block, rules, table, scratch, state)
+        ending = march(ground, block, settings, table, scratch, state)
         impacts += state.impacts
         for n in range(state.nodes - 1):
             area += carry_on(trail, scratch, work, table[n].node, table[n + 1].node, M)
@@ -344,7 +344,7 @@ def carry_on(trail: Trail, scratch: Record, work: Record, node: Record, followin
 
     Returns the logarithm of the size of that step's determinant.
     """
-    ground, block, rules, _ = trail
+    ground, block, settings, _ = trail
     if node.side < 0:  # what coming to rest has made of it
         return 0.0
     if following.side < 0:
@@ -355,7 +355,7 @@ def carry_on(trail: Trail, scratch: Record, work: Record, node: Record, followin
         for piece in range(node.piece + 1, following.piece):
             h += length_of(ground, piece)
         h += following.offset
-    order, _, degree = expand(ground, block, rules, scratch, node, h)
+    order, _, degree = expand(ground, block, settings, scratch, node, h)
     expand_coefficients(trail, scratch, work, node.side, degree, order)
     for j in range(order - 1):
         work.forcing[j] = 0.0
@@ -380,8 +380,8 @@ def come_to_rest(ground: Ground, block: Record, node: Record, following: Record,
     """
     side = node.side
     after = restoring(ground, block, side, following.piece, following.offset)
-    if after >= 0.0 and not block.facing:
-        after = restoring(ground, block, block.entered[side], following.piece, following.offset)
+    if after >= 0.0 and not block.two_stops:
+        after = restoring(ground, block, block.next_side[side], following.piece, following.offset)
     if after >= 0.0 or node.u > 0.0:
         M[0, 0] = M[0, 1] = M[1, 0] = M[1, 1] = 0.0
     elif node.v > 0.0:
@@ -398,7 +398,7 @@ def apply_saltation(ground: Ground, block: Record, left: int, following: Record,
 
     Returns the logarithm of the size of its determinant.
     """
-    across = block.facing and following.side != left  # at the other stop: seen from there, all signs change
+    across = block.two_stops and following.side != left  # at the other stop: seen from there, all signs change
     hit, sign = (following.side, -1.0) if across else (left, 1.0)
     speed = -sign * v
     e = factor(block, hit, speed, 0)  # which is not drawn
@@ -424,16 +424,16 @@ def to_next_impact(trail: Trail, scratch: Record, work: Record, table: Records, 
 
     Where there is none, because the body rests or overturns first, ``ending`` says so and the derivative is NaN.
     """
-    ground, block, rules, _ = trail
+    ground, block, settings, _ = trail
     for k in range(states.shape[0]):
         state = states[k]
         out[k, 0, 0], out[k, 0, 1], out[k, 1, 0], out[k, 1, 1] = 1.0, 0.0, 0.0, 1.0
         fate = Fate.UNFINISHED.value
         for _ in range(turns_from(state)):
-            state.until = pieces_of(ground)
+            state.stop_piece = pieces_of(ground)
             state.budget = 1
             state.nodes = state.impacts = state.events = state.sequences = 0
-            ending = march(ground, block, rules, table, scratch, state)
+            ending = march(ground, block, settings, table, scratch, state)
             carry_on(trail, scratch, work, table[0].node, state, out[k])
             if ending != Ending.PAUSED:
                 fate = put_back(ground, block, state, ending)

@@ -48,23 +48,23 @@ def time_of(ground: Ground, state: Record) -> float:
 @inlined
 def count_impact(state: Record) -> None:
     """Count an impact of a proven sequence; before a proof, set the speed at which the next one is tried."""
-    if state.run > 0:
-        state.run += 1
-    elif state.v > state.proof_speed:
-        state.proof_speed = max(state.proof_speed, _SLOWER * state.v)
+    if state.proven_impacts > 0:
+        state.proven_impacts += 1
+    elif state.v > state.certificate_speed:
+        state.certificate_speed = max(state.certificate_speed, _SLOWER * state.v)
 
 
 @inlined
-def record_proof(ground: Ground, block: Record, rules: Record, state: Record, proof: Proof) -> None:
+def record_proof(ground: Ground, block: Record, settings: Record, state: Record, proof: Proof) -> None:
     """Store since when chattering is proven, and at which speed the next proof is tried."""
     if not proof.upper >= 0.0:
-        state.proof_speed = _SLOWER * state.v
+        state.certificate_speed = _SLOWER * state.v
         return
-    if state.run == 0:
-        state.run = 1
+    if state.proven_impacts == 0:
+        state.proven_impacts = 1
         state.run_start = time_of(ground, state)
-    excess = (proof.upper - proof.lower) / rules.tolerance
-    if block.varying:
+    excess = (proof.upper - proof.lower) / settings.tolerance
+    if block.variable_restitution:
         # The width is proportional to the square of the speed, or to the speed where the factor is drawn.
         ratio = 1.0 / excess if is_drawn(block) else math.sqrt(1.0 / excess)
     else:
@@ -76,7 +76,7 @@ def record_proof(ground: Ground, block: Record, rules: Record, state: Record, pr
     # The next arc is about this long; arcs go with the speed, and must not be lost in the rounding of times.
     arc = (1.0 - max(block.restitution[0], block.restitution[1])) * proof.time
     least = _RESOLVED * ULP * time_of(ground, state) / arc if arc > 0.0 else 0.0
-    state.proof_speed = state.v * min(_SLOWEST, max(ratio, least))
+    state.certificate_speed = state.v * min(_SLOWEST, max(ratio, least))
 
 
 @inlined
@@ -93,9 +93,9 @@ def time_to_piece(ground: Ground, state: Record, time: float) -> float:
 
 
 @shared
-def proven_bounds(ground: Ground, block: Record, rules: Record, scratch: Record, state: Record) -> Proof:
+def proven_bounds(ground: Ground, block: Record, settings: Record, scratch: Record, state: Record) -> Proof:
     """Proven bounds on the time to rest, widened by the rounding of all times; all NaN: no proof."""
-    lower, upper, time, height = prove_rest(ground, block, rules, scratch, state)
+    lower, upper, time, height = prove_rest(ground, block, settings, scratch, state)
     rounding = allowance(time_of(ground, state), upper, state)
     return Proof(lower - rounding, upper + rounding, time, height)
 
@@ -103,40 +103,42 @@ def proven_bounds(ground: Ground, block: Record, rules: Record, scratch: Record,
 @inlined
 def allowance(time: float, upper: float, state: Record) -> float:
     """Allow for the rounding of the times, and of the arcs resolved since the first proof."""
-    since = time - state.run_start if state.run > 0 else 0.0
-    return 4.0 * ULP * time + 8.0 * ULP * (max(state.run, 1) + 4) * (since + upper)
+    since = time - state.run_start if state.proven_impacts > 0 else 0.0
+    return 4.0 * ULP * time + 8.0 * ULP * (max(state.proven_impacts, 1) + 4) * (since + upper)
 
 
 @shared
-def rest_after_impact(ground: Ground, block: Record, rules: Record, state: Record, proof: Proof) -> Rest:
+def rest_after_impact(ground: Ground, block: Record, settings: Record, state: Record, proof: Proof) -> Rest:
     """Whether the block comes to rest at an impact, given the bounds that are proven there (NaN: none)."""
     time = time_of(ground, state)
-    if rules.treatment == RestRule.CERTIFIED:
+    if settings.treatment == RestRule.CERTIFIED:
         if state.v == 0.0:
             rounding = allowance(time, 0.0, state)
             return Rest(-rounding, rounding, 0.0, False)
         # No rotation that is not resolved may be higher than those that are.
-        good = max(rules.tolerance, 4.0 * allowance(time, proof.upper, state))
+        good = max(settings.tolerance, 4.0 * allowance(time, proof.upper, state))
         if proof.upper - proof.lower <= good and proof.height <= state.peak:
             return Rest(proof.lower, proof.upper, proof.time, False)
-    elif rules.treatment == RestRule.BYPASS:
+    elif settings.treatment == RestRule.BYPASS:
         left = geometric_time(ground, block, state)
         if state.v <= block.limit[state.side] and left >= 0.0:
             return Rest(np.nan, np.nan, left, False)
-    elif is_imposed(rules, block.limit[state.side], state.v, time - state.last_impact_time, time - state.uplifted):
+    elif is_imposed(
+        settings, block.limit[state.side], state.v, time - state.last_impact_time, time - state.last_uplift_time
+    ):
         return Rest(np.nan, np.nan, 0.0, False)
     stalled = has_stalled(ground, block, state)
     return Rest(np.nan, np.nan, 0.0 if stalled or state.v == 0.0 else np.nan, stalled)
 
 
 @inlined
-def is_imposed(rules: Record, limit: float, v: float, interval: float, since_uplift: float) -> bool:
+def is_imposed(settings: Record, limit: float, v: float, interval: float, since_uplift: float) -> bool:
     """Whether a treatment other than the certificate brings the block to rest at this impact."""
-    if rules.treatment == RestRule.VELOCITY:
+    if settings.treatment == RestRule.VELOCITY:
         return v <= limit
-    if rules.treatment == RestRule.INTERVAL:
+    if settings.treatment == RestRule.INTERVAL:
         return interval <= limit
-    return rules.treatment == RestRule.TIME and since_uplift >= limit
+    return settings.treatment == RestRule.TIME and since_uplift >= limit
 
 
 @inlined
@@ -145,7 +147,7 @@ def geometric_time(ground: Ground, block: Record, state: Record) -> float:
 
     The sum of the paper's Eq. 75 without its remainder: arcs of 2 v/g, and speeds that fall by a factor at each impact.
     """
-    i, j = state.side, block.entered[state.side]
+    i, j = state.side, block.next_side[state.side]
     g_i = restoring(ground, block, i, state.piece, state.offset)
     g_j = restoring(ground, block, j, state.piece, state.offset)
     e_i, e_j = middle_factor(block, i, state.v), middle_factor(block, j, state.v)
@@ -171,7 +173,7 @@ LARGEST_GAMMA = 2.0**-14
 
 @shared
 def pass_proven_impacts(
-    ground: Ground, block: Record, rules: Record, table: Records, state: Record, left: float
+    ground: Ground, block: Record, settings: Record, table: Records, state: Record, left: float
 ) -> None:
     """March the linear model through some impacts within ``left``, up to the one at which another proof is tried.
 
@@ -182,20 +184,20 @@ def pass_proven_impacts(
     for _ in range(PROVEN_PER_ITERATION):
         side, v = state.side, state.v
         g = restoring(ground, block, side, state.piece, state.offset)
-        t, speed = proven_arc(v, g, block.gain[side] * sign_of(side) * rate, block.stiffness[side])
+        t, speed = proven_arc(v, g, block.threshold_slope[side] * sign_of(side) * rate, block.stiffness[side])
         slower = block.restitution[side] * speed
         # The arc is below its first tangent.
-        if not (t < end - state.offset and slower > state.proof_speed and v * t <= state.peak):
+        if not (t < end - state.offset and slower > state.certificate_speed and v * t <= state.peak):
             return
-        state.side = block.entered[side]
+        state.side = block.next_side[side]
         state.v = slower
         state.offset += t
         state.last_impact_time = start_of(ground, state.piece) + state.offset
         state.impacts += 1
-        state.run += 1
+        state.proven_impacts += 1
         state.budget -= 1
-        write_impact(rules, table, state, state.last_impact_time, speed)
-        write_node(ground, rules, table, state)
+        write_impact(settings, table, state, state.last_impact_time, speed)
+        write_node(ground, settings, table, state)
 
 
 @inlined

@@ -17,7 +17,7 @@ _WORD = 0xFFFFFFFF
 @inlined
 def factor(block: Record, side: int, speed: float, number: int) -> float:
     """Factor on the speed of an impact that leaves a side; ``number`` of them came before."""
-    if block.varying:
+    if block.variable_restitution:
         return varying_factor(block, side, speed, number)
     return float(block.restitution[side])
 
@@ -25,34 +25,34 @@ def factor(block: Record, side: int, speed: float, number: int) -> float:
 @shared
 def varying_factor(block: Record, side: int, speed: float, number: int) -> float:
     """`factor` where it varies."""
-    least, largest = block.least[side], block.restitution[side]
+    least, largest = block.min_restitution[side], block.restitution[side]
     if is_drawn(block):
         return min(largest, least + (largest - least) * uniform(int(block.seed), int(number)))
-    return max(least, largest - block.slope[side] * speed)
+    return max(least, largest - block.restitution_slope[side] * speed)
 
 
 @inlined
 def is_drawn(block: Record) -> bool:
     """Whether the factor is drawn at each impact."""
-    return bool(block.varying and block.seed >= 0)
+    return bool(block.variable_restitution and block.seed >= 0)
 
 
 @inlined
 def relative_slope(block: Record, side: int, speed: float, e: float) -> float:
     """Return the derivative of the speed after an impact by that before it, over the factor e: 1 for a constant one."""
-    if block.varying and block.seed < 0 and e > block.least[side]:
-        return 1.0 - block.slope[side] * speed / e
+    if block.variable_restitution and block.seed < 0 and e > block.min_restitution[side]:
+        return 1.0 - block.restitution_slope[side] * speed / e
     return 1.0
 
 
 @inlined
 def least_factor(block: Record, side: int, fastest: float) -> float:
     """Least factor of all impacts up to a speed; the largest is ``block.restitution``."""
-    if not block.varying:
+    if not block.variable_restitution:
         return float(block.restitution[side])
     if block.seed >= 0:
-        return float(block.least[side])
-    return max(block.least[side], block.restitution[side] - block.slope[side] * fastest)
+        return float(block.min_restitution[side])
+    return max(block.min_restitution[side], block.restitution[side] - block.restitution_slope[side] * fastest)
 
 
 @inlined

@@ -15,9 +15,17 @@ import numpy as np
 
 from rocking.arrays import Floats
 from rocking.kernels.compiled import inlined, shared
-from rocking.kernels.recurrences import INTEGRATED_TWICE, angle_coefficients, nonlinear_coefficient
+from rocking.kernels.series import (
+    INTEGRATED_TWICE,
+    NEGLIGIBLE,
+    SHORTENINGS,
+    SMALLEST,
+    TRUNCATION,
+    angle_coefficients,
+    nonlinear_coefficient,
+    shortening,
+)
 from rocking.kernels.state import ORDER, Record
-from rocking.kernels.truncation import NEGLIGIBLE, SHORTENINGS, SMALLEST, TRUNCATION, shortening
 
 
 @inlined
@@ -30,7 +38,7 @@ def restrained_step(block: Record, side: int) -> float:
 
 @shared
 def expand_restrained(
-    block: Record, rules: Record, state: Record, scratch: Record, degrees: tuple[int, int], h: float
+    block: Record, settings: Record, state: Record, scratch: Record, degrees: tuple[int, int], h: float
 ) -> tuple[int, float]:
     """Series of an arc for a motion and a weight of these degrees, to which the restraints' parts are added.
 
@@ -41,28 +49,28 @@ def expand_restrained(
     scratch.ground[0] += block.added_push[side]
     c[0] = state.u
     c[1] = state.v
-    if rules.nonlinear:
+    if settings.nonlinear:
         psi = block.slenderness[side] - state.u
         scratch.sine[0], scratch.cosine[0] = math.sin(psi), math.cos(psi)
         scratch.half_sine[0], scratch.half_cosine[0] = math.sin(0.5 * state.u), math.cos(0.5 * state.u)
     power = h * h
     largest = term = abs(state.v) * h
     for k in range(ORDER - 1):
-        value = restrained_force(block, side, scratch, degrees, rules.nonlinear, k)
+        value = restrained_force(block, side, scratch, degrees, settings.nonlinear, k)
         c[k + 2] = (value - block.damping[side] * ((k + 1) * c[k + 1])) * INTEGRATED_TWICE[k]
         previous = term
         term = (k + 2) * abs(c[k + 2]) * power
         largest = max(largest, term)
         if k > degree and term + previous <= NEGLIGIBLE * largest:
-            beyond, _ = truncation_restrained(block, rules, side, scratch, degrees, k + 2, h)
+            beyond, _ = truncation_restrained(block, settings, side, scratch, degrees, k + 2, h)
             if beyond <= TRUNCATION * largest:
                 return k + 2, h
-        if rules.nonlinear:
+        if settings.nonlinear:
             angle_coefficients(scratch, k)
             half_angle_coefficients(scratch, k)
         power *= h
     for _ in range(SHORTENINGS):
-        beyond, largest = truncation_restrained(block, rules, side, scratch, degrees, ORDER, h)
+        beyond, largest = truncation_restrained(block, settings, side, scratch, degrees, ORDER, h)
         excess = beyond / max(TRUNCATION * largest, SMALLEST)
         if excess <= 1.0:
             break
@@ -82,9 +90,9 @@ def restrained_force(
         value += nonlinear_coefficient(lam, scratch, degrees, k) / INTEGRATED_TWICE[k]
         return value - block.prestress[side] * scratch.half_cosine[k]
     if k <= degrees[0]:
-        value -= block.gain[side] * A[k]
+        value -= block.threshold_slope[side] * A[k]
     if k <= degrees[1]:
-        value -= block.gain[side] * (block.threshold[side] * W[k])
+        value -= block.threshold_slope[side] * (block.threshold[side] * W[k])
     if k == 0:
         value -= block.prestress[side]
     for j in range(min(k, degrees[1]) + 1):
@@ -108,7 +116,7 @@ def half_angle_coefficients(scratch: Record, k: int) -> None:
 
 @shared
 def truncation_restrained(
-    block: Record, rules: Record, side: int, scratch: Record, degrees: tuple[int, int], order: int, h: float
+    block: Record, settings: Record, side: int, scratch: Record, degrees: tuple[int, int], order: int, h: float
 ) -> tuple[float, float]:
     """Bound on the truncation of an arc's velocity over h, and its largest term; both times h.
 
@@ -130,7 +138,7 @@ def truncation_restrained(
     stiffness = abs(block.stiffness[side]) * h * h
     known = spring * (d[order - 1] + d[order]) + drag * last
     feedback = drag / order + spring / (order * (order + 1))
-    if rules.nonlinear:
+    if settings.nonlinear:
         prestress = abs(block.prestress[side]) * h * h
         return beyond_angles(scratch, degrees, order, h, (stiffness, prestress, known, feedback)), largest
     for k in range(order - 1, order - 2 - degrees[1], -1):  # from here on: sums of all later terms

@@ -12,9 +12,17 @@ from rocking.kernels.arc import sign_of, weight_at
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.events import StepEnd
 from rocking.kernels.ground import Ground, acceleration, coefficient, has_vertical, is_straight, vertical_of
-from rocking.kernels.recurrences import Line, Seven, Ten, linear_ten, nonlinear_ten, weighted_ten
+from rocking.kernels.series import (
+    Line,
+    Seven,
+    Ten,
+    linear_ten,
+    nonlinear_ten,
+    strength_of,
+    truncation_is_negligible,
+    weighted_ten,
+)
 from rocking.kernels.state import Outcome, Record
-from rocking.kernels.truncation import strength_of, truncation_is_negligible
 
 #: Largest lam t^2 of a linear step, lam |W| t^2 of one while the weight W changes, and (lam (|W| + |a|/g) + v^2) t^2 of
 #: a nonlinear one.
@@ -38,34 +46,34 @@ _CONVERGED = 1e-8
 
 
 @inlined
-def short_step(ground: Ground, block: Record, rules: Record, state: Record, left: float) -> StepEnd:
+def short_step(ground: Ground, block: Record, settings: Record, state: Record, left: float) -> StepEnd:
     """Step to the next impact or over ``left``, or a part of it; UNDECIDED where it is small or not simple."""
-    end = short_part(ground, block, rules, state, left)
+    end = short_part(ground, block, settings, state, left)
     return undecided() if end.outcome == Outcome.STEP and end.time < _WORTH * left else end
 
 
 @inlined
-def short_part(ground: Ground, block: Record, rules: Record, state: Record, left: float) -> StepEnd:
+def short_part(ground: Ground, block: Record, settings: Record, state: Record, left: float) -> StepEnd:
     """Step to the next impact or over ``left``, or the part of it that is short."""
     if not is_straight(ground) or block.restrained:
         return undecided()
     if has_vertical(ground):
-        return short_weighted_step(ground, block, rules, state, left)
-    if rules.nonlinear:
+        return short_weighted_step(ground, block, settings, state, left)
+    if settings.nonlinear:
         return short_nonlinear_step(ground, block, state, left, None)
     c = linear_series(ground, block, state)
-    end = resolve_step(c, reach_linear(block, state, left), state, block.fallen)
+    end = resolve_step(c, reach_linear(block, state, left), state, block.overturn_angle)
     return end if is_complete(c, end.time) else undecided()
 
 
 @shared
-def short_weighted_step(ground: Ground, block: Record, rules: Record, state: Record, left: float) -> StepEnd:
+def short_weighted_step(ground: Ground, block: Record, settings: Record, state: Record, left: float) -> StepEnd:
     """Step in the same way while the weight changes."""
     weight, lam = weight_line(ground, state), block.stiffness[state.side]
-    if rules.nonlinear:
+    if settings.nonlinear:
         return short_nonlinear_step(ground, block, state, left, weight)
     c = weighted_series(ground, block, state, weight)
-    end = resolve_step(c, reach_weighted(lam, weight, left), state, block.fallen)
+    end = resolve_step(c, reach_weighted(lam, weight, left), state, block.overturn_angle)
     return end if is_complete_weighted(c, lam, weight, end.time) else undecided()
 
 
@@ -73,7 +81,7 @@ def short_weighted_step(ground: Ground, block: Record, rules: Record, state: Rec
 def short_nonlinear_step(ground: Ground, block: Record, state: Record, left: float, weight: Line | None) -> StepEnd:
     """Step in the same way in the nonlinear model."""
     c, angles = nonlinear_series(ground, block, state, weight)
-    end = resolve_step(c, reach_nonlinear(ground, block, state, left, weight), state, block.fallen)
+    end = resolve_step(c, reach_nonlinear(ground, block, state, left, weight), state, block.overturn_angle)
     push = (acceleration(ground, state.piece, state.offset), coefficient(ground, state.piece, 1))
     complete = is_complete_nonlinear(c, angles, block.stiffness[state.side], push, weight, end.time)
     return end if complete else undecided()
@@ -151,7 +159,7 @@ def greatest(weight: Line | None, left: float) -> float:
 def linear_series(ground: Ground, block: Record, state: Record) -> Ten:
     """Series of a linear arc under a ground acceleration that is linear in time."""
     side = state.side
-    gain = block.gain[side]
+    gain = block.threshold_slope[side]
     push = push_line(ground, state)
     return linear_ten(state.u, state.v, block.stiffness[side], gain * (block.threshold[side] + push[0]), gain * push[1])
 
@@ -159,7 +167,7 @@ def linear_series(ground: Ground, block: Record, state: Record) -> Ten:
 @inlined
 def weighted_series(ground: Ground, block: Record, state: Record, weight: Line) -> Ten:
     """Series of a linear arc under two ground accelerations that are linear in time."""
-    side, gain = state.side, block.gain[state.side]
+    side, gain = state.side, block.threshold_slope[state.side]
     push = push_line(ground, state)
     pushes = (gain * push[0], gain * push[1])
     return weighted_ten(state.u, state.v, block.stiffness[side], gain * block.threshold[side], pushes, weight)

@@ -33,20 +33,20 @@ def signatures() -> dict[str, tuple[Any, ...]]:
     count = reals(1, kind=np.int64)
     flags, singles = reals(1, kind=np.bool_), reals(1, kind=np.float32)
     seen = ground.Ground(reals(3, 4), reals(1, 1, 4), 0.0, 2, 2)
-    block, rules, scratch = state.record(state.BLOCK), state.record(state.RULES), state.new_scratch()
+    block, settings, scratch = state.record(state.BLOCK), state.record(state.SETTINGS), state.new_scratch()
     blocks, states, table = state.records(1, state.BLOCK), state.new_states(1, 1), state.new_table(1)
-    trail = Trail(seen, block, rules, state.records(1, state.NODE_ROW))
+    trail = Trail(seen, block, settings, state.records(1, state.NODE_ROW))
     pool = pool_of(blocks, states, 1, 1.0, 0)
-    setting = Setting(seen, block, rules, table, reals(2, 1, 10))
+    setting = Setting(seen, block, settings, table, reals(2, 1, 10))
     sequences = (given(), given(), given())
     statuses = reals(1, kind=np.int8)
     shares = (reals(1, 1, kind=np.float32), reals(1, 1, kind=np.float32), reals(1, 1, kind=np.float32), singles)
     return {
-        "march.march": (seen, block, rules, table, scratch, states[0]),
+        "march.march": (seen, block, settings, table, scratch, states[0]),
         "trace.trace": (trail, scratch, given(), count, reals(1, 3)),
         "trace.vary": (trail, scratch, state.record(state.VARIATION), 0, given(), reals(), reals(), reals()),
         "adjoint.adjoint": (trail, scratch, state.record(state.VARIATION), 0, 0.0, reals(3), reals(2, 2)),
-        "adjoint.of_ending": (trail, scratch, 0, reals(3), reals(2, 2)),
+        "adjoint.adjoint_of_final_state": (trail, scratch, 0, reals(3), reals(2, 2)),
         "periodic.iterate": (setting, scratch, states, 1, reals(1, 1, 3), count),
         "periodic.settle": (setting, scratch, states, 1, reals(1, TRAP), count, count),
         "periodic.differentiate": (trail, scratch, state.record(state.VARIATION), table, states, reals(1, 2, 2)),
@@ -55,12 +55,12 @@ def signatures() -> dict[str, tuple[Any, ...]]:
         "uplift.note_complete": (seen, blocks, states, scratch, flags),
         "uplift.next_uplifts": (trail, scratch, reals()),
         "ground.fill": (given(3), given(2, 2), 1.0, seen, reals()),
-        "lanes.run_lanes": (seen, rules, scratch, pool, 0),
-        "lanes.march_each": (seen, rules, scratch, pool),
+        "lanes.run_lanes": (seen, settings, scratch, pool, 0),
+        "lanes.march_each": (seen, settings, scratch, pool),
         "oscillator.peak_displacements": (given(3), given(2, 2), given(), 0.05, reals(), reals()),
-        "sine.eq65.eq65_time": (1.0, 1.0, 1.0),
-        "sine.eq65.eq65_sums": (1.0,),
-        "sine.eq65.eq65_terms": (1.0, reals(), reals()),
+        "sine.series.eq65_time": (1.0, 1.0, 1.0),
+        "sine.series.eq65_sums": (1.0,),
+        "sine.series.eq65_terms": (1.0, reals(), reals()),
         "sine.series.series_arcs": (reals(1, 1), True, 1.0, 1.0, reals(1, 1), reals(1, 1), reals(1, 1, 1)),
         "sine.sequence.fitted_amplitudes": (given(), given(), True, reals()),
         "population.shares": (*shares, reals(1, 1, kind=np.float32), reals()),

@@ -23,7 +23,7 @@ ORDER = 22
 #: Side of a body at rest. Every negative side is one at rest: see `resting_side`.
 AT_REST = -1
 
-#: The value of ``until`` of a march that ends at no piece of the motion.
+#: The value of ``stop_piece`` of a march that ends at no piece of the motion.
 TO_THE_END = 2**62
 
 
@@ -89,7 +89,7 @@ class Ending(IntEnum):
 
 
 def _record(**fields: Any) -> np.dtype[np.void]:
-    """Type of a record with these fields."""
+    """Type of a record with these fields, at the offsets of a C struct."""
     return np.dtype(
         [(name, *(kind if isinstance(kind, tuple) else (kind,))) for name, kind in fields.items()], align=True
     )
@@ -98,44 +98,89 @@ def _record(**fields: Any) -> np.dtype[np.void]:
 _SIDES = ("f8", (2,))
 _SERIES = ("f8", (ORDER + 2,))
 
-#: A block, side by side: lambda in u'' = lambda u - ...; uplift threshold in g and its gain (the restoring acceleration
-#: at zero rotation is gain (threshold + side a/g)); restitution on leaving the side, and the side entered from it; the
-#: rotation at which the block has overturned; slenderness, its sine and cosine; limit of a treatment other than the
-#: certificate; what restraints add: to the restoring acceleration at zero rotation, over the gain (``hold``); to the
-#: weight and to the push of u'', in g; a force of cos(u/2) and one of u, over inertia; damping, c in u'' = ... - c u';
-#: whether there is any of these five; and whether the sides are two stops that face each
-#: other: each side is then entered from itself, and at ``fallen``, their distance, the body hits the other stop.
-#: From ``yielding`` on: whether there is a tendon that yields; of it stiffness times lever arm over inertia, lever arm,
-#: what it adds to weight and push where it is elastic, elongations at which it yields and hangs slack; and the values
-#: of four fields without it. From ``varying`` on: whether the restitution varies, up to that above; the seed by which
-#: it is drawn at each impact, or -1 where it falls with the speed; its least value, and how much it falls per speed.
-#: The fields that most iterations of a march read come first, here and below: fewer cache lines are read.
+#: A body. Fields of two numbers are of side + and side -; accelerations are in units of g. The fields that most
+#: iterations of a march read come first, here and below: fewer cache lines are read.
 BLOCK = _record(
-    stiffness=_SIDES, gain=_SIDES, threshold=_SIDES, hold=_SIDES, restitution=_SIDES, entered=("i8", (2,)),
-    fallen="f8", restrained="?", facing="?", slenderness=_SIDES, sine=_SIDES, cosine=_SIDES, limit=_SIDES,
-    added_weight=_SIDES, added_push=_SIDES, prestress=_SIDES, spring=_SIDES, damping=_SIDES,
-    yielding="?", tendon=_SIDES, opening=_SIDES, tendon_weight=_SIDES, tendon_push=_SIDES, yields="f8", slack="f8",
-    base_weight=_SIDES, base_push=_SIDES, base_prestress=_SIDES, base_hold=_SIDES,
-    varying="?", seed="i8", least=_SIDES, slope=_SIDES,
-)  # fmt: skip
+    stiffness=_SIDES,  # lambda in u'' = lambda u - ..., 1/s^2
+    threshold_slope=_SIDES,  # restoring acceleration at zero rotation per acceleration above the threshold
+    threshold=_SIDES,  # ground acceleration that lifts the body, without restraints
+    restraint_threshold=_SIDES,  # what restraints add to the threshold
+    restitution=_SIDES,  # factor on the speed on leaving the side; the largest where it varies
+    next_side=("i8", (2,)),  # side entered from the side
+    overturn_angle="f8",  # rotation at which the body has overturned; between two stops their distance
+    restrained="?",  # whether added_weight to damping, or restraint_threshold, are not all zero
+    two_stops="?",  # whether the sides are two stops that face each other
+    slenderness=_SIDES,  # alpha, rad
+    sine=_SIDES,  # of alpha
+    cosine=_SIDES,  # of alpha
+    limit=_SIDES,  # of a treatment of chattering other than the certificate
+    added_weight=_SIDES,  # what restraints add to the weight
+    added_push=_SIDES,  # what restraints add to the push
+    prestress=_SIDES,  # restraining force of cos(u/2) over inertia, 1/s^2
+    spring=_SIDES,  # restraining force of u over inertia, 1/s^2
+    damping=_SIDES,  # c in u'' = ... - c u', 1/s
+    yielding="?",  # whether there is a tendon that yields
+    tendon=_SIDES,  # its stiffness times lever arm over inertia
+    lever_arm=_SIDES,  # its distance from the pivot, m
+    tendon_weight=_SIDES,  # what it adds to the weight where it is elastic
+    tendon_push=_SIDES,  # what it adds to the push where it is elastic
+    yields="f8",  # elongation at which it yields, m
+    slack="f8",  # elongation at which it hangs slack, m
+    base_weight=_SIDES,  # added_weight without it
+    base_push=_SIDES,  # added_push without it
+    base_prestress=_SIDES,  # prestress without it
+    base_restraint_threshold=_SIDES,  # restraint_threshold without it
+    variable_restitution="?",  # whether the restitution varies
+    seed="i8",  # by which it is drawn at each impact; -1 where it falls with the speed
+    min_restitution=_SIDES,  # its least value
+    restitution_slope=_SIDES,  # how much it falls per speed, s/rad
+)
 
-#: How to compute: model, end of chattering (`RestRule`), width of a good bracket (s), when to stop (s), whether that
-#: is never, and whether the tables are written or only the state is kept.
-RULES = _record(nonlinear="?", treatment="i8", tolerance="f8", stop="f8", endless="?", record="?")
+#: How to compute.
+SETTINGS = _record(
+    nonlinear="?",  # model
+    treatment="i8",  # end of chattering, a `RestRule`
+    tolerance="f8",  # width of a good bracket on the time of rest, s
+    stop="f8",  # time to stop at, s
+    no_end_time="?",  # whether that is infinite
+    record="?",  # whether the tables are written, or only the state is kept
+)
 
-#: The state of a march. ``until`` is the first piece that is not marched through and ``budget`` the number of
-#: iterations left; ``run`` counts the impacts since chattering was proven; ``smooth`` marks an uplift that is not a
-#: jump; a proof is tried only at a speed below ``proof_speed``; ``stalled`` counts the rests only because time hardly
-#: advanced from one impact to the next. ``uplifted`` and ``rested`` are the last such times. ``near_ties`` counts the
-#: decisions by the last digits whether a block touches the ground, or to which side it goes without weight. ``law``
-#: and ``plastic`` are those of a tendon that yields; ``leaning`` is the rotation about which the body leans at the end.
+#: The state of a march.
 STATE = _record(
-    piece="i8", offset="f8", side="i8", u="f8", v="f8", peak="f8", until="i8", budget="i8",
-    run="i8", proof_speed="f8", last_impact_time="f8", impacts="i8", ending="i8", smooth="?", peak_time="f8",
-    run_start="f8", uplifted="f8", rested="f8", first_uplift="f8", first_rest="f8", resting="f8", end="f8",
-    nodes="i8", events="i8", sequences="i8", uplifts="i8", rests="i8", stalled="i8", near_ties="i8",
-    law="i8", plastic="f8", leaning="f8",
-)  # fmt: skip
+    piece="i8",  # present piece of the motion
+    offset="f8",  # time since its start, s
+    side="i8",  # 0 is side +, 1 side -; negative at rest
+    u="f8",  # rotation in the frame of the side
+    v="f8",  # its rate
+    peak="f8",  # highest rotation so far
+    stop_piece="i8",  # first piece that is not marched through
+    budget="i8",  # iterations left
+    proven_impacts="i8",  # impacts since chattering was proven
+    certificate_speed="f8",  # speed below which the next proof is tried
+    last_impact_time="f8",  # of the last impact or uplift
+    impacts="i8",  # number so far
+    ending="i8",  # an `Ending`
+    continuous_uplift="?",  # whether the body has just been lifted, and not by a jump
+    peak_time="f8",  # time of the peak
+    run_start="f8",  # time at which chattering was proven
+    last_uplift_time="f8",
+    last_rest_time="f8",
+    first_uplift="f8",  # times; 0 without one
+    first_rest="f8",
+    time_at_rest="f8",  # all together
+    end="f8",  # time at which the march ended
+    nodes="i8",  # rows of the table written
+    events="i8",
+    sequences="i8",
+    uplifts="i8",  # number so far
+    rests="i8",
+    rests_by_rounding="i8",  # rests only because time hardly advanced from one impact to the next
+    rounding_decisions="i8",  # whether a block touches the ground, or to which side it goes without weight
+    law="i8",  # of a tendon that yields, a `TendonLaw`
+    plastic="f8",  # its plastic elongation, m
+    leaning="f8",  # rotation about which the body leans at the end
+)
 
 #: A step of a response: the state at its start, as `expand` takes it. Elsewhere a side is +1 or -1, and 0 at rest.
 NODE_ROW = _record(time="f8", piece="i8", offset="f8", side="i4", law="i4", u="f8", v="f8")
@@ -147,12 +192,17 @@ SEQUENCE_ROW = _record(start="f8", end="f8", lower="f8", upper="f8", impacts="i8
 #: arrays by value.
 TABLE = _record(node=NODE_ROW, impact=IMPACT_ROW, event=EVENT_ROW, sequence=SEQUENCE_ROW)
 
-#: Scratch space: the series of one step; of the ground, the weight, sin and cos(alpha - u), and sin and cos(u/2) about
-#: its start; another.
+#: Scratch space: series of one step about its start.
 SCRATCH = _record(
-    rotation=_SERIES, ground=_SERIES, weight=_SERIES, sine=_SERIES, cosine=_SERIES, other=_SERIES,
-    half_sine=_SERIES, half_cosine=_SERIES,
-)  # fmt: skip
+    rotation=_SERIES,
+    ground=_SERIES,  # acceleration of the ground
+    weight=_SERIES,
+    sine=_SERIES,  # of alpha - u
+    cosine=_SERIES,
+    other=_SERIES,  # space for another series
+    half_sine=_SERIES,  # of u/2
+    half_cosine=_SERIES,
+)
 
 #: Scratch space of a variation: series of the stiffness, of the forcing and of the variation itself.
 VARIATION = _record(stiffness=_SERIES, forcing=_SERIES, change=_SERIES)
@@ -180,10 +230,19 @@ def new_states(count: int, budget: int) -> Records:
     """States of blocks at rest at time zero that march to the end of the motion."""
     states = records(count, STATE)
     states["side"] = AT_REST
-    states["until"] = TO_THE_END
+    states["stop_piece"] = TO_THE_END
     states["ending"] = Ending.RUNNING.value
     states["budget"] = budget
     return states
+
+
+def state_at(node: Record, plastic: float = 0.0, budget: int = np.iinfo(np.int64).max) -> Record:
+    """State of a march that starts at a node, with the plastic elongation of a tendon there."""
+    made = new_states(1, budget)[0]
+    for name in ("piece", "offset", "side", "u", "v", "law"):
+        made[name] = node[name]
+    made["peak"], made["plastic"] = node["u"], plastic
+    return made
 
 
 def new_scratch() -> Record:
@@ -201,7 +260,7 @@ def grown(table: Records) -> Records:
     return attributed(np.concatenate([table, np.zeros_like(table)]))
 
 
-# ---- Writing rows of a table; nothing is written where the rules say so ----
+# ---- Writing rows of a table; nothing is written where the settings say so ----
 
 #: Largest number of impacts of a proven sequence in one iteration of a march, and of rows of one kind that it writes.
 PROVEN_PER_ITERATION = 64
@@ -209,10 +268,10 @@ _ROWS_PER_ITERATION = PROVEN_PER_ITERATION + 3
 
 
 @inlined
-def has_space(rules: Record, table: Records, state: Record) -> bool:
+def has_space(settings: Record, table: Records, state: Record) -> bool:
     """Whether the table has space for what one iteration of the march can write."""
     most = max(max(state.nodes, state.impacts), max(state.events, state.sequences))
-    return not rules.record or most + _ROWS_PER_ITERATION <= table.shape[0]
+    return not settings.record or most + _ROWS_PER_ITERATION <= table.shape[0]
 
 
 @inlined
@@ -224,7 +283,7 @@ def signed(side: int) -> int:
 @inlined
 def resting_side(block: Record, side: int) -> int:
     """Side of a body that comes to rest on a side: of two stops that face each other it tells which; see `stop_of`."""
-    return -1 - side if block.facing else AT_REST
+    return -1 - side if block.two_stops else AT_REST
 
 
 @inlined
@@ -234,9 +293,9 @@ def stop_of(resting: int) -> int:
 
 
 @inlined
-def write_node(ground: Ground, rules: Record, table: Records, state: Record) -> None:
+def write_node(ground: Ground, settings: Record, table: Records, state: Record) -> None:
     """Write the state into the table."""
-    if not rules.record:
+    if not settings.record:
         return
     row = table[state.nodes].node
     row.time = start_of(ground, state.piece) + state.offset
@@ -250,9 +309,9 @@ def write_node(ground: Ground, rules: Record, table: Records, state: Record) -> 
 
 
 @inlined
-def write_event(rules: Record, table: Records, state: Record, time: float, kind: int) -> None:
+def write_event(settings: Record, table: Records, state: Record, time: float, kind: int) -> None:
     """Write an uplift, a rest or an overturning."""
-    if rules.record:
+    if settings.record:
         row = table[state.events].event
         row.time = time
         row.kind = kind
@@ -261,9 +320,9 @@ def write_event(rules: Record, table: Records, state: Record, time: float, kind:
 
 
 @inlined
-def write_impact(rules: Record, table: Records, state: Record, time: float, speed: float) -> None:
+def write_impact(settings: Record, table: Records, state: Record, time: float, speed: float) -> None:
     """Write the last impact, from the state after it and the speed before."""
-    if not rules.record:
+    if not settings.record:
         return
     row = table[state.impacts - 1].impact
     row.time = time
@@ -273,14 +332,16 @@ def write_impact(rules: Record, table: Records, state: Record, time: float, spee
 
 
 @inlined
-def write_sequence(rules: Record, table: Records, state: Record, time: float, rest: tuple[float, float, float]) -> None:
+def write_sequence(
+    settings: Record, table: Records, state: Record, time: float, rest: tuple[float, float, float]
+) -> None:
     """Write a chattering sequence that ends, from its last impact's time and (lower, upper, time) to rest."""
     lower, upper, to_rest = rest
-    if rules.record:
+    if settings.record:
         row = table[state.sequences].sequence
         row.start = state.run_start
         row.end = time + to_rest
         row.lower = time + lower
         row.upper = time + upper
-        row.impacts = state.run
+        row.impacts = state.proven_impacts
     state.sequences += 1

@@ -24,7 +24,7 @@ _ROUNDING = 2.0**-44
 
 
 @shared
-def adopt(block: Record, law: int, plastic: float) -> None:
+def apply_tendon_law(block: Record, law: int, plastic: float) -> None:
     """Write a law, and what follows from the plastic elongation, into the record of a block."""
     for side in range(2):
         force = -block.tendon[side] * (plastic + block.slack)  # at no elongation, over inertia and lever arm
@@ -36,13 +36,15 @@ def adopt(block: Record, law: int, plastic: float) -> None:
         block.added_weight[side] = block.base_weight[side] + weight
         block.added_push[side] = block.base_push[side] + push
         block.prestress[side] = block.base_prestress[side] + prestress
-        block.hold[side] = block.base_hold[side] + max(0.0, force) / block.gain[side]
+        block.restraint_threshold[side] = (
+            block.base_restraint_threshold[side] + max(0.0, force) / block.threshold_slope[side]
+        )
 
 
 @inlined
 def rotation_at(block: Record, nonlinear: bool, side: int, elongation: float) -> float:
     """Rotation at which the tendon is longer by so much; an infinity with the sign of that where it never is."""
-    x = block.opening[side]
+    x = block.lever_arm[side]
     if x <= 0.0 or (nonlinear and abs(elongation) >= 2.0 * x):
         return math.copysign(np.inf, elongation)
     return 2.0 * math.asin(0.5 * elongation / x) if nonlinear else elongation / x
@@ -51,7 +53,7 @@ def rotation_at(block: Record, nonlinear: bool, side: int, elongation: float) ->
 @inlined
 def elongation_at(block: Record, nonlinear: bool, side: int, u: float) -> float:
     """Elongation of the tendon at a rotation."""
-    return block.opening[side] * (2.0 * math.sin(0.5 * u) if nonlinear else u)
+    return block.lever_arm[side] * (2.0 * math.sin(0.5 * u) if nonlinear else u)
 
 
 @inlined
@@ -61,26 +63,28 @@ def law_of_standing(block: Record, plastic: float) -> int:
 
 
 @inlined
-def may_change_below(block: Record, rules: Record, plastic: float, height: float) -> bool:
+def may_change_below(block: Record, settings: Record, plastic: float, height: float) -> bool:
     """Whether the law of a standing block changes below a height on one of its sides."""
     level = block.slack if law_of_standing(block, plastic) == TendonLaw.SLACK else block.yields
-    plus = rotation_at(block, rules.nonlinear, 0, plastic + level)
-    minus = rotation_at(block, rules.nonlinear, 1, plastic + level)
+    plus = rotation_at(block, settings.nonlinear, 0, plastic + level)
+    minus = rotation_at(block, settings.nonlinear, 1, plastic + level)
     return bool(not height < min(plus, minus))
 
 
 @shared
-def next_law(block: Record, rules: Record, scratch: Record, state: Record, order: int, h: float) -> tuple[float, int]:
+def next_law(
+    block: Record, settings: Record, scratch: Record, state: Record, order: int, h: float
+) -> tuple[float, int]:
     """Time of the first change of the law along an arc, inf without one within h; and the law after it."""
     c, d, side = scratch.rotation, scratch.other, state.side
     if state.law == TendonLaw.PLASTIC:
         for k in range(order):
             d[k] = (k + 1) * c[k + 1]
         return first_of(d, order - 1, h), TendonLaw.ELASTIC
-    slack = rotation_at(block, rules.nonlinear, side, state.plastic + block.slack)
+    slack = rotation_at(block, settings.nonlinear, side, state.plastic + block.slack)
     if state.law == TendonLaw.SLACK:
         return time_to_level(c, order, h, slack, 1.0, d), TendonLaw.ELASTIC
-    top = rotation_at(block, rules.nonlinear, side, state.plastic + block.yields)
+    top = rotation_at(block, settings.nonlinear, side, state.plastic + block.yields)
     yielding = time_to_level(c, order, h, top, 1.0, d)
     slackening = time_to_level(c, order, h, slack, -1.0, d) if slack > 0.0 else np.inf
     if slackening < yielding:
@@ -114,19 +118,19 @@ def first_of(d: Floats, order: int, h: float) -> float:
 
 
 @inlined
-def plastic_after(block: Record, rules: Record, nodes: Records, row: int, before: float) -> float:
+def plastic_after(block: Record, settings: Record, nodes: Records, row: int, before: float) -> float:
     """Plastic elongation at a node of a response, from that at the node before it; of the first node from itself."""
     node = nodes[row]
     turns = row > 0 and node.law == TendonLaw.ELASTIC and nodes[row - 1].law == TendonLaw.PLASTIC
     if turns or (row == 0 and node.side >= 0):
-        return max(0.0, elongation_at(block, rules.nonlinear, node.side, node.u) - block.yields)
+        return max(0.0, elongation_at(block, settings.nonlinear, node.side, node.u) - block.yields)
     return before
 
 
 @inlined
-def change_law(block: Record, rules: Record, state: Record, law: int, u: float) -> None:
+def change_law(block: Record, settings: Record, state: Record, law: int, u: float) -> None:
     """Change the law of a block at a rotation."""
     if state.law == TendonLaw.PLASTIC:
-        state.plastic = max(0.0, elongation_at(block, rules.nonlinear, state.side, u) - block.yields)
+        state.plastic = max(0.0, elongation_at(block, settings.nonlinear, state.side, u) - block.yields)
     state.law = law
-    adopt(block, law, state.plastic)
+    apply_tendon_law(block, law, state.plastic)

@@ -15,10 +15,10 @@ from rocking.kernels.arc import evaluate, expand, restoring, sign_of, weight_at
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.events import first_root
 from rocking.kernels.ground import Ground, acceleration, has_vertical, length_of, slope, start_of, vertical_of
-from rocking.kernels.recurrences import INTEGRATED_TWICE, variation_coefficients
 from rocking.kernels.restitution import factor, middle_factor, relative_slope
+from rocking.kernels.series import INTEGRATED_TWICE, variation_coefficients
 from rocking.kernels.state import NODE_ROW, Record, Records, TendonLaw, records
-from rocking.kernels.tendon import adopt, law_of_standing, plastic_after
+from rocking.kernels.tendon import apply_tendon_law, law_of_standing, plastic_after
 
 #: Nodes of a response before its march.
 NO_NODES = records(0, NODE_ROW)
@@ -29,11 +29,11 @@ class Trail(NamedTuple):
 
     ground: Ground
     block: Record
-    rules: Record
+    settings: Record
     nodes: Records
 
 
-def own(trail: Trail) -> Trail:
+def copy_trail(trail: Trail) -> Trail:
     """Trail with a block of its own where a tendon yields: what follows its steps changes the law of that block."""
     return trail._replace(block=trail.block.copy()) if trail.block["yielding"] else trail
 
@@ -52,7 +52,7 @@ def trace(trail: Trail, scratch: Record, times: Floats, rows: Integers, out: Flo
     From the end of the last resolved arc to rest, or to the end of the response, they are zero. For a
     NaN the values mean nothing.
     """
-    ground, block, rules, nodes = trail
+    ground, block, settings, nodes = trail
     expanded = -1
     order = 0
     known, plastic = -1, 0.0  # of a tendon that yields
@@ -69,11 +69,11 @@ def trace(trail: Trail, scratch: Record, times: Floats, rows: Integers, out: Flo
             if block.yielding:
                 first, plastic = (known + 1, plastic) if row > known else (0, 0.0)
                 for each in range(first, row + 1):
-                    plastic = plastic_after(block, rules, nodes, each, plastic)
+                    plastic = plastic_after(block, settings, nodes, each, plastic)
                 known = row
-                adopt(block, node.law, plastic)
+                apply_tendon_law(block, node.law, plastic)
             left = np.inf if last else nodes[row + 1].time - node.time
-            order, h, _ = expand(ground, block, rules, scratch, node, left)
+            order, h, _ = expand(ground, block, settings, scratch, node, left)
             landing = np.inf
             if closes:
                 lead = 0 if node.u > 0.0 else (1 if node.v > 0.0 else 2)
@@ -145,8 +145,8 @@ def vary(
     for k in range(nodes.shape[0]):
         node = nodes[k]
         if trail.block.yielding:
-            plastic = plastic_after(trail.block, trail.rules, nodes, k, plastic)
-            adopt(trail.block, node.law, plastic)
+            plastic = plastic_after(trail.block, trail.settings, nodes, k, plastic)
+            apply_tendon_law(trail.block, node.law, plastic)
         if k + 1 == nodes.shape[0]:
             if node.side >= 0 and event_count < events.shape[0]:
                 events[event_count] = -du / node.v
@@ -176,7 +176,7 @@ def vary(
             if is_impact(nodes, k):
                 _, speed, _ = evaluate(scratch.rotation, order, t)
                 shift = du / -speed
-                away = -1.0 if trail.block.facing and following.side != node.side else 1.0  # the other stop
+                away = -1.0 if trail.block.two_stops and following.side != node.side else 1.0  # the other stop
                 rates = away * dv, -away * speed
                 du, dv = saltation(trail, node, following, quantity, shift, rates, impact_count)
                 impacts[impact_count] = shift
@@ -226,14 +226,14 @@ def on_side(quantity: int, side: int) -> int:
 @inlined
 def elongation_rate(trail: Trail, side: int, u: float) -> float:
     """Elongation of a tendon per rotation, at a rotation."""
-    return trail.block.opening[side] * (math.cos(0.5 * u) if trail.rules.nonlinear else 1.0)
+    return trail.block.lever_arm[side] * (math.cos(0.5 * u) if trail.settings.nonlinear else 1.0)
 
 
 @inlined
 def plastic_by_start(trail: Trail) -> float:
     """Return the plastic elongation of a tendon per rotation at the start of a response: 0 unless it yields there."""
     node = trail.nodes[0]
-    if not trail.block.yielding or plastic_after(trail.block, trail.rules, trail.nodes, 0, 0.0) <= 0.0:
+    if not trail.block.yielding or plastic_after(trail.block, trail.settings, trail.nodes, 0, 0.0) <= 0.0:
         return 0.0
     return elongation_rate(trail, node.side, node.u)
 
@@ -266,7 +266,7 @@ def expand_variation(
 
     ``start``: variations of rotation and velocity there, and of a tendon's plastic elongation.
     """
-    order, _, degree = expand(trail.ground, trail.block, trail.rules, scratch, node, left)
+    order, _, degree = expand(trail.ground, trail.block, trail.settings, scratch, node, left)
     expand_coefficients(trail, scratch, work, node.side, degree, order)
     here = on_side(quantity, node.side)
     if here == Quantity.FREQUENCY:
@@ -282,7 +282,9 @@ def expand_variation(
     if plastic != 0.0 and node.law == TendonLaw.ELASTIC:
         change = trail.block.tendon[node.side] * plastic
         for k in range(order - 1):
-            work.forcing[k] += change * (scratch.half_cosine[k] if trail.rules.nonlinear else (1.0 if k == 0 else 0.0))
+            work.forcing[k] += change * (
+                scratch.half_cosine[k] if trail.settings.nonlinear else (1.0 if k == 0 else 0.0)
+            )
     add_restraints(trail, scratch, work, node.side, order)
     variation_coefficients(work, trail.block.damping[node.side], order)
     return order
@@ -294,11 +296,11 @@ def expand_coefficients(trail: Trail, scratch: Record, work: Record, side: int, 
 
     The motion is then in scratch without what restraints add to it.
     """
-    lam, gain, threshold = trail.block.stiffness[side], trail.block.gain[side], trail.block.threshold[side]
+    lam, gain, threshold = trail.block.stiffness[side], trail.block.threshold_slope[side], trail.block.threshold[side]
     A, W, S, C = scratch.ground, scratch.weight, scratch.sine, scratch.cosine
     changes = degree if has_vertical(trail.ground) else 0
     for k in range(order - 1):
-        if trail.rules.nonlinear:
+        if trail.settings.nonlinear:
             stiffness = 0.0
             for j in range(min(k, changes) + 1):
                 stiffness += W[j] * C[k - j]
@@ -310,7 +312,7 @@ def expand_coefficients(trail: Trail, scratch: Record, work: Record, side: int, 
     W[0] -= trail.block.added_weight[side]
     A[0] -= trail.block.added_push[side]
     for k in range(order - 1):
-        if trail.rules.nonlinear:
+        if trail.settings.nonlinear:
             forcing = -S[k]
             for j in range(min(k, changes) + 1):
                 forcing += W[j] * S[k - j]
@@ -328,7 +330,7 @@ def expand_coefficients(trail: Trail, scratch: Record, work: Record, side: int, 
 def add_restraints(trail: Trail, scratch: Record, work: Record, side: int, order: int) -> None:
     """Add what prestress and springs are to d u''/d u, after `expand_coefficients`."""
     work.stiffness[0] -= trail.block.spring[side]
-    if trail.rules.nonlinear and trail.block.prestress[side] != 0.0:
+    if trail.settings.nonlinear and trail.block.prestress[side] != 0.0:
         for k in range(order - 1):
             work.stiffness[k] += 0.5 * trail.block.prestress[side] * scratch.half_sine[k]
 
@@ -351,7 +353,7 @@ def saltation(
     """
     block = trail.block
     dv, speed = rates
-    hit = following.side if block.facing else node.side
+    hit = following.side if block.two_stops else node.side
     left = restoring(trail.ground, block, hit, following.piece, following.offset) - block.damping[hit] * speed
     e = factor(block, hit, speed, number)
     entered = restoring(trail.ground, block, following.side, following.piece, following.offset)
@@ -364,20 +366,20 @@ def saltation(
 @inlined
 def uplift_shift(trail: Trail, node: Record, quantity: int, by_tendon: float) -> float:
     """Shift of the uplift with which a node begins; ``by_tendon``: see `restoring_by_tendon`."""
-    ground, block, rules, _ = trail
+    ground, block, settings, _ = trail
     threshold = block.threshold[node.side]
     push = -push_at(ground, block, node.side, node.piece, node.offset)
     rate = -push_rate(ground, block, node.side, node.piece, node.offset)
     if is_jump(trail, node):
         return 0.0
-    slackening = by_tendon / (block.gain[node.side] * rate)
+    slackening = by_tendon / (block.threshold_slope[node.side] * rate)
     if quantity == Quantity.MOTION:
         return -push / rate + slackening
     if on_side(quantity, node.side) == Quantity.SLENDERNESS:
         growth = weight_at(ground, node.piece, node.offset) + block.added_weight[node.side]
-        if rules.nonlinear:
+        if settings.nonlinear:
             growth *= 1.0 + threshold * threshold
-            growth += block.prestress[node.side] * threshold / block.gain[node.side]
+            growth += block.prestress[node.side] * threshold / block.threshold_slope[node.side]
         return block.slenderness[node.side] * growth / rate + slackening
     return slackening
 
@@ -385,7 +387,7 @@ def uplift_shift(trail: Trail, node: Record, quantity: int, by_tendon: float) ->
 @inlined
 def is_jump(trail: Trail, node: Record) -> bool:
     """Whether the motion jumps past the threshold at the uplift with which a node begins."""
-    threshold, hold = trail.block.threshold[node.side], trail.block.hold[node.side]
+    threshold, hold = trail.block.threshold[node.side], trail.block.restraint_threshold[node.side]
     push = -push_at(trail.ground, trail.block, node.side, node.piece, node.offset)
     return bool(abs(push - threshold - hold) > _JUMP * (abs(threshold) + abs(hold)))
 
@@ -426,7 +428,7 @@ def rest_shift(
     if rest.time == node.time:
         return shift
     block, i = trail.block, node.side
-    j = block.entered[i]
+    j = block.next_side[i]
     g_i = restoring(trail.ground, block, i, node.piece, node.offset)
     g_j = restoring(trail.ground, block, j, node.piece, node.offset)
     dg_i = restoring_shift(trail, node, i, quantity, shift) + restoring_by_tendon(block, i, plastic, dp)
@@ -443,16 +445,16 @@ def rest_shift(
 @inlined
 def restoring_shift(trail: Trail, node: Record, j: int, quantity: int, shift: float) -> float:
     """Change of a side's restoring acceleration at an impact that shifts."""
-    ground, block, rules, _ = trail
+    ground, block, settings, _ = trail
     here = acceleration(ground, node.piece, node.offset)
-    change = block.gain[j] * shift * push_rate(ground, block, j, node.piece, node.offset)
+    change = block.threshold_slope[j] * shift * push_rate(ground, block, j, node.piece, node.offset)
     if quantity == Quantity.MOTION:
-        change += block.gain[j] * push_at(ground, block, j, node.piece, node.offset)
+        change += block.threshold_slope[j] * push_at(ground, block, j, node.piece, node.offset)
     elif on_side(quantity, j) == Quantity.FREQUENCY:
         change += 2.0 * restoring(ground, block, j, node.piece, node.offset)
     elif on_side(quantity, j) == Quantity.SLENDERNESS:
         slope_of_angle = weight_at(ground, node.piece, node.offset) + block.added_weight[j]
-        if rules.nonlinear:
+        if settings.nonlinear:
             slope_of_angle = (
                 block.cosine[j] * slope_of_angle - (sign_of(j) * here + block.added_push[j]) * block.sine[j]
             )

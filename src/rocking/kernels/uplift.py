@@ -20,7 +20,7 @@ from rocking.kernels.ground import (
     vertical_of,
 )
 from rocking.kernels.state import AT_REST, Record, Records, stop_of
-from rocking.kernels.tendon import adopt, plastic_after
+from rocking.kernels.tendon import apply_tendon_law, plastic_after
 from rocking.kernels.trace import Trail
 
 #: Accelerations closer to a threshold than this fraction of it are at the threshold.
@@ -46,8 +46,8 @@ def next_uplift(
     """
     A, d = scratch.ground, scratch.other
     plus, minus = block.threshold[0], block.threshold[1]
-    hold_plus, hold_minus = block.hold[0], block.hold[1]
-    if block.facing:  # only the stop at which it rests
+    hold_plus, hold_minus = block.restraint_threshold[0], block.restraint_threshold[1]
+    if block.two_stops:  # only the stop at which it rests
         plus, minus = (plus, np.inf) if stop_of(resting) == 0 else (np.inf, minus)
     while True:
         following = next_beyond(ground, piece, (-plus, minus), (-hold_plus, hold_minus))
@@ -69,8 +69,8 @@ def next_uplift(
             passed = min(to_plus, to_minus)
             # A passing that rounding puts at the end of the piece is decided in the next one, which may turn back.
             if offset + passed < length:
-                side = stop_of(resting) if block.facing else 0
-                if block.entered[0] != 0:  # it rests on both sides
+                side = stop_of(resting) if block.two_stops else 0
+                if block.next_side[0] != 0:  # it rests on both sides
                     side = lifted_side(ground, block, piece, offset + passed, length - offset - passed, A, d)
                 return Uplift(piece, offset + passed, side, jump_minus if side == 1 else jump_plus)
         piece += 1
@@ -83,15 +83,15 @@ def next_uplifts(trail: Trail, scratch: Record, times: Floats) -> None:
 
     The law of a tendon that yields changes in the trail's block.
     """
-    ground, block, rules, nodes = trail
+    ground, block, settings, nodes = trail
     plastic = 0.0
     for k in range(nodes.shape[0]):
         node = nodes[k]
         if block.yielding:
-            plastic = plastic_after(block, rules, nodes, k, plastic)
-            adopt(block, node.law, plastic)
+            plastic = plastic_after(block, settings, nodes, k, plastic)
+            apply_tendon_law(block, node.law, plastic)
         if node.side < 0:
-            found = next_uplift(ground, block, scratch, node.side, node.piece, node.offset, rules.stop)
+            found = next_uplift(ground, block, scratch, node.side, node.piece, node.offset, settings.stop)
             times[k] = start_of(ground, found.piece) + found.offset if found.side != AT_REST else np.inf
 
 
@@ -128,11 +128,11 @@ def difference_series(ground: Ground, block: Record, piece: int, offset: float, 
     Without restraints it is the horizontal motion, of unequal sides as well: both thresholds vanish with the weight.
     ``d`` is scratch space.
     """
-    if block.hold[0] == 0.0 and block.hold[1] == 0.0:
+    if block.restraint_threshold[0] == 0.0 and block.restraint_threshold[1] == 0.0:
         return local_series(ground, piece, offset, 1.0, A)
     uneven = 0.5 * (block.threshold[1] - block.threshold[0])
     degree = push_series(ground, piece, offset, uneven, 1.0, A, d)
-    A[0] -= uneven + 0.5 * (block.hold[1] - block.hold[0])
+    A[0] -= uneven + 0.5 * (block.restraint_threshold[1] - block.restraint_threshold[0])
     return degree
 
 
@@ -286,7 +286,7 @@ def time_beyond(ground: Ground, block: Record, scratch: Record, piece: int, offs
         return 0.0
     A, d = scratch.ground, scratch.other
     degree = push_series(ground, piece, offset, threshold, sign, A, d)
-    threshold += block.hold[side]
+    threshold += block.restraint_threshold[side]
     d[0] = sign * A[0] - (threshold - _BACK * abs(threshold))
     for k in range(1, degree + 1):
         d[k] = sign * A[k]

@@ -26,7 +26,7 @@ _FARTHEST: Final = 1.6
 
 #: Fields of a body's record that make its potential.
 _FIELDS: Final = (
-    "stiffness", "gain", "threshold", "slenderness", "added_weight", "added_push", "prestress", "spring",
+    "stiffness", "threshold_slope", "threshold", "slenderness", "added_weight", "added_push", "prestress", "spring",
 )  # fmt: skip
 
 
@@ -105,7 +105,7 @@ class Energy:
             psi = made["slenderness"] - 0.5 * u
             lifted = made["stiffness"] * (weight * np.sin(psi) + push * np.cos(psi)) + made["prestress"]
             return np.asarray(half * lifted + 0.5 * made["spring"] * u * u)
-        stands = made["gain"] * (made["threshold"] * weight + push) + made["prestress"]
+        stands = made["threshold_slope"] * (made["threshold"] * weight + push) + made["prestress"]
         return np.asarray(u * (stands - 0.5 * (made["stiffness"] * weight - made["spring"]) * u))
 
     def boundary(self, side: int) -> tuple[Floats, Floats]:
@@ -125,7 +125,7 @@ class Energy:
     def sides_at(self, impacts: NDArray[np.void]) -> tuple[Integers, Integers]:
         """Sides that the body leaves and enters at impacts of a response."""
         into: Integers = np.where(impacts["side"] > 0, 0, 1)
-        return (into if int(self.record["entered"][0]) == 0 else 1 - into), into
+        return (into if int(self.record["next_side"][0]) == 0 else 1 - into), into
 
     def losses(self, impacts: NDArray[np.void]) -> Floats:
         """Energy that each impact of a response takes."""
@@ -151,7 +151,7 @@ def _balance_on_a_line(made: Record, added_weight: Floats, added_push: Floats, p
     """Rotation at which what brings a block back has become nothing, where it is a straight line in the rotation."""
     found, weight = np.full(2, math.inf), 1.0 + added_weight
     falls = made["stiffness"] * weight - made["spring"]
-    stands = made["gain"] * (made["threshold"] * weight + added_push) + prestress
+    stands = made["threshold_slope"] * (made["threshold"] * weight + added_push) + prestress
     np.divide(stands, falls, out=found, where=falls > 0.0)
     return found
 

@@ -12,10 +12,10 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.kernels import state
-from rocking.kernels.adjoint import Ends, adjoint, of_ending
+from rocking.kernels.adjoint import Ends, adjoint, adjoint_of_final_state
 from rocking.kernels.march import march
 from rocking.kernels.state import Records
-from rocking.kernels.trace import Trail, own
+from rocking.kernels.trace import Trail, copy_trail
 from rocking.motion import piecewise
 from rocking.motion.motion import Motion
 from rocking.response.history import steps_to_events, steps_to_impacts
@@ -257,14 +257,10 @@ def _later(response: Response, row: int, until: float) -> Records:
 
 def _ties_before(trail: Trail, instant: float) -> bool:
     """Whether the last digits decided on a touch up to an instant: the march is followed once more, as far as that."""
-    rules, start = trail.rules.copy(), state.new_states(1, np.iinfo(np.int64).max)[0]
-    first = trail.nodes[0]
-    for name in ("piece", "offset", "side", "u", "v"):
-        start[name] = first[name]
-    start["peak"] = first["u"]
-    rules["stop"], rules["endless"], rules["record"] = math.nextafter(instant, math.inf), False, False
-    march(trail.ground, own(trail).block, rules, state.new_table(0), state.new_scratch(), start)
-    return bool(start["near_ties"] > 0)
+    rules, start = trail.settings.copy(), state.state_at(trail.nodes[0])
+    rules["stop"], rules["no_end_time"], rules["record"] = math.nextafter(instant, math.inf), False, False
+    march(trail.ground, copy_trail(trail).block, rules, state.new_table(0), state.new_scratch(), start)
+    return bool(start["rounding_decisions"] > 0)
 
 
 def _by_adjoint(target: _Target, change: Floats, out: Floats) -> str:
@@ -273,7 +269,7 @@ def _by_adjoint(target: _Target, change: Floats, out: Floats) -> str:
     starts_at_rest, begin = int(nodes["side"][0]) < 0, float(nodes["time"][0])
     ends = Ends.START
     if target.by_state is None:
-        ends = Ends(of_ending(own(target.trail), scratch, target.row, change, out))
+        ends = Ends(adjoint_of_final_state(copy_trail(target.trail), scratch, target.row, change, out))
     else:
         change[:2] = target.by_state
         if not np.any(change) or (target.instant == begin and not target.is_height):
@@ -282,7 +278,7 @@ def _by_adjoint(target: _Target, change: Floats, out: Floats) -> str:
         return _REASONS[ends]
     if target.instant > begin:
         work = state.record(state.VARIATION)
-        ends = Ends(adjoint(own(target.trail), scratch, work, target.row, target.since, change, out))
+        ends = Ends(adjoint(copy_trail(target.trail), scratch, work, target.row, target.since, change, out))
         if ends in _REASONS:
             return _REASONS[ends]
         waits = starts_at_rest and (len(nodes) == 1 or nodes["time"][1] > begin)

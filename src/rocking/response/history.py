@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from rocking import checks
 from rocking.arrays import Flags, Floats, Integers
-from rocking.bisection import bisected
+from rocking.bisection import bisected, halved, middle
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.march import march
 from rocking.kernels.state import Records
-from rocking.kernels.trace import Trail, own, trace
+from rocking.kernels.trace import Trail, copy_trail, trace
 from rocking.tables import counted
 
 #: Times at which each step of the last arc is looked at for its last passage of the balance point.
@@ -88,7 +88,7 @@ class History:
         found = np.empty((len(times), 3))
         given = times.view()
         given.flags.writeable = False  # one type, whatever the caller may do: `trace` is compiled once
-        trace(own(self.trail), state.new_scratch(), given, rows, found)
+        trace(copy_trail(self.trail), state.new_scratch(), given, rows, found)
         if any(self.stops):
             side = self.trail.nodes["side"][rows]
             found[:, 0] += np.array(self.stops)[np.where(side < 0, -1 - side, side)]
@@ -148,9 +148,8 @@ class History:
         step, part = np.nonzero((rate[:, :-1] >= 0.0) & (rate[:, 1:] <= 0.0))
         low, high, rows, sign = times[step, part], times[step, part + 1], moving[step], 1.0 - 2.0 * side[step]
         for _ in range(_TURNINGS if len(step) else 0):
-            middle = 0.5 * (low + high)
-            out = sign * self.states_in(middle, rows)[:, 1] > 0.0
-            low, high = np.where(out, middle, low), np.where(out, high, middle)
+            out = sign * self.states_in(middle(low, high), rows)[:, 1] > 0.0
+            low, high = halved(low, high, out, ~out)
         np.maximum.at(found, step, np.abs(self.states_in(low, rows)[:, 0]))
         plus, minus = (float(np.max(found[side == k], initial=0.0)) for k in range(2))
         return plus, minus
@@ -190,18 +189,15 @@ def with_all_impacts(trail: Trail, *, cut: bool) -> Trail:
     closing = closing[nodes["v"][closing] > slowest[nodes["side"][closing]]]
     if not len(closing):
         return trail
-    body, rules, scratch = trail.block.copy(), trail.rules.copy(), state.new_scratch()
-    rules["treatment"], rules["endless"], rules["record"] = state.RestRule.VELOCITY, False, True
+    body, rules, scratch = trail.block.copy(), trail.settings.copy(), state.new_scratch()
+    rules["treatment"], rules["no_end_time"], rules["record"] = state.RestRule.VELOCITY, False, True
     table = state.new_table(1024)
     parts, done, plastic = [], 0, plastic_elongations(trail)
     for row in closing:
-        start = state.new_states(1, _MOST_IMPACTS)[0]
-        for name in ("piece", "offset", "side", "u", "v", "law"):
-            start[name] = nodes[name][row]
-        start["plastic"] = plastic[row]
+        start = state.state_at(nodes[row], plastic[row], _MOST_IMPACTS)
         body["limit"] = np.maximum(slowest, _LEAST_SHARE * start["v"])
         start["peak"] = math.inf  # nobody asks for the highest rotation; weight presses down where a rest is proven
-        rules["stop"] = nodes["time"][row + 1] if row + 1 < len(nodes) else trail.rules["stop"]
+        rules["stop"] = nodes["time"][row + 1] if row + 1 < len(nodes) else trail.settings["stop"]
         while march(trail.ground, body, rules, table, scratch, start) == state.Ending.FULL:
             table = state.grown(table)
         found = table["node"][1 : start["nodes"]]
@@ -212,8 +208,8 @@ def with_all_impacts(trail: Trail, *, cut: bool) -> Trail:
 
 def elongation(trail: Trail, rotations: Floats, side: Integers) -> Floats:
     """Elongation of the tendon that may yield at rotations to each side, m."""
-    bend = 2.0 * np.sin(0.5 * rotations) if trail.rules["nonlinear"] else rotations
-    return np.asarray(trail.block["opening"][np.maximum(side, 0)] * bend)
+    bend = 2.0 * np.sin(0.5 * rotations) if trail.settings["nonlinear"] else rotations
+    return np.asarray(trail.block["lever_arm"][np.maximum(side, 0)] * bend)
 
 
 def plastic_elongations(trail: Trail) -> Floats:

@@ -120,7 +120,7 @@ class Response(Result):
     def _history(self) -> History:
         """Course in time, with the impacts that follow where a proof has closed a sequence."""
         trail, sequences = self.solution.trail, self.solution.sequences
-        if int(trail.rules["treatment"]) == state.RestRule.CERTIFIED:
+        if int(trail.settings["treatment"]) == state.RestRule.CERTIFIED:
             closed = bool(len(sequences)) and bool(sequences["end"][-1] >= self.duration)
             trail = with_all_impacts(trail, cut=closed and self.moves_at_end)
         return History(trail, self.duration, self.body.stops)
@@ -128,7 +128,7 @@ class Response(Result):
     @cached_property
     def _energy(self) -> Energy:
         trail = self.solution.trail
-        return energy_of(self.body, trail.block, nonlinear=bool(trail.rules["nonlinear"]))
+        return energy_of(self.body, trail.block, nonlinear=bool(trail.settings["nonlinear"]))
 
     @cached_property
     def _contact(self) -> Contact:
@@ -177,7 +177,7 @@ class Response(Result):
     @property
     def _reaches_second_stop(self) -> bool:
         """Whether the peak is where the second of two stops is."""
-        return bool(self.solution.trail.block["facing"]) and self.peak_rotation == self.body.stops[1]
+        return bool(self.solution.trail.block["two_stops"]) and self.peak_rotation == self.body.stops[1]
 
     @cached_property
     def tendons(self) -> NDArray[np.void]:

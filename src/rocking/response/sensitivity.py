@@ -14,8 +14,8 @@ from rocking import checks
 from rocking.arrays import Flags, Floats
 from rocking.errors import InvalidOption
 from rocking.kernels import state
-from rocking.kernels.adjoint import Ends, adjoint, of_ending
-from rocking.kernels.trace import Quantity, Trail, own, vary
+from rocking.kernels.adjoint import Ends, adjoint, adjoint_of_final_state
+from rocking.kernels.trace import Quantity, Trail, copy_trail, vary
 from rocking.kernels.uplift import next_uplifts
 from rocking.response.history import History
 from rocking.tables import counted
@@ -58,7 +58,7 @@ class Sensitivity:
 
     def __init__(self, response: Response) -> None:
         self._trail = trail = response.solution.trail
-        drawn = int(trail.block["seed"]) >= 0 and bool(trail.block["varying"])
+        drawn = int(trail.block["seed"]) >= 0 and bool(trail.block["variable_restitution"])
         # What is drawn goes by the number of the impact, which those beyond a proof do not count in.
         self._history = History(trail, response.duration, response.body.stops) if drawn else response._history
         self._peak_time = np.array([response.peak_time])
@@ -156,7 +156,7 @@ def _varied(trail: Trail, quantity: int, times: Floats, impacts: int, events: in
     start = _STARTS.get(quantity)
     if start is None or trail.nodes[start][0] != 0.0:  # a share of nothing changes nothing
         scratch, work = state.new_scratch(), state.record(state.VARIATION)
-        vary(own(trail), scratch, work, quantity, times, heights, at_impacts, at_events)
+        vary(copy_trail(trail), scratch, work, quantity, times, heights, at_impacts, at_events)
     return heights, at_impacts, at_events
 
 
@@ -180,7 +180,7 @@ def _uplifts(trail: Trail, share: float) -> Floats:
     """Return times of the next uplifts from all rests, with thresholds that are multiplied by a share."""
     block, times = trail.block.copy(), np.zeros(len(trail.nodes))
     block["threshold"] *= share
-    block["hold"] *= share
+    block["restraint_threshold"] *= share
     next_uplifts(trail._replace(block=block), state.new_scratch(), times)
     return times
 
@@ -192,13 +192,13 @@ def carried_errors(trail: Trail, proven: Flags, stop: float) -> Floats:
     """
     nodes = state.attributed(np.append(trail.nodes, trail.nodes[-1:]))
     nodes["side"][-1] = state.AT_REST
-    trail, scratch, work = own(trail._replace(nodes=nodes)), state.new_scratch(), state.record(state.VARIATION)
+    trail, scratch, work = copy_trail(trail._replace(nodes=nodes)), state.new_scratch(), state.record(state.VARIATION)
     fastest, out = np.sqrt(np.max(np.abs(trail.block["stiffness"]))), np.zeros_like(trail.ground.pieces[:, 2:])
     last, found = np.flatnonzero((nodes["side"][:-1] >= 0) & (nodes["side"][1:] < 0)), np.full(len(proven), np.inf)
     for k in np.flatnonzero(proven):
         node, following, change = nodes[last[k]], nodes[last[k] + 1], np.zeros(5)
         row, time = (last[k], 0.0) if node["v"] > 0.0 else (last[k] - 1, math.inf)
-        if of_ending(trail, scratch, row, change, out) != Ends.START:
+        if adjoint_of_final_state(trail, scratch, row, change, out) != Ends.START:
             continue
         if node["v"] > 0.0:  # as the time to rest differs from its first order, so do its derivatives, twice and more
             change[:3] *= 1.0 + 4.0 * abs((following["time"] - node["time"]) / (change[1] * node["v"]) - 1.0)
