@@ -5,7 +5,7 @@ straight lines are exact. Pulses start at time 0, are zero after their end, and 
 
 A piece is the Taylor series about its middle, moved to its start, and so short that the first term left out is below
 1e-16 of the amplitude. Large angles are computed without their rounding: products and quotients with their errors,
-whole turns subtracted exactly.
+whole turns subtracted exactly. A number that is not finite or out of its range raises `InvalidMotion`.
 """
 
 from __future__ import annotations
@@ -66,11 +66,6 @@ def rectangular(amplitude: float, duration: float) -> Motion:
     Motion
         One piece.
 
-    Raises
-    ------
-    InvalidMotion
-        If `amplitude` is not finite or `duration` is not positive.
-
     Examples
     --------
     >>> rectangular(2.0, 0.5).pgv
@@ -93,11 +88,6 @@ def triangular(amplitude: float, duration: float) -> Motion:
     -------
     Motion
         Two pieces.
-
-    Raises
-    ------
-    InvalidMotion
-        If `amplitude` is not finite or `duration` is not positive.
 
     Examples
     --------
@@ -224,11 +214,6 @@ def n_lobe(amplitude: float | Sequence[float], frequency: float, *, lobes: int |
     -------
     Motion
         It starts and ends without a jump.
-
-    Raises
-    ------
-    InvalidMotion
-        If there is no lobe, `lobes` contradicts the amplitudes, or a number is not usable.
 
     Examples
     --------

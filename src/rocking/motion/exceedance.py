@@ -16,13 +16,6 @@ def exceedances(motion: Motion, thresholds: tuple[float, float], gravity: float 
 
     The thresholds (m/s^2) lift it to side + where -a passes the first, and to side - where a passes the second, as
     `Block.uplift_thresholds` gives them; a vertical acceleration adds to the gravity (m/s^2) under which they hold.
-
-    Examples
-    --------
-    >>> import math, rocking
-    >>> exceedances(rocking.pulses.sine(2.0, 0.5, cycles=1), (1.0, 1.0)).round(9)
-    array([[0.16666667, 0.83333333],
-           [1.16666667, 1.83333333]])
     """
     plus, minus = thresholds
     towards_plus, towards_minus = _push(motion, -plus / gravity), _push(motion, minus / gravity)
@@ -42,16 +35,6 @@ def lifting_factors(
 
     The thresholds, pairs as `exceedances` takes one, have shape (n, 2), and so has what the weight makes of them, by
     default all: a vertical motion changes that alone. They are infinite where a block rocks to one side.
-
-    Examples
-    --------
-    A vertical acceleration of -g/2 at the moment of the horizontal peak halves the factor that lifts this block:
-
-    >>> from rocking import Motion
-    >>> push = Motion.from_samples([0.0, 2.0, 0.0], 0.1)
-    >>> pull = Motion.from_samples([0.0, -9.80665 / 2.0, 0.0], 0.1)
-    >>> lifting_factors(push, [(4.0, 4.0)]), lifting_factors(push.with_vertical(pull), [(4.0, 4.0)])
-    (array([2.]), array([1.]))
     """
     pairs = np.asarray(thresholds, dtype=np.float64)
     weighing = pairs if own is None else np.asarray(own, dtype=np.float64)

@@ -230,7 +230,9 @@ def properties(
         extent = max(float(np.ptp(part.vertices, axis=0).max()) for part in found.parts) * length_of(unit)
     if extent and not 1e-9 < extent < 1e9:
         raise InvalidBlock(f"is {extent:.3g} m large, which no body is: correct {{}}", "unit", path=found.name)
-    rotation = _turned(turn) @ upright(found.up if up is None else up) * length_of(unit)
+    sine, cosine = (float(part) for part in sine_cosine(checks.finite(turn, "turn", InvalidBlock)))
+    clockwise = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])  # seen from above
+    rotation = clockwise @ upright(found.up if up is None else up) * length_of(unit)
     parts = [part._replace(vertices=part.vertices @ rotation.T) for part in found.parts]
     every = np.vstack([part.vertices[np.unique(part.faces)] for part in parts])
     ground = float(every[:, 2].min())
@@ -261,16 +263,14 @@ def properties(
         "description": found.name,
         "height": height,
         "regions": [Region(*each) for each in zip(names, (each.amount for each in inside), used, strict=True)],
-        "repairs": _all_repairs(names, surfaces),
+        "repairs": tuple(
+            f"{name}: {sentence}" if len(names) > 1 else sentence
+            for name, surface in zip(names, surfaces, strict=True)
+            for sentence in surface.repairs
+        ),
         "notes": (*notes, *overlaps(names, surfaces), *height_notes(height), *density_notes(used)),
     }
     return made, [surface._replace(vertices=surface.vertices - [0.0, 0.0, ground]) for surface in surfaces]
-
-
-def _turned(turn: object) -> Floats:
-    """Rotation about the vertical, clockwise seen from above, by degrees; shape (3, 3)."""
-    sine, cosine = (float(part) for part in sine_cosine(checks.finite(turn, "turn", InvalidBlock)))
-    return np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _densities(
@@ -346,26 +346,21 @@ def _cavities(surfaces: Sequence[Surface], may: Sequence[bool]) -> dict[int, int
     return found
 
 
-def _all_repairs(names: Sequence[str], surfaces: Sequence[Surface]) -> tuple[str, ...]:
-    """All that was repaired, each with the part if there are several."""
-    several = len(names) > 1
-    return tuple(
-        f"{name}: {sentence}" if several else sentence
-        for name, surface in zip(names, surfaces, strict=True)
-        for sentence in surface.repairs
-    )
-
-
 def _support(corners: Floats, given: ArrayLike | None, tolerance: float, path: str) -> tuple[Floats, tuple[str, ...]]:
     """Support polygon, and notes on it, of a mesh whose lowest corner is at height zero."""
     outline = polygons.hull(corners[:, :2])
     if given is not None:
         polygon = polygons.given_polygon(given)
-        beyond = 0.0 if outline is None else _outside(outline, polygon)
+        beyond = 0.0
+        if outline is not None:
+            facing, distances = polygons.edges(outline - outline[0])
+            beyond = float(np.max((polygon - outline[0]) @ polygons.directions(facing).T - distances))
         if outline is None or beyond > 1e-6 * float(np.ptp(corners, axis=0).max()):
+            (west, south, _), (east, north, _) = corners.min(axis=0), corners.max(axis=0)
             raise InvalidBlock(
-                f"{{}} reaches {beyond:.3g} m beyond the outline of the mesh, from {_ends(corners)}; its corners are "
-                "(east, north) in m, in the mesh's own coordinates",
+                f"{{}} reaches {beyond:.3g} m beyond the outline of the mesh, from {west:.4g} m to {east:.4g} m in the "
+                f"east and {south:.4g} m to {north:.4g} m in the north; its corners are (east, north) in m, in the "
+                "mesh's own coordinates",
                 "support",
             )
         return polygon, ()
@@ -387,14 +382,3 @@ def _support(corners: Floats, given: ArrayLike | None, tolerance: float, path: s
         f"the base is not flat or its edges are round: the support would be {100.0 * growth:.2g} % larger with the "
         f"corners up to {10.0 * tolerance:.2g} m above the lowest one instead of {tolerance:.2g} m",
     )
-
-
-def _outside(outline: Floats, polygon: Floats) -> float:
-    """How far a polygon reaches beyond a convex one, m."""
-    facing, distances = polygons.edges(outline - outline[0])
-    return float(np.max((polygon - outline[0]) @ polygons.directions(facing).T - distances))
-
-
-def _ends(corners: Floats) -> str:
-    (west, south, _), (east, north, _) = corners.min(axis=0), corners.max(axis=0)
-    return f"{west:.4g} m to {east:.4g} m in the east and {south:.4g} m to {north:.4g} m in the north"

@@ -80,6 +80,15 @@ def _edges(faces: Integers) -> Integers:
     return np.asarray(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2))
 
 
+def _shared(faces: Integers) -> tuple[Integers, Integers, int, Integers]:
+    """Edges of triangles, their numbers without a sense and how many these are, and pairs of edges that two share."""
+    edges = _edges(faces)
+    _, key, counts = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
+    key = key.reshape(-1)
+    order = np.argsort(key, kind="stable")
+    return edges, key, len(counts), order[counts[key[order]] == 2].reshape(-1, 2)
+
+
 def components(count: int, pairs: Integers) -> Integers:
     """Label each of so many things by the connected ones that it is among, from pairs of neighbours."""
     from scipy.sparse import coo_array
@@ -95,19 +104,16 @@ def _against_neighbours(faces: Integers) -> Flags:
     Every triangle stands in a graph twice, as it is and turned; neighbours are linked as they agree. Where both of one
     triangle are connected, the surface has one side only.
     """
-    edges = _edges(faces)
-    _, key, counts = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
-    key = key.reshape(-1)
-    order = np.argsort(key, kind="stable")
-    one, other = order[counts[key[order]] == 2].reshape(-1, 2).T
+    edges, _, _, pairs = _shared(faces)
+    one, other = pairs.T
     agree = edges[one, 0] != edges[other, 0]
     n = len(faces)
     if agree.all():
         return np.zeros(n, bool)
     left, right = one // 3, other // 3
     crossed = np.where(agree, 0, n)
-    pairs = np.vstack([np.column_stack([left, right + crossed]), np.column_stack([left + n, right + n - crossed])])
-    label = components(2 * n, pairs)
+    links = np.vstack([np.column_stack([left, right + crossed]), np.column_stack([left + n, right + n - crossed])])
+    label = components(2 * n, links)
     if np.any(label[:n] == label[n:]):
         raise InvalidBlock("the surface of the mesh has one side only, as a Möbius strip: it encloses nothing")
     patch = components(n, np.column_stack([left, right]))
@@ -154,18 +160,15 @@ def _filled(vertices: Floats, faces: Integers) -> tuple[Floats, Integers, tuple[
 
 def shells_of(faces: Integers) -> Integers:
     """Label the triangles of each closed surface, from 0 up: pieces that touch at corners or edges are apart."""
-    edges = _edges(faces)
-    _, key, counts = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
-    key = key.reshape(-1)
-    order = np.argsort(key, kind="stable")
-    patch = components(len(faces), order[counts[key[order]] == 2].reshape(-1, 2) // 3)
+    edges, key, count_edges, pairs = _shared(faces)
+    patch = components(len(faces), pairs // 3)
     # Patches that are not closed are parts of one surface where they share an edge.
     of_edge = np.repeat(patch, 3)
-    each, place = np.unique(of_edge * len(counts) + key, return_inverse=True)
+    each, place = np.unique(of_edge * count_edges + key, return_inverse=True)
     net = np.bincount(place.reshape(-1), weights=np.where(edges[:, 0] < edges[:, 1], 1.0, -1.0))
-    links = np.isin(of_edge, each[net != 0.0] // len(counts))
+    links = np.isin(of_edge, each[net != 0.0] // count_edges)
     count = int(patch.max()) + 1
-    label = components(count + len(counts), np.column_stack([of_edge, count + key])[links])[patch]
+    label = components(count + count_edges, np.column_stack([of_edge, count + key])[links])[patch]
     return np.asarray(np.unique(label, return_inverse=True)[1].reshape(-1), dtype=np.int64)
 
 

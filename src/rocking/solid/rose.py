@@ -125,11 +125,7 @@ def checked_azimuths(azimuths: ArrayLike | None) -> Floats:
 def rose_of(
     polygon: Floats, height: float, inertia: Floats, gravity: float, azimuths: Floats, description: str
 ) -> Rose:
-    """Return the rose of a body.
-
-    `polygon` is its support about the centre of mass, m, `height` that of the centre, m, and `inertia` the tensor about
-    it over the mass, m^2, with axes to the east, to the north and up.
-    """
+    """Return the rose of a body: support about the centre of mass, its height, m, and inertia over the mass, m^2."""
     import xarray as xr
 
     here, there = (polygons.extents(polygon, turned) for turned in (azimuths, azimuths + 180.0))

@@ -64,8 +64,8 @@ class Solid(Result):
     Notes
     -----
     In the vertical plane of an azimuth the body is a block (`block`): it rocks about the edges, or corners, where its
-    support ends in that direction and in the opposite one. Left out are turning about the vertical, rolling over
-    corners, and what products of inertia add; `rose` says for every azimuth how large what is left out is.
+    support ends in that direction and in the opposite one. Turning about the vertical, rolling over corners and
+    products of inertia are left out; `rose` contains their sizes.
 
     Examples
     --------
@@ -169,10 +169,9 @@ class Solid(Result):
 
         Notes
         -----
-        Volume, centre and inertia are sums over tetrahedra between the triangles and one place, exact for the mesh. A
-        hole is filled by triangles between its edge and the mean of its corners, which is exact where it is flat. Where
-        several parts are of one density and some are open, these are joined first. A surface in another one, with its
-        normals inwards, is a cavity; so is such a part to which `density` gives none.
+        Volume, centre and inertia are exact for the mesh. A hole is filled by triangles between its edge and the mean
+        of its corners. Where several parts are of one density and some are open, these are joined first. A surface in
+        another one, with its normals inwards, is a cavity; so is such a part to which `density` gives none.
 
         Examples
         --------
@@ -324,17 +323,7 @@ class Solid(Result):
 
 
 class Plane(NamedTuple):
-    """A body in the vertical plane of an azimuth.
-
-    Attributes
-    ----------
-    azimuth : float
-        Degrees clockwise from north, of side +.
-    pivots : Extent
-        Where the support ends on side + and on side -.
-    height, gyration : float
-        Height of the centre of mass, and radius of gyration about the horizontal axis across the plane, m.
-    """
+    """A body in the plane of an azimuth, deg: pivots of side + and -, height of the mass, radius of gyration, m."""
 
     azimuth: float
     pivots: polygons.Extent

@@ -28,15 +28,7 @@ _PIECES: Final = 24
 
 
 class Extent(NamedTuple):
-    """How far a support reaches in n directions from the centre of mass, and what it turns about there; m.
-
-    Attributes
-    ----------
-    distance : ndarray, shape (n,)
-        How far it reaches.
-    low, high : ndarray, shape (n,)
-        Ends of the edge, or the corner twice, that is farthest, in the direction 90 deg counterclockwise.
-    """
+    """Reach of a support in n directions, and ends of the edge or corner there, 90 deg counterclockwise; m, (n,)."""
 
     distance: Floats
     low: Floats
@@ -123,13 +115,7 @@ class Sections(NamedTuple):
     pieces: tuple[Piece, ...]
 
     def across(self, azimuth: float) -> Floats:
-        """Return the outline as it is seen along the axis across an azimuth, to the right of which is that direction.
-
-        Returns
-        -------
-        ndarray, shape (n, 6)
-            Trapezoids: their lower and upper end, left and right end below, left and right end above, m.
-        """
+        """Return the outline across an azimuth as trapezoids: heights, ends below and ends above, m, shape (n, 6)."""
         towards = directions(azimuth)[0]
         ends: list[list[tuple[float, float]]] = [[] for _ in self.heights]
         for section, corners in self.pieces:

@@ -7,6 +7,7 @@ units below the names or above them.
 from __future__ import annotations
 
 import csv
+import functools
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -244,11 +245,15 @@ def _ways(delimiter: str) -> Iterator[tuple[Callable[[str], list[str]], bool]]:
     What single blanks or brackets divide may as well be a sentence; names begin with that of the times.
     """
     for sign in ["\t", ";", ","] if delimiter == " " else [delimiter, ";", ",", "\t"]:
-        yield lambda line, sign=sign: next(csv.reader([line], delimiter=sign, skipinitialspace=True), []), True
+        yield functools.partial(_divided, sign), True
     yield lambda line: re.split(r"\t+|\s{2,}", line.strip()), True
     yield lambda line: _UP_TO_BRACKET.findall(line) if line.rstrip().endswith((")", "]")) else [], False
     if delimiter == " ":
         yield _WORD_WITH_BRACKETS.findall, False
+
+
+def _divided(sign: str, line: str) -> list[str]:
+    return next(csv.reader([line], delimiter=sign, skipinitialspace=True), [])
 
 
 def _texts(name: str) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import io
 import re
@@ -115,21 +116,18 @@ def _claims(source: Source) -> list[str]:
     if not installed():
         return []
     from obspy.core.util.base import ENTRY_POINTS
-
-    return [str(name) for name in ENTRY_POINTS["waveform"] if name not in _REFUSED and _claimed_by(name, source)]
-
-
-def _claimed_by(name: str, source: Source) -> bool:
     from obspy.core.util.misc import buffered_load_entry_point
 
+    claims = []
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        try:
-            is_format = buffered_load_entry_point("obspy", f"obspy.plugin.waveform.{name}", "isFormat")
-            return bool(is_format(_opened(source)))
-        except Exception:
+        for name in (each for each in ENTRY_POINTS["waveform"] if each not in _REFUSED):
             # A reader that stumbles over foreign bytes (they raise anything) does not claim them.
-            return False
+            with contextlib.suppress(Exception):
+                is_format = buffered_load_entry_point("obspy", f"obspy.plugin.waveform.{name}", "isFormat")
+                if is_format(_opened(source)):
+                    claims.append(str(name))
+    return claims
 
 
 def _opened(source: Source) -> io.BytesIO:
