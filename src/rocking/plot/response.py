@@ -88,7 +88,9 @@ def response_figure(
     shown = float(time[0]), float(time[-1])
     scale = _scale("rad" if label else units, slenderness)
     drawn = scale.of(rotation)
-    zoom = chattering if place.get("ax") is None and chattering and _can_be_zoomed(chattering) else None
+    zoom = None
+    if place.get("ax") is None and chattering and chattering.impact_times.size > 1:
+        zoom = chattering if math.isfinite(chattering.rest_upper - chattering.rest_lower) else None
     histories = 1 if not motion_time.size else 2 if vertical_acceleration_g is None else 3
     with page_for((7.0, 4.4 if histories < 3 else 5.4), **place) as page:
         (main, *grounds), sequence = _panels(page, histories, zoomed=zoom is not None)
@@ -107,10 +109,9 @@ def response_figure(
             _draw_motion(grounds[0], motion_time, motion_acceleration_g, thresholds_g)
         if vertical_acceleration_g is not None and len(grounds) > 1:
             _draw_ground(grounds[1], motion_time, vertical_acceleration_g, 0.6)
-        histories_shown = main, *grounds
         labels = label or _Y_LABELS[units].format(limit), "ground acceleration (g)", "vertical (g)"
-        for axes, name in zip(histories_shown, labels, strict=False):
-            is_last = axes is histories_shown[-1]
+        for axes, name in zip(page.drawn, labels, strict=False):
+            is_last = axes is page.drawn[-1]
             axes.tick_params(labelbottom=is_last)
             add_labels(axes, _time_label(shown, duration) if is_last else "", name)
         if zoom and sequence is not None:
@@ -134,10 +135,6 @@ def _panels(page: Page, histories: int, *, zoomed: bool) -> tuple[list[Axes], Ax
     sequence = figure.add_subplot(grid[:, 1] if beside else grid[-1, 0]) if zoomed else None
     page.drawn = [rotation, *grounds]
     return page.drawn, sequence
-
-
-def _can_be_zoomed(sequence: DrawnSequence) -> bool:
-    return sequence.impact_times.size > 1 and math.isfinite(sequence.rest_upper - sequence.rest_lower)
 
 
 def _within(times: Floats, shown: tuple[float, float]) -> Floats:
@@ -353,11 +350,7 @@ def energy_figure(
     """
     with page_for((7.0, 3.0), **place) as page:
         (axes,) = page.panels()
-        label = "at rest"
-        for start, end in np.clip(rest_intervals, time[0], time[-1]):
-            if start < end:
-                axes.axvspan(start, end, color=REST, linewidth=0.0, label=label)
-                label = ""
+        _shade_rest(axes, np.clip(rest_intervals, time[0], time[-1]))
         total = kinetic + potential
         top = float(np.max(total, initial=0.0)) or 1.0
         axes.plot(time, total, color=INK, linewidth=1.4, label="total, which drops at impacts")

@@ -109,10 +109,7 @@ class Energy:
         return np.asarray(u * (stands - 0.5 * (made["stiffness"] * weight - made["spring"]) * u))
 
     def boundary(self, side: int) -> tuple[Floats, Floats]:
-        """Rotation over balance and |velocity| over p times balance that part what overturns without shaking.
-
-        Both counted in the frame of the side; none where its restraints hold the body at any rotation.
-        """
+        """Rotation over balance and |velocity| over p times balance with as much energy as at the balance of a side."""
         balance = self.balance[side]
         if not math.isfinite(balance):
             return np.empty(0), np.empty(0)
