@@ -115,7 +115,10 @@ def response_figure(
             axes.tick_params(labelbottom=is_last)
             add_labels(axes, _time_label(shown, duration) if is_last else "", name)
         if zoom and sequence is not None:
-            _mark_sequence(main, zoom)
+            start, at = float(zoom.impact_times[0]), main.get_xaxis_transform()
+            main.plot([start, zoom.rest_upper], [0.95, 0.95], "|-", color=ABOVE, linewidth=1.3, transform=at)
+            look = {"ha": "center", "va": "bottom", "color": ABOVE, "fontweight": "bold", "xycoords": at}
+            write(main, "A", (0.5 * (start + zoom.rest_upper), 0.955), (0, 2), **look)
             _draw_sequence(sequence, zoom)
     return page.figure
 
@@ -241,13 +244,6 @@ def _time_label(shown: tuple[float, float], duration: float | None) -> str:
         return "time (s)"
     digits = max(0, 1 - math.floor(math.log10(end - start)))
     return f"time (s); shown: {start:.{digits}f}–{end:.{digits}f} s of {duration:.{digits}f} s"
-
-
-def _mark_sequence(axes: Axes, sequence: DrawnSequence) -> None:
-    start, end = float(sequence.impact_times[0]), sequence.rest_upper
-    axes.plot([start, end], [0.95, 0.95], "|-", color=ABOVE, linewidth=1.3, transform=axes.get_xaxis_transform())
-    at, look = (0.5 * (start + end), 0.955), {"ha": "center", "va": "bottom", "color": ABOVE, "fontweight": "bold"}
-    write(axes, "A", at, (0, 2), xycoords=axes.get_xaxis_transform(), **look)
 
 
 def _draw_sequence(axes: Axes, sequence: DrawnSequence) -> None:

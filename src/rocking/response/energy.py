@@ -154,13 +154,7 @@ def _balance_on_a_line(made: Record, added_weight: Floats, added_push: Floats, p
 
 
 def energy_of(body: Body, record: Record, *, nonlinear: bool) -> Energy:
-    """Return the energy of a body.
-
-    Raises
-    ------
-    InvalidOption
-        If it is no block, a tendon of it yields, or its restraints hold it at any rotation.
-    """
+    """Return the energy of a body; refuse what is no block, has a tendon that yields, or is held at any rotation."""
     if not isinstance(body, Block | RestrainedBlock):
         raise InvalidOption(
             f"the energy that overturns a body is known of blocks alone, not of a {type(body).__name__}"
