@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-import xarray as xr
 
 import rocking
 from rocking import (
@@ -13,7 +12,6 @@ from rocking import (
     Certified,
     IntervalThreshold,
     InvalidOption,
-    OutputError,
     VelocityThreshold,
     simulate,
 )
@@ -153,21 +151,6 @@ def test_a_tolerance_below_all_rounding_proves_the_rest_that_a_wider_one_proves(
         assert row["lower"] <= proof["lower"] <= row["end"] <= proof["upper"] <= row["upper"]
         assert proof["upper"] <= proof["lower"] + 1e-11
         assert max(row["lower"], known["lower"]) <= min(row["upper"], known["upper"])
-
-
-def test_export_round_trips(shaken, tmp_path):
-    shaken.to_netcdf(tmp_path / "r.nc", dt=0.02)
-    with xr.open_dataset(tmp_path / "r.nc") as dataset:
-        assert np.allclose(dataset.rotation, shaken.rotation(dataset.time.values), atol=1e-15)
-        assert dataset.attrs["overturned"] == 0
-        assert list(dataset.event_kind.values) == list(shaken.events["kind"])
-    shaken.to_csv(tmp_path / "r.csv", dt=0.02)
-    table = np.loadtxt(tmp_path / "r.csv", delimiter=",", skiprows=1)
-    assert np.allclose(table[:, 1], shaken.rotation(table[:, 0]), atol=1e-12)
-    with pytest.raises(OutputError, match="nowhere"):
-        shaken.to_csv(tmp_path / "nowhere" / "r.csv")
-    with pytest.raises(InvalidOption, match="dt"):
-        shaken.to_xarray(dt=0.0)
 
 
 def test_every_kind_of_response_can_be_drawn(block, record):

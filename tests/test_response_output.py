@@ -187,8 +187,9 @@ def test_tables_that_are_none_and_steps_that_mean_nothing_are_refused(shaken, tm
         shaken.to_dataframe("nodes")
     with pytest.raises(InvalidOption, match="dt is the step of the histories"):
         shaken.to_csv(tmp_path / "impacts.csv", "impacts", dt=0.01)
-    with pytest.raises(InvalidOption, match="dt"):
-        shaken.to_dataframe(dt=-1.0)
+    for read in (shaken.to_dataframe, shaken.to_xarray):
+        with pytest.raises(InvalidOption, match="dt"):
+            read(dt=-1.0)
     with pytest.raises(OutputError, match="nowhere"):
         shaken.to_csv(tmp_path / "nowhere" / "r.csv", "impacts")
 
@@ -197,7 +198,9 @@ def test_every_variable_of_the_dataset_has_a_unit_in_the_file_too(shaken, tmp_pa
     shaken.to_netcdf(tmp_path / "r.nc", dt=0.02)
     with xr.open_dataset(tmp_path / "r.nc") as dataset:
         units = {name: variable.attrs.get("units") for name, variable in dataset.variables.items()}
-        assert dataset.attrs["motion"] == shaken.motion.name
+        assert dataset.attrs["motion"] == shaken.motion.name and dataset.attrs["overturned"] == 0
+        assert np.allclose(dataset.rotation, shaken.rotation(dataset.time.values), atol=1e-15)
+        assert list(dataset.event_kind.values) == list(shaken.events["kind"])
         assert None not in units.values()
         assert units["impact_speed_after"] == "rad/s"
         assert units["sequence_lower"] == units["event_time"] == "s"

@@ -123,12 +123,6 @@ class Result(ABC):
         -------
         dict of str to object
             Units are in the names, or SI.
-
-        Examples
-        --------
-        >>> from rocking.chattering import critical_report
-        >>> sorted(critical_report(2.0, 0.92).to_dict())
-        ['critical_amplitude', 'eta', 'omega']
         """
 
     def to_json(self, path: str | Path) -> None:
@@ -167,12 +161,6 @@ class Result(ABC):
         ------
         InvalidOption
             If there is no such table.
-
-        Examples
-        --------
-        >>> from rocking.chattering import chattering_report
-        >>> [*chattering_report(1.03, 2.0, 0.92).to_dataframe("impacts").columns]
-        ['time', 'side', 'interval', 'speed_before', 'speed_after']
         """
         names = [*self.TABLES]
         if not names:
@@ -180,39 +168,11 @@ class Result(ABC):
         return frame_of(self._columns(checks.one_of(table or names[0], "table", InvalidOption, names)))
 
     def to_csv(self, path: str | Path, table: str | None = None) -> None:
-        """Write one of the tables as text columns with a header; "inf" stands for infinity.
-
-        Parameters
-        ----------
-        path : str or pathlib.Path
-            File to write, whole or not at all.
-        table : str, optional
-            One of `TABLES`; by default the first.
-
-        Raises
-        ------
-        InvalidOption
-            If there is no such table.
-        OutputError
-            If the file cannot be written.
-        """
+        """Write a table of `to_dataframe` as text columns with a header, as `to_json`; "inf" stands for infinity."""
         write_csv(path, self.to_dataframe(table), digits=self._FORMAT)
 
     def to_excel(self, path: str | Path) -> None:
-        """Write all tables as the sheets of a workbook (.xlsx).
-
-        Parameters
-        ----------
-        path : str or pathlib.Path
-            File to write, whole or not at all.
-
-        Raises
-        ------
-        InvalidOption
-            If there is no table, or openpyxl is not installed.
-        OutputError
-            If the file cannot be written.
-        """
+        """Write all tables as the sheets of a workbook (.xlsx), as `to_json`; `InvalidOption` without openpyxl."""
         write_excel(path, {table: self.to_dataframe(table) for table in self.TABLES or [""]})
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
@@ -334,18 +294,7 @@ class DatasetResult(Result):
         return self.data[[*self.TABLES[name]]]
 
     def to_netcdf(self, path: str | Path) -> None:
-        """Write the dataset to a NetCDF file.
-
-        Parameters
-        ----------
-        path : str or pathlib.Path
-            File to write, whole or not at all.
-
-        Raises
-        ------
-        OutputError
-            If the file cannot be written.
-        """
+        """Write `data` to a NetCDF file, as `to_json`."""
         write_netcdf(path, self.data)
 
     def __repr__(self) -> str:

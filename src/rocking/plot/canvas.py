@@ -175,10 +175,8 @@ def magnified(largest: float) -> tuple[float, str]:
 
     Examples
     --------
-    >>> magnified(0.0154)
-    (1000.0, '$10^{3}$ ')
-    >>> magnified(0.4), magnified(0.0)
-    ((1.0, ''), (1.0, ''))
+    >>> magnified(0.0154), magnified(0.4)
+    ((1000.0, '$10^{3}$ '), (1.0, ''))
     """
     power = 3 * max(0, math.ceil((-math.log10(largest) - 0.5) / 3.0)) if largest > 0.0 else 0
     return 10.0**power, f"$10^{{{power}}}$ " if power else ""

@@ -60,7 +60,10 @@ def fragility_figure(
             axes.fill_between([], [], [], color=GROUND, alpha=0.4, linewidth=0.0, label=band_label)
         else:
             axes.plot([], [], linestyle="none", label=band_label)
-        axes.plot([], [], "o", color=GROUND, label=_dots(lines), **_DOT)
+        pooled = np.concatenate([line.outcomes for line in lines])
+        fewest, most = round(float(pooled.min())), round(float(pooled.max()))
+        count = f"{most} outcome{'' if most == 1 else 's'}" if fewest == most else f"{fewest} to {most} outcomes"
+        axes.plot([], [], "o", color=GROUND, label=f"dot: share of {count} at about its intensity", **_DOT)
         axes.set(xlim=(0.0, float(lines[0].intensity[-1])), ylim=(0.0, 1.0))
         axes.grid(True)
         add_labels(axes, intensity_label, probability_label)
@@ -83,14 +86,6 @@ def dispersions_figure(
         add_labels(axes, "dispersion of the intensity at overturning (90 % interval)", "")
         page.handles = []
     return page.figure
-
-
-def _dots(lines: Sequence[FragilityLine]) -> str:
-    """Say what one dot pools."""
-    held = np.concatenate([line.outcomes for line in lines])
-    fewest, most = round(float(held.min())), round(float(held.max()))
-    count = f"{fewest}" if fewest == most else f"{fewest} to {most}"
-    return f"dot: share of {count} outcome{'' if most == 1 else 's'} at about its intensity"
 
 
 #: Shares of a rate are shown from this part of the highest one on.
@@ -301,14 +296,11 @@ def _handles(curves: Sequence[SpectrumCurves], motions: Sequence[str], fractiles
         each.append(Line2D([], [], color=GROUND, linewidth=0.5, label=f"each of {len(motions)} motions"))
     middle = _middle(fractiles)
     others = ", ".join(f"{100 * share:g}" for share in sorted(fractiles) if share != middle)
-    each.append(Line2D([], [], color=INK, linewidth=_MIDDLE, label=_named(f"{100 * middle:g}")))
-    if others:
-        each.append(Line2D([], [], color=INK, linewidth=_OTHER, label=_named(others)))
+    for percent, width in ((f"{100 * middle:g}", _MIDDLE), (others, _OTHER)):
+        if percent:
+            label = "median" if percent == "50" else f"{percent} % of the motions are below"
+            each.append(Line2D([], [], color=INK, linewidth=width, label=label))
     return each
-
-
-def _named(percent: str) -> str:
-    return "median" if percent == "50" else f"{percent} % of the motions are below"
 
 
 #: Bars of a histogram of blocks.
@@ -349,7 +341,16 @@ def outcomes_figure(
                 page.figure.add_subplot(at) for at in (grid[0, :], *(grid[1, k] for k in range(len(parameters))))
             ]
         tests, *panels = page.drawn or page.panels()
-        _draw_tests(tests, probabilities, overturned)
+        # In increasing order, and each outcome where a sure prediction would put it.
+        order = np.argsort(probabilities, kind="stable")
+        number, fell = np.arange(1, order.size + 1), overturned[order]
+        tests.plot(number, probabilities[order], color=INK, linewidth=1.2, label="fitted probability")
+        tests.plot(number[fell], np.ones(fell.sum()), "v", color=ABOVE, label="overturned", **_DOTS)
+        stood: Any = {"color": INK, "mfc": "white", "label": "did not overturn", **_DOTS}
+        tests.plot(number[~fell], np.zeros((~fell).sum()), "o", **stood)
+        tests.set_ylim(0.0, 1.0)
+        tests.grid(True)
+        add_labels(tests, "test, by its probability", "probability of overturning")
         for panel, parameter in zip(panels, parameters, strict=False):
             _draw_parameter(panel, parameter, weights)
         if panels:
@@ -376,18 +377,6 @@ def measured_figure(
         for panel in (main, *others):
             panel.axhline(0.0, color=INK, linewidth=0.4)
     return page.figure
-
-
-def _draw_tests(axes: Axes, probabilities: Floats, overturned: Flags) -> None:
-    """Draw the probabilities in increasing order, and each outcome where a sure prediction would put it."""
-    order = np.argsort(probabilities, kind="stable")
-    number, fell = np.arange(1, order.size + 1), overturned[order]
-    axes.plot(number, probabilities[order], color=INK, linewidth=1.2, label="fitted probability")
-    axes.plot(number[fell], np.ones(fell.sum()), "v", color=ABOVE, label="overturned", **_DOTS)
-    axes.plot(number[~fell], np.zeros((~fell).sum()), "o", color=INK, mfc="white", label="did not overturn", **_DOTS)
-    axes.set_ylim(0.0, 1.0)
-    axes.grid(True)
-    add_labels(axes, "test, by its probability", "probability of overturning")
 
 
 def _draw_parameter(axes: Axes, parameter: Parameter, weights: Floats) -> None:

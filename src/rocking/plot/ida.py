@@ -73,7 +73,8 @@ def ida_figure(*, motions: Sequence[ScaledMotion], level_label: str, **place: Un
     with page_for((7.0, 4.2), **place) as page:
         curves, *strips = page.panels(1, 2, sharey=True, width_ratios=(2.0, 1.0))
         for motion, style in zip(motions, styles, strict=True):
-            _draw_motion(curves, motion, style | (_OWN if few else _ALIKE))
+            look = {"marker": ".", "markeredgewidth": 0.0, "label": as_written(motion.label), **style}
+            curves.plot(motion.peak, motion.levels, **look, **(_OWN if few else _ALIKE))
         if not few:
             _draw_fractiles(curves, motions)
         curves.set_xlim(left=0.0, right=curves.get_xlim()[1])
@@ -85,8 +86,8 @@ def ida_figure(*, motions: Sequence[ScaledMotion], level_label: str, **place: Un
         for panel in strips:
             _draw_strips(panel, motions, styles if few else [{"color": INK}] * len(motions))
             _name_strips(panel, motions, few=few)
-        named = motions if few else []
-        page.handles = _handles(named, with_strips=bool(strips), with_arrows=_go_on(motions))
+        goes_on = any(high > _highest_shown(motions) for motion in motions for _, high in motion.bands)
+        page.handles = _handles(motions if few else [], with_strips=bool(strips), with_arrows=goes_on)
     return page.figure
 
 
@@ -107,11 +108,6 @@ def levels_reaching(motion: ScaledMotion, peaks: Floats) -> Floats:
     rise = np.where(peak[after] > peak[before], peak[after] - peak[before], np.inf)
     between = level[before] + (peaks - peak[before]) / rise * (level[after] - level[before])
     return np.where(first < level.size, between, overturns)
-
-
-def _draw_motion(axes: Axes, motion: ScaledMotion, style: dict[str, Any]) -> None:
-    peak = np.where(np.isfinite(motion.peak), motion.peak, np.nan)
-    axes.plot(peak, motion.levels, marker=".", markeredgewidth=0.0, label=as_written(motion.label), **style)
 
 
 def _draw_ways(axes: Axes, motion: ScaledMotion, color: str) -> None:
@@ -143,12 +139,6 @@ def _highest_shown(motions: Sequence[ScaledMotion]) -> float:
     stands = [motion.levels[np.isfinite(motion.peak)] for motion in motions]
     last = max(float(motion.levels[-1]) for motion in motions)
     return min(_HEADROOM * float(np.max(np.concatenate(stands), initial=0.0)) or last, last)
-
-
-def _go_on(motions: Sequence[ScaledMotion]) -> bool:
-    """Whether a strip leaves the frame."""
-    top = _highest_shown(motions)
-    return any(high > top for motion in motions for _, high in motion.bands)
 
 
 def _draw_strips(axes: Axes, motions: Sequence[ScaledMotion], styles: Sequence[dict[str, Any]]) -> None:

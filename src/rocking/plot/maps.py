@@ -164,13 +164,17 @@ def _patches(polygons: Mapping[int, Sequence[Floats]], names: Mapping[int, str],
 
     `frame` is the area of the whole.
     """
+
+    def area(x: Floats, y: Floats) -> float:
+        return 0.5 * abs(float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))))
+
     looks: dict[tuple[str, str], list[int]] = {}
     for region in sorted(polygons):
         looks.setdefault(_look(region), []).append(region)
     return [
         _patch(look, names[alike[0]] if len(alike) == 1 else f"overturns after {alike[0]} or more")
         for look, alike in looks.items()
-        if sum(_area(corners) for region in alike for corners in polygons[region]) > _LEAST_SEEN * frame
+        if sum(area(*corners.T) for region in alike for corners in polygons[region]) > _LEAST_SEEN * frame
     ]
 
 
@@ -178,11 +182,6 @@ def _patch(look: tuple[str, str], label: str) -> Patch:
     from matplotlib.patches import Patch
 
     return Patch(facecolor=look[0], hatch=look[1], edgecolor=INK, linewidth=0.5, label=label)
-
-
-def _area(corners: Floats) -> float:
-    x, y = corners.T
-    return 0.5 * abs(float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))))
 
 
 #: Width and height of one panel, inches, and how many stand side by side.

@@ -88,7 +88,9 @@ def response_figure(
     shown = float(time[0]), float(time[-1])
     scale = _scale("rad" if label else units, slenderness)
     drawn = scale.of(rotation)
-    zoom = chattering if place.get("ax") is None and chattering and _can_be_zoomed(chattering) else None
+    zoom = None
+    if place.get("ax") is None and chattering and chattering.impact_times.size > 1:
+        zoom = chattering if math.isfinite(chattering.rest_upper - chattering.rest_lower) else None
     histories = 1 if not motion_time.size else 2 if vertical_acceleration_g is None else 3
     with page_for((7.0, 4.4 if histories < 3 else 5.4), **place) as page:
         (main, *grounds), sequence = _panels(page, histories, zoomed=zoom is not None)
@@ -107,14 +109,16 @@ def response_figure(
             _draw_motion(grounds[0], motion_time, motion_acceleration_g, thresholds_g)
         if vertical_acceleration_g is not None and len(grounds) > 1:
             _draw_ground(grounds[1], motion_time, vertical_acceleration_g, 0.6)
-        histories_shown = main, *grounds
         labels = label or _Y_LABELS[units].format(limit), "ground acceleration (g)", "vertical (g)"
-        for axes, name in zip(histories_shown, labels, strict=False):
-            is_last = axes is histories_shown[-1]
+        for axes, name in zip(page.drawn, labels, strict=False):
+            is_last = axes is page.drawn[-1]
             axes.tick_params(labelbottom=is_last)
             add_labels(axes, _time_label(shown, duration) if is_last else "", name)
         if zoom and sequence is not None:
-            _mark_sequence(main, zoom)
+            start, at = float(zoom.impact_times[0]), main.get_xaxis_transform()
+            main.plot([start, zoom.rest_upper], [0.95, 0.95], "|-", color=ABOVE, linewidth=1.3, transform=at)
+            look = {"ha": "center", "va": "bottom", "color": ABOVE, "fontweight": "bold", "xycoords": at}
+            write(main, "A", (0.5 * (start + zoom.rest_upper), 0.955), (0, 2), **look)
             _draw_sequence(sequence, zoom)
     return page.figure
 
@@ -134,10 +138,6 @@ def _panels(page: Page, histories: int, *, zoomed: bool) -> tuple[list[Axes], Ax
     sequence = figure.add_subplot(grid[:, 1] if beside else grid[-1, 0]) if zoomed else None
     page.drawn = [rotation, *grounds]
     return page.drawn, sequence
-
-
-def _can_be_zoomed(sequence: DrawnSequence) -> bool:
-    return sequence.impact_times.size > 1 and math.isfinite(sequence.rest_upper - sequence.rest_lower)
 
 
 def _within(times: Floats, shown: tuple[float, float]) -> Floats:
@@ -246,13 +246,6 @@ def _time_label(shown: tuple[float, float], duration: float | None) -> str:
     return f"time (s); shown: {start:.{digits}f}–{end:.{digits}f} s of {duration:.{digits}f} s"
 
 
-def _mark_sequence(axes: Axes, sequence: DrawnSequence) -> None:
-    start, end = float(sequence.impact_times[0]), sequence.rest_upper
-    axes.plot([start, end], [0.95, 0.95], "|-", color=ABOVE, linewidth=1.3, transform=axes.get_xaxis_transform())
-    at, look = (0.5 * (start + end), 0.955), {"ha": "center", "va": "bottom", "color": ABOVE, "fontweight": "bold"}
-    write(axes, "A", at, (0, 2), xycoords=axes.get_xaxis_transform(), **look)
-
-
 def _draw_sequence(axes: Axes, sequence: DrawnSequence) -> None:
     rest = 0.5 * (sequence.rest_lower + sequence.rest_upper)
     start = sequence.impact_times[:-1]
@@ -353,11 +346,7 @@ def energy_figure(
     """
     with page_for((7.0, 3.0), **place) as page:
         (axes,) = page.panels()
-        label = "at rest"
-        for start, end in np.clip(rest_intervals, time[0], time[-1]):
-            if start < end:
-                axes.axvspan(start, end, color=REST, linewidth=0.0, label=label)
-                label = ""
+        _shade_rest(axes, np.clip(rest_intervals, time[0], time[-1]))
         total = kinetic + potential
         top = float(np.max(total, initial=0.0)) or 1.0
         axes.plot(time, total, color=INK, linewidth=1.4, label="total, which drops at impacts")

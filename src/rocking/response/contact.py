@@ -32,13 +32,7 @@ Measure = Callable[[Floats, Floats], Floats]
 
 
 def friction_coefficient(value: object) -> float:
-    """Return a coefficient of friction.
-
-    Raises
-    ------
-    InvalidOption
-        If it is not positive, or larger than that of any two materials.
-    """
+    """Return a coefficient of friction; refuse one that is not positive, or larger than that of any two materials."""
     coefficient = checks.positive(value, "friction", InvalidOption)
     if coefficient > _ROUGHEST:
         raise InvalidOption(

@@ -109,10 +109,7 @@ class Energy:
         return np.asarray(u * (stands - 0.5 * (made["stiffness"] * weight - made["spring"]) * u))
 
     def boundary(self, side: int) -> tuple[Floats, Floats]:
-        """Rotation over balance and |velocity| over p times balance that part what overturns without shaking.
-
-        Both counted in the frame of the side; none where its restraints hold the body at any rotation.
-        """
+        """Rotation over balance and |velocity| over p times balance with as much energy as at the balance of a side."""
         balance = self.balance[side]
         if not math.isfinite(balance):
             return np.empty(0), np.empty(0)
@@ -157,13 +154,7 @@ def _balance_on_a_line(made: Record, added_weight: Floats, added_push: Floats, p
 
 
 def energy_of(body: Body, record: Record, *, nonlinear: bool) -> Energy:
-    """Return the energy of a body.
-
-    Raises
-    ------
-    InvalidOption
-        If it is no block, a tendon of it yields, or its restraints hold it at any rotation.
-    """
+    """Return the energy of a body; refuse what is no block, has a tendon that yields, or is held at any rotation."""
     if not isinstance(body, Block | RestrainedBlock):
         raise InvalidOption(
             f"the energy that overturns a body is known of blocks alone, not of a {type(body).__name__}"

@@ -51,13 +51,7 @@ def active_span(response: Response) -> tuple[float, float]:
 
 
 def shown_span(response: Response, window: Sequence[float] | None) -> tuple[float, float]:
-    """Return a window of a response, s, or else what is worth drawing.
-
-    Raises
-    ------
-    InvalidOption
-        If the window is no stretch of the response.
-    """
+    """Return a window of a response, s, or else what is worth drawing; refuse what is no stretch of the response."""
     if window is None:
         return active_span(response)
     ends: Any = checks.numbers(window, "window", InvalidOption)
@@ -174,13 +168,7 @@ class Course(NamedTuple):
 
 
 def course_of(response: Response, start: float, end: float) -> Course:
-    """Follow a response from a time to a later one, s.
-
-    Raises
-    ------
-    InvalidOption
-        If the energy of its body is not known.
-    """
+    """Follow a response, of a body whose energy is known, from a time to a later one, s."""
     history, energy = response._history, response._energy
     even, step = np.linspace(start, end, _EVEN_TIMES_OF_COURSE, retstep=True)
     impacts = response.impacts[(response.impacts["time"] >= start) & (response.impacts["time"] <= end)]

@@ -27,7 +27,6 @@ Quantity = Literal["peak", "rotation", "velocity", "event", "impact"]
 #: To so long before a rest, s, its impacts are followed: what is left is to first order, and rounding counts for less.
 _CLOSE: Final = 1e-5
 
-_NO_REASON: Final = ""
 _OVERTURNS: Final = "the block overturns: its peak is where it falls, whatever changes a little"
 _AT_STOP: Final = "the body reaches its second stop: its peak is there, whatever changes a little"
 _UNFINISHED: Final = "the simulation was not finished: its derivatives are not known"
@@ -129,12 +128,10 @@ def gradient(response: Response, of: Quantity = "peak", at: float | None = None)
     Notes
     -----
     One pass back along the steps of the response, whatever the number of samples: the adjoint of what
-    `Response.sensitivity` carries forwards (see "Impacts: restitution and sensitivity" in the documentation). At rest a
-    rotation does not change. The time of an uplift changes with the motion about it alone, and not at all where the
-    motion jumps past the threshold; that of a rest follows its impacts up to 0.01 ms before it, and is to first order
-    from there. Numbers are NaN where there is no derivative, and `Gradient.reason` says why: where a block overturns,
-    so that its peak is fixed, touches the ground without speed, or leaves it as it comes to rest, and throughout where
-    the simulation was not finished.
+    `Response.sensitivity` carries forwards (see "Impacts: restitution and sensitivity" in the documentation). The time
+    of an uplift changes with the motion about it alone, and not at all where the motion jumps past the threshold; that
+    of a rest follows its impacts up to 0.01 ms before it, and is to first order from there. Numbers are NaN where there
+    is no derivative, and `Gradient.reason` says why.
 
     Examples
     --------
@@ -193,7 +190,7 @@ class _Target:
     row: int = 0
     since: float = 0.0
     by_state: tuple[float, float] | None = None
-    reason: str = _NO_REASON
+    reason: str = ""
     is_height: bool = False
 
 
@@ -201,7 +198,7 @@ def _peak(response: Response, at: float | None) -> _Target:
     if at is not None:
         raise InvalidOption('{} is for other quantities: a "peak" is where it is', "at", value=at)
     trail, value, instant = response.solution.trail, response.peak_rotation, response.peak_time
-    reason = _NO_REASON
+    reason = ""
     if response.overturned:
         reason = _OVERTURNS
     elif response._reaches_second_stop:
@@ -273,7 +270,7 @@ def _by_adjoint(target: _Target, change: Floats, out: Floats) -> str:
     else:
         change[:2] = target.by_state
         if not np.any(change) or (target.instant == begin and not target.is_height):
-            return _NO_REASON  # at rest, or the start itself
+            return ""  # at rest, or the start itself
     if ends in _REASONS:
         return _REASONS[ends]
     if target.instant > begin:
@@ -283,12 +280,12 @@ def _by_adjoint(target: _Target, change: Floats, out: Floats) -> str:
             return _REASONS[ends]
         waits = starts_at_rest and (len(nodes) == 1 or nodes["time"][1] > begin)
         if ends == Ends.REST or waits:
-            return _NO_REASON  # what comes to rest again before an uplift leaves nothing
+            return ""  # what comes to rest again before an uplift leaves nothing
         if not starts_at_rest:
             change[0] = math.nan if nodes["u"][0] == 0.0 else change[0]
     if starts_at_rest:
         change[:2] = math.nan
-    return _FROM_REST if np.any(np.isnan(change)) else _NO_REASON
+    return _FROM_REST if np.any(np.isnan(change)) else ""
 
 
 def _sign(side: int) -> float:

@@ -38,24 +38,12 @@ _LEAST_SHARE: Final = 1e-9
 
 
 class Solution(NamedTuple):
-    """What the integration returned, from which a response computes everything else.
+    """What the integration returned, from which a response computes everything else."""
 
-    Attributes
-    ----------
-    trail : Trail
-        Ground, body and settings as kernels take them, and the nodes of the series.
-    sequences : structured array
-        Chattering sequences as they were proven, without the rounding before the proof.
-    residual : float
-        Coordinate at the end.
-    again : callable
-        Repeats the simulation with the motion and the start multiplied by a factor.
-    """
-
-    trail: Trail
-    sequences: NDArray[np.void]
-    residual: float
-    again: Callable[[float], Any]
+    trail: Trail  # ground, body and settings as kernels take them, and the nodes of the series
+    sequences: NDArray[np.void]  # as they were proven, without the rounding before the proof
+    residual: float  # coordinate at the end
+    again: Callable[[float], Any]  # repeats the simulation with the motion and the start multiplied by a factor
 
     def __repr__(self) -> str:
         return f"<Solution: {counted(len(self.trail.nodes), 'node')}>"
