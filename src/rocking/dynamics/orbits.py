@@ -441,7 +441,7 @@ class _Search:
         return np.asarray(fine & (x >= low) & ~((x == low) & (v < 0.0)))
 
     def mapped(self, states: Floats, count: int) -> Floats:
-        """Rows of states, states after periods and the derivative, shape (n, 8); NaN for states that no body may have."""
+        """Rows of states, states after periods and derivatives, shape (n, 8); NaN for states that no body may have."""
         rows, fine = np.full((len(states), 8), np.nan), self._possible(states)
         after, change = self.strobe.derivative(states[fine], count)
         rows[:, :2], rows[fine, 2:4], rows[fine, 4:] = states, after, change.reshape(-1, 4)
