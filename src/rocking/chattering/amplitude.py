@@ -134,10 +134,8 @@ def critical_amplitude_nonlinear(
 
     Parameters
     ----------
-    omega : array_like
-        Forcing frequency over p.
-    eta : array_like
-        Coefficient of restitution.
+    omega, eta : array_like
+        As in `critical_amplitude`.
     alpha : array_like
         Slenderness angle, rad, between 0 and pi/2.
     threads, progress : int or bool, optional
@@ -153,7 +151,7 @@ def critical_amplitude_nonlinear(
     Raises
     ------
     InvalidOption
-        If a parameter is NaN, infinite or out of range.
+        As `critical_amplitude`.
 
     Notes
     -----

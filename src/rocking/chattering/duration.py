@@ -337,14 +337,9 @@ def _exact_times(a: Floats, omega: Floats, eta: Floats) -> Floats:
     parts = [slice(start, start + _PART) for start in range(0, phases.size, _PART)]
     for _ in in_threads(part, parts, threads=cores()):
         pass
-    return (_marked(phases, statuses) / frequencies).reshape(shape)[()]
-
-
-def _marked(phases: Floats, statuses: NDArray[np.int8]) -> Floats:
-    """Mark phases as times are: NaN for incomplete chattering, infinity for what is not resolved."""
     phases[statuses == Verdict.INCOMPLETE] = math.nan
     phases[statuses == Verdict.UNRESOLVED] = math.inf
-    return phases
+    return (phases / frequencies).reshape(shape)[()]
 
 
 def _alike_together(a: Floats, eta: Floats) -> NDArray[np.int64]:
