@@ -64,13 +64,6 @@ def test_a_sequence_has_a_status_and_finite_numbers(omega):
         assert 0.0 < phase <= np.pi
 
 
-def test_what_is_not_resolved_is_told_as_infinite():
-    told = duration._marked(
-        np.array([1.0, 2.0, 3.0]), np.array([Verdict.FOUND, Verdict.INCOMPLETE, Verdict.UNRESOLVED], np.int8)
-    )
-    assert told == pytest.approx([1.0, np.nan, np.inf], nan_ok=True)
-
-
 @pytest.mark.parametrize("count", [1, 2, 63, 64, 65, 511, 512, 513, 1100])
 def test_every_number_of_sequences_fills_the_lanes(count):
     rng = np.random.default_rng(count)

@@ -52,12 +52,6 @@ _COEFFICIENTS: Final = np.array([
      -5.343e-09, -1.09e-09, 5.9e-11, 9.9e-11, 7e-12],
 ])  # fmt: skip
 
-#: Width of the final bracket.
-_WIDTH: Final = 1e-12
-
-#: Beyond it no block's first sequence has been seen to be complete; doubled where one is.
-_FIRST_HIGH: Final = 1.5
-
 #: Phase before uplift at which the simulated motion starts.
 _LEAD: Final = 0.1
 
@@ -139,10 +133,8 @@ def critical_amplitude_nonlinear(
 
     Parameters
     ----------
-    omega : array_like
-        Forcing frequency over p.
-    eta : array_like
-        Coefficient of restitution.
+    omega, eta : array_like
+        As in `critical_amplitude`.
     alpha : array_like
         Slenderness angle, rad, between 0 and pi/2.
     threads, progress : int or bool, optional
@@ -158,7 +150,7 @@ def critical_amplitude_nonlinear(
     Raises
     ------
     InvalidOption
-        If a parameter is NaN, infinite or out of range.
+        As `critical_amplitude`.
 
     Notes
     -----
@@ -187,11 +179,12 @@ def _critical(omega: float, eta: float, alpha: float) -> float:
     if eta == 1.0:
         return 1.0
     block = Block.from_parameters(p=1.0, alpha=alpha, restitution=eta)
-    low, high = 1.0, _FIRST_HIGH
+    # Beyond 1.5 no block's first sequence has been seen to be complete.
+    low, high = 1.0, 1.5
     try:
         while _comes_to_rest(block, high, omega):
             low, high = high, 2.0 * high
-        return bisected(low, high, lambda a: not _comes_to_rest(block, a, omega), width=_WIDTH)[0]
+        return bisected(low, high, lambda a: not _comes_to_rest(block, a, omega), width=1e-12)[0]
     except Unfinished:
         return math.nan
 

@@ -45,10 +45,6 @@ _PAPER_RESTITUTION: Final = 0.92
 #: Two ulp: what adding to a phase and dividing by omega may lose of the bracket.
 _ROUNDING: Final = 2.0**-51
 
-#: A sequence that lasts half a period but for such a share may be within rounding of the critical amplitude.
-_CRITICAL: Final = 1e-6
-
-_FIRST_CAPACITY: Final = 512
 _LARGEST_CAPACITY: Final = 1 << 23
 
 IMPACT: Final = np.dtype(
@@ -229,7 +225,7 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
         raise InvalidOption(f"{{}} must be at least 1e-15 and finite, not {tolerance!r}", "tolerance", value=tolerance)
     if amplitude == 1.0:
         return ChatteringSequence(np.zeros(0, IMPACT), True, 0.0, 0.0, 0.0)
-    capacity, half_period = _FIRST_CAPACITY, math.pi / frequency
+    capacity, half_period = 512, math.pi / frequency
     while True:
         status, impacts, phases = _resolved(amplitude, frequency, restitution, tolerance, capacity)
         stays = impacts.size > 1 and not impacts["time"][-1] > impacts["time"][impacts.size // 2]
@@ -240,7 +236,8 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
             raise InvalidOption(
                 f"the sequence takes more than {_LARGEST_CAPACITY} impacts: lower {{}} = {eta!r}", "eta", value=eta
             )
-    if status == Verdict.UNRESOLVED or impacts["time"].max(initial=0.0) > half_period * (1.0 - _CRITICAL):
+    # So near to half a period the amplitude may be within rounding of the critical one.
+    if status == Verdict.UNRESOLVED or impacts["time"].max(initial=0.0) > half_period * (1.0 - 1e-6):
         # Where rounding decides, the verdict is that of `chattering_time`, which says no more than half a period.
         settled = float(chattering_time(amplitude, frequency, restitution))
         if status != Verdict.FOUND and math.isfinite(settled):
@@ -340,14 +337,9 @@ def _exact_times(a: Floats, omega: Floats, eta: Floats) -> Floats:
     parts = [slice(start, start + _PART) for start in range(0, phases.size, _PART)]
     for _ in in_threads(part, parts, threads=cores()):
         pass
-    return (_marked(phases, statuses) / frequencies).reshape(shape)[()]
-
-
-def _marked(phases: Floats, statuses: NDArray[np.int8]) -> Floats:
-    """Mark phases as times are: NaN for incomplete chattering, infinity for what is not resolved."""
     phases[statuses == Verdict.INCOMPLETE] = math.nan
     phases[statuses == Verdict.UNRESOLVED] = math.inf
-    return phases
+    return (phases / frequencies).reshape(shape)[()]
 
 
 def _alike_together(a: Floats, eta: Floats) -> NDArray[np.int64]:

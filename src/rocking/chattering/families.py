@@ -78,12 +78,14 @@ def lobes(block: Block, *, omega: float = 2.0, count: int = 5, model: Model = "n
 
     Parameters
     ----------
-    block, model : Block, str
-        As for `sine`.
+    block : Block
+        What rocks.
     omega : float
         Frequency of the lobes.
     count : int
         How many there are.
+    model : str
+        As for `sine`.
 
     Returns
     -------
@@ -115,10 +117,12 @@ def ricker(
 
     Parameters
     ----------
-    block, model : Block, str
-        As for `sine`.
+    block : Block
+        What rocks.
     kind : {"symmetric", "antisymmetric"}
         Second or third derivative of a Gaussian.
+    model : str
+        As for `sine`.
 
     Returns
     -------
@@ -142,10 +146,12 @@ def mavroeidis_papageorgiou(
 
     Parameters
     ----------
-    block, model : Block, str
-        As for `sine`.
+    block : Block
+        What rocks.
     phase, gamma : float
         As for `rocking.pulses.mavroeidis_papageorgiou`.
+    model : str
+        As for `sine`.
 
     Returns
     -------

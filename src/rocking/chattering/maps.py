@@ -68,9 +68,6 @@ class Outcome(IntEnum):
         return self.name.lower().replace("_", " ")
 
 
-#: Four ulp: by so much of itself a peak that was meant to be the threshold may exceed it.
-_ROUNDING: Final = 2.0**-50
-
 _EPISODE: Final = np.dtype(
     [(name, float) for name in ("uplift", "proven", "rest", "lower", "upper", "duration")]
     + [("impacts", np.int64), ("ground", float)]
@@ -280,7 +277,8 @@ def last_exceedance(motion: Motion, thresholds: tuple[float, float], gravity: fl
 
     What passes a threshold by no more than rounding lifts no block.
     """
-    plus, minus = (threshold * (1.0 + _ROUNDING) for threshold in thresholds)
+    # By four ulp a peak that was meant to be the threshold may exceed it.
+    plus, minus = (threshold * (1.0 + 2.0**-50) for threshold in thresholds)
     lifts = motion.vertical is None and motion.pga > min(plus, minus)
     if not (lifts or len(exceedances(motion, (plus, minus), gravity))):
         return None

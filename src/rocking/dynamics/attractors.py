@@ -27,27 +27,9 @@ from rocking.threads import in_threads
 LONGEST: Final = 64
 RETURN: Final = 1e-6
 
-#: Newton's method: most steps, and the distance at which it is done, over the size of the states.
-_STEPS: Final = 12
-_FIXED: Final = 1e-11
-
-#: Largest and smallest neighbourhood, over the size of the states, and how much larger the one is that is checked.
-_LARGEST: Final = 0.25
-_SMALLEST: Final = 1e-7
-_MARGIN: Final = 2.0
-
-#: Least rate of contraction that a norm is made for; most terms of its sum, and the largest of them.
-_LEAST_RATE: Final = 0.01
-_TERMS: Final = 100_000
-_LARGEST_TERM: Final = 1e12
-
-#: Where it is checked: on so many rings, at so many angles; at few angles of the outermost first.
+#: Where it is checked: on so many rings, at so many angles.
 _RINGS: Final = 4
 _ANGLES: Final = 24
-_FIRST: Final = 4
-
-#: Most points of an attractor that get a neighbourhood: a state passes all of them.
-_POINTS: Final = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,12 +103,12 @@ def attractor_from(strobe: StroboscopicMap, state: Floats, size: Floats) -> Attr
 def _fixed_point(strobe: StroboscopicMap, at: Floats, period: int, size: Floats) -> tuple[Floats, Floats] | None:
     """Find the fixed point of some periods near a state by Newton's method, with the derivative there."""
     start = at
-    for _ in range(_STEPS):
+    for _ in range(12):
         after, change = strobe.derivative(at, period)
         if not np.isfinite(change).all():
             return None
         off = after - at
-        if np.abs(off / size).max() < _FIXED:
+        if np.abs(off / size).max() < 1e-11:
             return at, change
         at = at + np.linalg.solve(np.eye(2) - change, off) if change.any() else after
         if np.abs((at - start) / size).max() > np.sqrt(RETURN):
@@ -134,22 +116,11 @@ def _fixed_point(strobe: StroboscopicMap, at: Floats, period: int, size: Floats)
     return None
 
 
-def traps_of(strobe: StroboscopicMap, attractor: Attractor, size: Floats) -> Floats:
-    """Neighbourhoods of the points of an attractor that no state leaves, as rows for `kernels.periodic.settle`.
-
-    Of a long orbit some points have one. None has where the check fails however small it is.
-    """
-    points = attractor.states[evenly(attractor.period, _POINTS)]
-    _, made = strobe._states(points)
-    rows = [
-        trap
-        for point, record in zip(points, made, strict=True)
-        if (trap := _trap(strobe, attractor, point, record, size)) is not None
-    ]
-    return np.array(rows).reshape(-1, TRAP)
-
-
 def _trap(strobe: StroboscopicMap, attractor: Attractor, point: Floats, record: Records, size: Floats) -> Floats | None:
+    """Neighbourhood of a point of an attractor that no state leaves, as a row for `kernels.periodic.settle`.
+
+    None where the check fails however small it is.
+    """
     side, u, v = int(record["side"]), float(record["u"]), float(record["v"])
     if side < 0:  # at rest, wherever it came from
         return np.array([side, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -157,16 +128,32 @@ def _trap(strobe: StroboscopicMap, attractor: Attractor, point: Floats, record: 
     shape, rate = _contracting_norm(change, size)
     if not np.isfinite(shape).all():
         return None
+
+    def stays(offsets: Floats) -> bool:
+        """Whether states off the point come nearer to it, on the same side and as it does itself."""
+        here = offsets[u + offsets[:, 0] > 0.0]
+        if np.any(u + offsets[:, 0] >= strobe._records["overturn_angle"][0]) or len(here) == 0:
+            return False
+        samples = strobe._coordinates(u + here[:, 0], v + here[:, 1], np.full(len(here), side))
+        after, changes = strobe.derivative(samples, attractor.period)
+        if not np.isfinite(changes).all() or np.any(strobe._states(after)[1]["side"] != side):
+            return False
+        if attractor.rests:
+            target = strobe._coordinates(np.array([u]), np.array([v]), np.array([side]))[0]
+            return bool(not changes.any() and np.abs((after - target) / size).max() < 1e-9)
+        _, _, impacts = strobe.followed(samples, attractor.period)
+        norms = np.linalg.norm(shape @ changes @ np.linalg.inv(shape), ord=2, axis=(1, 2))
+        return bool(np.all(impacts == attractor.impacts) and np.all(norms <= 0.5 * (1.0 + rate)))
+
     angles = 2.0 * np.pi * np.arange(_ANGLES) / _ANGLES
     rings = np.arange(1, _RINGS + 1)[:, None, None] / _RINGS
     disc = (rings * np.stack([np.cos(angles), np.sin(angles)], axis=-1)).reshape(-1, 2) @ np.linalg.inv(shape).T
-    radius = _LARGEST
-    while radius > _SMALLEST:
-        offsets = _MARGIN * radius * disc
-        few = offsets[-_ANGLES :: _ANGLES // _FIRST]
-        if all(
-            _stays(strobe, attractor, (side, u, v), each, shape, 0.5 * (1.0 + rate), size) for each in (few, offsets)
-        ):
+    radius = 0.25  # over the size of the states
+    while radius > 1e-7:
+        # What is checked is twice as large.
+        offsets = 2.0 * radius * disc
+        # At few angles of the outermost ring first.
+        if stays(offsets[-_ANGLES :: _ANGLES // 4]) and stays(offsets):
             form = shape.T @ shape / radius**2
             return np.array([side, u, v, form[0, 0], form[0, 1], form[1, 1]])
         radius *= 0.5
@@ -180,47 +167,17 @@ def _contracting_norm(change: Floats, size: Floats) -> tuple[Floats, float]:
     """
     scale = np.diag(1.0 / size)
     M = scale @ change @ np.diag(size)
-    rate = max(float(np.sqrt(np.abs(np.linalg.eigvals(M)).max())), _LEAST_RATE)
+    rate = max(float(np.sqrt(np.abs(np.linalg.eigvals(M)).max())), 0.01)
     form, power = np.eye(2), np.eye(2)
-    for _ in range(_TERMS):
+    for _ in range(100_000):
         power = M @ power / rate
         term = power.T @ power
         form = form + term
         if np.abs(term).max() < 1e-14 * np.abs(form).max():
             return np.linalg.cholesky(form).T @ scale, rate
-        if np.abs(term).max() > _LARGEST_TERM:
+        if np.abs(term).max() > 1e12:
             break
     return np.full((2, 2), np.nan), rate
-
-
-def _stays(
-    strobe: StroboscopicMap,
-    attractor: Attractor,
-    middle: tuple[int, float, float],
-    offsets: Floats,
-    shape: Floats,
-    rate: float,
-    size: Floats,
-) -> bool:
-    """Whether states off the middle of a neighbourhood come nearer to it, on the same side and as it does itself."""
-    side, u, v = middle
-    if np.any(u + offsets[:, 0] >= strobe._records["overturn_angle"][0]):
-        return False
-    here = offsets[u + offsets[:, 0] > 0.0]
-    if len(here) == 0:
-        return False
-    samples = strobe._coordinates(u + here[:, 0], v + here[:, 1], np.full(len(here), side))
-    after, changes = strobe.derivative(samples, attractor.period)
-    if not np.isfinite(changes).all():
-        return False
-    _, made = strobe._states(after)
-    same_side = np.all(made["side"] == side)
-    if attractor.rests:
-        target = strobe._coordinates(np.array([u]), np.array([v]), np.array([side]))[0]
-        return bool(same_side and not changes.any() and np.abs((after - target) / size).max() < 1e-9)
-    _, _, impacts = strobe.followed(samples, attractor.period)
-    norms = np.linalg.norm(shape @ changes @ np.linalg.inv(shape), ord=2, axis=(1, 2))
-    return bool(same_side and np.all(impacts == attractor.impacts) and np.all(norms <= rate))
 
 
 class KnownAttractors:
@@ -300,8 +257,10 @@ class KnownAttractors:
                 near = np.abs((known.states - attractor.states[0]) / self.size).max(axis=1)
                 if near.min() < RETURN:
                     return number
-        traps = traps_of(self.strobe, attractor, self.size)
-        if not len(traps):
+        points = attractor.states[evenly(attractor.period, 8)]  # of a long orbit some have a neighbourhood
+        pairs = zip(points, self.strobe._states(points)[1], strict=True)
+        traps = [row for pair in pairs if (row := _trap(self.strobe, attractor, *pair, self.size)) is not None]
+        if not traps:
             return -1
         self.owner = np.append(self.owner, np.full(len(traps), len(self.attractors)))
         self.traps = np.concatenate([self.traps, traps])

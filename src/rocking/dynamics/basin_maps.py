@@ -39,7 +39,6 @@ _NAMES: Final = ("overturns to side +", "overturns to side -", "not settled")
 
 #: Cells of the coarsest pass, at least, and cells between two looks for attractors.
 _COARSEST: Final = 400
-_BATCH: Final = 16_384
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -307,7 +306,8 @@ class _Grid:
             for number in range(passes):
                 # Those of a pass in a mixed order: what an interrupt leaves out is then left out all over the grid.
                 cells = np.random.default_rng(number).permutation(np.flatnonzero(level == number))
-                for some in ranges(len(cells), _BATCH):
+                # Attractors are looked for after so many cells.
+                for some in ranges(len(cells), 16_384):
                     self._follow(cells[some])
                     bar.advance(len(cells[some]))
 

@@ -34,13 +34,6 @@ if TYPE_CHECKING:
 #: Ways to go through the values of the parameter.
 Direction = Literal["up", "down", "both", "afresh"]
 
-#: An orbit is still settling if the distance between its states shrinks to less than this share while they are kept.
-_STILL: Final = 0.99
-
-#: Least size that the kept states of an orbit are compared by, over the natural scale: `RETURN` of it is some thousand
-#: times rounding.
-_LEAST_SIZE: Final = 1e-6
-
 #: What stands for a period where the body overturned, and where it took too many steps to be followed.
 OVERTURNED: Final = -1
 NOT_FOLLOWED: Final = -2
@@ -343,7 +336,8 @@ def period_of(states: Floats, scale: Scale | None = None) -> int:
     """
     size = np.abs(states).max(axis=0) + np.finfo(float).tiny
     if scale is not None:
-        size = np.maximum(size, _LEAST_SIZE * np.array(scale))
+        # `RETURN` of this size is some thousand times rounding.
+        size = np.maximum(size, 1e-6 * np.array(scale))
 
     def apart(period: int) -> Floats:
         distance: Floats = (np.abs(states[period:] - states[:-period]) / size).max(axis=1)
@@ -354,7 +348,7 @@ def period_of(states: Floats, scale: Scale | None = None) -> int:
             # An orbit that comes nearer to a shorter one from both sides in turn looks like one of twice its period.
             for shorter in (each for each in range(1, period) if period % each == 0):
                 gaps = apart(shorter)
-                if gaps[-period:].max() < _STILL * gaps[:period].max():
+                if gaps[-period:].max() < 0.99 * gaps[:period].max():
                     return 0
             return period
     return 0

@@ -15,7 +15,7 @@ from rocking.arrays import Flags, Floats
 from rocking.body import Body, title_of
 from rocking.constants import Model
 from rocking.dynamics.maps import StroboscopicMap
-from rocking.dynamics.orbits import PeriodicOrbit, orbit_at, sizes_of, trajectory_of
+from rocking.dynamics.orbits import PeriodicOrbit, orbit_at, sizes_of
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.result import Result
@@ -36,9 +36,6 @@ CHATTERING: Final = "loss of complete chattering"
 REST: Final = "start of rest"
 UPLIFT: Final = "uplift"
 OVERTURNING: Final = "overturning"
-
-#: Differences of peaks, over the greatest, that are only rounding.
-_FLAT: Final = 1e-9
 
 #: How a branch may end without one.
 LIMIT: Final = "limit of the parameter"
@@ -269,7 +266,8 @@ class Branch(Result):
         unit = "" if self.unit == "1" else f" ({self.unit.replace('^2', '²')})"
         # Between two stops that are both hit the greatest size is always that of a stop, and tells nothing.
         peaks = np.concatenate([each.peaks for each in branches])
-        flat = float(np.ptp(peaks)) <= _FLAT * float(np.max(peaks))
+        places = [at for each in branches for at in each.bifurcations]
+        flat = float(np.ptp(peaks)) <= 1e-9 * float(np.max(peaks))
         what = f"{coordinate.name} at the start of a period" if flat else f"largest {coordinate.name}"
         periods = ", ".join(str(each) for each in sorted({each.period for each in branches}))
         headline = f"orbits of {periods} periods, in {len(branches)} branches" if others else self._headline()
@@ -278,9 +276,7 @@ class Branch(Result):
             heights=_apart([each.states[:, 0] if flat else each.peaks for each in branches]),
             stable=_apart([each.is_stable for each in branches]) == 1.0,
             marks=[
-                (at.kind, at.value, float(at.orbit.state[0]) if flat else _peak_at(at))
-                for each in branches
-                for at in each.bifurcations
+                (each.kind, each.value, float(each.orbit.state[0]) if flat else each.orbit._peak) for each in places
             ],
             labels=(f"{self.name}{unit}", f"{what} ({coordinate.unit})"),
             title=title or as_written(f"{title_of(body)}, {headline.replace('^2', '²')}"),
@@ -292,14 +288,6 @@ class Branch(Result):
 def _apart(lines: Sequence[NDArray[Any]]) -> Floats:
     """Join lines, with a NaN between one and the next, where a plotted one breaks off."""
     return np.concatenate([np.append(np.asarray(line, dtype=np.float64), np.nan) for line in lines])[:-1]
-
-
-def _peak_at(bifurcation: Bifurcation) -> float:
-    """Greatest size of the coordinate on the orbit at a bifurcation."""
-    orbit = bifurcation.orbit
-    return trajectory_of(
-        StroboscopicMap(orbit.body, orbit.motion, orbit.model, orbit.treatment), orbit.state, orbit.period
-    ).peak
 
 
 def _written(multipliers: NDArray[np.complex128]) -> str:

@@ -24,39 +24,10 @@ from rocking.dynamics.orbits import OrbitTrajectory, PeriodicOrbit
 from rocking.errors import InvalidOption, RockingError
 from rocking.motion.motion import Motion
 
-#: Steps along a branch, over the scales of state and parameter: the first one, and the factor by which one grows after
-#: so few Newton steps.
-_FIRST_STEP: Final = 0.005
-_LONGER: Final = 1.4
-_QUICK: Final = 4
-
-#: Steps that succeed after one that failed until that one is forgotten; and the distance below which a point takes the
-#: place of the one before.
-_SUCCESSES: Final = 5
-_NEAR: Final = 1e-5
-
-#: Steps that are tried for each point.
-_TRIALS: Final = 4
-
-#: Least cosine between one tangent and the next, how far a point may be from where the tangent leads, over the step (a
-#: bend of that cosine makes it half as much), and the longest step in which that may mean that the branch ends; in a
-#: longer one it bends, or the point is one of another branch.
+#: Least cosine between one tangent and the next, and how far a point may be from where the tangent leads, over the step
+#: (a bend of that cosine makes it half as much).
 _COSINE: Final = 0.97
 _ASIDE: Final = 0.25
-_SHARP: Final = 1e-3
-
-#: Size of det(R - 1) on either side of a turn of the parameter: it is zero there.
-_TURNING: Final = 0.05
-
-#: Speed of the slowest impact, over the scale, from which grazing is extrapolated.
-_SLOW: Final = 2e-3
-
-#: Step along a tangent that shows where it leads after the start of a period has been moved.
-_AHEAD: Final = 1e-6
-
-#: Points after which a branch may have come back to where it began, and how far from that it may pass, over the step.
-_ROUND: Final = 12
-_BESIDE: Final = 0.1
 
 #: Step along a branch below which it has come to its end.
 _LEAST_STEP: Final = 1e-13
@@ -66,12 +37,6 @@ _GRAZES: Final = 1e-4
 
 #: Steps beyond the end of a branch at which the kind of its orbits is looked at.
 _BEYOND: Final = (0.0, *np.geomspace(1e-12, 1e-4, 9).tolist())
-
-#: Points from which grazing is extrapolated, at least and at most, and how far the last two estimates may differ, over
-#: the range of the parameter.
-_FEWEST: Final = 4
-_EXTRAPOLATED: Final = 6
-_AGREEMENT: Final = 1e-6
 
 #: Points from which the crossing of two branches is interpolated.
 _CROSSING: Final = 4
@@ -185,7 +150,7 @@ class _Walk:
     def __init__(self, equations: OrbitEquations, z: Floats, direction: float, longest: float) -> None:
         self.trajectory = equations.trajectory(z)
         self.equations, self.z = equations.moved(z, self.trajectory)
-        self.direction, self.step, self.longest = direction, min(_FIRST_STEP, longest), longest
+        self.direction, self.step, self.longest = direction, min(0.005, longest), longest
         #: Of each point the parameter, the state at the start of the motion's period, multipliers and greatest size.
         self.points: list[tuple[float, Floats, NDArray[np.complex128], float]] = []
         self.bifurcations: list[Bifurcation] = []
@@ -215,7 +180,7 @@ class _Walk:
         self.written = self.z
         #: Speed of the slowest impact and parameter, over its size, at all points so far.
         self.slowest = [(self.trajectory.slowest, self.z[2])]
-        for _ in range(_TRIALS * most):
+        for _ in range(4 * most):  # some steps fail
             if len(self.points) >= most:
                 break
             end = self.advance()
@@ -254,14 +219,15 @@ class _Walk:
             return self.bifurcations[-1].kind
         self.bifurcations.extend(_passed(self, new, tests))
         before, self.trajectory = self.trajectory, equations.trajectory(new)
-        if len(self.points) > 1 and np.max(np.abs(new - self.written)) < _NEAR:
+        # A point so near takes the place of the one before.
+        if len(self.points) > 1 and np.max(np.abs(new - self.written)) < 1e-5:
             self.points.pop()
         else:
             self.written = new
         self.add_point(new)
         self.go_to(solved, self.tangent)
         self.successes += 1
-        self.ahead = math.inf if self.successes > _SUCCESSES else self.ahead - self.step
+        self.ahead = math.inf if self.successes > 5 else self.ahead - self.step
         if at_limit:
             return ends.LIMIT
         if self.comes_to_graze(before):
@@ -271,13 +237,14 @@ class _Walk:
         self.move_start()
         if self.ahead < math.inf:
             self.step = 0.5 * self.ahead
-        elif solved.steps <= _QUICK:
-            self.step = min(self.step * _LONGER, self.longest)
+        elif solved.steps <= 4:
+            self.step = min(self.step * 1.4, self.longest)
         return ""
 
     def shorten(self) -> None:
         """Try half the step that failed; there is no point of this kind at its end, unless the branch bends."""
-        if not (self.turned and self.step > _SHARP):
+        # In a longer step it bends, or the point is one of another branch.
+        if not (self.turned and self.step > 1e-3):
             self.ahead, self.successes = self.step, 0
         self.step *= 0.5
         self.tangent = self.equations.tangent(self.z, self.tangent)
@@ -286,7 +253,7 @@ class _Walk:
         """Whether the slowest impact comes to have no speed, and where."""
         equations, speed = self.equations, self.trajectory.slowest
         self.slowest.append((speed, self.z[2]))
-        if equations.kind.rests or speed >= min(_SLOW * equations.sizes[1], before.slowest):
+        if equations.kind.rests or speed >= min(2e-3 * equations.sizes[1], before.slowest):
             return False
         grazing = _vanishing(self)
         self.bifurcations += [] if grazing is None else [grazing]
@@ -294,7 +261,7 @@ class _Walk:
 
     def has_returned(self) -> bool:
         """Whether the branch has passed its first point again, in the direction in which it left it."""
-        if len(self.points) <= _ROUND:
+        if len(self.points) <= 12:
             return False
         first, second, before, last = (
             np.append(self.points[k][1], self.points[k][0]) / self.equations.sizes for k in (0, 1, -2, -1)
@@ -304,7 +271,7 @@ class _Walk:
         share = float((first - before) @ step) / size**2
         beside = float(np.linalg.norm(first - before - share * step))
         same_way = float(step @ left) > _COSINE * size * float(np.linalg.norm(left))
-        return 0.0 <= share <= 1.0 and beside < _BESIDE * size and same_way
+        return 0.0 <= share <= 1.0 and beside < 0.1 * size and same_way
 
     def next(self) -> tuple[Solved, bool] | None:
         """Return the next point where a step leads to one of the same kind, and whether at a limit."""
@@ -329,7 +296,7 @@ class _Walk:
         before, after = self.tests, found.tests(onwards)
         if before.at_one * after.at_one < 0.0 and before.at_minus_one * after.at_minus_one < 0.0:
             return None  # A multiplier passes 1 and -1, or changes its sign through infinity, where an impact grazes.
-        if self.turns(after) and max(abs(before.at_one), abs(after.at_one)) > _TURNING:
+        if self.turns(after) and max(abs(before.at_one), abs(after.at_one)) > 0.05:
             return None  # Too far from the turn, or there is none: the difference by the parameter reaches past an end.
         return (found, at_limit) if equations.kind_at(found.z) == equations.kind else None
 
@@ -347,7 +314,7 @@ class _Walk:
         if equations is self.equations:
             return
         # At a fold the parameter does not say where the branch leads: the course a little ahead does.
-        onwards = self.equations.later(self.z + _AHEAD * self.tangent, equations.shift) - z
+        onwards = self.equations.later(self.z + 1e-6 * self.tangent, equations.shift) - z
         onwards /= np.linalg.norm(onwards)
         found = equations.solved(z, onwards)
         if found is not None:
@@ -357,24 +324,22 @@ class _Walk:
 
 def _passed(here: _Walk, new: Floats, after: Tests) -> Iterator[Bifurcation]:
     """Bifurcations between a point and the next one at which the branch goes on."""
-    before = here.tests
-    if before.at_one * after.at_one < 0.0:
-        kind = ends.FOLD if before.onwards * after.onwards < 0.0 else ends.BRANCHES
-        yield from _located(kind, here, new, lambda tests: tests.at_one)
-    if before.at_minus_one * after.at_minus_one < 0.0:
-        kind = ends.SYMMETRY if here.equations.by_half else ends.FLIP
-        yield from _located(kind, here, new, lambda tests: tests.at_minus_one)
+    turns = here.tests.onwards * after.onwards < 0.0
+    at_minus_one = ends.SYMMETRY if here.equations.by_half else ends.FLIP
+    for k, kind in enumerate((ends.FOLD if turns else ends.BRANCHES, at_minus_one)):
+        if here.tests[k] * after[k] < 0.0:
+            yield from _located(kind, here, new, k)
 
 
-def _located(kind: str, here: _Walk, new: Floats, value_of: Callable[[Tests], float]) -> Iterator[Bifurcation]:
-    """Root of a test function between two points."""
+def _located(kind: str, here: _Walk, new: Floats, number: int) -> Iterator[Bifurcation]:
+    """Root of one of the test functions between two points."""
     z, tangent = here.z, here.tangent
 
     def solve(length: float) -> Solved | None:
         return here.equations.solved(z + length * tangent, tangent)
 
     def test(solved: Solved) -> float:
-        return value_of(solved.tests(tangent_of(solved.jacobian, tangent)))
+        return solved.tests(tangent_of(solved.jacobian, tangent))[number]
 
     points, reached = _towards_root(solve, test, 0.0, float(tangent @ (new - z)))
     if not reached and len(points) > 1:
@@ -415,15 +380,15 @@ def _vanishing(here: _Walk) -> Bifurcation | None:
     (least, value), *others = reversed(here.slowest)
     speeds, values = [least], [value]
     for speed, value in others:
-        if len(speeds) == _EXTRAPOLATED or speed < speeds[-1]:
+        if len(speeds) == 6 or speed < speeds[-1]:
             break
         if speed >= speeds[-1] + least:
             speeds.append(speed)
             values.append(value)
-    if len(speeds) < _FEWEST:
+    if len(speeds) < 4:
         return None
     estimates = [_at_zero(speeds[:most], values[:most]) for most in range(len(speeds) - 2, len(speeds) + 1)]
-    if abs(estimates[-1] - estimates[-2]) > _AGREEMENT:
+    if abs(estimates[-1] - estimates[-2]) > 1e-6:
         return None
     found = here.bifurcation(ends.GRAZING, here.z, estimates)
     return found._replace(value=float(estimates[-1] * here.equations.sizes[2]))

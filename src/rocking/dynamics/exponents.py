@@ -177,13 +177,16 @@ def lyapunov_exponents(
     bump = np.exp(-1.0 / (at * (1.0 - at)))
     weights: Floats = bump / bump.sum()
     known = ~np.isnan(logs).any(axis=1)
-    mean = np.full(2, np.nan)
+    mean, error = np.full(2, np.nan), float("nan")
     if known.all():  # else nothing is known of what would follow, whatever rests came before
         mean[:] = [-np.inf if np.isneginf(each).any() else weights @ each for each in logs.T]
+    if np.isfinite(logs[:, 0]).all():  # the error of a plain mean, from those of consecutive parts
+        means = [part.mean() for part in np.array_split(logs[:, 0], _BATCHES)]
+        error = float(np.std(means, ddof=1) / np.sqrt(_BATCHES))
     return LyapunovExponents(
         largest=float(mean[0]),
         smallest=float(mean[1]),
-        standard_error=_standard_error(logs[:, 0]) * float(np.sqrt(count * np.sum(weights**2))),
+        standard_error=error * float(np.sqrt(count * np.sum(weights**2))),
         period=strobe.period,
         periods=count,
         impacts=impacts / count,
@@ -191,11 +194,3 @@ def lyapunov_exponents(
         fate=fate,
         stretches=logs,
     )
-
-
-def _standard_error(values: Floats) -> float:
-    """Return the standard error of a plain mean, from those of consecutive parts; NaN where there is none."""
-    if not np.isfinite(values).all():
-        return float("nan")
-    means = [part.mean() for part in np.array_split(values, _BATCHES)]
-    return float(np.std(means, ddof=1) / np.sqrt(_BATCHES))

@@ -32,12 +32,6 @@ _BEYOND_ALL: Final = 1e12
 #: States that a thread takes at once, so that an interrupt is seen soon.
 TOGETHER: Final = 256
 
-#: Periods of all states in one call of a kernel: half a second.
-_PERIODS: Final = 100_000
-
-#: Rows of the table that a derivative uses again and again.
-_ROWS: Final = 512
-
 #: A share of one that is less by no more than rounding.
 _ALMOST: Final = 1.0 - 2.0**-40
 
@@ -89,7 +83,7 @@ class PeriodicForcing:
     def _marching(self) -> tuple[Trail, state.Record, state.Record, state.Records]:
         """Return what kernels of derivatives need beside the states: the problem, and space to work in."""
         trail = Trail(self._ground, self._records[0], self._rules(record=True), NO_NODES)
-        return trail, state.new_scratch(), state.record(state.VARIATION), state.new_table(_ROWS)
+        return trail, state.new_scratch(), state.record(state.VARIATION), state.new_table(512)
 
     def checked_starts(self, given: ArrayLike, name: str) -> Floats:
         """Return states to start from, shape (n, 2): finite numbers, in front of the stops."""
@@ -213,7 +207,8 @@ def repeated(motion: Motion, gravity: float, sign: float = 1.0) -> Ground:
 
 def parts_of(count: int, periods: int) -> Sequence[slice]:
     """Ranges of states for one call of a kernel each, over so many periods."""
-    return [*ranges(count, min(TOGETHER, max(1, _PERIODS // periods)))]
+    # Half a second of periods.
+    return [*ranges(count, min(TOGETHER, max(1, 100_000 // periods)))]
 
 
 def sensible(values: Floats, name: str) -> None:

@@ -20,9 +20,6 @@ from rocking.motion.motion import Motion
 from rocking.threads import cores, in_threads
 from rocking.treatment import Treatment, VelocityThreshold
 
-#: Threshold on a speed that none is below: an impact map closes no chattering.
-_NO_SPEED: Final = 1e-300
-
 #: Fields of a body's record that are a side's own.
 _OF_SIDES: Final = (
     "stiffness", "threshold_slope", "threshold", "slenderness", "restitution", "min_restitution", "restitution_slope",
@@ -432,4 +429,5 @@ def impact_map(body: Body, motion: Motion, *, model: Model | None = None) -> Imp
     >>> dynamics.impact_map(ball, table)([[0.05, 1.0], [0.1, 0.8]]).shape
     (2, 2)
     """
-    return ImpactMap(body, motion, model, VelocityThreshold(_NO_SPEED))
+    # No speed is below this threshold: an impact map closes no chattering.
+    return ImpactMap(body, motion, model, VelocityThreshold(1e-300))

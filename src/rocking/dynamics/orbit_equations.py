@@ -39,25 +39,12 @@ Family = Callable[[float], tuple[Body, Motion]]
 #: The plane of one parameter, by its normal.
 AT_VALUE: Final = np.array([0.0, 0.0, 1.0])
 
-#: Newton steps to a branch, and its residual over the scale and the size of the derivative; and the largest one.
-_CORRECTIONS: Final = 10
+#: Residual of a point of a branch, over the scale and the size of the derivative; and the largest one.
 _RESIDUAL: Final = 1e-12
 _LARGEST_RESIDUAL: Final = 1e-6
 
-#: Step of differences by the parameter, over its range: least and greatest, and over the step along the branch, so that
-#: near the end of a branch few of them reach across it.
-_LEAST_DIFFERENCE: Final = 1e-13
+#: Greatest step of differences by the parameter, over its range.
 _DIFFERENCE: Final = 1e-6
-_OF_STEP: Final = 1e-3
-
-#: Distance from a limit of the parameter, over it, that is only rounding.
-_ROUNDING: Final = 2.0**-50
-
-#: An impact nearer to the start of a period than this share of it moves that start.
-_TOO_NEAR: Final = 0.03
-
-#: Values of the parameter at which a family is looked at.
-_SCAN_POINTS: Final = 5
 
 
 class Kind(NamedTuple):
@@ -153,12 +140,13 @@ class OrbitEquations:
     def physical(self, z: Floats) -> tuple[Floats, float]:
         """State and parameter of numbers z; exactly a limit where it differs from that by rounding."""
         value = float(z[2] * self.sizes[2])
-        at_limit = (each for each in self.limits if math.isclose(value, each, rel_tol=_ROUNDING))
+        at_limit = (each for each in self.limits if math.isclose(value, each, rel_tol=2.0**-50))
         return z[:2] * self.sizes[:2], next(at_limit, value)
 
     def for_step(self, step: float) -> None:
         """Choose the differences by the parameter for steps of some length along the branch."""
-        self.difference = min(max(_OF_STEP * step, _LEAST_DIFFERENCE), _DIFFERENCE)
+        # Near the end of a branch few of the differences by the parameter reach across it.
+        self.difference = min(max(1e-3 * step, 1e-13), _DIFFERENCE)
 
     def returned(self, state: Floats, value: float) -> tuple[Floats, Floats]:
         """State, or its mirror image, after the period or half of it, and the derivative; NaN where there is none."""
@@ -184,7 +172,7 @@ class OrbitEquations:
     def solved(self, guess: Floats, normal: Floats) -> Solved | None:
         """Return the point of the branch in the plane through a guess; None where Newton's method finds none."""
         z = guess.copy()
-        for count in range(_CORRECTIONS):
+        for count in range(10):
             residual, jacobian, _ = self.at(z)
             if not np.all(np.isfinite(jacobian)):
                 return None
@@ -258,7 +246,8 @@ class OrbitEquations:
         if self.by_half:  # the map of half a period ends at a breakpoint, too
             nearest[~are_halved(motion)] = -1.0
         best = int(np.argmax(nearest))
-        if nearest[self.shift] > _TOO_NEAR * period or nearest[best] <= nearest[self.shift]:
+        # An impact within 3 % of a period moves its start.
+        if nearest[self.shift] > 0.03 * period or nearest[best] <= nearest[self.shift]:
             return self, z
         return replace(self, shift=best), self.later(z, best)
 
@@ -271,7 +260,7 @@ def _stays_mirrored(family: Family, strobe: StroboscopicMap, limits: tuple[float
     """Whether the mirror image of every course is one half a period later, at a value and over the whole range."""
     if not is_mirrored(strobe):
         return False
-    for value in np.linspace(*limits, _SCAN_POINTS):
+    for value in np.linspace(*limits, 5):
         try:
             if not is_mirrored(StroboscopicMap(*family(float(value)), strobe.model, strobe.treatment)):
                 return False

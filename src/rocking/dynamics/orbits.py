@@ -38,27 +38,8 @@ SAME: Final = 1e-7
 _NEUTRAL: Final = 1e-9
 _NEUTRAL_PAIR: Final = 1e-6
 
-#: Points at which a period is looked at for extremes, and bisections by which these are found.
-_SCAN_POINTS: Final = 64
-_BISECTIONS: Final = 40
-
-#: Points of a figure for each period.
-_DRAWN: Final = 400
-
-
-#: Starts of a search, where none are given; periods after which every so many-th is given once more: it is then near
-#: what attracts it.
-_STARTS: Final = 1024
+#: Periods after which every so many-th start of a search is given once more: it is then near what attracts it.
 _LATER, _EVERY = 60, 8
-
-#: Newton steps of a search, and how often one that does not bring a state nearer is halved.
-_NEWTON_STEPS: Final = 40
-_HALVINGS: Final = 5
-
-#: Residual of an orbit, over the scale of its states and the size of the derivative; and the largest one: what comes
-#: back no nearer is called no orbit, however large the derivative.
-_RESIDUAL: Final = 1e-11
-_LARGEST_RESIDUAL: Final = 1e-6
 
 #: Speeds of starts: least and greatest gain over the impulse of a period, and what a block that overturns has at most.
 _LEAST_GAIN, _MOST_GAIN, _BLOCK_SPEED = 0.5, 20.0, 2.0
@@ -120,6 +101,11 @@ class PeriodicOrbit(Result):
     def response(self) -> Response:
         """One period of the orbit as a simulation, with its impacts, rests, and the state at any time."""
         return response_of(self._map, self.state, self.period)
+
+    @property
+    def _peak(self) -> float:
+        """Greatest size of the coordinate."""
+        return trajectory_of(self._map, self.state, self.period).peak
 
     @cached_property
     def _map(self) -> StroboscopicMap:
@@ -194,7 +180,7 @@ class PeriodicOrbit(Result):
 
     def _times(self) -> Floats:
         """Return times of a figure: even, with the last before and the first after every impact."""
-        even = np.linspace(0.0, self.response.duration, _DRAWN * self.period + 1)
+        even = np.linspace(0.0, self.response.duration, 400 * self.period + 1)
         at = self.response.impacts["time"]
         found: Floats = np.unique(np.concatenate([even, at, np.nextafter(at, 0.0)]))
         return found
@@ -244,7 +230,7 @@ def trajectory_of(strobe: StroboscopicMap, state: Floats, periods: int) -> Orbit
     """Extremes of the course of a body over so many periods."""
     response = response_of(strobe, state, periods)
     duration, impacts = response.duration, response.impacts
-    times = np.linspace(0.0, duration, _SCAN_POINTS * periods + 1)
+    times = np.linspace(0.0, duration, 64 * periods + 1)
     states = response.states(times)
     # A gap is least where the velocity passes zero between impacts.
     ends = np.concatenate([[0.0], impacts["time"], [duration]])
@@ -253,7 +239,7 @@ def trajectory_of(strobe: StroboscopicMap, state: Floats, periods: int) -> Orbit
     crossing = np.flatnonzero((v[1:] * v[:-1] < 0.0) & (inner[1:] == inner[:-1]))
     low, high = times[crossing], times[crossing + 1]
     rising = v[crossing] < 0.0
-    for _ in range(_BISECTIONS if len(crossing) else 0):
+    for _ in range(40 if len(crossing) else 0):
         middle = 0.5 * (low + high)
         before = (response.states(middle)[:, 1] < 0.0) == rising
         low, high = np.where(before, middle, low), np.where(before, high, middle)
@@ -394,7 +380,7 @@ class _Search:
         """States to start from: those given, or about as many as are wanted."""
         if given is not None and np.ndim(given) > 0:
             return self.strobe.checked_starts(given, "starts")
-        wanted = _STARTS if given is None else checks.whole(given, "starts", InvalidOption, least=1)
+        wanted = 1024 if given is None else checks.whole(given, "starts", InvalidOption, least=1)
         strobe, (low, high) = self.strobe, self.strobe.body.stops
         both = strobe._is_two_sided
         speed = self._fastest()
@@ -441,7 +427,7 @@ class _Search:
         return np.asarray(fine & (x >= low) & ~((x == low) & (v < 0.0)))
 
     def mapped(self, states: Floats, count: int) -> Floats:
-        """Rows of states, states after periods and the derivative, shape (n, 8); NaN where no body may be."""
+        """Rows of states, states after periods and derivatives, shape (n, 8); NaN for states that no body may have."""
         rows, fine = np.full((len(states), 8), np.nan), self._possible(states)
         after, change = self.strobe.derivative(states[fine], count)
         rows[:, :2], rows[fine, 2:4], rows[fine, 4:] = states, after, change.reshape(-1, 4)
@@ -453,20 +439,22 @@ class _Search:
         Rounding grows with the derivative, to a limit.
         """
         size = self.size(rows[:, 2:4] - rows[:, :2])
-        allowed = _RESIDUAL * np.maximum(1.0, np.max(np.abs(rows[:, 4:]), axis=1))
-        return size, size < np.minimum(allowed, _LARGEST_RESIDUAL)
+        allowed = 1e-11 * np.maximum(1.0, np.max(np.abs(rows[:, 4:]), axis=1))
+        # What comes back no nearer is called no orbit, however large the derivative.
+        return size, size < np.minimum(allowed, 1e-6)
 
     def converged(self, states: Floats, count: int) -> Floats:
         """States that come back after so many periods, to which Newton's method leads from others."""
         rows, done = self.mapped(states, count), np.zeros(len(states), dtype=bool)
-        for _ in range(_NEWTON_STEPS):
+        for _ in range(40):
             residual, sharp = self.residuals(rows)
             open_ = np.flatnonzero(~(done & sharp) & np.isfinite(residual))
             if not len(open_):
                 break
             done |= sharp  # One more step after the first that is sharp.
             new, step, better = rows[open_], _newton_step(rows[open_]), np.zeros(len(open_), dtype=bool)
-            for halving in range(_HALVINGS):
+            # A step that does not bring a state nearer is halved.
+            for halving in range(5):
                 left = np.flatnonzero(~better)
                 tried = self.mapped(rows[open_[left], :2] + 0.5**halving * step[left], count)
                 # A step that is sharp already need not come nearer: it only rounds in another way.
