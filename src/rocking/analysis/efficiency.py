@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike
 from rocking import checks
 from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.analysis.levels import (
-    REVERSED_TOO,
+    MIRROR_NOTE,
     clusters_of,
     families_of,
-    mean_one,
     motions_in_words,
+    normalised_weights,
     pooled,
     units_of,
     values_of,
@@ -117,7 +117,7 @@ def compare_measures(
     """
     many, shaken = bodies_of(blocks), several_motions(motions)
     slenderness_of(many)  # refused before the work
-    shares = mean_one(weights, len(many))
+    shares = normalised_weights(weights, len(many))
     if len(shaken) < 2:
         raise InvalidOption("measures are compared by how {} scatter: give two or more, not one", "motions")
     times = checks.positive_numbers(periods, "periods", InvalidOption)
@@ -201,7 +201,7 @@ class MeasureComparison(DatasetResult):
         if missing:
             pairs = "1 pair" if missing == 1 else f"{missing} pairs"
             text.append(f"left out: {pairs} of block and motion without overturning at any level looked at")
-        return "\n".join(text + ([f"note: {REVERSED_TOO}"] if data.sides_differ else []))
+        return "\n".join(text + ([f"note: {MIRROR_NOTE}"] if data.sides_differ else []))
 
     def to_dict(self) -> dict[str, Any]:
         data = self.data

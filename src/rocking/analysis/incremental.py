@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from rocking import checks
 from rocking.analysis.levels import (
-    REVERSED_TOO,
+    MIRROR_NOTE,
     Boundaries,
     boundaries,
     described,
@@ -248,7 +248,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         blocks = data.blocks if not many else counted(data.sizes["block"], "block")
         table = text_table([what, *(["block"] if many else []), "overturns"], rows)
         head = f"{blocks}, {data.model} model; {data.level.label} that overturns"
-        notes = [f"note: {REVERSED_TOO}"] if data.sides_differ else []
+        notes = [f"note: {MIRROR_NOTE}"] if data.sides_differ else []
         notes.append(f"note: {data.undecided}")
         notes += [f"note: {text}"] if (text := missing_text(np.isnan(data.peak_over_alpha.values))) else []
         return "\n".join([head, looked_at.summary(data.lowest_uplift), "", table, *notes])

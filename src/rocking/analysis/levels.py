@@ -84,7 +84,7 @@ def curves_of(data: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
 
 
 #: Where only motions as they are were simulated, though the sides of a block differ.
-REVERSED_TOO: Final = "the sides differ, so motions that are reversed (scaled by -1) overturn at other levels"
+MIRROR_NOTE: Final = "the sides differ, so motions that are reversed (scaled by -1) overturn at other levels"
 
 #: Two motions are one at two scales where they differ by no more than this share of their largest values.
 _ROUNDING: Final = 1e-9
@@ -95,7 +95,7 @@ BY_STATION: Final = "station"
 
 def described(blocks: Bodies | Body | Sequence[Body]) -> str:
     """Name blocks in a few words: one by its sizes or parameters, several by their number."""
-    only = only_block(blocks)
+    only = single_block(blocks)
     if only is None:
         return counted(len(bodies_of(blocks)), "block")
     if not isinstance(blocks, Blocks):
@@ -105,12 +105,12 @@ def described(blocks: Bodies | Body | Sequence[Body]) -> str:
 
 def pooled(blocks: Bodies | Body | Sequence[Body], weights: ArrayLike | None) -> str:
     """Name blocks whose outcomes are pooled, and say whether one counts more than another."""
-    if only_block(blocks) is not None:
+    if single_block(blocks) is not None:
         return described(blocks)
     return f"{described(blocks)}, {'all of equal weight' if weights is None else 'weighted'}"
 
 
-def mean_one(weights: ArrayLike | None, count: int) -> Floats:
+def normalised_weights(weights: ArrayLike | None, count: int) -> Floats:
     """Weights of blocks, one each and 1 in the mean; all 1 where none are given."""
     if weights is None:
         return np.ones(count)
@@ -123,7 +123,7 @@ def mean_one(weights: ArrayLike | None, count: int) -> Floats:
     return np.asarray(given * (count / given.sum()))
 
 
-def only_block(blocks: Bodies | Body | Sequence[Body]) -> Body | None:
+def single_block(blocks: Bodies | Body | Sequence[Body]) -> Body | None:
     """Return the block, as it was described, where there is one only."""
     if not isinstance(blocks, Sequence | Bodies):
         return blocks

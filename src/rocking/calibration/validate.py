@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from rocking import checks
 from rocking.analysis import levels as labels
-from rocking.analysis.levels import mean_one, pooled
+from rocking.analysis.levels import normalised_weights, pooled
 from rocking.arrays import Flags, Floats, Integers
 from rocking.body import Bodies, Body
 from rocking.calibration.diagnostics import Scores, log_losses
@@ -358,7 +358,7 @@ def validate(
             description, how = pooled(blocks, weights), model or "nonlinear"
             bodies = bodies_of(blocks)
             slenderness_of(bodies)  # refused before the work
-            shares = mean_one(weights, len(bodies)) / len(bodies)
+            shares = normalised_weights(weights, len(bodies)) / len(bodies)
             effective = math.inf if len(bodies) == 1 else 1.0 / float((shares**2).sum())
         fell = overturned_under(bodies, distinct, how, threads, progress)
         probabilities = chances_of(shares @ fell, effective, lapse or 0.0)[which]
