@@ -101,7 +101,7 @@ def response_rose(
     >>> import rocking
     >>> pair = tuple(rocking.records.load(f"ridgecrest-tow2-{azimuth}") for azimuth in ("090", "360"))
     >>> found = response_rose(rocking.Solid.from_mesh("statue"), [pair], azimuths=[0.0, 45.0, 90.0])
-    >>> found.overturned.values[0, 0].tolist()
+    >>> found.data.overturned.values[0, 0].tolist()
     [False, False, False]
     """
     import xarray as xr

@@ -112,7 +112,7 @@ def compare_measures(
     >>> block = rocking.Block.from_parameters(p=0.5, alpha=0.1, restitution=0.5)
     >>> pulses = [rocking.pulses.rectangular(1.0, length) for length in (0.05, 0.1, 0.2)]
     >>> found = compare_measures(block, pulses, periods=[1.0])
-    >>> [f"{name} {beta:.2f}" for name, beta in zip(found.measure.values, found.dispersion.values)]
+    >>> [f"{name} {beta:.2f}" for name, beta in zip(found.data.measure.values, found.data.dispersion.values)]
     ['PGA 0.67', 'PGV 0.02', 'SA(1 s) 0.01', 'PGA / uplift acceleration 0.67', 'p PGV / uplift acceleration 0.02']
     """
     many, shaken = bodies_of(blocks), several_motions(motions)
@@ -134,7 +134,7 @@ def compare_measures(
         many, shaken, measure="pga_ratio", model=model, tolerance=tolerance, threads=threads, progress=progress
     )
     lifting = units_of(many, Measure("pga_ratio"), model)
-    level = scaled.overturning_level.transpose("motion", "block").values
+    level = scaled.data.overturning_level.transpose("motion", "block").values
     factors = level * lifting / np.array([motion.pga for motion in shaken])[:, None]
     intensity = np.stack(
         [factors * values_of(shaken, measure)[:, None] / units_of(many, measure, model) for measure in measures]
@@ -144,11 +144,11 @@ def compare_measures(
     counted_in = np.isfinite(level[is_first])[:, shares > 0.0]
     sizes = [len(np.unique(together[is_first][overturns])) for overturns in counted_in.T]
     _check_enough(min(sizes), clusters)
-    named_motions = {name: scaled[name] for name in ("motion", "vertical") if name in scaled.coords}
+    named_motions = {name: scaled.data[name] for name in ("motion", "vertical") if name in scaled.data.coords}
     found = _dataset(measures, intensity, named_motions, shares, is_first, freedom=min(sizes) - 1)
     about = {"blocks": pooled(blocks, weights), "model": model, "damping": damping}
     about["sample"] = motions_in_words(together, clusters)
-    return MeasureComparison(found.assign_attrs(about, sides_differ=scaled.sides_differ))
+    return MeasureComparison(found.assign_attrs(about, sides_differ=scaled.data.sides_differ))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -113,7 +113,7 @@ def incremental_dynamic_analysis(
     >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     >>> pulse = rocking.pulses.one_sine(1.0, 5.0 / np.pi)
     >>> result = incremental_dynamic_analysis(block, pulse, measure="pga_ratio")
-    >>> for start, end in zip(result.band_start.values, result.band_end.values):
+    >>> for start, end in zip(result.data.band_start.values, result.data.band_end.values):
     ...     print(f"overturns from {start:.4f} to {end:.4f}")
     overturns from 2.9855 to 6.5019
     overturns from 7.2759 to nan

@@ -143,9 +143,9 @@ def overturning_map(
     >>> import rocking
     >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     >>> result = overturning_map(block, "half-sine", amplitudes=[0.5, 1.5, 2.5], frequencies=[2.0], model="linear")
-    >>> [mode_name(mode) for mode in result.mode.values[:, 0]]
+    >>> [mode_name(mode) for mode in result.data.mode.values[:, 0]]
     ['no uplift', 'rocks until the pulse is over', 'overturns without impact']
-    >>> print(f"{float(result.overturning_amplitude[0]):.7f}")
+    >>> print(f"{float(result.data.overturning_amplitude[0]):.7f}")
     1.8007239
     """
     levels = checks.increasing_numbers(amplitudes, "amplitudes", InvalidOption)

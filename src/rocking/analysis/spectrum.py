@@ -113,9 +113,9 @@ def rocking_spectrum(
     >>> motions = [rocking.pulses.one_sine(5.0, f) for f in (0.5, 1.0, 2.0)]
     >>> blocks = rocking.Blocks.grid(p=[1.0, 2.0, 4.0], alpha=[0.2], restitution=[0.9])
     >>> spectrum = rocking_spectrum(blocks, motions)
-    >>> spectrum.overturned.sum("motion").values.ravel().tolist()
+    >>> spectrum.data.overturned.sum("motion").values.ravel().tolist()
     [1, 2, 3]
-    >>> spectrum.fractile_over_alpha.sel(fractile=0.5).values.ravel().round(3).tolist()
+    >>> spectrum.data.fractile_over_alpha.sel(fractile=0.5).values.ravel().round(3).tolist()
     [0.367, inf, inf]
     """
     shares = _shares(fractiles)

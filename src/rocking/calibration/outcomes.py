@@ -281,7 +281,7 @@ class Calibration(DrawnResult, TableResult):
         >>> import rocking
         >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (2.0, 3.0, 4.0, 5.0)]
         >>> found = rocking.calibrate(pulses, [0, 0, 1, 1], p=2.0, restitution=0.9, two_sided=False, candidates=128)
-        >>> found.spectrum(pulses, p=[1.0, 2.0]).sizes["p"]
+        >>> found.spectrum(pulses, p=[1.0, 2.0]).data.sizes["p"]
         2
         """
         return rocking_spectrum(self.blocks, motions, weights=self.weights, model=model or self.model, **options)
