@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +21,7 @@ from rocking.errors import InvalidOption, Message
 from rocking.motion.description import Origin, labelled
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
+from rocking.plausibility import is_multiple
 from rocking.problem import bodies_of
 from rocking.progress import Progress, note
 from rocking.response import COUNT, RELATIVE, factors_near, percent
@@ -85,9 +86,6 @@ def curves_of(data: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
 
 #: Where only motions as they are were simulated, though the sides of a block differ.
 MIRROR_NOTE: Final = "the sides differ, so motions that are reversed (scaled by -1) overturn at other levels"
-
-#: Two motions are one at two scales where they differ by no more than this share of their largest values.
-_ROUNDING: Final = 1e-9
 
 #: What stands for labels of motions that are their stations.
 BY_STATION: Final = "station"
@@ -176,43 +174,20 @@ def families_of(motions: Sequence[Motion], *, reversed_too: bool = True) -> Inte
 
     ``reversed_too``: by factors of either sign; else by positive ones alone.
     """
-    shapes = [_shape_of(motion) for motion in motions]
     # None of these changes with the scale or the sign: only motions that are alike in all are compared in full.
-    alike = np.array([(np.abs(one.values).mean(), np.sqrt((one.values**2).mean())) for one in shapes])
+    alike = np.empty((len(motions), 2))
+    for k, motion in enumerate(motions):
+        size = np.abs(np.concatenate([part.coefficients.ravel() for part in (motion, motion.vertical) if part]))
+        alike[k] = (size / size.max()).mean(), np.sqrt(((size / size.max()) ** 2).mean())
     firsts: list[int] = []
     families = np.empty(len(motions), dtype=np.int64)
-    for k, shape in enumerate(shapes):
-        near = np.flatnonzero(np.all(np.abs(alike[firsts] - alike[k]) <= _ROUNDING, axis=1))
-        same = (int(j) for j in near if _is_multiple(shapes[firsts[j]], shape, reversed_too=reversed_too))
+    for k, motion in enumerate(motions):
+        near = np.flatnonzero(np.all(np.abs(alike[firsts] - alike[k]) <= 1e-9, axis=1))
+        same = (int(j) for j in near if is_multiple(motions[firsts[j]], motion, reversed_too=reversed_too))
         families[k] = next(same, len(firsts))
         if families[k] == len(firsts):
             firsts.append(k)
     return families
-
-
-class _Shape(NamedTuple):
-    """Breakpoints of a motion and its vertical component, and their coefficients over the largest."""
-
-    times: Floats
-    values: Floats
-    horizontal: int
-
-
-def _shape_of(motion: Motion) -> _Shape:
-    parts = [part for part in (motion, motion.vertical) if part is not None]
-    values = np.concatenate([part.coefficients.ravel() for part in parts])
-    times = np.concatenate([part.breakpoints for part in parts])
-    return _Shape(times, values / np.abs(values).max(), motion.coefficients.size)
-
-
-def _is_multiple(first: _Shape, other: _Shape, *, reversed_too: bool) -> bool:
-    """Whether scaling makes one of the other; a negative factor reverses the horizontal component alone."""
-    sizes = [(one.times.size, one.values.size, one.horizontal) for one in (first, other)]
-    if sizes[0] != sizes[1] or not np.allclose(first.times, other.times, rtol=_ROUNDING, atol=0.0):
-        return False
-    signs = np.where(np.arange(first.values.size) < first.horizontal, -1.0, 1.0)
-    turned = [first.values, signs * first.values] if reversed_too else [first.values]
-    return any(bool(np.abs(other.values - values).max() <= _ROUNDING) for values in turned)
 
 
 def units_of(blocks: Bodies, measure: Measure, model: Model) -> Floats:

@@ -460,7 +460,6 @@ def calibrate(
     >>> found = rocking.calibrate(motions, overturned, model="linear", candidates=512, two_sided=False)
     >>> bool(np.mean((found.predict(motions) > 0.5) == overturned) > 0.9)
     True
-
     """
     tested = several_motions(motions)
     observed = checked_outcomes(overturned, len(tested))

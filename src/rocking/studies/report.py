@@ -503,7 +503,6 @@ class FragilityPlan:
         A curve for each block, or one for all.
     confidence : float
         Probability of the intervals.
-
     """
 
     measure: IntensityName = "pga"
@@ -535,7 +534,6 @@ class SpectrumPlan:
     ----------
     fractiles : sequence of float
         Shares of the motions, in (0, 1), that stay below.
-
     """
 
     fractiles: Sequence[float] = FRACTILES
