@@ -89,15 +89,13 @@ def compare_measures(
 
     Notes
     -----
-    Every motion is scaled up, in steps of 5 %, until it overturns the block (`incremental_dynamic_analysis`; between
-    the steps a lower level may do so, too). The logarithm of its intensity there, ln x, has the standard deviation beta
-    over the motions: the dispersion of the fragility that is the distribution of x, and the less, the more efficient
-    the measure. The interval of beta is that of a normal sample. Over several blocks beta is pooled from the deviations
-    from each block's own mean; a measure that is to serve them all must also have a small deviation from one mean. Both
-    have the same degrees of freedom, those of the motions: blocks share these, so that more blocks are no larger
-    sample. Of motions that are multiples of one another the first counts, since all of them overturn a block at one
-    intensity; where the sides of a block differ, reversed ones count as well. Motions of one cluster may do almost the
-    same: the intervals then have the degrees of freedom of the clusters.
+    Every motion is scaled up, in steps of 5 %, until it overturns the block (`incremental_dynamic_analysis`). The
+    logarithm of its intensity there has the standard deviation beta over the motions, the dispersion of the fragility:
+    the smaller, the more efficient the measure. The interval of beta is that of a normal sample. Over several blocks
+    beta is pooled from the deviations from each block's own mean; a measure that serves them all also has a small
+    deviation from one mean. Blocks share the motions, so that the degrees of freedom are those of the motions, or of
+    the clusters if these are given. Of motions that are multiples of one another only the first counts; where the sides
+    of a block differ, reversed ones count as well.
 
     References
     ----------

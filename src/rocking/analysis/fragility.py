@@ -435,9 +435,7 @@ def fragility(
     limits : mapping of str to float
         Limit states: peak rotation over slenderness (of the block as it stands, the smaller one of two sides) that is
         exceeded; ``math.inf`` stands for overturning, the default.
-    model : {"nonlinear", "linear"}
-        Equation of motion.
-    chattering : str or Treatment
+    model, chattering : optional
         As for `simulate`.
     polarity : {"+", "-", "both"}
         Motions as they are, reversed, or both. With both each motion counts twice, unless all blocks are symmetric:

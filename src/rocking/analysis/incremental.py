@@ -96,9 +96,9 @@ def incremental_dynamic_analysis(
 
     Notes
     -----
-    Ends of bands are found by bisection between neighbouring levels whose verdicts differ; what lies between two levels
-    with the same verdict is not seen. Under records a finer search may find thinner bands beside those that were found.
-    The lowest level that is found then depends on the resolution of the search, and is not a safety margin by itself.
+    Ends of bands are found by bisection between neighbouring levels whose outcomes differ. Bands between two levels
+    with the same outcome are not found: under records a finer search may find thinner bands, so that the lowest level
+    depends on the resolution of the search, and is not a safety margin by itself.
 
     References
     ----------

@@ -74,9 +74,7 @@ def rocking_spectrum(
         How much each block of an ensemble counts; by default all alike.
     fractiles : sequence of float
         Shares, in (0, 1), of motions (and of the ensemble's weight) that stay below the fractile curves.
-    model : {"nonlinear", "linear"}
-        Equation of motion.
-    chattering : str or Treatment
+    model, chattering : optional
         As for `simulate`.
     threads, progress : optional
         As for `simulate_many`.

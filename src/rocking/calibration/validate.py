@@ -293,16 +293,11 @@ def validate(
 
     Notes
     -----
-    The share of n blocks that overturn is itself uncertain; the probability is its mean by Jeffreys' prior, as in
-    `Calibration.predict`, where one block is not taken as known. Outcomes are scored by the Brier score and the
-    logarithmic one (Gneiting and Raftery 2007).
-
+    The share of n blocks that overturn is itself uncertain; the probability is its mean by Jeffreys' prior, unless one
+    block is taken as known. Outcomes are scored by the Brier score and the logarithmic one (Gneiting and Raftery 2007).
     Standard errors are those of the jackknife that leaves out clusters: tests of one group, else of one motion. The
-    base rate that skill is against comes from the same tests, which favours it.
-
-    A consistency band holds the central 90 % of the shares in simulations from the predictions themselves (Broecker and
-    Smith 2007), here with these predictions and not with others drawn from them. The chance of reliability comes from
-    the same simulations.
+    base rate of the skill comes from the same tests, which favours it. Consistency bands (Broecker and Smith 2007) and
+    the chance of reliability are of simulations with these predictions.
 
     References
     ----------
