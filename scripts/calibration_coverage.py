@@ -79,7 +79,7 @@ def drawn(count: int, two_sided: bool) -> Iterator[DataSet]:
     """Draw so many truths, and pass over those whose outcomes are all the same."""
     space = Space.of(**BOUNDS, two_sided=two_sided)
     rng = np.random.default_rng(two_sided)
-    truths = population.with_dispersions(space, space.spread_evenly(count, rng), rng)
+    truths = population.with_dispersions(space, space.quasi_random(count, rng), rng)
     for seed, truth in enumerate(truths[:, None]):
         motions = tests(rng)
         overturned = outcomes(space, truth, motions, rng)

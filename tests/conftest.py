@@ -94,7 +94,7 @@ def coarsely() -> Callable[[], AbstractContextManager[None]]:
     @contextmanager
     def shortened() -> Iterator[None]:
         with pytest.MonkeyPatch.context() as patched:
-            patched.setattr(search, "_GUIDING", (64, 1))
+            patched.setattr(search, "_PROPOSAL", (64, 1))
             patched.setattr(search, "_COMPARED", (64, 2))
             patched.setattr(search, "_EXPONENTS", (0.1, 1.0))
             patched.setattr(search, "_MORE", 0)

@@ -78,7 +78,7 @@ def unseen():
 
 def test_two_sides_by_housners_rule_are_those_of_one_rectangle():
     space = Space.of((1.0, 8.0), (0.05, 0.5), "housner", two_sided=True)
-    points = space.spread_evenly(200, np.random.default_rng(3))
+    points = space.quasi_random(200, np.random.default_rng(3))
     blocks, named = space.blocks(points), space.named(points)
     compared = 0
     for k, block in enumerate(blocks):
@@ -95,7 +95,7 @@ def test_two_sides_by_housners_rule_are_those_of_one_rectangle():
     assert compared > 150
     np.testing.assert_allclose(rocking.Blocks(blocks.p, blocks.alpha).restitution, blocks.restitution, rtol=1e-6)
     symmetric = Space.of(2.0, (0.05, 0.5), "housner", two_sided=False)
-    assert set(symmetric.blocks(symmetric.spread_evenly(20, np.random.default_rng(3))).p.ravel()) == {2.0}
+    assert set(symmetric.blocks(symmetric.quasi_random(20, np.random.default_rng(3))).p.ravel()) == {2.0}
 
 
 def test_what_a_hidden_block_will_do_is_predicted(found, unseen):
@@ -270,7 +270,7 @@ def test_a_mistaken_division_is_refused(found, change, word):
 def test_even_points_fill_the_space_evenly():
     space = Space.of((1.0, 4.0), (0.1, 0.2), (0.5, 1.0), two_sided=True)
     rng = np.random.default_rng(0)
-    points = space.spread_evenly(4096, rng)
+    points = space.quasi_random(4096, rng)
     low, high = space.box
     independent = low + rng.random((200_000, 4)) * (high - low)
     inside = independent[space.contains(independent)]
@@ -300,7 +300,7 @@ def threshold_evidence():
     """Symmetric blocks that overturn where alpha is below a threshold, one threshold for each of 40 tests."""
     space = Space.of((1.0, 2.0), (0.05, 0.5), (0.5, 0.9), two_sided=False)
     rng = np.random.default_rng(3)
-    points = space.spread_evenly(4096, rng)
+    points = space.quasi_random(4096, rng)
     thresholds = np.log(np.geomspace(0.08, 0.35, 40))
     fallen = (points[:, 1:2] < thresholds).astype(np.float32)
     observed = np.log(0.17) + 0.1 * rng.standard_normal(40) < thresholds
@@ -321,7 +321,7 @@ def test_the_posterior_is_that_of_brute_force(threshold_evidence):
     drawn = posterior(evidence, 512, 4, np.random.default_rng(0))
     rng = np.random.default_rng(1)
     space = evidence.candidates.space
-    prior = population.with_dispersions(space, space.spread_evenly(8000, rng), rng)
+    prior = population.with_dispersions(space, space.quasi_random(8000, rng), rng)
     likelihood = np.exp(evidence.log_likelihoods(prior))
     weights = likelihood / likelihood.sum()
     mean = weights @ prior
@@ -344,7 +344,7 @@ def test_the_posterior_is_that_of_brute_force(threshold_evidence):
 def test_a_search_goes_on_while_few_candidates_speak_for_what_it_found(
     threshold_evidence, monkeypatch, candidates, goes_on, populations
 ):
-    monkeypatch.setattr(searching, "_GUIDING", (populations, 2))
+    monkeypatch.setattr(searching, "_PROPOSAL", (populations, 2))
     monkeypatch.setattr(searching, "_COMPARED", (populations, 4))
     evidence, thresholds = threshold_evidence
     space = evidence.candidates.space

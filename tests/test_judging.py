@@ -153,8 +153,8 @@ def test_a_known_block_is_certain_and_a_lapse_is_not():
     assert [test.probability for test in found.tests] == [1.0, 0.0] and math.isinf(found.log_loss.value)
     assert any("a certainty failed" in note for note in found.notes)
     assert any("no test overturned" in note for note in found.notes) and math.isnan(found.brier.skill)
-    blurred = rocking.validate(tests, BLOCK, lapse=0.01)
-    assert [test.probability for test in blurred.tests] == pytest.approx([0.99, 0.01])
+    with_outliers = rocking.validate(tests, BLOCK, lapse=0.01)
+    assert [test.probability for test in with_outliers.tests] == pytest.approx([0.99, 0.01])
     assert "all tests overturned" in rocking.validate([ShakeTest(STRONG, True)], BLOCK).summary()
 
 
@@ -248,7 +248,7 @@ def test_a_table_of_tests_is_read_with_its_units_and_labels(tmp_path):
     [
         ("motion,fell\nx,1", 1, "the columns must be motion and overturned"),
         ("motion,overturned,specimen\nridgecrest-clc-090,1,a\nridgecrest-clc-090,1,b", 1, "of 2 specimens: give each"),
-        ("motion,overturned,overturned\nx,1,1", 1, "each once"),
+        ("motion,overturned,overturned\nx,1,1", 1, "must be there once"),
         ("motion,overturned\nno-such-file.txt,1", 2, "no-such-file.txt"),
         ("motion,overturned\n,1", 2, "this is a folder; name one record file"),
         ("motion,overturned\nridgecrest-clc-090,perhaps", 2, "'perhaps' is not 0 or 1"),

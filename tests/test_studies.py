@@ -627,7 +627,7 @@ def test_a_vertical_component_is_part_of_a_study(tmp_path):
 
 def test_what_would_be_ignored_of_a_study_that_is_there_is_refused(tmp_path):
     rocking.study(tmp_path / "one", BLOCKS, MOTIONS, levels=[0.5, 1.0], unit_blocks=512)
-    with pytest.raises(rocking.errors.InvalidOption, match="levels, measure belong to blocks and motions"):
+    with pytest.raises(rocking.errors.InvalidOption, match="measure, levels belong to blocks and motions"):
         rocking.study(tmp_path / "one", levels=[1.0], measure="pga")
     for given in ({"model": "linear"}, {"chattering": "velocity"}, {"measure": "pga"}, {"polarity": "both"}):
         with pytest.raises(rocking.errors.InvalidOption, match=f"{next(iter(given))} belongs to blocks and motions"):

@@ -90,7 +90,7 @@ def vertical_notes(motion: Motion) -> tuple[str, ...]:
     vertical = motion.vertical
     if vertical is None:
         return ()
-    if _is_multiple(motion, vertical):
+    if is_multiple(motion.with_vertical(None), vertical):
         return ("the vertical motion is the horizontal one itself: name its own channel or file",)
     notes = [f"the vertical motion: {sentence}" for sentence in reading_notes(vertical)]
     direction = _origin(vertical).channel
@@ -299,15 +299,22 @@ def _timing_notes(motion: Motion, vertical: Motion) -> Iterator[str]:
         )
 
 
-def _is_multiple(motion: Motion, other: Motion) -> bool:
-    """Whether one motion is a multiple of the other one."""
-    if not np.array_equal(motion.breakpoints, other.breakpoints):
+def is_multiple(motion: Motion, other: Motion, *, reversed_too: bool = True) -> bool:
+    """Whether scaling makes one motion of the other, but for rounding; a negative factor leaves the vertical as it is.
+
+    ``reversed_too``: by factors of either sign; else by positive ones alone.
+    """
+    parts = [[part for part in (one, one.vertical) if part is not None] for one in (motion, other)]
+    if [part.coefficients.shape for part in parts[0]] != [part.coefficients.shape for part in parts[1]]:
         return False
-    one, two = motion.coefficients[:, 0], other.coefficients[:, 0]
-    at = int(np.argmax(np.abs(one)))
-    if one[at] == 0.0 or two[at] == 0.0:
+    times, others_times = (np.concatenate([part.breakpoints for part in each]) for each in parts)
+    values, others = (np.concatenate([part.coefficients.ravel() for part in each]) for each in parts)
+    largest, others_largest = np.abs(values).max(), np.abs(others).max()
+    if not largest > 0.0 < others_largest or not np.allclose(times, others_times, rtol=1e-9, atol=0.0):
         return False
-    return bool(np.allclose(two, two[at] / one[at] * one, rtol=0.0, atol=1e-6 * abs(two[at])))
+    signs = np.where(np.arange(values.size) < motion.coefficients.size, -1.0, 1.0)
+    apart = [others / others_largest - way * values / largest for way in ([1.0, signs] if reversed_too else [1.0])]
+    return any(bool(np.abs(each).max() <= 1e-9) for each in apart)
 
 
 def _origin(motion: Motion) -> Origin:

@@ -16,7 +16,7 @@ import numpy as np
 
 from rocking import checks
 from rocking.analysis.incremental import incremental_dynamic_analysis
-from rocking.analysis.levels import REVERSED_TOO, values_of
+from rocking.analysis.levels import MIRROR_NOTE, values_of
 from rocking.analysis.survey import BlockUnderRecords, motion_of
 from rocking.arrays import Floats
 from rocking.block import Block, Blocks, one_block
@@ -451,7 +451,7 @@ class Check(BlockUnderRecords):
         return super().to_dict() | {"notes": self._notes()}
 
     def _notes(self) -> list[str]:
-        return [] if self.block.alone().is_symmetric else [REVERSED_TOO]
+        return [] if self.block.alone().is_symmetric else [MIRROR_NOTE]
 
     def _headline(self) -> str:
         return f"{super()._headline()}; by {', '.join(self.ratios[0]) or 'no rule'}"

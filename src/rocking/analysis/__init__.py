@@ -1,4 +1,4 @@
-"""What engineers ask of many simulations: spectra, overturning maps, scaling, fragility, calibration, rules."""
+"""What engineers ask of many simulations: spectra, overturning maps, scaling, fragility, risk, rules."""
 
 import lazy_loader
 

@@ -70,9 +70,7 @@ def response_rose(
         Azimuths of the first and the second component of every pair; by default as their records say.
     restitution : float or pair, optional
         As for `Solid.block`.
-    model : {"nonlinear", "linear"}
-        Equation of motion.
-    chattering : str or Treatment
+    model, chattering : optional
         As for `simulate`.
     threads, progress : optional
         As for `simulate_many`.

@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike
 from rocking import checks
 from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.analysis.levels import (
-    REVERSED_TOO,
+    MIRROR_NOTE,
     clusters_of,
     families_of,
-    mean_one,
     motions_in_words,
+    normalised_weights,
     pooled,
     units_of,
     values_of,
@@ -89,15 +89,13 @@ def compare_measures(
 
     Notes
     -----
-    Every motion is scaled up, in steps of 5 %, until it overturns the block (`incremental_dynamic_analysis`; between
-    the steps a lower level may do so, too). The logarithm of its intensity there, ln x, has the standard deviation beta
-    over the motions: the dispersion of the fragility that is the distribution of x, and the less, the more efficient
-    the measure. The interval of beta is that of a normal sample. Over several blocks beta is pooled from the deviations
-    from each block's own mean; a measure that is to serve them all must also have a small deviation from one mean. Both
-    have the same degrees of freedom, those of the motions: blocks share these, so that more blocks are no larger
-    sample. Of motions that are multiples of one another the first counts, since all of them overturn a block at one
-    intensity; where the sides of a block differ, reversed ones count as well. Motions of one cluster may do almost the
-    same: the intervals then have the degrees of freedom of the clusters.
+    Every motion is scaled up, in steps of 5 %, until it overturns the block (`incremental_dynamic_analysis`). The
+    logarithm of its intensity there has the standard deviation beta over the motions, the dispersion of the fragility:
+    the smaller, the more efficient the measure. The interval of beta is that of a normal sample. Over several blocks
+    beta is pooled from the deviations from each block's own mean; a measure that serves them all also has a small
+    deviation from one mean. Blocks share the motions, so that the degrees of freedom are those of the motions, or of
+    the clusters if these are given. Of motions that are multiples of one another only the first counts; where the sides
+    of a block differ, reversed ones count as well.
 
     References
     ----------
@@ -117,7 +115,7 @@ def compare_measures(
     """
     many, shaken = bodies_of(blocks), several_motions(motions)
     slenderness_of(many)  # refused before the work
-    shares = mean_one(weights, len(many))
+    shares = normalised_weights(weights, len(many))
     if len(shaken) < 2:
         raise InvalidOption("measures are compared by how {} scatter: give two or more, not one", "motions")
     times = checks.positive_numbers(periods, "periods", InvalidOption)
@@ -201,7 +199,7 @@ class MeasureComparison(DatasetResult):
         if missing:
             pairs = "1 pair" if missing == 1 else f"{missing} pairs"
             text.append(f"left out: {pairs} of block and motion without overturning at any level looked at")
-        return "\n".join(text + ([f"note: {REVERSED_TOO}"] if data.sides_differ else []))
+        return "\n".join(text + ([f"note: {MIRROR_NOTE}"] if data.sides_differ else []))
 
     def to_dict(self) -> dict[str, Any]:
         data = self.data

@@ -18,12 +18,12 @@ from rocking.analysis.hazard import HazardCurve
 from rocking.analysis.levels import (
     clusters_of,
     groups_of,
-    mean_one,
     motions_in_words,
-    only_block,
+    normalised_weights,
     pooled,
     ratios_of,
     simulate_levels,
+    single_block,
     undecided_text,
     units_of,
     values_of,
@@ -218,11 +218,6 @@ class Fragility(Result):
         Risk
             Rate, return period and probability in a number of years, for each limit state.
 
-        Raises
-        ------
-        InvalidOption
-            If the two are not of one intensity measure.
-
         Notes
         -----
         The integral of rate(x) dP(x) over all intensities x, in closed form: a lognormal against a power of x on each
@@ -264,11 +259,6 @@ class Fragility(Result):
         -------
         Survival
             Intensity that was most likely never reached, largest annual rates, and the probability of surviving.
-
-        Raises
-        ------
-        InvalidOption
-            If an argument is out of its range, there is no such limit state, or the hazard curve is of another measure.
 
         Examples
         --------
@@ -441,9 +431,7 @@ def fragility(
     limits : mapping of str to float
         Limit states: peak rotation over slenderness (of the block as it stands, the smaller one of two sides) that is
         exceeded; ``math.inf`` stands for overturning, the default.
-    model : {"nonlinear", "linear"}
-        Equation of motion.
-    chattering : str or Treatment
+    model, chattering : optional
         As for `simulate`.
     polarity : {"+", "-", "both"}
         Motions as they are, reversed, or both. With both each motion counts twice, unless all blocks are symmetric:
@@ -530,7 +518,7 @@ def fragility(
         curves=tuple(curves),
         measure=how,
         description=text + of_polarities(polarity, is_symmetric=many.is_symmetric),
-        block=only_block(blocks),
+        block=single_block(blocks),
         model=model,
         outcomes=outcomes,
         one_way=polarity != "both" and not many.is_symmetric,
@@ -544,7 +532,7 @@ def fragility(
 
 def weights_of(weights: ArrayLike | None, count: int) -> Floats:
     """Weights of blocks, 1 in the mean of those that have any: outcomes are as many as without the others."""
-    shares = mean_one(weights, count)
+    shares = normalised_weights(weights, count)
     return np.asarray(shares / shares[shares > 0.0].mean())
 
 

@@ -170,11 +170,6 @@ class HazardCurve(Result):
             Rates (1/year), shaped like the intensities: below the first and above the last point of the curve those of
             its extended lines, which are infinite at 0.
 
-        Raises
-        ------
-        InvalidOption
-            If an intensity is no number, or negative.
-
         Examples
         --------
         >>> float(HazardCurve([1.0, 2.0], [1e-2, 2.5e-3]).rate_of(4.0))
@@ -361,8 +356,8 @@ def _ends(hazard: HazardCurve) -> tuple[Floats, Floats]:
     return corners[:-1], corners[1:]
 
 
-def _log_total(fitted: Probit, hazard: HazardCurve) -> float:
-    return float(np.logaddexp.reduce(log_parts(fitted, hazard)[0]))
+def _log_total(fitted: Probit, hazard: HazardCurve, until: float = math.inf) -> float:
+    return float(np.logaddexp.reduce(log_parts(fitted, hazard, until)[0]))
 
 
 def _log_seen(fitted: Probit, hazard: HazardCurve, log_at: Floats) -> tuple[Floats, Floats]:
@@ -403,18 +398,17 @@ def quantile_intensities(fitted: Probit, hazard: HazardCurve) -> tuple[float, fl
         return 0.0, 0.0, 0.0
 
     def excess(log_at: float, share: float) -> float:
-        cumulative = np.logaddexp.reduce(log_parts(fitted, hazard, log_at)[0])
         product = _log_seen(fitted, hazard, np.array([log_at]))[0][0]
-        return float(np.exp(cumulative - total) - np.exp(product - total)) - share
+        return float(np.exp(_log_total(fitted, hazard, log_at) - total) - np.exp(product - total)) - share
 
     def found(share: float) -> float:
         # What comes from above x is at most rate(x): where that is what remains of the whole rate, x is high enough.
         left = total + math.log1p(-share)
         segment = np.searchsorted(-np.log(hazard.rate[1:-1]), -left)
-        high, step = float((log_c[segment] - left) / k[segment]), 1.0
-        low, step = high, 1.0
+        low = high = float((log_c[segment] - left) / k[segment])
+        step = 1.0
         while excess(high, share) < 0.0:  # by rounding
-            high, step = high + step, 2.0 * step
+            high += 1.0
         while excess(low, share) > 0.0:
             low, step = low - step, 2.0 * step
         return float(np.exp(brentq(excess, low, high, args=(share,), xtol=1e-13)))

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from rocking import checks
 from rocking.analysis.levels import (
-    REVERSED_TOO,
+    MIRROR_NOTE,
     Boundaries,
     boundaries,
     described,
@@ -96,9 +96,9 @@ def incremental_dynamic_analysis(
 
     Notes
     -----
-    Ends of bands are found by bisection between neighbouring levels whose verdicts differ; what lies between two levels
-    with the same verdict is not seen. Under records a finer search may find thinner bands beside those that were found.
-    The lowest level that is found then depends on the resolution of the search, and is not a safety margin by itself.
+    Ends of bands are found by bisection between neighbouring levels whose outcomes differ. Bands between two levels
+    with the same outcome are not found: under records a finer search may find thinner bands, so that the lowest level
+    depends on the resolution of the search, and is not a safety margin by itself.
 
     References
     ----------
@@ -248,7 +248,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         blocks = data.blocks if not many else counted(data.sizes["block"], "block")
         table = text_table([what, *(["block"] if many else []), "overturns"], rows)
         head = f"{blocks}, {data.model} model; {data.level.label} that overturns"
-        notes = [f"note: {REVERSED_TOO}"] if data.sides_differ else []
+        notes = [f"note: {MIRROR_NOTE}"] if data.sides_differ else []
         notes.append(f"note: {data.undecided}")
         notes += [f"note: {text}"] if (text := missing_text(np.isnan(data.peak_over_alpha.values))) else []
         return "\n".join([head, looked_at.summary(data.lowest_uplift), "", table, *notes])

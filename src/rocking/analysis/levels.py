@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +21,7 @@ from rocking.errors import InvalidOption, Message
 from rocking.motion.description import Origin, labelled
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
+from rocking.plausibility import is_multiple
 from rocking.problem import bodies_of
 from rocking.progress import Progress, note
 from rocking.response import COUNT, RELATIVE, factors_near, percent
@@ -84,10 +85,7 @@ def curves_of(data: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
 
 
 #: Where only motions as they are were simulated, though the sides of a block differ.
-REVERSED_TOO: Final = "the sides differ, so motions that are reversed (scaled by -1) overturn at other levels"
-
-#: Two motions are one at two scales where they differ by no more than this share of their largest values.
-_ROUNDING: Final = 1e-9
+MIRROR_NOTE: Final = "the sides differ, so motions that are reversed (scaled by -1) overturn at other levels"
 
 #: What stands for labels of motions that are their stations.
 BY_STATION: Final = "station"
@@ -95,7 +93,7 @@ BY_STATION: Final = "station"
 
 def described(blocks: Bodies | Body | Sequence[Body]) -> str:
     """Name blocks in a few words: one by its sizes or parameters, several by their number."""
-    only = only_block(blocks)
+    only = single_block(blocks)
     if only is None:
         return counted(len(bodies_of(blocks)), "block")
     if not isinstance(blocks, Blocks) or blocks.terms:
@@ -105,12 +103,12 @@ def described(blocks: Bodies | Body | Sequence[Body]) -> str:
 
 def pooled(blocks: Bodies | Body | Sequence[Body], weights: ArrayLike | None) -> str:
     """Name blocks whose outcomes are pooled, and say whether one counts more than another."""
-    if only_block(blocks) is not None:
+    if single_block(blocks) is not None:
         return described(blocks)
     return f"{described(blocks)}, {'all of equal weight' if weights is None else 'weighted'}"
 
 
-def mean_one(weights: ArrayLike | None, count: int) -> Floats:
+def normalised_weights(weights: ArrayLike | None, count: int) -> Floats:
     """Weights of blocks, one each and 1 in the mean; all 1 where none are given."""
     if weights is None:
         return np.ones(count)
@@ -123,7 +121,7 @@ def mean_one(weights: ArrayLike | None, count: int) -> Floats:
     return np.asarray(given * (count / given.sum()))
 
 
-def only_block(blocks: Bodies | Body | Sequence[Body]) -> Body | None:
+def single_block(blocks: Bodies | Body | Sequence[Body]) -> Body | None:
     """Return the block, as it was described, where there is one only."""
     if not isinstance(blocks, Sequence | Bodies):
         return blocks
@@ -176,43 +174,20 @@ def families_of(motions: Sequence[Motion], *, reversed_too: bool = True) -> Inte
 
     ``reversed_too``: by factors of either sign; else by positive ones alone.
     """
-    shapes = [_shape_of(motion) for motion in motions]
     # None of these changes with the scale or the sign: only motions that are alike in all are compared in full.
-    alike = np.array([(np.abs(one.values).mean(), np.sqrt((one.values**2).mean())) for one in shapes])
+    alike = np.empty((len(motions), 2))
+    for k, motion in enumerate(motions):
+        size = np.abs(np.concatenate([part.coefficients.ravel() for part in (motion, motion.vertical) if part]))
+        alike[k] = (size / size.max()).mean(), np.sqrt(((size / size.max()) ** 2).mean())
     firsts: list[int] = []
     families = np.empty(len(motions), dtype=np.int64)
-    for k, shape in enumerate(shapes):
-        near = np.flatnonzero(np.all(np.abs(alike[firsts] - alike[k]) <= _ROUNDING, axis=1))
-        same = (int(j) for j in near if _is_multiple(shapes[firsts[j]], shape, reversed_too=reversed_too))
+    for k, motion in enumerate(motions):
+        near = np.flatnonzero(np.all(np.abs(alike[firsts] - alike[k]) <= 1e-9, axis=1))
+        same = (int(j) for j in near if is_multiple(motions[firsts[j]], motion, reversed_too=reversed_too))
         families[k] = next(same, len(firsts))
         if families[k] == len(firsts):
             firsts.append(k)
     return families
-
-
-class _Shape(NamedTuple):
-    """Breakpoints of a motion and its vertical component, and their coefficients over the largest."""
-
-    times: Floats
-    values: Floats
-    horizontal: int
-
-
-def _shape_of(motion: Motion) -> _Shape:
-    parts = [part for part in (motion, motion.vertical) if part is not None]
-    values = np.concatenate([part.coefficients.ravel() for part in parts])
-    times = np.concatenate([part.breakpoints for part in parts])
-    return _Shape(times, values / np.abs(values).max(), motion.coefficients.size)
-
-
-def _is_multiple(first: _Shape, other: _Shape, *, reversed_too: bool) -> bool:
-    """Whether scaling makes one of the other; a negative factor reverses the horizontal component alone."""
-    sizes = [(one.times.size, one.values.size, one.horizontal) for one in (first, other)]
-    if sizes[0] != sizes[1] or not np.allclose(first.times, other.times, rtol=_ROUNDING, atol=0.0):
-        return False
-    signs = np.where(np.arange(first.values.size) < first.horizontal, -1.0, 1.0)
-    turned = [first.values, signs * first.values] if reversed_too else [first.values]
-    return any(bool(np.abs(other.values - values).max() <= _ROUNDING) for values in turned)
 
 
 def units_of(blocks: Bodies, measure: Measure, model: Model) -> Floats:

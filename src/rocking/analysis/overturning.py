@@ -127,9 +127,8 @@ def overturning_map(
     Notes
     -----
     By dimensional analysis one pulse of one frequency is enough: blocks of different p stand for the frequencies. Every
-    change of mode between neighbouring amplitudes of the grid is found by bisection, so a region that is not monotone
-    (overturning after one impact, safety above it, overturning without impact above that) keeps all its edges. What
-    lies between two neighbouring amplitudes of the same mode is not seen.
+    change of mode between neighbouring amplitudes of the grid is found by bisection. Changes between two neighbouring
+    amplitudes of the same mode are not found.
 
     References
     ----------
@@ -235,10 +234,7 @@ class OverturningMap(DatasetResult):
         overturning_amplitude, the lowest that overturns the block; NaN where none of the grid does, or its first
         already does. Over (boundary): boundary_frequency, boundary_amplitude, and the modes below and above it.
 
-        A mode is a whole number (`mode_name` says it in words). -3: no uplift. -2: rests, that is complete chattering
-        brings the block to rest at least once before the pulse is over. -1: rocks until the pulse is over, that is it
-        comes to rest only after it. n >= 0: overturns, after n impacts. -4: overturns after it has been at rest. -5:
-        the simulation was given up.
+        A mode is a `Mode`, or the number of impacts after which the block overturns; `mode_name` returns its words.
     """
 
     TABLES = MappingProxyType(

@@ -115,7 +115,7 @@ class Goodness:
     p_value: float
 
 
-def levelled(intensity: Floats) -> Floats:
+def merge_equal_intensities(intensity: Floats) -> Floats:
     """Return intensities of which those that differ by rounding alone, as those of scaled motions, are one."""
     order = np.argsort(intensity, kind="stable")
     ordered = intensity[order]

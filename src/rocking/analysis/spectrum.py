@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.analysis.levels import curves_of, labels_of, mean_one, motions_text, pooled, ratios_of
+from rocking.analysis.levels import curves_of, labels_of, motions_text, normalised_weights, pooled, ratios_of
 from rocking.arrays import Floats
 from rocking.block import Blocks
 from rocking.block.bodies import rates_of
@@ -74,9 +74,7 @@ def rocking_spectrum(
         How much each block of an ensemble counts; by default all alike.
     fractiles : sequence of float
         Shares, in (0, 1), of motions (and of the ensemble's weight) that stay below the fractile curves.
-    model : {"nonlinear", "linear"}
-        Equation of motion.
-    chattering : str or Treatment
+    model, chattering : optional
         As for `simulate`.
     threads, progress : optional
         As for `simulate_many`.
@@ -127,7 +125,7 @@ def rocking_spectrum(
         checks.grid_size({"motions": len(shaken), "blocks": len(gathered)}, InvalidOption)
         table = simulate_many(gathered, shaken, **options)
         return RockingSpectrum(_grid_spectrum(table, gathered.axes, gathered.gravity, shares))
-    weight = mean_one(weights, len(gathered))
+    weight = normalised_weights(weights, len(gathered))
     median = float(weighted_fractiles(gathered.p.mean(axis=1), weight, _HALF)[0])
     rates = median * np.geomspace(0.5, 2.0, 25)
     if p is not None or size is not None:

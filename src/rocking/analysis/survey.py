@@ -107,8 +107,12 @@ class Survey(BlockUnderRecords):
     precision: float = PRECISION
 
     def rows(self) -> list[dict[str, Any]]:
-        each = zip(self._labels(), self.responses, strict=True)
-        return [label | _row(response, self.precision) | self._sliding(response) for label, response in each]
+        rows = []
+        for label, response in zip(self._labels(), self.responses, strict=True):
+            friction = self.friction
+            sliding = {} if friction is None else {"friction": friction, _SLIDING: response.sliding_time(friction)}
+            rows.append(label | _row(response, self.precision) | sliding)
+        return rows
 
     def summary(self) -> str:
         limit = self.block.coordinate.limit
@@ -139,11 +143,6 @@ class Survey(BlockUnderRecords):
         }
         friction = {} if self.friction is None else {"friction": self.friction}
         return {"block": block, **friction, "records": self.rows(), "skipped": dict(self.skipped)}
-
-    def _sliding(self, response: Response) -> dict[str, float]:
-        if self.friction is None:
-            return {}
-        return {"friction": self.friction, _SLIDING: response.sliding_time(self.friction)}
 
     def write(self, folder: str | Path) -> None:
         """Write summary.csv, summary.json and, if openpyxl is installed, summary.xlsx.

@@ -205,10 +205,8 @@ def calibrate_history(
     -----
     Least squares in the logarithms of the parameters, by the derivatives of `Sensitivity.rotation`. The search starts
     from 2048 blocks over the whole range; the best go through fits to 15, 30, 60 and 100 % of the history. Standard
-    errors are from the curvature at the optimum, and allow for residuals that are correlated in time (their variance
-    counts by its integrated autocorrelation), yet not for a specimen that is no rigid plane block.
-
-    Restitution is found in practice so (paper, section 2.3).
+    errors are from the curvature at the optimum, and allow for residuals that are correlated in time, yet not for a
+    specimen that is no rigid plane block.
 
     Examples
     --------
@@ -323,7 +321,7 @@ class _Problem:
         return found
 
     def error(self, logs: Floats, count: int) -> float:
-        """Sum of the squared residuals of the first samples."""
+        """Return the sum of the squared residuals of the first samples."""
         return float((self.residuals(logs, count) ** 2).sum())
 
 

@@ -19,7 +19,7 @@ from rocking.block import Blocks
 from rocking.body import Bodies
 from rocking.calibration.diagnostics import Diagnostics, Scores, diagnosed
 from rocking.calibration.search import Evidence as _Evidence
-from rocking.calibration.search import Problem, blurred, expected_share, posterior, search, systematic, unpacked
+from rocking.calibration.search import Problem, expected_share, posterior, search, systematic, unpacked, with_outliers
 from rocking.calibration.space import SIDED, Knowledge, Space, unit_of
 from rocking.constants import Model
 from rocking.ensemble import simulate_many
@@ -361,7 +361,7 @@ def overturned_under(
 def chances_of(share: Floats, effective: float, lapse: float) -> Floats:
     """Probabilities of recorded outcomes, from a share of so many effective blocks; a known block counts as certain."""
     expected = share if math.isinf(effective) else expected_share(share, effective)
-    return np.clip(blurred(expected, lapse), 0.0, 1.0)  # a sum of weights may be a rounding above 1
+    return np.clip(with_outliers(expected, lapse), 0.0, 1.0)  # a sum of weights may be a rounding above 1
 
 
 def group_labels(groups: Sequence[object] | None, count: int, folds: int) -> NDArray[np.int64]:
@@ -457,7 +457,6 @@ def calibrate(
     >>> found = rocking.calibrate(motions, overturned, model="linear", candidates=512, two_sided=False)
     >>> bool(np.mean((found.predict(motions) > 0.5) == overturned) > 0.9)
     True
-
     """
     tested = several_motions(motions)
     observed = checked_outcomes(overturned, len(tested))

@@ -34,7 +34,7 @@ _BATCH: Final = 64
 
 
 #: Blocks are drawn from a guide with its dispersions wider by a factor.
-WIDENED: Final = 1.2
+PROPOSAL_WIDTH: Final = 1.2
 
 #: A share that n simulated blocks estimate is itself uncertain: Jeffreys' prior, Beta(1/2, 1/2).
 _JEFFREYS: Final = 0.5
@@ -126,7 +126,7 @@ class Candidates:
     def log_density(self, points: Floats) -> Floats:
         """Logarithm of the number of candidates per volume at points in the space, shape (c,)."""
         parts = [np.full(len(points), np.log(self.evenly / self.space.volume))]
-        parts += [np.log(count) + log_density(guide, WIDENED, points) for count, guide in self.guides]
+        parts += [np.log(count) + log_density(guide, PROPOSAL_WIDTH, points) for count, guide in self.guides]
         return np.asarray(np.logaddexp.reduce(parts))
 
 
@@ -163,7 +163,7 @@ class Evidence:
     def probabilities(self, populations: Floats) -> Floats:
         """Probability of overturning for each population and motion, shape (c, m)."""
         found, effective = self._shares(populations)
-        return blurred(expected_share(found, effective[:, None]), self.lapse)
+        return with_outliers(expected_share(found, effective[:, None]), self.lapse)
 
     def effective(self, populations: Floats) -> Floats:
         """Effective number of candidates that speak for each population, shape (c,)."""
@@ -173,7 +173,7 @@ class Evidence:
         """Log-likelihood of each population, shape (c,)."""
         if not len(populations):
             return np.zeros(0)
-        chances = blurred(self._shares(populations)[0], self.lapse)
+        chances = with_outliers(self._shares(populations)[0], self.lapse)
         return np.asarray(np.log(np.where(self.observed, chances, 1.0 - chances)).sum(axis=1))
 
     def _shares(self, populations: Floats) -> tuple[Floats, Floats]:
@@ -225,7 +225,7 @@ def expected_share(share: Floats, effective: ArrayLike) -> Floats:
     return np.asarray((count * share + _JEFFREYS) / (count + 2.0 * _JEFFREYS))
 
 
-def blurred(probabilities: Floats, lapse: float) -> Floats:
+def with_outliers(probabilities: Floats, lapse: float) -> Floats:
     """Probabilities of recorded outcomes, from those of the rocking block."""
     return lapse + (1.0 - 2.0 * lapse) * probabilities
 
@@ -242,7 +242,7 @@ _MORE: Final = 2
 
 #: Draws from a posterior, and rounds of moves after each step of their tempering: where they guide the search, and
 #: where they are compared.
-_GUIDING: Final = (256, 2)
+_PROPOSAL: Final = (256, 2)
 _COMPARED: Final = (256, 4)
 
 #: Runs agree where R-hat is below this: their means then differ by less than two thirds of a standard deviation.
@@ -265,13 +265,13 @@ class Problem:
 
     def filling(self, count: int, rng: np.random.Generator) -> Candidates:
         """Try blocks that fill the space evenly."""
-        points = self.space.spread_evenly(count, rng)
+        points = self.space.quasi_random(count, rng)
         return Candidates(self.space, points, self.tried(points), count)
 
-    def guided(self, candidates: Candidates, exponent: float, count: int, rng: np.random.Generator) -> Candidates:
+    def propose(self, candidates: Candidates, exponent: float, count: int, rng: np.random.Generator) -> Candidates:
         """Try blocks where populations fit, too: the lower the exponent of the likelihood, the wider around."""
-        populations = posterior(self.evidence(candidates), *_GUIDING, rng, exponent=exponent, progress=False)
-        points = drawn(populations, WIDENED, count, rng)
+        populations = posterior(self.evidence(candidates), *_PROPOSAL, rng, exponent=exponent, progress=False)
+        points = drawn(populations, PROPOSAL_WIDTH, count, rng)
         points = points[self.space.contains(points)]
         return candidates.joined((count, populations), points, self.tried(points))
 
@@ -324,7 +324,7 @@ def _compared(
     longer, posteriors = [], []
     for run, rng in zip(runs, streams, strict=True):
         for exponent in exponents:
-            run = problem.guided(run, exponent, part, rng)
+            run = problem.propose(run, exponent, part, rng)
         longer.append(run)
         posteriors.append(posterior(problem.evidence(run), *_COMPARED, rng, progress=False))
     return Search(problem.evidence(Candidates.pooled(longer)), tuple(longer), tuple(posteriors))

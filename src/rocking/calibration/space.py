@@ -104,7 +104,7 @@ class Space:
         ratio = [self.ratio] if self.two_sided else []
         return np.concatenate([self.lower, np.negative(ratio)]), np.concatenate([self.upper, ratio])
 
-    def spread_evenly(self, count: int, rng: np.random.Generator) -> Floats:
+    def quasi_random(self, count: int, rng: np.random.Generator) -> Floats:
         """Points that fill the space evenly: those of a scrambled Halton sequence that lie in it."""
         from scipy.stats import qmc
 

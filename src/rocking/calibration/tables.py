@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Container, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, get_args
@@ -56,16 +56,10 @@ class _Table:
         """Return the numbers of a column."""
         return np.array([self.convert(line, row[column], float, "a number") for line, row in self.rows])
 
-    def doubled(self, read: Container[str]) -> list[str]:
-        """Return the names of columns, of those that are read, which are there several times."""
-        return [name for name in dict.fromkeys(self.columns) if name in read and self.columns.count(name) > 1]
-
     def answers(self, column: str) -> tuple[bool, ...]:
         """Return the truth values of a column: 1 or 0, yes or no, true or false."""
-        read = _ANSWERS.__getitem__
-        return tuple(
-            self.convert(line, row[column].lower(), read, "0 or 1, no or yes, false or true") for line, row in self.rows
-        )
+        read, what = _ANSWERS.__getitem__, "0 or 1, no or yes, false or true"
+        return tuple(self.convert(line, row[column].lower(), read, what) for line, row in self.rows)
 
     def convert(self, line: int, text: str, how: Callable[[str], Any], what: str) -> Any:
         """Return a cell read in some way; an error says the line and what it should be."""
@@ -84,11 +78,10 @@ def read_calibration(
 ) -> list[ShakeTest] | History:
     """Read a table of tests, as `read_tests`, or of a history: `time_s`, and `rotation_rad` or `rotation_deg`."""
     table = read_table(path)
-    both = ["rotation_rad", "rotation_deg"]
-    if doubled := table.doubled(table.columns) or both * ({*both} <= {*table.columns}):
-        raise table.error(f"each column must be there once, and one rotation, but there is more: {', '.join(doubled)}")
     if {"motion", "overturned"} <= set(table.columns):
         return _tests_of(table, channel=channel, dt=dt, units=units)
+    if {"rotation_rad", "rotation_deg"} <= set(table.columns):
+        raise table.error("rotation must be there once, in rad or in deg, but rotation_rad and rotation_deg are there")
     for column, unit in (("rotation_rad", 1.0), ("rotation_deg", np.pi / 180.0)):
         if {"time_s", column} <= set(table.columns):
             return History(table.numbers("time_s"), unit * table.numbers(column))
@@ -105,8 +98,6 @@ def read_ensemble(path: Path) -> Ensemble:
         [named(f"{name}_{side}", unit) for side in ("plus", "minus")]
         for name, unit in (("p", "rad/s"), ("alpha", "rad"), ("restitution", "1"))
     ]
-    if doubled := table.doubled(table.columns):
-        raise table.error(f"each column must be there once, but {' and '.join(doubled)} several times")
     missing = [name for name in (*columns[0], *columns[1], *columns[2], "weight", "model") if name not in table.columns]
     if missing:
         raise table.error(f"no ensemble of a calibration, whose ensemble.csv has {' and '.join(missing)}")
@@ -123,8 +114,8 @@ def read_ensemble(path: Path) -> Ensemble:
     return Ensemble(blocks, table.numbers("weight"), models.pop())
 
 
-def read_table(path: Path) -> _Table:
-    """Read a CSV table with a header."""
+def read_table(path: Path, name: Callable[[str], str] = str) -> _Table:
+    """Read a CSV table whose header, by `name`, has each column once."""
     try:
         text = path.read_text("utf-8-sig")
     except OSError as error:
@@ -134,7 +125,11 @@ def read_table(path: Path) -> _Table:
     cells = csv_rows(text)
     if len(cells) < 2:
         raise UnreadableRecord("it holds no rows below its header", path=str(path))
-    (_, columns), *rows = cells
+    (_, header), *rows = cells
+    columns = [name(cell) for cell in header]
+    if doubled := [column for column in dict.fromkeys(columns) if columns.count(column) > 1]:
+        text = f"each column must be there once, but {' and '.join(doubled)} several times"
+        raise UnreadableRecord(text, path=str(path), line=1)
     for line, row in rows:
         if len(row) != len(columns):
             found = f"{counted(len(row), 'cell')} under {counted(len(columns), 'column')}"
@@ -242,7 +237,7 @@ def read_tests(
     [<ShakeTest: ridgecrest-clc-090, stood>, <ShakeTest: ridgecrest-clc-090, overturned>]
     """
     table = read_table(checks.path(path, "path of a table", UnreadableRecord))
-    if not {"motion", "overturned"} <= {*table.columns} or table.doubled(table.columns):
+    if not {"motion", "overturned"} <= {*table.columns}:
         raise table.error(f"the columns must be motion and overturned, each once, not {','.join(table.columns)}")
     return _tests_of(table, channel=channel, dt=dt, units=units)
 
@@ -258,17 +253,12 @@ def read_observed(
     as those of one earthquake; tests under one motion do in any case, and so do groups that have a motion in common.
     A row without a label belongs to no group. Channel, dt and units are what record files do not say.
     """
-    given = read_table(path)
-    columns = tuple(heading_of(cell) for cell in given.columns)
-    rows = tuple((line, {heading_of(name): cell for name, cell in row.items()}) for line, row in given.rows)
-    table = _Table(path, columns, rows)
-    if doubled := table.doubled({*HEADINGS, "overturned", "trials", "motion", "group"}):
-        raise table.error(f"each column must be there once, but {' and '.join(doubled)} several times")
-    found = [name for name in dict.fromkeys(columns) if name in HEADINGS]
+    table = read_table(path, heading_of)
+    columns = table.columns
+    found = [name for name in columns if name in HEADINGS]
     if "overturned" not in columns or len(found) + ("motion" in columns) != 1:
         raise table.error(
-            f"the columns must be overturned and either motion or one of {', '.join(HEADINGS)}, "
-            f"not {','.join(given.columns)}"
+            f"the columns must be overturned and either motion or one of {', '.join(HEADINGS)}, not {','.join(columns)}"
         )
     counts = "trials" in columns
     observed: dict[str, Any] = {
@@ -280,7 +270,7 @@ def read_observed(
         observed |= _against_intensity(table, found[0], measure)
     else:
         observed |= _under_motions(table, measure, channel=channel, dt=dt, units=units)
-    outcomes = round(float(np.sum(np.broadcast_to(observed["trials"], len(rows)))))
+    outcomes = round(float(np.sum(np.broadcast_to(observed["trials"], len(table.rows)))))
     return observed | {"description": f"{counted(outcomes, 'observed outcome')} in {path.name}"}
 
 

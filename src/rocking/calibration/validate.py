@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from rocking import checks
 from rocking.analysis import levels as labels
-from rocking.analysis.levels import mean_one, pooled
+from rocking.analysis.levels import normalised_weights, pooled
 from rocking.arrays import Flags, Floats, Integers
 from rocking.body import Bodies, Body
 from rocking.calibration.diagnostics import Scores, log_losses
@@ -290,16 +290,11 @@ def validate(
 
     Notes
     -----
-    The share of n blocks that overturn is itself uncertain; the probability is its mean by Jeffreys' prior, as in
-    `Calibration.predict`, where one block is not taken as known. Outcomes are scored by the Brier score and the
-    logarithmic one (Gneiting and Raftery 2007).
-
+    The share of n blocks that overturn is itself uncertain; the probability is its mean by Jeffreys' prior, unless one
+    block is taken as known. Outcomes are scored by the Brier score and the logarithmic one (Gneiting and Raftery 2007).
     Standard errors are those of the jackknife that leaves out clusters: tests of one group, else of one motion. The
-    base rate that skill is against comes from the same tests, which favours it.
-
-    A consistency band holds the central 90 % of the shares in simulations from the predictions themselves (Broecker and
-    Smith 2007), here with these predictions and not with others drawn from them. The chance of reliability comes from
-    the same simulations.
+    base rate of the skill comes from the same tests, which favours it. Consistency bands (Broecker and Smith 2007) and
+    the chance of reliability are of simulations with these predictions.
 
     References
     ----------
@@ -355,7 +350,7 @@ def validate(
             description, how = pooled(blocks, weights), model or "nonlinear"
             bodies = bodies_of(blocks)
             slenderness_of(bodies)  # refused before the work
-            shares = mean_one(weights, len(bodies)) / len(bodies)
+            shares = normalised_weights(weights, len(bodies)) / len(bodies)
             effective = math.inf if len(bodies) == 1 else 1.0 / float((shares**2).sum())
         fell = overturned_under(bodies, distinct, how, threads, progress)
         probabilities = chances_of(shares @ fell, effective, lapse or 0.0)[which]

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from rocking import checks
 from rocking.analysis.curve import Band, checked_limit, fitted_curve, passed
 from rocking.analysis.fragility import OVERTURNING, Fragility, fit_fragility, of_polarities, weights_of
-from rocking.analysis.levels import clusters_of, motions_in_words, only_block, pooled, ratios_of, units_of, values_of
+from rocking.analysis.levels import clusters_of, motions_in_words, pooled, ratios_of, single_block, units_of, values_of
 from rocking.analysis.spectrum import fractiles_of, overturned_share
 from rocking.arrays import Floats, Integers, evenly
 from rocking.body import Bodies
@@ -324,7 +324,7 @@ def pooled_fragility(
         measure=measure,
         description=f"{text}, {product.model} model"
         + of_polarities(product.polarity, is_symmetric=product.bodies.is_symmetric),
-        block=only_block(product.bodies),
+        block=single_block(product.bodies),
         model=product.model,
         outcomes=None,
         one_way=product.polarity != "both" and not product.bodies.is_symmetric,
@@ -503,7 +503,6 @@ class FragilityPlan:
         A curve for each block, or one for all.
     confidence : float
         Probability of the intervals.
-
     """
 
     measure: IntensityName = "pga"
@@ -535,7 +534,6 @@ class SpectrumPlan:
     ----------
     fractiles : sequence of float
         Shares of the motions, in (0, 1), that stay below.
-
     """
 
     fractiles: Sequence[float] = FRACTILES
