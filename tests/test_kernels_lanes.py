@@ -19,11 +19,11 @@ from rocking.kernels.lanes import (
     LONGEST_SUBSTEP,
     LONGEST_WEIGHTED_SUBSTEP,
     Pool,
-    load,
+    fill_lane,
     pool_of,
     set_angles,
     stumpff,
-    unload,
+    write_lane,
 )
 from rocking.kernels.series import Line
 from rocking.kernels.state import Record, Records, new_scratch
@@ -92,7 +92,7 @@ def stepped(
     """Take up to a group of blocks through one sample that starts with row[0] and changes by row[1] per second."""
     pool: Pool = pool_of(blocks, states, 1, h, way.substeps if way.nonlinear else 0)
     for lane in range(len(blocks)):
-        load(pool, lane, lane)
+        fill_lane(pool, lane, lane)
         if way.nonlinear:
             set_angles(pool, lane, lane)
     group = pool.groups[0]
@@ -108,7 +108,7 @@ def stepped(
     assert not np.any(group["event"][len(blocks) :]) or not np.all(np.isfinite(row))  # empty lanes
     ground = in_units_of_g([0.0, 1.0, 2.0], [[0.0, 0.0]] * 2)
     for lane in range(len(blocks)):
-        assert unload(ground, pool, lane, 1) == lane
+        assert write_lane(ground, pool, lane, 1) == lane
     return [Step(blocks[k], before[k], states[k], not events[k]) for k in range(len(blocks))]
 
 

@@ -243,5 +243,5 @@ class Kind(Protocol):
         """Gather single ones."""
 
 
-#: Kinds by name. A body finds here what it is one of, which knows it and which it cannot import.
+#: Classes of many bodies by name: a registry, so that a body need not import the class that imports it.
 KINDS: Final[dict[str, Kind]] = {}

@@ -61,22 +61,13 @@ _TASK: Final = 8_000_000
 
 @dataclass(frozen=True)
 class Setup:
-    """What all simulations share: n bodies, and how to compute.
-
-    Attributes
-    ----------
-    bodies : Bodies
-        n bodies.
-    model, treatment, duration
-        As for `rocking.simulate`.
-    start : tuple of float or None, float
-        Coordinate of all bodies at time 0, and its rate; None: zero, or the stop where zero is behind it.
-    """
+    """What all simulations share: n bodies, and how to compute, as for `rocking.simulate`."""
 
     bodies: Bodies
     model: Model
     treatment: Treatment
     duration: float | None = None
+    #: Coordinate of all bodies at time 0, and its rate; None is zero, or the stop where zero is behind it.
     start: tuple[float | None, float] = (None, 0.0)
 
     def run(
@@ -114,24 +105,12 @@ class Run(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """Some of the bodies under one motion times a factor.
-
-    Attributes
-    ----------
-    bodies : slice or ndarray of int
-        Which bodies.
-    motion : Motion
-        What shakes them.
-    factor : float
-        Factor on the motion.
-    key : tuple of int
-        Where the outcomes belong, for the caller.
-    """
+    """Some of the bodies under one motion times a factor."""
 
     bodies: slice | Integers
     motion: Motion
     factor: float = 1.0
-    key: tuple[int, ...] = ()
+    key: tuple[int, ...] = ()  # where the outcomes belong, for the caller
 
 
 def simulate_tasks(
@@ -139,19 +118,8 @@ def simulate_tasks(
 ) -> Iterator[tuple[Task, NDArray[np.void]]]:
     """Outcomes of every task, in their order: structured arrays (`OUTCOME`), one row a body.
 
-    Parameters
-    ----------
-    setup : Setup
-        Bodies and settings.
-    tasks : iterable of Task
-        Taken as they are needed, some ahead of the results.
-    threads : int, optional
-        Number of threads; by default one for every core.
-
-    Notes
-    -----
-    What becomes of a body depends on the body and its motion alone, bit for bit, whatever shares its task. An
-    interrupt leaves the rest undone.
+    Tasks are taken as they are needed, some ahead of the results. What becomes of a body depends on the body and its
+    motion alone, bit for bit, whatever shares its task. An interrupt leaves the rest undone.
     """
     cancelled = threading.Event()
 

@@ -120,12 +120,8 @@ def set_start(
         If a body cannot be there, or a number is not finite or beyond all sense.
     """
     stops = bodies.stops
-    if (
-        not isinstance(rate, np.ndarray)
-        and rate == 0.0
-        and (coordinate is None or coordinate == 0.0)
-        and not np.count_nonzero(stops)
-    ):
+    still = not isinstance(rate, np.ndarray) and rate == 0.0 and (coordinate is None or coordinate == 0.0)
+    if still and not np.count_nonzero(stops):
         return
     facing, one_sided = records["two_stops"], records["next_side"][:, 0] == 0
     if coordinate is None:

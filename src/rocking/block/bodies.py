@@ -23,6 +23,8 @@ from rocking.errors import InvalidBlock
 from rocking.kernels import state
 from rocking.tables import range_text
 
+_NAMES: Final = ("p", "alpha", "restitution")
+
 #: Terms of restraints on each side, and their values without one; and whether a block rocks to side + only.
 _TERMS: Final = {**Terms()._asdict(), "one_sided": 0.0}
 _UNITS: Final = {
@@ -108,7 +110,7 @@ class Blocks:
                 "p", "alpha", "restitution",
             ) from None  # fmt: skip
         g = checked_gravity(gravity)
-        for name in ("p", "alpha", "restitution") if restitution is not None else ("p", "alpha"):
+        for name in _NAMES if restitution is not None else _NAMES[:2]:
             checked_sides(arrays[name], name)
         if restitution is None:
             arrays["restitution"] = _conserved(arrays["p"], arrays["alpha"])
@@ -119,7 +121,7 @@ class Blocks:
         held = {name: np.ascontiguousarray(values) for name, values in arrays.items()}
         for values in held.values():
             values.flags.writeable = False
-        for name in ("p", "alpha", "restitution"):
+        for name in _NAMES:
             object.__setattr__(self, name, held.pop(name))
         for name, value in (("gravity", gravity), ("terms", held), ("axes", axes)):
             object.__setattr__(self, name, value)
@@ -207,17 +209,17 @@ class Blocks:
             return blocks
         several = not isinstance(blocks, (Block, RestrainedBlock, str)) and isinstance(blocks, Iterable)
         gathered: list[Any] = [*cast("Iterable[Block]", blocks)] if several else [blocks]
-        free = True
         for each in gathered:
-            if isinstance(each, RestrainedBlock):
-                free = free and not each.is_one_sided and each._terms == (Terms(), Terms())
-            else:
+            if not isinstance(each, (Block, RestrainedBlock)):
                 one_block(each)
         gravities = {each.gravity for each in gathered}
         if len(gravities) != 1:
             raise InvalidBlock("Blocks.of needs at least one block, and all of them under the same {}", "gravity")
-        table = np.array([_rows(each, free) for each in gathered]).transpose(2, 0, 1)
-        names = ("p", "alpha", "restitution", *_TERMS)[: len(table)]
+        rows = [each._rows() for each in gathered]
+        if max(len(sides[0]) for sides in rows) > len(_NAMES):
+            rows = [[(*side, *[*_TERMS.values()][len(side) - len(_NAMES) :]) for side in sides] for sides in rows]
+        table = np.array(rows).transpose(2, 0, 1)
+        names = (*_NAMES, *_TERMS)[: len(table)]
         return cls.__new__(cls)._fill(gravities.pop(), dict(zip(names, table, strict=True)))
 
     @property
@@ -240,11 +242,11 @@ class Blocks:
         """Return every block as kernels take it (`kernels.state.BLOCK`), shape (n,)."""
         p, alpha = self.p, self.alpha
         made = state.records(len(self), state.BLOCK)
-        made["stiffness"] = p * p
-        made["slenderness"] = alpha
-        made["sine"], made["cosine"] = np.sin(alpha), np.cos(alpha)
+        stiffness, cosine = p * p, np.cos(alpha)
+        made["stiffness"], made["slenderness"] = stiffness, alpha
+        made["sine"], made["cosine"] = np.sin(alpha), cosine
         made["threshold"] = alpha if model == "linear" else np.tan(alpha)
-        made["threshold_slope"] = p * p if model == "linear" else p * p * np.cos(alpha)
+        made["threshold_slope"] = stiffness if model == "linear" else stiffness * cosine
         made["restitution"] = self.restitution
         made["limit"] = limits
         made["next_side"] = (1, 0)
@@ -387,18 +389,6 @@ class Blocks:
                 f"values, not {checks.shown(index)}; for one block alone blocks[0]"
             )
         return chosen
-
-
-def _rows(body: Block | RestrainedBlock, free: bool) -> list[tuple[float, ...]]:
-    """Parameters of both sides of a block, and unless it is free their terms."""
-    block, terms, one_way = body, (Terms(), Terms()), False
-    if isinstance(body, RestrainedBlock):
-        block, terms, one_way = body.block, body._terms, body.is_one_sided
-    rows = [
-        (side.p, side.alpha, side.restitution, *(() if free else (*term, float(one_way))))
-        for side, term in zip(block.sides, terms, strict=True)
-    ]
-    return rows[:1] * 2 if one_way else rows
 
 
 def rates_of(p: ArrayLike | None, size: ArrayLike | None, gravity: float) -> ArrayLike:

@@ -151,6 +151,14 @@ class RestrainedBlock:
             object.__setattr__(self, name, value)
         return self
 
+    def _rows(self) -> list[tuple[float, ...]]:
+        """Parameters and terms of both sides, as `Blocks` has them; without terms where it is a free block."""
+        rows = self.block._rows()
+        if not self.is_one_sided and self._terms == (Terms(), Terms()):
+            return rows
+        rows = [(*row, *terms, float(self.is_one_sided)) for row, terms in zip(rows, self._terms, strict=True)]
+        return rows[:1] * 2 if self.is_one_sided else rows
+
     def __str__(self) -> str:
         """Return description and parameters in one line."""
         return f"{self.description}; {in_line(self.sides)}"

@@ -159,6 +159,10 @@ class Block:
             object.__setattr__(self, name, value)
         return self
 
+    def _rows(self) -> list[tuple[float, ...]]:
+        """Parameters of both sides, as `Blocks` has them."""
+        return [(side.p, side.alpha, side.restitution) for side in self.sides]
+
     def _with_sides(self, sides: tuple[Side, Side]) -> Block:
         """Return the block with other sides."""
         return Block.__new__(Block)._fill(sides, self.gravity, self.description, self.mass)

@@ -99,14 +99,8 @@ def fill(breakpoints: Floats, coefficients: Floats, unit: float, ground: Ground,
             piece = bounds_within(ground, k, 0.0, pieces[k, _LENGTH], A)
             low, high, steepest = min(low, piece.low), max(high, piece.high), max(steepest, piece.slope)
             jumps += piece.jumps + jump_after(ground, k) if k < last else 0.0
-        set_stretch(ground, stretch, Window(low, high, steepest, jumps))
-
-
-@inlined
-def set_stretch(ground: Ground, stretch: int, bounds: Window) -> None:
-    """Write the bounds on a stretch."""
-    row = ground.stretches[stretch, component_of(ground)]
-    row[_LOW], row[_HIGH], row[_SLOPE], row[_JUMPS] = bounds
+        row = ground.stretches[stretch, component_of(ground)]
+        row[_LOW], row[_HIGH], row[_SLOPE], row[_JUMPS] = low, high, steepest, jumps
 
 
 @inlined

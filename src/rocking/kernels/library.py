@@ -143,17 +143,13 @@ def _format(kind: Any) -> str:
 
 def _taker(kind: Any) -> Taker:
     if isinstance(kind, str):
-        return _take_truth if kind == "bool" else _take_number
+        return _pack_bool if kind == "bool" else lambda value, packed: packed.append(value)
     if "tuple" in kind:
         return _tuple_taker([_taker(each) for each in kind["tuple"]])
     return _array_taker(kind) if "dimensions" in kind else _record_taker(kind)
 
 
-def _take_number(value: Any, packed: list[Any]) -> None:
-    packed.append(value)
-
-
-def _take_truth(value: Any, packed: list[Any]) -> None:
+def _pack_bool(value: Any, packed: list[Any]) -> None:
     if not isinstance(value, (bool, np.bool_)):
         raise TypeError(f"{value!r} is neither True nor False")
     packed.append(bool(value))

@@ -71,7 +71,7 @@ def march(ground: Ground, block: Record, settings: Record, table: Records, scrat
 
 @inlined
 def initialise_tendon(ground: Ground, block: Record, settings: Record, state: Record) -> None:
-    """Give a body's tendon the law of its state; one that starts too far from rest has stretched it for good."""
+    """Give a body's tendon the law of its state; one that starts too far from rest has already yielded."""
     if time_of(ground, state) == 0.0 and state.side >= 0:
         stretched = elongation_at(block, settings.nonlinear, state.side, state.u) - block.yields
         state.plastic = max(state.plastic, stretched)
@@ -84,7 +84,8 @@ def march_step(ground: Ground, block: Record, settings: Record, table: Records, 
     write_node(ground, settings, table, state)
     if state.side < 0:
         return rest_until_uplift(ground, block, settings, table, scratch, state)
-    if state.proven_impacts > 0 and state.u == 0.0 and may_pass(ground, block, settings):
+    plain = is_straight(ground) and not (has_vertical(ground) or settings.nonlinear)
+    if state.proven_impacts > 0 and state.u == 0.0 and plain and not (block.restrained or block.variable_restitution):
         pass_proven_impacts(ground, block, settings, table, state, time_left(ground, settings, state))
     outcome = follow_arc(ground, block, settings, scratch, state)
     if outcome == Outcome.IMPACT or (outcome == Outcome.OVERTURN and block.two_stops):
@@ -92,18 +93,14 @@ def march_step(ground: Ground, block: Record, settings: Record, table: Records, 
     if outcome == Outcome.OVERTURN:
         return end_by_overturning(ground, block, settings, table, state)
     if outcome == Outcome.STOPPED:
-        return end_by_stopping(ground, settings, table, state)
+        state.end = settings.stop
+        state.peak_time = min(state.peak_time, settings.stop)  # a peak there may be a rounding later
+        write_node(ground, settings, table, state)
+        return Ending.DONE
     if outcome == Outcome.LEANS:
         state.end = time_of(ground, state)
         return Ending.LEANS
     return Ending.BALANCED if outcome == Outcome.BALANCED else Ending.RUNNING
-
-
-@inlined
-def may_pass(ground: Ground, block: Record, settings: Record) -> bool:
-    """Whether `pass_proven_impacts` applies: linear, unrestrained, a constant weight, a motion linear in time."""
-    plain = not (block.restrained or block.variable_restitution)
-    return not settings.nonlinear and is_straight(ground) and not has_vertical(ground) and plain
 
 
 @inlined
@@ -287,15 +284,6 @@ def end_by_overturning(ground: Ground, block: Record, settings: Record, table: R
     write_node(ground, settings, table, state)
     write_event(settings, table, state, state.end, EventKind.OVERTURN)
     return Ending.OVERTURNED
-
-
-@inlined
-def end_by_stopping(ground: Ground, settings: Record, table: Records, state: Record) -> int:
-    """End a march in the middle of an arc, at the time given by the settings; a peak there may be a rounding later."""
-    state.end = settings.stop
-    state.peak_time = min(state.peak_time, settings.stop)
-    write_node(ground, settings, table, state)
-    return Ending.DONE
 
 
 @inlined

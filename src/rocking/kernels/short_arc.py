@@ -62,18 +62,19 @@ def short_part(ground: Ground, block: Record, settings: Record, state: Record, l
     if settings.nonlinear:
         return short_nonlinear_step(ground, block, state, left, None)
     c = linear_series(ground, block, state)
-    end = resolve_step(c, reach_linear(block, state, left), state, block.overturn_angle)
+    end = resolve_step(c, reach(abs(block.stiffness[state.side]), SHORT_LINEAR, left), state, block.overturn_angle)
     return end if is_complete(c, end.time) else undecided()
 
 
 @shared
 def short_weighted_step(ground: Ground, block: Record, settings: Record, state: Record, left: float) -> StepEnd:
     """Step in the same way while the weight changes."""
-    weight, lam = weight_line(ground, state), block.stiffness[state.side]
+    lam = block.stiffness[state.side]
+    weight = weight_at(ground, state.piece, state.offset), coefficient(vertical_of(ground), state.piece, 1)
     if settings.nonlinear:
         return short_nonlinear_step(ground, block, state, left, weight)
     c = weighted_series(ground, block, state, weight)
-    end = resolve_step(c, reach_weighted(lam, weight, left), state, block.overturn_angle)
+    end = resolve_step(c, reach(abs(lam) * greatest(weight, left), SHORT_WEIGHTED, left), state, block.overturn_angle)
     return end if is_complete_weighted(c, lam, weight, end.time) else undecided()
 
 
@@ -81,9 +82,12 @@ def short_weighted_step(ground: Ground, block: Record, settings: Record, state: 
 def short_nonlinear_step(ground: Ground, block: Record, state: Record, left: float, weight: Line | None) -> StepEnd:
     """Step in the same way in the nonlinear model."""
     c, angles = nonlinear_series(ground, block, state, weight)
-    end = resolve_step(c, reach_nonlinear(ground, block, state, left, weight), state, block.overturn_angle)
-    push = (acceleration(ground, state.piece, state.offset), coefficient(ground, state.piece, 1))
-    complete = is_complete_nonlinear(c, angles, block.stiffness[state.side], push, weight, end.time)
+    lam, slope = block.stiffness[state.side], coefficient(ground, state.piece, 1)
+    start = coefficient(ground, state.piece, 0) + slope * state.offset
+    size = lam * (greatest(weight, left) + max(abs(start), abs(start + slope * left))) + state.v * state.v
+    end = resolve_step(c, reach(size, SHORT_NONLINEAR, left), state, block.overturn_angle)
+    push = (acceleration(ground, state.piece, state.offset), slope)
+    complete = is_complete_nonlinear(c, angles, lam, push, weight, end.time)
     return end if complete else undecided()
 
 
@@ -121,32 +125,9 @@ def undecided() -> StepEnd:
 
 
 @inlined
-def weight_line(ground: Ground, state: Record) -> Line:
-    """Weight at a state, and its slope, where it is linear in time."""
-    return weight_at(ground, state.piece, state.offset), coefficient(vertical_of(ground), state.piece, 1)
-
-
-@inlined
-def reach_linear(block: Record, state: Record, left: float) -> float:
-    """Time over which nine terms of a linear arc are exact; ``left`` where that is enough."""
-    size = abs(block.stiffness[state.side])
-    return left if size * left * left <= SHORT_LINEAR else min(left, math.sqrt(SHORT_LINEAR / size))
-
-
-@inlined
-def reach_weighted(lam: float, weight: Line, left: float) -> float:
-    """Reach of a linear arc while the weight changes."""
-    size = abs(lam) * greatest(weight, left)
-    return left if size * left * left <= SHORT_WEIGHTED else min(left, math.sqrt(SHORT_WEIGHTED / size))
-
-
-@inlined
-def reach_nonlinear(ground: Ground, block: Record, state: Record, left: float, weight: Line | None) -> float:
-    """Time over which nine terms of a nonlinear arc are exact; ``left`` where that is enough."""
-    start = coefficient(ground, state.piece, 0) + coefficient(ground, state.piece, 1) * state.offset
-    push = max(abs(start), abs(start + coefficient(ground, state.piece, 1) * left))
-    size = block.stiffness[state.side] * (greatest(weight, left) + push) + state.v * state.v
-    return left if size * left * left <= SHORT_NONLINEAR else min(left, math.sqrt(SHORT_NONLINEAR / size))
+def reach(size: float, limit: float, left: float) -> float:
+    """Time t, at most ``left``, up to which size t^2 is within a limit."""
+    return left if size * left * left <= limit else min(left, math.sqrt(limit / size))
 
 
 @inlined
