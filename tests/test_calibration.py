@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 from scipy.stats import norm
 
 import rocking
-from rocking.calibration import search as population
 from rocking.calibration import search as searching
 from rocking.calibration.diagnostics import Scores, bounds_reached
 from rocking.calibration.history import HistoryCalibration
@@ -321,7 +320,7 @@ def test_the_posterior_is_that_of_brute_force(threshold_evidence):
     drawn = posterior(evidence, 512, 4, np.random.default_rng(0))
     rng = np.random.default_rng(1)
     space = evidence.candidates.space
-    prior = population.with_dispersions(space, space.quasi_random(8000, rng), rng)
+    prior = searching.with_dispersions(space, space.quasi_random(8000, rng), rng)
     likelihood = np.exp(evidence.log_likelihoods(prior))
     weights = likelihood / likelihood.sum()
     mean = weights @ prior
@@ -363,8 +362,8 @@ def test_shares_are_sums_over_weighted_candidates(threshold_evidence):
     """In single precision, against double precision without leaving anything out."""
     evidence, _ = threshold_evidence
     rng = np.random.default_rng(6)
-    populations = population.with_dispersions(evidence.candidates.space, evidence.candidates.points[:50], rng)
-    centre, dispersion = population.unpacked(populations)
+    populations = searching.with_dispersions(evidence.candidates.space, evidence.candidates.points[:50], rng)
+    centre, dispersion = searching.unpacked(populations)
     apart = (evidence.candidates.points - centre[:, None]) / dispersion[:, None]
     weights = np.exp(-0.5 * (apart**2).sum(axis=2) + evidence.candidates.log_weights)
     weights /= weights.sum(axis=1, keepdims=True)
@@ -431,14 +430,14 @@ def test_one_candidate_predicts_no_certainty(threshold_evidence):
 def test_the_density_is_that_of_what_is_drawn():
     rng = np.random.default_rng(5)
     populations = np.array([[0.0, 1.0, 2.0, -2.3, -1.7, -2.9], [0.2, 1.1, 2.1, -2.3, -2.3, -2.3]])
-    points = population.drawn(populations, 1.5, 40_000, rng)
+    points = searching.drawn(populations, 1.5, 40_000, rng)
     few = points[:100, None]
-    centre, dispersion = population.unpacked(populations)
+    centre, dispersion = searching.unpacked(populations)
     parts = norm.pdf(few, centre, 1.5 * dispersion).prod(axis=2)
     np.testing.assert_allclose(
-        population.log_density(populations, 1.5, points[:100]), np.log(parts.mean(axis=1)), atol=1e-9
+        searching.log_density(populations, 1.5, points[:100]), np.log(parts.mean(axis=1)), atol=1e-9
     )
-    density = np.exp(population.log_density(populations, 1.5, points))
+    density = np.exp(searching.log_density(populations, 1.5, points))
     box = (points > [0.0, 0.9, 1.95]) & (points < [0.2, 1.1, 2.05])
     inside = box.all(axis=1)
     # The mean of 1/density over points in a box is its volume over its share.

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.analysis import probit as lognormal
+from rocking.analysis import probit
 from rocking.analysis.probit import Outcomes, Probit, normal_scores, probabilities
 from rocking.analysis.regions import FEWEST, Confidence, Ends, LikelyRegion, Quantity, Resamples
 from rocking.arrays import Floats, Integers, as_asked
@@ -109,8 +109,8 @@ class FragilityCurve:
     confidence: float
     clusters: int
     independent: bool
-    likelihood: lognormal.Likelihood
-    goodness: lognormal.Goodness
+    likelihood: probit.Likelihood
+    goodness: probit.Goodness
     _uncertainty: Confidence
 
     def __repr__(self) -> str:
@@ -330,15 +330,15 @@ def fitted_curve(
     Without clusters every trial is on its own, also where several are at one intensity.
     """
     intensity, exceeded, trials = data
-    intensity = lognormal.merge_equal_intensities(intensity)
+    intensity = probit.merge_equal_intensities(intensity)
     # Both are sums of the same weights, perhaps in another order.
     exceeded = np.where(np.abs(trials - exceeded) <= 1e-12 * trials, trials, exceeded)
     z = np.log(intensity)
     outcomes = Outcomes(z, exceeded, trials)
-    fault = lognormal.unidentified(outcomes, measure.shown)
+    fault = probit.unidentified(outcomes, measure.shown)
     if fault is not None:
         raise Unfitted(f"no lognormal can be fitted to {name!r}: {fault}")
-    fitted = lognormal.fit(outcomes.alone())
+    fitted = probit.fit(outcomes.alone())
     middle = float(-fitted.intercept[0] / fitted.slope[0])
     if not z.min() - math.log(_FARTHEST) <= middle <= z.max() + math.log(_FARTHEST):
         raise Unfitted(
@@ -360,12 +360,12 @@ def fitted_curve(
         exceeded=exceeded,
         trials=trials,
         fitted=fitted,
-        covariance=lognormal.covariance(outcomes, fitted),
+        covariance=probit.covariance(outcomes, fitted),
         confidence=band.confidence,
         clusters=count,
         independent=independent,
-        likelihood=lognormal.gain(outcomes, fitted, independent=independent),
-        goodness=lognormal.goodness(outcomes, fitted, independent=independent),
+        likelihood=probit.gain(outcomes, fitted, independent=independent),
+        goodness=probit.goodness(outcomes, fitted, independent=independent),
         _uncertainty=uncertainty,
     )
 
@@ -425,7 +425,7 @@ def _log_medians(fits: Probit) -> Floats:
 
 def _dispersion(slope: float) -> float:
     """Dispersion of a slope: 0 of a step, infinite of a level curve."""
-    if slope >= lognormal.STEEP:
+    if slope >= probit.STEEP:
         return 0.0
     return 1.0 / slope if slope > 0.0 else math.inf
 

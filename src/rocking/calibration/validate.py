@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import checks
-from rocking.analysis import levels as labels
+from rocking.analysis import levels
 from rocking.analysis.levels import normalised_weights, pooled
 from rocking.arrays import Flags, Floats, Integers
 from rocking.body import Bodies, Body
@@ -332,7 +332,7 @@ def validate(
         checks.within(lapse, "lapse", InvalidOption, 0.0, 0.5)
     distinct, which = distinct_motions([test.motion for test in given])
     observed = np.array([test.overturned for test in given], dtype=bool)
-    clusters = labels.numbered(
+    clusters = levels.numbered(
         [("group", test.group) if test.group else ("motion", k) for test, k in zip(given, which, strict=True)]
     )
     description, how = "predictions of tests that were left out", ""
