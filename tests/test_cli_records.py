@@ -429,7 +429,7 @@ def test_a_station_s_name_leads_to_its_horizontal_records(run, command):
 def test_a_fit_used_beyond_its_range_is_one_line(run, monkeypatch):
     import warnings
 
-    from rocking.cli import chattering as module
+    from rocking.cli import analysis as module
     from rocking.errors import OutsideFit
 
     def report(*_):

@@ -64,7 +64,7 @@ simulate {P} --pivots 0.2,-0.1 --height-of-mass 1 --gyration 1 | --pivots must b
 simulate {P} --pivots 0.2,0.1 --height-of-mass 1 --gyration 0 | --gyration must be a positive length
 simulate {P} --offset 0.1 | needs more than --offset: give --width and --height, or --half-width and --half-height
 simulate {P} {S} --offset 0.2 | --offset must be at most a quarter of the width
-simulate {P} {W} --tendon stiffnes=1 | --tendon takes NAME=VALUE with stiffness, prestress, offset, strength
+simulate {P} {W} --tendon stiffnes=1 | --tendon has no stiffnes; did you mean stiffness?
 simulate {P} {W} --tendon prestress=1 | --tendon needs stiffness
 simulate {P} {W} --tendon stiffness=1e6,stiffness=2 | --tendon gives stiffness twice, in 'stiffness=1e6,stiffness=2'
 simulate {P} {W} --tendon stiffness=-1 | --tendon: stiffness of a tendon must be at least 0 N/m, not -1
@@ -126,7 +126,7 @@ orbits {Q} | a block is needed
 orbits {Q} --ball 0.5 --width 1 | leave --width out
 orbits {Q} --ball 0.5 --oscillator frequency=1 --restitution 0.5 | leave --oscillator and --restitution
 orbits {Q} --oscillator frequency=1 | --oscillator needs restitution
-orbits {Q} --oscillator frequency=1,mass=3 | --oscillator takes NAME=VALUE
+orbits {Q} --oscillator frequency=1,mass=3 | --oscillator has no mass; there are frequency, restitution, damping_ratio, stop, second_stop
 orbits {Q} --pendulum p=many,gap=1,restitution=0.5 | --pendulum
 orbits {Q} --ball 0.5 --along amplitude:16:9 | a lower value to a higher one
 orbits {Q} --ball 0.5 --orbit 1 | --along

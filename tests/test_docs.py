@@ -19,7 +19,7 @@ from cyclopts import CycloptsError
 
 import rocking
 from rocking.cli import app, main, wording
-from rocking.studies.file.tables import SCHEMA
+from rocking.studies.file import SCHEMA
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]

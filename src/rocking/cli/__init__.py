@@ -35,10 +35,8 @@ def _lines_of(module: str) -> dict[str, str]:
 
 
 for _module, _commands in {
-    "simulate": ("simulate", "check"),
-    "records": ("records", "pulses"),
-    "chattering": ("chatter", "critical"),
-    "analysis": ("spectrum", "map", "ida", "measures"),
+    "simulate": ("simulate", "check", "records", "pulses"),
+    "analysis": ("chatter", "critical", "spectrum", "map", "ida", "measures"),
     "dynamics": ("orbits", "bifurcation", "basin"),
     "fragility": ("fragility",),
     "calibrate": ("calibrate", "validate"),
@@ -53,7 +51,37 @@ app.command(
     name="study",
     help="Run a study too long for one sitting: created once, resumed after anything.",
 )
-app.command("rocking.cli.version:version", name=["--version", "-V"], help="Display the version.")
+
+
+def _version(*, verbose: bool = False) -> None:
+    """Display the version.
+
+    Parameters
+    ----------
+    verbose
+        Add the versions of Python and of the libraries below, and which compiled code serves this installation.
+    """
+    import platform
+    from importlib import metadata
+
+    import rocking
+    from rocking.kernels import compiled
+
+    if not verbose:
+        print(rocking.__version__)
+        return
+    below = ", ".join(f"{name} {metadata.version(name)}" for name in ("numpy", "scipy"))
+    rows = {
+        "rocking": rocking.__version__,
+        "Python": f"{platform.python_version()} on {platform.platform()}",
+        "packages": below,
+        "compiled code": compiled.state(),
+    }
+    for name, value in rows.items():
+        print(f"{name:13}  {value}")
+
+
+app.command(_version, name=["--version", "-V"], help="Display the version.")
 app.register_install_completion_command(help="Install completion of commands and options for this shell.")
 
 

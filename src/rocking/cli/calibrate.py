@@ -17,10 +17,17 @@ from rocking.analysis.calibration.result import Calibration, group_labels
 from rocking.analysis.calibration.space import HOUSNER
 from rocking.analysis.input_tables import History, Outcomes, read_calibration, read_tests
 from rocking.analysis.validation import validate as judged
-from rocking.cli.body_options import EnsembleOptions
-from rocking.cli.options import BLOCK, MODEL, WHOLE, ModelOptions
+from rocking.cli.options import (
+    BLOCK,
+    MODEL,
+    RECORDS,
+    WHOLE,
+    EnsembleOptions,
+    FileOptions,
+    ModelOptions,
+    ScaledPulseOptions,
+)
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, subfolder, write_results, write_tables
-from rocking.cli.records import RECORDS, FileOptions, ScaledPulseOptions
 from rocking.constants import Model
 from rocking.errors import InvalidOption, RockingError, literal
 from rocking.motion.motion import Motion
@@ -94,12 +101,12 @@ def calibrate(
     given: dict[str, Any] = {**ranges, "model": model, "two_sided": two_sided}
     choices = {name: value for name, value in given.items() if value is not None}
     with output.folder() as folder:
-        table = read_calibration(data, channel=file.channel, dt=file.dt, units=file.units)
+        table = read_calibration(data, **file.about())
         if not isinstance(table, History):
             _refuse("a history", motion=motion, initial_rotation=initial_rotation)
-            if not (predict or file.pulse):
+            if not (predict or file.given("pulse")):
                 _refuse_without("predict", file)
-            others = {name: file.read(name) for name in predict} | file.pulses()
+            others = {name: file.motion(name) for name in predict} | file.pulses()
             how = _How(seed, folds, others, {"candidates": candidates, **choices})
             results = _of_specimens(table, how, folder) if isinstance(table, dict) else _of_outcomes(table, how)
         else:
@@ -150,14 +157,13 @@ def _refuse(belong_to: str, **given: object) -> None:
 
 def _refuse_without(option: str, file: ScaledPulseOptions) -> None:
     """Refuse what is said of motions where none is given that it could be said of."""
-    for name in ("scale", "pga", "pgv", "sa", "vertical"):
-        if getattr(file, name) is not None:
-            raise InvalidOption("{} is for the motions of {} or {}: give one, or leave it out", name, option, "pulse")
+    for name in file.given("scale", "pga", "pgv", "sa", "vertical"):
+        raise InvalidOption("{} is for the motions of {} or {}: give one, or leave it out", name, option, "pulse")
 
 
 def _shaking(record: str | None, file: ScaledPulseOptions) -> Motion | None:
     """Motion of the base, if it moved."""
-    motions = file.pulses() if record is None else {record: file.read(record)} | file.pulses()
+    motions = file.pulses() if record is None else {record: file.motion(record)} | file.pulses()
     if len(motions) > 1:
         raise InvalidOption("a history has one motion of the base: give {}, or one {}", "motion", "pulse")
     return next(iter(motions.values()), None)
@@ -244,7 +250,7 @@ def validate(
         Seed of the simulations for bands and chances.
     """
     with output.folder() as folder:
-        rows = read_tests(tests, channel=file.channel, dt=file.dt, units=file.units)
+        rows = read_tests(tests, **file.about())
         found = judged(rows, **block.blocks(model), lapse=lapse, bins=bins, seed=seed)
         result = found.to_dict()
         if folder is not None:

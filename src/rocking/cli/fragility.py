@@ -20,10 +20,21 @@ from rocking.analysis.fragility.result import Fragility
 from rocking.analysis.hazard import HazardCurve
 from rocking.analysis.input_tables import read_observed
 from rocking.analysis.risk import check_measure
-from rocking.cli.body_options import EnsembleOptions
-from rocking.cli.options import BLOCK, MEASURE, MODEL, WHOLE, MeasureOptions, TreatmentOptions, labels_of
+from rocking.cli.options import (
+    BLOCK,
+    MEASURE,
+    MODEL,
+    RECORDS,
+    WHOLE,
+    EnsembleOptions,
+    MeasureOptions,
+    MotionOptions,
+    Names,
+    ReadRecords,
+    TreatmentOptions,
+    labels_of,
+)
 from rocking.cli.output import OUTPUT, OutputOptions, left_out, print_result, write_results
-from rocking.cli.records import RECORDS, MotionOptions, Names, ReadRecords
 from rocking.ensemble import Polarity
 from rocking.errors import InvalidOption, Unfitted
 from rocking.motion.scaling import Measure
@@ -119,7 +130,7 @@ def fragility(
     with output.folder() as folder:
         read = None
         if outcomes is not None:
-            observed = read_observed(outcomes, measure.wanted, channel=motion.channel, dt=motion.dt, units=motion.units)
+            observed = read_observed(outcomes, measure.wanted, **motion.about())
             _check_hazard(curve, observed["measure"])
             fitted = fit_fragility(**observed, band=band)
         else:
@@ -222,7 +233,6 @@ def _refuse_beside_outcomes(
     clusters: str | None,
 ) -> None:
     """Refuse options that do not go with observed outcomes."""
-    motions = ("pulse", "scale", "pga", "pgv", "sa", "vertical", "keep_going")
     given = {
         "records": names,
         "levels": measure.levels,
@@ -232,8 +242,8 @@ def _refuse_beside_outcomes(
         "clusters": clusters,
         "model": model.equation,
         "chattering": model.chattering if model.chattering != "certified" else None,
-        **{name: getattr(motion, name) for name in motions},
-        **dict.fromkeys(block.of_block(), True),
+        **motion.given("pulse", "scale", "pga", "pgv", "sa", "vertical", "keep_going"),
+        **block.given(),
     }
     found = [option for option, value in given.items() if value not in (None, False, ())]
     if found:

@@ -12,6 +12,7 @@ from cyclopts.exceptions import UnknownOptionError, UnusedCliTokensError
 
 from rocking.checks import meant
 from rocking.errors import DamagedStudy, InvalidOption, RockingError, Spelling
+from rocking.inputs.texts import option_of
 
 #: How alike two names must be for the one to be a slip of the other: a letter or two in a word of six.
 _ALIKE: Final = 0.8
@@ -36,11 +37,6 @@ def spelling_of(command: App) -> Spelling:
 def called(app: App, arguments: Sequence[str]) -> App:
     """Return the command that is called, or the program where none is; to the parser --help is a command as well."""
     return app.parse_commands(arguments)[1][len(_words(app, arguments))]
-
-
-def option_of(argument: str) -> str:
-    """Return the option of an argument: --half-width of half_width."""
-    return f"--{argument.replace('_', '-')}"
 
 
 def refuse_unknown_options(given: Iterable[object], app: App, arguments: Sequence[str]) -> None:

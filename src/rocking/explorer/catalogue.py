@@ -12,9 +12,8 @@ from urllib.parse import parse_qsl
 
 from rocking.analysis.labels import numbered
 from rocking.errors import InvalidOption, RockingError
-from rocking.explorer.parameters import PARAMETERS, field_label, names_of
+from rocking.explorer.parameters import PARAMETERS, Texts, field_label, names_of
 from rocking.explorer.phrases import phrase
-from rocking.explorer.texts import Texts
 from rocking.explorer.uploads import UploadStore, measures
 from rocking.motion import records
 

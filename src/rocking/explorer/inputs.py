@@ -7,7 +7,7 @@ The texts are those of the page's address: names of the command line's options a
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -16,9 +16,9 @@ from rocking.constants import STANDARD_GRAVITY, Model
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
 from rocking.explorer.meshes import Body, pivots_of
 from rocking.explorer.motions import motion_of, texts_of_motion
-from rocking.explorer.parameters import PARAMETERS, SHAPES
-from rocking.explorer.texts import BLOCK_NAMES, NAMES, Texts, Values, given_texts, written_arguments
+from rocking.explorer.parameters import BLOCK_NAMES, NAMES, PARAMETERS, SHAPES, Texts, Values, given_texts
 from rocking.explorer.uploads import UploadStore
+from rocking.inputs.bodies import block_of, call_of
 from rocking.motion.motion import Motion
 from rocking.motion.piecewise import STRONGEST, TOO_STRONG
 from rocking.response import Response, trail_of
@@ -30,14 +30,6 @@ _LIVELIEST: Final = 0.998
 
 #: Shortest duration, s: below it arithmetic, and not mechanics, says what is shown.
 _SHORTEST: Final = 1e-12
-
-#: What makes a block of each shape, its name in `rocking`, and what it calls the parameters.
-_MAKERS: Final[Mapping[str, tuple[Callable[..., Block], str]]] = {
-    "sizes": (Block, "Block"),
-    "parameters": (Block.from_parameters, "Block.from_parameters"),
-    "pivots": (Block.from_pivots, "Block.from_pivots"),
-}
-_ARGUMENTS: Final = {"pivots": "distances", "height_of_mass": "height", "gyration": "radius_of_gyration"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,13 +192,9 @@ def _block(given: Texts, values: Values, uploads: UploadStore) -> _FoundBlock:
         )
     if shape.name == "mesh":
         return _of_mesh(given, values, uploads)
-    names = (*shape.needed, *shape.optional, "restitution", "gravity")
-    arguments = {_ARGUMENTS.get(name, name): values[name] for name in names if name in values}
-    if isinstance(arguments.get("distances"), float):
-        arguments["distances"] = (arguments["distances"],) * 2
-    make, name = _MAKERS[shape.name]
-    options = {each: given[each] for each in NAMES if each in BLOCK_NAMES and each in given}
-    return _FoundBlock(make(**arguments), f"{name}({written_arguments(arguments)})", options)
+    described = {name: values[name] for name in NAMES if name in BLOCK_NAMES or name == "gravity" if name in values}
+    options = {name: given[name] for name in described if name != "gravity"}
+    return _FoundBlock(block_of(described), call_of(described), options)
 
 
 def _of_mesh(given: Texts, values: Values, uploads: UploadStore) -> _FoundBlock:

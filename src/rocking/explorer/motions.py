@@ -11,9 +11,11 @@ import numpy as np
 
 from rocking import checks
 from rocking.errors import InvalidMotion, InvalidOption
-from rocking.explorer.parameters import PARAMETERS, PULSES, SCALINGS, names_of
-from rocking.explorer.texts import Texts, Values, as_option, as_path, given_texts, written_arguments
+from rocking.explorer.parameters import PARAMETERS, PULSES, Texts, Values, given_texts, names_of
 from rocking.explorer.uploads import UploadStore
+from rocking.inputs.declared import SCALINGS
+from rocking.inputs.texts import arguments as written_arguments
+from rocking.inputs.texts import as_option, as_path
 from rocking.motion import records
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure

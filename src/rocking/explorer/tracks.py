@@ -8,9 +8,9 @@ from typing import Final
 
 from rocking.errors import RockingError
 from rocking.explorer.inputs import read_case
-from rocking.explorer.parameters import PARAMETERS, Parameter, names_of
-from rocking.explorer.texts import Texts
+from rocking.explorer.parameters import PARAMETERS, Texts, names_of
 from rocking.explorer.uploads import UploadStore
+from rocking.inputs.declared import Input
 
 #: Steps of a slider from its low to its high end, as the page has them.
 STEPS: Final = 1000
@@ -19,7 +19,7 @@ STEPS: Final = 1000
 _OF_BLOCKS: Final = frozenset({*names_of("block"), "gravity", "model", "duration"})
 
 
-def text_at(parameter: Parameter, step: int) -> str:
+def text_at(parameter: Input, step: int) -> str:
     """Write the number at a step of a parameter's slider as the page does.
 
     Examples
@@ -29,8 +29,7 @@ def text_at(parameter: Parameter, step: int) -> str:
     """
     part, (low, high) = step / STEPS, (parameter.low, parameter.high)
     number = low * (high / low) ** part if parameter.logarithmic else low + part * (high - low)
-    suffix: str = parameter.described()["suffix"]
-    return f"{float(f'{number:.3g}')!r}".removesuffix(".0") + suffix
+    return f"{float(f'{number:.3g}')!r}".removesuffix(".0") + parameter.suffix
 
 
 def tracks(texts: Texts) -> dict[str, list[list[int]]]:
@@ -72,17 +71,12 @@ def _track(given: Texts, name: str, text: str, side: int) -> list[int]:
     return [here - _reach(lambda k: refused(here - k), here), here + _reach(lambda k: refused(here + k), STEPS - here)]
 
 
-def _nearest(parameter: Parameter, text: str) -> int:
-    value = parameter.read(text if parameter.values != "two" else f"{text},{text}")
-    number = value[0] if isinstance(value, tuple) else value
-    steps = range(STEPS + 1)
-
-    def at(step: int) -> float:
-        there = text_at(parameter, step)
-        found = parameter.read(there if parameter.values != "two" else f"{there},{there}")
+def _nearest(parameter: Input, text: str) -> int:
+    def value(of: str) -> float:
+        found = parameter.read(of)
         return float(found[0] if isinstance(found, tuple) else found)
 
-    return min(bisect.bisect_left(steps, number, key=at), STEPS)
+    return min(bisect.bisect_left(range(STEPS + 1), value(text), key=lambda k: value(text_at(parameter, k))), STEPS)
 
 
 def _reach(refused: Callable[[int], bool], most: int) -> int:
