@@ -4,7 +4,6 @@ import json
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 import rocking
 from rocking import Block, Blocks, Motion, quantities
@@ -13,12 +12,6 @@ from rocking.errors import RockingError
 RECORD = "el-centro-meloland-270"
 SIZES = ["--width", "0.24", "--height", "1.1"]
 PULSE = "one-sine:amplitude=0.4g,frequency=1Hz"
-
-
-@pytest.fixture
-def undrawn(run, monkeypatch):
-    """Files of figures without a figure, where only their names matter."""
-    monkeypatch.setattr(Figure, "savefig", lambda figure, file, **options: file.write(b"not drawn"))
 
 
 #: What is typed after `rocking`, and words of the one sentence that answers: {R} is a record, {S} sizes, {B} a block by
@@ -99,6 +92,8 @@ ida {R} {S} --levels 2g,1g | increas
 ida {R} {S} --measure pgv --levels 0.2g:1g:5 | --levels takes a velocity as 40cm/s or 0.4 (m/s), not '0.2g'
 ida {R} {S} --measure pga_ratio --levels 0.2g,1g | which counts in the block's own units, not '0.2g'
 fragility {R} {S} | overturning
+fragility {R} --ensemble none.csv --restitution 0.5 | --ensemble has blocks of its own: leave --restitution out
+measures {R} --ensemble none.csv --one-sided --spring 2 | leave --one-sided and --spring out
 fragility {R} {S} --limits half=much | --limits half
 fragility {R} {S} --limits half=0.5,half=0.7 | has half twice
 fragility {R} {S} --limits overturning=0.5 | gives a rotation the name 'overturning'
@@ -126,7 +121,7 @@ orbits {Q} | a block is needed
 orbits {Q} --ball 0.5 --width 1 | leave --width out
 orbits {Q} --ball 0.5 --oscillator frequency=1 --restitution 0.5 | leave --oscillator and --restitution
 orbits {Q} --oscillator frequency=1 | --oscillator needs restitution
-orbits {Q} --oscillator frequency=1,mass=3 | --oscillator has no mass; there are frequency, restitution, damping_ratio, stop, second_stop
+orbits {Q} --oscillator frequency=1,mass=3 | --oscillator has no mass; there are frequency, restitution
 orbits {Q} --pendulum p=many,gap=1,restitution=0.5 | --pendulum
 orbits {Q} --ball 0.5 --along amplitude:16:9 | a lower value to a higher one
 orbits {Q} --ball 0.5 --orbit 1 | --along
@@ -316,37 +311,6 @@ def test_levels_of_a_velocity_may_have_their_unit(run):
 
 
 ECCENTRIC = ["--p", "2.9858,3.0053", "--alpha", "0.27417,0.155"]
-
-
-@pytest.mark.parametrize(
-    ("options", "block"),
-    [
-        (ECCENTRIC, lambda: Block.from_parameters((2.9858, 3.0053), (0.27417, 0.155))),
-        (
-            ["--pivots", "0.2,0.15", "--height-of-mass", "0.6", "--gyration", "0.4"],
-            lambda: Block.from_pivots((0.2, 0.15), 0.6, 0.4),
-        ),
-        (
-            ["--pivots", "0.2", "--height-of-mass", "0.6", "--gyration", "0.4", "--restitution", "0.7,0.8"],
-            lambda: Block.from_pivots((0.2, 0.2), 0.6, 0.4, restitution=(0.7, 0.8)),
-        ),
-        (
-            ["--width", "0.3", "--height", "1.1", "--offset", "-0.03"],
-            lambda: Block(width=0.3, height=1.1, offset=-0.03),
-        ),
-        (
-            ["--half-width", "0.15", "--half-height", "0.55", "--offset", "0.03", "--restitution", "0.9,0.8"],
-            lambda: Block(width=0.3, height=1.1, offset=0.03, restitution=(0.9, 0.8)),
-        ),
-    ],
-)
-def test_an_eccentric_block_is_that_of_python(run, options, block):
-    code, out, _ = run("simulate", "--pulse", "one-sine:amplitude=0.4g,frequency=1Hz", *options, "--json")
-    assert code == 0
-    truth = rocking.simulate(block(), rocking.pulses.one_sine(0.4 * 9.80665, 1.0))
-    found = json.loads(out)
-    assert found["block"]["restitution"] == [side.restitution for side in truth.block.sides]
-    assert found["peak_rotation_rad"] == truth.peak_rotation
 
 
 def test_sides_that_look_swapped_or_rounded_are_noted(run):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -102,36 +102,28 @@ def calibrate(
     choices = {name: value for name, value in given.items() if value is not None}
     with output.folder() as folder:
         table = read_calibration(data, **file.about())
-        if not isinstance(table, History):
-            _refuse("a history", motion=motion, initial_rotation=initial_rotation)
-            if not (predict or file.given("pulse")):
-                _refuse_without("predict", file)
-            others = {name: file.motion(name) for name in predict} | file.pulses()
-            how = _How(seed, folds, others, {"candidates": candidates, **choices})
-            results = _of_specimens(table, how, folder) if isinstance(table, dict) else _of_outcomes(table, how)
-        else:
-            _refuse("outcomes", predict=predict or None, folds=folds or None)
-            _refuse("outcomes", candidates=candidates if candidates != _CANDIDATES else None)
-            shaking = _shaking(motion, file)
-            if shaking is None:
-                _refuse_without("motion", file)
+        others: dict[str, object] = {"motion": motion, "initial_rotation": initial_rotation}
+        if isinstance(table, History):
+            others = {"predict": predict, "folds": folds, "candidates": candidates != _CANDIDATES}
+        for name in [name for name, value in others.items() if value]:
+            belong_to = "outcomes" if isinstance(table, History) else "a history"
+            raise InvalidOption(f"{{}} is for {belong_to}; the columns of this table are not", name)
+        records = predict if motion is None else (motion,)
+        motions = _motions(records, file, "motion" if isinstance(table, History) else "predict")
+        if isinstance(table, History):
+            if len(motions) > 1:
+                raise InvalidOption("a history has one motion of the base: give {}, or one {}", "motion", "pulse")
+            shaking = next(iter(motions.values()), None)
             history = calibrate_history(
                 table.times, table.rotation, shaking, **choices, initial_rotation=start, seed=seed
             )
-            results = _history_results(history)
+            results = _Results(history, history.to_dict(), history.summary())
+        else:
+            choices = {"candidates": candidates, "seed": seed, **choices}
+            results = _of_specimens(table if isinstance(table, dict) else {"": table}, motions, folds, choices, folder)
         if folder is not None:
             results.write(folder)
         print_result(results.numbers, results.text, as_json=output.as_json)
-
-
-@dataclass(frozen=True)
-class _How:
-    """How to calibrate, and what to predict."""
-
-    seed: int
-    folds: int
-    others: Mapping[str, Motion]
-    choices: Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -149,46 +141,34 @@ class _Results:
         write_results(folder, figures={"calibration": self.found.plot} if self.found else {}, result=self.numbers)
 
 
-def _refuse(belong_to: str, **given: object) -> None:
-    for name, value in given.items():
-        if value is not None:
-            raise InvalidOption(f"{{}} is for {belong_to}; the columns of this table are not", name)
-
-
-def _refuse_without(option: str, file: ScaledPulseOptions) -> None:
-    """Refuse what is said of motions where none is given that it could be said of."""
-    for name in file.given("scale", "pga", "pgv", "sa", "vertical"):
+def _motions(records: Sequence[str], file: ScaledPulseOptions, option: str) -> dict[str, Motion]:
+    """Read records and pulses; refuse what is said of motions where there are none."""
+    motions = {name: file.motion(name) for name in records} | file.pulses()
+    for name in {} if motions else file.given("scale", "pga", "pgv", "sa", "vertical"):
         raise InvalidOption("{} is for the motions of {} or {}: give one, or leave it out", name, option, "pulse")
+    return motions
 
 
-def _shaking(record: str | None, file: ScaledPulseOptions) -> Motion | None:
-    """Motion of the base, if it moved."""
-    motions = file.pulses() if record is None else {record: file.motion(record)} | file.pulses()
-    if len(motions) > 1:
-        raise InvalidOption("a history has one motion of the base: give {}, or one {}", "motion", "pulse")
-    return next(iter(motions.values()), None)
-
-
-def _of_specimens(tables: Mapping[str, Outcomes], how: _How, folder: Path | None) -> _Results:
-    """Calibrate each specimen by itself, and write each as soon as it is done."""
+def _of_specimens(
+    tables: Mapping[str, Outcomes], others: Mapping[str, Motion], folds: int, choices: Mapping[str, Any],
+    folder: Path | None,
+) -> _Results:  # fmt: skip
+    """Calibrate each specimen by itself, and write each as soon as it is done; the only one has no name."""
     for name, table in tables.items():
         with _naming(name):
-            _check(table, how)
-    results = {}
+            checked_outcomes(table.overturned, len(table.overturned))
+            if folds:
+                group_labels(table.groups, len(table.overturned), folds)
+    made = {}
     for name, table in tables.items():
         with _naming(name):
-            results[name] = _of_outcomes(table, how)
-        if folder is not None:
-            results[name].write(subfolder(folder, name))
-    numbers = {"specimens": {name: one.numbers for name, one in results.items()}}
-    return _Results(None, numbers, "\n\n".join(f"specimen {name}\n{one.text}" for name, one in results.items()))
-
-
-def _check(table: Outcomes, how: _How) -> None:
-    """Refuse outcomes that cannot be calibrated, and more folds than groups, before the work."""
-    checked_outcomes(table.overturned, len(table.overturned))
-    if how.folds:
-        group_labels(table.groups, len(table.overturned), how.folds)
+            made[name] = _of_outcomes(table, others, folds, choices)
+        if folder is not None and name:
+            made[name].write(subfolder(folder, name))
+    if "" in made:
+        return made[""]
+    numbers = {"specimens": {name: one.numbers for name, one in made.items()}}
+    return _Results(None, numbers, "\n\n".join(f"specimen {name}\n{one.text}" for name, one in made.items()))
 
 
 @contextlib.contextmanager
@@ -197,28 +177,25 @@ def _naming(specimen: str) -> Iterator[None]:
     try:
         yield
     except RockingError as error:
-        error.message = replace(error.message, template=f"specimen {literal(specimen)}: {error.message.template}")
+        if specimen:
+            template = f"specimen {literal(specimen)}: {error.message.template}"
+            error.message = replace(error.message, template=template)
         raise
 
 
-def _of_outcomes(table: Outcomes, how: _How) -> _Results:
-    _check(table, how)
-    found = calibrated(table.motions, table.overturned, seed=how.seed, **how.choices)
-    predicted = dict(zip(how.others, found.predict([*how.others.values()]), strict=True))
+def _of_outcomes(table: Outcomes, others: Mapping[str, Motion], folds: int, choices: Mapping[str, Any]) -> _Results:
+    found = calibrated(table.motions, table.overturned, **choices)
+    predicted = dict(zip(others, found.predict([*others.values()]), strict=True))
     numbers = {**found.to_dict(), "predicted": predicted}
     parts = [found.summary()]
-    if how.folds:
-        scores = found.cross_validate(groups=table.groups, folds=how.folds).scores
+    if folds:
+        scores = found.cross_validate(groups=table.groups, folds=folds).scores
         numbers["cross_validated"] = asdict(scores)
-        parts.append(f"left-out motions: {scores} ({counted(how.folds, 'fold')})")
+        parts.append(f"left-out motions: {scores} ({counted(folds, 'fold')})")
     if predicted:
         rows = [(name, float(chance)) for name, chance in predicted.items()]
         parts.append("\n" + text_table(["motion", "probability"], rows))
     return _Results(found, numbers, "\n".join(parts))
-
-
-def _history_results(found: HistoryCalibration) -> _Results:
-    return _Results(found, found.to_dict(), found.summary())
 
 
 def validate(

@@ -15,13 +15,13 @@ from cyclopts import Group, Parameter, Token
 from rocking.constants import Model
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingError, UnreadableRecord, literal
 from rocking.inputs import bodies
-from rocking.inputs.declared import INPUTS
+from rocking.inputs.declared import INPUTS, noted_acceleration
 from rocking.inputs.texts import option_of
 from rocking.motion.motion import Motion
 from rocking.motion.named import expanded, named_motion, named_vertical
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.named_pulses import named_pulse
-from rocking.plausibility import level_notes, motion_notes, vertical_notes
+from rocking.plausibility import motion_notes, vertical_notes
 from rocking.progress import Progress, note
 from rocking.quantities import Quantity, acceleration, number, scaling, values, velocity
 
@@ -251,7 +251,7 @@ class FileOptions(InputOptions):
         """Return the motion of a record or a pulse, with its vertical component and scaled, with notes on it."""
         given, vertical = self.given(), self.given().get("vertical")
         # A mistake in the options is reported before a long file is read.
-        target = scaling({n: given[n] for n in ("scale", "pga", "pgv", "sa") if n in given}, noted_acceleration)
+        target = scaling({n: given[n] for n in ("scale", "pga", "pgv", "sa") if n in given}, positive_acceleration)
         if is_pulse:
             motion = named_pulse(name)
             if vertical is not None:
@@ -396,7 +396,7 @@ class MeasureOptions:
 
     def chosen(self) -> dict[str, Any]:
         """Return measure and levels as arguments."""
-        readers: Mapping[str, Quantity] = {"pga": noted_acceleration, "sa": noted_acceleration, "pgv": velocity}
+        readers: Mapping[str, Quantity] = {"pga": positive_acceleration, "sa": positive_acceleration, "pgv": velocity}
         levels = None if self.levels is None else values(self.levels, "levels", readers.get(self.measure, _ratio))
         return {"measure": self.wanted, "levels": levels}
 
@@ -443,16 +443,13 @@ def labels_of(clusters: str | None) -> str | list[str] | None:
     return clusters if clusters in (None, BY_STATION) else [label.strip() for label in clusters.split(",")]
 
 
-def noted_acceleration(text: str, name: str) -> float:
-    """Return an acceleration, m/s^2, with a note where a number without a unit looks like one in g."""
-    value = acceleration(text, name)
-    if not value > 0.0:
+def positive_acceleration(text: str, name: str) -> float:
+    """Return a positive acceleration, m/s^2, with a note where a number without a unit looks like one in g."""
+    if not acceleration(text, name) > 0.0:
         raise InvalidOption(
             f"{{}} must be above 0, not {text.strip()}; {{}} -1 reverses a motion", name, "scale", value=text
         )
-    for sentence in level_notes(text, value, name):
-        note(sentence)
-    return value
+    return noted_acceleration(text, name)
 
 
 def _ratio(text: str, name: str) -> float:

@@ -32,29 +32,30 @@ PARAMETERS: Final = {name: each for name, each in INPUTS.items() if each.group}
 
 _LONGEST_TEXT: Final = 300
 
+
+def _of(group: str, numbers: str, **texts: str) -> dict[str, Input]:
+    """Declare names of an address, in their order: numbers, but for some texts with their defaults."""
+    return {
+        name: Input(
+            name,
+            group,
+            "text" if name in texts else "number",
+            default=texts.get(name, "200" if "points" in name else ""),
+        )
+        for name in numbers.split()
+    }
+
+
 #: What an address says about a map, of a case or of a study.
-MAP: Final = by_name(
-    Input("x", "map", "text"),
-    Input("x_from", "map"),
-    Input("x_to", "map"),
-    Input("y", "map", "text"),
-    Input("y_from", "map"),
-    Input("y_to", "map"),
-    Input("points", "map", default="200"),
-    Input("quantity", "map", "text"),
-    Input("motion_index", "map"),
-    Input("polarity_index", "map"),
-    Input("scale_index", "map"),
-    *(Input(f"fix_{name}", "map") for name in ("p", "alpha", "restitution", "block")),
-)
+MAP: Final = _of(
+    "map",
+    "x x_from x_to y y_from y_to points quantity motion_index polarity_index scale_index "
+    "fix_p fix_alpha fix_restitution fix_block",
+    x="", y="", quantity="",
+)  # fmt: skip
 
 #: What an address says about a sweep under periodic motion.
-SWEEP: Final = by_name(
-    Input("sweep", "sweep", "text", default="a"),
-    Input("sweep_from", "sweep"),
-    Input("sweep_to", "sweep"),
-    Input("sweep_points", "sweep", default="200"),
-)
+SWEEP: Final = _of("sweep", "sweep sweep_from sweep_to sweep_points", sweep="a")
 
 #: What an address says about the time that is read.
 READING: Final = by_name(Input("at", "reading", "duration", "", "s"))

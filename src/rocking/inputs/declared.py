@@ -10,6 +10,8 @@ from rocking import quantities
 from rocking.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.motion.units import plain_spelling
+from rocking.plausibility import level_notes
+from rocking.progress import note
 
 #: What reads a number of each kind, and its SI unit.
 READERS: Final[Mapping[str, tuple[quantities.Quantity, str]]] = {
@@ -24,6 +26,15 @@ READERS: Final[Mapping[str, tuple[quantities.Quantity, str]]] = {
     "frequency": (quantities.frequency, "Hz"),
     "acceleration": (quantities.acceleration, "m/s^2"),
 }
+
+
+def noted_acceleration(text: str, name: str) -> float:
+    """Return an acceleration, m/s^2, with a note where a number without a unit looks like one in g."""
+    value = quantities.acceleration(text, name)
+    for sentence in level_notes(text, value, name):
+        note(sentence)
+    return value
+
 
 #: What the page writes behind a number in these units; others are SI units.
 _SUFFIXES: Final = {"°": "deg", "g": "g"}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import fnmatch
 import glob
@@ -30,7 +29,7 @@ from rocking.inputs.bodies import (
     quantity_of,
     shape_of,
 )
-from rocking.inputs.declared import INPUTS
+from rocking.inputs.declared import INPUTS, noted_acceleration
 from rocking.inputs.toml import Tables, in_line, moved, nearest
 from rocking.motion import records
 from rocking.motion.formats.source import Request
@@ -38,7 +37,7 @@ from rocking.motion.motion import Motion
 from rocking.motion.named import expanded, is_there, named_motion
 from rocking.motion.scaling import FACTOR, Measure, MeasureName
 from rocking.named_pulses import pulse_family
-from rocking.plausibility import level_notes, motion_notes
+from rocking.plausibility import motion_notes
 from rocking.progress import note
 from rocking.studies.inputs import OUTCOMES, chosen_outcomes
 from rocking.studies.report import PLANS, ReportPlan, check_part
@@ -51,17 +50,15 @@ TEMPLATE: Final = Path(__file__).with_name("template.toml").read_text("utf-8")
 #: What motions may be scaled to, and how levels are read.
 _MEASURES: Final[Mapping[str, quantities.Quantity]] = {
     "factor": quantities.number,
-    "pga": quantities.acceleration,
+    "pga": noted_acceleration,
     "pgv": quantities.velocity,
-    "sa": quantities.acceleration,
+    "sa": noted_acceleration,
 }
 
 #: Keys of restraints that are tables: one word for several.
 _FORCES: Final = {f"{name}s": name for name in FORCES}
 
-#: Keys of restraints, and those of blocks that may have them.
 _HELD: Final = tuple(f"{name}s" if name in FORCES else name for name in HELD)
-_MASSIVE: Final = ("width", "half_width", "pivots")
 
 #: Tables of a file and their keys.
 SCHEMA: Final[Mapping[str, tuple[str, ...]]] = {
@@ -189,15 +186,13 @@ def _check_keys(tables: Tables, table: str) -> None:
         if key not in SCHEMA[table]:
             raise tables.wrong(table, key, f"[{table}] has no {{}}; {nearest(key, SCHEMA[table])}", key)
         wanted = next((kind for kind, keys in _TYPES.items() if key in keys and table.count(".") == 0), "")
-        kinds = {"text": str, "true or false": bool, "a table": dict}
         several = dict if wanted.startswith("tables") else str
-        if wanted in kinds:
-            is_right = isinstance(value, kinds[wanted])
-        elif wanted == "text or a whole number":
+        is_list = isinstance(value, list) and all(isinstance(each, several) for each in value)
+        kind = {"text": str, "true or false": bool, "a table": dict}.get(wanted)
+        is_right = is_list if kind is None else isinstance(value, kind)
+        if wanted == "text or a whole number":
             is_right = isinstance(value, str) or type(value) is int
-        else:
-            is_right = not wanted or (isinstance(value, list) and all(isinstance(each, several) for each in value))
-        if not is_right:
+        if wanted and not is_right:
             sentence = f"{{}} must be {wanted.format(key)}, not {checks.shown(value)}"
             raise tables.wrong(table, key, sentence, key, value=value)
         if wanted == "a table":
@@ -208,8 +203,8 @@ def _bodies(tables: Tables) -> Bodies:
     """Bodies of all combinations of what [blocks] gives, or of the table that it names."""
     given = tables.table("blocks")
     held = [name for name in given if name in _HELD]
-    if held and not {*_MASSIVE} & given.keys():
-        sentence = f"{{}} goes with {_listed(_MASSIVE)} of a block"
+    if held and not {"width", "half_width", "pivots"} & given.keys():
+        sentence = "{} goes with width, half_width and pivots of a block"
         raise tables.wrong("blocks", held[0], sentence, held[0])
     if "csv" in given:
         if len(given) > 1:
@@ -341,19 +336,7 @@ def _scales(tables: Tables) -> Scales:
         with tables.located("scales", key=name):
             values = quantities.axis(given[name], name, _MEASURES[name])
             checks.positive_numbers(values, name, InvalidOption)
-        _note_levels(name, given[name])
         return Scales.of(values, Measure(cast(MeasureName, name), **options))
-
-
-def _note_levels(name: str, given: object) -> None:
-    """Note levels without a unit that look like accelerations in g."""
-    if name in ("pga", "sa"):
-        for each in given if isinstance(given, list) else [given]:
-            # Of START:STOP:COUNT the stop is the strongest.
-            text = each.split(":")[:2][-1] if isinstance(each, str) else f"{each!r}"
-            with contextlib.suppress(ValueError):  # a number with a unit
-                for sentence in level_notes(text.strip(), float(text), name):
-                    note(sentence)
 
 
 def _motions(tables: Tables, scales: Scales) -> tuple[list[Motion], list[str], list[str]]:
@@ -431,8 +414,3 @@ def _pulses(tables: Tables, k: int) -> list[Motion]:
             axes[key] = [value] if quantity is None else quantities.axis(value, key, quantity)
     with tables.located(table, occurrence=k):
         return [family.motion(dict(zip(axes, values, strict=True))) for values in itertools.product(*axes.values())]
-
-
-def _listed(names: Sequence[str]) -> str:
-    """Join names as a sentence does."""
-    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
