@@ -10,8 +10,8 @@ from rocking.cli.options import BlockOptions, BodyOptions, MotionOptions, StartO
 from rocking.explorer.inputs import read_case
 from rocking.explorer.parameters import PARAMETERS
 from rocking.explorer.uploads import UploadStore
-from rocking.inputs.bodies import BLOCK, HELD, SHAPES, block_of, call_of
-from rocking.inputs.declared import INPUTS
+from rocking.inputs.bodies import block_of, call_of
+from rocking.inputs.declared import BLOCK, HELD, INPUTS, SHAPES
 from rocking.studies import read_study
 from rocking.studies.file import SCHEMA
 

@@ -35,7 +35,8 @@ from rocking.cli.options import (
 )
 from rocking.cli.output import OUTPUT, OutputOptions, deliver, print_result, write_results
 from rocking.errors import InvalidBlock, InvalidOption
-from rocking.inputs.bodies import SHAPES, block_of, note_likely_mistakes
+from rocking.inputs.bodies import block_of, note_likely_mistakes
+from rocking.inputs.declared import SHAPES
 from rocking.quantities import angle, length, tilt, values
 from rocking.result import DatasetResult
 

@@ -14,7 +14,7 @@ from cyclopts import Group, Parameter, Token
 
 from rocking.constants import Model
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingError, UnreadableRecord, literal
-from rocking.inputs import bodies
+from rocking.inputs import bodies, declared
 from rocking.inputs.declared import INPUTS, noted_acceleration
 from rocking.inputs.texts import option_of
 from rocking.motion.motion import Motion
@@ -94,10 +94,10 @@ def _with(*names: str) -> Callable[[type[Options]], type[Options]]:
     def decorated(options: type[Options]) -> type[Options]:
         made: list[Any] = []
         for name in names:
-            declared = INPUTS[name]
-            kind, default = _TYPES.get(declared.kind, (str | None, None))
-            is_signed = declared.is_number or "acceleration" in declared.kind
-            of = Parameter(help=declared.help, negative="", allow_leading_hyphen=is_signed)
+            each = INPUTS[name]
+            kind, default = _TYPES.get(each.kind, (str | None, None))
+            is_signed = each.is_number or "acceleration" in each.kind
+            of = Parameter(help=each.help, negative="", allow_leading_hyphen=is_signed)
             made.append((name, Annotated[kind, of], default))
         about = {"__doc__": options.__doc__, "__module__": options.__module__}
         return make_dataclass(options.__name__, made, bases=(options,), frozen=True, namespace=about)
@@ -105,26 +105,26 @@ def _with(*names: str) -> Callable[[type[Options]], type[Options]]:
     return decorated
 
 
-@_with(*(name for name in bodies.BLOCK if name != "mass"))
+@_with(*(name for name in declared.BLOCK if name != "mass"))
 class BlockOptions(InputOptions):
     """A block by its sizes, by its parameters, or by its pivots."""
 
     def block(self) -> Block:
         """Return the block, with notes on what looks like a mistake."""
-        block = bodies.block_of(self.read(*bodies.BLOCK))
+        block = bodies.block_of(self.read(*declared.BLOCK))
         bodies.note_likely_mistakes([block])
         return block
 
 
-@_with("mass", *bodies.HELD)
+@_with("mass", *declared.HELD)
 class HeldOptions(BlockOptions):
     """A block, and what holds it back or pushes it."""
 
     def body(self) -> Body:
         """Return the block, with its restraints where there are some."""
-        given, block = self.given(), bodies.block_of(self.read(*bodies.BLOCK))
-        forces = [_made(bodies.FORCES[name], text, name) for name in bodies.FORCES for text in given.get(name, ())]
-        for name, couple in bodies.COUPLES.items():
+        given, block = self.given(), bodies.block_of(self.read(*declared.BLOCK))
+        forces = [_made(declared.FORCES[name], text, name) for name in declared.FORCES for text in given.get(name, ())]
+        for name, couple in declared.COUPLES.items():
             if name in given:
                 with _about(name):
                     forces.append(couple(INPUTS[name].read(given[name])))

@@ -13,8 +13,8 @@ from typing import Any, Final, NamedTuple
 from rocking.constants import VERSION
 from rocking.errors import InvalidOption
 from rocking.explorer.phrases import english
-from rocking.inputs.bodies import SHAPES as ALL_SHAPES
 from rocking.inputs.declared import INPUTS, SCALINGS, Input, by_name
+from rocking.inputs.declared import SHAPES as ALL_SHAPES
 from rocking.motion import records
 from rocking.motion.units import CHOICES
 from rocking.named_pulses import FAMILIES

@@ -5,14 +5,14 @@ from __future__ import annotations
 import inspect
 import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from rocking import checks
-from rocking.block import Block, Damper, Load, RestrainedBlock, Restraint, Spring, Tendon, Thrust
+from rocking.block import Block, RestrainedBlock, Restraint
 from rocking.body import Body
 from rocking.errors import InvalidBlock, InvalidOption, Message, literal
 from rocking.inputs import texts
-from rocking.inputs.declared import INPUTS, READERS
+from rocking.inputs.declared import BLOCK, INPUTS, READERS, SHAPES, Shape
 from rocking.plausibility import block_notes, restraint_notes
 from rocking.progress import note
 from rocking.quantities import Quantity
@@ -20,31 +20,6 @@ from rocking.quantities import Quantity
 #: Bodies that are searched for likely mistakes.
 _NOTED: Final = 100
 
-
-class Shape(NamedTuple):
-    """A way to describe a block: the inputs that it needs and accepts, and the function of `rocking` that makes one."""
-
-    name: str
-    needed: tuple[str, ...]
-    optional: tuple[str, ...]
-    make: Callable[..., Block]
-
-
-#: A restitution goes with each of them.
-SHAPES: Final = (
-    Shape("sizes", ("width", "height"), ("offset", "mass"), Block),
-    Shape("half sizes", ("half_width", "half_height"), ("offset", "mass"), Block),
-    Shape("parameters", ("p", "alpha"), (), Block.from_parameters),
-    Shape("pivots", ("pivots", "height_of_mass", "gyration"), ("mass",), Block.from_pivots),
-)
-
-#: Inputs that describe a block.
-BLOCK: Final = (*dict.fromkeys(n for shape in SHAPES for n in (*shape.needed, *shape.optional)), "restitution")
-
-#: Restraints, by the names of their inputs: couples are numbers, the others have parameters.
-COUPLES: Final[Mapping[str, Callable[[float], Restraint]]] = {"spring": Spring, "damper": Damper}
-FORCES: Final[Mapping[str, Callable[..., Restraint]]] = {"tendon": Tendon, "thrust": Thrust, "load": Load}
-HELD: Final = ("one_sided", "lean", "tendon", "spring", "damper", "thrust", "load")
 
 #: What goes with a slenderness that is all that is known of a block.
 _FREQUENCY_PARAMETER: Final = (

@@ -17,19 +17,8 @@ from rocking.block import Blocks, RestrainedBlock, RestrainedBlocks
 from rocking.body import Bodies
 from rocking.ensemble import Product, Scales
 from rocking.errors import InvalidMotion, InvalidOption, RockingError, StudyError, UnreadableRecord
-from rocking.inputs.bodies import (
-    BLOCK,
-    COUPLES,
-    FORCES,
-    HELD,
-    block_of,
-    body_of,
-    check_parameters,
-    note_likely_mistakes,
-    quantity_of,
-    shape_of,
-)
-from rocking.inputs.declared import INPUTS, noted_acceleration
+from rocking.inputs.bodies import block_of, body_of, check_parameters, note_likely_mistakes, quantity_of, shape_of
+from rocking.inputs.declared import BLOCK, COUPLES, FORCES, HELD, INPUTS, noted_acceleration
 from rocking.inputs.toml import Tables, in_line, moved, nearest
 from rocking.motion import records
 from rocking.motion.formats.source import Request
@@ -55,9 +44,7 @@ _MEASURES: Final[Mapping[str, quantities.Quantity]] = {
     "sa": noted_acceleration,
 }
 
-#: Keys of restraints that are tables: one word for several.
-_FORCES: Final = {f"{name}s": name for name in FORCES}
-
+#: Keys of restraints: of those that are tables one word for several.
 _HELD: Final = tuple(f"{name}s" if name in FORCES else name for name in HELD)
 
 #: Tables of a file and their keys.
@@ -77,7 +64,7 @@ _TYPES: Final[Mapping[str, tuple[str, ...]]] = {
     "a list of texts": ("records", "outcomes"),
     "true or false": ("one_sided", "skip_unreadable"),
     "a table": tuple(PLANS),
-    "tables, [[blocks.{}]]": tuple(_FORCES),
+    "tables, [[blocks.{}]]": tuple(f"{name}s" for name in FORCES),
     "tables, [[motions.{}]]": ("pulses",),
 }
 
@@ -217,7 +204,7 @@ def _bodies(tables: Tables) -> Bodies:
     for name in (*described, *(name for name in ("one_sided", "lean") if name in given)):
         with tables.located("blocks", key=name):
             axes[name] = INPUTS[name].axis(given[name])
-    restraints = [*_couples(tables), *_forces(tables)]
+    restraints = [*_restraints(tables)]
     with tables.located("blocks"):
         if "p" in axes:
             return Blocks.grid(**axes)
@@ -233,29 +220,24 @@ def _bodies(tables: Tables) -> Bodies:
         return RestrainedBlocks.of(bodies) if isinstance(bodies[0], RestrainedBlock) else Blocks.of(bodies)
 
 
-def _couples(tables: Tables) -> Iterator[list[Any]]:
-    given = tables.table("blocks")
+def _restraints(tables: Tables) -> Iterator[list[Any]]:
+    """Give what each restraint may be: one, or several where its numbers are lists or ranges."""
+    blocks = tables.table("blocks")
     for name, couple in COUPLES.items():
-        if name in given:
+        if name in blocks:
             with tables.located("blocks", key=name):
-                yield [couple(value) for value in INPUTS[name].axis(given[name])]
-
-
-def _forces(tables: Tables) -> Iterator[list[Any]]:
-    """Give what each restraint that is a table may be: one, or several where its numbers are lists or ranges."""
-    for key, name in _FORCES.items():
-        for k, given in enumerate(tables.table("blocks").get(key, [])):
-            table, axes = f"blocks.{key}", dict[str, Any]()
+                yield [couple(value) for value in INPUTS[name].axis(blocks[name])]
+    for name, force in FORCES.items():
+        for k, given in enumerate(blocks.get(f"{name}s", [])):
+            table, axes = f"blocks.{name}s", dict[str, Any]()
             with tables.located(table, occurrence=k):
-                check_parameters(FORCES[name], given, f"[[{table}]]")
-            for each, value in given.items():
-                with tables.located(table, key=each, occurrence=k):
-                    axes[each] = (
-                        [value] if isinstance(value, bool) else quantities.axis(value, each, quantity_of(each)).tolist()
-                    )
+                check_parameters(force, given, f"[[{table}]]")
+            for key, value in given.items():
+                with tables.located(table, key=key, occurrence=k):
+                    numbers = [value] if isinstance(value, bool) else quantities.axis(value, key, quantity_of(key))
+                    axes[key] = [*numbers]
             with tables.located(table, occurrence=k):
-                rows = itertools.product(*axes.values())
-                yield [FORCES[name](**dict(zip(axes, row, strict=True))) for row in rows]
+                yield [force(**dict(zip(axes, row, strict=True))) for row in itertools.product(*axes.values())]
 
 
 def _blocks_of_csv(tables: Tables, table: Path) -> Blocks:
