@@ -138,25 +138,9 @@ class HeldOptions(BlockOptions):
         return body
 
 
-@dataclass(frozen=True)
+@_with("ball", "oscillator", "pendulum")
 class BodyOptions(HeldOptions):
     """A block with what holds it back, or another body in its place."""
-
-    ball: Annotated[
-        str | None,
-        hint("In place of a block a ball on a table, by its coefficient of restitution; the motion is up."),
-    ] = None
-    oscillator: Annotated[
-        str | None,
-        hint(
-            "In place of a block an oscillator that hits a stop, as frequency=1,restitution=0.8,stop=0.01 (Hz, m), "
-            "with damping_ratio and second_stop."
-        ),
-    ] = None
-    pendulum: Annotated[
-        str | None,
-        hint("In place of a block a pendulum between walls, as p=3,gap=0.1,restitution=0.6 (rad/s, m)."),
-    ] = None
 
     def body(self) -> Body:
         """Return the other body that is given, or where there is none the block."""
@@ -168,14 +152,15 @@ class BodyOptions(HeldOptions):
         first = next((name for name in kinds if name in self.given()), None)
         if first is None:
             return super().body()
-        others = [name for name in (*kinds, "restitution", *self.given()) if name in self.given() and name != first]
-        if others := [*dict.fromkeys(others)]:
+        given = self.given()
+        if others := [
+            name for name in dict.fromkeys((*kinds, "restitution", *given)) if name in given and name != first
+        ]:
             raise InvalidBlock(f"{{}} is a body of its own: leave {bodies.all_of(others)} out", first, *others)
-        text = self.given()[first]
         if first != "ball":
-            return _made(kinds[first], text, first)
+            return _made(kinds[first], given[first], first)
         with _about("ball"):
-            return BouncingBall(number(text, "ball"))
+            return BouncingBall(self.read("ball")["ball"])
 
 
 @dataclass(frozen=True)
