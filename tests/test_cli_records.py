@@ -221,24 +221,6 @@ def test_what_the_locale_cannot_encode_is_shown_as_question_marks(monkeypatch):
     assert b"rocking: ??d?.txt" in stderr.buffer.getvalue()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "sentence"),
-    [
-        (["el-centro-meloland-up", *BLOCK], "looks vertical"),
-        ([RECORD, "--width", "2", "--height", "1", "--restitution", "0.5"], "sizes swapped"),
-        ([RECORD, "--width", "20", "--height", "100"], "in metres"),
-    ],
-)
-def test_what_looks_like_a_mistake_is_noted_and_computed(run, arguments, sentence):
-    code, out, err = run("simulate", *arguments)
-    assert code == 0
-    assert "outcome" in out
-    assert err.count("\n") == 1
-    assert err.startswith("rocking: note: ")
-    assert sentence in err
-    assert run("simulate", *arguments, "--quiet")[2] == ""
-
-
 @pytest.mark.parametrize(("unit", "sentence"), [("m/s2", "moves no block"), ("g", "are the units right")])
 def test_a_peak_of_another_order_is_noted(run, tmp_path, unit, sentence):
     record = tmp_path / "record.txt"
@@ -307,21 +289,26 @@ def test_a_hyphen_is_a_polarity(run):
     assert apart[0] == 0
 
 
-@pytest.mark.parametrize(
-    ("option", "value", "sentence"),
-    [
-        ("--pga", "0.4", "--pga 0.4 is taken for 0.4 m/s^2, 0.0408 g; write 0.4g for 0.4 g"),
-        ("--pga", "400", "the peak acceleration is 40.8 g"),
-        ("--sa", "0.3@1", "--sa 0.3 is taken for 0.3 m/s^2"),
-        ("--sa", "0.3g@1000", "the peak acceleration is 8.35e+03 g"),
-        ("--pgv", "40", "more than any ground motion has"),
-        ("--scale", "0", "the acceleration is zero throughout"),
-    ],
-)
-def test_a_suspicious_scaling_is_noted(run, option, value, sentence):
-    code, _, err = run("simulate", RECORD, *BLOCK, option, value)
-    assert code == 0
-    assert sentence in err and err.count("note") == 1
+NOTES = """
+el-centro-meloland-up {B} | looks vertical
+{R} --width 2 --height 1 --restitution 0.5 | sizes swapped
+{R} --width 20 --height 100 | in metres
+{R} {B} --pga 0.4 | --pga 0.4 is taken for 0.4 m/s^2, 0.0408 g; write 0.4g for 0.4 g
+{R} {B} --pga 400 | the peak acceleration is 40.8 g
+{R} {B} --sa 0.3@1 | --sa 0.3 is taken for 0.3 m/s^2
+{R} {B} --sa 0.3g@1000 | the peak acceleration is 8.35e+03 g
+{R} {B} --pgv 40 | more than any ground motion has
+{R} {B} --scale 0 | the acceleration is zero throughout
+"""
+
+
+@pytest.mark.parametrize("noted", NOTES.strip().splitlines())
+def test_what_looks_like_a_mistake_is_noted_and_computed(run, noted):
+    typed, _, sentence = noted.replace("{R}", RECORD).replace("{B}", " ".join(BLOCK)).partition(" | ")
+    code, out, err = run("simulate", *typed.split())
+    assert code == 0 and "outcome" in out
+    assert err.startswith("rocking: note: ") and sentence in err and err.count("note") == err.count("\n") == 1
+    assert run("simulate", *typed.split(), "--quiet")[2] == ""
 
 
 def test_a_sensible_scaling_is_not_noted(run):

@@ -20,18 +20,8 @@ from rocking.errors import INTERRUPTED, DamagedStudy, InvalidOption, RockingErro
 from rocking.inputs.texts import option_of
 from rocking.progress import notes_for
 
-#: What is wrong where a disk is full.
-_FULL: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
-
-#: How alike two names must be for the one to be a slip of the other: a letter or two in a word of six.
-_ALIKE: Final = 0.8
-
 #: Names so short are too alike for a guess: a suggestion must not lead to another quantity.
 _SHORT: Final = len("--pga")
-
-#: What kinds of numbers are called.
-_NUMBERS: Final[dict[type, str]] = {float: "a number", int: "a whole number"}
-
 
 app = App(
     name="rocking",
@@ -139,7 +129,7 @@ def _sentence(error: Exception, given: list[str]) -> str:
     """Say what is wrong; nothing where it is a fault of the program."""
     if isinstance(error, (RockingError, CycloptsError)):
         return sentence_of(error, given)
-    if isinstance(error, OSError) and error.errno in _FULL:
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO):
         # Files have their own sentence: this is what is printed, to a disk that is full.
         _close_output()
         return f"the output cannot be written: {os.strerror(error.errno)}; send it elsewhere"
@@ -216,8 +206,9 @@ def sentence_of(error: RockingError | CycloptsError, arguments: Sequence[str]) -
         sentence = f"{command} needs {_name(argument)}"
         if is_given and not _is_positional(argument):
             sentence = f"{_name(argument)} needs a value"
-    elif isinstance(error, CoercionError) and argument and error.token and error.target_type in _NUMBERS:
-        sentence = f"{_name(argument)} takes {_NUMBERS[error.target_type]}, not {error.token.value!r}"
+    elif isinstance(error, CoercionError) and argument and error.token and error.target_type in (float, int):
+        kind = "a number" if error.target_type is float else "a whole number"
+        sentence = f"{_name(argument)} takes {kind}, not {error.token.value!r}"
     elif isinstance(error, UnusedCliTokensError):
         sentence = f"{command} takes no argument {' '.join(error.unused_tokens or ())!r}"
     return f"{sentence}; see {command} --help"
@@ -228,7 +219,9 @@ def _unknown_option(typed: str, arguments: Sequence[str]) -> str:
     command = command_of(arguments)
     known = {"--help", *_options(command), *(each for each in command if each.startswith("-"))}
     words = {each.lstrip("-"): each for each in known if len(each) > _SHORT}
-    hint = meant(name.lstrip("-"), words if len(name) > _SHORT else {}, "see its --help", _ALIKE)
+    hint = meant(
+        name.lstrip("-"), words if len(name) > _SHORT else {}, "see its --help", 0.8
+    )  # a slip: a letter or two of six
     return f"{_named(arguments)} has no option {name}; {hint}"
 
 

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
@@ -36,11 +36,6 @@ from rocking.response import PRECISION, Response, steps_within
 from rocking.response.contact import friction_coefficient
 from rocking.simulation import simulate as run
 from rocking.tables import text_table, to_json
-
-#: Names of files in one sentence.
-_SHOWN: Final = 5
-
-_EXAMPLE: Final = "rocking simulate --pulse sine:amplitude=0.2g,frequency=2Hz,cycles=5 --width 0.24 --height 1.1"
 
 
 @dataclass(frozen=True)
@@ -177,8 +172,7 @@ def records(
     else:
         print("\n\n".join([each.summary() for each in shown] + [*refused.values()]))
     if refused:
-        left = len(refused) - _SHOWN
-        names_of = ", ".join([*refused][:_SHOWN]) + (f" and {left} more" if left > 0 else "")
+        names_of = ", ".join([*refused][:5]) + (f" and {len(refused) - 5} more" if len(refused) > 5 else "")
         raise UnreadableRecord(f"{len(refused)} of {len(files)} files cannot be read: {names_of}")
 
 
@@ -205,7 +199,8 @@ def pulses(*, output: Annotated[PrintOptions, OUTPUT] = PrintOptions()) -> None:
         return
     rows = [(one.name, _listed(one, dict.fromkeys(one.needed)), _listed(one, one.optional)) for one in families]
     print(text_table(["pulse", "needs", "takes"], rows))
-    print(f"\namplitudes may be 0.5g or 4.9m/s2, frequencies 2Hz or 12.6rad/s, angles 90deg:\n{_EXAMPLE}")
+    print("\namplitudes may be 0.5g or 4.9m/s2, frequencies 2Hz or 12.6rad/s, angles 90deg:")
+    print("rocking simulate --pulse sine:amplitude=0.2g,frequency=2Hz,cycles=5 --width 0.24 --height 1.1")
 
 
 def _listed(family: PulseFamily, parameters: Mapping[str, Any]) -> str:

@@ -15,9 +15,6 @@ from rocking.explorer.periodic import KEPT, PASSED
 from rocking.explorer.sweeps import Sweep, call_at
 from rocking.inputs.texts import command_line
 
-#: Quantities of a map of overturning.
-_OVERTURNING: Final = ("peak", "mode")
-
 _CHATTERING: Final = """\
 import math
 
@@ -220,7 +217,7 @@ def map_as_code(grid: MapGrid) -> dict[str, Any]:
     command = map_as_command(grid)
     return {
         "python": {each: map_as_python(grid, each) for each in QUANTITIES},
-        "command": dict.fromkeys(_OVERTURNING, command),
+        "command": dict.fromkeys(("peak", "mode"), command),
     }
 
 

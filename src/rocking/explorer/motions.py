@@ -22,9 +22,6 @@ from rocking.motion.scaling import Measure
 from rocking.named_pulses import FAMILIES, pulse_values
 from rocking.quantities import acceleration, scaling
 
-#: Letters of a key in the name of a variable.
-_TOLD_APART: Final = 6
-
 #: Longest pulse, cycles: a page shows no more, and memory is bounded.
 MOST_SHOWN: Final = 1000.0
 
@@ -108,7 +105,7 @@ def _unscaled(name: str, values: Values, uploads: UploadStore) -> Found:
     if kind == "given":
         motion = uploads.motion(key)
         name = "".join(letter for letter in motion.name if letter.isprintable())  # a new line would end the comment
-        variable = f"given_{key[:_TOLD_APART]}"
+        variable = f"given_{key[:6]}"
         return Found(motion, variable, (), f"{variable} = ...  # {name}: the motion that this page was opened with")
     if kind == "file":
         return _from_file(key, values, values.get("channel"), uploads)
