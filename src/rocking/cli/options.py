@@ -96,7 +96,7 @@ def _with(*names: str) -> Callable[[type[Options]], type[Options]]:
         for name in names:
             each = INPUTS[name]
             kind, default = _TYPES.get(each.kind, (str | None, None))
-            is_signed = each.is_number or "acceleration" in each.kind
+            is_signed = each.kind in declared.READERS or "acceleration" in each.kind
             of = Parameter(help=each.help, negative="", allow_leading_hyphen=is_signed)
             made.append((name, Annotated[kind, of], default))
         about = {"__doc__": options.__doc__, "__module__": options.__module__}

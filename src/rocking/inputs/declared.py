@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal, NamedTuple
 
 from rocking import quantities
-from rocking.arrays import Floats
 from rocking.block import Block, Damper, Load, Restraint, Spring, Tendon, Thrust
 from rocking.errors import InvalidOption
 from rocking.motion.units import plain_spelling
@@ -81,11 +80,6 @@ class Input:
     text: str = ""
     argument: str = ""
 
-    @property
-    def is_number(self) -> bool:
-        """Whether it is one number, or one for each side."""
-        return self.kind in READERS
-
     def read(self, text: str) -> Any:
         """Return the value of a text in SI units: the text itself, a number, or a tuple of two numbers.
 
@@ -96,26 +90,33 @@ class Input:
         """
         if self.kind == "acceleration at a period":
             return quantities.at_a_period(text, self.name)
-        if not self.is_number:
+        if self.kind not in READERS:
             return text
-        found = quantities.sides(text, self.name, READERS[self.kind][0]) if self.values != "one" else self.one(text)
+        if self.values == "one":
+            return self.one(text)
+        found = quantities.sides(text, self.name, READERS[self.kind][0])
         if self.values == "two" and not isinstance(found, list):
             found = [found, found]
         return tuple(found) if isinstance(found, list) else found
 
+    def one(self, text: str) -> float:
+        """Return a number that belongs to one side, or to both."""
+        return READERS[self.kind][0](text, self.name)
+
     def axis(self, value: Any) -> list[Any]:
         """Return the values that a study file gives: of a number one, a list, or a range; of pivots pairs."""
-        if not self.is_number:
+        if self.kind not in READERS:
             return [value]
+        reader = READERS[self.kind][0]
         if self.values != "two":
-            return [*map(float, self._axis(value))]
+            return [*map(float, quantities.axis(value, self.name, reader))]
         pairs = value if isinstance(value, list) and value and isinstance(value[0], list) else [value]
-        found = [tuple(self._axis(pair).tolist()) for pair in pairs]
+        found = [tuple(map(float, quantities.axis(pair, self.name, reader))) for pair in pairs]
         if any(len(pair) != 2 for pair in found):
             raise InvalidOption(
                 "{} must be a pair, [0.2, 0.15] (side +, side -), or a list of pairs", self.name, value=value
             )
-        return found
+        return [*found]
 
     def described(self) -> dict[str, Any]:
         """Return what the page needs, in plain values."""
@@ -132,20 +133,11 @@ class Input:
     def _units(self) -> dict[str, float]:
         """Return the size of each unit in the unit that is shown, by plain spellings as in `quantities.UNITS`."""
         kind = {"acceleration at a period": "acceleration", "tilt": "angle"}.get(self.kind, self.kind)
-        units = quantities.UNITS.get(kind, {})
-        shown = units[plain_spelling(self.suffix)] if units else None
-        return {
-            name: unit.multiplier * shown.divisor / unit.divisor / shown.multiplier
-            for name, unit in units.items()
-            if shown
-        }
-
-    def one(self, text: str) -> float:
-        """Return a number that belongs to one side, or to both."""
-        return READERS[self.kind][0](text, self.name)
-
-    def _axis(self, value: Any) -> Floats:
-        return quantities.axis(value, self.name, READERS[self.kind][0])
+        if kind not in quantities.UNITS:
+            return {}
+        units = quantities.UNITS[kind]
+        shown = units[plain_spelling(self.suffix)]
+        return {name: unit.multiplier * shown.divisor / unit.divisor / shown.multiplier for name, unit in units.items()}
 
 
 def by_name(*inputs: Input) -> dict[str, Input]:
