@@ -214,6 +214,12 @@ def run(unarranged: None, capsys: pytest.CaptureFixture[str]) -> Callable[..., t
     return call
 
 
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Make figures and their files, but draw nothing into these."""
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda figure, file, **options: file.write(b"not drawn"))
+
+
 @pytest.fixture(scope="session")
 def shared() -> Path:
     """Folder with records and reference values that do not ship with the project; absent on most machines."""

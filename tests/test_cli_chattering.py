@@ -2,6 +2,8 @@
 
 import json
 
+import pytest
+
 from rocking.chattering import (
     asymptotic_table,
     chattering_time,
@@ -10,6 +12,8 @@ from rocking.chattering import (
     first_interval,
     sequence,
 )
+
+METHODS = ("asymptotic", "series", "semianalytical", "exact")
 
 
 def test_chatter_json_is_what_the_functions_give(run):
@@ -49,29 +53,18 @@ def test_chatter_shows_the_iterative_procedure(run):
     assert len(out.splitlines()) < 40
 
 
-def test_chatter_says_complete_or_incomplete(run):
-    assert "complete: proven" in run("chatter", 1.03, 2, 0.92)[1]
-    code, out, _ = run("chatter", 1.05, 2, 0.92)
-    assert code == 0
-    assert "incomplete" in out
-    assert "worthless" in out
-    result = json.loads(run("chatter", 1.05, 2, 0.92, "--json")[1])
-    assert result["complete"] is False
-    assert result["chattering_time"]["exact"] is None
-    assert result["bracket"]["upper"] is None
-
-
-def test_without_loss_at_impacts_nothing_rests(run):
-    code, out, _ = run("chatter", 1.03, 2, 1)
-    assert code == 0
-    assert "incomplete" in out
-    assert json.loads(run("chatter", 1.03, 2, 1, "--json")[1])["series"]["error"] is None
-
-
-def test_at_the_threshold_there_is_nothing_to_wait_for(run):
-    result = json.loads(run("chatter", 1, 2, 0.92, "--json")[1])
-    assert result["complete"] is True
-    assert set(result["chattering_time"].values()) == {0.0}
+@pytest.mark.parametrize(
+    ("a", "eta", "words", "times", "upper"),
+    [(1.03, 0.92, "complete: proven", {}, True), (1.05, 0.92, "worthless", {"exact": None}, False),
+     (1.03, 1, "incomplete", {}, False), (1, 0.92, "complete", dict.fromkeys(METHODS, 0.0), True)],
+)  # fmt: skip
+def test_chatter_says_complete_or_incomplete(run, a, eta, words, times, upper):
+    code, out, _ = run("chatter", a, 2, eta)
+    assert code == 0 and words in out and ("incomplete" in out) != upper
+    result = json.loads(run("chatter", a, 2, eta, "--json")[1])
+    assert result["complete"] is upper
+    assert result["chattering_time"].items() >= times.items()
+    assert (result["bracket"]["upper"] is not None) == upper
 
 
 def test_critical_json_has_every_method(run):

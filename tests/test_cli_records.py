@@ -1,6 +1,5 @@
 """The command line and records: many at once, targets to scale to, units, names that are close, what looks wrong."""
 
-import importlib
 import io
 import json
 import re
@@ -11,9 +10,7 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking import quantities
 from rocking.cli import main
-from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
 from rocking.plausibility import motion_notes
 from rocking.progress import note, notes_for
@@ -38,14 +35,6 @@ def folder(tmp_path):
         (place / f"r{k}.AT2").write_text(text)
     (place / ".hidden").write_text("nothing")
     return place
-
-
-def test_full_sizes_are_twice_the_half_sizes(run):
-    half = run("simulate", RECORD, "--half-width", 0.12, "--half-height", 0.55, "--json")
-    assert run("simulate", RECORD, *BLOCK, "--json")[1] == half[1]
-    code, _, err = run("simulate", RECORD, "--width", 0.24, "--half-height", 0.55)
-    assert code == 2
-    assert "--width and --height" in err
 
 
 @pytest.mark.cases(fast=6)
@@ -74,62 +63,12 @@ def test_records_are_scaled_to_a_target_by_every_command(monkeypatch, run, comma
     assert (pytest.approx(seen[0][0]), seen[0][1]) == target
 
 
-@pytest.mark.parametrize(
-    ("read", "text", "expected"),
-    [
-        ("length", "50 cm", 0.5),
-        ("length", "240mm", 0.24),
-        ("length", "1 ft", 0.3048),
-        ("position", "-2in", -0.0508),
-        ("angle", "12 °", np.pi / 15),
-        ("acceleration", "30 %g", 0.3 * 9.80665),
-        ("acceleration", "3.2 m/s²", 3.2),
-        ("acceleration", "250 gal", 2.5),
-        ("velocity", "40 cm/s", 0.4),
-        ("duration", "5 ms", 0.005),
-        ("frequency", "2 Hz", 2.0),
-        ("rate", "3.6 rad/s", 3.6),
-        ("rate", "90deg/s", np.pi / 2),
-    ],
-)
-def test_units_are_taken_as_people_write_them(read, text, expected):
-    assert getattr(quantities, read)(text, "--x") == pytest.approx(expected, rel=1e-15)
-
-
 def test_sizes_speeds_and_steps_of_the_command_line_have_units(run):
     plain = run("simulate", "el-centro-meloland-270", "--width", "0.24", "--height", "1", "--pgv", "0.4")
     assert (
         run("simulate", "el-centro-meloland-270", "--width", "24cm", "--height", "1000mm", "--pgv", "40cm/s") == plain
     )
     assert plain[0] == 0
-
-
-@pytest.mark.parametrize(("read", "text"), [("acceleration", "0.5ft"), ("angle", "12grad"), ("number", "3g")])
-def test_a_unit_of_another_quantity_is_refused(read, text):
-    with pytest.raises(InvalidOption, match="--x takes"):
-        getattr(quantities, read)(text, "--x")
-
-
-def test_ranges_have_units_at_their_ends():
-    assert quantities.values("0.1g:0.3g:3", "--levels", quantities.acceleration) == pytest.approx(
-        [0.1 * GRAVITY, 0.2 * GRAVITY, 0.3 * GRAVITY]
-    )
-    assert quantities.values("5deg,10deg", "--alpha", quantities.angle) == pytest.approx(np.radians([5.0, 10.0]))
-
-
-@pytest.mark.parametrize(
-    ("command", "module", "analysis"),
-    [("ida", "analysis", "incremental_dynamic_analysis"), ("fragility", "fragility", "run")],
-)
-def test_levels_of_an_acceleration_may_be_in_g_and_those_of_a_velocity_may_not(
-    run, monkeypatch, command, module, analysis
-):
-    def refuse(*_, levels, **__):
-        raise InvalidOption(f"{levels.round(6).tolist()}")
-
-    monkeypatch.setattr(importlib.import_module(f"rocking.cli.{module}"), analysis, refuse)
-    assert "[0.980665, 1.96133]" in run(command, RECORD, *BLOCK, "--levels", "0.1g,0.2g")[2]
-    assert "--levels takes a velocity" in run(command, RECORD, *BLOCK, "--measure", "pgv", "--levels", "0.1g,0.2g")[2]
 
 
 def test_files_folders_patterns_and_shipped_names_make_one_table(run, folder):
@@ -282,24 +221,6 @@ def test_what_the_locale_cannot_encode_is_shown_as_question_marks(monkeypatch):
     assert b"rocking: ??d?.txt" in stderr.buffer.getvalue()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "sentence"),
-    [
-        (["el-centro-meloland-up", *BLOCK], "looks vertical"),
-        ([RECORD, "--width", "2", "--height", "1", "--restitution", "0.5"], "sizes swapped"),
-        ([RECORD, "--width", "20", "--height", "100"], "in metres"),
-    ],
-)
-def test_what_looks_like_a_mistake_is_noted_and_computed(run, arguments, sentence):
-    code, out, err = run("simulate", *arguments)
-    assert code == 0
-    assert "outcome" in out
-    assert err.count("\n") == 1
-    assert err.startswith("rocking: note: ")
-    assert sentence in err
-    assert run("simulate", *arguments, "--quiet")[2] == ""
-
-
 @pytest.mark.parametrize(("unit", "sentence"), [("m/s2", "moves no block"), ("g", "are the units right")])
 def test_a_peak_of_another_order_is_noted(run, tmp_path, unit, sentence):
     record = tmp_path / "record.txt"
@@ -368,21 +289,26 @@ def test_a_hyphen_is_a_polarity(run):
     assert apart[0] == 0
 
 
-@pytest.mark.parametrize(
-    ("option", "value", "sentence"),
-    [
-        ("--pga", "0.4", "--pga 0.4 is taken for 0.4 m/s^2, 0.0408 g; write 0.4g for 0.4 g"),
-        ("--pga", "400", "the peak acceleration is 40.8 g"),
-        ("--sa", "0.3@1", "--sa 0.3 is taken for 0.3 m/s^2"),
-        ("--sa", "0.3g@1000", "the peak acceleration is 8.35e+03 g"),
-        ("--pgv", "40", "more than any ground motion has"),
-        ("--scale", "0", "the acceleration is zero throughout"),
-    ],
-)
-def test_a_suspicious_scaling_is_noted(run, option, value, sentence):
-    code, _, err = run("simulate", RECORD, *BLOCK, option, value)
-    assert code == 0
-    assert sentence in err and err.count("note") == 1
+NOTES = """
+el-centro-meloland-up {B} | looks vertical
+{R} --width 2 --height 1 --restitution 0.5 | sizes swapped
+{R} --width 20 --height 100 | in metres
+{R} {B} --pga 0.4 | --pga 0.4 is taken for 0.4 m/s^2, 0.0408 g; write 0.4g for 0.4 g
+{R} {B} --pga 400 | the peak acceleration is 40.8 g
+{R} {B} --sa 0.3@1 | --sa 0.3 is taken for 0.3 m/s^2
+{R} {B} --sa 0.3g@1000 | the peak acceleration is 8.35e+03 g
+{R} {B} --pgv 40 | more than any ground motion has
+{R} {B} --scale 0 | the acceleration is zero throughout
+"""
+
+
+@pytest.mark.parametrize("noted", NOTES.strip().splitlines())
+def test_what_looks_like_a_mistake_is_noted_and_computed(run, noted):
+    typed, _, sentence = noted.replace("{R}", RECORD).replace("{B}", " ".join(BLOCK)).partition(" | ")
+    code, out, err = run("simulate", *typed.split())
+    assert code == 0 and "outcome" in out
+    assert err.startswith("rocking: note: ") and sentence in err and err.count("note") == err.count("\n") == 1
+    assert run("simulate", *typed.split(), "--quiet")[2] == ""
 
 
 def test_a_sensible_scaling_is_not_noted(run):
@@ -429,7 +355,7 @@ def test_a_station_s_name_leads_to_its_horizontal_records(run, command):
 def test_a_fit_used_beyond_its_range_is_one_line(run, monkeypatch):
     import warnings
 
-    from rocking.cli import chattering as module
+    from rocking.cli import analysis as module
     from rocking.errors import OutsideFit
 
     def report(*_):

@@ -55,12 +55,3 @@ def test_ida_and_fragility_take_restraints(run):
     code, out, _ = run("fragility", *given, *SIZES, *FACADE, "--levels", "1:4:7", "--polarity", "both", "--json")
     truth = rocking.fragility(body, pulse, levels=levels, polarity="both")
     assert json.loads(out)["curves"][0]["median"] == pytest.approx(truth.curves[0].median)
-
-
-def test_restraints_need_a_mass_and_an_ensemble_has_blocks_of_its_own(run, tmp_path):
-    code, _, err = run("simulate", *PULSE, "--p", "2", "--alpha", "0.2", "--spring", "5")
-    assert code != 0
-    assert "needs its --mass, kg, beside its sizes or its pivots" in err
-    code, _, err = run("fragility", *PULSE, "--ensemble", tmp_path / "none.csv", *FACADE)
-    assert code != 0
-    assert "--ensemble has blocks of its own: leave --one-sided and --thrust out" in err

@@ -4,7 +4,6 @@ import json
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 import rocking
 from rocking import Block, Blocks, Motion, quantities
@@ -13,12 +12,6 @@ from rocking.errors import RockingError
 RECORD = "el-centro-meloland-270"
 SIZES = ["--width", "0.24", "--height", "1.1"]
 PULSE = "one-sine:amplitude=0.4g,frequency=1Hz"
-
-
-@pytest.fixture
-def undrawn(run, monkeypatch):
-    """Files of figures without a figure, where only their names matter."""
-    monkeypatch.setattr(Figure, "savefig", lambda figure, file, **options: file.write(b"not drawn"))
 
 
 #: What is typed after `rocking`, and words of the one sentence that answers: {R} is a record, {S} sizes, {B} a block by
@@ -35,6 +28,8 @@ simulate {R} --width -0.24 --height 1 | --width must be a positive number, in m,
 simulate {R} --half-width 0 --half-height 1 | --half-width must be a positive number
 simulate {R} --width 24kg --height 1 | --width takes a length as 0.2, 0.2m or 20cm, not '24kg'
 simulate {R} --half-width 2 --half-height 1 | give --restitution
+simulate {R} --width 1.1 --height 0.24 | it is 1.1 m wide and 0.24 m high, so swap its sizes if that is a slip
+simulate {R} --half-width 1 --half-height 0.25 | it is 2 m wide and 0.5 m high, so swap its sizes if that is a slip
 simulate {R} --p 0 --alpha 0.2 | --p must be positive, from 1e-06 to 1e+06 rad/s, not 0
 simulate {R} --p 2 --alpha 12 | is taken for rad, and pi/2 is the limit; did you mean 12deg?
 simulate {R} {S} --initial-rotation 12 | is taken for rad, and pi/2 is the limit; did you mean 12deg?
@@ -64,7 +59,7 @@ simulate {P} --pivots 0.2,-0.1 --height-of-mass 1 --gyration 1 | --pivots must b
 simulate {P} --pivots 0.2,0.1 --height-of-mass 1 --gyration 0 | --gyration must be a positive length
 simulate {P} --offset 0.1 | needs more than --offset: give --width and --height, or --half-width and --half-height
 simulate {P} {S} --offset 0.2 | --offset must be at most a quarter of the width
-simulate {P} {W} --tendon stiffnes=1 | --tendon takes NAME=VALUE with stiffness, prestress, offset, strength
+simulate {P} {W} --tendon stiffnes=1 | --tendon has no stiffnes; did you mean stiffness?
 simulate {P} {W} --tendon prestress=1 | --tendon needs stiffness
 simulate {P} {W} --tendon stiffness=1e6,stiffness=2 | --tendon gives stiffness twice, in 'stiffness=1e6,stiffness=2'
 simulate {P} {W} --tendon stiffness=-1 | --tendon: stiffness of a tendon must be at least 0 N/m, not -1
@@ -99,6 +94,8 @@ ida {R} {S} --levels 2g,1g | increas
 ida {R} {S} --measure pgv --levels 0.2g:1g:5 | --levels takes a velocity as 40cm/s or 0.4 (m/s), not '0.2g'
 ida {R} {S} --measure pga_ratio --levels 0.2g,1g | which counts in the block's own units, not '0.2g'
 fragility {R} {S} | overturning
+fragility {R} --ensemble none.csv --restitution 0.5 | --ensemble has blocks of its own: leave --restitution out
+measures {R} --ensemble none.csv --one-sided --spring 2 | leave --one-sided and --spring out
 fragility {R} {S} --limits half=much | --limits half
 fragility {R} {S} --limits half=0.5,half=0.7 | has half twice
 fragility {R} {S} --limits overturning=0.5 | gives a rotation the name 'overturning'
@@ -126,7 +123,7 @@ orbits {Q} | a block is needed
 orbits {Q} --ball 0.5 --width 1 | leave --width out
 orbits {Q} --ball 0.5 --oscillator frequency=1 --restitution 0.5 | leave --oscillator and --restitution
 orbits {Q} --oscillator frequency=1 | --oscillator needs restitution
-orbits {Q} --oscillator frequency=1,mass=3 | --oscillator takes NAME=VALUE
+orbits {Q} --oscillator frequency=1,mass=3 | --oscillator has no mass; there are frequency, restitution
 orbits {Q} --pendulum p=many,gap=1,restitution=0.5 | --pendulum
 orbits {Q} --ball 0.5 --along amplitude:16:9 | a lower value to a higher one
 orbits {Q} --ball 0.5 --orbit 1 | --along
@@ -194,18 +191,6 @@ def test_angles_that_may_be_radians_are_taken_for_them(run):
 def test_degrees_are_suspected_in_python(call):
     with pytest.raises(RockingError, match=r"if it is in degrees, give math\.radians\(12\)"):
         call()
-
-
-@pytest.mark.parametrize(
-    "sizes", [["--width", "1.1", "--height", "0.24"], ["--half-width", "1", "--half-height", "0.25"]]
-)
-def test_swapped_sizes_are_suspected(run, sizes):
-    code, _, err = run("simulate", RECORD, *sizes)
-    assert code == 2
-    wide, high = float(sizes[1]), float(sizes[3])
-    full = 2.0 if sizes[0] == "--half-width" else 1.0
-    assert f"it is {full * wide:g} m wide and {full * high:g} m high, so swap its sizes if that is a slip" in err
-    assert "--restitution" in err
 
 
 def test_a_rotation_may_be_negative(run):
@@ -316,37 +301,6 @@ def test_levels_of_a_velocity_may_have_their_unit(run):
 
 
 ECCENTRIC = ["--p", "2.9858,3.0053", "--alpha", "0.27417,0.155"]
-
-
-@pytest.mark.parametrize(
-    ("options", "block"),
-    [
-        (ECCENTRIC, lambda: Block.from_parameters((2.9858, 3.0053), (0.27417, 0.155))),
-        (
-            ["--pivots", "0.2,0.15", "--height-of-mass", "0.6", "--gyration", "0.4"],
-            lambda: Block.from_pivots((0.2, 0.15), 0.6, 0.4),
-        ),
-        (
-            ["--pivots", "0.2", "--height-of-mass", "0.6", "--gyration", "0.4", "--restitution", "0.7,0.8"],
-            lambda: Block.from_pivots((0.2, 0.2), 0.6, 0.4, restitution=(0.7, 0.8)),
-        ),
-        (
-            ["--width", "0.3", "--height", "1.1", "--offset", "-0.03"],
-            lambda: Block(width=0.3, height=1.1, offset=-0.03),
-        ),
-        (
-            ["--half-width", "0.15", "--half-height", "0.55", "--offset", "0.03", "--restitution", "0.9,0.8"],
-            lambda: Block(width=0.3, height=1.1, offset=0.03, restitution=(0.9, 0.8)),
-        ),
-    ],
-)
-def test_an_eccentric_block_is_that_of_python(run, options, block):
-    code, out, _ = run("simulate", "--pulse", "one-sine:amplitude=0.4g,frequency=1Hz", *options, "--json")
-    assert code == 0
-    truth = rocking.simulate(block(), rocking.pulses.one_sine(0.4 * 9.80665, 1.0))
-    found = json.loads(out)
-    assert found["block"]["restitution"] == [side.restitution for side in truth.block.sides]
-    assert found["peak_rotation_rad"] == truth.peak_rotation
 
 
 def test_sides_that_look_swapped_or_rounded_are_noted(run):

@@ -24,6 +24,7 @@ OF_MESHES = {"azimuth", "up", "unit", "density", "tolerance"}
 
 
 def in_shown_unit(parameter, value):
+    value = value[0] if isinstance(value, tuple) else value
     factor = {"°": math.pi / 180.0, "g": 9.80665}.get(parameter.unit, 1.0) if parameter.kind != "number" else 1.0
     return value / factor
 

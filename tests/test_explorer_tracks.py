@@ -6,8 +6,8 @@ import pytest
 
 from rocking.errors import RockingError
 from rocking.explorer.core import Explorer
+from rocking.explorer.inputs import STEPS, text_at, tracks
 from rocking.explorer.parameters import PARAMETERS
-from rocking.explorer.tracks import STEPS, text_at, tracks
 
 
 def bodies(count, seed):

@@ -5,34 +5,34 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from functools import cached_property
+from typing import Any, Final
 
 from rocking import checks, pulses, quantities
 from rocking.errors import InvalidOption
+from rocking.inputs.declared import READERS, Input, by_name
 from rocking.motion.motion import Motion
 
 
-class _Kind(NamedTuple):
-    """What a parameter is: how its text is read (None: it is a word), and its unit."""
+def _parameter(name: str, kind: str, unit: str, default: str, low: float, high: float, text: str = "") -> Input:
+    """Declare a parameter of pulses; its slider is logarithmic where it can be."""
+    logarithmic = low > 0.0 and name not in ("cycles", "gamma")
+    return Input(name, "pulse", kind, "", unit, default, low, high, logarithmic, text=text or f"pulse_{name}")
 
-    read: quantities.Quantity | None
-    unit: str
 
-
-_KINDS: Final = {
-    "amplitude": _Kind(quantities.acceleration, "m/s^2"),
-    "frequency": _Kind(quantities.frequency, "Hz"),
-    "phase": _Kind(quantities.angle, "rad"),
-    "duration": _Kind(quantities.duration, "s"),
-    "cycles": _Kind(quantities.number, ""),
-    "gamma": _Kind(quantities.number, ""),
-    "lobes": _Kind(quantities.number, ""),
-    "kind": _Kind(None, ""),
-}
-
-#: The amplitude of this pulse is that of its velocity.
-_OF_VELOCITY: Final = pulses.mavroeidis_papageorgiou
-_VELOCITY: Final = _Kind(quantities.velocity, "m/s")
+#: Parameters of pulses, each declared once for all pulses that have it.
+PARAMETERS: Final = by_name(
+    _parameter("amplitude", "acceleration", "g", "0.3g", 0.02, 2.0),
+    _parameter("frequency", "frequency", "Hz", "1", 0.1, 10.0),
+    _parameter("duration", "duration", "s", "0.5", 0.05, 5.0),
+    _parameter("cycles", "number", "", "2.5", 0.5, 20.0),
+    _parameter("phase", "angle", "°", "0deg", 0.0, 360.0),
+    _parameter("gamma", "number", "cycles", "2", 1.0, 6.0),
+    Input("lobes", "pulse"),
+    Input("kind", "pulse", "text"),
+)
+#: The amplitude of a pulse that is given by its velocity.
+_VELOCITY: Final = _parameter("amplitude", "velocity", "m/s", "0.6", 0.05, 3.0, "pulse_velocity")
 
 
 @dataclass(frozen=True)
@@ -49,44 +49,45 @@ class PulseFamily:
     @property
     def needed(self) -> tuple[str, ...]:
         """Names of the parameters without a default."""
-        return tuple(name for name, each in self._parameters.items() if each.default is inspect.Parameter.empty)
+        return tuple(name for name in self._defaults if name not in self.optional)
 
     @property
     def optional(self) -> Mapping[str, Any]:
         """Defaults of the other parameters, by name."""
-        return {name: each.default for name, each in self._parameters.items() if name not in self.needed}
+        return {name: default for name, default in self._defaults.items() if default is not inspect.Parameter.empty}
 
     @property
     def is_of_velocity(self) -> bool:
         """Whether its amplitude is that of its velocity."""
-        return self.make is _OF_VELOCITY
+        return self.make is pulses.mavroeidis_papageorgiou
+
+    def parameter(self, name: str) -> Input:
+        """Return the declaration of a parameter."""
+        if name not in self._defaults:
+            hint = checks.meant(name, [*self._defaults], f"it takes {_listed(self._defaults)}")
+            raise InvalidOption(f"the pulse {self.name} has no {name}; {hint}")
+        return _VELOCITY if name == "amplitude" and self.is_of_velocity else PARAMETERS[name]
 
     def unit(self, parameter: str) -> str:
-        """Return the unit of a parameter; empty where it has none."""
-        return self._kind(parameter).unit
+        """Return the SI unit of a parameter; empty where it has none."""
+        return READERS.get(self.parameter(parameter).kind, (None, ""))[1]
 
     def quantity(self, parameter: str) -> quantities.Quantity | None:
         """Return what reads a parameter from its text; None where it is a word."""
-        if parameter not in self._parameters:
-            hint = checks.meant(parameter, [*self._parameters], f"it takes {_listed(self._parameters)}")
-            raise InvalidOption(f"the pulse {self.name} has no {parameter}; {hint}")
-        return self._kind(parameter).read
+        return READERS.get(self.parameter(parameter).kind, (None, ""))[0]
 
     def motion(self, values: Mapping[str, Any]) -> Motion:
         """Make a pulse of the values of its parameters."""
         for name in values:
-            self.quantity(name)
+            self.parameter(name)
         missing = [name for name in self.needed if name not in values]
         if missing:
             raise InvalidOption(f"the pulse {self.name} needs {_listed(missing)} as well")
         return self.make(**{name: _whole(value) if name == "lobes" else value for name, value in values.items()})
 
-    @property
-    def _parameters(self) -> Mapping[str, inspect.Parameter]:
-        return inspect.signature(self.make).parameters
-
-    def _kind(self, parameter: str) -> _Kind:
-        return _VELOCITY if parameter == "amplitude" and self.is_of_velocity else _KINDS[parameter]
+    @cached_property
+    def _defaults(self) -> Mapping[str, Any]:
+        return {name: each.default for name, each in inspect.signature(self.make).parameters.items()}
 
 
 #: All families, by name.
@@ -134,10 +135,6 @@ def named_pulse(text: str) -> Motion:
     --------
     >>> named_pulse("sine:amplitude=0.2g,frequency=2Hz,cycles=5").description
     <Description: sine, amplitude 1.9613, frequency 2, cycles 5, phase 0>
-    >>> named_pulse("sine:amplitude=0.2g,frequency=2Hz")
-    Traceback (most recent call last):
-        ...
-    rocking.errors.InvalidOption: the pulse sine needs cycles as well
     """
     family, values = pulse_values(text)
     return family.motion(values)
@@ -145,30 +142,25 @@ def named_pulse(text: str) -> Motion:
 
 def pulse_values(text: str) -> tuple[PulseFamily, dict[str, Any]]:
     """Family and values (SI units) of the parameters that a text of `named_pulse` gives."""
-    family, written = pulse_texts(text)
-    return family, {parameter: _value(family, parameter, texts) for parameter, texts in written.items()}
+    family, texts = pulse_texts(text)
+    return family, {parameter: _value(family, parameter, parts) for parameter, parts in texts.items()}
 
 
 def pulse_texts(text: str) -> tuple[PulseFamily, dict[str, list[str]]]:
     """Family and parameters of a text of `named_pulse` as they are written: of most one value, without blanks."""
     name, _, rest = checks.text(text, "pulse", InvalidOption).partition(":")
-    return pulse_family(name), _parts(rest)
-
-
-def _parts(text: str) -> dict[str, list[str]]:
-    """Texts of each parameter; one without a name goes with the parameter before."""
-    found: dict[str, list[str]] = {}
-    for part in filter(None, text.split(",")):
-        name, given, value = (each.strip() for each in part.partition("="))
-        if given and name not in found:
-            found[name] = [value]
-        elif given:
-            raise InvalidOption(f"{name} is given twice in {text!r}")
-        elif found:
-            [*found.values()][-1].append(name)
+    family, texts = pulse_family(name), dict[str, list[str]]()
+    for part in filter(None, rest.split(",")):
+        name, equals, value = (each.strip() for each in part.partition("="))
+        if equals and name in texts:
+            raise InvalidOption(f"{name} is given twice in {rest!r}")
+        if equals:
+            texts[name] = [value]
+        elif texts:
+            [*texts.values()][-1].append(name)  # another value of the parameter before
         else:
             raise InvalidOption(f"a pulse is written NAME:PARAMETER=VALUE,PARAMETER=VALUE, but {part!r} has no name")
-    return found
+    return family, texts
 
 
 def _value(family: PulseFamily, parameter: str, texts: list[str]) -> Any:

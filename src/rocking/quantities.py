@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -69,47 +69,34 @@ def number(text: str, name: str) -> float:
     return value
 
 
-def acceleration(text: str, name: str) -> float:
-    """Return an acceleration, m/s^2, from "0.5g", "4.9m/s2", "490gal" or "4.9" (m/s^2)."""
-    return _in_units("acceleration", text, name, "an acceleration as 0.5g, 4.9m/s2 or 4.9 (m/s^2)")
+def _reader(units: Mapping[str, Unit], wanted: str) -> Quantity:
+    """Return what reads a number with or without one of some units."""
+
+    def read(text: str, name: str) -> float:
+        value, spelling = _parts(text)
+        unit = units.get(plain_spelling(spelling))
+        if value is None or unit is None:
+            raise InvalidOption(f"{{}} takes {wanted}, not {text.strip()!r}", name, value=text)
+        return value * unit.multiplier / unit.divisor
+
+    return read
 
 
-def angle(text: str, name: str) -> float:
-    """Return an angle, rad, from "12deg", "0.2rad" or "0.2" (rad)."""
-    return _in_units("angle", text, name, "an angle as 12deg or 0.2 (rad)")
-
-
-def frequency(text: str, name: str) -> float:
-    """Return a frequency, Hz, from "2Hz", "12.6rad/s" or "2" (Hz)."""
-    return _in_units("frequency", text, name, "a frequency as 2Hz, 12.6rad/s or 2 (Hz)")
-
-
-def velocity(text: str, name: str) -> float:
-    """Return a velocity, m/s, from "0.4m/s", "40cm/s" or "0.4" (m/s)."""
-    return _in_units("velocity", text, name, "a velocity as 40cm/s or 0.4 (m/s)")
-
-
-def rate(text: str, name: str) -> float:
-    """Return an angular velocity, rad/s, from "2rad/s", "5deg/s" or "2" (rad/s)."""
-    return _in_units("rate", text, name, "an angular velocity as 2, 2rad/s or 5deg/s")
-
-
-def duration(text: str, name: str) -> float:
-    """Return a time, s, from "1.5s", "5ms" or "1.5"."""
-    return _in_units("duration", text, name, "a time as 1.5 (s)")
+acceleration: Final = _reader(UNITS["acceleration"], "an acceleration as 0.5g, 4.9m/s2 or 4.9 (m/s^2)")
+angle: Final = _reader(UNITS["angle"], "an angle as 12deg or 0.2 (rad)")
+duration: Final = _reader(UNITS["duration"], "a time as 1.5 (s)")
+frequency: Final = _reader(UNITS["frequency"], "a frequency as 2Hz, 12.6rad/s or 2 (Hz)")
+position: Final = _reader(UNITS["position"], "a length as 0.2, 0.2m or 20cm")
+rate: Final = _reader(UNITS["rate"], "an angular velocity as 2, 2rad/s or 5deg/s")
+velocity: Final = _reader(UNITS["velocity"], "a velocity as 40cm/s or 0.4 (m/s)")
 
 
 def length(text: str, name: str) -> float:
     """Return a positive length, m, from "0.2m", "20cm" or "0.2" (m)."""
-    value = _in_units("length", text, name, "a length as 0.2, 0.2m or 20cm")
+    value = position(text, name)
     if not value > 0.0:
         raise InvalidOption(f"{{}} must be a positive length, in m, not {text.strip()}", name, value=text)
     return value
-
-
-def position(text: str, name: str) -> float:
-    """Return a position, m, from "-0.2m", "20cm" or "0.2" (m)."""
-    return _in_units("position", text, name, "a length as 0.2, 0.2m or 20cm")
 
 
 def tilt(text: str, name: str) -> float:
@@ -131,25 +118,35 @@ def of_state(unit: str) -> tuple[Quantity, Quantity]:
 
 def sides(text: str, name: str, quantity: Quantity = number) -> float | list[float]:
     """Return one number, or a list of two: side + and side -."""
-    found = [quantity(part, name) for part in text.split(",")]
-    if len(found) > 2:
-        raise InvalidOption(
-            f"{{}} takes a number, or two with a comma between (side +, side -), not {text!r}", name, value=text
-        )
-    return found[0] if len(found) == 1 else found
+    return _one_or_two(text, name, quantity, "a number, or two with a comma between (side +, side -)")
 
 
 def bounds(text: str, name: str, quantity: Quantity = number) -> float | tuple[float, ...]:
     """Return one number, which is known, or two: the lowest and the highest that are thinkable."""
+    wanted = "a number, if it is known, or two with a comma between, the lowest and the highest thinkable"
+    found = _one_or_two(text, name, quantity, wanted)
+    return tuple(found) if isinstance(found, list) else found
+
+
+def _one_or_two(text: str, name: str, quantity: Quantity, wanted: str) -> float | list[float]:
     found = [quantity(part, name) for part in text.split(",")]
     if len(found) > 2:
-        raise InvalidOption(
-            "{} takes a number, if it is known, or two with a comma between, the lowest and the highest thinkable, not "
-            f"{text!r}",
-            name,
-            value=text,
-        )
-    return found[0] if len(found) == 1 else tuple(found)
+        raise InvalidOption(f"{{}} takes {wanted}, not {text!r}", name, value=text)
+    return found[0] if len(found) == 1 else found
+
+
+def axis(value: Any, name: str, quantity: Quantity = number) -> Floats:
+    """Return the numbers of a value of a study file: one, a list, or a range.
+
+    Examples
+    --------
+    >>> axis(["10cm", 0.2], "width", length).tolist(), axis("1:3:3", "p").tolist(), axis(2, "p").tolist()
+    ([0.1, 0.2], [1.0, 2.0, 3.0], [2.0])
+    """
+    if isinstance(value, str):
+        return values(value, name, quantity)
+    numbers = value if isinstance(value, list) else [value]
+    return np.array([quantity(one if isinstance(one, str) else repr(one), name) for one in numbers])
 
 
 def values(text: str, name: str, quantity: Quantity = number) -> Floats:
@@ -174,6 +171,14 @@ def values(text: str, name: str, quantity: Quantity = number) -> Floats:
     return _decimals(np.geomspace(start, stop, count))
 
 
+def at_a_period(text: str, name: str, quantity: Quantity = acceleration) -> tuple[float, float]:
+    """Return an acceleration, m/s^2, and a period, s, from "0.4g@1.0"."""
+    level, at, period = text.partition("@")
+    if not at:
+        raise InvalidOption(f"{{}} takes an acceleration at a period, as 0.4g@1.0, not {text!r}", name, value=text)
+    return quantity(level, name), duration(period, name)
+
+
 def scaling(given: Mapping[str, str | float | None], quantity: Quantity = acceleration) -> tuple[float, Measure] | None:
     """Return the level that a motion is scaled to, and the measure that it is of; None where nothing is given.
 
@@ -196,13 +201,9 @@ def scaling(given: Mapping[str, str | float | None], quantity: Quantity = accele
     if name == "pga":
         return checks.finite(quantity(str(value), name), name, InvalidOption), Measure("pga")
     if name == "sa":
-        level, at, period = str(value).partition("@")
-        if not at:
-            raise InvalidOption(
-                f"{{}} takes an acceleration at a period, as 0.4g@1.0, not {value!r}", name, value=value
-            )
-        both = quantity(level, name), duration(period, name)
-        read_level, read_period = (checks.finite(each, name, InvalidOption) for each in both)
+        read_level, read_period = (
+            checks.finite(each, name, InvalidOption) for each in at_a_period(str(value), name, quantity)
+        )
         return read_level, Measure("sa", read_period)
     read = number if name == "scale" else velocity
     plain = read(value, name) if isinstance(value, str) else float(value)
@@ -214,14 +215,6 @@ def scaling(given: Mapping[str, str | float | None], quantity: Quantity = accele
 def _decimals(numbers: Floats) -> Floats:
     """Numbers as people write them: 0.3, not 0.30000000000000004."""
     return np.array([decimal(value) for value in numbers])
-
-
-def _in_units(kind: str, text: str, name: str, wanted: str) -> float:
-    value, spelling = _parts(text)
-    unit = UNITS[kind].get(plain_spelling(spelling))
-    if value is None or unit is None:
-        raise InvalidOption(f"{{}} takes {wanted}, not {text.strip()!r}", name, value=text)
-    return value * unit.multiplier / unit.divisor
 
 
 def _parts(text: str) -> tuple[float | None, str]:

@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import ast
 import errno
+import functools
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from inspect import Parameter
 from pathlib import Path
 from typing import Final
 
-from cyclopts import App, CycloptsError
+from cyclopts import App, Argument, CoercionError, CycloptsError, MissingArgumentError, UnknownCommandError
+from cyclopts.exceptions import UnknownOptionError, UnusedCliTokensError
 
-from rocking.cli import wording
-from rocking.errors import INTERRUPTED, RockingError
+from rocking.checks import meant
+from rocking.errors import INTERRUPTED, DamagedStudy, InvalidOption, RockingError, Spelling
+from rocking.inputs.texts import option_of
 from rocking.progress import notes_for
 
-#: What is wrong where a disk is full.
-_FULL: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+#: Names so short are too alike for a guess: a suggestion must not lead to another quantity.
+_SHORT: Final = len("--pga")
 
 app = App(
     name="rocking",
@@ -35,10 +39,8 @@ def _lines_of(module: str) -> dict[str, str]:
 
 
 for _module, _commands in {
-    "simulate": ("simulate", "check"),
-    "records": ("records", "pulses"),
-    "chattering": ("chatter", "critical"),
-    "analysis": ("spectrum", "map", "ida", "measures"),
+    "simulate": ("simulate", "check", "records", "pulses"),
+    "analysis": ("chatter", "critical", "spectrum", "map", "ida", "measures"),
     "dynamics": ("orbits", "bifurcation", "basin"),
     "fragility": ("fragility",),
     "calibrate": ("calibrate", "validate"),
@@ -53,7 +55,37 @@ app.command(
     name="study",
     help="Run a study too long for one sitting: created once, resumed after anything.",
 )
-app.command("rocking.cli.version:version", name=["--version", "-V"], help="Display the version.")
+
+
+def _version(*, verbose: bool = False) -> None:
+    """Display the version.
+
+    Parameters
+    ----------
+    verbose
+        Add the versions of Python and of the libraries below, and which compiled code serves this installation.
+    """
+    import platform
+    from importlib import metadata
+
+    import rocking
+    from rocking.kernels import compiled
+
+    if not verbose:
+        print(rocking.__version__)
+        return
+    below = ", ".join(f"{name} {metadata.version(name)}" for name in ("numpy", "scipy"))
+    rows = {
+        "rocking": rocking.__version__,
+        "Python": f"{platform.python_version()} on {platform.platform()}",
+        "packages": below,
+        "compiled code": compiled.state(),
+    }
+    for name, value in rows.items():
+        print(f"{name:13}  {value}")
+
+
+app.command(_version, name=["--version", "-V"], help="Display the version.")
 app.register_install_completion_command(help="Install completion of commands and options for this shell.")
 
 
@@ -96,8 +128,8 @@ def _is_of_an_interrupt(error: BaseException | None) -> bool:
 def _sentence(error: Exception, given: list[str]) -> str:
     """Say what is wrong; nothing where it is a fault of the program."""
     if isinstance(error, (RockingError, CycloptsError)):
-        return wording.of(error, app, given)
-    if isinstance(error, OSError) and error.errno in _FULL:
+        return sentence_of(error, given)
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO):
         # Files have their own sentence: this is what is printed, to a disk that is full.
         _close_output()
         return f"the output cannot be written: {os.strerror(error.errno)}; send it elsewhere"
@@ -108,13 +140,13 @@ def _sentence(error: Exception, given: list[str]) -> str:
 
 def _run(given: list[str]) -> None:
     """Call the command that is given."""
-    called = wording.called(app, given)
+    called = command_of(given)
     if called.default_command is not None:
         called.help = None  # The help of a command is all that its function says, not its line in the list.
     command, bound, _ = app.parse_args(given, exit_on_error=False, print_error=False)
-    wording.refuse_unknown_options(bound.args, app, given)
+    refuse_unknown_options(bound.args, given)
     quiet = any(getattr(value, "quiet", False) for value in bound.arguments.values())
-    with notes_for("nobody" if quiet else "everybody", wording.spelling_of(called)):
+    with notes_for("nobody" if quiet else "everybody", spelling_of(called)):
         command(*bound.args, **bound.kwargs)
     sys.stdout.flush()
 
@@ -122,3 +154,97 @@ def _run(given: list[str]) -> None:
 def _close_output() -> None:
     """Send to nowhere what is still to be printed."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def spelling_of(command: App) -> Spelling:
+    """Return how a command writes the name of an argument: as its option, if it has that option."""
+
+    @functools.cache  # Nothing is asked of the command before a message names an argument.
+    def options() -> frozenset[str]:
+        return frozenset(_options(command))
+
+    return lambda name: option_of(name) if option_of(name) in options() else name
+
+
+def command_of(arguments: Sequence[str]) -> App:
+    """Return the command that is called, or the program where none is; to the parser --help is a command as well."""
+    return app.parse_commands(arguments)[1][len(_words(arguments))]
+
+
+def refuse_unknown_options(given: Iterable[object], arguments: Sequence[str]) -> None:
+    """Check that no name of a record is an option that the command does not have; after "--" any name may be one.
+
+    Raises
+    ------
+    InvalidOption
+        Naming that option, and the one that may be meant.
+    """
+    typed = arguments[: arguments.index("--")] if "--" in arguments else arguments
+    for name in given:
+        if isinstance(name, str) and name.startswith("-") and name.lstrip("-")[:1].isalpha() and name in typed:
+            raise InvalidOption(_unknown_option(name, arguments))
+
+
+def sentence_of(error: RockingError | CycloptsError, arguments: Sequence[str]) -> str:
+    """Return an error as one line that names options."""
+    if isinstance(error, DamagedStudy):
+        return f"{error.text()}: rocking study verify FOLDER --repair computes it again"
+    if isinstance(error, RockingError):
+        return error.text(spelling_of(command_of(arguments))).rstrip(".")
+    if isinstance(error, UnknownCommandError):
+        unknown = (error.unused_tokens or arguments)[0]
+        commands = [each for each in command_of(arguments) if not each.startswith("-")]
+        hint = meant(unknown, commands, f"there are {', '.join(commands)}")
+        return f"there is no command {unknown}; {hint}"
+    if isinstance(error, UnknownOptionError):
+        return _unknown_option(error.token.keyword or error.token.value, arguments)
+    sentence = " ".join(str(error).split()).rstrip(".")
+    command = _named(arguments)
+    argument = error.argument
+    if isinstance(error, MissingArgumentError) and argument is not None:
+        is_given = any(each.partition("=")[0] in argument.names for each in arguments)
+        sentence = f"{command} needs {_name(argument)}"
+        if is_given and not _is_positional(argument):
+            sentence = f"{_name(argument)} needs a value"
+    elif isinstance(error, CoercionError) and argument and error.token and error.target_type in (float, int):
+        kind = "a number" if error.target_type is float else "a whole number"
+        sentence = f"{_name(argument)} takes {kind}, not {error.token.value!r}"
+    elif isinstance(error, UnusedCliTokensError):
+        sentence = f"{command} takes no argument {' '.join(error.unused_tokens or ())!r}"
+    return f"{sentence}; see {command} --help"
+
+
+def _unknown_option(typed: str, arguments: Sequence[str]) -> str:
+    name = typed.partition("=")[0]
+    command = command_of(arguments)
+    known = {"--help", *_options(command), *(each for each in command if each.startswith("-"))}
+    words = {each.lstrip("-"): each for each in known if len(each) > _SHORT}
+    hint = meant(
+        name.lstrip("-"), words if len(name) > _SHORT else {}, "see its --help", 0.8
+    )  # a slip: a letter or two of six
+    return f"{_named(arguments)} has no option {name}; {hint}"
+
+
+def _named(arguments: Sequence[str]) -> str:
+    """Return how the command that is called is typed."""
+    return " ".join(["rocking", *_words(arguments)])
+
+
+def _words(arguments: Sequence[str]) -> list[str]:
+    return [each for each in app.parse_commands(arguments)[0] if each not in app.help_flags]
+
+
+def _options(command: App) -> Iterable[str]:
+    """Options of a command, without the arguments that need no name."""
+    if command.default_command is None:
+        return ()
+    arguments = command.assemble_argument_collection()
+    return [name for each in arguments if not _is_positional(each) for name in each.names if name.startswith("-")]
+
+
+def _name(argument: Argument) -> str:
+    return argument.name.lstrip("-").upper() if _is_positional(argument) else argument.name
+
+
+def _is_positional(argument: Argument) -> bool:
+    return not argument.keys and argument.field_info.kind is not Parameter.KEYWORD_ONLY

@@ -1,23 +1,49 @@
-"""`rocking spectrum`, `map`, `ida`, `measures`: many simulations, one answer."""
+"""`rocking spectrum`, `map`, `ida`, `measures`: many simulations, one answer; `chatter`, `critical`: theory."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
+
+from cyclopts import Parameter
 
 from rocking.analysis.efficiency import compare_measures
 from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.analysis.overturning import overturning_map
 from rocking.analysis.spectrum import Abscissa, rocking_spectrum
-from rocking.block import Blocks
-from rocking.cli.body_options import EnsembleOptions, HeldOptions, SlendernessOptions, ensemble_of
-from rocking.cli.options import BLOCK, MEASURE, MODEL, MeasureOptions, ModelOptions, TreatmentOptions, labels_of
-from rocking.cli.output import OUTPUT, OutputOptions, deliver
-from rocking.cli.records import RECORDS, MotionOptions, Names, ReadRecords, UnscaledOptions
-from rocking.errors import InvalidOption
+from rocking.block import Block, Blocks
+from rocking.chattering.report import chattering_report, critical_report
+from rocking.cli.options import (
+    BLOCK,
+    MEASURE,
+    MODEL,
+    RECORDS,
+    WHOLE,
+    BlockOptions,
+    EnsembleOptions,
+    HeldOptions,
+    MeasureOptions,
+    ModelOptions,
+    MotionOptions,
+    Names,
+    ReadRecords,
+    TreatmentOptions,
+    UnscaledOptions,
+    ensemble_of,
+    labels_of,
+)
+from rocking.cli.output import OUTPUT, OutputOptions, deliver, print_result, write_results
+from rocking.errors import InvalidBlock, InvalidOption
+from rocking.inputs.bodies import block_of, note_likely_mistakes
+from rocking.inputs.declared import SHAPES
 from rocking.quantities import angle, length, tilt, values
 from rocking.result import DatasetResult
+
+#: Descriptions of a block, of which the slenderness alone may be known.
+_SLENDER: Final = tuple(
+    shape._replace(needed=("alpha",), optional=("p",)) if "alpha" in shape.needed else shape for shape in SHAPES
+)
 
 
 def spectrum(
@@ -96,7 +122,7 @@ def map(
     gamma: float | None = None,
     kind: str | None = None,
     tolerance: float = 1e-9,
-    block: Annotated[SlendernessOptions, BLOCK] = SlendernessOptions(),
+    block: Annotated[BlockOptions, BLOCK] = BlockOptions(),
     model: Annotated[ModelOptions, MODEL] = ModelOptions(),
     output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
 ) -> None:
@@ -133,7 +159,7 @@ def map(
     }
     with output.folder() as folder:
         found = overturning_map(
-            block.block(),
+            _slender(block),
             pulse,
             amplitudes=values(amplitudes, "amplitudes"),
             frequencies=values(frequencies, "frequencies"),
@@ -222,3 +248,81 @@ def _deliver(
         result |= read.to_dict()
         found = replace(found, data=found.data.assign_coords(record=("motion", [*read.motions])))
     deliver(found, stem, folder=folder, as_json=as_json, result=result, **figure)
+
+
+def _slender(options: BlockOptions) -> Block:
+    """Return a block, of which the slenderness alone may be given: p is then 1."""
+    values = options.read()
+    if isinstance(values.get("alpha"), tuple) and not {"p", "restitution"} & values.keys():
+        raise InvalidBlock(
+            "the restitution of two different sides follows from {} and {} of both: give {}, too", "p", "alpha", "p"
+        )
+    block = block_of({"p": 1.0} | values if "alpha" in values else values, _SLENDER)
+    note_likely_mistakes([block])
+    return block
+
+
+def chatter(
+    a: float,
+    omega: float,
+    eta: float,
+    *,
+    p: float | None = None,
+    order: Annotated[int, WHOLE] = 4,
+    resolved: Annotated[int | None, WHOLE] = None,
+    table: Annotated[bool, Parameter(negative="")] = False,
+    output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
+) -> None:
+    """Say how long a slender block chatters under a sine, by every method, and whether it comes to rest.
+
+    Times are dimensionless, p t; with --p also in seconds. --out holds chatter.png, .pdf (intervals between
+    the impacts), result.json, impacts.csv and cycles.csv.
+
+    Parameters
+    ----------
+    a
+        Amplitude of the ground acceleration over g alpha, at least 1.
+    omega
+        Frequency of the ground acceleration (rad/s) over the block's p.
+    eta
+        Coefficient of restitution.
+    p
+        The block's frequency parameter, rad/s.
+    order
+        Terms of the expansion in a - 1, 1 to 34.
+    resolved
+        Impacts that the semi-analytical method resolves; by default as many as the restitution asks for.
+    table
+        Show the paper's iterative procedure (Eqs 62 and 64): its first cycles and the last; all are in cycles.csv.
+    """
+    with output.folder() as folder:
+        report = chattering_report(a, omega, eta, order=order, resolved=resolved, p=p)
+        result, text = report.to_dict(), report.summary()
+        if table:
+            text += f"\n\n{report.table()}"
+            result = {**result, "asymptotic_table": report.to_dataframe("cycles").to_dict("records")}
+        if folder is not None:
+            report.to_csv(folder / "impacts.csv")
+            if report.cycles is not None:
+                report.to_csv(folder / "cycles.csv", "cycles")
+            write_results(folder, figures={"chatter": report.plot}, result=report.to_dict())
+        print_result(result, text, as_json=output.as_json)
+
+
+def critical(omega: float, eta: float, *, output: Annotated[OutputOptions, OUTPUT] = OutputOptions()) -> None:
+    """Give the amplitude up to which chattering under a sine is complete, by every method.
+
+    --out holds result.json.
+
+    Parameters
+    ----------
+    omega
+        Frequency of the ground acceleration (rad/s) over the block's p.
+    eta
+        Coefficient of restitution.
+    """
+    with output.folder() as folder:
+        report = critical_report(omega, eta)
+        if folder is not None:
+            report.to_json(folder / "result.json")
+        print_result(report.to_dict(), report.summary(), as_json=output.as_json)

@@ -16,10 +16,17 @@ from rocking.calibration.space import HOUSNER
 from rocking.calibration.tables import History, read_calibration, read_tests
 from rocking.calibration.validate import ShakeTest
 from rocking.calibration.validate import validate as judged
-from rocking.cli.body_options import EnsembleOptions
-from rocking.cli.options import BLOCK, MODEL, WHOLE, ModelOptions
+from rocking.cli.options import (
+    BLOCK,
+    MODEL,
+    RECORDS,
+    WHOLE,
+    EnsembleOptions,
+    FileOptions,
+    ModelOptions,
+    ScaledPulseOptions,
+)
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results, write_tables
-from rocking.cli.records import RECORDS, FileOptions, ScaledPulseOptions
 from rocking.constants import Model
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
@@ -92,37 +99,28 @@ def calibrate(
     given: dict[str, Any] = {**ranges, "model": model, "two_sided": two_sided}
     choices = {name: value for name, value in given.items() if value is not None}
     with output.folder() as folder:
-        table = read_calibration(data, channel=file.channel, dt=file.dt, units=file.units)
-        if not isinstance(table, History):
-            _refuse("a history", motion=motion, initial_rotation=initial_rotation)
-            if not (predict or file.pulse):
-                _refuse_without("predict", file)
-            others = {name: file.read(name) for name in predict} | file.pulses()
-            how = _How(seed, folds, others, {"candidates": candidates, **choices})
-            results = _of_outcomes(table, how)
-        else:
-            _refuse("outcomes", predict=predict or None, folds=folds or None)
-            _refuse("outcomes", candidates=candidates if candidates != _CANDIDATES else None)
-            shaking = _shaking(motion, file)
-            if shaking is None:
-                _refuse_without("motion", file)
+        table = read_calibration(data, **file.about())
+        others: dict[str, object] = {"motion": motion, "initial_rotation": initial_rotation}
+        if isinstance(table, History):
+            others = {"predict": predict, "folds": folds, "candidates": candidates != _CANDIDATES}
+        for name in [name for name, value in others.items() if value]:
+            belong_to = "outcomes" if isinstance(table, History) else "a history"
+            raise InvalidOption(f"{{}} is for {belong_to}; the columns of this table are not", name)
+        records = predict if motion is None else (motion,)
+        motions = _motions(records, file, "motion" if isinstance(table, History) else "predict")
+        if isinstance(table, History):
+            if len(motions) > 1:
+                raise InvalidOption("a history has one motion of the base: give {}, or one {}", "motion", "pulse")
+            shaking = next(iter(motions.values()), None)
             history = calibrate_history(
                 table.times, table.rotation, shaking, **choices, initial_rotation=start, seed=seed
             )
-            results = _history_results(history)
+            results = _Results(history, history.to_dict(), history.summary())
+        else:
+            results = _of_outcomes(table, motions, folds, {"candidates": candidates, "seed": seed, **choices})
         if folder is not None:
             results.write(folder)
         print_result(results.numbers, results.text, as_json=output.as_json)
-
-
-@dataclass(frozen=True)
-class _How:
-    """How to calibrate, and what to predict."""
-
-    seed: int
-    folds: int
-    others: Mapping[str, Motion]
-    choices: Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -140,49 +138,34 @@ class _Results:
         write_results(folder, figures={"calibration": self.found.plot}, result=self.numbers)
 
 
-def _refuse(belong_to: str, **given: object) -> None:
-    for name, value in given.items():
-        if value is not None:
-            raise InvalidOption(f"{{}} is for {belong_to}; the columns of this table are not", name)
+def _motions(records: Sequence[str], file: ScaledPulseOptions, option: str) -> dict[str, Motion]:
+    """Read records and pulses; refuse what is said of motions where there are none."""
+    motions = {name: file.motion(name) for name in records} | file.pulses()
+    for name in {} if motions else file.given("scale", "pga", "pgv", "sa", "vertical"):
+        raise InvalidOption("{} is for the motions of {} or {}: give one, or leave it out", name, option, "pulse")
+    return motions
 
 
-def _refuse_without(option: str, file: ScaledPulseOptions) -> None:
-    """Refuse what is said of motions where none is given that it could be said of."""
-    for name in ("scale", "pga", "pgv", "sa", "vertical"):
-        if getattr(file, name) is not None:
-            raise InvalidOption("{} is for the motions of {} or {}: give one, or leave it out", name, option, "pulse")
-
-
-def _shaking(record: str | None, file: ScaledPulseOptions) -> Motion | None:
-    """Motion of the base, if it moved."""
-    motions = file.pulses() if record is None else {record: file.read(record)} | file.pulses()
-    if len(motions) > 1:
-        raise InvalidOption("a history has one motion of the base: give {}, or one {}", "motion", "pulse")
-    return next(iter(motions.values()), None)
-
-
-def _of_outcomes(tests: Sequence[ShakeTest], how: _How) -> _Results:
+def _of_outcomes(
+    tests: Sequence[ShakeTest], others: Mapping[str, Motion], folds: int, choices: Mapping[str, Any]
+) -> _Results:
     fell, groups = [test.overturned for test in tests], [test.group for test in tests]
     # Outcomes that cannot be calibrated, and more folds than groups, are refused before the work.
     checked_outcomes(fell, len(tests))
-    if how.folds:
-        group_labels(groups, len(tests), how.folds)
-    found = calibrated([test.motion for test in tests], fell, seed=how.seed, **how.choices)
-    predicted = dict(zip(how.others, found.predict([*how.others.values()]), strict=True))
+    if folds:
+        group_labels(groups, len(tests), folds)
+    found = calibrated([test.motion for test in tests], fell, **choices)
+    predicted = dict(zip(others, found.predict([*others.values()]), strict=True))
     numbers = {**found.to_dict(), "predicted": predicted}
     parts = [found.summary()]
-    if how.folds:
-        scores = found.cross_validate(groups=groups, folds=how.folds).scores
+    if folds:
+        scores = found.cross_validate(groups=groups, folds=folds).scores
         numbers["cross_validated"] = asdict(scores)
-        parts.append(f"left-out motions: {scores} ({counted(how.folds, 'fold')})")
+        parts.append(f"left-out motions: {scores} ({counted(folds, 'fold')})")
     if predicted:
         rows = [(name, float(chance)) for name, chance in predicted.items()]
         parts.append("\n" + text_table(["motion", "probability"], rows))
     return _Results(found, numbers, "\n".join(parts))
-
-
-def _history_results(found: HistoryCalibration) -> _Results:
-    return _Results(found, found.to_dict(), found.summary())
 
 
 def validate(
@@ -214,7 +197,7 @@ def validate(
         Seed of the simulations for bands and chances.
     """
     with output.folder() as folder:
-        rows = read_tests(tests, channel=file.channel, dt=file.dt, units=file.units)
+        rows = read_tests(tests, **file.about())
         found = judged(rows, **block.blocks(model), lapse=lapse, bins=bins, seed=seed)
         result = found.to_dict()
         if folder is not None:

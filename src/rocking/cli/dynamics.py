@@ -13,8 +13,7 @@ from rocking import checks
 from rocking.arrays import Floats
 from rocking.block import Block, RestrainedBlock
 from rocking.body import Body
-from rocking.cli.body_options import BodyOptions
-from rocking.cli.options import BLOCK, MODEL, WHOLE, ModelOptions, written
+from rocking.cli.options import BLOCK, MODEL, WHOLE, BodyOptions, ModelOptions, written
 from rocking.cli.output import OUTPUT, OutputOptions, deliver, print_result, write_results, write_tables
 from rocking.dynamics.basin_maps import basins
 from rocking.dynamics.bifurcation import Direction, bifurcation_diagram

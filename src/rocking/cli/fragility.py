@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import Parameter
 
@@ -19,10 +19,20 @@ from rocking.analysis.fragility import fragility as run
 from rocking.analysis.hazard import HazardCurve
 from rocking.analysis.risk import check_measure
 from rocking.calibration.tables import read_observed
-from rocking.cli.body_options import EnsembleOptions
-from rocking.cli.options import BLOCK, MEASURE, MODEL, WHOLE, MeasureOptions, TreatmentOptions, labels_of
+from rocking.cli.options import (
+    BLOCK,
+    MEASURE,
+    MODEL,
+    RECORDS,
+    WHOLE,
+    EnsembleOptions,
+    MeasureOptions,
+    MotionOptions,
+    Names,
+    TreatmentOptions,
+    labels_of,
+)
 from rocking.cli.output import OUTPUT, OutputOptions, left_out, print_result, write_results
-from rocking.cli.records import RECORDS, MotionOptions, Names, ReadRecords
 from rocking.ensemble import Polarity
 from rocking.errors import InvalidOption, Unfitted
 from rocking.motion.scaling import Measure
@@ -99,9 +109,13 @@ def fragility(
         probable that is; survival.png and .pdf to --out.
     """
     if outcomes is not None:
-        _refuse_beside_outcomes(
-            names, block, motion, measure, model, limits=limits, polarity=polarity, clusters=clusters
-        )
+        beside = {
+            "records": names, "levels": measure.levels, "ensemble": block.ensemble, "clusters": clusters,
+            "limits": limits != "overturning", "polarity": polarity != "+", "model": model.equation,
+            "chattering": model.chattering != "certified", **block.given(),
+            **motion.given("pulse", "scale", "pga", "pgv", "sa", "vertical", "keep_going"),
+        }  # fmt: skip
+        _refuse_beside_outcomes(beside)
     bodies = {} if outcomes is not None else block.blocks(model)
     checks.positive(years, "years", InvalidOption)
     curve = _hazard(hazard, site, years, measure.period)
@@ -109,7 +123,6 @@ def fragility(
     if output.out is not None:
         nrml.check_names([taxonomy], "taxonomy")
         nrml.check_names(states, "a limit state")
-    not_passed = ""
     if standing is not None:
         checks.positive(standing, "standing", InvalidOption)
         not_passed = _limit_of_standing([*states])
@@ -118,7 +131,7 @@ def fragility(
     with output.folder() as folder:
         read = None
         if outcomes is not None:
-            observed = read_observed(outcomes, measure.wanted, channel=motion.channel, dt=motion.dt, units=motion.units)
+            observed = read_observed(outcomes, measure.wanted, **motion.about())
             _check_hazard(curve, observed["measure"])
             fitted = fit_fragility(**observed, band=band)
         else:
@@ -150,22 +163,37 @@ def fragility(
                     fitted.to_nrml(folder / name, taxonomy=taxonomy, format=form)
             fitted.to_csv(folder / "fragility.csv")
             if fitted.outcomes is not None:
-                together = fitted if read is None else _with_records(fitted, read)
-                together.to_csv(folder / "outcomes.csv", "outcomes")
+                _with_records(fitted, found.get("records", [])).to_csv(folder / "outcomes.csv", "outcomes")
             write_results(folder, figures=figures, result=found)
         print_result(found, "\n\n".join(text), as_json=output.as_json)
+
+
+def _refuse_beside_outcomes(given: Mapping[str, object]) -> None:
+    for option in [option for option, value in given.items() if value]:
+        sentence = "{} are observed, of a block and under motions of their own: leave {} out"
+        raise InvalidOption(sentence, "outcomes", option)
+
+
+def _check_hazard(curve: HazardCurve | None, measure: Measure) -> None:
+    if curve is not None:
+        check_measure(curve, measure)
 
 
 def _limit_of_standing(names: list[str]) -> str:
     """Name the limit that a block has not passed in a time: overturning, or the only one."""
     if len(names) > 1 and "overturning" not in names:
-        raise InvalidOption(
-            f"{{}} is about overturning, or about one limit, not {' and '.join(names)}: name one of them in {{}}",
-            "standing",
-            "limits",
-            value=names,
-        )
+        sentence = f"{{}} is about overturning, or about one limit, not {' and '.join(names)}: name one of them in {{}}"
+        raise InvalidOption(sentence, "standing", "limits", value=names)
     return "overturning" if "overturning" in names else names[0]
+
+
+def _with_records(found: Fragility, records: list[dict[str, Any]]) -> Fragility:
+    """Name the motion of each outcome by the record that was read, too."""
+    if not records or found.outcomes is None:
+        return found
+    named = found.outcomes.copy()
+    named.insert(0, "record", named["motion"].map({row["motion"]: row["record"] for row in records}))
+    return replace(found, outcomes=named)
 
 
 @contextlib.contextmanager
@@ -191,53 +219,6 @@ def _hazard(file: Path | None, site: int, years: float, period: float | None) ->
     for sentence in hazard_notes(curve.intensity, curve.measure):
         note(f"{file}: {sentence}")
     return curve
-
-
-def _check_hazard(curve: HazardCurve | None, measure: Measure) -> None:
-    """Refuse a hazard curve of another measure, before the work."""
-    if curve is not None:
-        check_measure(curve, measure)
-
-
-def _with_records(found: Fragility, read: ReadRecords) -> Fragility:
-    """Name the motion of each outcome by the record that was read, too."""
-    if found.outcomes is None:
-        return found
-    records = {row["motion"]: row["record"] for row in read.to_dict()["records"]}
-    named = found.outcomes.copy()
-    named.insert(0, "record", named["motion"].map(records))
-    return replace(found, outcomes=named)
-
-
-def _refuse_beside_outcomes(
-    names: Sequence[str],
-    block: EnsembleOptions,
-    motion: MotionOptions,
-    measure: MeasureOptions,
-    model: TreatmentOptions,
-    *,
-    limits: str,
-    polarity: Polarity,
-    clusters: str | None,
-) -> None:
-    """Refuse options that do not go with observed outcomes."""
-    motions = ("pulse", "scale", "pga", "pgv", "sa", "vertical", "keep_going")
-    given = {
-        "records": names,
-        "levels": measure.levels,
-        "ensemble": block.ensemble,
-        "limits": limits if limits != "overturning" else None,
-        "polarity": polarity if polarity != "+" else None,
-        "clusters": clusters,
-        "model": model.equation,
-        "chattering": model.chattering if model.chattering != "certified" else None,
-        **{name: getattr(motion, name) for name in motions},
-        **dict.fromkeys(block.of_block(), True),
-    }
-    found = [option for option, value in given.items() if value not in (None, False, ())]
-    if found:
-        sentence = "{} are observed, of a block and under motions of their own: leave {} out"
-        raise InvalidOption(sentence, "outcomes", found[0])
 
 
 def _limits(text: str) -> dict[str, float]:

@@ -1,28 +1,53 @@
-"""Options that several commands share, in groups: the intensity, the equation of motion, how chattering ends."""
+"""Options that several commands share, made from the declared inputs: bodies, motions, intensity, model, treatment."""
 
 from __future__ import annotations
 
+import inspect
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Annotated, Any, Final
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, fields, make_dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple, TypeVar
 
 from cyclopts import Group, Parameter, Token
 
-from rocking.analysis.levels import BY_STATION
 from rocking.constants import Model
-from rocking.errors import InvalidOption
+from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingError, UnreadableRecord, literal
+from rocking.inputs import bodies, declared
+from rocking.inputs.declared import INPUTS, noted_acceleration
+from rocking.inputs.texts import option_of
+from rocking.motion.motion import Motion
 from rocking.motion.scaling import IntensityName, Measure
-from rocking.plausibility import level_notes
-from rocking.progress import note
-from rocking.quantities import Quantity, acceleration, number, values, velocity
+from rocking.named_pulses import named_pulse
+from rocking.plausibility import motion_notes, vertical_notes
+from rocking.progress import Progress, note
+from rocking.quantities import Quantity, acceleration, number, scaling, values, velocity
+from rocking.records.named import expanded, named_motion, named_vertical
 
-_DIGITS: Final = re.compile(r"[+-]?\d+")
+if TYPE_CHECKING:
+    from rocking.block import Block
+    from rocking.body import Body
+
+Made = TypeVar("Made")
+Options = TypeVar("Options", bound="InputOptions")
 
 #: Spread over the command's own options, each group under its own heading in the help.
-BLOCK: Final = Parameter(name="*", group=Group("Block", sort_key=1))
 MEASURE: Final = Parameter(name="*", group=Group("Intensity", sort_key=0))
+BLOCK: Final = Parameter(name="*", group=Group("Block", sort_key=1))
+RECORDS: Final = Parameter(name="*", group=Group("Records", sort_key=2))
 MODEL: Final = Parameter(name="*", group=Group("Model", sort_key=3))
+
+#: Records as arguments: a lone hyphen is one, too.
+Names = Annotated[
+    str,
+    Parameter(
+        name="RECORDS",
+        allow_leading_hyphen=True,
+        help="Record files, folders, patterns (*.AT2), names of shipped records (see rocking records), or - for "
+        "standard input. A file's format is recognised by its content.",
+    ),
+]
 
 
 def hint(text: str) -> Parameter:
@@ -35,23 +60,302 @@ def written(text: str) -> Parameter:
     return Parameter(help=text, allow_leading_hyphen=True)
 
 
-def measured(text: str, quantity: Quantity) -> Parameter:
-    """Return the help of an option whose value is a number with or without a unit, which `quantity` reads."""
-
-    def read(_: Any, tokens: Sequence[Token]) -> float:
-        return quantity(tokens[0].value, (tokens[0].keyword or "").lstrip("-").replace("-", "_"))
-
-    return Parameter(help=text, converter=read, allow_leading_hyphen=True)
-
-
 def _whole(_: Any, tokens: Sequence[Token]) -> int:
-    if not _DIGITS.fullmatch(tokens[0].value):
+    if not re.fullmatch(r"[+-]?\d+", tokens[0].value):
         raise ValueError(tokens[0].value)
     return int(tokens[0].value)
 
 
 #: How a whole number is read: the parser itself would round 1.5 to one.
 WHOLE: Final = Parameter(converter=_whole)
+
+
+@dataclass(frozen=True)
+class InputOptions:
+    """Texts of some inputs."""
+
+    def given(self, *names: str) -> dict[str, Any]:
+        """Return the texts that are given, or those of them that have these names."""
+        texts = {each.name: getattr(self, each.name) for each in fields(self)}
+        return {n: text for n, text in texts.items() if text not in (None, False, ()) and (not names or n in names)}
+
+    def read(self, *names: str) -> dict[str, Any]:
+        """Return the values of what is given, or of those of them that have these names."""
+        return {name: INPUTS[name].read(text) for name, text in self.given(*names).items() if name in INPUTS}
+
+
+#: Types and defaults of options that are not a text.
+_TYPES: Final[Mapping[str, tuple[Any, Any]]] = {"flag": (bool, False), "texts": (tuple[str, ...], ())}
+
+
+def _with(*names: str) -> Callable[[type[Options]], type[Options]]:
+    """Give a class of options a field for each of some inputs."""
+
+    def decorated(options: type[Options]) -> type[Options]:
+        made: list[Any] = []
+        for name in names:
+            each = INPUTS[name]
+            kind, default = _TYPES.get(each.kind, (str | None, None))
+            is_signed = each.kind in declared.READERS or "acceleration" in each.kind
+            of = Parameter(help=each.help, negative="", allow_leading_hyphen=is_signed)
+            made.append((name, Annotated[kind, of], default))
+        about = {"__doc__": options.__doc__, "__module__": options.__module__}
+        return make_dataclass(options.__name__, made, bases=(options,), frozen=True, namespace=about)
+
+    return decorated
+
+
+@_with(*(name for name in declared.BLOCK if name != "mass"))
+class BlockOptions(InputOptions):
+    """A block by its sizes, by its parameters, or by its pivots."""
+
+    def block(self) -> Block:
+        """Return the block, with notes on what looks like a mistake."""
+        block = bodies.block_of(self.read(*declared.BLOCK))
+        bodies.note_likely_mistakes([block])
+        return block
+
+
+@_with("mass", *declared.HELD)
+class HeldOptions(BlockOptions):
+    """A block, and what holds it back or pushes it."""
+
+    def body(self) -> Body:
+        """Return the block, with its restraints where there are some."""
+        given, block = self.given(), bodies.block_of(self.read(*declared.BLOCK))
+        forces = [_made(declared.FORCES[name], text, name) for name in declared.FORCES for text in given.get(name, ())]
+        for name, couple in declared.COUPLES.items():
+            if name in given:
+                with _about(name):
+                    forces.append(couple(INPUTS[name].read(given[name])))
+        try:
+            body = bodies.body_of(block, self.read("restitution", "one_sided", "lean"), forces)
+        except InvalidBlock as wrong:
+            if not forces or wrong.argument != "offset":
+                raise
+            raise InvalidBlock(literal(str(wrong))) from wrong  # that of a restraint, where --offset is the block's own
+        bodies.note_likely_mistakes([block], [body])
+        return body
+
+
+@_with("ball", "oscillator", "pendulum")
+class BodyOptions(HeldOptions):
+    """A block with what holds it back, or another body in its place."""
+
+    def body(self) -> Body:
+        """Return the other body that is given, or where there is none the block."""
+        from rocking.dynamics.bodies import BouncingBall, ImpactOscillator, InvertedPendulum
+
+        kinds: dict[str, Callable[..., Body]] = {
+            "ball": BouncingBall, "oscillator": ImpactOscillator, "pendulum": InvertedPendulum,
+        }  # fmt: skip
+        first = next((name for name in kinds if name in self.given()), None)
+        if first is None:
+            return super().body()
+        given = self.given()
+        if others := [
+            name for name in dict.fromkeys((*kinds, "restitution", *given)) if name in given and name != first
+        ]:
+            raise InvalidBlock(f"{{}} is a body of its own: leave {bodies.all_of(others)} out", first, *others)
+        if first != "ball":
+            return _made(kinds[first], given[first], first)
+        with _about("ball"):
+            return BouncingBall(self.read("ball")["ball"])
+
+
+@dataclass(frozen=True)
+class EnsembleOptions(HeldOptions):
+    """A block by its sizes or by its parameters, or the ensemble of a calibration."""
+
+    ensemble: Annotated[
+        Path | None,
+        hint("In place of a block the ensemble.csv that rocking calibrate writes, with its weights and its model."),
+    ] = None
+
+    def blocks(self, model: ModelOptions) -> dict[str, Any]:
+        """Return blocks, weights and equation of motion as arguments."""
+        if self.ensemble is None:
+            return {"blocks": self.body(), "model": model.model}
+        if given := self.of_block():
+            raise InvalidBlock(f"{{}} has blocks of its own: leave {bodies.all_of(given)} out", "ensemble", *given)
+        return ensemble_of(self.ensemble, model)
+
+    def of_block(self) -> list[str]:
+        """Return the options of a block that are given."""
+        return [name for name in self.given() if name != "ensemble"]
+
+
+def ensemble_of(file: Path, model: ModelOptions) -> dict[str, Any]:
+    """Return blocks, weights and equation of motion of an ensemble as arguments."""
+    from rocking.calibration.tables import read_ensemble
+
+    found = read_ensemble(file)
+    return {"blocks": found.blocks, "weights": found.weights, "model": model.equation or found.model}
+
+
+@contextmanager
+def _about(option: str) -> Iterator[None]:
+    """Say of which option a parameter is that is wrong, whose name may be that of another option."""
+    try:
+        yield
+    except RockingError as wrong:
+        raise InvalidOption(f"{{}}: {literal(str(wrong))}", option) from wrong
+
+
+def _made(kind: Callable[..., Made], text: str, option: str) -> Made:
+    """Make what an option describes by NAME=VALUE."""
+    given: dict[str, Any] = {}
+    known = inspect.signature(kind).parameters
+    for part in text.split(","):
+        name, equals, value = (each.strip() for each in part.partition("="))
+        name = name.replace("-", "_")
+        if not equals:
+            raise InvalidOption(f"{{}} takes NAME=VALUE with commas between, not {part.strip()!r}", option, value=text)
+        if name in given:
+            raise InvalidOption(f"{{}} gives {name} twice, in {text!r}", option)
+        if name in known and isinstance(known[name].default, bool):
+            if value not in ("yes", "no"):
+                raise InvalidOption(f"{{}} takes {name}=yes or {name}=no, not {value!r}", option, value=text)
+            given[name] = value == "yes"
+        else:
+            given[name] = bodies.quantity_of(name)(value, option)
+    bodies.check_parameters(kind, given, "{}", option)
+    with _about(option):
+        return kind(**given)
+
+
+@_with("channel", "dt", "units")
+class FileOptions(InputOptions):
+    """What a record file does not say."""
+
+    def about(self) -> dict[str, Any]:
+        """Return channel, step and units as arguments."""
+        return {"channel": None, "dt": None, "units": None} | self.read("channel", "dt", "units")
+
+    def motion(self, name: str, *, several: bool = False, is_pulse: bool = False) -> Motion:
+        """Return the motion of a record or a pulse, with its vertical component and scaled, with notes on it."""
+        given, vertical = self.given(), self.given().get("vertical")
+        # A mistake in the options is reported before a long file is read.
+        target = scaling({n: given[n] for n in ("scale", "pga", "pgv", "sa") if n in given}, positive_acceleration)
+        if is_pulse:
+            motion = named_pulse(name)
+            if vertical is not None:
+                motion = motion.with_vertical(named_vertical(vertical, name, **self.about()))
+        else:
+            motion = named_motion(name, **self.about(), vertical=vertical, several=several)
+        notes = motion_notes(motion)
+        for sentence in (*notes, *vertical_notes(motion)):
+            note(f"{name}: {sentence}")
+        if target is None:
+            return motion
+        scaled = motion.scaled_to(*target)
+        for sentence in motion_notes(scaled):
+            if sentence not in notes:
+                note(f"{name}, scaled: {sentence}")
+        return scaled
+
+    def pulses(self) -> dict[str, Motion]:
+        """Return the pulses by their texts."""
+        return {text: self.motion(text, is_pulse=True) for text in self.given().get("pulse", ())}
+
+
+@_with("vertical", "scale", "pga", "pgv", "sa", "pulse")
+class ScaledPulseOptions(FileOptions):
+    """One record at a time, and pulses, scaled."""
+
+
+class ReadRecords(NamedTuple):
+    """Records that were read, and pulses.
+
+    Attributes
+    ----------
+    motions : dict of str to Motion
+        Motions by the names that were asked for.
+    skipped : dict of str to str
+        Why records could not be read.
+    single : bool
+        Whether one record or pulse was named by itself, and no folder or pattern that happens to hold one.
+    """
+
+    motions: dict[str, Motion]
+    skipped: dict[str, str]
+    single: bool
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return for machines what stands for each record in other tables, and what was skipped."""
+        from rocking.analysis.survey import record_columns
+
+        return {"records": record_columns([*self.motions], [*self.motions.values()]), "skipped": self.skipped}
+
+
+def refusal(name: str, error: RockingError) -> str:
+    """Return why a record cannot be read, with its name, in the words of the command line."""
+    reason = error.text(lambda argument: option_of(argument) if argument in ("channel", "dt", "units") else argument)
+    return reason if error.path == name else f"{name}: {reason}"
+
+
+def read_each(
+    names: Sequence[str], read: Callable[[str], Made], *, keep_going: bool
+) -> tuple[dict[str, Made], dict[str, str]]:
+    """Read records one after the other; return what was read, and why others cannot be where it goes on."""
+    found: dict[str, Made] = {}
+    refused: dict[str, str] = {}
+    with Progress("reading records", total=len(names)) as progress:
+        for name in names:
+            try:
+                found[name] = read(name)
+            except (UnreadableRecord, InvalidMotion) as error:
+                if not keep_going:
+                    raise
+                refused[name] = refusal(name, error)
+            progress.advance()
+    return found, refused
+
+
+@dataclass(frozen=True)
+class _RecordOptions(FileOptions):
+    """Several records, and pulses."""
+
+    keep_going: Annotated[
+        bool, Parameter(name="--keep-going", negative="", help="Skip records that cannot be read, and list them.")
+    ] = False
+
+    def read_all(self, names: Sequence[str]) -> ReadRecords:
+        """Return the motions of records, folders of them and patterns, and the pulses, by the name of each.
+
+        Raises
+        ------
+        UnreadableRecord
+            If one cannot be read, or with --keep-going none.
+        """
+        records, pulses = expanded(names), self.given().get("pulse", ())
+        if not records and not pulses:
+            raise InvalidOption(
+                "give one record or more: files, folders, or names of shipped records (see rocking records), or {}",
+                "pulse",
+            )
+        made = self.pulses()
+        motions, skipped = read_each(
+            records, lambda name: self.motion(name, several=len(records) > 1), keep_going=self.keep_going
+        )
+        if records and not motions:
+            raise UnreadableRecord(
+                f"none of {len(records)} records could be read; the first: {next(iter(skipped.values()))}"
+            )
+        for reason in skipped.values():
+            note(f"skipped: {reason}")
+        motions |= made
+        return ReadRecords(motions, skipped, [*motions] == [*names, *pulses] and len(motions) == 1)
+
+
+@_with("vertical", "pulse")
+class UnscaledOptions(_RecordOptions):
+    """Several records, and pulses, with their vertical motions, that an analysis scales itself."""
+
+
+@_with("vertical", "scale", "pga", "pgv", "sa", "pulse")
+class MotionOptions(_RecordOptions):
+    """Several records, and pulses, scaled."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +381,8 @@ class MeasureOptions:
 
     def chosen(self) -> dict[str, Any]:
         """Return measure and levels as arguments."""
-        levels = None if self.levels is None else values(self.levels, "levels", self._quantity())
+        readers: Mapping[str, Quantity] = {"pga": positive_acceleration, "sa": positive_acceleration, "pgv": velocity}
+        levels = None if self.levels is None else values(self.levels, "levels", readers.get(self.measure, _ratio))
         return {"measure": self.wanted, "levels": levels}
 
     @property
@@ -85,22 +390,12 @@ class MeasureOptions:
         """Measure of intensity."""
         return Measure(self.measure, self.period, self.damping)
 
-    def _quantity(self) -> Quantity:
-        """Return what reads a level of the measure."""
-        return {"pga": noted_acceleration, "sa": noted_acceleration, "pgv": velocity}.get(self.measure, _ratio)
-
 
 @dataclass(frozen=True)
 class ModelOptions:
     """The equation of motion."""
 
-    equation: Annotated[
-        Model | None,
-        Parameter(
-            name="--model",
-            help="Equation of motion: of finite rotations (nonlinear, the default), or linearised for slender blocks.",
-        ),
-    ] = None
+    equation: Annotated[Model | None, Parameter(name="--model", help=INPUTS["model"].help)] = None
 
     @property
     def model(self) -> Model:
@@ -112,36 +407,34 @@ class ModelOptions:
 class TreatmentOptions(ModelOptions):
     """The equation of motion, and how chattering ends."""
 
-    chattering: Annotated[
-        str,
-        hint(
-            "How chattering ends: certified, velocity, bypass, interval, or (under a sine) time; with a limit, as "
-            "certified=1e-9 (s), velocity=5e-10 or bypass=1e-3 (over p alpha), interval=1e-9 (s)."
-        ),
-    ] = "certified"
+    chattering: Annotated[str, hint(INPUTS["chattering"].help)] = "certified"
 
     def chosen(self) -> dict[str, Any]:
         """Return model and treatment as arguments."""
         from rocking.treatment import treatment
 
-        return {"model": self.equation or "nonlinear", "chattering": treatment(self.chattering)}
+        return {"model": self.model, "chattering": treatment(self.chattering)}
+
+
+@_with("duration", "initial_rotation", "initial_velocity")
+class StartOptions(InputOptions):
+    """How a simulation starts and ends."""
 
 
 def labels_of(clusters: str | None) -> str | list[str] | None:
     """Return what an option says of motions that belong together."""
+    from rocking.analysis.levels import BY_STATION
+
     return clusters if clusters in (None, BY_STATION) else [label.strip() for label in clusters.split(",")]
 
 
-def noted_acceleration(text: str, name: str) -> float:
-    """Return an acceleration, m/s^2, with a note where a number without a unit looks like one in g."""
-    value = acceleration(text, name)
-    if not value > 0.0:
+def positive_acceleration(text: str, name: str) -> float:
+    """Return a positive acceleration, m/s^2, with a note where a number without a unit looks like one in g."""
+    if not acceleration(text, name) > 0.0:
         raise InvalidOption(
             f"{{}} must be above 0, not {text.strip()}; {{}} -1 reverses a motion", name, "scale", value=text
         )
-    for sentence in level_notes(text, value, name):
-        note(sentence)
-    return value
+    return noted_acceleration(text, name)
 
 
 def _ratio(text: str, name: str) -> float:

@@ -21,15 +21,7 @@ if TYPE_CHECKING:
     from rocking.result import DatasetResult, Result
 
 
-#: Resolution of figures as PNG.
-_DOTS_PER_INCH: Final = 160
-
-
 OUTPUT: Final = Parameter(name="*", group=Group("Output", sort_key=4))
-
-
-#: Of the files that commands write.
-_SUFFIXES: Final = frozenset({".png", ".pdf", ".csv", ".nc", ".json", ".xml"})
 
 
 @dataclass(frozen=True)
@@ -68,7 +60,7 @@ def write_results(folder: Path, *, figures: Mapping[str, Callable[[], Figure]], 
     for stem, draw in figures.items():
         with left_out(f"{stem}.png and {stem}.pdf"):
             figure = draw()
-            write_figure(folder / f"{stem}.png", figure, dpi=_DOTS_PER_INCH)
+            write_figure(folder / f"{stem}.png", figure, dpi=160)
             write_figure(folder / f"{stem}.pdf", figure)
     write_text(folder / "result.json", to_json(result) + "\n")  # last: where it is, all is there
 
@@ -143,7 +135,8 @@ def output_folder(folder: Path, *, listed: bool = False) -> Iterator[Path]:
         if replaced := [name for name in written if name in before]:
             note(f"replaced in {folder}: {', '.join(replaced)}")
             new = {Path(name).parts[0] for name in written}
-            if kept := sorted({name for name in now if Path(name).suffix in _SUFFIXES} - new):
+            suffixes = (".png", ".pdf", ".csv", ".nc", ".json", ".xml")
+            if kept := sorted({name for name in now if name.endswith(suffixes)} - new):
                 note(f"from before in {folder}: {', '.join(kept)}")
     except BaseException:
         with suppress(OSError):

@@ -1,44 +1,55 @@
-"""`rocking simulate` and `rocking check`: one block under one record, or under many."""
+"""`rocking simulate` and `check`: one block under records; `rocking records` and `pulses`: the motions there are."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from rocking import quantities
 from rocking.analysis.survey import folder_names, survey
-from rocking.cli.body_options import BlockOptions, HeldOptions
-from rocking.cli.options import BLOCK, MODEL, ModelOptions, TreatmentOptions, measured
-from rocking.cli.output import OUTPUT, OutputOptions, print_result, subfolder, write_results
-from rocking.cli.records import RECORDS, MotionOptions, Names
-from rocking.errors import InvalidOption
+from rocking.cli.options import (
+    BLOCK,
+    MODEL,
+    RECORDS,
+    BlockOptions,
+    FileOptions,
+    HeldOptions,
+    ModelOptions,
+    MotionOptions,
+    Names,
+    StartOptions,
+    TreatmentOptions,
+    read_each,
+)
+from rocking.cli.output import OUTPUT, OutputOptions, PrintOptions, print_result, subfolder, write_results
+from rocking.errors import InvalidOption, UnreadableRecord
+from rocking.named_pulses import FAMILIES, PulseFamily
+from rocking.plausibility import reading_notes
+from rocking.progress import note
+from rocking.records.named import (
+    STANDARD_INPUT,
+    Contents,
+    contents,
+    expanded,
+    is_shipped,
+    refuse_what_is_known,
+    shipped,
+)
 from rocking.response import PRECISION, Response, steps_within
 from rocking.response.contact import friction_coefficient
 from rocking.rules import check as apply_rules
 from rocking.simulation import simulate as run
+from rocking.tables import text_table, to_json
 
 
 @dataclass(frozen=True)
-class _Start:
+class _Start(StartOptions):
     """How a simulation starts and ends, and what is asked of it."""
 
-    duration: Annotated[
-        float | None,
-        measured(
-            "Time to stop at, s; by default when the block is at rest after the motion, or has overturned.",
-            quantities.duration,
-        ),
-    ] = None
-    initial_rotation: Annotated[
-        str, Parameter(help="Rotation at the start, 2deg or 0.03 (rad).", allow_leading_hyphen=True)
-    ] = "0"
-    initial_velocity: Annotated[
-        float, measured("Angular velocity at the start, 5deg/s or 0.09 (rad/s).", quantities.rate)
-    ] = 0.0
     friction: Annotated[
         float | None, Parameter(help="Coefficient of friction: say whether the block would slide, and when first.")
     ] = None
@@ -78,12 +89,7 @@ def simulate(
     steps_within(start.precision)
     shown: dict[str, Any] = {"friction": start.friction, "precision": start.precision}
     body = block.body()
-    options: dict[str, Any] = {
-        **model.chosen(),
-        "duration": start.duration,
-        "initial_rotation": quantities.tilt(start.initial_rotation, "initial_rotation"),
-        "initial_velocity": start.initial_velocity,
-    }
+    options: dict[str, Any] = {**model.chosen(), **start.read()}
     for name in [name for name, chosen in (("each", each), ("energy", energy)) if chosen and output.out is None]:
         raise InvalidOption("{} writes files; name the folder for them with {}", name, "out")
     with output.folder() as folder:
@@ -153,3 +159,63 @@ def check(
             found.to_csv(folder / "check.csv")
             write_results(folder, figures={}, result=result)
         print_result(result, found.summary(), as_json=output.as_json)
+
+
+def records(
+    *names: Names,
+    file: Annotated[FileOptions, RECORDS] = FileOptions(),
+    output: Annotated[PrintOptions, OUTPUT] = PrintOptions(),
+) -> None:
+    """List the shipped records, or show what record files hold and what the reader took them for.
+
+    Of several files those that cannot be read are listed with the reason, and the exit status is 2.
+    """
+    files = expanded(names)
+    several = len(files) > 1
+    found, refused = read_each(files, lambda name: _contents(name, file, several=several), keep_going=several)
+    shown = [*found.values()] if files else [shipped()]
+    if output.as_json:
+        listed = [each.to_dict() for each in shown] + [{"file": name, "error": refused[name]} for name in refused]
+        print(to_json(listed[0] if len(listed) == 1 else {"files": listed}))
+    else:
+        print("\n\n".join([each.summary() for each in shown] + [*refused.values()]))
+    if refused:
+        names_of = ", ".join([*refused][:5]) + (f" and {len(refused) - 5} more" if len(refused) > 5 else "")
+        raise UnreadableRecord(f"{len(refused)} of {len(files)} files cannot be read: {names_of}")
+
+
+def _contents(name: str, file: FileOptions, *, several: bool) -> Contents:
+    if is_shipped(name):
+        if not several:
+            refuse_what_is_known(name, **file.about())
+        return shipped(name)
+    source = sys.stdin.buffer if name == STANDARD_INPUT else name
+    found = contents(source, **file.about(), several=several)
+    for motion, entry in zip(found.motions, found.entries, strict=True):
+        for sentence in reading_notes(motion):
+            note(f"{name}, channel {entry['channel']}: {sentence}")
+    return found
+
+
+def pulses(*, output: Annotated[PrintOptions, OUTPUT] = PrintOptions()) -> None:
+    """List the pulses that --pulse takes, with their parameters and, where they need not be given, their defaults."""
+    families = FAMILIES.values()
+    if output.as_json:
+        units = [{name: one.unit(name) for name in (*one.needed, *one.optional)} for one in families]
+        known = [{"name": one.name, "needs": one.needed, "takes": one.optional} for one in families]
+        print(to_json({"pulses": [one | {"units": of_one} for one, of_one in zip(known, units, strict=True)]}))
+        return
+    rows = [(one.name, _listed(one, dict.fromkeys(one.needed)), _listed(one, one.optional)) for one in families]
+    print(text_table(["pulse", "needs", "takes"], rows))
+    print("\namplitudes may be 0.5g or 4.9m/s2, frequencies 2Hz or 12.6rad/s, angles 90deg:")
+    print("rocking simulate --pulse sine:amplitude=0.2g,frequency=2Hz,cycles=5 --width 0.24 --height 1.1")
+
+
+def _listed(family: PulseFamily, parameters: Mapping[str, Any]) -> str:
+    """Return parameters of a pulse with their units and defaults."""
+    units = {name: f" ({family.unit(name)})" if family.unit(name) else "" for name in parameters}
+    defaults = {
+        name: "" if value is None else f" = {value:g}" if isinstance(value, float) else f" = {value}"
+        for name, value in parameters.items()
+    }
+    return ", ".join(name + units[name] + defaults[name] for name in parameters)

@@ -17,14 +17,14 @@ from rocking.block import Blocks
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption, Unfitted
 from rocking.explorer.catalogue import clusters_of, entries_of, title_of
-from rocking.explorer.code import block_options, command_line
+from rocking.explorer.code import block_options
 from rocking.explorer.inputs import Case, require_rest
 from rocking.explorer.motions import Found, read_motion
-from rocking.explorer.parameters import ASSESSMENT
+from rocking.explorer.parameters import ASSESSMENT, Texts
 from rocking.explorer.payload import Payload
 from rocking.explorer.phrases import phrase
-from rocking.explorer.texts import Texts
 from rocking.explorer.uploads import UploadStore
+from rocking.inputs.texts import command_line
 from rocking.motion.exceedance import lifting_factors
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import FACTOR, Measure

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-import shlex
-from collections.abc import Mapping
 from typing import Any, Final
 
 from rocking.analysis.overturning import PULSES
@@ -13,13 +10,10 @@ from rocking.constants import STANDARD_GRAVITY
 from rocking.explorer.inputs import Case
 from rocking.explorer.maps import Axis, MapGrid, sign_of
 from rocking.explorer.motions import arguments_of, is_pulse, pulse_call
-from rocking.explorer.parameters import QUANTITIES
+from rocking.explorer.parameters import BLOCK_NAMES, NAMES, QUANTITIES
 from rocking.explorer.periodic import KEPT, PASSED
 from rocking.explorer.sweeps import Sweep, call_at
-from rocking.explorer.texts import BLOCK_NAMES, NAMES, as_option
-
-#: Quantities of a map of overturning.
-_OVERTURNING: Final = ("peak", "mode")
+from rocking.inputs.texts import command_line
 
 _CHATTERING: Final = """\
 import math
@@ -223,7 +217,7 @@ def map_as_code(grid: MapGrid) -> dict[str, Any]:
     command = map_as_command(grid)
     return {
         "python": {each: map_as_python(grid, each) for each in QUANTITIES},
-        "command": dict.fromkeys(_OVERTURNING, command),
+        "command": dict.fromkeys(("peak", "mode"), command),
     }
 
 
@@ -273,11 +267,6 @@ def sweep_as_code(sweep: Sweep) -> dict[str, Any]:
 def block_options(case: Case) -> dict[str, str]:
     """Options that describe the block and its model."""
     return {**case.block_options, **{each: case.texts[each] for each in ("model",) if each in case.texts}}
-
-
-def command_line(words: list[str], options: Mapping[str, str]) -> str:
-    """Write a command with its options, as a shell takes it."""
-    return shlex.join([*words, *itertools.chain.from_iterable(itertools.starmap(as_option, options.items()))])
 
 
 def _is_overturning_map(grid: MapGrid) -> bool:

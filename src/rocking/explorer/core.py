@@ -17,10 +17,9 @@ from rocking.explorer.comparing import as_csv, shift_of
 from rocking.explorer.facts import facts
 from rocking.explorer.inputs import read_case
 from rocking.explorer.meshes import described
-from rocking.explorer.parameters import names_of
+from rocking.explorer.parameters import Texts, names_of
 from rocking.explorer.payload import Payload
 from rocking.explorer.simulated import Simulated
-from rocking.explorer.texts import Texts
 from rocking.explorer.uploads import UploadStore
 from rocking.explorer.windows import (
     POINTS,

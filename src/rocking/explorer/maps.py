@@ -22,9 +22,9 @@ from rocking.engine import Setup, Task, simulate_tasks
 from rocking.errors import InvalidOption
 from rocking.explorer.inputs import Case, require_possible, require_rest
 from rocking.explorer.motions import arguments_of, is_pulse, pulse_of, pulse_text
-from rocking.explorer.parameters import QUANTITIES, SCALINGS, names_of
+from rocking.explorer.parameters import BLOCK_NAMES, QUANTITIES, Texts, names_of
 from rocking.explorer.phrases import phrase
-from rocking.explorer.texts import BLOCK_NAMES, Texts
+from rocking.inputs.declared import SCALINGS
 from rocking.motion.motion import Motion
 from rocking.named_pulses import pulse_texts
 from rocking.quantities import number

@@ -11,16 +11,15 @@ import numpy as np
 
 from rocking import checks, records
 from rocking.errors import InvalidMotion, InvalidOption
-from rocking.explorer.parameters import PARAMETERS, PULSES, SCALINGS, names_of
-from rocking.explorer.texts import Texts, Values, as_option, as_path, given_texts, written_arguments
+from rocking.explorer.parameters import PARAMETERS, PULSES, Texts, Values, given_texts, names_of
 from rocking.explorer.uploads import UploadStore
+from rocking.inputs.declared import SCALINGS
+from rocking.inputs.texts import arguments as written_arguments
+from rocking.inputs.texts import as_option, as_path
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
 from rocking.named_pulses import FAMILIES, pulse_values
 from rocking.quantities import acceleration, scaling
-
-#: Letters of a key in the name of a variable.
-_TOLD_APART: Final = 6
 
 #: Longest pulse, cycles: a page shows no more, and memory is bounded.
 MOST_SHOWN: Final = 1000.0
@@ -105,7 +104,7 @@ def _unscaled(name: str, values: Values, uploads: UploadStore) -> Found:
     if kind == "given":
         motion = uploads.motion(key)
         name = "".join(letter for letter in motion.name if letter.isprintable())  # a new line would end the comment
-        variable = f"given_{key[:_TOLD_APART]}"
+        variable = f"given_{key[:6]}"
         return Found(motion, variable, (), f"{variable} = ...  # {name}: the motion that this page was opened with")
     if kind == "file":
         return _from_file(key, values, values.get("channel"), uploads)

@@ -11,11 +11,10 @@ from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
 from rocking.explorer.core import Explorer
 from rocking.explorer.facts import verdict
-from rocking.explorer.parameters import READING
+from rocking.explorer.parameters import READING, Texts
 from rocking.explorer.payload import Payload
 from rocking.explorer.phrases import phrase
 from rocking.explorer.simulated import Simulated
-from rocking.explorer.texts import Texts
 from rocking.explorer.windows import checked_window, extremes
 from rocking.response import Response, active_span
 from rocking.response.figure import boundary_of, course_of, marked

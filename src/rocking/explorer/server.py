@@ -32,12 +32,11 @@ from rocking.explorer import assessment, maps, periodic, readings, sweeps
 from rocking.explorer.catalogue import entries_of, listing
 from rocking.explorer.code import map_as_code, sweep_as_code
 from rocking.explorer.core import EXPORTS, Explorer
-from rocking.explorer.inputs import Case, read_case
+from rocking.explorer.inputs import Case, read_case, tracks
 from rocking.explorer.parameters import PARAMETERS, field_label, specification
 from rocking.explorer.payload import Payload, pack
 from rocking.explorer.phrases import ENGLISH, file_name, filled, phrase, preferred
 from rocking.explorer.studies import StudyView
-from rocking.explorer.tracks import tracks
 from rocking.explorer.uploads import LARGEST
 from rocking.quantities import number
 from rocking.tables import plain

@@ -19,8 +19,8 @@ from rocking.errors import InvalidOption, StudyError
 from rocking.explorer.motions import texts_of_motion
 from rocking.explorer.payload import Payload
 from rocking.explorer.phrases import phrase
-from rocking.explorer.texts import as_path
 from rocking.explorer.uploads import UploadStore
+from rocking.inputs.texts import as_path
 from rocking.motion.scaling import FACTOR
 from rocking.quantities import number
 

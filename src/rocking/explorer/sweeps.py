@@ -15,7 +15,7 @@ from rocking.errors import InvalidOption
 from rocking.explorer.inputs import Case, require_possible
 from rocking.explorer.maps import AXES, Axis, change_pulse
 from rocking.explorer.motions import arguments_of, pulse_call
-from rocking.explorer.parameters import SCALINGS
+from rocking.explorer.parameters import Texts
 from rocking.explorer.payload import Payload
 from rocking.explorer.periodic import (
     KEPT,
@@ -32,7 +32,7 @@ from rocking.explorer.periodic import (
     values_of,
 )
 from rocking.explorer.phrases import phrase
-from rocking.explorer.texts import Texts
+from rocking.inputs.declared import SCALINGS
 from rocking.quantities import number
 
 #: Values of a sweep, the steps between those of each level, and how many come at once.

@@ -1,0 +1,258 @@
+"""Every input, declared once: its name, how its text is read, what the help says of it, and its field on the page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Literal, NamedTuple
+
+from rocking import quantities
+from rocking.block import Block, Damper, Load, Restraint, Spring, Tendon, Thrust
+from rocking.errors import InvalidOption
+from rocking.plausibility import level_notes
+from rocking.progress import note
+from rocking.records.units import plain_spelling
+
+#: What reads a number of each kind, and its SI unit.
+READERS: Final[Mapping[str, tuple[quantities.Quantity, str]]] = {
+    "number": (quantities.number, ""),
+    "length": (quantities.length, "m"),
+    "position": (quantities.position, "m"),
+    "angle": (quantities.angle, "rad"),
+    "tilt": (quantities.tilt, "rad"),
+    "rate": (quantities.rate, "rad/s"),
+    "duration": (quantities.duration, "s"),
+    "velocity": (quantities.velocity, "m/s"),
+    "frequency": (quantities.frequency, "Hz"),
+    "acceleration": (quantities.acceleration, "m/s^2"),
+}
+
+
+def noted_acceleration(text: str, name: str) -> float:
+    """Return an acceleration, m/s^2, with a note where a number without a unit looks like one in g."""
+    value = quantities.acceleration(text, name)
+    for sentence in level_notes(text, value, name):
+        note(sentence)
+    return value
+
+
+#: What the page writes behind a number in these units; others are SI units.
+_SUFFIXES: Final = {"°": "deg", "g": "g"}
+
+
+@dataclass(frozen=True)
+class Input:
+    """An input: an option of the command line, a key of study files, and a field of the page.
+
+    Attributes
+    ----------
+    name : str
+        Name of the option (with hyphens), of the key, and in the page's address.
+    group : str
+        Form of the page that sets it, which comparisons replace as a whole; empty where the page has no field.
+    kind : str
+        How its text is read: a key of `READERS`, "acceleration at a period", "text", "flag" (yes or no), or "texts"
+        (several).
+    help : str
+        Help of its option.
+    unit, default, low, high, logarithmic, step : str, str, float, float, bool, float
+        Field of the page: the unit that is shown, the text it starts with, ends of its slider, in that unit; whether
+        equal distances are equal ratios; steps of the slider where they are no thousandth of its way.
+    values : str
+        Whether the sides of a block may differ in it.
+    text : str
+        The page calls it ``field.TEXT`` and describes it as ``about.TEXT``; by default the name.
+    argument : str
+        Name of the argument in Python, where it is another.
+    """
+
+    name: str
+    group: str = ""
+    kind: str = "number"
+    help: str = ""
+    unit: str = ""
+    default: str = ""
+    low: float = 0.0
+    high: float = 0.0
+    logarithmic: bool = False
+    values: Literal["one", "one or two", "two"] = "one"
+    step: float = 0.0
+    text: str = ""
+    argument: str = ""
+
+    def read(self, text: str) -> Any:
+        """Return the value of a text in SI units: the text itself, a number, or a tuple of two numbers.
+
+        Examples
+        --------
+        >>> INPUTS["alpha"].read("0.1,0.2"), INPUTS["sa"].read("2@0.5"), INPUTS["pivots"].read("20cm")
+        ((0.1, 0.2), (2.0, 0.5), (0.2, 0.2))
+        """
+        if self.kind == "acceleration at a period":
+            return quantities.at_a_period(text, self.name)
+        if self.kind not in READERS:
+            return text
+        if self.values == "one":
+            return self.one(text)
+        found = quantities.sides(text, self.name, READERS[self.kind][0])
+        if self.values == "two" and not isinstance(found, list):
+            found = [found, found]
+        return tuple(found) if isinstance(found, list) else found
+
+    def one(self, text: str) -> float:
+        """Return a number that belongs to one side, or to both."""
+        return READERS[self.kind][0](text, self.name)
+
+    def axis(self, value: Any) -> list[Any]:
+        """Return the values that a study file gives: of a number one, a list, or a range; of pivots pairs."""
+        if self.kind not in READERS:
+            return [value]
+        reader = READERS[self.kind][0]
+        if self.values != "two":
+            return [*map(float, quantities.axis(value, self.name, reader))]
+        pairs = value if isinstance(value, list) and value and isinstance(value[0], list) else [value]
+        found = [tuple(map(float, quantities.axis(pair, self.name, reader))) for pair in pairs]
+        if any(len(pair) != 2 for pair in found):
+            raise InvalidOption(
+                "{} must be a pair, [0.2, 0.15] (side +, side -), or a list of pairs", self.name, value=value
+            )
+        return [*found]
+
+    def described(self) -> dict[str, Any]:
+        """Return what the page needs, in plain values."""
+        names = ("name", "group", "unit", "default", "low", "high", "logarithmic", "values", "step")
+        plain = {name: getattr(self, name) for name in names}
+        kind = "angle" if self.kind == "tilt" else self.kind
+        return {**plain, "kind": kind, "text": self.text or self.name, "suffix": self.suffix, "units": self._units()}
+
+    @property
+    def suffix(self) -> str:
+        """Unit behind a number in the unit that is shown; an azimuth is in degrees without it."""
+        return "" if self.kind == "number" else _SUFFIXES.get(self.unit, "")
+
+    def _units(self) -> dict[str, float]:
+        """Return the size of each unit in the unit that is shown, by plain spellings as in `quantities.UNITS`."""
+        kind = {"acceleration at a period": "acceleration", "tilt": "angle"}.get(self.kind, self.kind)
+        if kind not in quantities.UNITS:
+            return {}
+        units = quantities.UNITS[kind]
+        shown = units[plain_spelling(self.suffix)]
+        return {name: unit.multiplier * shown.divisor / unit.divisor / shown.multiplier for name, unit in units.items()}
+
+
+def by_name(*inputs: Input) -> dict[str, Input]:
+    """Return inputs by their names."""
+    return {each.name: each for each in inputs}
+
+
+#: All inputs of a single simulation, in the order of the page's address.
+INPUTS: Final = by_name(
+    Input("half_width", "", "position", "Half the width of a rectangular block, 0.12 (m) or 12cm."),
+    Input("half_height", "", "position", "Half its height, m."),
+    Input("width", "block", "position", "Width of a rectangular block, 0.24 (m) or 24cm; with --height.",
+        "m", "0.24", 0.02, 5.0, True),
+    Input("height", "block", "position", "Its height, m.", "m", "1.1", 0.1, 20.0, True),
+    Input("offset", "block", "position",
+        "How far its centre of mass is off the middle of the width, m; positive to side + (the right).",
+        "m", "0", -0.25, 0.25),
+    Input("p", "block", "rate", "Frequency parameter, rad/s; one number or two; with --alpha.",
+        "rad/s", "3.61", 0.3, 12.0, True, "one or two"),
+    Input("alpha", "block", "tilt", "Slenderness, 12deg or 0.2 (rad); two with a comma between are side + and side -.",
+        "°", "12.3deg", 1.5, 40.0, False, "one or two"),
+    Input("pivots", "block", "length",
+        "Distances of the pivots of side + and side - from the centre of mass, m, as 0.2,0.15; with --height-of-mass "
+        "and --gyration.", "m", "0.15", 0.01, 2.5, True, "two", argument="distances"),
+    Input("height_of_mass", "block", "length", "Height of the centre of mass above the pivots, m.",
+        "m", "0.55", 0.05, 10.0, True, argument="height"),
+    Input("gyration", "block", "length", "Radius of gyration about the centre of mass, m.",
+        "m", "0.33", 0.02, 8.0, True, argument="radius_of_gyration"),
+    Input("mesh", "block", "text", default="statue"),
+    Input("azimuth", "block", "number", "", "°", "90", 0.0, 360.0, step=1.0),
+    Input("up", "block", "text"),
+    Input("unit", "block", "text"),
+    Input("density", "block", "text"),
+    Input("tolerance", "block", "length", "", "m"),
+    Input("restitution", "block", "number",
+        "Factor on the angular speed at an impact, in (0, 1]; one or two; by default from angular momentum (Housner's "
+        "where both sides are equal).", "", "0.93", 0.5, 0.99, False, "one or two"),
+    Input("mass", "", "number", "Mass of the block, kg, which restraints need; with its sizes or pivots."),
+    Input("one_sided", "", "flag",
+        "It rocks to side + only, as a wall against transverse walls; --restitution is then the speed back over that "
+        "before."),
+    Input("lean", "", "tilt", "Angle by which it stands out of plumb to side +, 1deg or 0.02 (rad)."),
+    Input("tendon", "", "texts",
+        "Elastic tendon, as stiffness=2e6,prestress=5e3 (N/m, N), with offset (m, to side +) and strength (N), at "
+        "which it yields; several times for several."),
+    Input("spring", "", "number", "Rotational spring, N m/rad."),
+    Input("damper", "", "number", "Rotational viscous damper, N m s/rad."),
+    Input("thrust", "", "texts",
+        "Horizontal force to side +, as force=1500,height=4 (N, m), with offset (m); several times for several."),
+    Input("load", "", "texts",
+        "Weight on it, as mass=250,height=3 (kg, m), with offset (m), and follows=no for one that presses and does "
+        "not move with it; several times for several."),
+    Input("ball", "", "number",
+        "In place of a block a ball on a table, by its coefficient of restitution; the motion is up."),
+    Input("oscillator", "", "text",
+        "In place of a block an oscillator that hits a stop, as frequency=1,restitution=0.8,stop=0.01 (Hz, m), with "
+        "damping_ratio and second_stop."),
+    Input("pendulum", "", "text",
+        "In place of a block a pendulum between walls, as p=3,gap=0.1,restitution=0.6 (rad/s, m)."),
+    Input("gravity", "model", "acceleration", "", "m/s²"),
+    Input("motion", "motion", "text", default="ridgecrest-clc-090"),
+    Input("channel", "motion", "text", "Channel, by number or name, of files that hold several."),
+    Input("vertical", "motion", "text",
+        "Vertical motion, scaled alike: a channel of the same file, or another file or shipped record."),
+    Input("dt", "motion", "duration", "Sampling step, 0.01 (s) or 10ms, of files that do not say theirs.", "s", "0.01"),
+    Input("units", "motion", "text", "Units of files that do not say theirs: g, m/s2, cm/s2, gal, mm/s2, mg."),
+    Input("scale", "motion", "number", "Factor on the motion; negative: reversed.", "", "1", 0.1, 10.0, True),
+    Input("pga", "motion", "acceleration", "Scale to this peak ground acceleration: 0.5g, 4.9m/s2 or 4.9 (m/s^2).",
+        "g", "0.4g", 0.05, 2.0, True),
+    Input("pgv", "motion", "velocity", "Scale to this peak ground velocity, 0.4 (m/s) or 40cm/s.",
+        "m/s", "0.5", 0.05, 3.0, True),
+    Input("sa", "motion", "acceleration at a period",
+        "Scale to this spectral acceleration (5 % damping) at a period: 0.4g@1.0 is 0.4 g at 1.0 s.",
+        "g", "0.5g", 0.05, 4.0, True),
+    Input("pulse", "", "texts",
+        "A pulse as the ground motion, sine:amplitude=0.2g,frequency=2Hz,cycles=5 (see rocking pulses); once for "
+        "each."),
+    Input("model", "model", "text",
+        "Equation of motion: of finite rotations (nonlinear, the default), or linearised for slender blocks.",
+        default="nonlinear"),
+    Input("chattering", "treatment", "text",
+        "How chattering ends: certified, velocity, bypass, interval, or (under a sine) time; with a limit, as "
+        "certified=1e-9 (s), velocity=5e-10 or bypass=1e-3 (over p alpha), interval=1e-9 (s).", default="certified"),
+    Input("duration", "model", "duration",
+        "Time to stop at, s; by default when the block is at rest after the motion, or has overturned.", "s"),
+    Input("initial_rotation", "start", "tilt", "Rotation at the start, 2deg or 0.03 (rad).", "°", "0deg", -20.0, 20.0),
+    Input("initial_velocity", "start", "rate", "Angular velocity at the start, 5deg/s or 0.09 (rad/s).",
+        "rad/s", "0", -2.0, 2.0),
+)  # fmt: skip
+
+#: Inputs that scale a motion, of which there is one at most.
+SCALINGS: Final = ("pga", "pgv", "sa", "scale")
+
+
+class Shape(NamedTuple):
+    """A way to describe a block: the inputs that it needs and accepts, and the function of `rocking` that makes one."""
+
+    name: str
+    needed: tuple[str, ...]
+    optional: tuple[str, ...]
+    make: Callable[..., Block]
+
+
+#: A restitution goes with each of them.
+SHAPES: Final = (
+    Shape("sizes", ("width", "height"), ("offset", "mass"), Block),
+    Shape("half sizes", ("half_width", "half_height"), ("offset", "mass"), Block),
+    Shape("parameters", ("p", "alpha"), (), Block.from_parameters),
+    Shape("pivots", ("pivots", "height_of_mass", "gyration"), ("mass",), Block.from_pivots),
+)
+
+#: Inputs that describe a block.
+BLOCK: Final = (*dict.fromkeys(n for shape in SHAPES for n in (*shape.needed, *shape.optional)), "restitution")
+
+#: Restraints, by the names of their inputs: couples are numbers, the others have parameters.
+COUPLES: Final[Mapping[str, Callable[[float], Restraint]]] = {"spring": Spring, "damper": Damper}
+FORCES: Final[Mapping[str, Callable[..., Restraint]]] = {"tendon": Tendon, "thrust": Thrust, "load": Load}
+HELD: Final = ("one_sided", "lean", "tendon", "spring", "damper", "thrust", "load")

@@ -1,0 +1,102 @@
+"""A text file in TOML: its tables, and the line of every mistake in them."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import tomllib
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any, TypeVar
+
+from rocking import checks
+from rocking.errors import InvalidMotion, RockingError, StudyError, UnreadableRecord
+
+_Kept = TypeVar("_Kept", bound=RockingError)
+
+
+class Tables:
+    """Tables of a file, and where each key of them stands."""
+
+    def __init__(self, path: str | Path) -> None:
+        self.file = checks.path(path, "the file of a study", StudyError)
+        try:
+            self.text = self.file.read_text("utf-8-sig")
+            self.tables = tomllib.loads(self.text)
+        except OSError as error:
+            raise StudyError(f"the file cannot be read: {error.strerror or error}", path=str(self.file)) from None
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise StudyError(f"this is no TOML file: {error}; correct it", path=str(self.file)) from None
+
+    def table(self, table: str, occurrence: int = 0) -> Any:
+        """Content of a table, empty where it is missing; of those of a list, the occurrence-th."""
+        content: Any = self.tables
+        for name in table.split("."):
+            content = content.get(name, {})
+        return content[occurrence] if isinstance(content, list) else content
+
+    @contextlib.contextmanager
+    def located(self, *tables: str, key: str | None = None, occurrence: int = 0) -> Iterator[None]:
+        """Give a mistake the line of this key, or of the first that it names in these tables, or of the heading."""
+        try:
+            yield
+        except RockingError as error:
+            named = error.message.arguments if key is None else (key,)
+            places = [(table, name) for table in tables for name in named if name in self.table(table, occurrence)]
+            table, name = places[0] if places else (tables[0], None)
+            raise moved(error, StudyError, self.file, self.line_of(table, name, occurrence)) from None
+
+    @contextlib.contextmanager
+    def located_record(self, name: str) -> Iterator[None]:
+        """Give what is wrong with a record the line that names it."""
+        try:
+            yield
+        except (UnreadableRecord, InvalidMotion) as error:
+            first = self.line_of("motions", "records")
+            lines = self.text.splitlines()[first - 1 :]
+            line = next((k for k, text in enumerate(lines, start=first) if name in text), first)
+            raise moved(error, type(error), self.file, line) from None
+
+    def wrong(self, table: str, key: str | None, message: str, *names: str, value: object = None) -> StudyError:
+        """Return the error that says what is wrong with a key of a table, or with the table."""
+        return StudyError(message, *names, path=str(self.file), line=self.line_of(table, key), value=value)
+
+    def line_of(self, table: str, key: str | None, occurrence: int = 0) -> int:
+        """Line of a key in a table, the occurrence-th of that name; of its heading without a key; 1 if unseen."""
+        if "." in table and not re.search(rf"^\s*\[+\s*{re.escape(table)}\b", self.text, re.MULTILINE):
+            parent, _, name = table.rpartition(".")  # it is written within its parent
+            return self.line_of(parent, name)
+        here, seen, heading_line = "", -1, 1
+        for number, line in enumerate(self.text.splitlines(), start=1):
+            if heading := re.match(r"\s*\[+\s*([\w.]+)\s*\]+", line):
+                here = heading[1]
+                seen += here == table
+                if key is not None and here == f"{table}.{key}":
+                    return number
+                if here == table and seen == occurrence:
+                    heading_line = number
+            found = re.match(r"\s*([\w.-]+)\s*=", line)
+            if found and key is not None and here == table and max(seen, 0) == occurrence and found[1] == key:
+                return number
+        return heading_line
+
+
+@contextlib.contextmanager
+def in_line(file: Path, line: int) -> Iterator[None]:
+    """Give a mistake the line of a file."""
+    try:
+        yield
+    except RockingError as error:
+        raise moved(error, StudyError, file, line) from None
+
+
+def moved(error: RockingError, kind: type[_Kept], file: Path, line: int, where: str = "") -> _Kept:
+    """Return an error as one of this line, with all its data; what it says of a file of its own comes before."""
+    where += error.text().removesuffix(error.message.text())
+    return kind(where + error.message.template, *error.message.arguments, path=str(file), line=line, value=error.value)
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Say which known name is meant, or which there are."""
+    names = [*known]
+    return checks.meant(name, names, f"there are {', '.join(names)}")
