@@ -187,7 +187,7 @@ def test_a_sweep_is_what_its_script_computes(texts, asked, tmp_path):
     script = tmp_path / "sweep.py"
     script.write_text(sweep_as_python(sweep), "utf-8")
     ran = runpy.run_path(str(script))["found"]
-    assert len(found) == ran.period.size == 48
+    assert len(found) == ran.data.period.size == 48
     overturned = periodic = 0
     for (direction, index), each in found.items():
         at = ran.data.sel(direction=direction, start=0).isel(value=index)

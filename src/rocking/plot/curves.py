@@ -246,7 +246,8 @@ def spectrum_figure(
                     _draw(peaks, x, single, width, style)
             else:
                 for single in curve.singles if len(curves) <= _WITH_ALL_MOTIONS else ():
-                    peaks.plot(x, single, color=style["color"], linewidth=0.5, alpha=0.35)
+                    shown = np.where(np.isfinite(single), single, np.nan)
+                    peaks.plot(x, shown, color=style["color"], linewidth=0.5, alpha=0.35)
                 for share, row in chosen.items():
                     _draw(peaks, x, curve.fractiles[row], _MIDDLE if share == middle else _OTHER, style)
             for panel in shares:
@@ -267,8 +268,9 @@ def spectrum_figure(
 
 def _draw(axes: Axes, x: Floats, values: Floats, width: float, style: dict[str, Any]) -> None:
     """Draw a line with gaps where its values are infinite, and mark its ends there."""
-    axes.plot(x, values, marker="o" if x.size == 1 else "", markersize=4.0, linewidth=width, **style)
     finite = np.isfinite(values)
+    shown = np.where(finite, values, np.nan)
+    axes.plot(x, shown, marker="o" if x.size == 1 else "", markersize=4.0, linewidth=width, **style)
     ends = finite & ~(np.append(True, finite[:-1]) & np.append(finite[1:], True))
     if ends.any():
         axes.plot(x[ends], values[ends], color=style["color"], **_END)

@@ -74,7 +74,8 @@ def ida_figure(*, motions: Sequence[ScaledMotion], level_label: str, **place: Un
         curves, *strips = page.panels(1, 2, sharey=True, width_ratios=(2.0, 1.0))
         for motion, style in zip(motions, styles, strict=True):
             look = {"marker": ".", "markeredgewidth": 0.0, "label": as_written(motion.label), **style}
-            curves.plot(motion.peak, motion.levels, **look, **(_OWN if few else _ALIKE))
+            peak = np.where(np.isfinite(motion.peak), motion.peak, np.nan)
+            curves.plot(peak, motion.levels, **look, **(_OWN if few else _ALIKE))
         if not few:
             _draw_fractiles(curves, motions)
         curves.set_xlim(left=0.0, right=curves.get_xlim()[1])
