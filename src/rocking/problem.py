@@ -214,15 +214,9 @@ def settings_of(
             )
     else:
         duration = checks.positive(duration, "duration", InvalidOption, "s")
-    return state.record(
-        state.SETTINGS,
-        nonlinear=model == "nonlinear",
-        treatment=treatment.code,
-        tolerance=treatment.bracket,
-        stop=math.inf if duration is None else duration,
-        no_end_time=duration is None,
-        record=record,
-    )
+    stop = math.inf if duration is None else duration
+    fields = (model == "nonlinear", treatment.code, treatment.bracket, stop, duration is None, record)
+    return state.attributed(np.array([fields], dtype=state.SETTINGS))[0]
 
 
 @functools.lru_cache(maxsize=8)
