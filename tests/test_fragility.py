@@ -349,6 +349,11 @@ def test_a_cloud_has_every_motion_at_its_own_intensity(alpha):
     assert result.curve("part").median < result.curve("overturning").median
 
 
+def test_a_limit_of_the_peak_rotation_is_not_negative():
+    with pytest.raises(rocking.InvalidOption, match="must be 0 or more, not -0.5"):
+        fragility(BLOCK, PULSES, levels=[2.5, 3.5], limits={"half": -0.5})
+
+
 def test_stripes_scale_every_motion_to_every_level():
     levels = np.array([2.5, 3.5, 5.0])
     sided = rocking.Block.from_parameters((2.0, 2.5), (0.25, 0.15), (0.9, 0.85))

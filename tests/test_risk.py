@@ -193,6 +193,14 @@ def test_the_share_beyond_the_curve_is_told() -> None:
     assert "above the hazard curve" in short.summary()
 
 
+def test_an_interval_without_an_end_is_explained() -> None:
+    site = HazardCurve([2.0, 3.0], [1e-2, 5e-3])
+    note = "whose summary says why they have no end"
+    assert note not in fragility_with(3.0, 0.4).annual_rate(site).summary()
+    few = rocking.fit_fragility([2.0, 3.0, 4.0], [False, False, True], band=Band("likelihood"))
+    assert note in few.annual_rate(site).summary()
+
+
 def test_a_table_is_read_with_its_units(tmp_path: Path) -> None:
     path = tmp_path / "site.csv"
     path.write_text("annual_rate,pga_g\n0.02,0.1\n0.001,0.5\n")
