@@ -350,7 +350,7 @@ def test_a_cloud_has_every_motion_at_its_own_intensity(alpha):
 
 
 def test_a_limit_of_the_peak_rotation_is_not_negative():
-    with pytest.raises(rocking.InvalidOption, match="must be 0 or more, not -0.5"):
+    with pytest.raises(rocking.InvalidOption, match=r"must be 0 or more, not -0\.5"):
         fragility(BLOCK, PULSES, levels=[2.5, 3.5], limits={"half": -0.5})
 
 

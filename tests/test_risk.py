@@ -197,7 +197,7 @@ def test_an_interval_without_an_end_is_explained() -> None:
     site = HazardCurve([2.0, 3.0], [1e-2, 5e-3])
     note = "whose summary says why they have no end"
     assert note not in fragility_with(3.0, 0.4).annual_rate(site).summary()
-    few = rocking.fit_fragility([2.0, 3.0, 4.0], [False, False, True], band=Band("likelihood"))
+    few = rocking.fit_fragility([2.0, 2.5, 3.0, 4.0, 5.0], [False, True, False, True, True], band=Band("likelihood"))
     assert note in few.annual_rate(site).summary()
 
 
