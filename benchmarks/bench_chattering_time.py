@@ -12,7 +12,7 @@ import numpy as np
 
 from rocking import chattering
 from rocking.chattering import duration
-from rocking.threads import cores
+from rocking.core.threads import cores
 
 CASE = (1.03, 2.0, 0.92)
 REPETITIONS = 5

@@ -18,10 +18,10 @@ import numba
 import numpy as np
 
 import rocking
-from rocking.constants import Model
+from rocking.core.constants import Model
 from rocking.kernels import lanes, state
-from rocking.problem import ground_of, settings_of
-from rocking.treatment import Certified
+from rocking.engine.problem import ground_of, settings_of
+from rocking.engine.treatment import Certified
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests"))

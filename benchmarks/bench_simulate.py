@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import rocking
-from rocking.constants import Model
+from rocking.core.constants import Model
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests"))

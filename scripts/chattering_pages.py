@@ -16,7 +16,7 @@ from pages import markdown, write
 import rocking
 from rocking.chattering import chattering_time, critical_amplitude, families
 from rocking.chattering.maps import chattering_episodes, chattering_map
-from rocking.tables import counted
+from rocking.core.tables import counted
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples/paper"))
 

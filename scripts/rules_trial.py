@@ -13,7 +13,7 @@ from pages import markdown, write
 
 import rocking
 from rocking import rules
-from rocking.constants import MODELS
+from rocking.core.constants import MODELS
 from rocking.plot.canvas import CURVES, add_labels, add_legend, figure_for, handles_of
 from rocking.rules import TITLES
 

@@ -19,7 +19,7 @@ from scipy.optimize import minimize
 
 import rocking
 from rocking.calibration import Scores, Validation
-from rocking.constants import STANDARD_GRAVITY
+from rocking.core.constants import STANDARD_GRAVITY
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -24,7 +24,7 @@ from pages import markdown, write
 import rocking
 from rocking import overturning_map
 from rocking.calibration import Scores, Validation
-from rocking.constants import STANDARD_GRAVITY
+from rocking.core.constants import STANDARD_GRAVITY
 
 ROOT = Path(__file__).resolve().parents[1]
 

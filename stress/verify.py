@@ -33,7 +33,7 @@ from promises.promise import Found, Promise
 from rows import markdown, with_earlier
 
 import rocking
-from rocking.progress import Progress
+from rocking.core.progress import Progress
 
 ROOT = Path(__file__).resolve().parents[1]
 LIBRARIES = ("numpy", "numba", "scipy", "python-flint")

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import rocking
-from rocking.body import Bodies, Body
+from rocking.block.body import Bodies, Body
 
 #: What describes the methods of these classes, which do not inherit from it.
 PROTOCOLS: dict[Any, tuple[Any, ...]] = {

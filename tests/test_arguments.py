@@ -10,7 +10,7 @@ import rocking
 from rocking import Block, Blocks, InvalidBlock, InvalidMotion
 from rocking.analysis import Band
 from rocking.analysis.survey import survey
-from rocking.named_pulses import named_pulse
+from rocking.inputs.pulses import named_pulse
 
 BLOCK = Block(width=0.24, height=1.1)
 MOTION = rocking.pulses.one_sine(3.0, 1.0)

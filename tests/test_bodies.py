@@ -6,10 +6,10 @@ import pytest
 
 import rocking
 from rocking import InvalidBlock, InvalidMotion, InvalidOption, Motion, dynamics, simulate, simulate_many
-from rocking.body import Bodies, Body
-from rocking.constants import STANDARD_GRAVITY
-from rocking.engine import Setup, Task, simulate_tasks
-from rocking.treatment import Certified
+from rocking.block.body import Bodies, Body
+from rocking.core.constants import STANDARD_GRAVITY
+from rocking.engine.tasks import Setup, Task, simulate_tasks
+from rocking.engine.treatment import Certified
 
 G = 9.81
 

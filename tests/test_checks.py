@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking import checks
+from rocking.core import checks
 from rocking.errors import InvalidBlock, InvalidOption
 
 REAL = [1, 1.0, np.float32(1), np.float64(1), np.int64(1), np.uint8(1), Fraction(1), np.array(1), np.array(1.0)]

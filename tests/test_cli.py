@@ -18,7 +18,7 @@ import rocking
 from rocking import cli
 from rocking.cli import app
 from rocking.errors import INTERRUPTED
-from rocking.threads import in_threads
+from rocking.core.threads import in_threads
 
 BLOCK = ["--half-width", "0.12", "--half-height", "0.55"]
 RECORD = "el-centro-meloland-270"

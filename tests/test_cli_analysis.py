@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking import fragility, incremental_dynamic_analysis, overturning_map, quantities, rocking_spectrum
+from rocking import fragility, incremental_dynamic_analysis, overturning_map, rocking_spectrum
+from rocking.core import quantities
 from rocking.analysis import Band
-from rocking.tables import to_json
+from rocking.core.tables import to_json
 
 RECORD = "el-centro-meloland-270"
 OTHER = "el-centro-meloland-360"
@@ -105,7 +106,7 @@ def no_work(monkeypatch):
     def simulated(*arguments, **named):
         raise AssertionError("this was simulated")
 
-    monkeypatch.setattr("rocking.engine.simulate_task", simulated)
+    monkeypatch.setattr("rocking.engine.tasks.simulate_task", simulated)
     # A function has the name of its module there.
     monkeypatch.setattr(import_module("rocking.rules"), "simulate", simulated)
 

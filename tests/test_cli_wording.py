@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking import Block, Blocks, Motion, quantities
+from rocking import Block, Blocks, Motion
+from rocking.core import quantities
 from rocking.errors import RockingError
 
 RECORD = "el-centro-meloland-270"

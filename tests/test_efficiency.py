@@ -9,7 +9,7 @@ from scipy.stats import chi2
 import rocking
 from rocking import compare_measures
 from rocking.analysis import efficiency
-from rocking.constants import STANDARD_GRAVITY as G
+from rocking.core.constants import STANDARD_GRAVITY as G
 
 SLENDER = rocking.Block.from_parameters(p=1.0, alpha=1e-3, restitution=0.5)
 LENGTHS = np.array([0.3, 1.2, 4.8])

@@ -9,18 +9,8 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking import (
-    Block,
-    Blocks,
-    Certified,
-    InvalidBlock,
-    InvalidOption,
-    Measure,
-    VelocityThreshold,
-    engine,
-    simulate,
-    simulate_many,
-)
+from rocking import Block, Blocks, Certified, InvalidBlock, InvalidOption, Measure, VelocityThreshold, simulate, simulate_many
+from rocking.engine.tasks import tasks as engine
 
 
 @pytest.fixture(scope="module")

@@ -8,10 +8,11 @@ from oracles.multiprecision import follow
 from oracles.problem import Problem
 
 import rocking
-from rocking import Blocks, Motion, ensemble, simulate, simulate_many
-from rocking.ensemble import Scales
+from rocking import Blocks, Motion, simulate, simulate_many
+from rocking.simulation.simulate import ensemble
+from rocking.simulation.ensemble import Scales
 from rocking.kernels.ground import components
-from rocking.problem import ground_of
+from rocking.engine.problem import ground_of
 
 GRAVITY = 9.80665
 MODELS = pytest.mark.parametrize("model", ["linear", "nonlinear"])

@@ -26,7 +26,7 @@ from explorer_texts import in_english
 from PIL import Image
 
 import rocking
-from rocking import quantities
+from rocking.core import quantities
 from rocking.chattering.families import sine
 from rocking.explorer import maps
 from rocking.explorer.core import Explorer

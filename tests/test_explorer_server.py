@@ -30,7 +30,7 @@ from rocking.explorer.launch import served
 from rocking.explorer.server import App, low_priority
 from rocking.explorer.studies import StudyView
 from rocking.explorer.uploads import LARGEST, UploadStore
-from rocking.threads import AHEAD, cores
+from rocking.core.threads import AHEAD, cores
 
 PORT = 8123
 OURS = f"http://127.0.0.1:{PORT}"

@@ -14,7 +14,7 @@ from rocking import InvalidOption, fit_fragility, fragility
 from rocking.analysis import Band
 from rocking.analysis.levels import clusters_of, families_of
 from rocking.block import Blocks
-from rocking.progress import notes_for
+from rocking.core.progress import notes_for
 
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
 PULSES = [rocking.pulses.one_sine(1.0, frequency) for frequency in np.linspace(0.3, 1.5, 13)]

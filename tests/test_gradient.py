@@ -8,7 +8,7 @@ from oracles.cases import GRAVITY
 
 import rocking
 from rocking import Block, Motion
-from rocking.arrays import Floats
+from rocking.core.arrays import Floats
 
 P, ALPHA, RESTITUTION = (2.0, 2.6), (0.15, 0.12), (0.9, 0.7)
 BLOCK = Block.from_parameters(p=P, alpha=ALPHA, restitution=RESTITUTION)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rocking.arrays import Floats
+from rocking.core.arrays import Floats
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "docs" / "howto"
 #: One second of a sine and a half, m/s^2, in the steps of the examples, and a change of all samples.

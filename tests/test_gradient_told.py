@@ -328,8 +328,8 @@ def test_where_a_block_leaves_as_it_comes_to_rest_there_is_no_derivative() -> No
 def test_of_an_unfinished_simulation_no_derivative_is_known(
     monkeypatch: pytest.MonkeyPatch, model: Any, side: float
 ) -> None:
-    monkeypatch.setattr("rocking.simulation.SLICE", 20)
-    monkeypatch.setattr("rocking.simulation.slices", lambda _: 1)
+    monkeypatch.setattr("rocking.simulation.simulate.SLICE", 20)
+    monkeypatch.setattr("rocking.simulation.simulate.slices", lambda _: 1)
     response = rocking.simulate(BLOCK, None, model=model, initial_rotation=0.05 * side)
     assert response.unfinished
     assert len(response.impacts) > 1

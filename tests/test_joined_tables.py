@@ -9,7 +9,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import rocking
-from rocking import quantities
+from rocking.core import quantities
 from rocking.analysis.survey import survey
 
 SIZES = ["--width", "0.24", "--height", "1.1"]

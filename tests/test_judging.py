@@ -8,7 +8,8 @@ import pytest
 from scipy import stats
 
 import rocking
-from rocking import Block, Blocks, InvalidOption, ShakeTest, UnreadableRecord, engine
+from rocking import Block, Blocks, InvalidOption, ShakeTest, UnreadableRecord
+from rocking.engine.tasks import tasks as engine
 from rocking.calibration import Validation
 
 STRONG, WEAK = rocking.pulses.one_sine(6.0, 1.0), rocking.pulses.one_sine(1.0, 1.0)

@@ -8,7 +8,7 @@ import pytest
 from kernel_records import ULP, in_units_of_g, one_sided, rocking_block, rules_for, state_of
 from oracles.taylor import Line, Number, System, coefficients, mp
 
-from rocking.arrays import Floats
+from rocking.core.arrays import Floats
 from rocking.kernels import state
 from rocking.kernels.series import (
     angle_coefficients,

@@ -11,7 +11,7 @@ from oracles.cases import GRAVITY
 from oracles.problem import Problem
 
 import rocking
-from rocking.constants import Model
+from rocking.core.constants import Model
 from rocking.kernels import state
 from rocking.kernels.arc import restoring
 from rocking.kernels.state import Record

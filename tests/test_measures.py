@@ -15,7 +15,7 @@ from scipy import linalg
 from scipy.integrate import solve_ivp
 
 from rocking import pulses, records
-from rocking.constants import STANDARD_GRAVITY
+from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion
 from rocking.motion.motion import Motion
 

@@ -9,7 +9,7 @@ import pytest
 import rocking
 from rocking import pulses
 from rocking.chattering import chattering_time
-from rocking.named_pulses import FAMILIES, PARAMETERS, named_pulse, pulse_family
+from rocking.inputs.pulses import FAMILIES, PARAMETERS, named_pulse, pulse_family
 
 G = 9.80665
 

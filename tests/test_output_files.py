@@ -12,11 +12,11 @@ import pytest
 from matplotlib.figure import Figure
 
 import rocking
-from rocking import tables
+from rocking.core import tables
 from rocking.analysis.survey import folder_names, survey
-from rocking.result import DatasetResult
+from rocking.core.result import DatasetResult
 from rocking.studies.results import FORMATS
-from rocking.tables import whole_file, write_figure
+from rocking.core.tables import whole_file, write_figure
 
 resource = pytest.importorskip("resource")
 

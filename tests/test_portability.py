@@ -11,7 +11,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from rocking import threads
+from rocking.core import threads
 from rocking.explorer import apart, launch, server
 from rocking.plot import canvas
 from rocking.studies import folder
@@ -39,7 +39,7 @@ WORDS = re.compile(rf"\bimport ({'|'.join(MODULES)})\b|\b({'|'.join(MODULES_WITH
 def test_every_place_that_depends_on_the_system_is_on_the_page() -> None:
     assert len(TEXTS) > 100
     places = {name for name, text in TEXTS.items() if WORDS.search(text)}
-    assert {"explorer/apart.py", "studies/folder.py", "threads.py"} <= places
+    assert {"explorer/apart.py", "studies/folder.py", "core/threads.py"} <= places
     shown = {name for name in places if f"`{name}`" in PAGE or f"`{name.removesuffix('.py')}." in PAGE}
     assert places - shown == set()
 

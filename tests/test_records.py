@@ -10,7 +10,7 @@ import ship_records
 from numpy.testing import assert_array_equal
 
 from rocking import read, records
-from rocking.constants import STANDARD_GRAVITY
+from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import UnreadableRecord
 from rocking.records.named import named_motion, numbered, shipped
 

@@ -18,7 +18,7 @@ from rocking.kernels import state
 from rocking.response import QUANTITIES, history, sensitivity, summary
 from rocking.response.summary import known_ratio, time_text
 from rocking.rules import Check
-from rocking.tables import named
+from rocking.core.tables import named
 
 TABLES = {
     "events": ["time_s", "kind", "side"],

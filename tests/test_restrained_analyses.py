@@ -9,7 +9,7 @@ import pytest
 
 import rocking
 from rocking import Block, Damper, InvalidBlock, InvalidOption, RestrainedBlock, Tendon, Thrust, dynamics
-from rocking.ensemble import body_coordinates
+from rocking.simulation.ensemble import body_coordinates
 
 FACADE = RestrainedBlock(Block(width=0.5, height=5.0, mass=6e3), Thrust(8e2, height=4.0), one_sided=True)
 LEANING = RestrainedBlock(Block(width=0.5, height=3.0, mass=4e3), Tendon(1e5, prestress=2e3), lean=0.02)

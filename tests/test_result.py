@@ -12,12 +12,13 @@ from matplotlib.figure import Figure
 from public_names import public_names
 
 import rocking
-from rocking import dynamics, engine
+from rocking import dynamics
+from rocking.engine.tasks import tasks as engine
 from rocking.calibration.outcomes import overturned_under
 from rocking.chattering import chattering_map, critical_amplitude_nonlinear, families
-from rocking.progress import Progress
-from rocking.result import DatasetResult
-from rocking.tables import counted
+from rocking.core.progress import Progress
+from rocking.core.result import DatasetResult
+from rocking.core.tables import counted
 
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
 PULSE = rocking.pulses.one_sine(6.0, 1.0)

@@ -13,7 +13,7 @@ from scipy.integrate import quad
 import rocking
 from rocking import rules
 from rocking import rules as criteria
-from rocking.constants import STANDARD_GRAVITY as G
+from rocking.core.constants import STANDARD_GRAVITY as G
 
 NUMBER = re.compile(r"\d+(?:\.\d+)?")
 RECORD = "el-centro-meloland-270"
@@ -177,8 +177,8 @@ def test_a_check_compares_the_rules_with_simulations(record):
 def test_what_was_not_finished_says_nothing_of_a_rule(record, monkeypatch):
     found = rules.check(TOMBSTONE, {"whole": record, "cut": record}, rules=["west"])
     with monkeypatch.context() as patched:
-        patched.setattr("rocking.simulation.slices", lambda ground: 1)
-        patched.setattr("rocking.simulation.SLICE", 5)
+        patched.setattr("rocking.simulation.simulate.slices", lambda ground: 1)
+        patched.setattr("rocking.simulation.simulate.SLICE", 5)
         cut = rocking.simulate(TOMBSTONE, rocking.pulses.sine(4.0, 2.0, cycles=20))
     assert cut.unfinished
     text = replace(found, responses=(found.responses[0], cut), ratios=({"west": 0.5},) * 2).summary()

@@ -20,7 +20,7 @@ from rocking import (
     Tendon,
     Thrust,
 )
-from rocking.plausibility import density_notes, restraint_notes
+from rocking.inputs.notes import density_notes, restraint_notes
 
 WALL = Block(width=0.5, height=4.0, mass=5e3)
 PULSE = rocking.pulses.one_sine(2.0, 1.0)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rocking.errors import UnreadableRecord
-from rocking.plausibility import reading_notes, vertical_notes
+from rocking.inputs.notes import reading_notes, vertical_notes
 from rocking.records.formats import channels, chosen, identify, read
 from rocking.records.formats.source import Request
 from rocking.records.named import named_motion, named_vertical

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from rocking.threads import AHEAD, in_threads
+from rocking.core.threads import AHEAD, in_threads
 
 
 @pytest.mark.parametrize("threads", [1, 4])

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import rocking
 from rocking.chattering import chattering_time
 from rocking.errors import OutsideFit
-from rocking.treatment import treatment
+from rocking.engine.treatment import treatment
 
 BENCH = runpy.run_path(str(Path(__file__).parents[1] / "benchmarks/bench_schemes.py"))
 BLOCK = rocking.Block.from_parameters(p=1.0, alpha=0.2, restitution=0.92)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking import HazardCurve, Measure, quantities
+from rocking import HazardCurve, Measure
+from rocking.core import quantities
 from rocking.analysis.hazard import HEADINGS
 from rocking.calibration.tables import read_observed
 from rocking.motion.scaling import _MEASURES

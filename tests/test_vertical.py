@@ -13,7 +13,7 @@ import rocking
 from rocking import InvalidMotion, InvalidOption, Motion
 from rocking.motion.description import Origin
 from rocking.motion.exceedance import exceedances, lifting_factors
-from rocking.plausibility import vertical_notes
+from rocking.inputs.notes import vertical_notes
 from rocking.records.named import named_motion
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")

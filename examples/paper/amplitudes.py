@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from rocking.arrays import Floats
+from rocking.core.arrays import Floats
 from rocking.plot.canvas import ABOVE, GROUND, INK, REST, figure_for, write
 
 if TYPE_CHECKING:

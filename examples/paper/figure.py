@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking import checks, pulses
-from rocking.arrays import Floats
+from rocking import pulses
+
+from rocking.core import checks
+from rocking.core.arrays import Floats
 from rocking.block import Block
 from rocking.chattering.amplitude import critical_amplitude
 from rocking.chattering.duration import chattering_time
@@ -26,9 +28,9 @@ from rocking.chattering.expansions import (
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.response import Response
-from rocking.simulation import simulate
-from rocking.tables import write_figure
-from rocking.treatment import Treatment
+from rocking.simulation.simulate import simulate
+from rocking.core.tables import write_figure
+from rocking.engine.treatment import Treatment
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

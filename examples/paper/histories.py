@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from rocking.arrays import Floats
+from rocking.core.arrays import Floats
 from rocking.plot.canvas import (
     ABOVE,
     GROUND,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 import numpy as np
 
-from rocking.arrays import Floats
+from rocking.core.arrays import Floats
 from rocking.plot.canvas import ABOVE, GROUND, INK, REST, figure_for
 
 if TYPE_CHECKING:

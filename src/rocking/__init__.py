@@ -6,7 +6,7 @@ and the command line start at once.
 
 import lazy_loader
 
-from rocking.constants import VERSION
+from rocking.core.constants import VERSION
 
 __version__ = VERSION
 

@@ -26,12 +26,12 @@ from .block import (
     impact_restitution,
     one_sided_restitution,
 )
-from .body import Bodies, Body, Coordinate
+from .block.body import Bodies, Body, Coordinate
 from .calibration.history import HistoryCalibration, calibrate_history
 from .calibration.outcomes import Calibration, calibrate
 from .calibration.tables import read_tests
 from .calibration.validate import ModelValidation, ShakeTest, validate
-from .ensemble import Product, Scales, simulate_many
+from .simulation.ensemble import Product, Scales, simulate_many
 from .errors import (
     DamagedStudy,
     InvalidBlock,
@@ -52,11 +52,11 @@ from .motion.description import Description, Origin
 from .motion.scaling import Measure
 from .records.formats import read
 from .response import Gradient, Perturbed, Repeat, Response, Sensitivity, gradient
-from .result import DatasetResult, Result, Row
-from .simulation import simulate
+from .core.result import DatasetResult, Result, Row
+from .simulation.simulate import simulate
 from .solid.solid import Solid
 from .studies import Study, study
-from .treatment import AsymptoticTime, Certified, GeometricBypass, IntervalThreshold, Treatment, VelocityThreshold
+from .engine.treatment import AsymptoticTime, Certified, GeometricBypass, IntervalThreshold, Treatment, VelocityThreshold
 
 __version__: str
 

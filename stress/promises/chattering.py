@@ -14,7 +14,7 @@ from oracles import balance
 import rocking
 from promises.exact import GRAVITY, Side, rest
 from promises.promise import ABOVE_ENSEMBLES, Found, Promise
-from rocking.treatment import Certified
+from rocking.engine.treatment import Certified
 
 #: Cases of a part, some ten seconds of processor time.
 CASES = 400

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rocking
-from rocking.arrays import Floats
+from rocking.core.arrays import Floats
 from rocking.motion.exceedance import exceedances
 
 GRAVITY = 9.80665

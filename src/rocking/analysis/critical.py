@@ -6,15 +6,15 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final
 
-from rocking import checks
-from rocking.bisection import bisected
-from rocking.body import Body
-from rocking.constants import Model
+from rocking.core import checks
+from rocking.core.bisection import bisected
+from rocking.block.body import Body
+from rocking.core.constants import Model
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.records.named import one_motion
 from rocking.response import Gradient, Response, gradient
-from rocking.simulation import simulate
+from rocking.simulation.simulate import simulate
 
 _NO_BALANCE: Final = (
     "the outcome changes without the block coming to the balance point: by a touch of the ground without speed, or at "

@@ -10,22 +10,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking import checks
+from rocking.core import checks
 from rocking.analysis.levels import ratios_of
 from rocking.analysis.spectrum import overturned_share
-from rocking.constants import Model
-from rocking.engine import missing_text
-from rocking.ensemble import Scales, simulate_many
+from rocking.core.constants import Model
+from rocking.engine.tasks import missing_text
+from rocking.simulation.ensemble import Scales, simulate_many
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import FACTOR, Measure, MeasureName
-from rocking.progress import Progress
+from rocking.core.progress import Progress
 from rocking.records.named import several_motions
-from rocking.result import DatasetResult, variable
+from rocking.core.result import DatasetResult, variable
 from rocking.solid.rose import checked_azimuths
 from rocking.solid.solid import Solid
-from rocking.tables import as_written, counted, text_table
-from rocking.treatment import Treatment
+from rocking.core.tables import as_written, counted, text_table
+from rocking.engine.treatment import Treatment
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -210,7 +210,7 @@ class ResponseRose(DatasetResult):
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.arrays import evenly
+        from rocking.core.arrays import evenly
         from rocking.plot.rose import shares_figure
 
         data = self.data

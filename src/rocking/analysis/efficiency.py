@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking import checks
+from rocking.core import checks
 from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.analysis.levels import (
     MIRROR_NOTE,
@@ -22,15 +22,15 @@ from rocking.analysis.levels import (
     units_of,
     values_of,
 )
-from rocking.arrays import Flags, Floats, Integers
-from rocking.body import Bodies, Body
-from rocking.constants import Model
+from rocking.core.arrays import Flags, Floats, Integers
+from rocking.block.body import Bodies, Body
+from rocking.core.constants import Model
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
-from rocking.problem import bodies_of, slenderness_of
+from rocking.engine.problem import bodies_of, slenderness_of
 from rocking.records.named import Motions, several_motions
-from rocking.result import DatasetResult, variable
-from rocking.tables import as_written, text_table
+from rocking.core.result import DatasetResult, variable
+from rocking.core.tables import as_written, text_table
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -12,20 +12,20 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rocking import checks
+from rocking.core import checks
 from rocking.analysis.levels import Boundaries, boundaries
-from rocking.arrays import Flags, Floats, Integers
+from rocking.core.arrays import Flags, Floats, Integers
 from rocking.block import Block, Blocks, one_block
-from rocking.constants import VERSION, Model
-from rocking.engine import OUTCOME, Setup, missing_text, simulate_each
+from rocking.core.constants import VERSION, Model
+from rocking.engine.tasks import OUTCOME, Setup, missing_text, simulate_each
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion.motion import Motion
-from rocking.named_pulses import pulse_family
-from rocking.progress import Progress
+from rocking.inputs.pulses import pulse_family
+from rocking.core.progress import Progress
 from rocking.records.named import one_motion
-from rocking.result import DatasetResult, table_of_some, variable
-from rocking.tables import as_written, cell, named, text_table
-from rocking.treatment import Certified
+from rocking.core.result import DatasetResult, table_of_some, variable
+from rocking.core.tables import as_written, cell, named, text_table
+from rocking.engine.treatment import Certified
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from rocking.arrays import Flags, Floats, Integers
+from rocking.core.arrays import Flags, Floats, Integers
 
 _ITERATIONS: Final = 100
 

@@ -24,7 +24,7 @@ from rocking.analysis.probit import (
     solved,
     standardised,
 )
-from rocking.arrays import Floats, Integers
+from rocking.core.arrays import Floats, Integers
 
 #: Directions in which a region is measured: between them 4e-5 of an interval's width is lost.
 _RAYS: Final = 360

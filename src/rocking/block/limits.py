@@ -7,8 +7,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from rocking import checks
-from rocking.arrays import Floats
+from rocking.core import checks
+from rocking.core.arrays import Floats
 from rocking.errors import InvalidBlock
 
 # Lowest and highest values, both included: far beyond any block, and far enough from the ends of double precision for

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from rocking import checks
+from rocking.core import checks
 from rocking.block.limits import checked_length, checked_pair, checked_parameter
 from rocking.errors import InvalidBlock
 

@@ -10,16 +10,16 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from rocking import checks
-from rocking.arrays import Floats, Integers
-from rocking.bisection import bisected
+from rocking.core import checks
+from rocking.core.arrays import Floats, Integers
+from rocking.core.bisection import bisected
 from rocking.block.limits import checked_pair, checked_parameter
 from rocking.block.restitution import Restitution, one_sided_restitution
 from rocking.block.restraints import Load, Pivot, Restraint, Tendon, Terms
 from rocking.block.sides import Side, in_line
 from rocking.block.single import Block, one_block
-from rocking.body import KINDS, Bodies, ContactLaw, Coordinate
-from rocking.constants import MODELS, Model
+from rocking.block.body import KINDS, Bodies, ContactLaw, Coordinate
+from rocking.core.constants import MODELS, Model
 from rocking.errors import InvalidBlock, InvalidOption
 
 #: Rotations at which the balance is looked for, on each side.
@@ -196,7 +196,7 @@ class RestrainedBlock:
 
     @property
     def contact(self) -> ContactLaw | None:
-        """Forces of the ground over the weight of the block with the loads that follow it (see `rocking.body`).
+        """Forces of the ground over the weight of the block with the loads that follow it (see `rocking.block.body`).
 
         What stands behind a block of one side pushes it to side +, without friction, as far as that is needed while it
         is at rest; so what is left for the ground is least then. None where the forces are not known: of a block that

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rocking import checks
-from rocking.arrays import Floats, Integers
+from rocking.core import checks
+from rocking.core.arrays import Floats, Integers
 from rocking.errors import InvalidBlock
 
 

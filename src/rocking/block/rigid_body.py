@@ -8,7 +8,7 @@ from typing import Final, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.arrays import Floats
+from rocking.core.arrays import Floats
 
 Number = TypeVar("Number", float, Floats)
 

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any, Final, Never
 
 import numpy as np
 
-from rocking import checks, svg
-from rocking.arrays import Floats, Integers
+from rocking.core import checks, svg
+from rocking.core.arrays import Floats, Integers
 from rocking.block.limits import checked_gravity, checked_length, checked_mass, checked_pair, checked_parameter
 from rocking.block.restitution import housner_restitution
 from rocking.block.rigid_body import contact_forces, gyration_squared, refusal, rigid_bodies
 from rocking.block.sides import Side, even_sides, in_line, restitutions, sides_on_pivots
-from rocking.body import KINDS, Bodies, ContactLaw, Coordinate
-from rocking.constants import MODELS, STANDARD_GRAVITY, Model
+from rocking.block.body import KINDS, Bodies, ContactLaw, Coordinate
+from rocking.core.constants import MODELS, STANDARD_GRAVITY, Model
 from rocking.errors import InvalidBlock, InvalidOption, UnequalSides
 
 if TYPE_CHECKING:
@@ -491,7 +491,7 @@ class Block:
 
     @property
     def contact(self) -> ContactLaw:
-        """Forces of the ground over the weight, from rotation and ground acceleration (see `rocking.body`)."""
+        """Forces of the ground over the weight, from rotation and ground acceleration (see `rocking.block.body`)."""
         return self._contact_forces
 
     def _contact_forces(

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking import checks
-from rocking.arrays import Floats
+from rocking.core import checks
+from rocking.core.arrays import Floats
 from rocking.block import Block
 from rocking.calibration.space import (
     EVERYTHING_IS_KNOWN,
@@ -22,15 +22,15 @@ from rocking.calibration.space import (
     unit_of,
     value_range,
 )
-from rocking.constants import Model
+from rocking.core.constants import Model
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.progress import Progress
+from rocking.core.progress import Progress
 from rocking.response import Response, drawing_times
 from rocking.response.sensitivity import changes_along
-from rocking.result import Result
-from rocking.simulation import simulate
-from rocking.tables import as_written, counted, text_table
+from rocking.core.result import Result
+from rocking.simulation.simulate import simulate
+from rocking.core.tables import as_written, counted, text_table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,8 +11,8 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking import checks
-from rocking.arrays import Floats
+from rocking.core import checks
+from rocking.core.arrays import Floats
 from rocking.block import Blocks, housner_restitution
 from rocking.block.rigid_body import eccentric_rectangles
 from rocking.errors import InvalidOption

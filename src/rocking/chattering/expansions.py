@@ -10,8 +10,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rocking import checks
-from rocking.arrays import Flags, Floats
+from rocking.core import checks
+from rocking.core.arrays import Flags, Floats
 from rocking.errors import InvalidOption
 from rocking.kernels.sine.series import eq65_sums, eq65_terms, phase_coefficients
 

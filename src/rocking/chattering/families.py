@@ -12,9 +12,11 @@ import math
 from collections.abc import Callable
 from typing import Literal, NamedTuple
 
-from rocking import checks, pulses
+from rocking import pulses
+
+from rocking.core import checks
 from rocking.block import Block, one_block
-from rocking.constants import Model
+from rocking.core.constants import Model
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion.motion import Motion
 from rocking.records.named import one_motion

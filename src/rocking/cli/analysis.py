@@ -37,8 +37,8 @@ from rocking.cli.output import OUTPUT, OutputOptions, deliver, print_result, wri
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.inputs.bodies import block_of, note_likely_mistakes
 from rocking.inputs.declared import SHAPES
-from rocking.quantities import angle, length, tilt, values
-from rocking.result import DatasetResult
+from rocking.core.quantities import angle, length, tilt, values
+from rocking.core.result import DatasetResult
 
 #: Descriptions of a block, of which the slenderness alone may be known.
 _SLENDER: Final = tuple(

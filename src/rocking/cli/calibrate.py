@@ -27,11 +27,11 @@ from rocking.cli.options import (
     ScaledPulseOptions,
 )
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results, write_tables
-from rocking.constants import Model
+from rocking.core.constants import Model
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.quantities import bounds, number, tilt
-from rocking.tables import counted, text_table
+from rocking.core.quantities import bounds, number, tilt
+from rocking.core.tables import counted, text_table
 
 #: Blocks to try, unless it is said.
 _CANDIDATES: Final = 8192

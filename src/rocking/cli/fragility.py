@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import Parameter
 
-from rocking import checks
+from rocking.core import checks
 from rocking.analysis import nrml
 from rocking.analysis.curve import Band
 from rocking.analysis.fragility import Fragility, fit_fragility
@@ -33,13 +33,13 @@ from rocking.cli.options import (
     labels_of,
 )
 from rocking.cli.output import OUTPUT, OutputOptions, left_out, print_result, write_results
-from rocking.ensemble import Polarity
+from rocking.simulation.ensemble import Polarity
 from rocking.errors import InvalidOption, Unfitted
 from rocking.motion.scaling import Measure
-from rocking.plausibility import hazard_notes
-from rocking.progress import note
-from rocking.quantities import number
-from rocking.tables import write_csv
+from rocking.inputs.notes import hazard_notes
+from rocking.core.progress import note
+from rocking.core.quantities import number
+from rocking.core.tables import write_csv
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,11 +11,11 @@ from cyclopts import Parameter
 from rocking.block import Block
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results, write_tables
 from rocking.errors import InvalidOption
-from rocking.plausibility import block_notes
-from rocking.progress import note
-from rocking.quantities import densities, length, number, sides, values
+from rocking.inputs.notes import block_notes
+from rocking.core.progress import note
+from rocking.core.quantities import densities, length, number, sides, values
 from rocking.solid.solid import Solid
-from rocking.tables import text_table, write_csv
+from rocking.core.tables import text_table, write_csv
 
 _Signed = Annotated[str | None, Parameter(allow_leading_hyphen=True)]
 

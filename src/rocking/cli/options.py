@@ -12,22 +12,22 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple, TypeVar
 
 from cyclopts import Group, Parameter, Token
 
-from rocking.constants import Model
+from rocking.core.constants import Model
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingError, UnreadableRecord, literal
 from rocking.inputs import bodies, declared
 from rocking.inputs.declared import INPUTS, noted_acceleration
 from rocking.inputs.texts import option_of
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import IntensityName, Measure
-from rocking.named_pulses import named_pulse
-from rocking.plausibility import motion_notes, vertical_notes
-from rocking.progress import Progress, note
-from rocking.quantities import Quantity, acceleration, number, scaling, values, velocity
+from rocking.inputs.pulses import named_pulse
+from rocking.inputs.notes import motion_notes, vertical_notes
+from rocking.core.progress import Progress, note
+from rocking.core.quantities import Quantity, acceleration, number, scaling, values, velocity
 from rocking.records.named import expanded, named_motion, named_vertical
 
 if TYPE_CHECKING:
     from rocking.block import Block
-    from rocking.body import Body
+    from rocking.block.body import Body
 
 Made = TypeVar("Made")
 Options = TypeVar("Options", bound="InputOptions")
@@ -411,7 +411,7 @@ class TreatmentOptions(ModelOptions):
 
     def chosen(self) -> dict[str, Any]:
         """Return model and treatment as arguments."""
-        from rocking.treatment import treatment
+        from rocking.engine.treatment import treatment
 
         return {"model": self.model, "chattering": treatment(self.chattering)}
 

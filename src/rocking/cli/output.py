@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 from cyclopts import Group, Parameter
 
 from rocking.errors import InvalidOption, Message, OutputError, literal
-from rocking.progress import note
-from rocking.tables import to_json, write_figure, write_text
+from rocking.core.progress import note
+from rocking.core.tables import to_json, write_figure, write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from rocking.result import DatasetResult, Result
+    from rocking.core.result import DatasetResult, Result
 
 
 OUTPUT: Final = Parameter(name="*", group=Group("Output", sort_key=4))

@@ -27,9 +27,9 @@ from rocking.cli.options import (
 )
 from rocking.cli.output import OUTPUT, OutputOptions, PrintOptions, print_result, subfolder, write_results
 from rocking.errors import InvalidOption, UnreadableRecord
-from rocking.named_pulses import FAMILIES, PulseFamily
-from rocking.plausibility import reading_notes
-from rocking.progress import note
+from rocking.inputs.pulses import FAMILIES, PulseFamily
+from rocking.inputs.notes import reading_notes
+from rocking.core.progress import note
 from rocking.records.named import (
     STANDARD_INPUT,
     Contents,
@@ -42,8 +42,8 @@ from rocking.records.named import (
 from rocking.response import PRECISION, Response, steps_within
 from rocking.response.contact import friction_coefficient
 from rocking.rules import check as apply_rules
-from rocking.simulation import simulate as run
-from rocking.tables import text_table, to_json
+from rocking.simulation.simulate import simulate as run
+from rocking.core.tables import text_table, to_json
 
 
 @dataclass(frozen=True)

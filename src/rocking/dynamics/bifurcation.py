@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking import checks
-from rocking.arrays import Floats, Integers
-from rocking.body import Body
-from rocking.constants import VERSION, Model
+from rocking.core import checks
+from rocking.core.arrays import Floats, Integers
+from rocking.block.body import Body
+from rocking.core.constants import VERSION, Model
 from rocking.dynamics.attractors import RETURN
 from rocking.dynamics.bodies import LinearBody
 from rocking.dynamics.forcing import Scale, described, scale_of
@@ -21,11 +21,11 @@ from rocking.dynamics.maps import Fate, StroboscopicMap, stroboscopic_map
 from rocking.dynamics.orbits import impacts_of
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.progress import Progress
-from rocking.result import DatasetResult, table_of_some, variable
-from rocking.tables import as_written, counted
-from rocking.threads import in_threads
-from rocking.treatment import Treatment
+from rocking.core.progress import Progress
+from rocking.core.result import DatasetResult, table_of_some, variable
+from rocking.core.tables import as_written, counted
+from rocking.core.threads import in_threads
+from rocking.engine.treatment import Treatment
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -14,10 +14,10 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from rocking import checks
-from rocking.arrays import Floats, Integers
-from rocking.body import KINDS, Coordinate
-from rocking.constants import STANDARD_GRAVITY, Model
+from rocking.core import checks
+from rocking.core.arrays import Floats, Integers
+from rocking.block.body import KINDS, Coordinate
+from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.kernels import state
 

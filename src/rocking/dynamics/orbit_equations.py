@@ -15,9 +15,9 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.arrays import Floats
-from rocking.body import Body
-from rocking.constants import Model
+from rocking.core.arrays import Floats
+from rocking.block.body import Body
+from rocking.core.constants import Model
 from rocking.dynamics.forcing import scale_of
 from rocking.dynamics.maps import Fate, HalfMap, StroboscopicMap, are_halved, distances, is_mirrored
 from rocking.dynamics.orbits import (
@@ -31,7 +31,7 @@ from rocking.dynamics.orbits import (
 )
 from rocking.errors import InvalidOption, RockingError
 from rocking.motion.motion import Motion
-from rocking.treatment import Treatment
+from rocking.engine.treatment import Treatment
 
 #: Makes body and motion of a parameter.
 Family = Callable[[float], tuple[Body, Motion]]

@@ -11,10 +11,10 @@ import numpy as np
 
 from rocking.analysis.fragility import fit_fragility
 from rocking.analysis.levels import simulate_levels
-from rocking.arrays import Flags, Floats
-from rocking.bisection import bisected
+from rocking.core.arrays import Flags, Floats
+from rocking.core.bisection import bisected
 from rocking.block import Blocks
-from rocking.constants import STANDARD_GRAVITY
+from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption, Unfitted
 from rocking.explorer.catalogue import clusters_of, entries_of, title_of
 from rocking.explorer.code import block_options
@@ -28,10 +28,10 @@ from rocking.inputs.texts import command_line
 from rocking.motion.exceedance import lifting_factors
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import FACTOR, Measure
-from rocking.quantities import number
+from rocking.core.quantities import number
 from rocking.response.contact import friction_coefficient
 from rocking.rules import overturning_velocity, rate
-from rocking.simulation import simulate
+from rocking.simulation.simulate import simulate
 
 #: Levels of a fragility, and points of its curve.
 _LEAST, _MOST = 2, 60

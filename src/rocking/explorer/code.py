@@ -6,7 +6,7 @@ import math
 from typing import Any, Final
 
 from rocking.analysis.overturning import PULSES
-from rocking.constants import STANDARD_GRAVITY
+from rocking.core.constants import STANDARD_GRAVITY
 from rocking.explorer.inputs import Case
 from rocking.explorer.maps import Axis, MapGrid, sign_of
 from rocking.explorer.motions import arguments_of, is_pulse, pulse_call

@@ -6,11 +6,11 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from rocking import checks
+from rocking.core import checks
 from rocking.errors import InvalidOption
 from rocking.motion.measures import significant_span
 from rocking.response import Response
-from rocking.tables import named
+from rocking.core.tables import named
 
 #: Part of the Arias intensity at which the shaking counts as begun.
 _BEGUN: Final = 0.05

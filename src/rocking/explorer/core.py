@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from rocking.arrays import Floats
+from rocking.core.arrays import Floats
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.explorer.code import case_as_command, case_as_python
 from rocking.explorer.comparing import as_csv, shift_of

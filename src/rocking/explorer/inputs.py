@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from rocking.block import Block
-from rocking.constants import STANDARD_GRAVITY, Model
+from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingError
 from rocking.explorer.meshes import Body, pivots_of
 from rocking.explorer.motions import motion_of, texts_of_motion
@@ -24,8 +24,8 @@ from rocking.inputs.declared import Input
 from rocking.motion.motion import Motion
 from rocking.motion.piecewise import STRONGEST, TOO_STRONG
 from rocking.response import Response
-from rocking.simulation import simulate
-from rocking.treatment import Treatment, treatment
+from rocking.simulation.simulate import simulate
+from rocking.engine.treatment import Treatment, treatment
 
 #: Product of both restitutions up to which a page waits for the block to come to rest.
 _LIVELIEST: Final = 0.998

@@ -18,7 +18,7 @@ from urllib.parse import urlencode
 
 from rocking.errors import InvalidOption, install
 from rocking.explorer.authentication import LOOPBACK, RequestAuthentication
-from rocking.progress import note
+from rocking.core.progress import note
 from rocking.response import Response
 
 if TYPE_CHECKING:

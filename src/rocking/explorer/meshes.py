@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from rocking import checks
-from rocking.arrays import Floats
-from rocking.constants import STANDARD_GRAVITY
+from rocking.core import checks
+from rocking.core.arrays import Floats
+from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidBlock, RockingError
 from rocking.explorer.apart import made_apart, made_here
 from rocking.explorer.payload import Payload
 from rocking.explorer.phrases import phrase
-from rocking.quantities import densities, number
+from rocking.core.quantities import densities, number
 from rocking.solid import Rose, Solid
 from rocking.solid.mesh import SHIPPED
 from rocking.solid.solid import Plane, plane_of

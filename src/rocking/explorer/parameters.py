@@ -11,16 +11,16 @@ from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
 from rocking import records
-from rocking.constants import VERSION
+from rocking.core.constants import VERSION
 from rocking.errors import InvalidOption
 from rocking.explorer.phrases import english
 from rocking.inputs.declared import INPUTS, SCALINGS, Input, by_name
 from rocking.inputs.declared import SHAPES as ALL_SHAPES
-from rocking.named_pulses import FAMILIES
+from rocking.inputs.pulses import FAMILIES
 from rocking.records.units import CHOICES
 from rocking.solid.mesh import SHIPPED
 from rocking.solid.mesh import UNITS as MESH_UNITS
-from rocking.treatment import treatment
+from rocking.engine.treatment import treatment
 
 Texts = Mapping[str, str]
 

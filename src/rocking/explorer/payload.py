@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from rocking.arrays import Floats
-from rocking.tables import plain
+from rocking.core.arrays import Floats
+from rocking.core.tables import plain
 
 
 @dataclass(frozen=True, eq=False)

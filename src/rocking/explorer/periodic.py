@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking import pulses
-from rocking.arrays import Floats
+from rocking.core.arrays import Floats
 from rocking.dynamics.bifurcation import period_of, states_after
 from rocking.dynamics.forcing import scale_of
 from rocking.dynamics.maps import Fate, StroboscopicMap, stroboscopic_map
@@ -20,7 +20,7 @@ from rocking.explorer.payload import Payload
 from rocking.explorer.phrases import phrase
 from rocking.motion.motion import Motion
 from rocking.response import Response
-from rocking.simulation import simulate
+from rocking.simulation.simulate import simulate
 
 #: Periods that a sweep lets pass at each value, and states after them that it keeps.
 PASSED: Final = 300

@@ -6,8 +6,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from rocking.arrays import without_dust
-from rocking.constants import STANDARD_GRAVITY
+from rocking.core.arrays import without_dust
+from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
 from rocking.explorer.core import Explorer
 from rocking.explorer.facts import verdict

@@ -38,8 +38,8 @@ from rocking.explorer.payload import Payload, pack
 from rocking.explorer.phrases import ENGLISH, file_name, filled, phrase, preferred
 from rocking.explorer.studies import StudyView
 from rocking.explorer.uploads import LARGEST
-from rocking.quantities import number
-from rocking.tables import plain
+from rocking.core.quantities import number
+from rocking.core.tables import plain
 
 T = TypeVar("T")
 _Naming = Callable[[str], str]

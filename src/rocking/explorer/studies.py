@@ -12,9 +12,9 @@ from typing import Any, Final
 import numpy as np
 
 import rocking
-from rocking import checks
-from rocking.arrays import Floats
-from rocking.constants import STANDARD_GRAVITY
+from rocking.core import checks
+from rocking.core.arrays import Floats
+from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption, StudyError
 from rocking.explorer.motions import texts_of_motion
 from rocking.explorer.payload import Payload
@@ -22,7 +22,7 @@ from rocking.explorer.phrases import phrase
 from rocking.explorer.uploads import UploadStore
 from rocking.inputs.texts import as_path
 from rocking.motion.scaling import FACTOR
-from rocking.quantities import number
+from rocking.core.quantities import number
 
 #: Largest map, points.
 _MOST: Final = 1_000_000

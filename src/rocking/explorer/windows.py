@@ -7,8 +7,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from rocking.arrays import Floats, Integers, without_dust
-from rocking.constants import STANDARD_GRAVITY
+from rocking.core.arrays import Floats, Integers, without_dust
+from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
 from rocking.explorer.inputs import Case
 from rocking.explorer.simulated import Simulated, unresolved

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
-from rocking import checks
+from rocking.core import checks
 from rocking.errors import InvalidMotion, RockingError, StudyError, UnreadableRecord
 
 _Kept = TypeVar("_Kept", bound=RockingError)

@@ -10,7 +10,7 @@ elongation, which forces the arcs on which it is elastic and is written where it
 import math
 from enum import IntEnum
 
-from rocking.arrays import Floats
+from rocking.core.arrays import Floats
 from rocking.kernels.arc import evaluate, expand, restoring, sign_of
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.ground import absolute_sums, has_vertical, vertical_of

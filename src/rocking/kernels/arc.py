@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from rocking.arrays import Floats
+from rocking.core.arrays import Floats
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.ground import Ground, acceleration, has_vertical, local_series, vertical_of
 from rocking.kernels.restrained import expand_restrained, restrained_step

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rocking.arrays import Floats
+from rocking.core.arrays import Floats
 from rocking.kernels.arc import restoring, sign_of, weight_series
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.ground import (

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rocking.arrays import Floats, Integers
+from rocking.core.arrays import Floats, Integers
 from rocking.kernels.compiled import inlined, kernel, shared
 
 #: Relative allowance for rounding in bounds.

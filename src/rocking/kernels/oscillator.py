@@ -2,7 +2,7 @@
 
 import math
 
-from rocking.arrays import Floats
+from rocking.core.arrays import Floats
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.ground import move
 

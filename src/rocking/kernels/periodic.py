@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rocking.arrays import Floats, Integers
+from rocking.core.arrays import Floats, Integers
 from rocking.kernels.arc import evaluate, expand, restoring, sign_of
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.ground import ROUNDING, Ground, length_of, start_of

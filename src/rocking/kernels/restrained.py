@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from rocking.arrays import Floats
+from rocking.core.arrays import Floats
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.series import (
     INTEGRATED_TWICE,

@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from rocking.arrays import Floats
+from rocking.core.arrays import Floats
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.events import first_root
 from rocking.kernels.state import Record, Records, TendonLaw

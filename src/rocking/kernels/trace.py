@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rocking.arrays import Floats, Integers
+from rocking.core.arrays import Floats, Integers
 from rocking.kernels.arc import evaluate, expand, restoring, sign_of, weight_at
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.events import first_root

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rocking.arrays import Flags, Floats
+from rocking.core.arrays import Flags, Floats
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.events import first_root
 from rocking.kernels.ground import (

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Final
 
-from rocking import checks
+from rocking.core import checks
 from rocking.errors import InvalidMotion
 
 _DOWN: Final = re.compile(r"\s*(?:down|dwn|dn)\b", re.IGNORECASE)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.arrays import Flags, Floats
-from rocking.constants import STANDARD_GRAVITY
+from rocking.core.arrays import Flags, Floats
+from rocking.core.constants import STANDARD_GRAVITY
 from rocking.motion import piecewise
 from rocking.motion.motion import Motion
 

@@ -9,13 +9,13 @@ from typing import Any, Final, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking import checks
-from rocking.arrays import Floats
-from rocking.bisection import bisected
-from rocking.constants import STANDARD_GRAVITY
+from rocking.core import checks
+from rocking.core.arrays import Floats
+from rocking.core.bisection import bisected
+from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion
 from rocking.motion import piecewise
-from rocking.tables import named
+from rocking.core.tables import named
 
 #: Damping of a spectral acceleration, if none is named.
 DAMPING: Final = 0.05

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking import checks, svg
-from rocking.arrays import Floats
-from rocking.constants import STANDARD_GRAVITY
+from rocking.core import checks, svg
+from rocking.core.arrays import Floats
+from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion
 from rocking.motion import piecewise
 from rocking.motion.description import Description, labelled
 from rocking.motion.processing import Processable
 from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
-from rocking.tables import as_written
+from rocking.core.tables import as_written
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

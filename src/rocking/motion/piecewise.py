@@ -10,9 +10,9 @@ from typing import Any, Final, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking import checks
-from rocking.arrays import Flags, Floats, Integers
-from rocking.constants import HIGHEST_DEGREE
+from rocking.core import checks
+from rocking.core.arrays import Flags, Floats, Integers
+from rocking.core.constants import HIGHEST_DEGREE
 from rocking.errors import InvalidMotion
 
 #: Pieces that meet within this part of the largest value do not jump.

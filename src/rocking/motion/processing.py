@@ -10,8 +10,8 @@ from typing import Any, Final, NamedTuple, Self, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking import checks
-from rocking.arrays import Floats
+from rocking.core import checks
+from rocking.core.arrays import Floats
 from rocking.errors import InvalidMotion
 from rocking.motion import piecewise
 from rocking.motion.description import Description, Origin, begins_later

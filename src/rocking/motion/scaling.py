@@ -9,12 +9,12 @@ from typing import Final, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking import checks
-from rocking.arrays import Floats
-from rocking.constants import STANDARD_GRAVITY
+from rocking.core import checks
+from rocking.core.arrays import Floats
+from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion.measures import DAMPING, Measured, checked_damping
-from rocking.tables import named
+from rocking.core.tables import named
 
 #: What an analysis may count motions by.
 IntensityName = Literal["pga", "pgv", "sa", "pga_ratio", "pgv_ratio"]

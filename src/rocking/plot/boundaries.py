@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rocking.arrays import Flags, Floats
+from rocking.core.arrays import Flags, Floats
 
 
 class Stack(NamedTuple):

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any, Final, TypedDict, Unpack
 
 import numpy as np
 
-from rocking import checks
-from rocking.arrays import Floats
+from rocking.core import checks
+from rocking.core.arrays import Floats
 from rocking.errors import InvalidOption
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final, Unpack
 
 import numpy as np
 
-from rocking.arrays import Flags, Floats, Integers
+from rocking.core.arrays import Flags, Floats, Integers
 from rocking.plot.canvas import ABOVE, GROUND, INK, Place, add_labels, page_for
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from rocking import checks
+from rocking.core import checks
 from rocking.errors import UnreadableRecord
 from rocking.motion.description import Description, Origin
 from rocking.motion.motion import Motion

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rocking.arrays import Floats
-from rocking.constants import STANDARD_GRAVITY
+from rocking.core.arrays import Floats
+from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import UnreadableRecord
 
 #: What the argument `units=` takes.

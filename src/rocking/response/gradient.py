@@ -8,8 +8,8 @@ from typing import Final, Literal, get_args
 
 import numpy as np
 
-from rocking import checks
-from rocking.arrays import Floats
+from rocking.core import checks
+from rocking.core.arrays import Floats
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.adjoint import Ends, adjoint, adjoint_of_final_state

@@ -9,11 +9,11 @@ import numpy as np
 
 from rocking.block import Block, RestrainedBlock
 from rocking.block.sides import in_line
-from rocking.constants import STANDARD_GRAVITY
-from rocking.problem import thresholds_of
+from rocking.core.constants import STANDARD_GRAVITY
+from rocking.engine.problem import thresholds_of
 from rocking.response.perturbed import percent, steps_within
-from rocking.result import Row
-from rocking.tables import counted
+from rocking.core.result import Row
+from rocking.core.tables import counted
 
 if TYPE_CHECKING:
     from rocking.response.response import Response

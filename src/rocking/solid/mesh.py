@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking import checks
-from rocking.arrays import Floats, Integers
+from rocking.core import checks
+from rocking.core.arrays import Floats, Integers
 from rocking.errors import InvalidBlock, InvalidOption, install, literal
 from rocking.motion.processing import sine_cosine
-from rocking.plausibility import density_notes, height_notes
+from rocking.inputs.notes import density_notes, height_notes
 from rocking.solid import support as polygons
 from rocking.solid.repair import (
     Surface,

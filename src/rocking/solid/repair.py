@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rocking.arrays import Flags, Floats, Integers
+from rocking.core.arrays import Flags, Floats, Integers
 from rocking.errors import InvalidBlock
-from rocking.tables import counted
+from rocking.core.tables import counted
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking import checks
-from rocking.arrays import Floats
+from rocking.core import checks
+from rocking.core.arrays import Floats
 from rocking.errors import InvalidOption
-from rocking.result import DatasetResult, table_of_some, variable
+from rocking.core.result import DatasetResult, table_of_some, variable
 from rocking.solid import support as polygons
-from rocking.tables import as_written, decimal
+from rocking.core.tables import as_written, decimal
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

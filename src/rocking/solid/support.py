@@ -12,8 +12,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking import checks
-from rocking.arrays import Floats
+from rocking.core import checks
+from rocking.core.arrays import Floats
 from rocking.errors import InvalidBlock, literal
 from rocking.motion.processing import sine_cosine
 from rocking.solid.repair import Surface, components

@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking import checks
-from rocking.arrays import Flags, Floats
-from rocking.engine import OUTCOME
-from rocking.ensemble import body_coordinates, dataset_of, verticals_of
+from rocking.core import checks
+from rocking.core.arrays import Flags, Floats
+from rocking.engine.tasks import OUTCOME
+from rocking.simulation.ensemble import body_coordinates, dataset_of, verticals_of
 from rocking.errors import InvalidOption, StudyError, install
-from rocking.progress import Progress
+from rocking.core.progress import Progress
 from rocking.studies.folder import Store
 from rocking.studies.product import require
 from rocking.studies.units import name_of
-from rocking.tables import columns_of, frame_of, plain, whole_file
+from rocking.core.tables import columns_of, frame_of, plain, whole_file
 
 if TYPE_CHECKING:
     import pandas as pd

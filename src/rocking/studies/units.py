@@ -17,11 +17,11 @@ from typing import Final
 
 import numpy as np
 
-from rocking import checks
-from rocking.arrays import Floats
-from rocking.constants import VERSION
-from rocking.engine import Setup, Task, simulate_task
-from rocking.ensemble import Product
+from rocking.core import checks
+from rocking.core.arrays import Floats
+from rocking.core.constants import VERSION
+from rocking.engine.tasks import Setup, Task, simulate_task
+from rocking.simulation.ensemble import Product
 from rocking.errors import InvalidOption, StudyError
 from rocking.kernels.compiled import fingerprint
 from rocking.motion.motion import Motion

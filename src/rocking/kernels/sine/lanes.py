@@ -19,7 +19,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.arrays import Floats, Integers
+from rocking.core.arrays import Floats, Integers
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.sine import Verdict
 from rocking.kernels.sine.arc import (

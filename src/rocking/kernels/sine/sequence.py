@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.arrays import Floats, Integers
+from rocking.core.arrays import Floats, Integers
 from rocking.kernels.certificate import Bounds, geometric_bracket
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.remaining import Restoring, remaining_time

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from rocking.arrays import Floats
+from rocking.core.arrays import Floats
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.remaining import Restoring, remaining_time
 from rocking.kernels.sine.sequence import LEVELS, STILL, richardson_weights

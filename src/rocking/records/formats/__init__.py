@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import BinaryIO, Final
 
-from rocking import checks
+from rocking.core import checks
 from rocking.errors import UnreadableRecord, install
 from rocking.motion.motion import Motion
 from rocking.records.formats import at2, cosmos, csmip, keyed, smc, table, through_obspy

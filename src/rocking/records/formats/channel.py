@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rocking.arrays import Floats
-from rocking.constants import STANDARD_GRAVITY
+from rocking.core.arrays import Floats
+from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import UnreadableRecord
 from rocking.motion.description import Description, Origin
 from rocking.motion.motion import Motion

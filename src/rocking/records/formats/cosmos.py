@@ -11,7 +11,7 @@ import math
 import re
 from typing import NamedTuple
 
-from rocking.arrays import Floats
+from rocking.core.arrays import Floats
 from rocking.records.formats import csmip
 from rocking.records.formats.channel import Channel, Recognised, channel_of, first_match
 from rocking.records.formats.source import Line, Request, Source

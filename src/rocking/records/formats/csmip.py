@@ -15,7 +15,7 @@ import itertools
 import re
 from typing import Any, NamedTuple
 
-from rocking.arrays import Floats
+from rocking.core.arrays import Floats
 from rocking.records.formats.channel import (
     Channel,
     Recognised,

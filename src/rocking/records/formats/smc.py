@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from rocking.arrays import Floats
+from rocking.core.arrays import Floats
 from rocking.records.formats.channel import (
     Channel,
     Recognised,

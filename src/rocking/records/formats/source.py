@@ -14,7 +14,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
-from rocking import checks
+from rocking.core import checks
 from rocking.errors import InvalidMotion, UnreadableRecord, literal
 from rocking.records.units import CHOICES, Unit, choose_unit, find_unit
 

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rocking.arrays import Floats
+from rocking.core.arrays import Floats
 from rocking.errors import UnreadableRecord, literal
 from rocking.records.formats.channel import (
     Channel,

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from rocking.arrays import Floats
+from rocking.core.arrays import Floats
 from rocking.errors import UnreadableRecord
 from rocking.records.formats.source import Entry, Source
 

@@ -9,12 +9,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from rocking import checks
-from rocking.arrays import Floats
+from rocking.core import checks
+from rocking.core.arrays import Floats
 from rocking.errors import InvalidOption, literal
 from rocking.motion.scaling import FACTOR, Measure
 from rocking.records.units import Unit, accelerations, plain_spelling, times
-from rocking.tables import decimal
+from rocking.core.tables import decimal
 
 #: What reads one number: its text and the name of the argument that it is of, to SI units.
 Quantity = Callable[[str, str], float]

@@ -17,7 +17,7 @@ from typing import Any, Final, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.arrays import Floats
+from rocking.core.arrays import Floats
 from rocking.errors import RockingError, literal
 
 #: Characters of a value in a message.

@@ -11,10 +11,10 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.arrays import Flags, Floats, Integers, ranges
+from rocking.core.arrays import Flags, Floats, Integers, ranges
 from rocking.block.single import ROTATION
-from rocking.body import Bodies
-from rocking.constants import Model
+from rocking.block.body import Bodies
+from rocking.core.constants import Model
 from rocking.errors import InvalidMotion, Unfinished
 from rocking.kernels import lanes, state
 from rocking.kernels.ground import Ground, greatest_weight
@@ -23,10 +23,10 @@ from rocking.kernels.march import march
 from rocking.kernels.state import Record, Records
 from rocking.kernels.uplift import note_complete
 from rocking.motion.motion import Motion
-from rocking.problem import ground_of, highest, set_start, settings_of, step_of
-from rocking.tables import counted
-from rocking.threads import in_threads
-from rocking.treatment import Treatment
+from rocking.engine.problem import ground_of, highest, set_start, settings_of, step_of
+from rocking.core.tables import counted
+from rocking.core.threads import in_threads
+from rocking.engine.treatment import Treatment
 
 #: What is kept of a simulation. ``unfinished``: it took more than its budget of steps; ``stopped``: the duration ended
 #: it while the body moved or the motion went on. All else is then as far as it came. ``leans``: restraints hold it

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final
 
-from rocking import checks, pulses, quantities
+from rocking import pulses
+
+from rocking.core import checks, quantities
 from rocking.errors import InvalidOption
 from rocking.inputs.declared import READERS, Input, by_name
 from rocking.motion.motion import Motion

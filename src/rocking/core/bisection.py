@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rocking.arrays import Flags, Floats
+from rocking.core.arrays import Flags, Floats
 
 
 def bisected(

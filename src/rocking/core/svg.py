@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from rocking.arrays import Floats
+from rocking.core.arrays import Floats
 
 #: Corners of a line at most.
 MOST_POINTS: Final = 400

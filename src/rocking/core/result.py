@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from rocking import checks
-from rocking.arrays import evenly
+from rocking.core import checks
+from rocking.core.arrays import evenly
 from rocking.errors import InvalidOption
-from rocking.tables import (
+from rocking.core.tables import (
     Column,
     columns_of,
     frame_of,

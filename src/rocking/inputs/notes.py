@@ -8,10 +8,10 @@ from typing import Final
 
 import numpy as np
 
-from rocking.arrays import Floats
+from rocking.core.arrays import Floats
 from rocking.block import Block, Load, RestrainedBlock, Thrust
 from rocking.block.rigid_body import rigid_bodies
-from rocking.constants import STANDARD_GRAVITY
+from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import Message
 from rocking.motion import measures
 from rocking.motion.description import Origin, begins_later

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, NamedTuple, Protocol, Self, runtime_checkable
 
-from rocking.arrays import Floats, Integers
-from rocking.constants import Model
+from rocking.core.arrays import Floats, Integers
+from rocking.core.constants import Model
 from rocking.kernels.state import Records
 
 

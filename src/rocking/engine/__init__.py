@@ -1,0 +1,1 @@
+"""Arrays for kernels, treatments of chattering, and many simulations as tasks in threads."""
