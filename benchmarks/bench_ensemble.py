@@ -19,9 +19,9 @@ import numpy as np
 
 import rocking
 from rocking.core.constants import Model
-from rocking.kernels import lanes, state
 from rocking.engine.problem import ground_of, settings_of
 from rocking.engine.treatment import Certified
+from rocking.kernels import lanes, state
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests"))

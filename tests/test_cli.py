@@ -17,8 +17,8 @@ import pytest
 import rocking
 from rocking import cli
 from rocking.cli import app
-from rocking.errors import INTERRUPTED
 from rocking.core.threads import in_threads
+from rocking.errors import INTERRUPTED
 
 BLOCK = ["--half-width", "0.12", "--half-height", "0.55"]
 RECORD = "el-centro-meloland-270"

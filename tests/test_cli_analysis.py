@@ -10,9 +10,9 @@ import pytest
 
 import rocking
 from rocking import fragility, incremental_dynamic_analysis, overturning_map, rocking_spectrum
-from rocking.core import quantities
 from rocking.analysis import Band
 from rocking.core.tables import to_json
+from rocking.inputs import quantities
 
 RECORD = "el-centro-meloland-270"
 OTHER = "el-centro-meloland-360"

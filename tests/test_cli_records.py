@@ -11,9 +11,9 @@ import pytest
 
 import rocking
 from rocking.cli import main
-from rocking.motion.scaling import Measure
-from rocking.inputs.notes import motion_notes
 from rocking.core.progress import note, notes_for
+from rocking.inputs.notes import motion_notes
+from rocking.motion.scaling import Measure
 from rocking.records.named import expanded
 
 RECORD = "el-centro-meloland-270"

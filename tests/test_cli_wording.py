@@ -7,8 +7,8 @@ import pytest
 
 import rocking
 from rocking import Block, Blocks, Motion
-from rocking.core import quantities
 from rocking.errors import RockingError
+from rocking.inputs import quantities
 
 RECORD = "el-centro-meloland-270"
 SIZES = ["--width", "0.24", "--height", "1.1"]

@@ -9,7 +9,17 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking import Block, Blocks, Certified, InvalidBlock, InvalidOption, Measure, VelocityThreshold, simulate, simulate_many
+from rocking import (
+    Block,
+    Blocks,
+    Certified,
+    InvalidBlock,
+    InvalidOption,
+    Measure,
+    VelocityThreshold,
+    simulate,
+    simulate_many,
+)
 from rocking.engine.tasks import tasks as engine
 
 

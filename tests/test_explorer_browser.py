@@ -26,13 +26,13 @@ from explorer_texts import in_english
 from PIL import Image
 
 import rocking
-from rocking.core import quantities
 from rocking.chattering.families import sine
 from rocking.explorer import maps
 from rocking.explorer.core import Explorer
 from rocking.explorer.inputs import read_case
 from rocking.explorer.launch import served
 from rocking.explorer.studies import StudyView
+from rocking.inputs import quantities
 from rocking.plot.canvas import cell_edges
 from rocking.response import known_ratio
 

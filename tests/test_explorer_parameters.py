@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from rocking.core import quantities
+from rocking.engine.treatment import treatment
 from rocking.errors import InvalidOption
 from rocking.explorer.parameters import (
     PARAMETERS,
@@ -13,8 +13,8 @@ from rocking.explorer.parameters import (
     specification,
 )
 from rocking.explorer.phrases import english
+from rocking.inputs import quantities
 from rocking.inputs.pulses import FAMILIES, named_pulse
-from rocking.engine.treatment import treatment
 
 #: What the command line takes as an argument, and what it does not do.
 NO_OPTIONS = {"motion", "mesh", "gravity", "initial_rotation", "initial_velocity"}

@@ -22,6 +22,7 @@ import pytest
 from explorer_client import Client, clients, let_in, opened_by
 
 import rocking
+from rocking.core.threads import AHEAD, cores
 from rocking.errors import InvalidOption, RockingError, StudyError
 from rocking.explorer import connections, launch, maps, server, uploads
 from rocking.explorer.authentication import RequestAuthentication
@@ -30,7 +31,6 @@ from rocking.explorer.launch import served
 from rocking.explorer.server import App, low_priority
 from rocking.explorer.studies import StudyView
 from rocking.explorer.uploads import LARGEST, UploadStore
-from rocking.core.threads import AHEAD, cores
 
 PORT = 8123
 OURS = f"http://127.0.0.1:{PORT}"

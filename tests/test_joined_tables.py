@@ -9,8 +9,8 @@ import pytest
 from matplotlib.figure import Figure
 
 import rocking
-from rocking.core import quantities
 from rocking.analysis.survey import survey
+from rocking.inputs import quantities
 
 SIZES = ["--width", "0.24", "--height", "1.1"]
 AT2 = """PEER NGA STRONG MOTION DATABASE RECORD

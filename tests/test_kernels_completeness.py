@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 from kernel_records import long_uncompiled, rocking_block, state_of
 
 import rocking
+from rocking.engine.problem import ground_of
 from rocking.kernels.state import AT_REST, new_scratch, records
 from rocking.kernels.uplift import note_complete
 from rocking.motion.exceedance import exceedances
-from rocking.engine.problem import ground_of
 
 Pair = tuple[float, float]
 

@@ -12,11 +12,11 @@ import pytest
 from matplotlib.figure import Figure
 
 import rocking
-from rocking.core import tables
 from rocking.analysis.survey import folder_names, survey
+from rocking.core import tables
 from rocking.core.result import DatasetResult
-from rocking.studies.results import FORMATS
 from rocking.core.tables import whole_file, write_figure
+from rocking.studies.results import FORMATS
 
 resource = pytest.importorskip("resource")
 

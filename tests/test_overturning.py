@@ -13,8 +13,8 @@ from rocking.analysis.levels import boundaries
 from rocking.analysis.overturning import PULSES, mode_name, overturning_map
 from rocking.block import Blocks
 from rocking.engine.tasks import Setup, simulate_each
-from rocking.inputs.pulses import FAMILIES
 from rocking.engine.treatment import Certified
+from rocking.inputs.pulses import FAMILIES
 
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
 PULSE_OF = rocking.pulses.one_sine

@@ -11,7 +11,7 @@ from promises.promise import Found
 import rocking
 from rocking.calibration.tables import read_tests
 from rocking.errors import InvalidOption, RockingError, UnreadableRecord
-from rocking.core.quantities import values
+from rocking.inputs.quantities import values
 from rocking.studies import read_study
 
 

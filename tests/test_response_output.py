@@ -13,12 +13,12 @@ import xarray as xr
 import rocking
 from rocking import Block, InvalidOption, OutputError, simulate
 from rocking.analysis.survey import survey
+from rocking.core.tables import named
 from rocking.explorer.facts import verdict
 from rocking.kernels import state
 from rocking.response import QUANTITIES, history, sensitivity, summary
 from rocking.response.summary import known_ratio, time_text
 from rocking.rules import Check
-from rocking.core.tables import named
 
 TABLES = {
     "events": ["time_s", "kind", "side"],

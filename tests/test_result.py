@@ -13,12 +13,12 @@ from public_names import public_names
 
 import rocking
 from rocking import dynamics
-from rocking.engine.tasks import tasks as engine
 from rocking.calibration.outcomes import overturned_under
 from rocking.chattering import chattering_map, critical_amplitude_nonlinear, families
 from rocking.core.progress import Progress
 from rocking.core.result import DatasetResult
 from rocking.core.tables import counted
+from rocking.engine.tasks import tasks as engine
 
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
 PULSE = rocking.pulses.one_sine(6.0, 1.0)

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 import rocking
 from rocking.chattering import chattering_time
-from rocking.errors import OutsideFit
 from rocking.engine.treatment import treatment
+from rocking.errors import OutsideFit
 
 BENCH = runpy.run_path(str(Path(__file__).parents[1] / "benchmarks/bench_schemes.py"))
 BLOCK = rocking.Block.from_parameters(p=1.0, alpha=0.2, restitution=0.92)

@@ -7,9 +7,9 @@ import pytest
 
 import rocking
 from rocking import HazardCurve, Measure
-from rocking.core import quantities
 from rocking.analysis.hazard import HEADINGS
 from rocking.calibration.tables import read_observed
+from rocking.inputs import quantities
 from rocking.motion.scaling import _MEASURES
 from rocking.records import units
 from rocking.solid.mesh import UNITS as LENGTHS_OF_MESHES

@@ -11,9 +11,9 @@ import pytest
 
 import rocking
 from rocking import InvalidMotion, InvalidOption, Motion
+from rocking.inputs.notes import vertical_notes
 from rocking.motion.description import Origin
 from rocking.motion.exceedance import exceedances, lifting_factors
-from rocking.inputs.notes import vertical_notes
 from rocking.records.named import named_motion
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")

@@ -14,7 +14,7 @@ mpl.use("agg")  # Figures are written, not shown.
 from figures import FIGURES, paper_figure
 
 from rocking import RockingError
-from rocking.core.quantities import angle
+from rocking.inputs.quantities import angle
 
 PARAMETERS = {
     "a": (float, "amplitude of the ground acceleration over g alpha"),

@@ -12,9 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking import pulses
-
-from rocking.core import checks
-from rocking.core.arrays import Floats
 from rocking.block import Block
 from rocking.chattering.amplitude import critical_amplitude
 from rocking.chattering.duration import chattering_time
@@ -25,12 +22,14 @@ from rocking.chattering.expansions import (
     lifting_amplitude,
     single,
 )
+from rocking.core import checks
+from rocking.core.arrays import Floats
+from rocking.core.tables import write_figure
+from rocking.engine.treatment import Treatment
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.response import Response
 from rocking.simulation.simulate import simulate
-from rocking.core.tables import write_figure
-from rocking.engine.treatment import Treatment
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -31,7 +31,15 @@ from .calibration.history import HistoryCalibration, calibrate_history
 from .calibration.outcomes import Calibration, calibrate
 from .calibration.tables import read_tests
 from .calibration.validate import ModelValidation, ShakeTest, validate
-from .simulation.ensemble import Product, Scales, simulate_many
+from .core.result import DatasetResult, Result, Row
+from .engine.treatment import (
+    AsymptoticTime,
+    Certified,
+    GeometricBypass,
+    IntervalThreshold,
+    Treatment,
+    VelocityThreshold,
+)
 from .errors import (
     DamagedStudy,
     InvalidBlock,
@@ -52,11 +60,10 @@ from .motion.description import Description, Origin
 from .motion.scaling import Measure
 from .records.formats import read
 from .response import Gradient, Perturbed, Repeat, Response, Sensitivity, gradient
-from .core.result import DatasetResult, Result, Row
+from .simulation.ensemble import Product, Scales, simulate_many
 from .simulation.simulate import simulate
 from .solid.solid import Solid
 from .studies import Study, study
-from .engine.treatment import AsymptoticTime, Certified, GeometricBypass, IntervalThreshold, Treatment, VelocityThreshold
 
 __version__: str
 

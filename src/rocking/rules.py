@@ -14,21 +14,21 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from rocking.core import checks
 from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.analysis.levels import MIRROR_NOTE, values_of
 from rocking.analysis.survey import BlockUnderRecords, motion_of
-from rocking.core.arrays import Floats
 from rocking.block import Block, Blocks, one_block
+from rocking.core import checks
+from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY, Model
+from rocking.core.progress import Progress
+from rocking.core.tables import decimal, named, range_text, text_table
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
-from rocking.core.progress import Progress
 from rocking.records.named import Motions, motions_by_name, several_motions
 from rocking.response import PRECISION, Response, in_brief, known_ratio
 from rocking.simulation.simulate import simulate
-from rocking.core.tables import decimal, named, range_text, text_table
 
 __all__ = ["RULES", "Check", "Rating", "asce_43_05", "check", "housner", "ishiyama", "priestley", "rate", "west"]
 

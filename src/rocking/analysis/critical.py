@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final
 
+from rocking.block.body import Body
 from rocking.core import checks
 from rocking.core.bisection import bisected
-from rocking.block.body import Body
 from rocking.core.constants import Model
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion

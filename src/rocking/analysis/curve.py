@@ -10,14 +10,14 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.core import checks
 from rocking.analysis import probit
 from rocking.analysis.probit import Outcomes, Probit, normal_scores, probabilities
 from rocking.analysis.regions import FEWEST, Confidence, Ends, LikelyRegion, Quantity, Resamples
+from rocking.core import checks
 from rocking.core.arrays import Floats, Integers, as_asked
+from rocking.core.tables import within
 from rocking.errors import InvalidOption, Unfitted
 from rocking.motion.scaling import Measure, intensities
-from rocking.core.tables import within
 
 BandKind = Literal["likelihood", "bootstrap"]
 

@@ -10,22 +10,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.core import checks
 from rocking.analysis.levels import ratios_of
 from rocking.analysis.spectrum import overturned_share
+from rocking.core import checks
 from rocking.core.constants import Model
+from rocking.core.progress import Progress
+from rocking.core.result import DatasetResult, variable
+from rocking.core.tables import as_written, counted, text_table
 from rocking.engine.tasks import missing_text
-from rocking.simulation.ensemble import Scales, simulate_many
+from rocking.engine.treatment import Treatment
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import FACTOR, Measure, MeasureName
-from rocking.core.progress import Progress
 from rocking.records.named import several_motions
-from rocking.core.result import DatasetResult, variable
+from rocking.simulation.ensemble import Scales, simulate_many
 from rocking.solid.rose import checked_azimuths
 from rocking.solid.solid import Solid
-from rocking.core.tables import as_written, counted, text_table
-from rocking.engine.treatment import Treatment
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

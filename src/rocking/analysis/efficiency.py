@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.core import checks
 from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.analysis.levels import (
     MIRROR_NOTE,
@@ -22,15 +21,16 @@ from rocking.analysis.levels import (
     units_of,
     values_of,
 )
-from rocking.core.arrays import Flags, Floats, Integers
 from rocking.block.body import Bodies, Body
+from rocking.core import checks
+from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.constants import Model
-from rocking.errors import InvalidOption
-from rocking.motion.scaling import Measure
-from rocking.engine.problem import bodies_of, slenderness_of
-from rocking.records.named import Motions, several_motions
 from rocking.core.result import DatasetResult, variable
 from rocking.core.tables import as_written, text_table
+from rocking.engine.problem import bodies_of, slenderness_of
+from rocking.errors import InvalidOption
+from rocking.motion.scaling import Measure
+from rocking.records.named import Motions, several_motions
 
 if TYPE_CHECKING:
     import xarray as xr

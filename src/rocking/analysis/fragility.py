@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, Final, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rocking.core import checks
 from rocking.analysis import nrml
 from rocking.analysis.curve import Band, FragilityCurve, fitted_curve, in_units, interval_text, median_text, passed
 from rocking.analysis.hazard import HazardCurve
@@ -30,19 +29,20 @@ from rocking.analysis.levels import (
 )
 from rocking.analysis.probit import groups
 from rocking.analysis.risk import Risk, Survival, mean_of_blocks, risk_of
-from rocking.core.arrays import Floats
 from rocking.block.body import Bodies, Body
+from rocking.core import checks
+from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY, Model
-from rocking.engine.tasks import Setup, missing_text
-from rocking.simulation.ensemble import SIGNS, Polarity, simulate_many
-from rocking.errors import InvalidOption, Message, Unfitted
-from rocking.motion.scaling import IntensityName, Measure
-from rocking.engine.problem import bodies_of, slenderness_of
 from rocking.core.progress import spelled
-from rocking.records.named import Motions, several_motions
 from rocking.core.result import Result
 from rocking.core.tables import Column, as_written, counted, text_table
+from rocking.engine.problem import bodies_of, slenderness_of
+from rocking.engine.tasks import Setup, missing_text
 from rocking.engine.treatment import Treatment, treatment
+from rocking.errors import InvalidOption, Message, Unfitted
+from rocking.motion.scaling import IntensityName, Measure
+from rocking.records.named import Motions, several_motions
+from rocking.simulation.ensemble import SIGNS, Polarity, simulate_many
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.core import checks
 from rocking.analysis.probit import Probit
+from rocking.core import checks
 from rocking.core.arrays import Floats, Integers, as_asked
 from rocking.core.constants import STANDARD_GRAVITY
-from rocking.errors import InvalidOption
-from rocking.motion.scaling import IntensityName, Measure, intensities
 from rocking.core.result import Result
 from rocking.core.tables import csv_rows, text_table
+from rocking.errors import InvalidOption
+from rocking.motion.scaling import IntensityName, Measure, intensities
 
 if TYPE_CHECKING:
     from rocking.plot.curves import HazardLine

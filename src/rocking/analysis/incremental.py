@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.core import checks
 from rocking.analysis.levels import (
     MIRROR_NOTE,
     Boundaries,
@@ -23,19 +22,20 @@ from rocking.analysis.levels import (
     units_of,
     values_of,
 )
-from rocking.core.arrays import Floats, Integers
 from rocking.block.body import Bodies, Body
+from rocking.core import checks
+from rocking.core.arrays import Floats, Integers
 from rocking.core.constants import Model
+from rocking.core.result import DatasetResult
+from rocking.core.tables import as_written, counted, named, text_table
+from rocking.engine.problem import bodies_of, never_rests, slenderness_of, thresholds_of
 from rocking.engine.tasks import Setup, missing_text, simulate_each
+from rocking.engine.treatment import Certified
 from rocking.errors import InvalidOption
 from rocking.motion.exceedance import lifting_factors
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import IntensityName, Measure
-from rocking.engine.problem import bodies_of, never_rests, slenderness_of, thresholds_of
 from rocking.records.named import Motions, several_motions
-from rocking.core.result import DatasetResult
-from rocking.core.tables import as_written, counted, named, text_table
-from rocking.engine.treatment import Certified
 
 if TYPE_CHECKING:
     import xarray as xr

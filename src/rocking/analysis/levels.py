@@ -10,22 +10,22 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.core import bisection, checks
-from rocking.core.arrays import Flags, Floats, Integers
 from rocking.block import Blocks
 from rocking.block.body import Bodies, Body, title_of
+from rocking.core import bisection, checks
+from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.constants import Model
+from rocking.core.progress import Progress, note
+from rocking.core.tables import counted
+from rocking.engine.problem import bodies_of
 from rocking.engine.tasks import Setup, Task, missing_text, simulate_tasks
-from rocking.simulation.ensemble import body_coordinates, simulate_many
 from rocking.errors import InvalidOption, Message
+from rocking.inputs.notes import is_multiple
 from rocking.motion.description import Origin, labelled
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
-from rocking.inputs.notes import is_multiple
-from rocking.engine.problem import bodies_of
-from rocking.core.progress import Progress, note
 from rocking.response import COUNT, RELATIVE, factors_near, percent
-from rocking.core.tables import counted
+from rocking.simulation.ensemble import body_coordinates, simulate_many
 
 if TYPE_CHECKING:
     import xarray as xr

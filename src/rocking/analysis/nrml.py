@@ -16,15 +16,15 @@ from typing import Final, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from rocking.core import checks
 from rocking.analysis.curve import FragilityCurve
 from rocking.analysis.levels import units_of
 from rocking.block.body import Body
+from rocking.core import checks
 from rocking.core.constants import STANDARD_GRAVITY, Model
+from rocking.core.tables import write_text
 from rocking.errors import InvalidOption
 from rocking.motion.measures import DAMPING
 from rocking.motion.scaling import Measure
-from rocking.core.tables import write_text
 
 NAMESPACE: Final = "http://openquake.org/xmlns/nrml/0.5"
 

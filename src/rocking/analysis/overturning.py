@@ -12,20 +12,20 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rocking.core import checks
 from rocking.analysis.levels import Boundaries, boundaries
-from rocking.core.arrays import Flags, Floats, Integers
 from rocking.block import Block, Blocks, one_block
+from rocking.core import checks
+from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.constants import VERSION, Model
-from rocking.engine.tasks import OUTCOME, Setup, missing_text, simulate_each
-from rocking.errors import InvalidMotion, InvalidOption
-from rocking.motion.motion import Motion
-from rocking.inputs.pulses import pulse_family
 from rocking.core.progress import Progress
-from rocking.records.named import one_motion
 from rocking.core.result import DatasetResult, table_of_some, variable
 from rocking.core.tables import as_written, cell, named, text_table
+from rocking.engine.tasks import OUTCOME, Setup, missing_text, simulate_each
 from rocking.engine.treatment import Certified
+from rocking.errors import InvalidMotion, InvalidOption
+from rocking.inputs.pulses import pulse_family
+from rocking.motion.motion import Motion
+from rocking.records.named import one_motion
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from rocking.core import checks
 from rocking.analysis.curve import FragilityCurve, in_units, interval_of
 from rocking.analysis.hazard import (
     HazardCurve,
@@ -21,11 +20,12 @@ from rocking.analysis.hazard import (
     shown_range,
 )
 from rocking.analysis.probit import Outcomes, Probit, fit_or_limits
+from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.errors import InvalidOption
-from rocking.motion.scaling import Measure
 from rocking.core.result import Result
 from rocking.core.tables import as_written, counted, known_digits, text_table, within
+from rocking.errors import InvalidOption
+from rocking.motion.scaling import Measure
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -10,22 +10,22 @@ from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.core import checks
 from rocking.analysis.levels import curves_of, labels_of, motions_text, normalised_weights, pooled, ratios_of
-from rocking.core.arrays import Floats
 from rocking.block import Blocks
 from rocking.block.bodies import rates_of
 from rocking.block.body import Bodies, Body
+from rocking.core import checks
+from rocking.core.arrays import Floats
 from rocking.core.constants import Model
-from rocking.engine.tasks import missing_text
-from rocking.simulation.ensemble import simulate_many
-from rocking.errors import InvalidOption
-from rocking.motion.motion import Motion
-from rocking.engine.problem import bodies_of
-from rocking.records.named import Motions, several_motions
 from rocking.core.result import DatasetResult, table_of_some, variable
 from rocking.core.tables import as_written
+from rocking.engine.problem import bodies_of
+from rocking.engine.tasks import missing_text
 from rocking.engine.treatment import Treatment
+from rocking.errors import InvalidOption
+from rocking.motion.motion import Motion
+from rocking.records.named import Motions, several_motions
+from rocking.simulation.ensemble import simulate_many
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING, Any, Final
 
 from rocking.block.body import Body
 from rocking.core.constants import STANDARD_GRAVITY
-from rocking.simulation.ensemble import body_coordinates, verticals_of
+from rocking.core.progress import Progress, note
+from rocking.core.result import Result
+from rocking.core.tables import Column, columns_with_skipped, counted, decimal, named, text_table
+from rocking.engine.problem import one_body
 from rocking.errors import InvalidOption, install
 from rocking.motion.motion import Motion
-from rocking.engine.problem import one_body
-from rocking.core.progress import Progress, note
 from rocking.records.named import Motions, motions_by_name, names_of
 from rocking.response import PRECISION, Response, in_brief, ratio_text, steps_within
 from rocking.response.contact import friction_coefficient
-from rocking.core.result import Result
+from rocking.simulation.ensemble import body_coordinates, verticals_of
 from rocking.simulation.simulate import simulate
-from rocking.core.tables import Column, columns_with_skipped, counted, decimal, named, text_table
 
 if TYPE_CHECKING:
     pass

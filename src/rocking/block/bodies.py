@@ -10,18 +10,18 @@ from typing import Any, Final, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rocking.core import checks
-from rocking.core.arrays import Floats
+from rocking.block.body import KINDS
 from rocking.block.limits import checked_gravity, checked_sides
 from rocking.block.restrained import RestrainedBlock
 from rocking.block.restraints import Terms
 from rocking.block.rigid_body import refusal, rigid_bodies
 from rocking.block.single import Block, one_block
-from rocking.block.body import KINDS
+from rocking.core import checks
+from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY, Model
+from rocking.core.tables import range_text
 from rocking.errors import InvalidBlock
 from rocking.kernels import state
-from rocking.core.tables import range_text
 
 _NAMES: Final = ("p", "alpha", "restitution")
 

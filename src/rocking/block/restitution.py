@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from rocking.core import checks
 from rocking.block.limits import checked_length, checked_pair, checked_parameter
+from rocking.core import checks
 from rocking.errors import InvalidBlock
 
 #: Most points at which a base meets the ground in turn: far beyond, rounding is what is left of the loss.

@@ -10,15 +10,15 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from rocking.core import checks
-from rocking.core.arrays import Floats, Integers
-from rocking.core.bisection import bisected
+from rocking.block.body import KINDS, Bodies, ContactLaw, Coordinate
 from rocking.block.limits import checked_pair, checked_parameter
 from rocking.block.restitution import Restitution, one_sided_restitution
 from rocking.block.restraints import Load, Pivot, Restraint, Tendon, Terms
 from rocking.block.sides import Side, in_line
 from rocking.block.single import Block, one_block
-from rocking.block.body import KINDS, Bodies, ContactLaw, Coordinate
+from rocking.core import checks
+from rocking.core.arrays import Floats, Integers
+from rocking.core.bisection import bisected
 from rocking.core.constants import MODELS, Model
 from rocking.errors import InvalidBlock, InvalidOption
 

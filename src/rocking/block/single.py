@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any, Final, Never
 
 import numpy as np
 
-from rocking.core import checks, svg
-from rocking.core.arrays import Floats, Integers
+from rocking.block.body import KINDS, Bodies, ContactLaw, Coordinate
 from rocking.block.limits import checked_gravity, checked_length, checked_mass, checked_pair, checked_parameter
 from rocking.block.restitution import housner_restitution
 from rocking.block.rigid_body import contact_forces, gyration_squared, refusal, rigid_bodies
 from rocking.block.sides import Side, even_sides, in_line, restitutions, sides_on_pivots
-from rocking.block.body import KINDS, Bodies, ContactLaw, Coordinate
+from rocking.core import checks, svg
+from rocking.core.arrays import Floats, Integers
 from rocking.core.constants import MODELS, STANDARD_GRAVITY, Model
 from rocking.errors import InvalidBlock, InvalidOption, UnequalSides
 

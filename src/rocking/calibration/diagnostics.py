@@ -13,11 +13,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.core.arrays import Flags, Floats
 from rocking.calibration.search import AGREEMENT, RUNS, Search, unpacked
 from rocking.calibration.space import HIGHEST, Space, unit_of
-from rocking.errors import InvalidOption
+from rocking.core.arrays import Flags, Floats
 from rocking.core.tables import counted
+from rocking.errors import InvalidOption
 
 #: A bound is reached if more than this share of the posterior, what lies beyond one end of an estimate's interval, is
 #: within the outermost part of the range, in the logarithm: then the interval ends where the bound is.

@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.core import checks
-from rocking.core.arrays import Floats
 from rocking.block import Block
 from rocking.calibration.space import (
     EVERYTHING_IS_KNOWN,
@@ -22,15 +20,17 @@ from rocking.calibration.space import (
     unit_of,
     value_range,
 )
+from rocking.core import checks
+from rocking.core.arrays import Floats
 from rocking.core.constants import Model
+from rocking.core.progress import Progress
+from rocking.core.result import Result
+from rocking.core.tables import as_written, counted, text_table
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.core.progress import Progress
 from rocking.response import Response, drawing_times
 from rocking.response.sensitivity import changes_along
-from rocking.core.result import Result
 from rocking.simulation.simulate import simulate
-from rocking.core.tables import as_written, counted, text_table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

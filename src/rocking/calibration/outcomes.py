@@ -10,24 +10,24 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rocking.core import checks
 from rocking.analysis.fragility import Fragility, fragility
 from rocking.analysis.levels import groups_of, note_missing
 from rocking.analysis.spectrum import RockingSpectrum, rocking_spectrum
-from rocking.core.arrays import Flags, Floats
 from rocking.block import Blocks
 from rocking.block.body import Bodies
 from rocking.calibration.diagnostics import Diagnostics, Scores, diagnosed
 from rocking.calibration.search import Evidence as _Evidence
 from rocking.calibration.search import Problem, expected_share, posterior, search, systematic, unpacked, with_outliers
 from rocking.calibration.space import SIDED, Knowledge, Space, unit_of
+from rocking.core import checks
+from rocking.core.arrays import Flags, Floats
 from rocking.core.constants import Model
-from rocking.simulation.ensemble import simulate_many
+from rocking.core.result import Result
+from rocking.core.tables import Column, as_written, counted, text_table
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.records.named import Motions, distinct_motions, several_motions
-from rocking.core.result import Result
-from rocking.core.tables import Column, as_written, counted, text_table
+from rocking.simulation.ensemble import simulate_many
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

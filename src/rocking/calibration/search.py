@@ -19,12 +19,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rocking.calibration.space import Space
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.bisection import bisected
-from rocking.calibration.space import Space
-from rocking.kernels import population as kernel
 from rocking.core.progress import Progress
 from rocking.core.threads import cores
+from rocking.kernels import population as kernel
 
 #: Prior of the logarithm of a dispersion from test to test: its standard deviation.
 _DISPERSION_LOG_DEVIATION: Final = 0.6

@@ -11,10 +11,10 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.core import checks
-from rocking.core.arrays import Floats
 from rocking.block import Blocks, housner_restitution
 from rocking.block.rigid_body import eccentric_rectangles
+from rocking.core import checks
+from rocking.core.arrays import Floats
 from rocking.errors import InvalidOption
 
 #: Parameters of a block's side, in the order of the coordinates.

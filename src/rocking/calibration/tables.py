@@ -10,19 +10,19 @@ from typing import Any, Final, get_args
 
 import numpy as np
 
-from rocking.core import checks
 from rocking.analysis.hazard import HEADINGS, heading_of
 from rocking.analysis.levels import families_of
-from rocking.core.arrays import Floats
 from rocking.block import Blocks
 from rocking.calibration.validate import ShakeTest
+from rocking.core import checks
+from rocking.core.arrays import Floats
 from rocking.core.constants import Model
+from rocking.core.tables import counted, csv_rows, named
 from rocking.errors import InvalidOption, RockingError, UnreadableRecord
+from rocking.inputs.pulses import FAMILIES, named_pulse
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
-from rocking.inputs.pulses import FAMILIES, named_pulse
 from rocking.records.named import is_there, named_motion, named_vertical
-from rocking.core.tables import counted, csv_rows, named
 
 _ANSWERS: Final = {"1": True, "0": False, "true": True, "false": False, "yes": True, "no": False}
 

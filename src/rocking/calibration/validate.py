@@ -10,20 +10,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.core import checks
 from rocking.analysis import levels
 from rocking.analysis.levels import normalised_weights, pooled
-from rocking.core.arrays import Flags, Floats, Integers
 from rocking.block.body import Bodies, Body
 from rocking.calibration.diagnostics import Scores, log_losses
 from rocking.calibration.outcomes import Calibration, Validation, chances_of, overturned_under
+from rocking.core import checks
+from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.constants import Model
-from rocking.errors import InvalidMotion, InvalidOption
-from rocking.motion.motion import Motion
-from rocking.engine.problem import bodies_of, slenderness_of
-from rocking.records.named import distinct_motions, numbered, one_motion
 from rocking.core.result import Result
 from rocking.core.tables import Column, as_written, columns_with_skipped, counted, text_table
+from rocking.engine.problem import bodies_of, slenderness_of
+from rocking.errors import InvalidMotion, InvalidOption
+from rocking.motion.motion import Motion
+from rocking.records.named import distinct_motions, numbered, one_motion
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,18 +10,17 @@ from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike
 
 from rocking import pulses
-
+from rocking.block import Block
+from rocking.chattering.expansions import broadcast, checked_frequency, checked_restitution, checked_slenderness
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.bisection import bisected
-from rocking.block import Block
-from rocking.chattering.expansions import broadcast, checked_frequency, checked_restitution, checked_slenderness
-from rocking.engine.tasks import require_finished
-from rocking.errors import InvalidOption, Unfinished
 from rocking.core.progress import Progress
-from rocking.simulation.simulate import simulate
 from rocking.core.threads import in_threads
+from rocking.engine.tasks import require_finished
 from rocking.engine.treatment import critical_amplitudes_by
+from rocking.errors import InvalidOption, Unfinished
+from rocking.simulation.simulate import simulate
 
 #: Where the Chebyshev expansion holds.
 FREQUENCIES: Final = (0.4, 10.0)

@@ -10,8 +10,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rocking.core import checks
-from rocking.core.arrays import Floats
 from rocking.chattering.expansions import (
     HIGHEST_ORDER,
     asymptotic_times,
@@ -23,14 +21,16 @@ from rocking.chattering.expansions import (
     series_times,
     single,
 )
+from rocking.core import checks
+from rocking.core.arrays import Floats
+from rocking.core.tables import counted
+from rocking.core.threads import cores, in_threads
 from rocking.errors import InvalidOption
 from rocking.kernels.sine import Verdict
 from rocking.kernels.sine.arc import first_impact
 from rocking.kernels.sine.lanes import GROUP, GROUPS, WIDTH, Answers, rest_phases
 from rocking.kernels.sine.sequence import IMPACT as RESOLVED
 from rocking.kernels.sine.sequence import resolve, semianalytical_phases
-from rocking.core.tables import counted
-from rocking.core.threads import cores, in_threads
 
 #: Sequences of a part, which is sorted and computed by one thread: few enough for a core's own cache.
 _PART: Final = 1 << 14

@@ -13,9 +13,8 @@ from collections.abc import Callable
 from typing import Literal, NamedTuple
 
 from rocking import pulses
-
-from rocking.core import checks
 from rocking.block import Block, one_block
+from rocking.core import checks
 from rocking.core.constants import Model
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion.motion import Motion

@@ -13,21 +13,21 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rocking.chattering.families import Family, SimulationInput
 from rocking.core import checks
 from rocking.core.arrays import Integers, without_dust
-from rocking.chattering.families import Family, SimulationInput
 from rocking.core.constants import VERSION
+from rocking.core.progress import Progress
+from rocking.core.result import DatasetResult, Result
+from rocking.core.tables import as_written, rows_of, text_table
+from rocking.core.threads import in_threads
 from rocking.engine.tasks import OUTCOME, complete_chattering
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.motion.exceedance import exceedances
 from rocking.motion.motion import Motion
-from rocking.core.progress import Progress
 from rocking.response import Response
-from rocking.core.result import DatasetResult, Result
 from rocking.simulation.simulate import simulate
-from rocking.core.tables import as_written, rows_of, text_table
-from rocking.core.threads import in_threads
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

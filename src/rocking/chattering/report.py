@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.core import checks
 from rocking.chattering.amplitude import critical_amplitude
 from rocking.chattering.duration import chattering_time, first_arc, sequence
 from rocking.chattering.expansions import (
@@ -22,9 +21,10 @@ from rocking.chattering.expansions import (
     first_interval,
     series_diagnosis,
 )
-from rocking.errors import InvalidOption, OutsideFit
+from rocking.core import checks
 from rocking.core.result import Result
 from rocking.core.tables import Column, counted, text_table
+from rocking.errors import InvalidOption, OutsideFit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

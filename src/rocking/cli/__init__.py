@@ -16,9 +16,9 @@ from cyclopts import App, Argument, CoercionError, CycloptsError, MissingArgumen
 from cyclopts.exceptions import UnknownOptionError, UnusedCliTokensError
 
 from rocking.core.checks import meant
+from rocking.core.progress import notes_for
 from rocking.errors import INTERRUPTED, DamagedStudy, InvalidOption, RockingError, Spelling
 from rocking.inputs.texts import option_of
-from rocking.core.progress import notes_for
 
 #: Names so short are too alike for a guess: a suggestion must not lead to another quantity.
 _SHORT: Final = len("--pga")

@@ -34,11 +34,11 @@ from rocking.cli.options import (
     labels_of,
 )
 from rocking.cli.output import OUTPUT, OutputOptions, deliver, print_result, write_results
+from rocking.core.result import DatasetResult
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.inputs.bodies import block_of, note_likely_mistakes
 from rocking.inputs.declared import SHAPES
-from rocking.core.quantities import angle, length, tilt, values
-from rocking.core.result import DatasetResult
+from rocking.inputs.quantities import angle, length, tilt, values
 
 #: Descriptions of a block, of which the slenderness alone may be known.
 _SLENDER: Final = tuple(

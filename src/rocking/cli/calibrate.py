@@ -28,10 +28,10 @@ from rocking.cli.options import (
 )
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results, write_tables
 from rocking.core.constants import Model
-from rocking.errors import InvalidOption
-from rocking.motion.motion import Motion
-from rocking.core.quantities import bounds, number, tilt
 from rocking.core.tables import counted, text_table
+from rocking.errors import InvalidOption
+from rocking.inputs.quantities import bounds, number, tilt
+from rocking.motion.motion import Motion
 
 #: Blocks to try, unless it is said.
 _CANDIDATES: Final = 8192

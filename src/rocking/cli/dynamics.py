@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from rocking.core import checks
-from rocking.core.arrays import Floats
 from rocking.block import Block, RestrainedBlock
 from rocking.block.body import Body
 from rocking.cli.options import BLOCK, MODEL, WHOLE, BodyOptions, ModelOptions, written
 from rocking.cli.output import OUTPUT, OutputOptions, deliver, print_result, write_results, write_tables
+from rocking.core import checks
+from rocking.core.arrays import Floats
+from rocking.core.tables import cell, counted, text_table
 from rocking.dynamics.basin_maps import basins
 from rocking.dynamics.bifurcation import Direction, bifurcation_diagram
 from rocking.dynamics.branches import Branch
@@ -23,10 +24,9 @@ from rocking.dynamics.forcing import scale_of
 from rocking.dynamics.maps import stroboscopic_map
 from rocking.dynamics.orbits import PeriodicOrbit, periodic_orbits
 from rocking.errors import InvalidOption
-from rocking.motion.motion import Motion
 from rocking.inputs.pulses import PulseFamily, pulse_values
-from rocking.core.quantities import Quantity, of_state, values
-from rocking.core.tables import cell, counted, text_table
+from rocking.inputs.quantities import Quantity, of_state, values
+from rocking.motion.motion import Motion
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

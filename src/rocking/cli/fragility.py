@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import Parameter
 
-from rocking.core import checks
 from rocking.analysis import nrml
 from rocking.analysis.curve import Band
 from rocking.analysis.fragility import Fragility, fit_fragility
@@ -33,13 +32,14 @@ from rocking.cli.options import (
     labels_of,
 )
 from rocking.cli.output import OUTPUT, OutputOptions, left_out, print_result, write_results
-from rocking.simulation.ensemble import Polarity
-from rocking.errors import InvalidOption, Unfitted
-from rocking.motion.scaling import Measure
-from rocking.inputs.notes import hazard_notes
+from rocking.core import checks
 from rocking.core.progress import note
-from rocking.core.quantities import number
 from rocking.core.tables import write_csv
+from rocking.errors import InvalidOption, Unfitted
+from rocking.inputs.notes import hazard_notes
+from rocking.inputs.quantities import number
+from rocking.motion.scaling import Measure
+from rocking.simulation.ensemble import Polarity
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,12 +10,12 @@ from cyclopts import Parameter
 
 from rocking.block import Block
 from rocking.cli.output import OUTPUT, OutputOptions, print_result, write_results, write_tables
+from rocking.core.progress import note
+from rocking.core.tables import text_table, write_csv
 from rocking.errors import InvalidOption
 from rocking.inputs.notes import block_notes
-from rocking.core.progress import note
-from rocking.core.quantities import densities, length, number, sides, values
+from rocking.inputs.quantities import densities, length, number, sides, values
 from rocking.solid.solid import Solid
-from rocking.core.tables import text_table, write_csv
 
 _Signed = Annotated[str | None, Parameter(allow_leading_hyphen=True)]
 

@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple, TypeVar
 from cyclopts import Group, Parameter, Token
 
 from rocking.core.constants import Model
+from rocking.core.progress import Progress, note
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingError, UnreadableRecord, literal
 from rocking.inputs import bodies, declared
 from rocking.inputs.declared import INPUTS, noted_acceleration
+from rocking.inputs.notes import motion_notes, vertical_notes
+from rocking.inputs.pulses import named_pulse
+from rocking.inputs.quantities import Quantity, acceleration, number, scaling, values, velocity
 from rocking.inputs.texts import option_of
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import IntensityName, Measure
-from rocking.inputs.pulses import named_pulse
-from rocking.inputs.notes import motion_notes, vertical_notes
-from rocking.core.progress import Progress, note
-from rocking.core.quantities import Quantity, acceleration, number, scaling, values, velocity
 from rocking.records.named import expanded, named_motion, named_vertical
 
 if TYPE_CHECKING:

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import Group, Parameter
 
-from rocking.errors import InvalidOption, Message, OutputError, literal
 from rocking.core.progress import note
 from rocking.core.tables import to_json, write_figure, write_text
+from rocking.errors import InvalidOption, Message, OutputError, literal
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -26,10 +26,11 @@ from rocking.cli.options import (
     read_each,
 )
 from rocking.cli.output import OUTPUT, OutputOptions, PrintOptions, print_result, subfolder, write_results
-from rocking.errors import InvalidOption, UnreadableRecord
-from rocking.inputs.pulses import FAMILIES, PulseFamily
-from rocking.inputs.notes import reading_notes
 from rocking.core.progress import note
+from rocking.core.tables import text_table, to_json
+from rocking.errors import InvalidOption, UnreadableRecord
+from rocking.inputs.notes import reading_notes
+from rocking.inputs.pulses import FAMILIES, PulseFamily
 from rocking.records.named import (
     STANDARD_INPUT,
     Contents,
@@ -43,7 +44,6 @@ from rocking.response import PRECISION, Response, steps_within
 from rocking.response.contact import friction_coefficient
 from rocking.rules import check as apply_rules
 from rocking.simulation.simulate import simulate as run
-from rocking.core.tables import text_table, to_json
 
 
 @dataclass(frozen=True)

@@ -14,15 +14,15 @@ from cyclopts import App, Parameter
 import rocking
 from rocking.cli.options import WHOLE
 from rocking.cli.output import OUTPUT, PrintOptions, QuietOptions, output_folder, print_result, write_results
-from rocking.errors import InvalidOption, OutputError, StudyError
 from rocking.core.progress import note
+from rocking.core.tables import counted, to_json, write_text
+from rocking.errors import InvalidOption, OutputError, StudyError
 from rocking.studies.file import TEMPLATE, read_study
 from rocking.studies.folder import Folder
 from rocking.studies.report import ReportPlan
 from rocking.studies.results import FORMATS, StudyVerdict
 from rocking.studies.run import scheduler_client
 from rocking.studies.study import Study, study_of
-from rocking.core.tables import counted, to_json, write_text
 
 study = App(name="study")
 

@@ -13,7 +13,6 @@ import numpy as np
 
 from rocking.core import checks
 from rocking.core.arrays import evenly
-from rocking.errors import InvalidOption
 from rocking.core.tables import (
     Column,
     columns_of,
@@ -27,6 +26,7 @@ from rocking.core.tables import (
     write_netcdf,
     write_text,
 )
+from rocking.errors import InvalidOption
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.core.arrays import Flags, Floats, Integers, evenly
+from rocking.core.tables import counted
+from rocking.core.threads import in_threads
 from rocking.dynamics.forcing import parts_of
 from rocking.dynamics.maps import StroboscopicMap
 from rocking.dynamics.orbits import multipliers_at, sizes_of
 from rocking.errors import InvalidOption
 from rocking.kernels.periodic import TRAP, settle
 from rocking.kernels.state import Records, new_scratch
-from rocking.core.tables import counted
-from rocking.core.threads import in_threads
 
 #: Longest period of an attractor, in periods of the motion, and how near a state must come back to be on one, over the
 #: size of the states.

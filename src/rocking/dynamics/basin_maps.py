@@ -9,21 +9,21 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rocking.block.body import Body
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers, ranges
-from rocking.block.body import Body
 from rocking.core.constants import VERSION, Model
-from rocking.dynamics.attractors import KnownAttractors
-from rocking.dynamics.forcing import described, scale_of, sensible
-from rocking.dynamics.maps import StroboscopicMap
-from rocking.errors import InvalidOption
-from rocking.kernels.periodic import Fate
-from rocking.motion.motion import Motion
 from rocking.core.progress import Progress, note
 from rocking.core.result import DatasetResult, variable
 from rocking.core.tables import as_written, counted, text_table
 from rocking.core.threads import cores
+from rocking.dynamics.attractors import KnownAttractors
+from rocking.dynamics.forcing import described, scale_of, sensible
+from rocking.dynamics.maps import StroboscopicMap
 from rocking.engine.treatment import Treatment
+from rocking.errors import InvalidOption
+from rocking.kernels.periodic import Fate
+from rocking.motion.motion import Motion
 
 if TYPE_CHECKING:
     import xarray as xr

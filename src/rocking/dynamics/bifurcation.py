@@ -10,22 +10,22 @@ from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rocking.block.body import Body
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
-from rocking.block.body import Body
 from rocking.core.constants import VERSION, Model
+from rocking.core.progress import Progress
+from rocking.core.result import DatasetResult, table_of_some, variable
+from rocking.core.tables import as_written, counted
+from rocking.core.threads import in_threads
 from rocking.dynamics.attractors import RETURN
 from rocking.dynamics.bodies import LinearBody
 from rocking.dynamics.forcing import Scale, described, scale_of
 from rocking.dynamics.maps import Fate, StroboscopicMap, stroboscopic_map
 from rocking.dynamics.orbits import impacts_of
+from rocking.engine.treatment import Treatment
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
-from rocking.core.progress import Progress
-from rocking.core.result import DatasetResult, table_of_some, variable
-from rocking.core.tables import as_written, counted
-from rocking.core.threads import in_threads
-from rocking.engine.treatment import Treatment
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

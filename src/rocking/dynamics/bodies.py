@@ -14,9 +14,9 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from rocking.block.body import KINDS, Coordinate
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
-from rocking.block.body import KINDS, Coordinate
 from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.kernels import state

@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rocking.block.body import Body, title_of
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats
-from rocking.block.body import Body, title_of
 from rocking.core.constants import Model
-from rocking.dynamics.maps import StroboscopicMap
-from rocking.dynamics.orbits import PeriodicOrbit, orbit_at, sizes_of
-from rocking.errors import InvalidOption
-from rocking.motion.motion import Motion
 from rocking.core.result import Result
 from rocking.core.tables import Column, as_written, cell, counted, named, text_table
+from rocking.dynamics.maps import StroboscopicMap
+from rocking.dynamics.orbits import PeriodicOrbit, orbit_at, sizes_of
 from rocking.engine.treatment import Treatment
+from rocking.errors import InvalidOption
+from rocking.motion.motion import Motion
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -13,9 +13,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from rocking.block.body import Body
 from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.block.body import Body
 from rocking.dynamics import branches as ends
 from rocking.dynamics.branches import Bifurcation, Branch
 from rocking.dynamics.maps import is_mirrored

@@ -9,18 +9,18 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rocking.block.body import Body
 from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.block.body import Body
 from rocking.core.constants import Model
+from rocking.core.result import Result
+from rocking.core.tables import counted
 from rocking.dynamics.forcing import TOGETHER
 from rocking.dynamics.maps import stroboscopic_map
+from rocking.engine.treatment import Treatment
 from rocking.errors import InvalidOption
 from rocking.kernels.periodic import Fate, stretch
 from rocking.motion.motion import Motion
-from rocking.core.result import Result
-from rocking.core.tables import counted
-from rocking.engine.treatment import Treatment
 
 #: Parts of an orbit whose means give the standard error.
 _BATCHES: Final = 20

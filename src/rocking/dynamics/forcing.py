@@ -9,22 +9,22 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rocking.block.body import Body
+from rocking.block.sides import in_line
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers, ranges
-from rocking.block.sides import in_line
-from rocking.block.body import Body
 from rocking.core.constants import MODELS, Model
 from rocking.dynamics.bodies import LinearBody
+from rocking.engine.problem import FASTEST, one_body, set_start
 from rocking.engine.tasks import Setup
+from rocking.engine.treatment import Treatment, treatment
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
 from rocking.kernels import state
 from rocking.kernels.ground import Ground, ground_of
 from rocking.kernels.periodic import Fate, Setting, step_rows
 from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
-from rocking.engine.problem import FASTEST, one_body, set_start
 from rocking.records.named import one_motion
-from rocking.engine.treatment import Treatment, treatment
 
 #: Ground acceleration, g, that lifts any body: it stands behind the second period.
 _BEYOND_ALL: Final = 1e12

@@ -7,18 +7,18 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rocking.block.body import Body
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats
-from rocking.block.body import Body
 from rocking.core.constants import Model
+from rocking.core.threads import cores, in_threads
 from rocking.dynamics.forcing import PeriodicForcing, parts_of, repeated
+from rocking.engine.treatment import Treatment, VelocityThreshold
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.periodic import Fate as Fate
 from rocking.kernels.periodic import differentiate, iterate, to_next_impact
 from rocking.motion.motion import Motion
-from rocking.core.threads import cores, in_threads
-from rocking.engine.treatment import Treatment, VelocityThreshold
 
 #: Fields of a body's record that are a side's own.
 _OF_SIDES: Final = (

@@ -15,8 +15,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.core.arrays import Floats
 from rocking.block.body import Body
+from rocking.core.arrays import Floats
 from rocking.core.constants import Model
 from rocking.dynamics.forcing import scale_of
 from rocking.dynamics.maps import Fate, HalfMap, StroboscopicMap, are_halved, distances, is_mirrored
@@ -29,9 +29,9 @@ from rocking.dynamics.orbits import (
     response_of,
     trajectory_of,
 )
+from rocking.engine.treatment import Treatment
 from rocking.errors import InvalidOption, RockingError
 from rocking.motion.motion import Motion
-from rocking.engine.treatment import Treatment
 
 #: Makes body and motion of a parameter.
 Family = Callable[[float], tuple[Body, Motion]]

@@ -10,21 +10,21 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rocking.block.body import Body, title_of
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats
-from rocking.block.body import Body, title_of
 from rocking.core.constants import Model
+from rocking.core.result import Result, Row, text_of
+from rocking.core.tables import Column, as_written, counted, named, plain
 from rocking.dynamics.bodies import LinearBody
 from rocking.dynamics.forcing import mean_size, scale_of
 from rocking.dynamics.maps import StroboscopicMap, is_mirrored
 from rocking.dynamics.simulation import in_positions
+from rocking.engine.treatment import Treatment
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.response import Response
-from rocking.core.result import Result, Row, text_of
 from rocking.simulation.simulate import response_to
-from rocking.core.tables import Column, as_written, counted, named, plain
-from rocking.engine.treatment import Treatment
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -13,14 +13,14 @@ import rocking.response
 from rocking.core import checks
 from rocking.core.arrays import Floats, as_asked
 from rocking.dynamics.bodies import LinearBodies, LinearBody
-from rocking.simulation.ensemble import dataset_of, outcomes_of, product_of, setup_of
+from rocking.engine.problem import never_rests
+from rocking.engine.treatment import Treatment
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.motion.motion import Motion
-from rocking.simulation.peak_changes import BETWEEN_STOPS
-from rocking.engine.problem import never_rests
 from rocking.records.named import Motions, one_motion, several_motions
+from rocking.simulation.ensemble import dataset_of, outcomes_of, product_of, setup_of
+from rocking.simulation.peak_changes import BETWEEN_STOPS
 from rocking.simulation.simulate import response_to
-from rocking.engine.treatment import Treatment
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -9,17 +9,17 @@ from typing import cast
 
 import numpy as np
 
-from rocking.core import checks
-from rocking.core.arrays import Floats
 from rocking.block import Block, Blocks, one_block
 from rocking.block.body import KINDS, Bodies, Body
+from rocking.core import checks
+from rocking.core.arrays import Floats
 from rocking.core.constants import MODELS, Model
+from rocking.engine.treatment import Treatment
 from rocking.errors import InvalidOption
 from rocking.kernels import ground, state
 from rocking.kernels.ground import Ground
 from rocking.motion import piecewise
 from rocking.motion.motion import Motion
-from rocking.engine.treatment import Treatment
 
 #: Fastest initial velocity, rad/s or m/s: beyond all sense, and squares and fourth powers of it are far from overflow.
 FASTEST = 1e6

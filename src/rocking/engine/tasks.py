@@ -11,10 +11,14 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.core.arrays import Flags, Floats, Integers, ranges
-from rocking.block.single import ROTATION
 from rocking.block.body import Bodies
+from rocking.block.single import ROTATION
+from rocking.core.arrays import Flags, Floats, Integers, ranges
 from rocking.core.constants import Model
+from rocking.core.tables import counted
+from rocking.core.threads import in_threads
+from rocking.engine.problem import ground_of, highest, set_start, settings_of, step_of
+from rocking.engine.treatment import Treatment
 from rocking.errors import InvalidMotion, Unfinished
 from rocking.kernels import lanes, state
 from rocking.kernels.ground import Ground, greatest_weight
@@ -23,10 +27,6 @@ from rocking.kernels.march import march
 from rocking.kernels.state import Record, Records
 from rocking.kernels.uplift import note_complete
 from rocking.motion.motion import Motion
-from rocking.engine.problem import ground_of, highest, set_start, settings_of, step_of
-from rocking.core.tables import counted
-from rocking.core.threads import in_threads
-from rocking.engine.treatment import Treatment
 
 #: What is kept of a simulation. ``unfinished``: it took more than its budget of steps; ``stopped``: the duration ended
 #: it while the body moved or the motion went on. All else is then as far as it came. ``leans``: restraints hold it

@@ -9,10 +9,10 @@ from typing import ClassVar, Final, Literal, get_args
 
 import numpy as np
 
-from rocking.core import checks
-from rocking.core.arrays import Flags, Floats, ranges
 from rocking.block import Blocks
 from rocking.block.body import Bodies
+from rocking.core import checks
+from rocking.core.arrays import Flags, Floats, ranges
 from rocking.core.constants import Model
 from rocking.errors import InvalidOption, OutsideFit
 from rocking.kernels import state

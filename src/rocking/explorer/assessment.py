@@ -11,9 +11,9 @@ import numpy as np
 
 from rocking.analysis.fragility import fit_fragility
 from rocking.analysis.levels import simulate_levels
+from rocking.block import Blocks
 from rocking.core.arrays import Flags, Floats
 from rocking.core.bisection import bisected
-from rocking.block import Blocks
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption, Unfitted
 from rocking.explorer.catalogue import clusters_of, entries_of, title_of
@@ -24,11 +24,11 @@ from rocking.explorer.parameters import ASSESSMENT, Texts
 from rocking.explorer.payload import Payload
 from rocking.explorer.phrases import phrase
 from rocking.explorer.uploads import UploadStore
+from rocking.inputs.quantities import number
 from rocking.inputs.texts import command_line
 from rocking.motion.exceedance import lifting_factors
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import FACTOR, Measure
-from rocking.core.quantities import number
 from rocking.response.contact import friction_coefficient
 from rocking.rules import overturning_velocity, rate
 from rocking.simulation.simulate import simulate

@@ -7,10 +7,10 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from rocking.core import checks
+from rocking.core.tables import named
 from rocking.errors import InvalidOption
 from rocking.motion.measures import significant_span
 from rocking.response import Response
-from rocking.core.tables import named
 
 #: Part of the Arias intensity at which the shaking counts as begun.
 _BEGUN: Final = 0.05

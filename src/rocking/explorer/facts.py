@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from rocking.core.arrays import Floats
 from rocking.block import Block
 from rocking.chattering.maps import chattering_episodes
+from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.explorer.phrases import phrase
 from rocking.explorer.simulated import Simulated, drifts
-from rocking.motion.motion import Motion
 from rocking.inputs.notes import block_notes, motion_notes
+from rocking.motion.motion import Motion
 from rocking.response import Response, in_words, known_ratio
 
 

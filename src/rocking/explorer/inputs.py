@@ -14,6 +14,7 @@ from typing import Final, NamedTuple
 
 from rocking.block import Block
 from rocking.core.constants import STANDARD_GRAVITY, Model
+from rocking.engine.treatment import Treatment, treatment
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingError
 from rocking.explorer.meshes import Body, pivots_of
 from rocking.explorer.motions import motion_of, texts_of_motion
@@ -25,7 +26,6 @@ from rocking.motion.motion import Motion
 from rocking.motion.piecewise import STRONGEST, TOO_STRONG
 from rocking.response import Response
 from rocking.simulation.simulate import simulate
-from rocking.engine.treatment import Treatment, treatment
 
 #: Product of both restitutions up to which a page waits for the block to come to rest.
 _LIVELIEST: Final = 0.998

@@ -16,9 +16,9 @@ from ipaddress import IPv6Address, ip_address
 from typing import TYPE_CHECKING, Final
 from urllib.parse import urlencode
 
+from rocking.core.progress import note
 from rocking.errors import InvalidOption, install
 from rocking.explorer.authentication import LOOPBACK, RequestAuthentication
-from rocking.core.progress import note
 from rocking.response import Response
 
 if TYPE_CHECKING:

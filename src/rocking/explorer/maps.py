@@ -12,23 +12,23 @@ from numpy.typing import NDArray
 
 from rocking.analysis.levels import ratios_of
 from rocking.analysis.overturning import modes_of
-from rocking.core.arrays import Flags, Floats, Integers
 from rocking.block import Blocks
 from rocking.block.restitution import housner_restitution
 from rocking.chattering.amplitude import critical_amplitude
 from rocking.chattering.maps import Outcome, last_exceedance, outcomes_of
+from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.engine.tasks import Setup, Task, simulate_tasks
+from rocking.engine.treatment import FITTED_FREQUENCIES, FITTED_RESTITUTIONS, Certified
 from rocking.errors import InvalidOption
 from rocking.explorer.inputs import Case, require_possible, require_rest
 from rocking.explorer.motions import arguments_of, is_pulse, pulse_of, pulse_text
 from rocking.explorer.parameters import BLOCK_NAMES, QUANTITIES, Texts, names_of
 from rocking.explorer.phrases import phrase
 from rocking.inputs.declared import SCALINGS
-from rocking.motion.motion import Motion
 from rocking.inputs.pulses import pulse_texts
-from rocking.core.quantities import number
-from rocking.engine.treatment import FITTED_FREQUENCIES, FITTED_RESTITUTIONS, Certified
+from rocking.inputs.quantities import number
+from rocking.motion.motion import Motion
 
 #: Points of an axis.
 _FEWEST, _MOST = 8, 400

@@ -19,7 +19,7 @@ from rocking.errors import InvalidBlock, RockingError
 from rocking.explorer.apart import made_apart, made_here
 from rocking.explorer.payload import Payload
 from rocking.explorer.phrases import phrase
-from rocking.core.quantities import densities, number
+from rocking.inputs.quantities import densities, number
 from rocking.solid import Rose, Solid
 from rocking.solid.mesh import SHIPPED
 from rocking.solid.solid import Plane, plane_of

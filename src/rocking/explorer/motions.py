@@ -10,18 +10,17 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from rocking import records
-
 from rocking.core import checks
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.explorer.parameters import PARAMETERS, PULSES, Texts, Values, given_texts, names_of
 from rocking.explorer.uploads import UploadStore
 from rocking.inputs.declared import SCALINGS
+from rocking.inputs.pulses import FAMILIES, pulse_values
+from rocking.inputs.quantities import acceleration, scaling
 from rocking.inputs.texts import arguments as written_arguments
 from rocking.inputs.texts import as_option, as_path
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
-from rocking.inputs.pulses import FAMILIES, pulse_values
-from rocking.core.quantities import acceleration, scaling
 
 #: Longest pulse, cycles: a page shows no more, and memory is bounded.
 MOST_SHOWN: Final = 1000.0

@@ -12,6 +12,7 @@ from typing import Any, Final, NamedTuple
 
 from rocking import records
 from rocking.core.constants import VERSION
+from rocking.engine.treatment import treatment
 from rocking.errors import InvalidOption
 from rocking.explorer.phrases import english
 from rocking.inputs.declared import INPUTS, SCALINGS, Input, by_name
@@ -20,7 +21,6 @@ from rocking.inputs.pulses import FAMILIES
 from rocking.records.units import CHOICES
 from rocking.solid.mesh import SHIPPED
 from rocking.solid.mesh import UNITS as MESH_UNITS
-from rocking.engine.treatment import treatment
 
 Texts = Mapping[str, str]
 

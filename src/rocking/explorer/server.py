@@ -27,6 +27,7 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
+from rocking.core.tables import plain
 from rocking.errors import InvalidOption, RockingError
 from rocking.explorer import assessment, maps, periodic, readings, sweeps
 from rocking.explorer.catalogue import entries_of, listing
@@ -38,8 +39,7 @@ from rocking.explorer.payload import Payload, pack
 from rocking.explorer.phrases import ENGLISH, file_name, filled, phrase, preferred
 from rocking.explorer.studies import StudyView
 from rocking.explorer.uploads import LARGEST
-from rocking.core.quantities import number
-from rocking.core.tables import plain
+from rocking.inputs.quantities import number
 
 T = TypeVar("T")
 _Naming = Callable[[str], str]

@@ -9,10 +9,10 @@ from typing import Final
 import numpy as np
 
 from rocking.core.arrays import Floats
+from rocking.engine.treatment import Certified
 from rocking.explorer.inputs import Case
 from rocking.motion.motion import Motion
 from rocking.response import Response
-from rocking.engine.treatment import Certified
 
 #: Bracket on a time of rest, s, with which impacts are resolved for a window close to it: some nanoseconds are left.
 _FINEST: Final = Certified(1e-40)

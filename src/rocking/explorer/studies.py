@@ -20,9 +20,9 @@ from rocking.explorer.motions import texts_of_motion
 from rocking.explorer.payload import Payload
 from rocking.explorer.phrases import phrase
 from rocking.explorer.uploads import UploadStore
+from rocking.inputs.quantities import number
 from rocking.inputs.texts import as_path
 from rocking.motion.scaling import FACTOR
-from rocking.core.quantities import number
 
 #: Largest map, points.
 _MOST: Final = 1_000_000

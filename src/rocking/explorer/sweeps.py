@@ -33,7 +33,7 @@ from rocking.explorer.periodic import (
 )
 from rocking.explorer.phrases import phrase
 from rocking.inputs.declared import SCALINGS
-from rocking.core.quantities import number
+from rocking.inputs.quantities import number
 
 #: Values of a sweep, the steps between those of each level, and how many come at once.
 _LEAST, _MOST = 8, 400

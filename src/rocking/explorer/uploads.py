@@ -14,8 +14,8 @@ from typing import Any, Final, NamedTuple
 from rocking.errors import InvalidMotion, RockingError, UnreadableRecord
 from rocking.explorer.meshes import MeshStore
 from rocking.explorer.parameters import MESH_KINDS
-from rocking.motion.motion import Motion
 from rocking.inputs.notes import motion_notes
+from rocking.motion.motion import Motion
 from rocking.records import formats
 from rocking.records.formats.channel import Channel
 from rocking.records.formats.source import Request

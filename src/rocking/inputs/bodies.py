@@ -7,15 +7,15 @@ import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Final
 
-from rocking.core import checks
 from rocking.block import Block, RestrainedBlock, Restraint
 from rocking.block.body import Body
+from rocking.core import checks
+from rocking.core.progress import note
 from rocking.errors import InvalidBlock, InvalidOption, Message, literal
 from rocking.inputs import texts
 from rocking.inputs.declared import BLOCK, INPUTS, READERS, SHAPES, Shape
 from rocking.inputs.notes import block_notes, restraint_notes
-from rocking.core.progress import note
-from rocking.core.quantities import Quantity
+from rocking.inputs.quantities import Quantity
 
 #: Bodies that are searched for likely mistakes.
 _NOTED: Final = 100

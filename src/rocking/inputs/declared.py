@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal, NamedTuple
 
-from rocking.core import quantities
 from rocking.block import Block, Damper, Load, Restraint, Spring, Tendon, Thrust
-from rocking.errors import InvalidOption
-from rocking.inputs.notes import level_notes
 from rocking.core.progress import note
+from rocking.errors import InvalidOption
+from rocking.inputs import quantities
+from rocking.inputs.notes import level_notes
 from rocking.records.units import plain_spelling
 
 #: What reads a number of each kind, and its SI unit.

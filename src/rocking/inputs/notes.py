@@ -8,9 +8,9 @@ from typing import Final
 
 import numpy as np
 
-from rocking.core.arrays import Floats
 from rocking.block import Block, Load, RestrainedBlock, Thrust
 from rocking.block.rigid_body import rigid_bodies
+from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import Message
 from rocking.motion import measures

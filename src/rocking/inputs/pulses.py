@@ -9,9 +9,9 @@ from functools import cached_property
 from typing import Any, Final
 
 from rocking import pulses
-
-from rocking.core import checks, quantities
+from rocking.core import checks
 from rocking.errors import InvalidOption
+from rocking.inputs import quantities
 from rocking.inputs.declared import READERS, Input, by_name
 from rocking.motion.motion import Motion
 

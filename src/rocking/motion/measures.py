@@ -13,9 +13,9 @@ from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.bisection import bisected
 from rocking.core.constants import STANDARD_GRAVITY
+from rocking.core.tables import named
 from rocking.errors import InvalidMotion
 from rocking.motion import piecewise
-from rocking.core.tables import named
 
 #: Damping of a spectral acceleration, if none is named.
 DAMPING: Final = 0.05

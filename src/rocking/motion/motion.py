@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike
 from rocking.core import checks, svg
 from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
+from rocking.core.tables import as_written
 from rocking.errors import InvalidMotion
 from rocking.motion import piecewise
 from rocking.motion.description import Description, labelled
 from rocking.motion.processing import Processable
 from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
-from rocking.core.tables import as_written
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

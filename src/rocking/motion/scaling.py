@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
+from rocking.core.tables import named
 from rocking.errors import InvalidMotion, InvalidOption
 from rocking.motion.measures import DAMPING, Measured, checked_damping
-from rocking.core.tables import named
 
 #: What an analysis may count motions by.
 IntensityName = Literal["pga", "pgv", "sa", "pga_ratio", "pgv_ratio"]

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, Unpack
 import numpy as np
 
 from rocking.core.arrays import Floats
-from rocking.plot.canvas import ABOVE, CURVES, GROUND, INK, Place, add_labels, page_for
 from rocking.core.tables import as_written
+from rocking.plot.canvas import ABOVE, CURVES, GROUND, INK, Place, add_labels, page_for
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

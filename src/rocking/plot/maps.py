@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.core.arrays import Floats
+from rocking.core.tables import as_written
 from rocking.errors import InvalidOption
 from rocking.plot.boundaries import Stack, runs
 from rocking.plot.canvas import ABOVE, INK, Place, add_labels, cell_edges, page_for
-from rocking.core.tables import as_written
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 
 from rocking.core.arrays import Floats
-from rocking.plot.canvas import ABOVE, GROUND, INK, REST, Place, add_labels, page_for, styles_of
 from rocking.core.tables import as_written
+from rocking.plot.canvas import ABOVE, GROUND, INK, REST, Place, add_labels, page_for, styles_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -15,11 +15,11 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from rocking.core.constants import STANDARD_GRAVITY
+from rocking.core.tables import decimal, named, text_table
 from rocking.errors import InvalidMotion, InvalidOption, UnreadableRecord
 from rocking.motion.motion import Motion
 from rocking.records import catalogue, formats
 from rocking.records.formats.source import Request
-from rocking.core.tables import decimal, named, text_table
 
 #: One motion, several, or several by names that replace their own.
 Motions = Motion | Mapping[str, Motion] | Sequence[Motion]

@@ -11,10 +11,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rocking.block.body import ContactLaw
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.bisection import bisected
-from rocking.block.body import ContactLaw
 from rocking.errors import InvalidOption
 from rocking.kernels.ground import components
 from rocking.motion import piecewise

@@ -14,9 +14,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.core.arrays import Floats, Integers
 from rocking.block import Block, RestrainedBlock
 from rocking.block.body import Body
+from rocking.core.arrays import Floats, Integers
 from rocking.errors import InvalidOption
 from rocking.kernels.state import Record
 

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, Unpack, get_args
 
 import numpy as np
 
+from rocking.block.body import title_of
 from rocking.core import checks, svg
 from rocking.core.arrays import Floats, Integers
-from rocking.block.body import title_of
 from rocking.core.constants import STANDARD_GRAVITY
+from rocking.core.tables import as_written
+from rocking.engine.problem import thresholds_of
 from rocking.errors import InvalidOption
 from rocking.plot.canvas import Place
 from rocking.plot.response import DrawnSequence, RotationUnits, energy_figure, phase_figure, response_figure
-from rocking.engine.problem import thresholds_of
-from rocking.core.tables import as_written
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -13,12 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.bisection import bisected, halved, middle
+from rocking.core.tables import counted
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.march import march
 from rocking.kernels.state import Records
 from rocking.kernels.trace import Trail, copy_trail, trace
-from rocking.core.tables import counted
 
 #: Times at which each step of the last arc is looked at for its last passage of the balance point.
 _LOOKS: Final = 33

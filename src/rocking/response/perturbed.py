@@ -9,12 +9,12 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rocking.block.body import Coordinate
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats
-from rocking.block.body import Coordinate
-from rocking.errors import InvalidOption
 from rocking.core.result import Result
 from rocking.core.tables import Column, records_of, text_of_columns
+from rocking.errors import InvalidOption
 
 #: Relative step of the factors, and their number, in summaries and tables.
 RELATIVE: Final = 1e-6

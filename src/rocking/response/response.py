@@ -12,11 +12,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rocking.core import checks
-from rocking.core.arrays import Floats, as_asked
 from rocking.block import Block, RestrainedBlock
 from rocking.block.body import Body
+from rocking.core import checks
+from rocking.core.arrays import Floats, as_asked
 from rocking.core.constants import Model
+from rocking.core.result import Result, Row, dictionary_of, text_of
+from rocking.core.tables import Column, frame_of, write_csv, write_netcdf
+from rocking.engine.treatment import Treatment
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.motion.motion import Motion
@@ -28,9 +31,6 @@ from rocking.response.history import History, with_all_impacts
 from rocking.response.perturbed import COUNT, OVERTURNS, PRECISION, RELATIVE, STANDS, UNMOVED, Perturbed, Repeat
 from rocking.response.perturbed import repeated as repeated_with
 from rocking.response.sensitivity import Sensitivity, ambiguities, carried_errors
-from rocking.core.result import Result, Row, dictionary_of, text_of
-from rocking.core.tables import Column, frame_of, write_csv, write_netcdf
-from rocking.engine.treatment import Treatment
 
 if TYPE_CHECKING:
     import pandas as pd

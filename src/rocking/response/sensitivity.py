@@ -12,13 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats
+from rocking.core.tables import counted
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.adjoint import Ends, adjoint, adjoint_of_final_state
 from rocking.kernels.trace import Quantity, Trail, copy_trail, vary
 from rocking.kernels.uplift import next_uplifts
 from rocking.response.history import History
-from rocking.core.tables import counted
 
 if TYPE_CHECKING:
     from rocking.response.response import Response

@@ -10,10 +10,10 @@ import numpy as np
 from rocking.block import Block, RestrainedBlock
 from rocking.block.sides import in_line
 from rocking.core.constants import STANDARD_GRAVITY
-from rocking.engine.problem import thresholds_of
-from rocking.response.perturbed import percent, steps_within
 from rocking.core.result import Row
 from rocking.core.tables import counted
+from rocking.engine.problem import thresholds_of
+from rocking.response.perturbed import percent, steps_within
 
 if TYPE_CHECKING:
     from rocking.response.response import Response

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from rocking.block import RestrainedBlock
 from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.block import RestrainedBlock
+from rocking.core.result import Row
+from rocking.core.tables import Column, named, records_of
 from rocking.errors import InvalidOption
 from rocking.response.history import even_times
 from rocking.response.perturbed import steps_within
-from rocking.core.result import Row
-from rocking.core.tables import Column, named, records_of
 
 if TYPE_CHECKING:
     import xarray as xr

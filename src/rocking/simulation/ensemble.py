@@ -10,24 +10,24 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rocking.block import Blocks
+from rocking.block.body import Bodies, Body
+from rocking.block.single import ROTATION
 from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.block import Blocks
-from rocking.block.single import ROTATION
-from rocking.block.body import Bodies, Body
 from rocking.core.constants import VERSION, Model
+from rocking.core.progress import Progress
+from rocking.core.threads import cores
+from rocking.engine.problem import bodies_of, settings_of
 from rocking.engine.tasks import OUTCOME, Setup, Task, check_components, parts_of, simulate_tasks
+from rocking.engine.treatment import Treatment, treatment
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.piecewise import STRONGEST
 from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
-from rocking.simulation.peak_changes import BETWEEN_STOPS, OF_BLOCKS, By, peak_changes
-from rocking.engine.problem import bodies_of, settings_of
-from rocking.core.progress import Progress
 from rocking.records.named import Motions, names_of, several_motions
 from rocking.response import COUNT, RELATIVE, factors_near
-from rocking.core.threads import cores
-from rocking.engine.treatment import Treatment, treatment
+from rocking.simulation.peak_changes import BETWEEN_STOPS, OF_BLOCKS, By, peak_changes
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.core.arrays import Flags, Floats, Integers
+from rocking.core.progress import Progress
+from rocking.core.threads import in_threads
+from rocking.engine.problem import highest
 from rocking.engine.tasks import Setup, Task
 from rocking.kernels import state
 from rocking.kernels.trace import NO_NODES, Quantity, Trail, vary
-from rocking.engine.problem import highest
-from rocking.core.progress import Progress
 from rocking.simulation.simulate import marched
-from rocking.core.threads import in_threads
 
 #: What peaks are differentiated by, and its name in words, by the name of the derivative in a dataset.
 By = Mapping[str, tuple[Quantity, str]]

@@ -8,19 +8,19 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.core.arrays import Floats
 from rocking.block.body import Body
+from rocking.core.arrays import Floats
 from rocking.core.constants import Model
+from rocking.engine.problem import ground_of, highest, one_body, set_start
 from rocking.engine.tasks import SLICE, Setup, slices
+from rocking.engine.treatment import Treatment, treatment
 from rocking.errors import InvalidOption
 from rocking.kernels import state
 from rocking.kernels.march import march
 from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
-from rocking.engine.problem import ground_of, highest, one_body, set_start
 from rocking.records.named import one_motion
 from rocking.response import Response, Solution
-from rocking.engine.treatment import Treatment, treatment
 
 _EVENT = np.dtype([("time", "f8"), ("kind", "U8"), ("side", "i1")])
 _IMPACT = np.dtype([("time", "f8"), ("side", "i1"), ("speed_before", "f8"), ("speed_after", "f8")])

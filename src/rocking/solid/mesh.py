@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
 from rocking.errors import InvalidBlock, InvalidOption, install, literal
-from rocking.motion.processing import sine_cosine
 from rocking.inputs.notes import density_notes, height_notes
+from rocking.motion.processing import sine_cosine
 from rocking.solid import support as polygons
 from rocking.solid.repair import (
     Surface,

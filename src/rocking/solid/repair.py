@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rocking.core.arrays import Flags, Floats, Integers
-from rocking.errors import InvalidBlock
 from rocking.core.tables import counted
+from rocking.errors import InvalidBlock
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

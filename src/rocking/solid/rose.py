@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 
 from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.errors import InvalidOption
 from rocking.core.result import DatasetResult, table_of_some, variable
-from rocking.solid import support as polygons
 from rocking.core.tables import as_written, decimal
+from rocking.errors import InvalidOption
+from rocking.solid import support as polygons
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.core import checks
-from rocking.core.arrays import Floats
 from rocking.block import Block
 from rocking.block.limits import checked_gravity, checked_mass
+from rocking.core import checks
+from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
-from rocking.errors import InvalidBlock
 from rocking.core.result import Result, Row, dictionary_of, text_of
+from rocking.core.tables import counted
+from rocking.errors import InvalidBlock
 from rocking.solid import support as polygons
 from rocking.solid.mesh import Region, properties
 from rocking.solid.rose import Rose, about_axes, checked_azimuths, rose_of
-from rocking.core.tables import counted
 
 if TYPE_CHECKING:
     from rocking.solid.mesh import Mesh

@@ -13,26 +13,26 @@ from typing import Any, Final, cast
 import numpy as np
 
 from rocking import records
-
-from rocking.core import checks, quantities
 from rocking.block import Blocks
 from rocking.block.body import Bodies
-from rocking.simulation.ensemble import Product, Scales
+from rocking.core import checks
+from rocking.core.progress import note
+from rocking.core.tables import counted, csv_rows
+from rocking.engine.treatment import treatment
 from rocking.errors import InvalidMotion, InvalidOption, RockingError, StudyError, UnreadableRecord
+from rocking.inputs import quantities
 from rocking.inputs.bodies import block_of, body_of, check_parameters, note_likely_mistakes, quantity_of, shape_of
 from rocking.inputs.declared import BLOCK, COUPLES, FORCES, HELD, INPUTS, noted_acceleration
+from rocking.inputs.notes import motion_notes
+from rocking.inputs.pulses import pulse_family
 from rocking.inputs.toml import Tables, in_line, moved, nearest
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import FACTOR, Measure, MeasureName
-from rocking.inputs.pulses import pulse_family
-from rocking.inputs.notes import motion_notes
-from rocking.core.progress import note
 from rocking.records.formats.source import Request
 from rocking.records.named import expanded, is_there, named_motion
+from rocking.simulation.ensemble import Product, Scales
 from rocking.studies.product import OUTCOMES, chosen_outcomes
 from rocking.studies.report import PLANS, ReportPlan, check_part
-from rocking.core.tables import counted, csv_rows
-from rocking.engine.treatment import treatment
 
 #: A file to start from, with comments.
 TEMPLATE: Final = Path(__file__).with_name("template.toml").read_text("utf-8")

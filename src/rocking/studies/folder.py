@@ -19,13 +19,13 @@ import numpy as np
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import VERSION
-from rocking.simulation.ensemble import Product, setup_of
+from rocking.core.tables import counted, write_bytes
 from rocking.errors import DamagedStudy, OutputError, StudyError
 from rocking.kernels.compiled import fingerprint
+from rocking.simulation.ensemble import Product, setup_of
 from rocking.studies import product as inputs
 from rocking.studies.product import outcomes_text
 from rocking.studies.units import DamagedUnit, Key, UnitGrid, Work, decoded, name_of
-from rocking.core.tables import counted, write_bytes
 
 if sys.platform == "win32":
     import msvcrt

@@ -17,15 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rocking.dynamics.bodies  # noqa: F401 -- its kinds are known from then on
+from rocking.block.body import KINDS, Bodies
 from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.block.body import KINDS, Bodies
-from rocking.simulation.ensemble import VARIABLES, Product, Scales
+from rocking.engine.treatment import treatment
 from rocking.errors import InvalidOption, StudyError
 from rocking.motion.description import Description
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
-from rocking.engine.treatment import treatment
+from rocking.simulation.ensemble import VARIABLES, Product, Scales
 
 #: All outcomes of a simulation, in the order in which a store holds them.
 OUTCOMES: Final = tuple(VARIABLES)

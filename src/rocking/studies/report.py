@@ -13,23 +13,23 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.core import checks
 from rocking.analysis.curve import Band, checked_limit, fitted_curve, passed
 from rocking.analysis.fragility import OVERTURNING, Fragility, fit_fragility, of_polarities, weights_of
 from rocking.analysis.levels import clusters_of, motions_in_words, pooled, ratios_of, single_block, units_of, values_of
 from rocking.analysis.spectrum import fractiles_of, overturned_share
-from rocking.core.arrays import Floats, Integers, evenly
 from rocking.block.body import Bodies
-from rocking.engine.tasks import missing_text
-from rocking.simulation.ensemble import Product, body_coordinates, verticals_of
-from rocking.errors import InvalidOption, Message, StudyError, Unfitted
-from rocking.motion.scaling import INTENSITIES, IntensityName, Measure
-from rocking.engine.problem import slenderness_of
+from rocking.core import checks
+from rocking.core.arrays import Floats, Integers, evenly
 from rocking.core.progress import Progress, note
 from rocking.core.result import DatasetResult, table_of_some, variable
+from rocking.core.tables import as_written, counted
+from rocking.engine.problem import slenderness_of
+from rocking.engine.tasks import missing_text
+from rocking.errors import InvalidOption, Message, StudyError, Unfitted
+from rocking.motion.scaling import INTENSITIES, IntensityName, Measure
+from rocking.simulation.ensemble import Product, body_coordinates, verticals_of
 from rocking.studies.folder import Folder, Store
 from rocking.studies.product import require
-from rocking.core.tables import as_written, counted
 
 if TYPE_CHECKING:
     import xarray as xr

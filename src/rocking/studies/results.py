@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats
-from rocking.engine.tasks import OUTCOME
-from rocking.simulation.ensemble import body_coordinates, dataset_of, verticals_of
-from rocking.errors import InvalidOption, StudyError, install
 from rocking.core.progress import Progress
+from rocking.core.tables import columns_of, frame_of, plain, whole_file
+from rocking.engine.tasks import OUTCOME
+from rocking.errors import InvalidOption, StudyError, install
+from rocking.simulation.ensemble import body_coordinates, dataset_of, verticals_of
 from rocking.studies.folder import Store
 from rocking.studies.product import require
 from rocking.studies.units import name_of
-from rocking.core.tables import columns_of, frame_of, plain, whole_file
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -31,13 +31,13 @@ from typing import Any, Final
 import numpy as np
 
 from rocking.core import checks
-from rocking.errors import InvalidOption, RockingError, StudyError, install
 from rocking.core.progress import Progress, note
+from rocking.core.tables import counted
+from rocking.core.threads import cores
+from rocking.errors import InvalidOption, RockingError, StudyError, install
 from rocking.studies.folder import Folder, Store, this_process
 from rocking.studies.report import kept_report
 from rocking.studies.units import Key, Work, compute, name_of
-from rocking.core.tables import counted
-from rocking.core.threads import cores
 
 #: The log of all runs; one of a part has a name of its own, as its lock has ("runs.3-10.jsonl" and "lock.3-10").
 _RUNS: Final = "runs.jsonl"

@@ -12,14 +12,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.core import checks
 from rocking.analysis.fragility import OVERTURNING, Fragility
 from rocking.block.body import Bodies, Body
+from rocking.core import checks
 from rocking.core.constants import Model
-from rocking.simulation.ensemble import Polarity, Product, dataset_of, product_of
+from rocking.core.tables import counted, write_netcdf
+from rocking.engine.treatment import Treatment
 from rocking.errors import InvalidOption
 from rocking.motion.scaling import IntensityName, Measure, MeasureName
 from rocking.records.named import Motions, names_of
+from rocking.simulation.ensemble import Polarity, Product, dataset_of, product_of
 from rocking.studies.folder import Folder, Store, exists, require_free
 from rocking.studies.product import OUTCOMES, chosen_outcomes
 from rocking.studies.report import (
@@ -38,8 +40,6 @@ from rocking.studies.report import (
 from rocking.studies.results import StudyVerdict, critical_scales, lazy_outcome, write_table
 from rocking.studies.run import RunReport, Status, log_run, run, status_of, verified
 from rocking.studies.units import fitting_unit, width_of
-from rocking.core.tables import counted, write_netcdf
-from rocking.engine.treatment import Treatment
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -21,10 +21,10 @@ from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import VERSION
 from rocking.engine.tasks import Setup, Task, simulate_task
-from rocking.simulation.ensemble import Product
 from rocking.errors import InvalidOption, StudyError
 from rocking.kernels.compiled import fingerprint
 from rocking.motion.motion import Motion
+from rocking.simulation.ensemble import Product
 
 #: Units are multiples of so many blocks, which the engine takes through a motion together.
 _GROUP: Final = 512

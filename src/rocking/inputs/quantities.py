@@ -11,10 +11,10 @@ import numpy as np
 
 from rocking.core import checks
 from rocking.core.arrays import Floats
+from rocking.core.tables import decimal
 from rocking.errors import InvalidOption, literal
 from rocking.motion.scaling import FACTOR, Measure
 from rocking.records.units import Unit, accelerations, plain_spelling, times
-from rocking.core.tables import decimal
 
 #: What reads one number: its text and the name of the argument that it is of, to SI units.
 Quantity = Callable[[str, str], float]
