@@ -112,7 +112,7 @@ def test_the_table_is_a_workbook_where_openpyxl_is_installed(run, folder, tmp_pa
     sheet = openpyxl.load_workbook(tmp_path / "summary.xlsx").active
     assert sheet.max_row == 4
     assert sheet["A1"].value == "record"
-    assert (sheet.title, sheet.freeze_panes) == ("summary", "A2")
+    assert (sheet.title, sheet.freeze_panes) == ("records", "A2")
 
 
 def test_without_openpyxl_a_note_says_why_there_is_no_workbook(run, folder, tmp_path, monkeypatch):
