@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking.engine.tasks import tasks as engine
+from rocking.engine import tasks as engine
 
 MODELS = pytest.mark.parametrize("model", ["linear", "nonlinear"])
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)

@@ -20,7 +20,7 @@ from rocking import (
     simulate,
     simulate_many,
 )
-from rocking.engine.tasks import tasks as engine
+from rocking.engine import tasks as engine
 
 
 @pytest.fixture(scope="module")

@@ -11,8 +11,8 @@ import rocking
 from rocking import Blocks, Motion, simulate, simulate_many
 from rocking.engine.problem import ground_of
 from rocking.kernels.ground import components
+from rocking.simulation import ensemble
 from rocking.simulation.ensemble import Scales
-from rocking.simulation.simulate import ensemble
 
 GRAVITY = 9.80665
 MODELS = pytest.mark.parametrize("model", ["linear", "nonlinear"])

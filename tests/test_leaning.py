@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 
 import rocking
 from rocking import Block, Damper, RestrainedBlock, Spring, Tendon, Thrust
-from rocking.engine.tasks import tasks as engine
+from rocking.engine import tasks as engine
 
 SIZE = {"width": 0.8, "height": 5.0, "mass": 9000.0}
 COLUMN = Block(**SIZE)
