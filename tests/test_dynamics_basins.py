@@ -219,8 +219,3 @@ def test_an_attractor_that_rests_at_the_start_of_a_period_is_known_after_one():
     # The coarse cells come before the attractor is known, and all others after it.
     assert (taken.tolist(), counts.tolist()) == ([1, 5], [1240, 441])
     assert len(np.unique(found.data.attractor.values)) == 1
-
-
-def test_attractors_of_one_name_are_told_apart_by_letters():
-    assert basin_maps._distinct(["orbit", "rest", "orbit", "orbit"]) == ["orbit (a)", "rest", "orbit (b)", "orbit (c)"]
-    assert basin_maps._distinct(["orbit"] * 28)[25:] == ["orbit (z)", "orbit (27)", "orbit (28)"]

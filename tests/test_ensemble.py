@@ -127,16 +127,9 @@ def test_the_result_can_be_written_and_says_what_it_is(records, tmp_path):
     ("options", "word"),
     [
         ({"levels": 1.0, "measure": "pga_ratio"}, "measure must be one of factor, pga, pgv, sa"),
-        ({"levels": 1.0, "measure": Measure("pga_ratio")}, "measure must be one of factor, pga, pgv, sa"),
         ({"levels": 1.0, "measure": "sa"}, r"give rocking\.Measure\(.sa., period=1\.0\), in s"),
         ({"measure": "pga"}, "levels"),
-        ({"levels": []}, "positive"),
-        ({"levels": [1.0, -1.0]}, "positive"),
-        ({"levels": "strong", "measure": "pga"}, "levels"),
         ({"polarity": "up"}, "polarity"),
-        ({"threads": 0}, "threads"),
-        ({"model": "cubic"}, "model"),
-        ({"duration": -1.0}, "duration"),
     ],
 )
 def test_bad_options_are_refused(records, options, word):

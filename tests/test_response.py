@@ -10,9 +10,7 @@ from rocking import (
     AsymptoticTime,
     Block,
     Certified,
-    IntervalThreshold,
     InvalidOption,
-    VelocityThreshold,
     simulate,
 )
 
@@ -184,10 +182,7 @@ def test_a_stop_cuts_the_response_short(block, record, shaken):
         ({"model": "quadratic"}, "model"),
         ({"chattering": "luck"}, "chattering"),
         ({"duration": 0.0}, "duration"),
-        ({"duration": math.nan}, "duration"),
-        ({"initial_rotation": math.nan}, "initial_rotation"),
         ({"initial_rotation": 2.0}, "pi/2"),
-        ({"initial_velocity": math.inf}, "initial_velocity"),
         ({"chattering": AsymptoticTime()}, "sinusoidal"),
     ],
 )
@@ -208,13 +203,6 @@ def test_a_block_on_its_corner_needs_a_duration():
     block = Block.from_parameters(p=1.0, alpha=0.25, restitution=0.9)
     with pytest.raises(InvalidOption, match="balances"):
         simulate(block, None, model="linear", initial_rotation=0.25)
-
-
-@pytest.mark.parametrize("make", [Certified, VelocityThreshold, IntervalThreshold])
-@pytest.mark.parametrize("value", [0.0, -1.0, math.nan, "small"])
-def test_thresholds_must_be_positive(make, value):
-    with pytest.raises(InvalidOption, match="positive"):
-        make(value)
 
 
 OF_TIME = (

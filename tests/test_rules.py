@@ -174,11 +174,9 @@ def test_a_check_compares_the_rules_with_simulations(record):
         assert f"West: {words} of 2" in text
 
 
-def test_what_was_not_finished_says_nothing_of_a_rule(record, monkeypatch):
+def test_what_was_not_finished_says_nothing_of_a_rule(record, few_steps):
     found = rules.check(TOMBSTONE, {"whole": record, "cut": record}, rules=["west"])
-    with monkeypatch.context() as patched:
-        patched.setattr("rocking.simulation.slices", lambda ground: 1)
-        patched.setattr("rocking.simulation.SLICE", 5)
+    with few_steps(5):
         cut = rocking.simulate(TOMBSTONE, rocking.pulses.sine(4.0, 2.0, cycles=20))
     assert cut.unfinished
     text = replace(found, responses=(found.responses[0], cut), ratios=({"west": 0.5},) * 2).summary()
