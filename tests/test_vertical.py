@@ -51,32 +51,6 @@ def test_a_constant_vertical_acceleration_is_another_gravity(model: str, lift: f
     assert one.peak_rotation == pytest.approx(two.peak_rotation, rel=1e-10)
 
 
-@pytest.mark.parametrize("model", MODELS)
-def test_the_sensitivity_to_the_motion_is_that_of_both_components(model: str) -> None:
-    block, motion = block_for(2.5, 0.18), wave(2.5, 3).with_vertical(wave(2.0, 103))
-    size = 1e-6
-    responses = [
-        rocking.simulate(block, motion.scaled(1.0 + change), model=model, duration=2.0) for change in (-size, 0.0, size)
-    ]
-    assert len({len(one.impacts) for one in responses}) == 1
-    expected = (responses[2].impacts["time"] - responses[0].impacts["time"]) / (2.0 * size)
-    assert responses[1].sensitivity.impacts["motion"] == pytest.approx(expected, rel=1e-4, abs=1e-6)
-
-
-@pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize("what", ["p", "alpha"])
-def test_the_sensitivity_to_the_block_holds_under_both_components(model: str, what: str) -> None:
-    motion, size = wave(2.5, 3).with_vertical(wave(2.0, 103)), 1e-6
-
-    def response(change: float) -> rocking.Response:
-        p, alpha = (2.5 * (1.0 + change), 0.18) if what == "p" else (2.5, 0.18 * (1.0 + change))
-        return rocking.simulate(block_for(p, alpha), motion, model=model, duration=2.0)
-
-    low, middle, high = (response(change) for change in (-size, 0.0, size))
-    expected = (high.impacts["time"] - low.impacts["time"]) / (2.0 * size)
-    assert middle.sensitivity.impacts[what] == pytest.approx(expected, rel=1e-4, abs=1e-6)
-
-
 def test_forces_carry_the_weight_in_the_frame_of_the_ground() -> None:
     """Under a constant w the forces are those under gravity g (1 + w), times 1 + w."""
     lift, push = 0.3, wave(3.0, 1)
