@@ -177,16 +177,6 @@ def test_bad_arrays_of_blocks_are_refused(make, word):
         make()
 
 
-@pytest.mark.parametrize("kind", [np.float32, np.float64, np.int64, np.array, int])
-def test_numbers_of_any_real_type_are_numbers(kind):
-    block = Block.from_parameters(p=kind(2), alpha=(kind(1), kind(1)), restitution=kind(1), gravity=kind(10))
-    assert block == Block.from_parameters(p=2.0, alpha=1.0, restitution=1.0, gravity=10.0)
-    assert type(block.p) is float
-    blocks = Blocks(p=kind(2), alpha=[kind(1)], restitution=kind(1), gravity=kind(10))
-    assert blocks.gravity == 10.0
-    assert blocks[0] == block
-
-
 @pytest.mark.parametrize("distances", [(0.3, 0.5), (0.5, 0.3)])
 def test_parameters_of_two_sides_tell_the_body_that_has_them(distances):
     sides = Block.from_pivots(distances, 1.2, 0.8).sides

@@ -60,13 +60,6 @@ def found(told, coarsely):
 
 
 @pytest.fixture(scope="module")
-def plain(shaken, coarsely):
-    """From few tests, of symmetric blocks."""
-    with coarsely():
-        return rocking.calibrate(shaken[0][:12], shaken[1][:12], candidates=128, two_sided=False, model="linear")
-
-
-@pytest.fixture(scope="module")
 def unseen():
     motions = bursts(100, seed=2)
     return motions, outcomes(motions)

@@ -290,14 +290,6 @@ def test_a_pulse_with_a_vertical_component_overturns_where_single_simulations_sa
             assert response.overturned == falls
 
 
-def test_the_summary_tells_none_from_already_the_first():
-    block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
-    low = rocking.overturning_map(block, "one-sine", amplitudes=[0.5, 1.5], frequencies=[5.0]).summary()
-    assert "none of those up to 1.5" in low
-    high = rocking.overturning_map(block, "one-sine", amplitudes=[4.0, 5.0], frequencies=[5.0]).summary()
-    assert "4 or less" in high
-
-
 def test_every_family_of_pulses_is_mapped_by_name_or_known_to_need_a_function() -> None:
     of_a_duration_or_several_amplitudes = {"rectangular", "triangular", "n-lobe"}
     assert set(FAMILIES) == {*PULSES} | of_a_duration_or_several_amplitudes

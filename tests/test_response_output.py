@@ -42,11 +42,6 @@ def fallen(record):
     return simulate(Block.from_parameters(p=4.0, alpha=0.05, restitution=0.9), record)
 
 
-@pytest.fixture(scope="module")
-def ambiguous():
-    return simulate(Block(half_width=0.12, half_height=0.75), rocking.records.load("ridgecrest-clc-090"))
-
-
 def test_a_notebook_shows_the_rotation_with_its_peak_in_the_colour_of_the_text(shaken, fallen):
     for response in (shaken, fallen, simulate(Block(half_width=0.2, half_height=1.0), None)):
         page = response._repr_html_()

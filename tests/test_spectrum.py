@@ -123,17 +123,6 @@ def test_what_makes_no_spectrum_is_refused(changes, word):
         rocking_spectrum(rocking.Blocks.grid(**grid), arguments.pop("motions"), **arguments)
 
 
-def test_the_title_of_a_figure_says_what_the_legend_need_not():
-    one = rocking_spectrum(rocking.Blocks.grid(alpha=[0.2], p=[2.0, 3.0]), PULSES[0]).plot()
-    assert "alpha = 0.2 rad (11.46°), nonlinear model" in one.get_suptitle()
-    two = rocking_spectrum(rocking.Blocks.grid(alpha=[0.2, 0.3], p=[2.0, 3.0]), PULSES[0]).plot()
-    assert "alpha" not in two.get_suptitle()
-    assert [text.get_text() for text in two.legends[0].get_texts()[:2]] == [
-        "alpha = 0.2 rad (11.46°)",
-        "alpha = 0.3 rad (17.19°)",
-    ]
-
-
 def test_a_figure_shows_any_number_of_curves_and_names_some_of_many(spectrum):
     for count in (5, 11):
         slendernesses = np.linspace(0.1, 0.3, count)

@@ -589,13 +589,6 @@ def test_units_are_whole_groups_of_blocks(tmp_path, width):
         made(tmp_path, unit_blocks=width)
 
 
-def test_an_empty_folder_holds_no_study(tmp_path):
-    with pytest.raises(rocking.StudyError, match="there is no study here"):
-        rocking.study(tmp_path)
-    with pytest.raises(rocking.InvalidOption, match="blocks and motions"):
-        rocking.study(tmp_path, BLOCKS)
-
-
 def test_a_vertical_component_is_part_of_a_study(tmp_path):
     """It is kept, computed with, and noticed when it is another one."""
     both = MOTIONS[0].with_vertical(MOTIONS[1])

@@ -94,24 +94,6 @@ def test_the_order_of_the_store_is_that_of_the_outcomes_and_those_always_kept_ma
     assert (about["format"], about["outcomes"]) == (3, KEPT)
 
 
-def test_a_choice_is_resumed_verified_and_repaired(complete, tmp_path):
-    study = made(tmp_path)
-    sound = contents(complete)
-    names = sorted(name for name in sound if name.startswith("result/c."))
-    for name in names[::2]:
-        (tmp_path / name).write_bytes(sound[name])
-    half = study.results().load()
-    assert 0 < int(half.done.sum()) < half.done.size
-    np.testing.assert_array_equal(np.isnan(half.peak_rotation.values), ~half.done.values)
-    assert rocking.study(tmp_path).run(threads=1).units == len(names) - len(names[::2])
-    assert contents(tmp_path) == sound
-    assert study.verify(recompute=len(names)) == []
-    (tmp_path / names[0]).write_bytes(sound[names[0]][:-1])
-    (fault,) = study.verify(repair=True)
-    assert "is damaged" in fault
-    assert contents(tmp_path) == sound
-
-
 def test_a_unit_of_another_choice_is_damage(complete, whole, tmp_path):
     study = made(tmp_path)
     study.run(threads=1)

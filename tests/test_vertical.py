@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from oracles.cases import wave
 
 import rocking
 from rocking import InvalidMotion, InvalidOption, Motion
@@ -20,14 +21,6 @@ pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 
 G = 9.80665
 MODELS = ("linear", "nonlinear")
-
-
-def wave(amplitude: float, seed: int, dt: float = 0.02, count: int = 200) -> Motion:
-    """Smooth random motion, linear between even samples."""
-    random = np.random.default_rng(seed)
-    t = dt * np.arange(count + 1)
-    parts = [random.normal() * np.sin(f * t + random.uniform(0.0, 6.0)) for f in random.uniform(2.0, 25.0, 6)]
-    return Motion.from_samples(amplitude * np.sum(parts, axis=0) * np.sin(np.pi * t / t[-1]), dt)
 
 
 def block_for(p: float, alpha: float, e: float = 0.9) -> rocking.Block:
@@ -341,14 +334,6 @@ def test_the_figure_of_a_response_moves_the_thresholds_with_the_weight_and_shows
     trace = next(line.get_xydata() for line in vertical.lines if len(line.get_xydata()) > 2)
     assert trace[:, 1] == pytest.approx(el_centro().vertical.acceleration(trace[:, 0]) / G)
     assert set(el_centro().vertical.breakpoints[400:500]) <= set(el_centro().drawing_times(0.0, 20.0))
-
-
-def test_the_summary_says_by_what_the_vertical_motion_multiplies_the_thresholds() -> None:
-    response = rocking.simulate(rocking.Block(width=0.5, height=2.0), el_centro())
-    low, high = el_centro().vertical.extremes
-    expected = f"0.2500 g, times the weight over that at rest, {1.0 + low / G:.4f} to {1.0 + high / G:.4f}"
-    assert expected in response.summary()
-    assert response.to_xarray(dt=0.1).attrs["vertical_motion"] == "el-centro-meloland-up"
 
 
 @pytest.mark.cases(fast=1)
