@@ -215,6 +215,26 @@ def run(unarranged: None, capsys: pytest.CaptureFixture[str]) -> Callable[..., t
 
 
 @pytest.fixture
+def small_budget(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Give simulations of ensembles up soon."""
+    monkeypatch.setattr("rocking.engine.BUDGET", 0)
+
+
+@pytest.fixture(scope="session")
+def few_steps() -> Callable[[int], AbstractContextManager[None]]:
+    """Single simulations within it are given up after so many steps."""
+
+    @contextmanager
+    def limited(steps: int) -> Iterator[None]:
+        with pytest.MonkeyPatch.context() as patched:
+            patched.setattr("rocking.simulation.slices", lambda ground: 1)
+            patched.setattr("rocking.simulation.SLICE", steps)
+            yield
+
+    return limited
+
+
+@pytest.fixture
 def undrawn(monkeypatch):
     """Make figures and their files, but draw nothing into these."""
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda figure, file, **options: file.write(b"not drawn"))

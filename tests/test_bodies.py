@@ -65,17 +65,6 @@ def test_the_response_of_a_ball_is_told_in_its_own_words():
         _ = found.block
 
 
-def test_what_a_ball_cannot_do_is_refused():
-    with pytest.raises(InvalidOption, match='give model "linear"'):
-        simulate(BALL, None)
-    with pytest.raises(InvalidOption, match="in front of the body's stop, not"):
-        simulate(BALL, None, model="linear", initial_rotation=-0.1)
-    with pytest.raises(InvalidOption, match='chattering "time" is for symmetric blocks'):
-        simulate(BALL, rocking.pulses.sine(15.0, 1.0, cycles=2), model="linear", chattering="time")
-    with pytest.raises(InvalidOption, match="never comes to rest"):
-        simulate(dynamics.BouncingBall(1.0), None, model="linear", initial_rotation=0.1)
-
-
 def test_a_rest_that_the_ground_ends_at_once_passes_on_what_shifts_it():
     ball = dynamics.BouncingBall(0.0, gravity=10.0)
     table = Motion.from_samples([-25.0] * 3 + [-22.0] * 3 + [-18.0, -12.0, 0.0, 0.0], 0.1)

@@ -60,13 +60,6 @@ def found(told, coarsely):
 
 
 @pytest.fixture(scope="module")
-def plain(shaken, coarsely):
-    """From few tests, of symmetric blocks."""
-    with coarsely():
-        return rocking.calibrate(shaken[0][:12], shaken[1][:12], candidates=128, two_sided=False, model="linear")
-
-
-@pytest.fixture(scope="module")
 def unseen():
     motions = bursts(100, seed=2)
     return motions, outcomes(motions)
@@ -227,27 +220,17 @@ def test_one_unknown_angle_is_found_from_forty_tests(coarse):
     [
         ({"overturned": [True, False]}, "each of the 3 motions"),
         ({"overturned": [1, 1, 1]}, "all the same"),
-        ({"overturned": [0, 0, 0]}, "all the same"),
         ({"overturned": [0, 2, 1]}, "True or False"),
-        ({"overturned": [0, math.nan, 1]}, "True or False"),
         ({"overturned": ["no", "yes", "no"]}, "True or False"),
-        ({"seed": -1}, "seed"),
-        ({"seed": 1.5}, "seed"),
         ({"lapse": 0.0}, "lapse"),
         ({"lapse": 0.5}, "lapse"),
         ({"candidates": 10}, "candidates"),
-        ({"ensemble": 0}, "ensemble"),
         ({"p": (2.0, 1.0)}, "p must be"),
-        ({"p": (0.0, 1.0)}, "p must be"),
-        ({"p": -2.0}, "p must be"),
-        ({"alpha": 1.6}, "alpha must be at most"),
         ({"p": 2.0, "alpha": 0.2, "restitution": 0.9}, "everything is known"),
         ({"restitution": "hausner"}, "'housner'"),
         ({"p": "housner"}, "p must be a value or a pair"),
         ({"alpha": (0.1, 1.0), "restitution": "housner"}, "below 0.9553"),
-        ({"p": (1.0, math.inf)}, "p must be"),
         ({"alpha": (0.1, 1.6)}, "alpha must be"),
-        ({"restitution": (0.5, 1.1)}, "restitution must be"),
         ({"model": "cubic"}, "model"),
     ],
 )
@@ -255,12 +238,6 @@ def test_a_mistaken_argument_is_refused(change, word):
     arguments = {"motions": bursts(3, seed=0), "overturned": [True, False, True], "candidates": 128} | change
     with pytest.raises(rocking.InvalidOption, match=word):
         rocking.calibrate(**arguments)
-
-
-@pytest.mark.parametrize(("change", "word"), [({"folds": 1}, "folds"), ({"groups": ["a"]}, "groups")])
-def test_a_mistaken_division_is_refused(found, change, word):
-    with pytest.raises(rocking.InvalidOption, match=word):
-        found.cross_validate(**change)
 
 
 # The parts: space, population, posterior.
@@ -641,8 +618,6 @@ def test_correlated_noise_widens_the_errors(coarse, sure, known):
             {"times": TIMES[:30], "rotation": released()[:30]}, "does not determine restitution", marks=pytest.mark.slow
         ),
         ({"p": 2.5, "alpha": 0.2, "restitution": 0.9, "initial_rotation": 0.1}, "everything is known"),
-        ({"alpha": (0.3, 0.2)}, "alpha must be"),
-        ({"restitution": (0.5, 2.0)}, "restitution must be"),
         ({"model": "cubic"}, "model"),
     ],
 )

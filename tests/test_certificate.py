@@ -9,7 +9,6 @@ from hypothesis import HealthCheck, given, settings
 from mpmath import mpf
 from oracles import balls, multiprecision
 from oracles.cases import GRAVITY, Case, Pair, cases, impacts_of
-from oracles.problem import Problem
 
 import rocking
 
@@ -142,12 +141,3 @@ def test_the_brackets_under_an_approximated_sine_hold_for_the_sine_itself(
     assert found
     for state, _, lower, upper in found:
         assert balls.within(balls.rest_enclosure(case.problem, *state, ground=ground), lower, upper)
-
-
-def test_a_proof_in_ball_arithmetic_refuses_a_bracket_that_misses_the_rest() -> None:
-    problem = Problem("linear", *SYMMETRIC, np.array([0.0]), np.zeros((0, 1)))
-    rest = balls.rest_enclosure(problem, 0.0, 1, 0.01)
-    near = float(multiprecision.rest_time(problem, 0.0, 1, 0.01))
-    assert balls.within(rest, near - 1e-15, near + 1e-15)
-    assert not balls.within(rest, near + 1e-15, near + 2e-15)
-    assert not balls.within(rest, near - 2e-15, near - 1e-15)

@@ -9,8 +9,6 @@ from rocking.chattering import duration
 from rocking.kernels.sine import Verdict
 from rocking.kernels.sine.sequence import semianalytical_phases
 
-EPS_SERIES_C1 = 10.827447906757
-
 
 def random_parameters(count, seed, spread=1.5):
     """Omega in [0.4, 10], eta in [0.5, 0.97], and amplitudes on both sides of the critical one, many close to it."""

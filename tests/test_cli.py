@@ -72,10 +72,10 @@ FILES = {
 
 @pytest.mark.cases(fast=3)
 @pytest.mark.parametrize("command", FILES)
-def test_a_command_writes_what_it_says(run, tmp_path, monkeypatch, command):
+def test_a_command_writes_what_it_says(run, tmp_path, request, command):
     drawn = {"spectrum", "chatter without loss"}  # figures of the others are made, and not drawn
     if command not in drawn:
-        monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda *given, **options: None)
+        request.getfixturevalue("undrawn")
     arguments, names = FILES[command]
     code, out, err = run(command.split()[0], *arguments, "--out", tmp_path / "new" / "folder")
     assert (code, err.count("rocking: note")) == (0, err.count("\n"))
@@ -118,48 +118,6 @@ def test_records_shows_what_a_file_was_taken_for(run, tmp_path):
     assert code == 0
     assert "text table, since" in out
     assert "0.2" in out
-
-
-def files(folder: Path) -> dict[str, Path]:
-    """One file for each way to damage a record."""
-    damaged = {
-        "empty": b"",
-        "binary": bytes(range(256)) * 20,
-        "npts": b"PEER NGA\nevent\nACCELERATION IN UNITS OF G\nNPTS= 7, DT= .01 SEC\n .1 .2 .3\n",
-        "token": b"0.0 0.0\n0.01 0.1\n0.02 oops\n0.03 0.1\n",
-        "nan": b"0.0 0.0\n0.01 nan\n0.02 0.1\n",
-    }
-    paths = {name: folder / name for name in damaged}
-    for name, content in damaged.items():
-        paths[name].write_bytes(content)
-    return paths | {"missing": folder / "nothing.AT2", "folder": folder}
-
-
-@pytest.mark.cases(fast=3)
-@pytest.mark.parametrize("name", ["empty", "binary", "npts", "token", "nan", "missing", "folder"])
-@pytest.mark.parametrize("command", ["simulate", "records"])
-def test_an_unusable_record_is_one_line_and_exit_2(run, tmp_path, name, command):
-    path = files(tmp_path)[name]
-    options = [*BLOCK, "--units", "g"] if command == "simulate" else ["--units", "g"]
-    code, out, err = run(command, path, *options)
-    # What each file of a folder holds is listed, and why it cannot be read.
-    listed = ["empty", "binary", "npts", "token", "nan"] if (command, name) == ("records", "folder") else []
-    assert code == 2
-    reported = (re.split(r": |, line", line)[0] for line in out.splitlines() if line)
-    assert sorted(Path(each).name for each in reported) == sorted(listed)
-    assert err.count("\n") == 1
-    assert err.startswith("rocking: ")
-    assert path.name in err
-
-
-def test_unknown_channel_names_those_there_are(run, shared):
-    path = shared / "records" / "shippable" / "CICLC.v1"
-    code, _, err = run("simulate", path, *BLOCK, "--channel", "9")
-    assert code == 2
-    assert "360 Deg" in err
-    code, _, err = run("simulate", path, *BLOCK)
-    assert code == 2
-    assert "360 Deg" in err
 
 
 def test_a_closed_pipe_is_no_traceback(run, monkeypatch):

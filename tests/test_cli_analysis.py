@@ -231,10 +231,6 @@ def test_calibrate_json_is_the_calibration(run, outcomes_table):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (["--alpha", "0.3,0.1"], "alpha must be a pair"),
-        (["--restitution", "hausner"], "--restitution"),
-        (["--candidates", "5"], "candidates"),
-        (["--folds", "40"], "folds"),
         (["--motion", RECORD], "--motion is for a history"),
         (["--predict", "no-such-record"], "no-such-record"),
     ],

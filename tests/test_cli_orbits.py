@@ -1,12 +1,11 @@
 """`rocking orbits`: the same numbers as the functions, files for every orbit, and one line for every mistake."""
 
 import json
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from rocking import Block, Damper, InvalidOption, RestrainedBlock, Tendon, Thrust, dynamics, pulses
+from rocking import Block, Damper, RestrainedBlock, Tendon, Thrust, dynamics, pulses
 from rocking.cli import dynamics as commands
 
 SINE = "sine:amplitude=12,frequency=5Hz"
@@ -27,17 +26,6 @@ def test_orbits_are_those_of_the_functions_and_one_is_followed(run, tmp_path):
     names = {path.name for path in tmp_path.iterdir()}
     assert {"branch.png", "points.csv", "bifurcations.csv", "result.json"} <= names
     assert {f"orbit-{k}.pdf" for k in range(1, len(expected) + 1)} <= names
-
-
-def test_the_first_stable_orbit_is_followed_unless_one_is_named():
-    unstable, stable, other = (SimpleNamespace(is_stable=k > 0) for k in range(3))
-    found = [unstable, stable, other]
-    assert commands._chosen(found, None) is stable
-    assert [commands._chosen(found, number) for number in (1, 2, 3)] == found
-    assert commands._chosen([unstable], None) is unstable
-    for number in (0, 4):
-        with pytest.raises(InvalidOption, match="from 1 to 3"):
-            commands._chosen(found, number)
 
 
 @pytest.mark.cases(fast=2)

@@ -90,9 +90,7 @@ def test_the_table_is_what_simulate_finds(run, folder):
 
 
 @pytest.mark.thorough
-def test_the_table_is_written_and_each_record_only_on_request(run, folder, tmp_path, monkeypatch):
-    # Figures take much of the time, and other tests look at them.
-    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda *_, **__: None)
+def test_the_table_is_written_and_each_record_only_on_request(run, undrawn, folder, tmp_path):
     (folder / "r0.AT2").unlink()
     out = tmp_path / "out"
     assert run("simulate", folder, *BLOCK, "--out", out)[0] == 0

@@ -210,10 +210,7 @@ def test_a_level_between_the_highest_sample_of_a_step_and_its_peak_is_passed(sha
     """A block at rest under a push c t^2 (1 - t): the friction that sticking needs is |a|/g, 4c/27g at two thirds."""
     size = 0.2 * GRAVITY * 27.0 / 4.0
     response = simulate(Block.from_parameters(p=2.0, alpha=0.4), Motion([0.0, 1.0], [[0.0, 0.0, size, -size]]))
-    contact = response._contact
-    seen = float(contact._measured(friction_demand, *contact._samples()).max())
     level = share * 0.2
-    assert 0.99 * 0.2 < seen < level
     assert response.required_friction == pytest.approx(0.2, rel=1e-12)
     passing = np.roots([-1.0, 1.0, 0.0, -share * 4.0 / 27.0])
     assert response.sliding_time(level) == pytest.approx(np.sort(passing.real)[1], rel=1e-9)

@@ -199,18 +199,6 @@ def test_the_entropy_of_a_straight_boundary_and_of_random_outcomes():
     assert whole == boundary == pytest.approx(math.log(3.0) - 2.0 / (2.0 * 400.0), abs=1e-3)  # bias of 400 draws
 
 
-if __name__ == "__main__":
-    import sys
-
-    total = np.zeros(3, dtype=int)
-    for number in range(int(sys.argv[1]), int(sys.argv[2])):
-        these = np.array(compared(number, 24))
-        total += these
-        if these[1]:
-            print(number, *these, flush=True)
-    print("cells", total[0], "contradicted", total[1], "ambiguous", total[2])
-
-
 def test_an_attractor_that_rests_at_the_start_of_a_period_is_known_after_one():
     ball, table = dynamics.BouncingBall(0.3, gravity=10.0), pulses.sine(11.0, 2.0, cycles=1)
     found = dynamics.basins(ball, table, np.linspace(0.0, 0.1, 41), np.linspace(0.01, 0.5, 41), periods=5)
@@ -219,8 +207,3 @@ def test_an_attractor_that_rests_at_the_start_of_a_period_is_known_after_one():
     # The coarse cells come before the attractor is known, and all others after it.
     assert (taken.tolist(), counts.tolist()) == ([1, 5], [1240, 441])
     assert len(np.unique(found.data.attractor.values)) == 1
-
-
-def test_attractors_of_one_name_are_told_apart_by_letters():
-    assert basin_maps._distinct(["orbit", "rest", "orbit", "orbit"]) == ["orbit (a)", "rest", "orbit (b)", "orbit (c)"]
-    assert basin_maps._distinct(["orbit"] * 28)[25:] == ["orbit (z)", "orbit (27)", "orbit (28)"]

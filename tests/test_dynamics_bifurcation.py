@@ -9,8 +9,6 @@ from test_dynamics_exponents import start_of_one_bounce
 from rocking import Block, dynamics, pulses
 from rocking.dynamics import bifurcation
 
-G = 9.80665
-
 
 def ball_case(e):
     ball, one_g = dynamics.BouncingBall(e, gravity=10.0), pulses.sine(10.0, 5.0, cycles=1)

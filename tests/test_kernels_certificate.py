@@ -18,6 +18,7 @@ from kernel_records import (
     state_of,
 )
 from oracles import multiprecision
+from oracles.cases import between
 from oracles.problem import Problem
 
 from rocking.kernels.arc import restoring, weight_series
@@ -47,10 +48,6 @@ quick = settings(deadline=None, max_examples=30)
 few = settings(deadline=None, max_examples=12)
 
 models = st.sampled_from(["linear", "nonlinear"])
-
-
-def between(low: float, high: float) -> st.SearchStrategy[float]:
-    return st.floats(low, high, allow_subnormal=False)
 
 
 def either(low: float, high: float) -> st.SearchStrategy[tuple[float, float]]:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from kernel_records import ULP, in_units_of_g, long_uncompiled
+from kernel_records import ULP, in_units_of_g, long_uncompiled, numbers
 from oracles.exact import exact, polynomial
 
 from rocking.kernels.adjoint import add_moments
@@ -33,11 +33,6 @@ pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 ANYTHING = (-math.inf, math.inf)
 
 quick = settings(deadline=None, max_examples=50)
-
-
-def numbers(low: float, high: float) -> st.SearchStrategy[float]:
-    """Numbers far from underflow."""
-    return st.floats(low, high).map(lambda x: x if abs(x) > 1e-30 else 0.0)
 
 
 def work() -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from kernel_records import MINUS, PLUS, ULP, in_units_of_g, rocking_block, rules_for, state_of
+from kernel_records import MINUS, PLUS, ULP, in_units_of_g, numbers, rocking_block, rules_for, state_of
 from oracles.exact import exact, first_above, polynomial, turning_points
 
 from rocking.kernels.arc import expand
@@ -21,18 +21,13 @@ QUARTER_TURN = 0.5 * math.pi
 quick = settings(deadline=None, max_examples=50)
 
 
-def between(low: float, high: float) -> st.SearchStrategy[float]:
-    """Numbers far from underflow."""
-    return st.floats(low, high).map(lambda x: x if abs(x) > 1e-30 else 0.0)
-
-
 @st.composite
 def series(draw: st.DrawFn) -> np.ndarray:
     """Series of a block that leaves the ground, is off it, or nearly falls."""
-    terms = draw(st.lists(between(-2.0, 2.0), min_size=2, max_size=9))
+    terms = draw(st.lists(numbers(-2.0, 2.0), min_size=2, max_size=9))
     start = draw(
         st.tuples(st.just(0.0), st.floats(1e-6, 1.0))
-        | st.tuples(st.floats(1e-6, 1.5), between(-1.0, 1.0))
+        | st.tuples(st.floats(1e-6, 1.5), numbers(-1.0, 1.0))
         | st.tuples(st.floats(1.3, 1.5), st.floats(0.5, 3.0))
     )
     return np.array([*start, *terms])

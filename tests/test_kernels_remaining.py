@@ -7,6 +7,7 @@ import pytest
 from hypothesis import HealthCheck, assume, event, given, settings
 from hypothesis import strategies as st
 from oracles import multiprecision, one_piece
+from oracles.cases import between
 from oracles.problem import Problem
 
 from rocking.kernels.remaining import Restoring, deviation, ratio, refined_bracket, remaining_time
@@ -24,10 +25,6 @@ quick = settings(
 few = settings(deadline=None, max_examples=12)
 
 Sides = tuple[Restoring, Restoring]
-
-
-def between(low: float, high: float) -> st.SearchStrategy[float]:
-    return st.floats(low, high, allow_subnormal=False)
 
 
 def signed(low: float, high: float) -> st.SearchStrategy[float]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from kernel_records import MINUS, PLUS, ULP, in_units_of_g, rocking_block
+from kernel_records import MINUS, PLUS, ULP, in_units_of_g, numbers, rocking_block
 from oracles.exact import exact, first_above, polynomial
 
 from rocking.kernels.ground import Ground
@@ -18,11 +18,6 @@ from rocking.kernels.uplift import next_uplift
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 
 quick = settings(deadline=None, max_examples=100)
-
-
-def between(low: float, high: float) -> st.SearchStrategy[float]:
-    """Numbers far from underflow."""
-    return st.floats(low, high).map(lambda x: x if abs(x) > 1e-30 else 0.0)
 
 
 def exact_uplift(ground: Ground, piece: int, offset: float, thresholds: tuple[float, float]) -> tuple[float, int]:
@@ -54,7 +49,7 @@ def uplift(
 def shakings(draw: st.DrawFn) -> Ground:
     """One to four pieces of one degree, with jumps between them."""
     columns = draw(st.integers(1, 8))
-    rows = draw(st.lists(st.lists(between(-1.0, 1.0), min_size=columns, max_size=columns), min_size=1, max_size=4))
+    rows = draw(st.lists(st.lists(numbers(-1.0, 1.0), min_size=columns, max_size=columns), min_size=1, max_size=4))
     widths = [draw(st.floats(0.01, 2.0)) for _ in rows]
     return in_units_of_g(np.cumsum([0.0, *widths]), rows)
 

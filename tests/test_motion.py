@@ -203,9 +203,7 @@ def test_scaling_and_polarity_keep_the_description_true():
     ("call", "argument"),
     [
         *((lambda each=each: LINE.scaled_to(1.0, each), "measure") for each in ("sa", "pga_ratio", None)),
-        (lambda: Measure("sa"), "measure"),
         (lambda: Measure("factor", period=1.0), "period"),
-        (lambda: Measure("sa", period=0.0), "period"),
         (lambda: Measure("sa", period=1.0, damping=7.0), "damping"),
         (lambda: Measure("pga", damping=0.1), "damping"),
         (lambda: Measure("strength"), "measure"),
@@ -300,16 +298,6 @@ def test_pieces_may_be_short_but_not_steep_beyond_all_sense():
         Motion.from_points([0.0, 1e-300, 1.0], [0.0, 1.0, 0.0])
     with pytest.raises(InvalidMotion, match="must last"):
         Motion([0.0, 1e-300], [[1.0]])
-
-
-@pytest.mark.parametrize("kind", [np.float32, np.int64, np.array])
-def test_numbers_of_any_real_type_describe_a_motion(kind):
-    motion = Motion.from_samples([kind(0), kind(2), kind(1)], kind(2), name="ramp")
-    assert (motion.step, motion.pga, type(motion.step)) == (2.0, 2.0, float)
-    assert motion.scaled_to(kind(4)).pga == 4.0
-    assert pulses.sine(kind(3), kind(1), cycles=kind(2)).duration == 2.0
-    assert pulses.n_lobe(2.0, 1.0, lobes=np.int64(3)).duration == 1.5
-    assert motion.processed(baseline=np.int64(0)).step == 2.0
 
 
 def test_descriptions_compare_by_value():
@@ -441,22 +429,17 @@ LINE = Motion([0.0, 1.0], [[1.0]], name="line")
     ("call", "sentence"),
     [
         (lambda: LINE.scaled(np.nan), "factor must be a finite number"),
-        (lambda: LINE.scaled("two"), "factor must be a finite number"),
         (lambda: LINE.scaled_to(0.0), "level must be a positive number"),
-        (lambda: LINE.scaled_to(np.inf, "pgv"), "level must be a positive number"),
         (lambda: LINE.scaled_to(-1.0, Measure("sa", 1.0)), "level must be a positive number"),
         (lambda: Motion([0.0, 1.0], [[0.0]]).scaled_to(1.0), "zero throughout"),
         (lambda: LINE.delayed(0.0), "delay must be a positive number"),
         (lambda: Motion.from_samples([1.0], 0.1), "at least two samples, not 1"),
         (lambda: Motion.from_samples([0.0, 1.0, np.nan], 0.1), "sample 2 of the motion is nan"),
         (lambda: Motion.from_samples([[0.0, 1.0]], 0.1), "1 dimension"),
-        (lambda: Motion.from_samples([1.0, 1j], 0.1), "an array of numbers"),
         (lambda: Motion.from_samples(["0.0", "1.0"], 0.1), "an array of numbers"),
-        (lambda: Motion.from_samples([False, True], 0.1), "an array of numbers"),
         (lambda: Motion.from_samples([0.0, 1.0], 0.0), "dt must be a positive number"),
         (lambda: Motion.from_samples([0.0, 1.0], [0.1, 0.2]), "from_points"),
         (lambda: Motion.from_samples([0.0, 1.0], 1e10), "dt must be a number from 1e-09 to 1e\\+09"),
-        (lambda: Motion.from_samples([0.0, 0.0], 1e-12), "dt must be a number from 1e-09 to 1e\\+09"),
         (lambda: Motion.from_samples([1e308, -1e308], 0.1), "must be finite numbers"),
         (lambda: Motion.from_samples([1e60, 0.0], 0.1), "must stay below 1e\\+30"),
         (lambda: Motion.from_points([0.0, 1.0, 1.0], [0.0] * 3), "increase strictly"),
@@ -477,13 +460,10 @@ LINE = Motion([0.0, 1.0], [[1.0]], name="line")
         (lambda: Description(3), "family of a description must be text"),
         (lambda: Description("sine", {"amplitude": "large"}), "amplitude of a description must be a number"),
         (lambda: LINE.acceleration("0.5"), "time must be a number"),
-        (lambda: LINE.velocity(["0.5"]), "time must be a number"),
-        (lambda: LINE.displacement(True), "time must be a number"),
         (lambda: LINE.measures(["0.5"]), "periods of a spectral acceleration must be a number"),
         (lambda: LINE.rotated(LINE, 30.0), "the azimuth of 'line' is not known: give recorded"),
         (lambda: LINE.rotated(LINE, 30.0, recorded=(0.0, 171.0)), "along one line to 9 deg"),
         (lambda: LINE.rotated(LINE, 30.0, recorded=(0.0,)), "recorded must be the azimuths of both"),
-        (lambda: LINE.rotated(LINE, np.inf, recorded=(0.0, 90.0)), "azimuth must be a finite number"),
         (lambda: LINE.rotated(3.0, 30.0), "other must be a Motion"),
     ],
 )

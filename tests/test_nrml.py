@@ -169,7 +169,6 @@ def test_pooled_blocks_need_one_to_count_for(tmp_path):
     ("options", "word"),
     [
         ({"taxonomy": "two words"}, "taxonomy"),
-        ({"taxonomy": ""}, "taxonomy"),
         ({"model_id": "a/b"}, "model_id"),
         ({"loss_category": "people"}, "loss_category"),
         ({"format": "table"}, "format"),

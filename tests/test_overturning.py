@@ -245,7 +245,6 @@ def test_the_figure_names_every_mode_that_it_shows():
     ("changes", "word"),
     [
         ({"pulse": "square"}, "no pulse 'square'"),
-        ({"pulse": "one-sin"}, "did you mean one-sine"),
         ({"pulse": "triangular"}, "one of sine, .* or a function"),
         ({"pulse": "sine"}, "cycles"),
         ({"pulse": "half-sine", "cycles": 2.0}, "cycles"),
@@ -266,11 +265,8 @@ def test_the_figure_names_every_mode_that_it_shows():
         ),
         ({"amplitudes": []}, "amplitudes"),
         ({"amplitudes": [2.0, 1.0]}, "increase"),
-        ({"amplitudes": [1.0, math.nan]}, "finite"),
-        ({"amplitudes": "high"}, "amplitudes"),
         ({"frequencies": [-1.0]}, "frequencies"),
         ({"tolerance": 0.0}, "tolerance"),
-        ({"model": "cubic"}, "model"),
         ({"block": rocking.Block.from_parameters(1.0, 0.2, 1.0)}, "restitution 1"),
     ],
 )
@@ -292,14 +288,6 @@ def test_a_pulse_with_a_vertical_component_overturns_where_single_simulations_sa
         for times, falls in ((1.0 - 1e-5, False), (1.0 + 1e-5, True)):
             response = rocking.simulate(BLOCK, pulse(times * level * lifting, frequency))
             assert response.overturned == falls
-
-
-def test_the_summary_tells_none_from_already_the_first():
-    block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
-    low = rocking.overturning_map(block, "one-sine", amplitudes=[0.5, 1.5], frequencies=[5.0]).summary()
-    assert "none of those up to 1.5" in low
-    high = rocking.overturning_map(block, "one-sine", amplitudes=[4.0, 5.0], frequencies=[5.0]).summary()
-    assert "4 or less" in high
 
 
 def test_every_family_of_pulses_is_mapped_by_name_or_known_to_need_a_function() -> None:

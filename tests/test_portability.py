@@ -13,7 +13,6 @@ import pytest
 
 from rocking.core import threads
 from rocking.explorer import apart, launch, server
-from rocking.plot import canvas
 from rocking.studies import folder
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -115,13 +114,6 @@ def test_a_limit_that_the_system_refuses_leaves_the_others(monkeypatch: pytest.M
     assert set(kept) == {0, 1, 2} - refused
 
 
-def test_where_there_are_no_limits_a_mesh_is_read_without_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "resource", None)
-    with pytest.raises(ImportError):
-        import resource  # noqa: F401
-    apart._limit_this_process()
-
-
 @pytest.mark.parametrize(("system", "reused"), [("linux", True), ("darwin", True), ("win32", False)])
 def test_on_windows_no_other_server_may_share_the_port(
     monkeypatch: pytest.MonkeyPatch, system: str, reused: bool
@@ -129,16 +121,6 @@ def test_on_windows_no_other_server_may_share_the_port(
     monkeypatch.setattr(sys, "platform", system)
     with launch._bound("127.0.0.1", 0) as listening:
         assert bool(listening.getsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR)) == reused
-
-
-@pytest.mark.parametrize("system", ["darwin", "win32"])
-def test_only_linux_asks_for_a_display(monkeypatch: pytest.MonkeyPatch, system: str) -> None:
-    monkeypatch.delenv("DISPLAY", raising=False)
-    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    monkeypatch.setattr(sys, "platform", "linux")
-    assert not canvas._has_display()
-    monkeypatch.setattr(sys, "platform", system)
-    assert canvas._has_display()
 
 
 class _Windows(SimpleNamespace):

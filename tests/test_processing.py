@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
+from oracles.cases import wave
 
 from rocking import pulses, records
 from rocking.errors import InvalidMotion
@@ -169,14 +170,6 @@ def test_processing_leaves_the_motion_itself_alone():
 
 
 # With a vertical component
-
-
-def wave(amplitude: float, seed: int, dt: float = 0.02, count: int = 200) -> Motion:
-    """Smooth random motion, linear between even samples."""
-    random = np.random.default_rng(seed)
-    t = dt * np.arange(count + 1)
-    parts = [random.normal() * np.sin(f * t + random.uniform(0.0, 6.0)) for f in random.uniform(2.0, 25.0, 6)]
-    return Motion.from_samples(amplitude * np.sum(parts, axis=0) * np.sin(np.pi * t / t[-1]), dt)
 
 
 def test_a_part_after_the_vertical_component_has_none() -> None:

@@ -1,11 +1,7 @@
 """The promises of docs/reliability.md at a small size, and the program that runs them."""
 
-from pathlib import Path
-
 import pytest
 from promises import chattering, containment, cross_code, events, one_answer
-
-ROOT = Path(__file__).parents[1]
 
 
 @pytest.mark.thorough

@@ -12,7 +12,7 @@ from numpy.testing import assert_array_equal
 from rocking import read, records
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import UnreadableRecord
-from rocking.records.named import named_motion, numbered, shipped
+from rocking.records.named import named_motion, numbered
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = ROOT / "src" / "rocking" / "records" / "data"
@@ -127,8 +127,3 @@ def test_a_record_by_name_is_multiplied_by_its_scale(scale, tmp_path):
 def test_numbers_of_names_leave_names_that_are_there():
     assert numbered(["a", "a", "a #1"]) == ["a #2", "a #3", "a #1"]
     assert numbered(["a #2", "a", "b", "a"]) == ["a #2", "a #1", "b", "a #3"]
-
-
-def test_contents_are_counted_in_words():
-    assert repr(shipped("ridgecrest-clc-090")) == "<Contents: 1 record: ridgecrest-clc-090>"
-    assert repr(shipped()).startswith(f"<Contents: {len(records.names())} records: ")

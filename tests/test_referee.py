@@ -49,7 +49,7 @@ ONCE_DIFFERENT = [
 ]
 
 
-@pytest.mark.cases(fast=3, thorough=15)
+@pytest.mark.cases(fast=5, thorough=15)
 @pytest.mark.parametrize(
     "seed, number, vertical",
     ONCE_DIFFERENT,

@@ -16,7 +16,7 @@ from rocking.analysis.survey import survey
 from rocking.core.tables import named
 from rocking.explorer.facts import verdict
 from rocking.kernels import state
-from rocking.response import QUANTITIES, history, sensitivity, summary
+from rocking.response import history, sensitivity, summary
 from rocking.response.summary import known_ratio, time_text
 from rocking.rules import Check
 
@@ -42,11 +42,6 @@ def fallen(record):
     return simulate(Block.from_parameters(p=4.0, alpha=0.05, restitution=0.9), record)
 
 
-@pytest.fixture(scope="module")
-def ambiguous():
-    return simulate(Block(half_width=0.12, half_height=0.75), rocking.records.load("ridgecrest-clc-090"))
-
-
 def test_a_notebook_shows_the_rotation_with_its_peak_in_the_colour_of_the_text(shaken, fallen):
     for response in (shaken, fallen, simulate(Block(half_width=0.2, half_height=1.0), None)):
         page = response._repr_html_()
@@ -56,31 +51,6 @@ def test_a_notebook_shows_the_rotation_with_its_peak_in_the_colour_of_the_text(s
     extreme = np.max(np.abs([float(text) for text in re.findall(r">(-?[\d.]+)</text>", shaken._repr_html_())[:2]]))
     assert extreme == pytest.approx(shaken.peak_over_slenderness, rel=2e-3)
     assert f">{fallen.overturn_time:.4g} s</text>" in fallen._repr_html_()
-
-
-def test_a_summary_and_a_dictionary_pass_once_along_the_response_for_each_quantity(monkeypatch):
-    """The sensitivity has six quantities; however often somebody asks, no pass is made twice."""
-    counted = {"vary": 0, "trace": 0}
-
-    def counting(name, kernel):
-        def call(*arguments):
-            counted[name] += 1
-            return kernel(*arguments)
-
-        return call
-
-    monkeypatch.setattr(sensitivity, "vary", counting("vary", sensitivity.vary))
-    monkeypatch.setattr(history, "trace", counting("trace", history.trace))
-    response = simulate(Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
-    response.summary()
-    assert counted["vary"] == len(QUANTITIES) - 2 == 4  # it starts at rest
-    once = dict(counted)
-    for _ in range(2):
-        response.summary()
-        response.to_dict()
-        repr(response)
-    assert counted == once
-    assert counted["trace"] <= 70  # most of them find the instant of tipping
 
 
 def test_a_summary_is_its_rows(shaken):

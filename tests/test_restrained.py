@@ -117,8 +117,6 @@ def test_what_is_known_in_closed_form():
     inertia = 4000.0 * (0.25**2 + 1.5**2) * 4.0 / 3.0 + 1000.0 * (0.25**2 + 3.0**2)
     assert whole.p == pytest.approx(math.sqrt(5000.0 * column.gravity * math.hypot(0.25, z) / inertia))
     assert whole.alpha == pytest.approx(math.atan2(0.25 - x, z))
-    toe = RestrainedBlock(column, Tendon(1e5, offset=0.25))
-    assert toe._terms[0].sine == 0.0 < -toe._terms[1].sine
     leaning = RestrainedBlock(column, lean=0.02)
     assert [side.alpha for side in leaning.sides] == pytest.approx([column.alpha - 0.02, column.alpha + 0.02])
 
@@ -178,34 +176,19 @@ def test_a_tendon_that_has_yielded_leaves_the_block_free():
     ("make", "says"),
     [
         (lambda: Tendon(0.0), "a tendon needs stiffness"),
-        (lambda: Tendon(-1.0), "stiffness of a tendon must be at least 0"),
         (lambda: Tendon(1e5, prestress=-3.0), "hangs slack holds nothing"),
         (lambda: Tendon(1e5, prestress=5e3, strength=4e3), "must be above its prestress"),
         (lambda: Tendon(0.0, prestress=5e3, strength=6e3), "that yields needs a stiffness"),
-        (lambda: Spring(0.0), "stiffness must be a positive number"),
-        (lambda: Damper(math.nan), "coefficient must be"),
         (lambda: Thrust(0.0, 2.0), "must not be zero"),
-        (lambda: Thrust(10.0, -2.0), "height must be a positive number"),
-        (lambda: Load(-1.0, 2.0), "mass must be a positive number"),
-        (lambda: RestrainedBlock(Block(width=0.4, height=2.0), Spring(1.0)), "needs its mass"),
-        (lambda: RestrainedBlock(Block(width=0.4, height=2.0, mass=1.0), 3.0), "is no restraint"),
         (lambda: RestrainedBlock(0.4), "a Block is needed"),
-        (lambda: RestrainedBlock(Block(width=0.4, height=2.0, mass=9.0), Thrust(900.0, 2.0)), "does not stand"),
         # Its moment about the pivot is that of the weight: the quotient is zero to the last bit.
         (lambda: RestrainedBlock(Block(width=0.25, height=1.0, mass=1.0), Thrust(0.25 * 9.80665, 0.5)), " 0 m/s"),
-        (lambda: RestrainedBlock(Block(width=0.4, height=2.0), lean=0.3), "falls: from -0.1974 to 0.1974 rad"),
-        (lambda: RestrainedBlock(Block(width=0.4, height=2.0), restitution=1.2), "restitution must be in"),
-        (
-            lambda: RestrainedBlock(Block(width=0.4, height=2.0, mass=9.0), Tendon(1.0, offset=0.3)),
-            "is beyond the pivot",
-        ),
         (
             lambda: RestrainedBlock(
                 Block(width=0.4, height=2.0, mass=9.0), Tendon(1e3, strength=9.0), Tendon(1e3, strength=8.0)
             ),
             "one tendon of a block may yield",
         ),
-        (lambda: Block.one_sided(width=0.4, height=-2.0), "height must be a positive number"),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_sentence(make, says):

@@ -26,11 +26,6 @@ ONE_PERIOD = rocking.pulses.sine(3.0, 1.0, cycles=1)
 RESTLESS = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=1.0 - 1e-9)
 
 
-@pytest.fixture
-def small_budget(monkeypatch):
-    monkeypatch.setattr(engine, "BUDGET", 0)
-
-
 #: Two blocks, of which the second is given up at a small budget where it does not overturn.
 TWO = [BLOCK, RESTLESS]
 
@@ -345,9 +340,9 @@ def test_a_fragility_keeps_every_simulation_for_an_audit(tmp_path):
         given.to_csv(tmp_path / "none.csv", "outcomes")
 
 
-def test_the_nonlinear_critical_amplitude_is_not_read_off_an_unfinished_simulation(monkeypatch):
+def test_the_nonlinear_critical_amplitude_is_not_read_off_an_unfinished_simulation(request):
     whole = critical_amplitude_nonlinear(2.0, 0.9, 0.2)
-    monkeypatch.setattr(engine, "BUDGET", 0)
+    request.getfixturevalue("small_budget")
     found = critical_amplitude_nonlinear(2.0, [0.9, 0.99999], 0.2)
     assert found[0] == whole
     assert np.isnan(found[1])

@@ -185,14 +185,6 @@ def test_a_rock_that_stands_bounds_how_often_it_was_shaken() -> None:
     assert math.exp(-certain * 0.7 * 2000.0) == pytest.approx(0.1)
 
 
-def test_the_share_beyond_the_curve_is_told() -> None:
-    fitted = fragility_with(3.0, 0.4)
-    short = fitted.annual_rate(HazardCurve([2.5, 3.5], [1e-2, 5e-3]))
-    assert short.rates[0].below > 0.2
-    assert "below the hazard curve" in short.summary()
-    assert "above the hazard curve" in short.summary()
-
-
 def test_an_interval_without_an_end_is_explained() -> None:
     site = HazardCurve([2.0, 3.0], [1e-2, 5e-3])
     note = "whose summary says why they have no end"

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 import rocking
 from rocking import Block, InvalidBlock, InvalidOption, Solid
-from rocking.solid.mesh import _NothingElse, upright
+from rocking.solid.mesh import upright
 from rocking.solid.repair import agreeing, closed, is_closed, joined, moments, overlaps, shells_of
 
 SCRIPT = runpy.run_path(str(Path(__file__).resolve().parents[1] / "scripts" / "ship_statue.py"))
@@ -572,13 +572,10 @@ REFUSED = {
     "density": (lambda: Solid.from_mesh(box(), density=-1.0), "density must be a positive number, in kg/m"),
     "unit": (lambda: Solid.from_mesh(box(), unit="inch"), "unit must be one of m, cm, mm, in, ft"),
     "up": (lambda: Solid.from_mesh(box(), up="north"), "up must be one of x, y, z"),
-    "up of zero": (lambda: Solid.from_mesh(box(), up=[0.0, 0.0, 0.0]), "up must be x, y or z, or a vector"),
-    "tolerance": (lambda: Solid.from_mesh(box(), tolerance=0.0), "tolerance must be a positive number, in m"),
     "both": (
         lambda: Solid.from_mesh(box(), tolerance=0.01, support=[[0, 0], [0.1, 0], [0, 0.1]]),
         "tolerance is how a support is looked for: leave it out where support is given",
     ),
-    "turn": (lambda: Solid.from_mesh(box(), turn=math.nan), "turn must be a finite number"),
     "no file": (lambda: Solid.from_mesh("nobody.obj"), "nobody.obj: there is no such file"),
     "no statue": (lambda: Solid.from_mesh("statu"), "the mesh that ships is statue"),
     "no mesh": (
@@ -591,7 +588,6 @@ REFUSED = {
     ),
     "centre": (lambda: Solid([(1, 0), (0, 1), (-1, -1)], (0, 1), np.eye(3)), r"centre must be finite numbers of shape"),
     "centre below": (lambda: Solid([(1, 0), (0, 1), (-1, -1)], (0, 0, -1), np.eye(3)), "height of the centre of mass"),
-    "azimuth": (lambda: Solid.from_mesh("statue").block(math.inf), "azimuth must be a finite number"),
     "stocky": (lambda: Solid.from_mesh(box((2.0, 2.0, 0.3))).block(0.0), "too stocky to rock that way"),
 }
 
@@ -673,15 +669,9 @@ def test_a_stream_names_no_other_file(tmp_path, monkeypatch):
         gltf["buffers"][0]["uri"] = uri
         with pytest.raises(InvalidBlock, match=f"a.gltf: names another file, '{uri}', which is not read"):
             Solid.from_mesh(named(json.dumps(gltf).encode(), "a.gltf"))
-    asked = []
-    monkeypatch.setattr(_NothingElse, "__getitem__", lambda resolver, other: asked.append(other) or bytes(120))
-    with pytest.raises(InvalidBlock):
-        Solid.from_mesh(named(json.dumps(gltf).encode(), "a.gltf"))
-    assert asked == ["file:///etc/passwd"]
     # Materials of an OBJ file are not looked for.
     scene = b"mtllib /etc/passwd\nusemtl red\n" + trimesh.exchange.obj.export_obj(box()).encode()
     assert Solid.from_mesh(named(scene, "a.obj")).volume == pytest.approx(box().volume)
-    assert len(asked) == 1
 
 
 def _box(sizes, at, *, inverted=False):

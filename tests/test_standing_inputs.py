@@ -1,8 +1,5 @@
 """What nobody can mean of meshes, walls, restraints and laws of restitution: one sentence says what, where and how."""
 
-import math
-
-import numpy as np
 import pytest
 import trimesh
 
@@ -10,7 +7,6 @@ import rocking
 from rocking import (
     Block,
     Damper,
-    FallingRestitution,
     Load,
     RandomRestitution,
     RestrainedBlock,
@@ -36,10 +32,6 @@ def held(*restraints, **options):
     return RestrainedBlock(WALL, *restraints, **options)
 
 
-def falling(largest=0.9, slope=0.1, least=0.5):
-    return held(restitution=FallingRestitution(largest, slope, least))
-
-
 def drawn(least=0.5, largest=0.9, seed=1):
     return held(restitution=RandomRestitution(least, largest, seed))
 
@@ -47,37 +39,12 @@ def drawn(least=0.5, largest=0.9, seed=1):
 #: What is done, what it is about (an argument or nothing), and words that say what is wrong and how to correct it.
 WRONG = {
     # Meshes
-    "density of text": (lambda: Solid.from_mesh(box(), density="2700"), "density", "in kg/m^3, not '2700'"),
-    "density of none": (lambda: Solid.from_mesh(box(), density={}), "density", "missing for mesh; its parts are mesh"),
-    "unit of nothing": (lambda: Solid.from_mesh(box(), unit=0.0), "unit", "positive number, in m, not 0"),
-    "support in mm": (
-        lambda: Solid.from_mesh(box(), support=[(300.0, 200.0), (-300.0, 200.0), (0.0, -200.0)]),
-        "support",
-        "reaches 300 m beyond the outline of the mesh, from -0.3 m to 0.3 m in the east",
-    ),
     "support aside": (
         lambda: Solid.from_mesh(box(), support=[(0.3, 0.2), (0.2, 0.2), (0.25, 0.1)]),
         "support",
         "its centre of mass lies 0.268 m outside its support, towards 243 deg; correct",
     ),
-    "support of NaN": (
-        lambda: Solid.from_mesh(box(), support=[(0.1, 0.1), (math.nan, 0.0), (0.0, -0.1)]),
-        "support",
-        "each a finite (east, north) in m, not",
-    ),
     "tolerance of all": (lambda: Solid.from_mesh(box(), tolerance=5.0), "tolerance", "below the height of the mesh"),
-    "points": (
-        lambda: Solid.from_mesh(np.zeros((3, 3))),
-        "mesh",
-        "the path of a file, a binary stream that has a name, or a mesh or scene of trimesh",
-    ),
-    "azimuth of text": (lambda: Solid.from_mesh(box()).block("north"), "azimuth", "a finite number, not 'north'"),
-    "gravity": (lambda: Solid.from_mesh(box(), gravity=0.0), "gravity", "positive number, in m/s^2, not 0"),
-    "restitution of a solid": (
-        lambda: Solid.from_mesh(box()).block(0.0, restitution=92.0),
-        "restitution",
-        "if it is in per cent, give 0.92",
-    ),
     "a solid that rocks": (
         lambda: rocking.simulate(Solid.from_mesh(box()), PULSE), "", "block(azimuth) of a Solid is what it is"
     ),
@@ -85,20 +52,13 @@ WRONG = {
     "restraints in a list": (lambda: held([Spring(1e3), Damper(1.0)]), "", "is no restraint: give them one by one"),
     "restraints twice": (lambda: RestrainedBlock(held(Spring(1e3)), Damper(1.0)), "", "give all of them at once"),
     "no mass": (lambda: Block.one_sided(Thrust(9.0, 2.0), width=0.4, height=4.0), "mass", "kg, beside its sizes"),
-    "NaN of a tendon": (lambda: Tendon(math.nan), "stiffness", "a finite number, not nan"),
-    "strength of text": (lambda: Tendon(1e5, strength="9 kN"), "strength", "a number, not '9 kN'"),
     "a tendon beyond": (
         lambda: held(Tendon(1e5, offset=2.0)), "offset", "beyond the pivot, which is 0.25 m from the centre of mass"
     ),
-    "a tendon's place": (lambda: Tendon(1e5, offset="toe"), "offset", "a finite number, not 'toe'"),
-    "an infinite tendon": (lambda: Tendon(math.inf), "stiffness", "a finite number, not inf"),
-    "a spring that pushes": (lambda: Spring(-1e3), "stiffness", "positive number, in N m/rad, not -1000"),
-    "a damper that drives": (lambda: Damper(-5.0), "coefficient", "positive number, in N m s/rad, not -5"),
     "a thrust below the ground": (lambda: Thrust(9.0, -1.0), "height", "positive number, in m, not -1"),
     "a thrust in kN for N": (
         lambda: held(Thrust(2e6, 3.0)), "", "a smaller thrust, load or lean lets it; forces are in N, masses in kg"
     ),
-    "a load of less than nothing": (lambda: Load(-5.0, 4.0), "mass", "positive number, in kg, not -5"),
     "a load outside": (
         lambda: held(Load(1e5, 4.0, offset=1.0)), "offset", "0.702 m beyond its pivot, so that it falls: give"
     ),
@@ -107,16 +67,9 @@ WRONG = {
         "width",
         "the sizes of a block are given by name, not as 0.4, 4: width and height for the full sizes",
     ),
-    "a load that follows": (lambda: Load(5.0, 4.0, follows="no"), "follows", "must be True or False, not 'no'"),
     "a pair for one side": (
         lambda: held(one_sided=True, restitution=(0.4, 0.5)), "restitution", "rocks one way is one number, not a pair"
     ),
-    "corners of different lengths": (
-        lambda: Solid.from_mesh(box(), support=[(0.1, 0.2), (0.3,)]),
-        "support",
-        "each a finite (east, north) in m, not [(0.1, 0.2), (0.3,)]",
-    ),
-    "walls": (lambda: held(one_sided="yes"), "one_sided", "must be True or False, not 'yes'"),
     "a lean in degrees": (
         lambda: held(lean=2.0), "lean", "0.1244 rad it stands; if it is in degrees, give math.radians(2)"
     ),
@@ -126,12 +79,7 @@ WRONG = {
         "at least 0 rad, in front of the body's stop",
     ),
     # Restitution
-    "a law above 1": (lambda: falling(largest=1.2), "largest", "in (0, 1], not 1.2"),
     "a law of percents": (lambda: drawn(80.0, 90.0), "largest", "if it is in per cent, give 0.9"),
-    "a law that gains": (lambda: falling(slope=-0.1), "slope", "in s/rad, not -0.1: a faster impact loses more"),
-    "a law of NaN": (lambda: falling(slope=math.nan), "slope", "at least 0, in s/rad, not nan"),
-    "bounds swapped": (lambda: drawn(0.9, 0.5), "least", "above 0 and at most largest, 0.5, not 0.9"),
-    "a seed of a fraction": (lambda: drawn(seed=1.5), "seed", "a whole number from 0 to 9007199254740992, not 1.5"),
     "three restitutions": (lambda: held(restitution=[0.9] * 3), "restitution", "a pair (side +, side -), not 3 values"),
     "a law by its name": (lambda: held(restitution="housner"), "restitution", "an array of numbers, not 'housner'"),
     "a law of a free block": (

@@ -124,9 +124,8 @@ def test_the_command_line_gives_no_verdict_on_what_it_stopped(run):
     assert (result["overturned"], result["stopped"]) == (False, True)
 
 
-def test_an_unfinished_response_has_no_verdict_either(block, monkeypatch):
-    monkeypatch.setattr("rocking.simulation.simulate.slices", lambda ground: 1)
-    monkeypatch.setattr("rocking.simulation.simulate.SLICE", 5)
-    response = simulate(block, rocking.pulses.sine(3.0, 1.0, cycles=20))
+def test_an_unfinished_response_has_no_verdict_either(block, few_steps):
+    with few_steps(5):
+        response = simulate(block, rocking.pulses.sine(3.0, 1.0, cycles=20))
     assert response.unfinished and not response.stopped
     assert "does not overturn" not in repr(response) + response.summary()

@@ -1,7 +1,6 @@
 """Studies: resumed after anything, byte for byte; every damage seen; nobody runs one twice at once."""
 
 import errno
-import hashlib
 import importlib
 import itertools
 import json
@@ -17,11 +16,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from studies_seen import after_each_unit, digest, store_of
 
 import rocking
 from rocking.studies import folder as folders
 from rocking.studies import units
-from rocking.studies.file import read_study
 from rocking.studies.product import OUTCOMES
 from rocking.studies.units import DamagedUnit, UnitGrid, decoded, name_of
 
@@ -44,15 +43,6 @@ print(report.stopped)
 
 def made(folder, *, blocks=BLOCKS, **changes):
     return rocking.study(folder, blocks, MOTIONS, **(OPTIONS | changes))
-
-
-def digest(folder):
-    """Hash of all that a study is: inputs, description, every unit."""
-    total = hashlib.sha256()
-    for path in sorted(Path(folder).rglob("*")):
-        if path.is_file() and not path.name.startswith(("lock", "runs.")):
-            total.update(f"{path.relative_to(folder)}".encode() + path.read_bytes())
-    return total.hexdigest()
 
 
 @pytest.fixture(scope="module")
@@ -88,9 +78,9 @@ def test_units_may_hold_several_motions_scales_and_polarities(reference, tmp_pat
     owner = importlib.import_module("rocking.studies.study")
     monkeypatch.setattr(owner, "fitting_unit", lambda product: (2, 1, 2, 1024))
     study = made(tmp_path, unit_blocks=None)
-    keys = list(study._store.grid)
+    keys = list(store_of(study).grid)
     assert len(keys) == 2 * 2 * 1 * 2
-    assert sum(map(study._store.grid.simulations, keys)) == reference.overturned.size
+    assert sum(map(store_of(study).grid.simulations, keys)) == reference.overturned.size
     study.run(threads=2)
     xr.testing.assert_identical(rocking.study(tmp_path).results().load(), reference)
     lazy = rocking.study(tmp_path).results()
@@ -104,7 +94,7 @@ def test_units_may_hold_several_motions_scales_and_polarities(reference, tmp_pat
     (tmp_path / "result" / name_of(keys[3])).unlink()
     found = rocking.study(tmp_path).results().load()
     np.testing.assert_array_equal(np.isnan(found.impacts.values), ~found.done.values)
-    assert (~found.done.values).sum() == study._store.grid.simulations(keys[3])
+    assert (~found.done.values).sum() == store_of(study).grid.simulations(keys[3])
 
 
 @pytest.mark.parametrize(
@@ -118,8 +108,8 @@ def test_a_study_is_cut_into_some_dozens_of_units_whatever_it_is_long_of(tmp_pat
     pulses = [rocking.pulses.one_sine(4.0, frequency) for frequency in np.linspace(0.5, 2.0, motions)]
     many = rocking.Blocks(p=np.linspace(1.0, 6.0, blocks), alpha=0.2, restitution=0.7)
     study = rocking.study(tmp_path, many, pulses, levels=np.linspace(0.5, 2.0, scales), model="linear")
-    assert 20 <= len(study._store.grid) <= 120
-    sizes = list(map(study._store.grid.simulations, study._store.grid))
+    assert 20 <= len(store_of(study).grid) <= 120
+    sizes = list(map(store_of(study).grid.simulations, store_of(study).grid))
     assert sum(sizes) == blocks * motions * scales
     study.run()
     stored = sum(path.stat().st_size for path in (tmp_path / "result").iterdir())
@@ -141,7 +131,7 @@ def test_whoever_computes_it_the_store_is_the_same_to_the_byte(complete, tmp_pat
         assert study.run().units == 0
         assert len(study.status.runs) == 12
     else:
-        keys = list(study._store.grid)
+        keys = list(store_of(study).grid)
         monkeypatch.setattr(UnitGrid, "__iter__", lambda self: iter(keys[::-1]))
         study.run(threads=1)
     assert digest(tmp_path) == digest(complete)
@@ -174,7 +164,7 @@ def test_a_killed_study_loses_no_unit_and_goes_on_to_the_same_bytes(complete, tm
     study = made(tmp_path)
     report = study.run()
     assert not report.failed
-    assert seen and report.units == len(study._store.grid) - len(seen)
+    assert seen and report.units == len(store_of(study).grid) - len(seen)
     assert digest(tmp_path) == digest(complete)
     assert not list(tmp_path.rglob(".*.part*"))
 
@@ -205,16 +195,10 @@ def test_what_a_crash_left_half_written_is_removed(complete, tmp_path):
     assert digest(tmp_path) == digest(complete)
 
 
-def after_the_first_unit(monkeypatch, study, action):
-    """Do something each time that a unit is stored."""
-    put = study._store.put
-    monkeypatch.setattr(study._store, "put", lambda key, data: (put(key, data), action()))
-
-
 def test_sigterm_finishes_the_units_in_hand(complete, tmp_path, monkeypatch):
     study = made(tmp_path)
     with monkeypatch.context() as patched:
-        after_the_first_unit(patched, study, lambda: signal.raise_signal(signal.SIGTERM))
+        after_each_unit(patched, lambda: signal.raise_signal(signal.SIGTERM))
         report = study.run(threads=1)
     assert report.stopped and 1 <= report.units == study.status.done <= 3
     assert "stopped, go on with another run" in str(report)
@@ -249,7 +233,7 @@ def test_ctrl_c_stops_in_the_middle_of_a_unit(complete, tmp_path, monkeypatch):
 
     with monkeypatch.context() as patched:
         patched.setattr("rocking.studies.run.compute", compute)
-        after_the_first_unit(patched, study, lambda: signal.raise_signal(signal.SIGINT))
+        after_each_unit(patched, lambda: signal.raise_signal(signal.SIGINT))
         with pytest.raises(KeyboardInterrupt):
             study.run(threads=2)
     assert stopped.count(False) == 1  # the unit that is stored
@@ -262,7 +246,7 @@ def test_ctrl_c_stops_in_the_middle_of_a_unit(complete, tmp_path, monkeypatch):
 def test_a_study_that_is_being_run_says_who_runs_it_and_how_fast(tmp_path, monkeypatch):
     study, seen = made(tmp_path), []
     with monkeypatch.context() as patched:
-        after_the_first_unit(patched, study, lambda: seen.append(rocking.study(tmp_path).status))
+        after_each_unit(patched, lambda: seen.append(rocking.study(tmp_path).status))
         study.run(threads=1, part="1/2")
     for status in seen[:-1]:
         running = status.running
@@ -452,7 +436,7 @@ def test_a_damaged_plan_of_a_report_is_told(tmp_path):
 def test_a_unit_that_is_another_s_is_found_by_computing_it_again(small_complete, tmp_path):
     shutil.copytree(small_complete, tmp_path, dirs_exist_ok=True)
     study = rocking.study(tmp_path)
-    names = [name_of(key) for key in study._store.grid]
+    names = [name_of(key) for key in store_of(study).grid]
     assert study.verify(recompute=len(names)) == []
     (tmp_path / "result" / names[0]).write_bytes((tmp_path / "result" / names[1]).read_bytes())
     assert study.verify() == []
@@ -592,8 +576,8 @@ def test_a_study_is_exported_to_parquet_or_says_what_is_missing(complete, tmp_pa
 
 def test_units_have_names_of_their_own_and_other_files_are_none(tmp_path):
     study = made(tmp_path)
-    names = [name_of(key) for key in study._store.grid]
-    assert len({*names}) == len(study._store.grid) == 36 and names[-1] == "c.0.2.1.1.2"
+    names = [name_of(key) for key in store_of(study).grid]
+    assert len({*names}) == len(store_of(study).grid) == 36 and names[-1] == "c.0.2.1.1.2"
     for name in ("c.0.1.2.3", "c.1.0.0.0.0", "c.0.a.0.0.0", "c.0.0.2.0.0", "c.0.0.0.0.0.0", "c.0."):
         (tmp_path / "result" / name).touch()
     assert study.status.done == 0
@@ -603,13 +587,6 @@ def test_units_have_names_of_their_own_and_other_files_are_none(tmp_path):
 def test_units_are_whole_groups_of_blocks(tmp_path, width):
     with pytest.raises(rocking.InvalidOption, match="unit_blocks"):
         made(tmp_path, unit_blocks=width)
-
-
-def test_an_empty_folder_holds_no_study(tmp_path):
-    with pytest.raises(rocking.StudyError, match="there is no study here"):
-        rocking.study(tmp_path)
-    with pytest.raises(rocking.InvalidOption, match="blocks and motions"):
-        rocking.study(tmp_path, BLOCKS)
 
 
 def test_a_vertical_component_is_part_of_a_study(tmp_path):
@@ -634,14 +611,6 @@ def test_what_would_be_ignored_of_a_study_that_is_there_is_refused(tmp_path):
             rocking.study(tmp_path / "one", **given)
     with pytest.raises(rocking.errors.InvalidOption, match="duration, outcomes belong to"):
         rocking.study(tmp_path / "one", duration=3.0, outcomes=["rests"])
-
-
-@pytest.mark.parametrize("folder", [5, None])
-def test_a_folder_that_is_no_path_is_told(folder):
-    with pytest.raises(rocking.errors.StudyError, match="the folder of a study must be text or a path"):
-        rocking.study(folder, BLOCKS, MOTIONS)
-    with pytest.raises(rocking.errors.StudyError, match="the file of a study must be text or a path"):
-        read_study(folder)
 
 
 def test_bodies_of_another_kind_with_the_same_numbers_are_another_study(tmp_path):

@@ -1,7 +1,6 @@
 """Studies on dask.distributed: real schedulers and workers, on 127.0.0.1 only; killed, and nothing is lost."""
 
 import contextlib
-import hashlib
 import json
 import os
 import re
@@ -16,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from studies_seen import after_each_unit, digest, store_of
 
 import rocking
 from rocking.studies import run as clusters
@@ -34,14 +34,6 @@ def made(folder):
     """Make a study of 20 units of a few hundredths of a second."""
     motion = rocking.records.load("el-centro-meloland-270")
     return rocking.study(folder, BLOCKS, motion, levels=np.linspace(2.0, 8.0, UNITS), measure="pga", unit_blocks=2048)
-
-
-def digest(folder):
-    total = hashlib.sha256()
-    for path in sorted(Path(folder).rglob("*")):
-        if path.is_file() and not path.name.startswith(("lock", "runs.")):
-            total.update(f"{path.relative_to(folder)}".encode() + path.read_bytes())
-    return total.hexdigest()
 
 
 def wait_until(true, seconds=300.0):  # far beyond what a busy machine takes: what is waited for comes
@@ -87,18 +79,6 @@ def cluster(tmp_path):
         yield found
 
 
-def after_the_first_unit(monkeypatch, study, action):
-    """Do something once the first unit of a study is stored."""
-    put = study._store.put
-
-    def first(key, data):
-        put(key, data)
-        monkeypatch.setattr(study._store, "put", put)
-        action()
-
-    monkeypatch.setattr(study._store, "put", first)
-
-
 def test_a_client_is_run_as_its_executor_is(tmp_path):
     """Without a worker's process: units are pickled and computed as on a cluster."""
     here = {"protocol": "tcp", "host": "127.0.0.1", "dashboard_address": None, "processes": False}
@@ -127,15 +107,16 @@ def test_a_cluster_loses_a_worker_a_unit_and_its_scheduler_but_no_result(complet
     study = made(tmp_path / "worker")
     with scheduler_client(cluster.address) as client:
         client.wait_for_workers(2)
-        after_the_first_unit(monkeypatch, study, cluster.workers[0].kill)
-        report = study.run(executor=client)
+        with monkeypatch.context() as patched:
+            after_each_unit(patched, cluster.workers[0].kill)
+            report = study.run(executor=client)
         assert (report.units, report.failed) == (UNITS, {})
         assert len(client.nthreads()) == 1
     assert digest(tmp_path / "worker") == complete
 
     # A unit kills its worker, every time: it fails, alone, and can be computed later.
     study = made(tmp_path / "unit")
-    poison = study._store.work((0, 7, 0, 0)).factors[0, 0, 0]
+    poison = store_of(study).work((0, 7, 0, 0)).factors[0, 0, 0]
 
     def deadly(work):
         if work.factors[0, 0, 0] == poison:
@@ -163,9 +144,9 @@ def test_a_cluster_loses_a_worker_a_unit_and_its_scheduler_but_no_result(complet
 
     # The scheduler is killed: one sentence, and no waiting for what will never come.
     study = made(tmp_path / "scheduler")
-    after_the_first_unit(monkeypatch, study, cluster.scheduler.kill)
     gone = pytest.raises(rocking.StudyError, match="the workers are gone: ")
-    with gone, scheduler_client(cluster.address) as client:
+    with gone, scheduler_client(cluster.address) as client, monkeypatch.context() as patched:
+        after_each_unit(patched, cluster.scheduler.kill)
         study.run(executor=client)
     assert 0 < study.status.done < UNITS
     study.run(threads=1)
@@ -173,7 +154,7 @@ def test_a_cluster_loses_a_worker_a_unit_and_its_scheduler_but_no_result(complet
 
 
 def test_a_worker_with_another_program_is_told_so(tmp_path):
-    work = made(tmp_path)._store.work((0, 0, 0, 0))
+    work = store_of(made(tmp_path)).work((0, 0, 0, 0))
     with pytest.raises(rocking.StudyError, match=r"has rocking .*, the study needs rocking 9\.9\.9"):
         compute(replace(work, program="rocking 9.9.9 (kernels 0)"))
 

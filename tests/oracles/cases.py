@@ -117,3 +117,11 @@ def cases(
         draw(pairs(*restitution, symmetric=symmetric)),
         draw(kinds[motion or draw(st.sampled_from(["record", "pulse"]))]),
     )
+
+
+def wave(amplitude: float, seed: int, dt: float = 0.02, count: int = 200) -> rocking.Motion:
+    """Smooth random motion, linear between even samples."""
+    random = np.random.default_rng(seed)
+    t = dt * np.arange(count + 1)
+    parts = [random.normal() * np.sin(f * t + random.uniform(0.0, 6.0)) for f in random.uniform(2.0, 25.0, 6)]
+    return rocking.Motion.from_samples(amplitude * np.sum(parts, axis=0) * np.sin(np.pi * t / t[-1]), dt)

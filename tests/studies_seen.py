@@ -1,0 +1,30 @@
+"""Studies as their tests look at them: the bytes that they keep, their units, and what happens as one is stored."""
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import rocking
+from rocking.studies.folder import Folder, Store
+
+
+def digest(folder: str | Path) -> str:
+    """Hash of all that a study is: inputs, description, every unit."""
+    total = hashlib.sha256()
+    for path in sorted(Path(folder).rglob("*")):
+        if path.is_file() and not path.name.startswith(("lock", "runs.")):
+            total.update(f"{path.relative_to(folder)}".encode() + path.read_bytes())
+    return total.hexdigest()
+
+
+def store_of(study: rocking.Study) -> Store:
+    """Outcomes of a study as they lie in its folder."""
+    return Store.open(Folder(study.place))
+
+
+def after_each_unit(monkeypatch: pytest.MonkeyPatch, action: Callable[[], object]) -> None:
+    """Do something each time that a unit is stored."""
+    put = Store.put
+    monkeypatch.setattr(Store, "put", lambda store, key, data: (put(store, key, data), action()))
