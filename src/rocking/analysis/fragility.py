@@ -89,6 +89,15 @@ class Fragility(Result):
         How many outcomes of a sample change within 3e-6 of the motion; empty where outcomes were given.
     missing : str
         How many simulations were given up, which the curves leave out; empty where there are none.
+
+    Examples
+    --------
+    >>> from rocking import HazardCurve, fit_fragility
+    >>> fitted = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4, measure="pga")
+    >>> risk = fitted.annual_rate(HazardCurve([0.5, 5.0], [1e-2, 1e-4]))
+    >>> one = risk.rate("overturning")
+    >>> f"{one.annual_rate:.6f} {one.probability(50.0):.4f}"
+    '0.000434 0.0215'
     """
 
     TABLES = ("curves", "outcomes")
@@ -184,53 +193,15 @@ class Fragility(Result):
         return f"{self.description}; {self.measure.label}; {curves}"
 
     def curve(self, limit_state: str) -> FragilityCurve:
-        """Return the curve of a limit state.
-
-        Parameters
-        ----------
-        limit_state : str
-            Its name.
-
-        Returns
-        -------
-        FragilityCurve
-            Its curve.
-
-        Examples
-        --------
-        >>> from rocking import fit_fragility
-        >>> fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4).curve("overturning").clusters
-        16
-        """
+        """Return the curve of a limit state, by its name."""
         curves = {curve.limit_state: curve for curve in self.curves}
         return curves[checks.one_of(limit_state, "limit_state", InvalidOption, list(curves))]
 
     def annual_rate(self, hazard: HazardCurve) -> Risk:
-        """Annual rates of exceeding the limit states at a site, from its hazard curve.
+        """Annual rates of exceeding the limit states at a site, from its hazard curve of this measure.
 
-        Parameters
-        ----------
-        hazard : HazardCurve
-            Annual rates of the intensities that this fragility is against.
-
-        Returns
-        -------
-        Risk
-            Rate, return period and probability in a number of years, for each limit state.
-
-        Notes
-        -----
-        The integral of rate(x) dP(x) over all intensities x, in closed form: a lognormal against a power of x on each
+        The integral of rate(x) dP(x) over all intensities x is in closed form: a lognormal against a power of x on each
         segment of the hazard curve. For one power k all along, it is rate(median) exp((k dispersion)^2/2) (Cornell).
-
-        Examples
-        --------
-        >>> from rocking import HazardCurve, fit_fragility
-        >>> fitted = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4, measure="pga")
-        >>> risk = fitted.annual_rate(HazardCurve([0.5, 5.0], [1e-2, 1e-4]))
-        >>> one = risk.rate("overturning")
-        >>> f"{one.annual_rate:.6f} {one.probability(50.0):.4f}"
-        '0.000434 0.0215'
         """
         return risk_of(self.curves, hazard, self.measure, self.description)
 
@@ -247,28 +218,18 @@ class Fragility(Result):
         Parameters
         ----------
         years : float
-            For how long the block has stood, or has not exceeded the limit state.
+            Time for which the block has stood, or has not exceeded the limit state.
         hazard : HazardCurve, optional
-            Annual rates of the intensities: how probable the survival is under them.
+            Annual rates of the intensities, for the probability of the survival.
         confidence : float
             Probability with which the limit would have been exceeded, were shaking any stronger or more frequent.
         limit_state : str
-            Name of what was not exceeded.
+            Name of the limit that was not exceeded.
 
         Returns
         -------
         Survival
             Intensity that was most likely never reached, largest annual rates, and the probability of surviving.
-
-        Examples
-        --------
-        >>> from rocking import HazardCurve, fit_fragility
-        >>> fitted = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4, measure="pga")
-        >>> found = fitted.survival(10_000.0, HazardCurve([0.5, 5.0], [1e-2, 1e-4]))
-        >>> found
-        <Survival: overturning: not in 10000 years; most likely never 0.4385 g or more>
-        >>> f"{found.probability:.4f}", found.contradicts
-        ('0.0131', False)
         """
         curve = self.curve(limit_state)
         rate = None if hazard is None else self.annual_rate(hazard).rate(limit_state)
@@ -309,6 +270,9 @@ class Fragility(Result):
     ) -> None:
         """Write the curves as an OpenQuake fragility model, NRML 0.5.
 
+        PGA and SA are written in g, PGV in cm/s, a measure in a block's own unit as PGA or PGV of that block. The
+        uplift acceleration is the limit of no damage of PGA, unless a vertical motion was simulated, which lowers it.
+
         Parameters
         ----------
         path : path
@@ -316,8 +280,8 @@ class Fragility(Result):
         taxonomy : str
             Identifier of the fragility function, which the exposure model refers to.
         format : {"continuous", "discrete"}
-            Lognormals by the mean and the standard deviation of the intensity (not of its logarithm, as OpenQuake
-            wants them), or probabilities at 40 intensities.
+            Lognormals by the mean and the standard deviation of the intensity (not of its logarithm, as OpenQuake wants
+            them), or probabilities at 40 intensities.
         block : Block, optional
             Block whose unit a dimensionless measure counts in, where the curves come from several.
         model_id, loss_category, asset_category : str
@@ -331,19 +295,6 @@ class Fragility(Result):
             damping than 5 % of critical, which OpenQuake's are of, or the dispersion is too wide.
         OutputError
             If the file cannot be written.
-
-        Notes
-        -----
-        Units become OpenQuake's: PGA and SA in g, PGV in cm/s. A measure in a block's own unit becomes PGA or PGV of
-        that block. The range of validity is that of the data. A block cannot move below its uplift acceleration, which
-        is written as the limit of no damage of PGA, unless a vertical motion was simulated, which lowers it.
-
-        Examples
-        --------
-        >>> import tempfile
-        >>> from rocking import fit_fragility
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4).to_nrml(f"{folder}/model.xml")
         """
         chosen = self.block
         if block is not None:

@@ -47,11 +47,9 @@ Ends = tuple[Floats, Floats]
 class LikelyRegion:
     """Parameters whose likelihood is not significantly below the maximum: intervals are of the profile likelihood.
 
-    A quantity lies, with the given confidence, between its extremes on the region. The region is convex, since the
-    likelihood is concave, and ends where curves no longer rise. Where clusters hold several outcomes each, it is
-    stretched to the covariance that the clusters show (Chandler and Bate 2007), each left out in turn, and Student's
-    distribution takes the place of the normal one. Fewer than three clusters tell nothing of it, and can hardly be
-    drawn anew: then the region is the whole plane.
+    The region is convex, and ends where curves no longer rise. Where clusters hold several outcomes each, it is
+    stretched to the covariance of the clusters (Chandler and Bate 2007) by Student's distribution. With fewer than
+    three clusters it is the whole plane.
     """
 
     boundary: Probit
@@ -91,9 +89,8 @@ class LikelyRegion:
 class Resamples:
     """Fits to data drawn anew from the clusters of outcomes, with replacement; intervals are BCa (Efron 1987).
 
-    A fit is a step where the drawn outcomes are separated, level where they do not rise; `degenerate` is the share of
-    such. The influence (clusters, 2) of a cluster is its score over the observed information: how far it pulls the fit.
-    Clusters that are alike have one row there, and `alike` says how many they are.
+    The influence (clusters, 2) of a cluster is its score over the observed information. Clusters that are alike have
+    one row there, and `alike` is their number.
     """
 
     fits: Probit
@@ -123,11 +120,7 @@ class Resamples:
         return cls(fits, 1.0 - float(regular.mean()), _influences(data, clusters, alike, fitted), alike)
 
     def interval(self, quantity: Quantity, estimate: Floats, gradient: Floats, confidence: float) -> Ends:
-        """Percentiles of a quantity, corrected for its bias and its skewness.
-
-        Of n quantities there are values (fits, n), estimates (n,) and derivatives (2, n) with respect to the
-        parameters.
-        """
+        """Percentiles of values (fits, n) about estimates (n,) with derivatives (2, n), less bias and skewness."""
         from scipy.special import ndtr, ndtri
 
         values = quantity(self.fits)

@@ -116,6 +116,14 @@ class Calibration(Result):
     diagnostics : Diagnostics
         How far this can be trusted: effective candidates, agreement of runs, bounds that the posterior
         reaches. Its `notes` say what is to be known before the estimates are believed; they are in the summary.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (2.0, 3.0, 4.0, 5.0)]
+    >>> found = rocking.calibrate(pulses, [0, 0, 1, 1], p=2.0, restitution=0.9, two_sided=False, candidates=128)
+    >>> bool(found.predict(rocking.pulses.one_sine(9.0, 1.0))[0] > 0.5)
+    True
     """
 
     TABLES = ("ensemble",)
@@ -143,27 +151,9 @@ class Calibration(Result):
         return {name: estimate.dispersion for name, estimate in self.estimates.items()}
 
     def predict(self, motions: Motions, *, threads: int | None = None, progress: bool | None = None) -> Floats:
-        """Probability that each motion overturns the specimen.
+        """Probability that each of m motions overturns the specimen, shape (m,).
 
-        Parameters
-        ----------
-        motions : Motion or sequence of Motion
-            m motions.
-        threads, progress : optional
-            As for `simulate_many`.
-
-        Returns
-        -------
-        ndarray, shape (m,)
-            Weighted share of the ensemble that overturns, within the lapse of 0 and 1.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (2.0, 3.0, 4.0, 5.0)]
-        >>> found = rocking.calibrate(pulses, [0, 0, 1, 1], p=2.0, restitution=0.9, two_sided=False, candidates=128)
-        >>> bool(found.predict(rocking.pulses.one_sine(9.0, 1.0))[0] > 0.5)
-        True
+        It is the weighted share of the ensemble that overturns, within the lapse of 0 and 1.
         """
         if isinstance(motions, Sized) and not isinstance(motions, Motion) and not len(motions):
             return np.empty(0)
@@ -190,10 +180,8 @@ class Calibration(Result):
         folds, repeats : int
             Number of parts, and of random divisions into parts.
         seed : int
-            Seeds the divisions.
-        threads : int, optional
-            As for `simulate_many`; it changes no result.
-        progress : bool, optional
+            Seed of the divisions.
+        threads, progress : optional
             As for `simulate_many`.
 
         Returns
@@ -205,14 +193,6 @@ class Calibration(Result):
         ------
         InvalidOption
             If there are fewer groups than folds, or labels do not match the motions.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (2.0, 3.0, 4.0, 5.0)]
-        >>> found = rocking.calibrate(pulses, [0, 0, 1, 1], p=2.0, restitution=0.9, two_sided=False, candidates=128)
-        >>> found.cross_validate(folds=2).probabilities.shape
-        (1, 4)
         """
         labels = group_labels(groups, len(self.observed), folds)
         rng = np.random.default_rng(checks.whole(seed, "seed", InvalidOption, 0))
@@ -229,59 +209,18 @@ class Calibration(Result):
         return Validation(probabilities, tuple(Scores.of(row, self.observed) for row in probabilities))
 
     def fragility(self, motions: Motions, *, model: Model | None = None, **options: Any) -> Fragility:
-        """Fit the specimen's fragility: the ensemble with its weights, in the equation of motion of the calibration.
+        """Fit the specimen's fragility by `rocking.fragility`: the weighted ensemble, by default in its own model.
 
-        Parameters
-        ----------
-        motions : Motion, sequence of Motion, or mapping of str to Motion
-            m motions.
-        model : {"linear", "nonlinear"}, optional
-            By default that of the calibration.
-        **options : object
-            Further arguments of `rocking.fragility`: measure, levels, limits, polarity, band, ...
-
-        Returns
-        -------
-        Fragility
-            What is not known of the block, and how it differs from test to test, widens the curve; its band is that of
-            the motions. The lapse of `predict`, chance that a test is not that of a rocking block at all, is not in it:
-            a weak motion does not overturn what it cannot lift.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (2.0, 3.0, 4.0, 5.0)]
-        >>> found = rocking.calibrate(pulses, [0, 0, 1, 1], p=2.0, restitution=0.9, two_sided=False, candidates=128)
-        >>> found.fragility(pulses, levels=[2.0, 3.0, 4.0, 6.0]).model
-        'nonlinear'
+        The uncertainty of the block, and its dispersion from test to test, widen the curve; its band is that of the
+        motions. The lapse of `predict` is left out, because a weak motion does not overturn what it cannot lift.
         """
         return fragility(self.blocks, motions, weights=self.weights, model=model or self.model, **options)
 
     def spectrum(self, motions: Motions, *, model: Model | None = None, **options: Any) -> RockingSpectrum:
-        """Peak rotation of the specimen, and of larger and smaller ones of its shape, with the ensemble's weights.
+        """Peak rotation of the specimen, and of larger and smaller ones of its shape, as `rocking.rocking_spectrum`.
 
-        Parameters
-        ----------
-        motions : Motion, sequence of Motion, or mapping of str to Motion
-            m motions.
-        model : {"linear", "nonlinear"}, optional
-            By default that of the calibration.
-        **options : object
-            Further arguments of `rocking.rocking_spectrum`: p (rad/s, to which the ensemble's median is moved; by
-            default half to twice its own) or size, fractiles, ...
-
-        Returns
-        -------
-        RockingSpectrum
-            Fractiles of the motions and of the ensemble's weight together.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (2.0, 3.0, 4.0, 5.0)]
-        >>> found = rocking.calibrate(pulses, [0, 0, 1, 1], p=2.0, restitution=0.9, two_sided=False, candidates=128)
-        >>> found.spectrum(pulses, p=[1.0, 2.0]).data.sizes["p"]
-        2
+        The ensemble's median is moved to each p, by default half to twice its own, in the calibrated model; fractiles
+        are those of the motions and of the ensemble's weight together.
         """
         return rocking_spectrum(self.blocks, motions, weights=self.weights, model=model or self.model, **options)
 

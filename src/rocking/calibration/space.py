@@ -50,11 +50,10 @@ Knowledge = float | Range | Literal["housner"]
 
 @dataclass(frozen=True, eq=False)
 class Space:
-    """Blocks in logarithmic coordinates: what is not known of p, slenderness (mean of both sides) and restitution.
+    """Blocks in logarithmic coordinates: unknown ones of p, slenderness (mean of both sides) and restitution.
 
-    The f unknown parameters keep to bounds on each side, whose logarithms are `lower` and `upper`; a restitution that
-    is neither unknown nor known follows from the slenderness. The last coordinate of a two-sided block is the logarithm
-    of the ratio of the slenderness of side + to that of side -, at most `ratio`, which is 0 for symmetric blocks.
+    Their bounds have the logarithms `lower` and `upper`; a restitution that is neither unknown nor known follows from
+    the slenderness. The last coordinate of a two-sided block is the logarithm of the ratio of its slendernesses.
     """
 
     unknown: tuple[str, ...]

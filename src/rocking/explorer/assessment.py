@@ -70,10 +70,7 @@ print(found.summary())
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
-    """A case, the entries of its list of records, and to which levels of which measure each is scaled.
-
-    Entries of one station have the same number among ``clusters``.
-    """
+    """A case, the entries of its list of records with ``clusters`` by station, and the levels of a measure."""
 
     case: Case
     entries: list[dict[str, str]]
@@ -99,13 +96,7 @@ class Assessment:
 
 
 def assessment_of(case: Case, texts: Texts, uploads: UploadStore) -> Assessment:
-    """Read what is assessed: ``records`` as `catalogue.entries_of`, ``measure``, its levels, and ``friction``.
-
-    Raises
-    ------
-    InvalidOption
-        If the list is empty, or a text is out of range.
-    """
+    """Read what is assessed: ``records`` as `catalogue.entries_of`, ``measure``, its levels, and ``friction``."""
     given = {name: texts[name].strip() for name in ASSESSMENT if texts.get(name, "").strip()}
     entries = entries_of(given.get("records", ""))
     if not entries:
@@ -256,11 +247,9 @@ def _rated(case: Case, motion: Motion) -> dict[str, Any]:
 
 
 def _margin(case: Case) -> dict[str, Any] | None:
-    """Return the factor on the case's motion at which it first overturns the block, and the peak acceleration of that.
+    """Return the lowest factor on the case's motion that overturns the block, or None, and the peak acceleration.
 
-    Levels that overturn may be several bands with gaps between: the lowest is looked for in steps from the level that
-    lifts the block. What is thinner than a step is not seen. Where no level overturns, the factor is None and the peak
-    acceleration that of the highest level looked at.
+    Levels that overturn may be several bands; what is thinner than a step from the level of uplift is not seen.
     """
     motion = case.motion
     if motion is None or motion.pga == 0.0:

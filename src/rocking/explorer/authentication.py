@@ -70,10 +70,7 @@ _OTHER_PAGE: Final = "only the page of this server may send this"
 
 
 class RequestAuthentication:
-    """ASGI application that passes on to another one what it lets through.
-
-    The server listens at ``port``, and may be called by the names ``hosts``, which are without it.
-    """
+    """ASGI application that passes on what it lets through, called at ``port`` by the names ``hosts``."""
 
     def __init__(self, application: Application, port: int, hosts: Iterable[str] = LOOPBACK) -> None:
         self._application = application

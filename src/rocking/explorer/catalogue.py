@@ -67,11 +67,6 @@ class Component:
 def entries_of(text: str) -> list[dict[str, str]]:
     """Read a list from an address: entries with ; between, each the texts of a motion as a query.
 
-    Raises
-    ------
-    InvalidOption
-        If it is too long, or an entry has texts that are not those of a motion.
-
     Examples
     --------
     >>> entries_of("motion=ridgecrest-clc-090&vertical=ridgecrest-clc-up;motion=ridgecrest-clc-360")
@@ -94,11 +89,7 @@ def entries_of(text: str) -> list[dict[str, str]]:
 
 
 def listing(uploads: UploadStore, answers: Iterable[Texts] = ()) -> dict[str, Any]:
-    """Return all records in groups, each of one station, and how much of what may be kept is in use.
-
-    ``answers`` say with which ``dt`` and ``units`` the file of each ``key`` is read. A file that cannot be read
-    with its answer is listed as without one, with what is wrong as the reason of its group.
-    """
+    """Return all records in groups, each of one station; ``answers`` are ``dt`` and ``units`` of each file's key."""
     known = {answer["key"]: answer for answer in answers if "key" in answer}
     files, problems = [], {}
     for key in uploads.kept():

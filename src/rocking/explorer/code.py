@@ -155,10 +155,7 @@ def case_as_command(case: Case) -> str | None:
 
 
 def map_as_python(grid: MapGrid, quantity: str) -> str:
-    """Write a script that computes a quantity of a map; it runs as it stands.
-
-    How the first rocking ends is told by `chattering_map`, everything else by `simulate_many` to the bits of the map.
-    """
+    """Write a script that computes a quantity of a map; it runs as it stands."""
     texts = {"x": grid.x.name, "y": grid.y.name, "xs": _values(grid.x), "ys": _values(grid.y)}
     before = grid.case.motion_before
     if quantity == "outcome":
@@ -284,10 +281,7 @@ def _range(axis: Axis) -> str:
 
 
 def _block(grid: MapGrid, *, by_size: bool = False) -> str:
-    """Call that makes the block, with the names of the axes among its arguments.
-
-    A pulse of another frequency is the same block of another p, in other units of time: ``by_size`` it is that.
-    """
+    """Call that makes the block, with the axes' names as arguments; ``by_size`` in place of the pulse's frequency."""
     varied = {grid.x.name, grid.y.name} & {"p", "alpha", "restitution", *(["omega"] if by_size else [])}
     texts, sides = grid.case.texts, grid.case.block.sides
     if not varied:

@@ -139,11 +139,7 @@ class Explorer:
         align: str = "start",
         whole: bool = False,
     ) -> Payload:
-        """Return two cases in one window of the first one's time, with chosen moments over each other (`ALIGNED`).
-
-        The second is another case as a ``whole``, or the first with some texts changed: those of its block, or of its
-        motion and its start, go together.
-        """
+        """Return two cases in one window, with chosen moments over each other; the second is ``whole`` or changed."""
         first, second = self._compared(texts, changed, whole=whole)
         shift = shift_of(first.response, second.response, align)
         spans = [active_span(first.response), tuple(end + shift for end in active_span(second.response))]
@@ -223,10 +219,7 @@ class Explorer:
 
 
 def _changed(texts: Texts, changed: Texts) -> dict[str, str]:
-    """Texts of a case with others in their place; those of a whole block go together, and of a motion with its start.
-
-    The form of a motion leaves out what begins at rest, so that another motion without a start has none.
-    """
+    """Texts of a case with others in their place; a block's, or a motion's and its start's, go together."""
     together = [(names_of("block"), names_of("block")), (names_of("motion"), names_of("motion", "start"))]
     gone = {name for given, names in together if changed.keys() & {*given} for name in names}
     return {name: value for name, value in texts.items() if name not in gone} | dict(changed)

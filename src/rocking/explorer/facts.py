@@ -107,10 +107,7 @@ def _motion_facts(motion: Motion) -> dict[str, Any]:
 
 
 def _outline(block: Block, outline: Floats | None) -> dict[str, Any]:
-    """Corners of the block as it stands (m, pivots at height 0), its centre of mass at distance 0, and how far it goes.
-
-    ``outline`` are trapezoids, shape (n, 6), of a body that is no rectangle.
-    """
+    """Corners of the block as it stands (m), or trapezoids (n, 6), its centre of mass at distance 0, and its extent."""
     right, left = (side.radius * math.sin(side.alpha) for side in block.sides)
     heights = [side.radius * math.cos(side.alpha) for side in block.sides]
     centre = 0.5 * (heights[0] + heights[1])

@@ -90,10 +90,7 @@ def served(
     port: int = 0,
     framed_by: str = "'none'",
 ) -> Server:
-    """Bind the explorer's application (`rocking.explorer.server.App`) to an address of this machine and a port.
-
-    Port 0 takes one that is free. `InvalidOption` is raised if it cannot be bound, or if a package is missing.
-    """
+    """Bind the explorer's application to an address of this machine and a port; 0 is one that is free."""
     require_packages()
     import uvicorn
 
@@ -188,6 +185,8 @@ _running: tuple[Explorer, Server] | None = None
 def explore(response: Response, *, height: int = 760) -> Frame:
     """Show a response in the explorer, in a frame of the notebook.
 
+    The page is served by this process on 127.0.0.1, and ends with it.
+
     Parameters
     ----------
     response : Response
@@ -204,11 +203,6 @@ def explore(response: Response, *, height: int = 760) -> Frame:
     ------
     InvalidOption
         If it is not a response, or a package of the ``explorer`` extra is missing.
-
-    Notes
-    -----
-    The page is served by this process on 127.0.0.1, so the notebook must be open on the same machine. It ends with
-    the process.
 
     Examples
     --------

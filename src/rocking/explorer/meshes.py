@@ -53,10 +53,7 @@ _READERS: Final[Mapping[str, Callable[[str], Any]]] = {
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A body of a mesh, the name of its file, and its outline.
-
-    ``call`` is the expression that makes it, of names of `rocking`.
-    """
+    """A body of a mesh, its file's name and outline; ``call`` is the expression that makes it."""
 
     solid: Solid
     sections: Sections
@@ -122,13 +119,7 @@ def pivots_of(body: Body, azimuth: float) -> tuple[tuple[float, float], float, f
 
 
 class MeshStore:
-    """Bodies of files that are kept; safe to use from several threads. One file is read at a time.
-
-    Parameters
-    ----------
-    file : callable
-        Returns a file that is kept by its key.
-    """
+    """Bodies of files that are kept by key; safe to use from several threads. One file is read at a time."""
 
     def __init__(self, file: Callable[[str], _File]) -> None:
         self._file = file

@@ -61,11 +61,7 @@ class Sine(NamedTuple):
 
 
 class Settled(NamedTuple):
-    """What a state becomes: the states of one period, or the last ones where none was found; and what ended it.
-
-    ``after`` is the number of periods; where the body overturned, the one in which it did. ``rests`` says whether there
-    is a rest in each repetition. ``course`` is where the trajectory that is drawn begins, and over how many periods.
-    """
+    """The states of one period, or the last ones; ``after`` is the number of periods, ``course`` the drawn part."""
 
     states: Floats
     period: int
@@ -103,10 +99,7 @@ def sine_of(case: Case) -> Sine | None:
 
 
 def nearest_sine(case: Case) -> Sine:
-    """Return the sine of the same peak acceleration, and of the pulse's frequency or else the same peak velocity.
-
-    Without any motion it is one half above the threshold of uplift.
-    """
+    """Return the sine of the pulse's peak acceleration and frequency (or else velocity), or one above uplift."""
     if case.motion is None or case.motion.pga == 0.0:
         return Sine(1.5 * lifting(case), 1.5 * slowest(case) / math.pi, 0.0, 10.0)
     text, pga = case.texts.get("motion", ""), case.motion.pga
@@ -154,10 +147,9 @@ def settled_case(case: Case, sine: Sine) -> tuple[Settled, StroboscopicMap]:
 
 
 def orbit(case: Case) -> Payload:
-    """Return the phase plane of a case whose sine never ends, in units of slenderness, and what it settles on in words.
+    """Return the phase plane of a case whose sine never ends, over slenderness, and what it settles on in words.
 
-    For another motion the header has nothing but ``offer``: the text of the nearest sine, its amplitude (m/s^2) and its
-    frequency (Hz).
+    For another motion the header has nothing but ``offer``: the text, amplitude (m/s^2) and frequency (Hz) of a sine.
     """
     sine = sine_of(case)
     if sine is None:

@@ -58,11 +58,6 @@ def phase(explorer: Explorer, texts: Texts, window: tuple[float, float]) -> Payl
 def at(explorer: Explorer, texts: Texts, time: str, window: tuple[float, float] | None = None) -> dict[str, Any]:
     """Return what a case is at a time, as its text says it, in the response that a window (s) shows.
 
-    Raises
-    ------
-    InvalidOption
-        If the text is no time of the response.
-
     Examples
     --------
     >>> texts = {"p": "2", "alpha": "0.2", "motion": "none", "initial_rotation": "0.02"}

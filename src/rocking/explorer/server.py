@@ -142,11 +142,7 @@ class Query:
 
 
 class App:
-    """The explorer's application.
-
-    The page opens with the texts of ``opening`` where its address has none, and shows a study as a map. ``framed_by``
-    are the sources of pages that may show it in a frame, as a content security policy writes them.
-    """
+    """The explorer's application; ``opening`` are a bare address's texts, ``framed_by`` pages that may frame it."""
 
     def __init__(
         self,
@@ -454,11 +450,7 @@ _NICENESS: Final = 19
 
 @contextmanager
 def low_priority() -> Iterator[Executor]:
-    """Give an executor of one thread that takes the processor only where nobody else wants it.
-
-    Where the system knows priorities of threads (Linux) those that it starts have the same one; elsewhere it is an
-    ordinary thread.
-    """
+    """Give an executor of one thread that takes the processor only where nobody else wants it (on Linux)."""
     with ThreadPoolExecutor(1, "rocking-low-priority", initializer=_lower_priority) as executor:
         yield executor
 

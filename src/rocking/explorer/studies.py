@@ -41,15 +41,7 @@ QUANTITIES: Final = ("overturned", "peak_rotation", "impacts", "rests", "time_at
 
 
 class StudyView:
-    """A study in a folder, slice by slice.
-
-    Blocks that are all combinations of some parameters are shown over these; others, by their number.
-
-    Parameters
-    ----------
-    folder : path
-        Where the study is kept.
-    """
+    """A study in a folder, slice by slice, over the parameters of its blocks' grid, or else by their number."""
 
     def __init__(self, folder: Path) -> None:
         self.name = folder.name
@@ -100,11 +92,7 @@ class StudyView:
         }
 
     def slice(self, texts: Mapping[str, str]) -> Payload:
-        """Return one quantity over two parameters ``x`` and ``y``, the others fixed.
-
-        The texts ``motion_index``, ``polarity_index``, ``scale_index``, ``fix_p``, ``fix_alpha``, ``fix_restitution``
-        and ``fix_block`` are the values of what is not drawn.
-        """
+        """Return one quantity over two parameters ``x`` and ``y``; texts as ``motion_index``, ``fix_p`` fix others."""
         axes = self.axes()
         x, y = (texts.get(which, "") for which in ("x", "y"))
         for which, name in {"x": x, "y": y}.items():

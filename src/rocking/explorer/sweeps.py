@@ -64,10 +64,7 @@ class Sweep:
 
 
 class Part(NamedTuple):
-    """Values of a sweep by number, in one direction of one level, and what was found at each.
-
-    ``share`` is the part of the work that is done with it.
-    """
+    """Values of a sweep by number, in one direction of one level, with results and ``share`` of the work."""
 
     stride: int
     direction: str
@@ -77,13 +74,7 @@ class Part(NamedTuple):
 
 
 def sweep_of(case: Case, texts: Texts) -> Sweep:
-    """Read what is swept: ``sweep`` (``a`` or ``omega``), ``sweep_from``, ``sweep_to``, and how many ``sweep_points``.
-
-    Raises
-    ------
-    InvalidOption
-        If the case's motion is no sine, or a text is out of range.
-    """
+    """Read what is swept: ``sweep`` (``a`` or ``omega``), ``sweep_from``, ``sweep_to``, and ``sweep_points``."""
     sine = sine_of(case)
     if sine is None:
         raise InvalidOption("a diagram needs a sine, of which one period repeats for ever: choose one", "motion")
@@ -109,11 +100,7 @@ def sweep_of(case: Case, texts: Texts) -> Sweep:
 
 
 def parts(sweep: Sweep) -> Generator[Part]:
-    """Sweep the parameter up and down, at first in large steps; each sweep replaces those of larger steps.
-
-    It begins at rest, goes on at each value from the last state at the value before, and begins again at rest after an
-    overturning.
-    """
+    """Sweep the parameter up and down from rest in ever smaller steps, on from the last state unless it overturned."""
     values, maps, done = sweep.axis.values, {}, 0
     every = [(stride, order) for stride in _STRIDES for order in (1, -1)]
     whole = sum(len(values[::stride]) for stride, _ in every)

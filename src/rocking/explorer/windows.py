@@ -96,10 +96,7 @@ def extremes(values: Floats, most: int) -> Integers:
 
 
 def _shaking(case: Case, start: float, end: float, points: int) -> dict[str, Floats]:
-    """Ground acceleration in a window, g; with a vertical component, the weight, by which thresholds are multiplied.
-
-    A g is the standard one, as in every text of a case, whatever gravity the block has.
-    """
+    """Ground acceleration in a window, standard g; with a vertical component, the weight that multiplies thresholds."""
     motion = case.motion
     if motion is None:
         return {"ground_time": np.empty(0), "ground_g": np.empty(0)}
@@ -150,10 +147,7 @@ def _uncertain(response: Response) -> Floats:
 
 
 def _intervals(response: Response) -> tuple[Floats, Floats]:
-    """Time from each impact to the next of the same rocking, and the ratio of the next interval but one to it; or NaN.
-
-    Where chattering is complete the ratio tends to the product of both restitutions: eta^2.
-    """
+    """Time from each impact to the next, and the ratio of the next interval but one to it (to eta^2); or NaN."""
     impact_times = np.asarray(response.impacts["time"], dtype=float)
     intervals = np.append(np.diff(impact_times), np.nan)[: len(impact_times)]
     uplifts = response.events["time"][response.events["kind"] == "uplift"]
