@@ -21,9 +21,6 @@ from rocking.explorer.uploads import UploadStore, measures
 MOST: Final = 160
 _LETTERS: Final = 40_000
 
-#: Components of one station are as long as each other up to this share.
-_AS_LONG: Final = 0.01
-
 #: What names a component at the end of a file's name or of a channel: azimuths, directions, codes of instruments.
 _UP: Final = r"up|ud[12]?|dwn|down|vrt|vert(?:ical)?|u-d|[behls][hln]z|z|v"
 _LEVEL: Final = r"ns[12]?|ew[12]?|n-s|e-w|[behls][hln][ne123xy]|[nexy]|[nsew]\d{1,3}[nsew]|h[12]|[0-3]\d\d"
@@ -215,7 +212,7 @@ def _belongs(one: Component, group: list[Component]) -> bool:
         or any(each.key == one.key for each in group)
     ):
         return False
-    if abs(one.samples - first.samples) > _AS_LONG * max(one.samples, first.samples):
+    if abs(one.samples - first.samples) > 0.01 * max(one.samples, first.samples):
         return False
     if one.station and first.station and (one.station, one.event) != (first.station, first.event):
         return False

@@ -12,13 +12,10 @@ from rocking.motion.measures import significant_span
 from rocking.response import Response
 from rocking.tables import named
 
-#: Part of the Arias intensity at which the shaking counts as begun.
-_BEGUN: Final = 0.05
-
 
 def _begun(response: Response) -> float:
     motion = response.motion
-    found = math.nan if motion is None else significant_span(motion, start=_BEGUN)[0]
+    found = math.nan if motion is None else significant_span(motion, start=0.05)[0]
     return 0.0 if math.isnan(found) else found
 
 

@@ -37,9 +37,6 @@ from rocking.response import Response, active_span
 _KEPT: Final = 48
 _KEPT_ROWS: Final = 2_000_000
 
-#: With what a spreadsheet's formulas begin.
-_FORMULA: Final = ("=", "+", "-", "@", "\t", "\r")
-
 #: What a figure or a table can be written as, and the type of its content.
 EXPORTS: Final[Mapping[str, str]] = {
     "svg": "image/svg+xml",
@@ -175,7 +172,8 @@ class Explorer:
         """Return the histories of two cases as one table, each under its name."""
         first, second = (shown.response for shown in self._compared(texts, changed, whole=whole))
         # A spreadsheet takes no name for a formula.
-        one, other = (f"'{name}" if name.startswith(_FORMULA) else name for name in names)
+        # A formula of a spreadsheet begins so.
+        one, other = (f"'{name}" if name.startswith(("=", "+", "-", "@", "\t", "\r")) else name for name in names)
         other = f"{other} (other)" if one == other else other
         return as_csv({one: first, other: second}, shift_of(first, second, align)).encode()
 

@@ -30,9 +30,6 @@ if TYPE_CHECKING:
 #: Address that nobody but this machine can reach.
 HERE: Final = "127.0.0.1"
 
-#: Pages that may show the explorer in a frame: a notebook that this machine serves.
-_NOTEBOOKS: Final = "http://localhost:* http://127.0.0.1:*"
-
 #: Connections at the same time, and those that wait to be accepted.
 _MOST: Final = 400
 _WAITING: Final = 128
@@ -229,7 +226,8 @@ def _server_of_this_process() -> tuple[Explorer, Server]:
     with _lock:
         if _running is None:
             explorer = Explorer()
-            server = served(explorer, {}, framed_by=_NOTEBOOKS)
+            # Notebooks that this machine serves.
+            server = served(explorer, {}, framed_by="http://localhost:* http://127.0.0.1:*")
             server.run_in_background()
             _running = explorer, server
         return _running

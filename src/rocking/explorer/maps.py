@@ -33,9 +33,6 @@ from rocking.treatment import FITTED_FREQUENCIES, FITTED_RESTITUTIONS, Certified
 #: Points of an axis.
 _FEWEST, _MOST = 8, 400
 
-#: Steps between the points of each level, coarse to fine.
-_STRIDES: Final = (8, 4, 2, 1)
-
 
 @dataclass(frozen=True)
 class AxisKind:
@@ -58,9 +55,6 @@ AXES: Final = {
         AxisKind("pga", "g", (0.1, 1.0), (0.1, 2.0)),
     )
 }
-
-#: Pairs that would vary the same thing twice.
-_SAME: Final = ({"omega", "p"}, {"a", "pga"})
 
 
 class Axis(NamedTuple):
@@ -119,7 +113,7 @@ def grid_of(case: Case, texts: Texts) -> MapGrid:
     if not (_FEWEST <= points <= _MOST and points == int(points)):
         raise InvalidOption(f"a map has from {_FEWEST} to {_MOST} points on each axis, not {points:g}")
     x, y = (_axis(which, case, texts, int(points)) for which in ("x", "y"))
-    if x.name == y.name or {x.name, y.name} in _SAME:
+    if x.name == y.name or {x.name, y.name} in ({"omega", "p"}, {"a", "pga"}):  # pairs that vary the same thing
         raise InvalidOption("{} and {} vary the same: choose another pair of axes", x.name, y.name)
     # Blocks of a map over the restitution have one on both sides, and the highest comes to rest last.
     eta = [float(axis.values[-1]) for axis in (x, y) if axis.name == "restitution"]
@@ -323,7 +317,7 @@ def _lifting(grid: MapGrid, alpha: float | None) -> float:
 def _tasks(grid: MapGrid, factors: Floats) -> Iterator[Task]:
     """Tasks level by level, row by row; points of a task share the factor on the motion."""
     rows, columns = grid.shape
-    for level, stride in enumerate(_STRIDES):
+    for level, stride in enumerate((8, 4, 2, 1)):
         for row in range(0, rows, stride):
             done = level > 0 and row % (2 * stride) == 0
             index = row * columns + np.arange(stride if done else 0, columns, 2 * stride if done else stride)

@@ -37,9 +37,6 @@ _File = tuple[str, bytes]
 #: Azimuths of the rose, degrees.
 _AZIMUTHS: Final = np.arange(0.0, 360.0, 2.0)
 
-#: Pieces of sections that the plan has at most.
-_PLANNED: Final = 40
-
 #: Parts that are named at most.
 _NAMED: Final = 6
 
@@ -84,7 +81,7 @@ class Body:
 def described(body: Body, azimuth: float) -> Payload:
     """Return what the page shows of a body: its plan, its rose, and what is said of it; m from its centre of mass."""
     solid, rose = body.solid, body.rose
-    pieces = body.sections.pieces[:: -(-len(body.sections.pieces) // _PLANNED)]
+    pieces = body.sections.pieces[:: -(-len(body.sections.pieces) // 40)]
     corners = np.vstack([piece.corners for piece in pieces]) - solid.centre[:2]
     support = solid.support - solid.centre[:2]
     parts = [each.name for each in solid.regions]

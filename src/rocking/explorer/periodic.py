@@ -33,9 +33,6 @@ LONGEST: Final = KEPT // 2
 _PATIENCE: Final = 8000
 _CLOUD: Final = 1024
 
-#: Rotation over slenderness at which the trajectory of an overturning is drawn no further.
-_FALLEN: Final = 1.5
-
 #: Points of a trajectory; an impact of less speed than this part of the greatest leaves no gap in it.
 _POINTS: Final = 6000
 _SEEN: Final = 2e-3
@@ -238,7 +235,7 @@ def _trajectory(case: Case, response: Response) -> dict[str, Floats]:
     """Return a response in the phase plane, with a gap at each impact, and what is across the gaps."""
     end = response.duration
     if response.overturned:
-        fallen = np.abs(_states(case, response, end)[1][:, 0]) > _FALLEN
+        fallen = np.abs(_states(case, response, end)[1][:, 0]) > 1.5  # of the slenderness
         end *= np.argmax(fallen) / (_POINTS - 1) if fallen.any() else 1.0
     times, states = _states(case, response, end)
     impacts = response.impacts[response.impacts["time"] <= end]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -19,10 +19,6 @@ from rocking.explorer.windows import checked_window, extremes
 from rocking.response import Response, active_span
 from rocking.response.figure import boundary_of, course_of, marked
 
-#: Points of a thumbnail, and times at which its rotation is evaluated.
-_POINTS: Final = 300
-_TIMES: Final = 2_000
-
 
 def phase(explorer: Explorer, texts: Texts, window: tuple[float, float]) -> Payload:
     """Return the phase plane and the energy of a case in a window (s); times count from its start.
@@ -32,7 +28,7 @@ def phase(explorer: Explorer, texts: Texts, window: tuple[float, float]) -> Payl
     >>> texts = {"p": "2", "alpha": "0.2", "motion": "none", "initial_rotation": "0.02"}
     >>> payload = phase(Explorer(), texts, (0.0, 0.5))
     >>> payload.header["needed"], round(float(payload.arrays["potential"][0]), 6)
-    ((1.0, 1.0), 0.189487)
+    ([1.0, 1.0], 0.189487)
     """
     shown = explorer.show(texts)
     start, end = checked_window(window, shown.response.duration)
@@ -123,10 +119,10 @@ def thumbnail(explorer: Explorer, texts: Texts) -> Payload:
     shown = explorer.show(texts)
     response = shown.response
     start, end = active_span(response)
-    times = np.linspace(start, end, _TIMES)
+    times = np.linspace(start, end, 2_000)
     rotation = response.rotation(times)
     plus, minus = (side.alpha for side in response.block.sides)
-    kept = extremes(rotation, _POINTS)
+    kept = extremes(rotation, 300)
     over = np.where(rotation >= 0.0, rotation / plus, rotation / minus)
     words = verdict(response, response.block.uplift_thresholds(shown.case.model))
     return Payload({"verdict": words, "from": start, "to": end}, {"time": times[kept], "rotation": over[kept]})

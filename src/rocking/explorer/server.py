@@ -47,10 +47,6 @@ _Naming = Callable[[str], str]
 #: Prefix of the texts of the case that is compared with.
 OTHER: Final = "other."
 
-#: Computations at the same time; the rest wait for their turn.
-_THREADS: Final = 4
-_MAPS: Final = 2
-
 #: Types of the page's own files.
 TYPES: Final = {
     ".css": "text/css; charset=utf-8",
@@ -58,9 +54,6 @@ TYPES: Final = {
     ".json": "application/json",
     ".svg": "image/svg+xml",
 }
-
-#: Letters of a name in a table.
-_LONGEST_NAME: Final = 120
 
 #: Files of the plotting library, in the order in which they are loaded.
 LIBRARY: Final = ("bokeh.min.js", "bokeh-api.min.js")
@@ -158,8 +151,8 @@ class App:
         self.files = page_files()
         self._pages: dict[str, str] = {}
         self.library = {name: (library_folder() / name).read_bytes() for name in LIBRARY}
-        self._threads = anyio.CapacityLimiter(_THREADS)
-        self._maps = anyio.CapacityLimiter(_MAPS)
+        self._threads = anyio.CapacityLimiter(4)  # the other computations wait
+        self._maps = anyio.CapacityLimiter(2)
         answers: dict[str, Callable[[Query], Payload | Any]] = {
             "/api/start": self._start,
             "/api/case": lambda query: explorer.case(query.texts(), query.window),
@@ -374,7 +367,7 @@ class App:
     async def compared(self, request: Request) -> Response:
         """Return two cases as one table."""
         query = Query(request.query_params)
-        first, second = (query.given.get(name, name)[:_LONGEST_NAME] for name in ("first", "second"))
+        first, second = (query.given.get(name, name)[:120] for name in ("first", "second"))
         content = await self._in_thread(
             lambda: self.explorer.compared_as_csv(*query.compared, (first, second), **query.comparison)
         )
@@ -444,10 +437,6 @@ async def _failure(_: Request, error: Exception) -> Response:
     return JSONResponse({"problem": problem, "argument": None}, 500, headers=_FRESH)
 
 
-#: Lowest priority of all: such a thread takes what others leave, and all of it where they leave everything.
-_NICENESS: Final = 19
-
-
 @contextmanager
 def low_priority() -> Iterator[Executor]:
     """Give an executor of one thread that takes the processor only where nobody else wants it (on Linux)."""
@@ -457,4 +446,4 @@ def low_priority() -> Iterator[Executor]:
 
 def _lower_priority() -> None:
     if sys.platform == "linux":
-        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)
+        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), 19)  # lowest priority of all

@@ -17,9 +17,6 @@ from rocking.treatment import Certified
 #: Bracket on a time of rest, s, with which impacts are resolved for a window close to it: some nanoseconds are left.
 _FINEST: Final = Certified(1e-40)
 
-#: A stretch without resolved impacts is seen where it is longer than this part of a window.
-_SEEN: Final = 1e-3
-
 #: Ground motion of longer periods than this (s) is not drawn where a record's baseline would drift.
 _LONGEST_PERIOD: Final = 10.0
 
@@ -59,7 +56,7 @@ def unresolved(response: Response, start: float, end: float) -> list[float]:
     ends = np.asarray(response.chattering["end"], dtype=float)
     impact_times = np.asarray(response.impacts["time"], dtype=float)
     last = impact_times[np.searchsorted(impact_times, ends, side="right") - 1]
-    seen = (ends > start) & (last < end) & (ends - last > _SEEN * (end - start))
+    seen = (ends > start) & (last < end) & (ends - last > 1e-3 * (end - start))
     return [float(each) for each in (ends - last)[seen]]
 
 

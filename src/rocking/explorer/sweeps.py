@@ -37,7 +37,6 @@ from rocking.quantities import number
 
 #: Values of a sweep, the steps between those of each level, and how many come at once.
 _LEAST, _MOST = 8, 400
-_STRIDES: Final = (8, 4, 2, 1)
 _AT_ONCE: Final = 10
 
 _FROM_REST: Final = (0.0, 0.0)
@@ -102,7 +101,7 @@ def sweep_of(case: Case, texts: Texts) -> Sweep:
 def parts(sweep: Sweep) -> Generator[Part]:
     """Sweep the parameter up and down from rest in ever smaller steps, on from the last state unless it overturned."""
     values, maps, done = sweep.axis.values, {}, 0
-    every = [(stride, order) for stride in _STRIDES for order in (1, -1)]
+    every = [(stride, order) for stride in (8, 4, 2, 1) for order in (1, -1)]
     whole = sum(len(values[::stride]) for stride, _ in every)
     for stride, order in every:
         start: ArrayLike = _FROM_REST

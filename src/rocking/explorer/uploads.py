@@ -44,9 +44,6 @@ _NAME, _HASH = 80, 24
 #: What a file is read with to learn its channels while it is not known what it leaves out.
 _STAND_INS: Final[dict[str, Any]] = {"dt": 1.0, "units": "m/s2"}
 
-#: Steps that are offered for a file that does not say its own, s.
-_STEPS: Final = (0.002, 0.005, 0.01, 0.02)
-
 
 class Upload(NamedTuple):
     """A file: its name without folders, and its content."""
@@ -269,7 +266,7 @@ def _told(motion: Motion, missing: list[str]) -> dict[str, Any]:
         choices["units"] = [(name, {"peak": peak}) for name, peak in peaks.items()]
     if "dt" in missing:
         steps = motion.duration / _STAND_INS["dt"]
-        choices["dt"] = [(f"{step:g}", {"lasts": steps * step}) for step in _STEPS]
+        choices["dt"] = [(f"{step:g}", {"lasts": steps * step}) for step in (0.002, 0.005, 0.01, 0.02)]
     return {"notes": [], "choices": choices, "measures": None}
 
 

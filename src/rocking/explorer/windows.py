@@ -20,7 +20,6 @@ POINTS: Final = 3_000
 
 #: Narrowest window, s: times have no more digits; and what is shown of a response that lasts no time.
 _NARROWEST: Final = 1e-12
-_OF_NOTHING: Final = 1.0
 
 #: Impacts of a window whose times are added to the line's.
 _MARKED: Final = 2_000
@@ -55,7 +54,7 @@ def about_window(shown: Simulated, start: float, end: float) -> dict[str, Any]:
 
 def ends_of(start: float, end: float) -> dict[str, float]:
     """Return the ends of what is shown, s, apart also where a response lasts no time."""
-    return {"from": start, "to": end if end > start else start + _OF_NOTHING}
+    return {"from": start, "to": end if end > start else start + 1.0}
 
 
 def lines_in(shown: Simulated, start: float, end: float, points: int = POINTS) -> dict[str, Floats]:
