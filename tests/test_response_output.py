@@ -13,7 +13,7 @@ import xarray as xr
 import rocking
 from rocking import Block, InvalidOption, OutputError, simulate
 from rocking.analysis.survey import survey
-from rocking.explorer.facts import verdict
+from rocking.explorer.simulated import verdict
 from rocking.kernels import state
 from rocking.response import QUANTITIES, history, sensitivity, summary
 from rocking.response.summary import known_ratio, time_text

@@ -301,7 +301,8 @@ def log_parts(fits: Probit, hazard: HazardCurve, until: float = math.inf) -> Flo
     from scipy.special import erfcx, ndtr
 
     k, log_c = (_extended(values) for values in powers(hazard))
-    ends = [np.minimum(each, until) for each in _ends(hazard)]
+    corners = np.concatenate([[-np.inf], np.log(hazard.intensity), [np.inf]])  # of the segments, and beyond them
+    ends = [np.minimum(each, until) for each in (corners[:-1], corners[1:])]
     a, b = (values[:, None] for values in fits)
     with np.errstate(all="ignore"):
         shift = k / b
@@ -321,12 +322,6 @@ def log_parts(fits: Probit, hazard: HazardCurve, until: float = math.inf) -> Flo
 def _extended(values: Floats) -> Floats:
     """One value for each segment of a hazard curve, with those of the first and the last also beyond them."""
     return np.concatenate([values[:1], values, values[-1:]])
-
-
-def _ends(hazard: HazardCurve) -> tuple[Floats, Floats]:
-    """Logarithms of the lower and upper ends of the segments, and of what is below and above."""
-    corners = np.concatenate([[-np.inf], np.log(hazard.intensity), [np.inf]])
-    return corners[:-1], corners[1:]
 
 
 def _log_total(fitted: Probit, hazard: HazardCurve, until: float = math.inf) -> float:

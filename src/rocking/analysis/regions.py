@@ -105,7 +105,10 @@ class Resamples:
     def of(cls, data: Outcomes, fitted: Probit, clusters: Integers | None, samples: int, seed: int) -> Resamples:
         """Draw and fit; without clusters every outcome is on its own."""
         if clusters is None:
-            data, alike = _single(data)
+            # One outcome of each kind at each intensity, and how many are like it: the outcomes may be very many.
+            alike = np.column_stack([data.exceeded, data.trials - data.exceeded]).ravel()
+            there, exceeded = alike > 0.0, np.tile([1.0, 0.0], data.z.size)[alike > 0.0]
+            data, alike = Outcomes(np.repeat(data.z, 2)[there], exceeded, np.ones_like(exceeded)), alike[there]
             clusters = np.arange(alike.size)
         else:
             alike = np.ones(int(clusters.max()) + 1)
@@ -144,14 +147,6 @@ class Resamples:
 
 
 Confidence = LikelyRegion | Resamples
-
-
-def _single(data: Outcomes) -> tuple[Outcomes, Floats]:
-    """One outcome of each kind at each intensity, and how many are like it: the outcomes may be very many."""
-    counts = np.column_stack([data.exceeded, data.trials - data.exceeded]).ravel()
-    there = counts > 0.0
-    exceeded = np.tile([1.0, 0.0], data.z.size)[there]
-    return Outcomes(np.repeat(data.z, 2)[there], exceeded, np.ones_like(exceeded)), counts[there]
 
 
 def _around(data: Outcomes, best: Probit, drop: float) -> Floats:

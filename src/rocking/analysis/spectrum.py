@@ -107,7 +107,8 @@ def rocking_spectrum(
     >>> rocking_spectrum(blocks, motions).data.fractile_over_alpha.sel(fractile=0.5).values.ravel().round(3).tolist()
     [0.367, inf, inf]
     """
-    shares = _shares(fractiles)
+    each = np.atleast_1d(checks.numbers(fractiles, "fractiles", InvalidOption)).ravel()
+    shares = np.array([checks.share(value, "each of fractiles", InvalidOption) for value in each])
     options: dict[str, Any] = {"model": model, "chattering": chattering, "threads": threads, "progress": progress}
     gathered, shaken = bodies_of(blocks), several_motions(motions)
     if not isinstance(gathered, Blocks):
@@ -350,8 +351,3 @@ def _described_spectrum(
         },
         {name: table.attrs[name] for name in ("program", "model", "chattering", "gravity", "motions", "histories")},
     )
-
-
-def _shares(fractiles: Sequence[float]) -> Floats:
-    each = np.atleast_1d(checks.numbers(fractiles, "fractiles", InvalidOption)).ravel()
-    return np.array([checks.share(value, "each of fractiles", InvalidOption) for value in each])

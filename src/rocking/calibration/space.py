@@ -68,7 +68,9 @@ class Space:
         bounds, known = {}, {}
         for name, given in zip(PARAMETERS, (p, alpha, restitution), strict=True):
             if isinstance(given, str):
-                _check_housner(name, given)
+                if name != "restitution" or given != HOUSNER:
+                    wanted = "a value or a pair (lowest, highest)" + f", or {HOUSNER!r}" * (name == "restitution")
+                    raise InvalidOption(f"{{}} must be {wanted}, not {given!r}", name, value=given)
             elif is_known(given):
                 known[name] = known_value(np.ravel(given)[0], name)
             else:
@@ -184,12 +186,6 @@ def known_value(value: object, name: str) -> float:
     if known > HIGHEST[name]:
         raise InvalidOption(f"{{}} must be at most {HIGHEST[name]:g}, not {known:g}", name, value=known)
     return known
-
-
-def _check_housner(name: str, given: str) -> None:
-    if name != "restitution" or given != HOUSNER:
-        wanted = "a value or a pair (lowest, highest)" + (f", or {HOUSNER!r}" if name == "restitution" else "")
-        raise InvalidOption(f"{{}} must be {wanted}, not {given!r}", name, value=given)
 
 
 def value_range(pair: Any, name: str, highest: float) -> Range:

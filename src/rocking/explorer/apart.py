@@ -123,11 +123,7 @@ def _limit_this_process() -> None:
             resource.setrlimit(kind, (soft, hard))
 
 
-def _main() -> None:
+if __name__ == "__main__":
     _limit_this_process()
     out, sys.stdout = sys.stdout, sys.stderr
     json.dump(_answer(sys.stdin.buffer.read()), out)
-
-
-if __name__ == "__main__":
-    _main()

@@ -11,8 +11,7 @@ from rocking.explorer.inputs import Case
 from rocking.explorer.maps import Axis, MapGrid, sign_of
 from rocking.explorer.motions import arguments_of, is_pulse, pulse_call
 from rocking.explorer.parameters import BLOCK_NAMES, NAMES, QUANTITIES
-from rocking.explorer.periodic import KEPT, PASSED
-from rocking.explorer.sweeps import Sweep, call_at
+from rocking.explorer.periodic import KEPT, PASSED, Sweep, call_at
 from rocking.inputs.texts import command_line
 
 _CHATTERING: Final = """\
@@ -192,7 +191,8 @@ def map_as_python(grid: MapGrid, quantity: str) -> str:
 def map_as_command(grid: MapGrid) -> str | None:
     """Write a map of overturning as a command; None for what the command line does not map."""
     texts = grid.case.texts
-    if not _is_overturning_map(grid) or "gravity" in texts:
+    is_of_pulse = texts.get("motion", "").partition(":")[0] in PULSES
+    if not is_of_pulse or (grid.x.name, grid.y.name) != ("omega", "a") or "gravity" in texts:
         return None
     name, given = texts["motion"].partition(":")[0], arguments_of(texts["motion"])
     if "duration" in given:  # the command has no cut pulses
@@ -264,12 +264,6 @@ def sweep_as_code(sweep: Sweep) -> dict[str, Any]:
 def block_options(case: Case) -> dict[str, str]:
     """Options that describe the block and its model."""
     return {**case.block_options, **{each: case.texts[each] for each in ("model",) if each in case.texts}}
-
-
-def _is_overturning_map(grid: MapGrid) -> bool:
-    """Whether the map is one of `rocking.overturning_map`: a pulse's amplitude over its frequency."""
-    name = grid.case.texts.get("motion", "").partition(":")[0]
-    return name in PULSES and (grid.x.name, grid.y.name) == ("omega", "a")
 
 
 def _values(axis: Axis) -> str:

@@ -1,25 +1,25 @@
-"""From a case to what a page shows: arrays, numbers and words. It knows no web."""
+"""From a case, or two beside each other, to what a page shows: arrays, numbers and words. It knows no web."""
 
 from __future__ import annotations
 
+import math
 import sys
 import tempfile
 import threading
 from collections import OrderedDict
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
+from rocking import checks
 from rocking.arrays import Floats
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.explorer.code import case_as_command, case_as_python
-from rocking.explorer.comparing import as_csv, shift_of
-from rocking.explorer.facts import facts
 from rocking.explorer.inputs import read_case
 from rocking.explorer.meshes import described
 from rocking.explorer.parameters import Texts, names_of
 from rocking.explorer.payload import Payload
-from rocking.explorer.simulated import Simulated
+from rocking.explorer.simulated import Simulated, facts
 from rocking.explorer.uploads import UploadStore
 from rocking.explorer.windows import (
     POINTS,
@@ -31,7 +31,66 @@ from rocking.explorer.windows import (
     lines_in,
     lines_of,
 )
+from rocking.motion.measures import significant_span
 from rocking.response import Response, active_span
+from rocking.tables import named
+
+
+def _begun(response: Response) -> float:
+    motion = response.motion
+    found = math.nan if motion is None else significant_span(motion, start=0.05)[0]
+    return 0.0 if math.isnan(found) else found
+
+
+def _lifted(response: Response) -> float:
+    times = response.events["time"][response.events["kind"] == "uplift"]
+    return float(times[0]) if len(times) else 0.0
+
+
+#: Moments, s, that are laid over each other; 0 where a response has no such one.
+ALIGNED: Final[Mapping[str, Callable[[Response], float]]] = {
+    "start": lambda _: 0.0,
+    "uplift": _lifted,
+    "arias": _begun,
+}
+
+
+def shift_of(first: Response, second: Response, align: str) -> float:
+    """Return by how much later, s, the second is drawn than it happens, for the chosen moments to coincide.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block = rocking.Block(width=0.24, height=1.1)
+    >>> first, second = (rocking.simulate(block, rocking.pulses.sine(3.0, f, cycles=2)) for f in (1.0, 2.0))
+    >>> f"{shift_of(first, second, 'uplift'):.4f}"
+    '0.0632'
+    """
+    moment = ALIGNED[checks.one_of(align, "align", InvalidOption, list(ALIGNED))]
+    return moment(first) - moment(second)
+
+
+def as_csv(responses: Mapping[str, Response], shift: float) -> str:
+    """Return the histories of two responses below each other, each under its name, in its own time and the common one.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block = rocking.Block(width=0.24, height=1.1)
+    >>> response = rocking.simulate(block, rocking.pulses.sine(3.0, 1.0, cycles=1))
+    >>> as_csv({"one": response, "other": response}, 2.0).splitlines()[0]
+    'case,common_time_s,time_s,rotation_rad,angular_velocity_rad_s,ground_acceleration_m_s2'
+    """
+    import pandas as pd
+
+    frames = []
+    for (name, response), later in zip(responses.items(), (0.0, shift), strict=True):
+        frame = response.to_dataframe("histories").reset_index()
+        frame.insert(0, named("common_time", "s"), frame[named("time", "s")] + later)
+        frame.insert(0, "case", name)
+        frames.append(frame)
+    return str(pd.concat(frames).to_csv(index=False))
+
 
 #: Responses that are kept; their steps and the samples of their motions, some hundreds of MB at most.
 _KEPT: Final = 48
@@ -202,8 +261,15 @@ class Explorer:
             elif form == "nc":
                 response.to_netcdf(file)
             else:
+                shown = None if window is None else checked_window(window, response.duration)
                 with self._drawing:
-                    _draw(response, file, None if window is None else checked_window(window, response.duration))
+                    from matplotlib import rc_context
+
+                    figure = response.plot(window=shown, longest_sequence=bool(len(response.chattering)))
+                    with rc_context({"svg.hashsalt": "rocking"}):
+                        figure.savefig(file, dpi=160)
+                    if "matplotlib.pyplot" in sys.modules:
+                        sys.modules["matplotlib.pyplot"].close(figure)
             return file.read_bytes()
 
     def _rows(self) -> int:
@@ -221,13 +287,3 @@ def _changed(texts: Texts, changed: Texts) -> dict[str, str]:
     together = [(names_of("block"), names_of("block")), (names_of("motion"), names_of("motion", "start"))]
     gone = {name for given, names in together if changed.keys() & {*given} for name in names}
     return {name: value for name, value in texts.items() if name not in gone} | dict(changed)
-
-
-def _draw(response: Response, file: Path, window: tuple[float, float] | None) -> None:
-    from matplotlib import rc_context
-
-    figure = response.plot(window=window, longest_sequence=bool(len(response.chattering)))
-    with rc_context({"svg.hashsalt": "rocking"}):
-        figure.savefig(file, dpi=160)
-    if "matplotlib.pyplot" in sys.modules:
-        sys.modules["matplotlib.pyplot"].close(figure)

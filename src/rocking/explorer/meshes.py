@@ -64,7 +64,7 @@ class Body:
     def across(self, azimuth: float) -> Floats:
         """Return its outline as it is seen along the axis across an azimuth, from its centre of mass; shape (n, 6)."""
         outline = self.sections.across(azimuth)
-        outline[:, 2:] -= float(self.solid.centre[:2] @ _towards(azimuth))
+        outline[:, 2:] -= float(self.solid.centre[:2] @ np.asarray(directions(azimuth)[0]))
         return outline
 
     def plane(self, azimuth: float) -> dict[str, Any]:
@@ -85,11 +85,13 @@ def described(body: Body, azimuth: float) -> Payload:
     corners = np.vstack([piece.corners for piece in pieces]) - solid.centre[:2]
     support = solid.support - solid.centre[:2]
     parts = [each.name for each in solid.regions]
+    data = solid.rose([azimuth]).data
+    left_out = {name: float(data[name][0]) for name in ("coupling", "aside", "gap")}
     header = {
         "name": solid.description,
         "about": _about(solid),
         "parts": parts,
-        "left_out": _left_out(solid, azimuth),
+        "left_out": phrase("body.left_out", azimuth=azimuth, **left_out),
         "repaired": phrase("body.repaired", repairs="; ".join(solid.repairs))
         if solid.repairs
         else phrase("body.sound"),
@@ -164,14 +166,3 @@ def _about(solid: Solid) -> dict[str, Any]:
     if solid.mass is None:
         return phrase("body.is", name=whole, **size)
     return phrase("body.is_heavy", name=whole, mass=solid.mass, **size)
-
-
-def _left_out(solid: Solid, azimuth: float) -> dict[str, Any]:
-    """Say what planar rocking leaves out towards an azimuth."""
-    data = solid.rose([azimuth]).data
-    coupling, aside, gap = (float(data[name][0]) for name in ("coupling", "aside", "gap"))
-    return phrase("body.left_out", azimuth=azimuth, coupling=coupling, aside=aside, gap=gap)
-
-
-def _towards(azimuth: float) -> Floats:
-    return np.asarray(directions(azimuth)[0])

@@ -10,11 +10,10 @@ from rocking.arrays import without_dust
 from rocking.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
 from rocking.explorer.core import Explorer
-from rocking.explorer.facts import verdict
 from rocking.explorer.parameters import READING, Texts
 from rocking.explorer.payload import Payload
 from rocking.explorer.phrases import phrase
-from rocking.explorer.simulated import Simulated
+from rocking.explorer.simulated import Simulated, verdict
 from rocking.explorer.windows import checked_window, extremes
 from rocking.response import Response, active_span
 from rocking.response.figure import boundary_of, course_of, marked

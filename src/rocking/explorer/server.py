@@ -28,7 +28,7 @@ from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
 from rocking.errors import InvalidOption, RockingError
-from rocking.explorer import assessment, maps, periodic, readings, sweeps
+from rocking.explorer import assessment, maps, periodic, readings
 from rocking.explorer.catalogue import entries_of, listing
 from rocking.explorer.code import map_as_code, sweep_as_code
 from rocking.explorer.core import EXPORTS, Explorer
@@ -277,13 +277,13 @@ class App:
     def _grid(self, query: Query) -> maps.MapGrid:
         return maps.grid_of(self._case(query), query.others)
 
-    def _sweep(self, query: Query) -> sweeps.Sweep:
-        return sweeps.sweep_of(self._case(query), query.others)
+    def _sweep(self, query: Query) -> periodic.Sweep:
+        return periodic.sweep_of(self._case(query), query.others)
 
     def _point_of_sweep(self, query: Query) -> dict[str, str]:
         """Return the texts of the case at a value of the parameter, released from a state where one is given."""
         value, _ = query.numbers("at", "at")
-        return sweeps.texts_at(self._sweep(query), value, query.numbers("u", "v") if query.given.get("u") else None)
+        return periodic.texts_at(self._sweep(query), value, query.numbers("u", "v") if query.given.get("u") else None)
 
     def _study(self) -> StudyView:
         if self.study is None:
@@ -304,8 +304,8 @@ class App:
 
         def begun(query: Query) -> _Stream:
             sweep = self._sweep(query)
-            about = {**sweeps.described(sweep), **sweep_as_code(sweep)}
-            return _Stream(about, sweeps.parts(sweep), lambda part: pack(sweeps.part_payload(sweep, part)))
+            about = {**periodic.described(sweep), **sweep_as_code(sweep)}
+            return _Stream(about, periodic.parts(sweep), lambda part: pack(periodic.part_payload(sweep, part)))
 
         return await self._streamed(request, begun)
 

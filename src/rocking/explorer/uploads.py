@@ -183,7 +183,7 @@ class UploadStore:
         with self._lock:
             self._read[request] = motion
             self._read.move_to_end(request)
-            while len(self._read) > 1 and sum(_samples(each) for each in self._read.values()) > READ:
+            while len(self._read) > 1 and sum(len(each.breakpoints) for each in self._read.values()) > READ:
                 self._read.popitem(last=False)
         return motion
 
@@ -224,10 +224,6 @@ class UploadStore:
 def _is_full(upload: Upload, others: Mapping[str, Upload]) -> bool:
     """Whether a file and others together are more than are kept."""
     return len(others) >= MOST or len(upload.data) + sum(len(each.data) for each in others.values()) > ALL
-
-
-def _samples(motion: Motion) -> int:
-    return len(motion.breakpoints)
 
 
 def _about(channel: Channel) -> dict[str, Any]:
