@@ -67,37 +67,30 @@ class Fragility(Result):
         One for each limit state.
     measure : Measure
         Intensity measure; intensities are in its SI units.
-    description : str
-        What was simulated or observed.
+    description, model : str
+        Description of the simulations or observations; equation of motion, on which a block's own unit depends.
     block : Block or None
         The block, where there is one.
-    model : str
-        Equation of motion, which says how a block's own unit counts.
     outcomes : pandas.DataFrame or None
         Every simulation: motion, block (position), polarity, the measure with its unit (SI, as pga_m_s2),
         peak_rotation_rad, peak_over_alpha (infinite where it overturned, NaN where unfinished), overturned, unfinished,
         whether each limit state was exceeded, and the weight of the block if any; None where outcomes were given.
-    one_way : bool
-        Whether sides that differ met motions in one polarity only: reversed, they do something else.
-    with_vertical : bool
-        Whether a vertical motion was simulated.
-    several_blocks : bool
-        Whether outcomes of several blocks count together.
+    one_way, with_vertical, several_blocks : bool
+        Whether sides that differ met motions in one polarity only; whether a vertical motion was simulated; whether
+        outcomes of several blocks count together.
     source : str
-        What a cluster of outcomes comes from: a motion, or, where outcomes were given, a cluster.
-    undecided : str
-        How many outcomes of a sample change within 3e-6 of the motion; empty where outcomes were given.
-    missing : str
-        How many simulations were given up, which the curves leave out; empty where there are none.
+        Origin of a cluster of outcomes: a motion, or, where outcomes were given, a cluster.
+    undecided, missing : str
+        How many outcomes of a sample change within 3e-6 of the motion, and how many simulations were given up, which
+        the curves leave out; empty where there are none.
 
     Examples
     --------
     >>> from rocking import HazardCurve, fit_fragility
     >>> fitted = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4, measure="pga")
     >>> risk = fitted.annual_rate(HazardCurve([0.5, 5.0], [1e-2, 1e-4]))
-    >>> one = risk.rate("overturning")
-    >>> f"{one.annual_rate:.6f} {one.probability(50.0):.4f}"
-    '0.000434 0.0215'
+    >>> f"{risk.rate('overturning').probability(50.0):.4f}"
+    '0.0215'
     """
 
     TABLES = ("curves", "outcomes")
@@ -373,8 +366,8 @@ def fragility(
     blocks : Blocks, Block, RestrainedBlock or sequence of one kind
         One block; or several whose outcomes are pooled: against a measure in their own units, or of an ensemble that
         stands for one block that is not quite known, with `weights` (`Calibration.fragility` does so).
-    motions : Motion, sequence of Motion, or mapping of str to Motion
-        m motions; a mapping gives them its names.
+    motions : optional
+        As for `simulate_many`: m motions.
     measure : {"pga", "pgv", "pga_ratio", "pgv_ratio"} or Measure
         Intensity measure, as for `incremental_dynamic_analysis`.
     levels : array_like, optional
@@ -385,16 +378,12 @@ def fragility(
     model, chattering : optional
         As for `simulate`.
     polarity : {"+", "-", "both"}
-        Motions as they are, reversed, or both. With both each motion counts twice, unless all blocks are symmetric:
-        they do the same under a motion and its mirror image, which is no second outcome.
+        Motions as they are, reversed, or both. With both each motion counts twice, unless all blocks are symmetric.
     weights : array_like, optional
-        How much the outcomes of each block count, one number for each; by default all alike. A block of weight 0 is
-        simulated, and is none of the data.
+        Weight of the outcomes of each block; by default all alike. Those of weight 0 are simulated, but are no data.
     clusters : "station" or array_like of labels, shape (m,), optional
-        Which motions belong together: intervals then tell how far clusters differ. "station" joins components of one
-        station in one earthquake, as their files name them. By default each motion is one cluster, with all its
-        outcomes. Motions that are multiples of one another, as one record scaled to several levels beforehand, are one
-        cluster in any case.
+        Which motions belong together, for intervals. "station" joins components of one station in one earthquake, as
+        their files name them. By default each motion is a cluster; multiples of one another always are one.
     band : Band
         How intervals and bands are made.
     threads, progress : optional
@@ -543,16 +532,14 @@ def fit_fragility(
         Number of trials at each intensity.
     clusters : array_like of labels, shape (n,), optional
         Which outcomes belong together (the motion, for instance), for the bands; by default each is on its own, as is
-        one whose label is NaN, None or empty. Fewer
-        than three clusters of several outcomes bound nothing: then intervals go from 0 to infinity.
-    measure : {"pga", "pgv", "pga_ratio", "pgv_ratio"} or Measure
-        What the intensity is, as for `fragility`.
-    band : Band
-        How intervals and bands are made.
+        one whose label is NaN, None or empty. With fewer than three clusters of several outcomes intervals go from 0 to
+        infinity.
+    measure, band : optional
+        As for `fragility`.
     block : Block, optional
-        What was tested, for the units of `Fragility.to_nrml`.
+        Tested block, for the units of `Fragility.to_nrml`.
     description : str
-        What was observed.
+        Description of the observations.
 
     Returns
     -------
@@ -562,9 +549,9 @@ def fit_fragility(
     Raises
     ------
     InvalidOption
-        If an argument is out of its range, or no rising lognormal fits best: no outcome exceeds the limit, or all do,
-        or they are separated (none up to some intensity and all from there on), or all at one intensity, or exceed the
-        limit no more often at higher intensities, or put the median at more than 1000 times any intensity.
+        If an argument is out of its range, or no rising lognormal fits best: the outcomes are all alike, separated
+        (none up to some intensity and all from there on), at one intensity, or exceed the limit no more often at higher
+        intensities, or put the median at more than 1000 times any intensity.
 
     Notes
     -----
@@ -573,19 +560,12 @@ def fit_fragility(
 
     References
     ----------
-    Chandler, R. E. and Bate, S. (2007). Inference for clustered data using the independence loglikelihood. Biometrika
-    94(1), 167-183.
-
-    Efron, B. (1987). Better bootstrap confidence intervals. Journal of the American Statistical Association 82(397),
-    171-185.
-
     Baker, J. W. (2015). Efficient analytical fragility function fitting using dynamic structural analysis. Earthquake
     Spectra 31(1), 579-599.
 
     Examples
     --------
-    >>> result = fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10)
-    >>> curve = result.curves[0]
+    >>> curve = fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10).curves[0]
     >>> print(f"median {curve.median:.4f} m/s^2, dispersion {curve.dispersion:.4f}")
     median 3.1509 m/s^2, dispersion 0.3042
     """

@@ -86,11 +86,11 @@ class Validation:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration(Result):
-    """Blocks that explain which motions overturned a specimen, and what they predict.
+    """Blocks that explain which motions overturned a specimen, and their predictions; from `calibrate`.
 
-    Made by `calibrate`. Its table "ensemble" has a row for each block: parameters of both sides, weight, and the
-    equation of motion; `rocking fragility --ensemble` and its like read it. Its figure has what happened against the
-    fitted probability of every test, and the ensemble of blocks.
+    Its table "ensemble" has a row for each block: parameters of both sides, weight, and the equation of motion;
+    `rocking fragility --ensemble` and its like read it. Its figure has the outcomes against the fitted probability of
+    every test, and the ensemble of blocks.
 
     Attributes
     ----------
@@ -99,31 +99,16 @@ class Calibration(Result):
     weights : ndarray, shape (n,)
         Their weights; they sum to 1.
     estimates : mapping of str to Estimate
-        The population's parameters: "p" (rad/s), "restitution", and "alpha" (rad), of a two-sided block
-        "alpha_plus" and "alpha_minus".
+        The population's parameters: "p" (rad/s), "restitution", and "alpha" (rad), of a two-sided block "alpha_plus"
+        and "alpha_minus".
     draws : mapping of str to ndarray, shape (d,)
         Draws of the posterior of the population's centre, by the same names.
-    probabilities : ndarray, shape (m,)
-        Fitted probability of overturning under each of the motions of the calibration.
-    observed : ndarray of bool, shape (m,)
-        What happened.
-    model : str
-        Equation of motion.
-    lapse : float
-        Chance that an outcome is not that of a rocking block at all.
-    seed : int
-        What the search started from.
+    probabilities, observed : ndarray, shape (m,)
+        Fitted probability of overturning under each motion of the calibration, and the observed outcome (bool).
+    model, lapse, seed : str, float, int
+        As for `calibrate`.
     diagnostics : Diagnostics
-        How far this can be trusted: effective candidates, agreement of runs, bounds that the posterior
-        reaches. Its `notes` say what is to be known before the estimates are believed; they are in the summary.
-
-    Examples
-    --------
-    >>> import rocking
-    >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (2.0, 3.0, 4.0, 5.0)]
-    >>> found = rocking.calibrate(pulses, [0, 0, 1, 1], p=2.0, restitution=0.9, two_sided=False, candidates=128)
-    >>> bool(found.predict(rocking.pulses.one_sine(9.0, 1.0))[0] > 0.5)
-    True
+        Effective candidates, agreement of runs, bounds that the posterior reaches; its `notes` are in the summary.
     """
 
     TABLES = ("ensemble",)
@@ -337,24 +322,23 @@ def calibrate(
     model : {"nonlinear", "linear"}
         Equation of motion; the linear one is faster and serves slender specimens.
     p, alpha, restitution : float or pair of float
-        A number, or a pair of equal ones, is known and kept, on both sides and in every test; a pair is the lowest and
-        highest value that is thinkable on either side (rad/s; rad; -), with a prior that is even in the logarithm. A
-        body of known size has p = ``Block(width=..., height=...).p``. The restitution may be "housner": it then
-        follows from the slenderness as 1 - 1.5 sin(alpha)^2 (Housner 1963), and of two sides from those of a rectangle
-        whose centre of mass is off the middle, whose p is that of the rectangle.
+        A number, or a pair of equal ones, is known, on both sides and in every test; a pair is the lowest and highest
+        thinkable value on either side (rad/s; rad; -), with a prior that is even in the logarithm. A body of known size
+        has p = ``Block(width=..., height=...).p``. The restitution may be "housner": it then follows from the
+        slenderness as 1 - 1.5 sin(alpha)^2 (Housner 1963), and of two sides from those of a rectangle whose centre of
+        mass is off the middle, whose p is that of the rectangle.
     two_sided : bool
-        Whether the slendernesses of the two sides may differ, by a factor of 3 at most. p and restitution of a rigid
-        body's sides differ by terms of second order in the slenderness only. By default they may, other than in
-        `calibrate_history`: hardly any specimen leans alike to both sides, and outcomes alone would not show it.
+        Whether the slendernesses of the two sides may differ, by a factor of 3 at most. By default they may, other than
+        in `calibrate_history`: hardly any specimen leans alike to both sides, and outcomes alone would not show it.
     lapse : float
         Chance that an outcome is not that of a rocking block at all.
     candidates : int
-        Blocks that are simulated under every motion, about; up to twice as many while runs disagree, or while few of
-        them tell what a typical population does. A motion that is given several times is simulated once.
+        Approximate number of blocks that are simulated under every distinct motion; up to twice as many while runs
+        disagree, or while few of them represent a typical population.
     ensemble : int
-        Most blocks that are kept for predictions.
+        Largest number of blocks for predictions.
     seed : int
-        The same seed gives the same result.
+        Seed of the random draws.
     threads, progress : optional
         As for `simulate_many`.
 
@@ -372,29 +356,20 @@ def calibrate(
     Notes
     -----
     Each test is taken to have its own block, drawn from a population that is lognormal in p, alpha, restitution and in
-    the ratio of the sides' slendernesses. The probability of an outcome is the share of the population that behaves so
-    (and a small lapse). The posterior over populations is drawn by sequential Monte Carlo (Del Moral, Doucet and Jasra
-    2006), with the prior that is given by the bounds and a lognormal prior on each dispersion (median 10 %).
-
-    Two independent runs each fill the bounds evenly, then try blocks where their own fits are good. A candidate weighs
-    what the density of candidates lacks, so that the prior does not change (deterministic mixture; Owen and Zhou 2000).
-    The summary reports runs that disagree, few effective candidates, and a posterior that reaches a bound.
+    the ratio of the sides' slendernesses. The posterior over populations is drawn by sequential Monte Carlo (Del Moral,
+    Doucet and Jasra 2006), with a lognormal prior on each dispersion (median 10 %). Two independent runs each fill the
+    bounds evenly, then try blocks where their own fits are good. A candidate weighs what the density of candidates
+    lacks, so that the prior does not change (deterministic mixture; Owen and Zhou 2000).
 
     Two mirrored blocks often explain the outcomes equally well; then the estimates of each side are wide while the
     predictions are not.
 
     Examples
     --------
-    A block is hidden behind forty outcomes:
-
-    >>> import numpy as np, rocking
-    >>> hidden = rocking.Block.from_parameters(p=3.0, alpha=0.15, restitution=0.9)
-    >>> pulses = [rocking.pulses.one_sine(a, f) for a in range(1, 9) for f in (0.5, 1.0, 1.5, 2.0, 3.0)]
-    >>> times = np.arange(0.0, 3.0, 0.02)
-    >>> motions = [rocking.Motion.from_samples(one.acceleration(times), 0.02) for one in pulses]
-    >>> overturned = [rocking.simulate(hidden, one, model="linear").overturned for one in motions]
-    >>> found = rocking.calibrate(motions, overturned, model="linear", candidates=512, two_sided=False)
-    >>> bool(np.mean((found.predict(motions) > 0.5) == overturned) > 0.9)
+    >>> import rocking
+    >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (2.0, 3.0, 4.0, 5.0)]
+    >>> found = calibrate(pulses, [0, 0, 1, 1], p=2.0, restitution=0.9, two_sided=False, candidates=128)
+    >>> bool(found.predict(rocking.pulses.one_sine(9.0, 1.0))[0] > 0.5)
     True
     """
     tested = several_motions(motions)
