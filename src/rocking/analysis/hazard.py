@@ -148,10 +148,9 @@ class HazardCurve(Result):
             raise
 
     def rate_of(self, intensity: ArrayLike) -> Floats:
-        """Annual rates of exceeding intensities (SI units, 0 or more), shaped like them.
+        """Annual rates of exceeding intensities (SI units, 0 or more), shaped like them; infinite at 0.
 
-        Below the first and above the last point of the curve they are those of its extended lines, which are infinite
-        at 0.
+        Below the first and above the last point of the curve they are those of its extended lines.
         """
         at = intensities(intensity)
         exponents, factors = powers(self)
