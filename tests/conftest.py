@@ -217,7 +217,7 @@ def run(unarranged: None, capsys: pytest.CaptureFixture[str]) -> Callable[..., t
 @pytest.fixture
 def small_budget(monkeypatch: pytest.MonkeyPatch) -> None:
     """Give simulations of ensembles up soon."""
-    monkeypatch.setattr("rocking.engine.BUDGET", 0)
+    monkeypatch.setattr("rocking.engine.tasks.BUDGET", 0)
 
 
 @pytest.fixture(scope="session")
@@ -227,8 +227,8 @@ def few_steps() -> Callable[[int], AbstractContextManager[None]]:
     @contextmanager
     def limited(steps: int) -> Iterator[None]:
         with pytest.MonkeyPatch.context() as patched:
-            patched.setattr("rocking.simulation.slices", lambda ground: 1)
-            patched.setattr("rocking.simulation.SLICE", steps)
+            patched.setattr("rocking.simulation.simulate.slices", lambda ground: 1)
+            patched.setattr("rocking.simulation.simulate.SLICE", steps)
             yield
 
     return limited

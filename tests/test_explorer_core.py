@@ -25,8 +25,8 @@ from rocking.explorer.motions import pulse_as_text, pulse_of, texts_of_motion
 from rocking.explorer.parameters import DEFAULT
 from rocking.explorer.parameters import PULSES as OFFERED
 from rocking.explorer.payload import pack
+from rocking.explorer.periodic import sweep_of
 from rocking.explorer.studies import StudyView
-from rocking.explorer.sweeps import sweep_of
 from rocking.explorer.uploads import LARGEST, MOST, UploadStore, bare_name
 from rocking.explorer.windows import extremes
 from rocking.inputs.pulses import FAMILIES

@@ -14,8 +14,17 @@ import rocking
 from rocking.errors import InvalidOption
 from rocking.explorer.code import sweep_as_command, sweep_as_python
 from rocking.explorer.inputs import read_case
-from rocking.explorer.periodic import KEPT, LONGEST, nearest_sine, orbit, sine_of
-from rocking.explorer.sweeps import part_payload, parts, sweep_of, texts_at
+from rocking.explorer.periodic import (
+    KEPT,
+    LONGEST,
+    nearest_sine,
+    orbit,
+    part_payload,
+    parts,
+    sine_of,
+    sweep_of,
+    texts_at,
+)
 from rocking.explorer.uploads import UploadStore
 
 BLOCK = {"width": "0.24", "height": "1.1", "restitution": "0.5"}

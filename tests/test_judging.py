@@ -10,7 +10,6 @@ from scipy import stats
 import rocking
 from rocking import Block, Blocks, InvalidOption, ShakeTest, UnreadableRecord
 from rocking.calibration import Validation
-from rocking.engine import tasks as engine
 
 STRONG, WEAK = rocking.pulses.one_sine(6.0, 1.0), rocking.pulses.one_sine(1.0, 1.0)
 BLOCK = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)

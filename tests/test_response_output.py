@@ -14,7 +14,7 @@ import rocking
 from rocking import Block, InvalidOption, OutputError, simulate
 from rocking.analysis.survey import survey
 from rocking.core.tables import named
-from rocking.explorer.facts import verdict
+from rocking.explorer.simulated import verdict
 from rocking.kernels import state
 from rocking.response import history, sensitivity, summary
 from rocking.response.summary import known_ratio, time_text

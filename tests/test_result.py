@@ -18,7 +18,6 @@ from rocking.chattering import chattering_map, critical_amplitude_nonlinear, fam
 from rocking.core.progress import Progress
 from rocking.core.result import DatasetResult
 from rocking.core.tables import counted
-from rocking.engine import tasks as engine
 
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
 PULSE = rocking.pulses.one_sine(6.0, 1.0)

@@ -60,16 +60,14 @@ def critical_scale(
     Parameters
     ----------
     block : Block
-        What rocks, or another body that can overturn.
+        Block, or another body that can overturn.
     motion : Motion
-        What is scaled, both components alike.
+        Motion that is scaled, both components alike.
     low, high : float
         Positive scales between which it is: the block stands at the lower one and overturns at the higher one. Where
         the outcome changes several times between them, one of the changes is found.
-    model : {"nonlinear", "linear"}
-        Equation of motion.
-    initial_rotation, initial_velocity : float
-        Start, rad and rad/s.
+    model, initial_rotation, initial_velocity : optional
+        As for `simulate`.
 
     Returns
     -------
@@ -86,18 +84,16 @@ def critical_scale(
 
     Notes
     -----
-    At the critical scale the response comes to the balance point and stays. The derivatives follow from those of a
-    rotation of the response that just overturns, by the implicit function theorem: see "Impacts: restitution and
-    sensitivity" in the documentation.
+    At the critical scale the response comes to the balance point and stays. The derivatives follow by the implicit
+    function theorem: see "Impacts: restitution and sensitivity" in the documentation.
 
     Examples
     --------
     >>> import rocking
     >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     >>> record = rocking.Motion.from_samples([0.0, 3.0, -4.0, 3.0, 0.0], 0.3)
-    >>> found = rocking.critical_scale(block, record, 2.0, 6.0)
-    >>> f"{found.scale:.6f}", f"{found.alpha:.6f}", f"{found.gradient.samples[3]:.6f}"
-    ('3.256134', '3.404557', '-0.617162')
+    >>> f"{rocking.critical_scale(block, record, 2.0, 6.0).scale:.6f}"
+    '3.256134'
     """
     if one_motion(motion) is None:
         raise InvalidOption("there is no {} to scale: give one", "motion")

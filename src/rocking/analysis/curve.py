@@ -97,6 +97,14 @@ class FragilityCurve:
         Pearson's test between groups of outcomes and the fit: one group for each intensity where each has five outcomes
         or more (stripes), else up to ten of equal size along the intensity (cloud; Hosmer and Lemeshow). It takes all
         outcomes for independent: where several belong to one cluster there is no p-value.
+
+    Examples
+    --------
+    >>> from rocking import fit_fragility
+    >>> curve = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4).curves[0]
+    >>> low, high = curve.band(curve.median)
+    >>> bool(low < 0.5 < high)
+    True
     """
 
     limit_state: str
@@ -141,10 +149,7 @@ class FragilityCurve:
 
     @property
     def degenerate(self) -> float:
-        """Share of resampled data sets whose outcomes were separated, all alike or fell; they count as limits.
-
-        Separated outcomes make a step, the others a level curve; NaN without a bootstrap.
-        """
+        """Share of resampled data sets that are separated, all alike or fall, as limits; NaN without a bootstrap."""
         return self._uncertainty.degenerate if isinstance(self._uncertainty, Resamples) else math.nan
 
     @property
@@ -169,49 +174,14 @@ class FragilityCurve:
         return _dispersion(float(steepest[0])), _dispersion(float(flattest[0]))
 
     def probability(self, intensity: ArrayLike) -> Floats:
-        """Fitted probability at intensities.
-
-        Parameters
-        ----------
-        intensity : array_like
-            Intensities in SI units, or a block's own; 0 or more.
-
-        Returns
-        -------
-        ndarray
-            Probabilities, shaped like the intensities.
-
-        Examples
-        --------
-        >>> from rocking import fit_fragility
-        >>> curve = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4).curves[0]
-        >>> curve.probability([curve.median, 0.0]).round(12).tolist()
-        [0.5, 0.0]
-        """
+        """Fitted probability at intensities of 0 or more (SI units, or a block's own), shaped like them."""
         at = intensities(intensity)
         return as_asked(probabilities(self.fitted, _logarithm(at).ravel())[0].reshape(at.shape))
 
     def intensity_of(self, probability: float) -> float:
-        """Intensity at which the fitted probability is as given.
+        """Intensity (SI units, or a block's own) at which the fitted probability is that given, between 0 and 1.
 
-        ``intensity_of(0.95)`` is the amplitude that a rock which still stands has most likely never seen.
-
-        Parameters
-        ----------
-        probability : float
-            Between 0 and 1.
-
-        Returns
-        -------
-        float
-            In SI units, or a block's own.
-
-        Examples
-        --------
-        >>> from rocking import fit_fragility
-        >>> curve = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4).curves[0]
-        >>> round(curve.intensity_of(0.5) / curve.median, 9)
-        1.0
+        ``intensity_of(0.95)`` is the amplitude that a rock which still stands has most likely never met.
         """
         from scipy.special import ndtri
 
@@ -223,29 +193,8 @@ class FragilityCurve:
     def largest_rate(self, intensity: ArrayLike, years: float, confidence: float = 0.95) -> Floats:
         """Annual rates of motions of an intensity or more above which a block that stood would have fallen.
 
-        They are -ln(1 - confidence)/(years P(intensity)). A precarious rock of that age contradicts a hazard curve
-        above them.
-
-        Parameters
-        ----------
-        intensity : array_like
-            Intensities in SI units, 0 or more.
-        years : float
-            For how long the block has stood.
-        confidence : float
-            Probability with which it would have fallen.
-
-        Returns
-        -------
-        ndarray
-            Rates (1/year), shaped like the intensities; infinite at 0.
-
-        Examples
-        --------
-        >>> from rocking import fit_fragility
-        >>> curve = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4).curves[0]
-        >>> f"{curve.largest_rate(curve.median, years=1000.0):.5f}"
-        '0.00599'
+        They are -ln(1 - confidence)/(years P(intensity)), shaped like the intensities (SI units, 0 or more), and
+        infinite at 0. A precarious rock of that age contradicts a hazard curve above them.
         """
         time = checks.positive(years, "years", InvalidOption)
         share = checks.share(confidence, "confidence", InvalidOption)
@@ -253,26 +202,7 @@ class FragilityCurve:
             return -math.log1p(-share) / (time * self.probability(intensity))
 
     def band(self, intensity: ArrayLike) -> tuple[Floats, Floats]:
-        """Lower and upper end of the pointwise confidence band of the probability.
-
-        Parameters
-        ----------
-        intensity : array_like
-            Intensities in SI units, or a block's own; 0 or more.
-
-        Returns
-        -------
-        low, high : ndarray
-            Probabilities, shaped like the intensities.
-
-        Examples
-        --------
-        >>> from rocking import fit_fragility
-        >>> curve = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4).curves[0]
-        >>> low, high = curve.band(curve.median)
-        >>> bool(low < 0.5 < high)
-        True
-        """
+        """Lower and upper end of the pointwise confidence band of the `probability` at intensities."""
         from scipy.special import ndtr
 
         at = intensities(intensity)
@@ -284,19 +214,7 @@ class FragilityCurve:
         return low, high
 
     def to_dict(self) -> dict[str, Any]:
-        """Return parameters, intervals and tests by name.
-
-        Returns
-        -------
-        dict of str to object
-            Intensities are in SI units, or a block's own.
-
-        Examples
-        --------
-        >>> from rocking import fit_fragility
-        >>> fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4).curves[0].to_dict()["exceeded"]
-        7
-        """
+        """Return parameters, intervals and tests by name; intensities are in SI units, or a block's own."""
         return {
             "limit_state": self.limit_state,
             "median": self.median,
@@ -325,10 +243,7 @@ def fitted_curve(
     measure: Measure,
     limit: float | None = None,
 ) -> FragilityCurve:
-    """Curve of a limit state from intensities, outcomes that exceed it, and trials; both may count in parts.
-
-    Without clusters every trial is on its own, also where several are at one intensity.
-    """
+    """Curve of a limit state from intensities, exceedances and trials; without clusters every trial is on its own."""
     intensity, exceeded, trials = data
     intensity = probit.merge_equal_intensities(intensity)
     # Both are sums of the same weights, perhaps in another order.

@@ -53,10 +53,12 @@ def response_rose(
 ) -> ResponseRose:
     """Simulate a body in the plane of every azimuth, under the component of the ground motion along it.
 
+    Each azimuth is a simulation of its own, in one vertical plane; motion across it is left out.
+
     Parameters
     ----------
     solid : Solid
-        What rocks; across each azimuth it is the block of `Solid.block`.
+        Body; across each azimuth it is the block of `Solid.block`.
     pairs : sequence of (Motion, Motion), or mapping of str to (Motion, Motion)
         m pairs of horizontal components, which start together.
     azimuths : array_like, optional
@@ -64,15 +66,13 @@ def response_rose(
     levels : array_like, optional
         Levels that every pair is scaled to; by default pairs as they are.
     measure : {"factor", "pga", "pgv"} or Measure
-        What the levels are, SI units: of a pair the geometric mean of both components as they were recorded. Both are
-        scaled by one factor.
+        Measure of the levels, SI units: the geometric mean of both components as they were recorded. Both are scaled by
+        one factor.
     recorded : pair of float, optional
         Azimuths of the first and the second component of every pair; by default as their records say.
     restitution : float or pair, optional
         As for `Solid.block`.
-    model, chattering : optional
-        As for `simulate`.
-    threads, progress : optional
+    model, chattering, threads, progress : optional
         As for `simulate_many`.
 
     Returns
@@ -88,11 +88,6 @@ def response_rose(
         If a component is no motion, or its azimuth is not known.
     InvalidOption
         If there is no pair, or an argument is out of its range.
-
-    Notes
-    -----
-    Each azimuth is a simulation of its own: the body rocks in one vertical plane, and what happens across that is left
-    out.
 
     Examples
     --------

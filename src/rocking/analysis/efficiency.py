@@ -55,20 +55,16 @@ def compare_measures(
 
     Parameters
     ----------
-    blocks : Blocks, Block, RestrainedBlock or sequence of one kind
-        n blocks.
-    motions : sequence of Motion
-        m motions, two at least.
+    blocks, motions : optional
+        As for `simulate_many`: n blocks, and m motions, two at least.
     periods : array_like
         Periods of spectral accelerations, s.
     damping : float
         Their fraction of critical damping.
     model : {"nonlinear", "linear"}
         Equation of motion.
-    weights : array_like, optional
-        How much each of several blocks counts, as those of a calibration; by default all alike.
-    clusters : "station" or array_like of labels, shape (m,), optional
-        Which motions belong together, as for `fragility`: a cluster counts as one motion in the intervals.
+    weights, clusters : optional
+        As for `fragility`; a cluster counts as one motion in the intervals.
     tolerance : float
         Width of the intensities at overturning, relative to them.
     threads, progress : optional
@@ -92,15 +88,9 @@ def compare_measures(
     Every motion is scaled up, in steps of 5 %, until it overturns the block (`incremental_dynamic_analysis`). The
     logarithm of its intensity there has the standard deviation beta over the motions, the dispersion of the fragility:
     the smaller, the more efficient the measure. The interval of beta is that of a normal sample. Over several blocks
-    beta is pooled from the deviations from each block's own mean; a measure that serves them all also has a small
-    deviation from one mean. Blocks share the motions, so that the degrees of freedom are those of the motions, or of
-    the clusters if these are given. Of motions that are multiples of one another only the first counts; where the sides
-    of a block differ, reversed ones count as well.
-
-    References
-    ----------
-    Vamvatsikos, D. and Cornell, C. A. (2002). Incremental dynamic analysis. Earthquake Engineering and Structural
-    Dynamics 31(3), 491-514.
+    beta is pooled from the deviations from each block's own mean, with the degrees of freedom of the motions or
+    clusters. Of motions that are multiples of one another only the first counts; where the sides of a block differ,
+    reversed ones count as well.
 
     Examples
     --------
@@ -245,11 +235,7 @@ def _dataset(
     *,
     freedom: int,
 ) -> xr.Dataset:
-    """Intensities at overturning and their dispersions.
-
-    `shares` are the weights of the blocks, 1 in the mean; only motions that are the first of their kind count. The
-    intervals have so many degrees of `freedom`.
-    """
+    """Intensities at overturning and their dispersions; only motions that are the first of their kind count."""
     import xarray as xr
     from scipy.special import chdtri
 

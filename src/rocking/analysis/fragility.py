@@ -67,28 +67,30 @@ class Fragility(Result):
         One for each limit state.
     measure : Measure
         Intensity measure; intensities are in its SI units.
-    description : str
-        What was simulated or observed.
+    description, model : str
+        Description of the simulations or observations; equation of motion, on which a block's own unit depends.
     block : Block or None
         The block, where there is one.
-    model : str
-        Equation of motion, which says how a block's own unit counts.
     outcomes : pandas.DataFrame or None
         Every simulation: motion, block (position), polarity, the measure with its unit (SI, as pga_m_s2),
         peak_rotation_rad, peak_over_alpha (infinite where it overturned, NaN where unfinished), overturned, unfinished,
         whether each limit state was exceeded, and the weight of the block if any; None where outcomes were given.
-    one_way : bool
-        Whether sides that differ met motions in one polarity only: reversed, they do something else.
-    with_vertical : bool
-        Whether a vertical motion was simulated.
-    several_blocks : bool
-        Whether outcomes of several blocks count together.
+    one_way, with_vertical, several_blocks : bool
+        Whether sides that differ met motions in one polarity only; whether a vertical motion was simulated; whether
+        outcomes of several blocks count together.
     source : str
-        What a cluster of outcomes comes from: a motion, or, where outcomes were given, a cluster.
-    undecided : str
-        How many outcomes of a sample change within 3e-6 of the motion; empty where outcomes were given.
-    missing : str
-        How many simulations were given up, which the curves leave out; empty where there are none.
+        Origin of a cluster of outcomes: a motion, or, where outcomes were given, a cluster.
+    undecided, missing : str
+        How many outcomes of a sample change within 3e-6 of the motion, and how many simulations were given up, which
+        the curves leave out; empty where there are none.
+
+    Examples
+    --------
+    >>> from rocking import HazardCurve, fit_fragility
+    >>> fitted = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4, measure="pga")
+    >>> risk = fitted.annual_rate(HazardCurve([0.5, 5.0], [1e-2, 1e-4]))
+    >>> f"{risk.rate('overturning').probability(50.0):.4f}"
+    '0.0215'
     """
 
     TABLES = ("curves", "outcomes")
@@ -184,53 +186,15 @@ class Fragility(Result):
         return f"{self.description}; {self.measure.label}; {curves}"
 
     def curve(self, limit_state: str) -> FragilityCurve:
-        """Return the curve of a limit state.
-
-        Parameters
-        ----------
-        limit_state : str
-            Its name.
-
-        Returns
-        -------
-        FragilityCurve
-            Its curve.
-
-        Examples
-        --------
-        >>> from rocking import fit_fragility
-        >>> fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4).curve("overturning").clusters
-        16
-        """
+        """Return the curve of a limit state, by its name."""
         curves = {curve.limit_state: curve for curve in self.curves}
         return curves[checks.one_of(limit_state, "limit_state", InvalidOption, list(curves))]
 
     def annual_rate(self, hazard: HazardCurve) -> Risk:
-        """Annual rates of exceeding the limit states at a site, from its hazard curve.
+        """Annual rates of exceeding the limit states at a site, from its hazard curve of this measure.
 
-        Parameters
-        ----------
-        hazard : HazardCurve
-            Annual rates of the intensities that this fragility is against.
-
-        Returns
-        -------
-        Risk
-            Rate, return period and probability in a number of years, for each limit state.
-
-        Notes
-        -----
-        The integral of rate(x) dP(x) over all intensities x, in closed form: a lognormal against a power of x on each
+        The integral of rate(x) dP(x) over all intensities x is in closed form: a lognormal against a power of x on each
         segment of the hazard curve. For one power k all along, it is rate(median) exp((k dispersion)^2/2) (Cornell).
-
-        Examples
-        --------
-        >>> from rocking import HazardCurve, fit_fragility
-        >>> fitted = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4, measure="pga")
-        >>> risk = fitted.annual_rate(HazardCurve([0.5, 5.0], [1e-2, 1e-4]))
-        >>> one = risk.rate("overturning")
-        >>> f"{one.annual_rate:.6f} {one.probability(50.0):.4f}"
-        '0.000434 0.0215'
         """
         return risk_of(self.curves, hazard, self.measure, self.description)
 
@@ -247,28 +211,18 @@ class Fragility(Result):
         Parameters
         ----------
         years : float
-            For how long the block has stood, or has not exceeded the limit state.
+            Time for which the block has stood, or has not exceeded the limit state.
         hazard : HazardCurve, optional
-            Annual rates of the intensities: how probable the survival is under them.
+            Annual rates of the intensities, for the probability of the survival.
         confidence : float
             Probability with which the limit would have been exceeded, were shaking any stronger or more frequent.
         limit_state : str
-            Name of what was not exceeded.
+            Name of the limit that was not exceeded.
 
         Returns
         -------
         Survival
             Intensity that was most likely never reached, largest annual rates, and the probability of surviving.
-
-        Examples
-        --------
-        >>> from rocking import HazardCurve, fit_fragility
-        >>> fitted = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4, measure="pga")
-        >>> found = fitted.survival(10_000.0, HazardCurve([0.5, 5.0], [1e-2, 1e-4]))
-        >>> found
-        <Survival: overturning: not in 10000 years; most likely never 0.4385 g or more>
-        >>> f"{found.probability:.4f}", found.contradicts
-        ('0.0131', False)
         """
         curve = self.curve(limit_state)
         rate = None if hazard is None else self.annual_rate(hazard).rate(limit_state)
@@ -309,6 +263,9 @@ class Fragility(Result):
     ) -> None:
         """Write the curves as an OpenQuake fragility model, NRML 0.5.
 
+        PGA and SA are written in g, PGV in cm/s, a measure in a block's own unit as PGA or PGV of that block. The
+        uplift acceleration is the limit of no damage of PGA, unless a vertical motion was simulated, which lowers it.
+
         Parameters
         ----------
         path : path
@@ -316,8 +273,8 @@ class Fragility(Result):
         taxonomy : str
             Identifier of the fragility function, which the exposure model refers to.
         format : {"continuous", "discrete"}
-            Lognormals by the mean and the standard deviation of the intensity (not of its logarithm, as OpenQuake
-            wants them), or probabilities at 40 intensities.
+            Lognormals by the mean and the standard deviation of the intensity (not of its logarithm, as OpenQuake wants
+            them), or probabilities at 40 intensities.
         block : Block, optional
             Block whose unit a dimensionless measure counts in, where the curves come from several.
         model_id, loss_category, asset_category : str
@@ -331,19 +288,6 @@ class Fragility(Result):
             damping than 5 % of critical, which OpenQuake's are of, or the dispersion is too wide.
         OutputError
             If the file cannot be written.
-
-        Notes
-        -----
-        Units become OpenQuake's: PGA and SA in g, PGV in cm/s. A measure in a block's own unit becomes PGA or PGV of
-        that block. The range of validity is that of the data. A block cannot move below its uplift acceleration, which
-        is written as the limit of no damage of PGA, unless a vertical motion was simulated, which lowers it.
-
-        Examples
-        --------
-        >>> import tempfile
-        >>> from rocking import fit_fragility
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4).to_nrml(f"{folder}/model.xml")
         """
         chosen = self.block
         if block is not None:
@@ -422,8 +366,8 @@ def fragility(
     blocks : Blocks, Block, RestrainedBlock or sequence of one kind
         One block; or several whose outcomes are pooled: against a measure in their own units, or of an ensemble that
         stands for one block that is not quite known, with `weights` (`Calibration.fragility` does so).
-    motions : Motion, sequence of Motion, or mapping of str to Motion
-        m motions; a mapping gives them its names.
+    motions : optional
+        As for `simulate_many`: m motions.
     measure : {"pga", "pgv", "pga_ratio", "pgv_ratio"} or Measure
         Intensity measure, as for `incremental_dynamic_analysis`.
     levels : array_like, optional
@@ -434,16 +378,12 @@ def fragility(
     model, chattering : optional
         As for `simulate`.
     polarity : {"+", "-", "both"}
-        Motions as they are, reversed, or both. With both each motion counts twice, unless all blocks are symmetric:
-        they do the same under a motion and its mirror image, which is no second outcome.
+        Motions as they are, reversed, or both. With both each motion counts twice, unless all blocks are symmetric.
     weights : array_like, optional
-        How much the outcomes of each block count, one number for each; by default all alike. A block of weight 0 is
-        simulated, and is none of the data.
+        Weight of the outcomes of each block; by default all alike. Those of weight 0 are simulated, but are no data.
     clusters : "station" or array_like of labels, shape (m,), optional
-        Which motions belong together: intervals then tell how far clusters differ. "station" joins components of one
-        station in one earthquake, as their files name them. By default each motion is one cluster, with all its
-        outcomes. Motions that are multiples of one another, as one record scaled to several levels beforehand, are one
-        cluster in any case.
+        Which motions belong together, for intervals. "station" joins components of one station in one earthquake, as
+        their files name them. By default each motion is a cluster; multiples of one another always are one.
     band : Band
         How intervals and bands are made.
     threads, progress : optional
@@ -592,16 +532,14 @@ def fit_fragility(
         Number of trials at each intensity.
     clusters : array_like of labels, shape (n,), optional
         Which outcomes belong together (the motion, for instance), for the bands; by default each is on its own, as is
-        one whose label is NaN, None or empty. Fewer
-        than three clusters of several outcomes bound nothing: then intervals go from 0 to infinity.
-    measure : {"pga", "pgv", "pga_ratio", "pgv_ratio"} or Measure
-        What the intensity is, as for `fragility`.
-    band : Band
-        How intervals and bands are made.
+        one whose label is NaN, None or empty. With fewer than three clusters of several outcomes intervals go from 0 to
+        infinity.
+    measure, band : optional
+        As for `fragility`.
     block : Block, optional
-        What was tested, for the units of `Fragility.to_nrml`.
+        Tested block, for the units of `Fragility.to_nrml`.
     description : str
-        What was observed.
+        Description of the observations.
 
     Returns
     -------
@@ -611,9 +549,9 @@ def fit_fragility(
     Raises
     ------
     InvalidOption
-        If an argument is out of its range, or no rising lognormal fits best: no outcome exceeds the limit, or all do,
-        or they are separated (none up to some intensity and all from there on), or all at one intensity, or exceed the
-        limit no more often at higher intensities, or put the median at more than 1000 times any intensity.
+        If an argument is out of its range, or no rising lognormal fits best: the outcomes are all alike, separated
+        (none up to some intensity and all from there on), at one intensity, or exceed the limit no more often at higher
+        intensities, or put the median at more than 1000 times any intensity.
 
     Notes
     -----
@@ -622,19 +560,12 @@ def fit_fragility(
 
     References
     ----------
-    Chandler, R. E. and Bate, S. (2007). Inference for clustered data using the independence loglikelihood. Biometrika
-    94(1), 167-183.
-
-    Efron, B. (1987). Better bootstrap confidence intervals. Journal of the American Statistical Association 82(397),
-    171-185.
-
     Baker, J. W. (2015). Efficient analytical fragility function fitting using dynamic structural analysis. Earthquake
     Spectra 31(1), 579-599.
 
     Examples
     --------
-    >>> result = fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10)
-    >>> curve = result.curves[0]
+    >>> curve = fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10).curves[0]
     >>> print(f"median {curve.median:.4f} m/s^2, dispersion {curve.dispersion:.4f}")
     median 3.1509 m/s^2, dispersion 0.3042
     """

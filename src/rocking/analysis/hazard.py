@@ -127,15 +127,6 @@ class HazardCurve(Result):
         ------
         InvalidOption
             If the file cannot be read, or is neither, or has no such site.
-
-        Examples
-        --------
-        >>> import tempfile
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     file = Path(folder, "museum.csv")
-        ...     _ = file.write_text("pga_g,annual_rate\n0.1,1e-2\n0.4,1e-4\n")
-        ...     HazardCurve.read(file)
-        <HazardCurve: museum; peak ground acceleration (g) from 0.1 to 0.4, annual rate from 0.01 to 0.0001>
         """
         file = checks.path(path, "path of a hazard curve", InvalidOption)
         checks.whole(site, "site", InvalidOption, 0)
@@ -157,23 +148,9 @@ class HazardCurve(Result):
             raise
 
     def rate_of(self, intensity: ArrayLike) -> Floats:
-        """Annual rate of exceeding intensities.
+        """Annual rates of exceeding intensities (SI units, 0 or more), shaped like them; infinite at 0.
 
-        Parameters
-        ----------
-        intensity : array_like
-            Intensities in SI units, 0 or more.
-
-        Returns
-        -------
-        ndarray
-            Rates (1/year), shaped like the intensities: below the first and above the last point of the curve those of
-            its extended lines, which are infinite at 0.
-
-        Examples
-        --------
-        >>> float(HazardCurve([1.0, 2.0], [1e-2, 2.5e-3]).rate_of(4.0))
-        0.000625
+        Below the first and above the last point of the curve they are those of its extended lines.
         """
         at = intensities(intensity)
         exponents, factors = powers(self)
@@ -305,11 +282,7 @@ def _from_openquake(lines: list[str], site: int, period: float | None) -> tuple[
 
 
 def _corners(rate: Floats) -> tuple[Integers, Floats]:
-    """Points of a curve that hardly falls in places, and its rates there, made to decrease.
-
-    Of a plateau the first point stays, and the last, lowered by almost nothing, unless the curve ends with it: then
-    the line before goes on.
-    """
+    """Points of a curve without its plateaus: their first point, and their last, lowered by almost nothing."""
     lowest = np.minimum.accumulate(rate)
     falls = np.diff(lowest) < 0.0
     first, last = np.append(True, falls)[: len(rate)], np.append(falls, False)[: len(rate)]
@@ -320,15 +293,15 @@ def _corners(rate: Floats) -> tuple[Integers, Floats]:
 def log_parts(fits: Probit, hazard: HazardCurve, until: float = math.inf) -> Floats:
     """Logarithms of integrals below the hazard curve, over each of its segments, and above, up to `until` (ln x).
 
-    Their shape is (fits, n + 1). The rate is the integral of rate(x) dP(x). On a segment rate(x) = c x^-k, and with
-    P = Phi(z), z = a + b ln x, its part is c exp(k a/b + k^2/(2 b^2)) [Phi(z + k/b)] between the segment's ends.
-    Where both lie on one side of z = -k/b the large terms cancel: with the scaled erfcx the part is
-    rate(x) exp(-z^2/2) erfcx(|z + k/b|/sqrt(2))/2 at the nearer end, less that at the other.
+    Their shape is (fits, n + 1). On a segment rate(x) = c x^-k, and with P = Phi(z), z = a + b ln x, the part is c
+    exp(k a/b + k^2/(2 b^2)) [Phi(z + k/b)]. Where both ends lie on one side of z = -k/b the large terms cancel: with
+    the scaled erfcx it is rate(x) exp(-z^2/2) erfcx(|z + k/b|/sqrt(2))/2 at the nearer end, less that at the other.
     """
     from scipy.special import erfcx, ndtr
 
     k, log_c = (_extended(values) for values in powers(hazard))
-    ends = [np.minimum(each, until) for each in _ends(hazard)]
+    corners = np.concatenate([[-np.inf], np.log(hazard.intensity), [np.inf]])  # of the segments, and beyond them
+    ends = [np.minimum(each, until) for each in (corners[:-1], corners[1:])]
     a, b = (values[:, None] for values in fits)
     with np.errstate(all="ignore"):
         shift = k / b
@@ -350,12 +323,6 @@ def _extended(values: Floats) -> Floats:
     return np.concatenate([values[:1], values, values[-1:]])
 
 
-def _ends(hazard: HazardCurve) -> tuple[Floats, Floats]:
-    """Logarithms of the lower and upper ends of the segments, and of what is below and above."""
-    corners = np.concatenate([[-np.inf], np.log(hazard.intensity), [np.inf]])
-    return corners[:-1], corners[1:]
-
-
 def _log_total(fitted: Probit, hazard: HazardCurve, until: float = math.inf) -> float:
     return float(np.logaddexp.reduce(log_parts(fitted, hazard, until)[0]))
 
@@ -372,11 +339,7 @@ def _log_seen(fitted: Probit, hazard: HazardCurve, log_at: Floats) -> tuple[Floa
 
 
 def shares_beyond(fitted: Probit, hazard: HazardCurve) -> tuple[float, float]:
-    """Shares of a rate from motions below the hazard curve's first point, and above its last.
-
-    By parts the integral of P(x) |d rate(x)| is that of rate(x) dP(x), less P(x) rate(x) at its upper end, and with
-    that at its lower end.
-    """
+    """Shares of the integral of P(x) |d rate(x)| below the hazard curve's first point, and above its last, by parts."""
     parts, total = log_parts(fitted, hazard)[0], _log_total(fitted, hazard)
     first, last = _log_seen(fitted, hazard, np.log(hazard.intensity[[0, -1]]))[0]
     with np.errstate(all="ignore"):
@@ -386,11 +349,7 @@ def shares_beyond(fitted: Probit, hazard: HazardCurve) -> tuple[float, float]:
 
 
 def quantile_intensities(fitted: Probit, hazard: HazardCurve) -> tuple[float, float, float]:
-    """Intensities below which the quantiles of a rate arise: shares of the motions P(x) |d rate(x)|.
-
-    The share below x is that of the integral of rate(x) dP(x), less P(x) rate(x), which is never above the whole rate:
-    neither loses more than the last digits of the share.
-    """
+    """Intensities below which the quantiles of a rate arise: shares of the motions P(x) |d rate(x)|."""
     from scipy.optimize import brentq
 
     total, (k, log_c) = _log_total(fitted, hazard), powers(hazard)

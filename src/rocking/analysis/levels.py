@@ -138,10 +138,7 @@ def values_of(motions: Sequence[Motion], measure: Measure) -> Floats:
 
 
 def clusters_of(motions: Sequence[Motion], labels: object = None) -> Integers:
-    """Whole numbers, the same for motions of one label and for multiples of one another, perhaps through others.
-
-    "station" stands for labels that are the earthquake and the station that records name.
-    """
+    """Whole numbers, the same for motions of one label ("station": of one record) or multiples of one another."""
     families, origins = families_of(motions), [motion.description.origin or Origin() for motion in motions]
     stations = [f"{one.event}, {one.station}" if one.station else "" for one in origins]
     if labels is None:
@@ -170,10 +167,7 @@ def motions_in_words(clusters: Integers, labels: object) -> str:
 
 
 def families_of(motions: Sequence[Motion], *, reversed_too: bool = True) -> Integers:
-    """Whole numbers, the same for motions that scaling makes of one another: together they tell no more than one.
-
-    ``reversed_too``: by factors of either sign; else by positive ones alone.
-    """
+    """Whole numbers, the same for motions that are multiples of one another, ``reversed_too`` by negative factors."""
     # None of these changes with the scale or the sign: only motions that are alike in all are compared in full.
     alike = np.empty((len(motions), 2))
     for k, motion in enumerate(motions):
@@ -201,10 +195,7 @@ def units_of(blocks: Bodies, measure: Measure, model: Model) -> Floats:
 def simulate_levels(
     blocks: Bodies, motions: Sequence[Motion], measure: Measure, levels: Floats, *, model: Model, **options: Any
 ) -> xr.Dataset:
-    """Simulate every block under every motion at every level; as `simulate_many`, with the dimension ``level``.
-
-    A measure that counts in a block's own unit scales the motions for each block.
-    """
+    """Simulate every block under every motion at every level, as `simulate_many`, with the dimension ``level``."""
     import xarray as xr
 
     units = units_of(blocks, measure, model)
@@ -234,11 +225,7 @@ def note_missing(unfinished: Flags) -> None:
 def undecided_text(
     setup: Setup, motions: Sequence[Motion], factors: Floats, overturned: Flags, threads: int | None
 ) -> str:
-    """Repeat a random sample of simulations with the motion scaled by 1 +- 3e-6; return how many outcomes change.
-
-    `factors` on the motions, negative for reversed ones, have the shape (level, motion, block, polarity) of the
-    outcomes `overturned`.
-    """
+    """Repeat a sample of simulations with motions scaled by 1 +- 3e-6, and return in words how many outcomes change."""
     shape = overturned.shape
     drawn = np.random.default_rng(0).permutation(overturned.size)[:30]
     sample = np.unravel_index(np.sort(drawn), shape)
@@ -260,10 +247,7 @@ def undecided_text(
 
 @dataclass(frozen=True, eq=False)
 class Boundaries:
-    """Changes of the outcome in columns of a grid, ordered by column, then level.
-
-    Each lies between a low and a high level, which have the outcomes below and above.
-    """
+    """Changes of the outcome in columns of a grid, by column, then level, each between a low and a high level."""
 
     column: Integers
     low: Floats
@@ -287,11 +271,8 @@ def boundaries(
 ) -> Boundaries:
     """Find all changes of the outcome (m, columns) between neighbouring levels (m,) of a grid.
 
-    `outcome_of` tells outcomes for arrays of columns and levels; the tolerance is relative to the level.
-
-    Where a bisection meets a third outcome both halves are followed, so each bracket ends with two outcomes that are
-    neighbours to within the tolerance. Only where an interval of the grid holds 64 changes or more, one is followed up
-    for all that lie between two outcomes. Outcomes between two levels of the grid with the same outcome are not seen.
+    A bracket with a third outcome is followed in both halves, but for an interval with 64 changes or more, where one is
+    followed for all between two outcomes. Changes between two levels of the same outcome are not seen.
     """
     row, column = np.nonzero(outcome[1:] != outcome[:-1])
     here = Boundaries(column, levels[row], levels[row + 1], outcome[row, column], outcome[row + 1, column])
@@ -315,10 +296,7 @@ def _halvings(here: Boundaries, tolerance: float) -> int:
 
 
 def _halved(here: Boundaries, wide: Flags, found: Integers, origin: Integers) -> tuple[Boundaries, Integers]:
-    """Brackets after one bisection of the wide ones; those that hold a third outcome become two.
-
-    `origin` is the interval of the grid that each comes from.
-    """
+    """Brackets after one bisection of the wide ones; those that contain a third outcome become two."""
     few = np.bincount(origin)[origin] < 64
     third = wide & few & (found != here.below) & (found != here.above)
     up = wide & (found == here.below)

@@ -96,16 +96,16 @@ def overturning_map(
         "sine" (give `cycles`), "half-sine", "one-sine", "one-cosine", "ricker" (`kind`) or "mavroeidis-papageorgiou"
         (`phase`, `gamma`); or a function of amplitude (m/s^2) and frequency (Hz) that returns a motion proportional to
         the amplitude, and of one shape: at twice the frequency it is over in half the time, and so is its vertical
-        component. It is called at the ends of the frequencies, of which one would do.
+        component.
     amplitudes : array_like, shape (m,)
-        Increasing amplitudes, over the smallest acceleration that lifts the block: g tan(alpha), in the linear model
-        g alpha. The amplitude of a Mavroeidis-Papageorgiou pulse is here its peak acceleration.
+        Increasing amplitudes, over the smallest acceleration that lifts the block: g tan(alpha), in the linear model g
+        alpha. The amplitude of a Mavroeidis-Papageorgiou pulse is here its peak acceleration.
     frequencies : array_like, shape (n,)
         Increasing values of 2 pi f/p, f the pulse's frequency and p the block's (the smaller one of two sides).
     model : {"nonlinear", "linear"}
         Equation of motion.
     tolerance : float
-        Boundaries are refined to this width, relative to the amplitude.
+        Width of refined boundaries, relative to the amplitude.
     threads, progress : optional
         As for `simulate_many`.
     **parameters : object
@@ -126,9 +126,9 @@ def overturning_map(
 
     Notes
     -----
-    By dimensional analysis one pulse of one frequency is enough: blocks of different p stand for the frequencies. Every
-    change of mode between neighbouring amplitudes of the grid is found by bisection. Changes between two neighbouring
-    amplitudes of the same mode are not found.
+    By dimensional analysis one pulse of one frequency is enough: blocks of different p stand for the frequencies.
+    Changes of mode between neighbouring amplitudes of the grid are found by bisection, those between two of the same
+    mode are not.
 
     References
     ----------
@@ -142,8 +142,6 @@ def overturning_map(
     >>> import rocking
     >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     >>> result = overturning_map(block, "half-sine", amplitudes=[0.5, 1.5, 2.5], frequencies=[2.0], model="linear")
-    >>> [mode_name(mode) for mode in result.data.mode.values[:, 0]]
-    ['no uplift', 'rocks until the pulse is over', 'overturns without impact']
     >>> print(f"{float(result.data.overturning_amplitude[0]):.7f}")
     1.8007239
     """
@@ -186,12 +184,12 @@ def overturning_map(
 
 
 def mode_name(mode: int) -> str:
-    """Return a mode of `overturning_map` in words.
+    """Return a `Mode`, or the number of impacts before overturning, in words.
 
     Parameters
     ----------
     mode : int
-        A `Mode`, or how many impacts an overturning block has had.
+        As in the results of `overturning_map`.
 
     Returns
     -------
@@ -223,18 +221,17 @@ def _overturns(modes: Integers) -> Flags:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class OverturningMap(DatasetResult):
-    """What a pulse does to a block, over amplitude and frequency; from `overturning_map`.
+    """Outcomes of a block under a pulse, over amplitude and frequency; from `overturning_map`.
 
     Its figure has the modes as regions between the refined boundaries.
 
     Attributes
     ----------
     data : xarray.Dataset
-        Over (amplitude, frequency): mode, and peak_rotation (rad; pi/2 where the block overturns). Over (frequency):
-        overturning_amplitude, the lowest that overturns the block; NaN where none of the grid does, or its first
-        already does. Over (boundary): boundary_frequency, boundary_amplitude, and the modes below and above it.
-
-        A mode is a `Mode`, or the number of impacts after which the block overturns; `mode_name` returns its words.
+        Over (amplitude, frequency): mode (a `Mode`, or the number of impacts before overturning), and peak_rotation
+        (rad; pi/2 where the block overturns). Over (frequency): overturning_amplitude, the lowest that overturns the
+        block; NaN where none of the grid does, or its first already does. Over (boundary): boundary_frequency,
+        boundary_amplitude, and the modes below and above it.
     """
 
     TABLES = MappingProxyType(

@@ -87,7 +87,7 @@ class Likelihood:
         Twice its gain over one probability for all intensities.
     p_value : float
         Probability of a larger gain if the intensity did not matter (chi-squared, one degree of freedom); NaN where
-        outcomes belong together, of which the test knows nothing.
+        outcomes belong together.
     """
 
     logarithm: float
@@ -107,7 +107,7 @@ class Goodness:
         Groups less two.
     p_value : float
         Probability of a larger statistic if the lognormal is right; NaN with fewer than three groups, and where
-        outcomes belong together, of which the test knows nothing.
+        outcomes belong together.
     """
 
     statistic: float
@@ -206,10 +206,7 @@ def covariance(data: Outcomes, fitted: Probit) -> Floats:
 
 
 def standardised(data: Outcomes, fitted: Probit) -> tuple[Outcomes, Probit, float, float]:
-    """Return data and fits with z about its mean and over its deviation, and these two.
-
-    Intensities that are close to each other would else be told apart by their last digits only.
-    """
+    """Return data and fits with z about its mean and over its deviation, and these two, so that digits suffice."""
     centre, spread = float(data.z.mean()), float(data.z.std())
     scaled = data._replace(z=(data.z - centre) / spread)
     return scaled, Probit(fitted.intercept + fitted.slope * centre, fitted.slope * spread), centre, spread

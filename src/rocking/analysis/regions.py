@@ -47,11 +47,9 @@ Ends = tuple[Floats, Floats]
 class LikelyRegion:
     """Parameters whose likelihood is not significantly below the maximum: intervals are of the profile likelihood.
 
-    A quantity lies, with the given confidence, between its extremes on the region. The region is convex, since the
-    likelihood is concave, and ends where curves no longer rise. Where clusters hold several outcomes each, it is
-    stretched to the covariance that the clusters show (Chandler and Bate 2007), each left out in turn, and Student's
-    distribution takes the place of the normal one. Fewer than three clusters tell nothing of it, and can hardly be
-    drawn anew: then the region is the whole plane.
+    The region is convex, and ends where curves no longer rise. Where clusters hold several outcomes each, it is
+    stretched to the covariance of the clusters (Chandler and Bate 2007) by Student's distribution. With fewer than
+    three clusters it is the whole plane.
     """
 
     boundary: Probit
@@ -91,9 +89,8 @@ class LikelyRegion:
 class Resamples:
     """Fits to data drawn anew from the clusters of outcomes, with replacement; intervals are BCa (Efron 1987).
 
-    A fit is a step where the drawn outcomes are separated, level where they do not rise; `degenerate` is the share of
-    such. The influence (clusters, 2) of a cluster is its score over the observed information: how far it pulls the fit.
-    Clusters that are alike have one row there, and `alike` says how many they are.
+    The influence (clusters, 2) of a cluster is its score over the observed information. Clusters that are alike have
+    one row there, and `alike` is their number.
     """
 
     fits: Probit
@@ -108,7 +105,10 @@ class Resamples:
     def of(cls, data: Outcomes, fitted: Probit, clusters: Integers | None, samples: int, seed: int) -> Resamples:
         """Draw and fit; without clusters every outcome is on its own."""
         if clusters is None:
-            data, alike = _single(data)
+            # One outcome of each kind at each intensity, and how many are like it: the outcomes may be very many.
+            alike = np.column_stack([data.exceeded, data.trials - data.exceeded]).ravel()
+            there, exceeded = alike > 0.0, np.tile([1.0, 0.0], data.z.size)[alike > 0.0]
+            data, alike = Outcomes(np.repeat(data.z, 2)[there], exceeded, np.ones_like(exceeded)), alike[there]
             clusters = np.arange(alike.size)
         else:
             alike = np.ones(int(clusters.max()) + 1)
@@ -123,11 +123,7 @@ class Resamples:
         return cls(fits, 1.0 - float(regular.mean()), _influences(data, clusters, alike, fitted), alike)
 
     def interval(self, quantity: Quantity, estimate: Floats, gradient: Floats, confidence: float) -> Ends:
-        """Percentiles of a quantity, corrected for its bias and its skewness.
-
-        Of n quantities there are values (fits, n), estimates (n,) and derivatives (2, n) with respect to the
-        parameters.
-        """
+        """Percentiles of values (fits, n) about estimates (n,) with derivatives (2, n), less bias and skewness."""
         from scipy.special import ndtr, ndtri
 
         values = quantity(self.fits)
@@ -151,14 +147,6 @@ class Resamples:
 
 
 Confidence = LikelyRegion | Resamples
-
-
-def _single(data: Outcomes) -> tuple[Outcomes, Floats]:
-    """One outcome of each kind at each intensity, and how many are like it: the outcomes may be very many."""
-    counts = np.column_stack([data.exceeded, data.trials - data.exceeded]).ravel()
-    there = counts > 0.0
-    exceeded = np.tile([1.0, 0.0], data.z.size)[there]
-    return Outcomes(np.repeat(data.z, 2)[there], exceeded, np.ones_like(exceeded)), counts[there]
 
 
 def _around(data: Outcomes, best: Probit, drop: float) -> Floats:

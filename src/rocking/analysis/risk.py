@@ -59,6 +59,11 @@ class Rate:
         Intensities (SI) of the motions below which 16, 50 and 84 % of the rate arise.
     bounds : (float, float)
         Rates between which the hazard curve can tell the rate; texts state the bound in place of a rate beyond them.
+
+    Examples
+    --------
+    >>> round(Rate("overturning", 1e-3, (5e-4, 2e-3), 0.0, 0.0, (1.0, 2.0, 3.0)).probability(50.0), 4)
+    0.0488
     """
 
     limit_state: str
@@ -74,59 +79,16 @@ class Rate:
         return f"<Rate: {self.limit_state}: {rate} a year ({between}), {self.in_words()}>"
 
     def in_words(self) -> str:
-        """Write the return period with its interval, to the digits that this leaves.
-
-        Returns
-        -------
-        str
-            "once in ... years", with the interval.
-
-        Examples
-        --------
-        >>> Rate("overturning", 1 / 464.8, (1 / 826, 1 / 206.1), 0.0, 0.0, (1.0, 2.0, 3.0)).in_words()
-        'once in 460 years (210 to 830)'
-        """
+        """Write the return period as "once in ... years", with the interval, to the digits that this leaves."""
         period, between = self._period_digits()
         return f"once in {period} year{'' if period == '1' else 's'} ({between})"
 
     def probability(self, years: float) -> float:
-        """Probability of at least one exceedance in some years, for exceedances that do not depend on one another.
-
-        Parameters
-        ----------
-        years : float
-            Time, above 0.
-
-        Returns
-        -------
-        float
-            1 - exp(-annual_rate years).
-
-        Examples
-        --------
-        >>> round(Rate("overturning", 1e-3, (5e-4, 2e-3), 0.0, 0.0, (1.0, 2.0, 3.0)).probability(50.0), 4)
-        0.0488
-        """
+        """Probability of at least one exceedance in a time (years), if exceedances are independent."""
         return -math.expm1(-self.annual_rate * checks.positive(years, "years", InvalidOption))
 
     def survival(self, years: float) -> float:
-        """Probability of no exceedance in some years: of standing, for overturning.
-
-        Parameters
-        ----------
-        years : float
-            Time, above 0.
-
-        Returns
-        -------
-        float
-            exp(-annual_rate years).
-
-        Examples
-        --------
-        >>> round(Rate("overturning", 1e-3, (5e-4, 2e-3), 0.0, 0.0, (1.0, 2.0, 3.0)).survival(50.0), 4)
-        0.9512
-        """
+        """Probability of no exceedance in a time (years): of standing, for overturning."""
         return math.exp(-self.annual_rate * checks.positive(years, "years", InvalidOption))
 
     @property
@@ -166,6 +128,13 @@ class Risk(Result):
         Annual rates of intensities.
     description : str
         What was simulated or observed.
+
+    Examples
+    --------
+    >>> from rocking import HazardCurve, fit_fragility
+    >>> fitted = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4)
+    >>> round(fitted.annual_rate(HazardCurve([0.5, 5.0], [1e-2, 1e-4])).rate("overturning").annual_rate, 6)
+    0.000434
     """
 
     rates: tuple[Rate, ...]
@@ -174,49 +143,12 @@ class Risk(Result):
     description: str
 
     def rate(self, limit_state: str) -> Rate:
-        """Return the rate of a limit state.
-
-        Parameters
-        ----------
-        limit_state : str
-            Its name.
-
-        Returns
-        -------
-        Rate
-            Its rate.
-
-        Examples
-        --------
-        >>> from rocking import HazardCurve, fit_fragility
-        >>> fitted = fit_fragility([1.0, 2.0, 3.0, 4.0], [0, 1, 2, 4], trials=4)
-        >>> round(fitted.annual_rate(HazardCurve([0.5, 5.0], [1e-2, 1e-4])).rate("overturning").annual_rate, 6)
-        0.000434
-        """
+        """Return the rate of a limit state, by its name."""
         rates = {one.limit_state: one for one in self.rates}
         return rates[checks.one_of(limit_state, "limit_state", InvalidOption, [*rates])]
 
     def summary(self, years: float = 50.0) -> str:
-        """Write rates, return periods and probabilities as a table.
-
-        Parameters
-        ----------
-        years : float
-            Time that the probabilities are for.
-
-        Returns
-        -------
-        str
-            Lines of text and tables.
-
-        Examples
-        --------
-        >>> from rocking import HazardCurve, fit_fragility
-        >>> fitted = fit_fragility([1.0, 2.0, 3.0], [0, 2, 4], trials=5)
-        >>> risk = fitted.annual_rate(HazardCurve([0.5, 5.0], [1e-2, 1e-4]))
-        >>> "probability in 10 years" in risk.summary(10)
-        True
-        """
+        """Write rates, return periods, and probabilities in a time (years) as a table."""
         years = checks.positive(years, "years", InvalidOption)
         scale, confidence = self.hazard.measure.scale, 100 * self.curves[0].confidence
         rows = []
@@ -250,26 +182,7 @@ class Risk(Result):
         return "\n".join([text_table(header, rows), *notes])
 
     def to_dict(self, years: float = 50.0) -> dict[str, Any]:
-        """Return what was found as plain values by name.
-
-        Parameters
-        ----------
-        years : float
-            Time that the probabilities are for.
-
-        Returns
-        -------
-        dict of str to object
-            Rates, probabilities, and the hazard curve; units are in the names, or SI.
-
-        Examples
-        --------
-        >>> from rocking import HazardCurve, fit_fragility
-        >>> fitted = fit_fragility([1.0, 2.0, 3.0], [0, 2, 4], trials=5)
-        >>> risk = fitted.annual_rate(HazardCurve([0.5, 5.0], [1e-2, 1e-4]))
-        >>> risk.to_dict(10.0)["years"]
-        10.0
-        """
+        """Return rates, probabilities in a time (years) and the hazard curve by name; units are in the names, or SI."""
         return {
             "description": self.description,
             "hazard": self.hazard.to_dict(),
@@ -370,7 +283,7 @@ def _rate(curve: FragilityCurve, hazard: HazardCurve) -> Rate:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Survival(Result):
-    """A limit state that was not exceeded in a time, and what that says of the shaking; from `Fragility.survival`.
+    """A limit state that was not exceeded in a time, and the shaking that this allows; from `Fragility.survival`.
 
     Its figure has the largest rates that fit with the survival, and the hazard curve beside them.
 
@@ -383,24 +296,17 @@ class Survival(Result):
     ----------
     curve : FragilityCurve
         Probabilities that the limit is exceeded.
-    measure : Measure
-        What its intensity is.
-    description : str
-        What was simulated or observed.
-    years : float
-        For how long it was not exceeded.
-    confidence : float
-        Probability with which it would have been, if shaking were any stronger or more frequent than what is said.
+    measure, description, several_blocks : Measure, str, bool
+        As of the `Fragility`.
+    years, confidence : float
+        As for `Fragility.survival`.
     hazard : HazardCurve or None
         Annual rates of intensities at the site.
     rate : Rate or None
         Annual rate of the limit state under that hazard curve.
-    several_blocks : bool
-        Whether outcomes of several blocks count together in the curve.
     mean_probability : float
-        Probability of the survival under the hazard curve of one of several blocks: the mean, by their weights, of the
-        probabilities of the blocks, each by a fragility curve of its own. NaN of one block, without a hazard curve, and
-        where the outcomes of each block are not kept.
+        Mean, by the weights of several blocks, of the probabilities of survival under the hazard curve, each by a
+        fragility curve of its own. NaN of one block, without a hazard curve, and where outcomes are not kept.
     """
 
     curve: FragilityCurve
@@ -608,10 +514,7 @@ def mean_of_blocks(outcomes: pd.DataFrame, column: str, limit_state: str, hazard
 
 
 def _log_rate_within(fits: Probit, hazard: HazardCurve) -> Floats:
-    """Logarithms of the rates that motions between the ends of the hazard curve add, shape (fits, 1).
-
-    That is the integral of P(x) |d rate(x)|, by parts.
-    """
+    """Logarithms of the integrals of P(x) |d rate(x)| between the ends of the hazard curve, shape (fits, 1)."""
     from scipy.special import ndtr
 
     a, b = (values[:, None] for values in fits)
@@ -623,10 +526,7 @@ def _log_rate_within(fits: Probit, hazard: HazardCurve) -> Floats:
 
 
 def _log_standing(fits: Probit, hazard: HazardCurve, years: float) -> Floats:
-    """Logarithms of the integral of exp(-rate(x) years) dP(x), shape (fits, 1).
-
-    Motions below the hazard curve's first point, or above its last, add nothing.
-    """
+    """Logarithms of the integral of exp(-rate(x) years) dP(x) over the hazard curve, shape (fits, 1)."""
     from scipy.special import log_ndtr
 
     a, b = (values[:, None] for values in fits)

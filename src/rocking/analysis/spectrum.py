@@ -61,22 +61,19 @@ def rocking_spectrum(
     ----------
     blocks : Blocks, Block, RestrainedBlock or sequence of one kind
         A grid of frequency parameters, slendernesses and restitutions (`Blocks.grid`), which are the dimensions of the
-        spectrum. Or any blocks as an ensemble, such as that of a calibration: all are made larger or smaller together,
-        so that their median p is each of `p`, and keep their shapes. A grid with `p`, `size` or `weights` is an
-        ensemble, too. Restraints grow with the blocks, as `Blocks.resized` says.
-    motions : Motion, sequence of Motion, or mapping of str to Motion
-        m motions; a mapping gives them its names.
+        spectrum. Or an ensemble, such as that of a calibration: any other blocks, or a grid with `p`, `size` or
+        `weights`. Its blocks are resized together (`Blocks.resized`) so that their median p is each of `p`.
+    motions : optional
+        As for `simulate_many`.
     p : array_like, optional
         Frequency parameters, rad/s, of an ensemble; by default half to twice its own, or those that `size` gives.
     size : array_like, optional
         Half diagonals R, m, in place of `p`: p = sqrt(3 g/(4 R)), as of a rectangular block.
     weights : array_like, optional
-        How much each block of an ensemble counts; by default all alike.
+        Weight of each block of an ensemble; by default all alike.
     fractiles : sequence of float
         Shares, in (0, 1), of motions (and of the ensemble's weight) that stay below the fractile curves.
-    model, chattering : optional
-        As for `simulate`.
-    threads, progress : optional
+    model, chattering, threads, progress : optional
         As for `simulate_many`.
 
     Returns
@@ -93,12 +90,9 @@ def rocking_spectrum(
 
     Notes
     -----
-    A block that overturns has no largest rotation, so it counts as infinitely large: fractiles are interpolated in the
-    ordered peaks, and are infinite where that share of the motions, or the next motion above it, overturns. Those of an
-    ensemble are the lowest peaks that the share of the weight does not pass.
-
-    Blocks of a grid are symmetric, so a motion and its mirror image give the same peaks. Those of an ensemble may not
-    be, and their peaks are over the smaller slenderness, of the blocks as they stand.
+    A block that overturns counts as infinitely large: fractiles are interpolated in the ordered peaks, and are infinite
+    where that share of the motions, or the next motion above it, overturns. Those of an ensemble are the lowest peaks
+    that the share of the weight does not pass. Its peaks are over the smaller slenderness, of the blocks as they stand.
 
     References
     ----------
@@ -110,13 +104,11 @@ def rocking_spectrum(
     >>> import rocking
     >>> motions = [rocking.pulses.one_sine(5.0, f) for f in (0.5, 1.0, 2.0)]
     >>> blocks = rocking.Blocks.grid(p=[1.0, 2.0, 4.0], alpha=[0.2], restitution=[0.9])
-    >>> spectrum = rocking_spectrum(blocks, motions)
-    >>> spectrum.data.overturned.sum("motion").values.ravel().tolist()
-    [1, 2, 3]
-    >>> spectrum.data.fractile_over_alpha.sel(fractile=0.5).values.ravel().round(3).tolist()
+    >>> rocking_spectrum(blocks, motions).data.fractile_over_alpha.sel(fractile=0.5).values.ravel().round(3).tolist()
     [0.367, inf, inf]
     """
-    shares = _shares(fractiles)
+    each = np.atleast_1d(checks.numbers(fractiles, "fractiles", InvalidOption)).ravel()
+    shares = np.array([checks.share(value, "each of fractiles", InvalidOption) for value in each])
     options: dict[str, Any] = {"model": model, "chattering": chattering, "threads": threads, "progress": progress}
     gathered, shaken = bodies_of(blocks), several_motions(motions)
     if not isinstance(gathered, Blocks):
@@ -135,10 +127,7 @@ def rocking_spectrum(
 
 
 def fractiles_of(peaks: Floats, shares: Floats) -> Floats:
-    """Fractiles of peaks (n, ...) along the first axis, shape (k, ...), for k shares from 0 to 1.
-
-    They are interpolated in the ordered values that are not NaN, and infinite where either neighbour is.
-    """
+    """Fractiles (k, ...) of peaks (n, ...), interpolated in those not NaN, infinite where either neighbour is."""
     ordered = np.sort(peaks, axis=0)  # those that are missing come last
     known = np.maximum(np.count_nonzero(~np.isnan(peaks), axis=0), 1)
     place = shares.reshape(-1, *[1] * known.ndim) * (known - 1)
@@ -242,30 +231,10 @@ class RockingSpectrum(DatasetResult):
         title: str = "",
         figsize: tuple[float, float] | None = None,
     ) -> Figure:
-        """Draw single motions thin, fractiles thick, and the share that overturns.
+        """Draw single motions thin, fractiles thick, and the share that overturns, against "p", "period" or "size".
 
-        Of more than two combinations of slenderness and restitution only the fractiles nearest to the median are
-        drawn, of more than four no single motions.
-
-        Parameters
-        ----------
-        ax, title, figsize : optional
-            As for `DrawnResult.plot`.
-        against : {"p", "period", "size"}
-            Abscissa.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            The new figure, or that of `ax`.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> blocks = rocking.Blocks.grid(p=[1.0, 2.0, 4.0], alpha=[0.2], restitution=[0.9])
-        >>> spectrum = rocking_spectrum(blocks, rocking.pulses.one_sine(5.0, 1.0))
-        >>> spectrum.plot(against="size", title="pulse").axes[-1].get_xlabel()
-        'half diagonal R (m)'
+        Of more than two combinations of slenderness and restitution only the fractiles nearest to the median are drawn,
+        of more than four no single motions. Otherwise as `DrawnResult.plot`.
         """
         from rocking.plot.curves import SpectrumCurves, spectrum_figure
 
@@ -382,8 +351,3 @@ def _described_spectrum(
         },
         {name: table.attrs[name] for name in ("program", "model", "chattering", "gravity", "motions", "histories")},
     )
-
-
-def _shares(fractiles: Sequence[float]) -> Floats:
-    each = np.atleast_1d(checks.numbers(fractiles, "fractiles", InvalidOption)).ravel()
-    return np.array([checks.share(value, "each of fractiles", InvalidOption) for value in each])

@@ -36,6 +36,11 @@ class Scores:
         Mean of -log of the probability that was given to the outcome; infinite after a certainty that failed.
     brier : float
         Mean squared difference between probability and outcome (Brier 1950).
+
+    Examples
+    --------
+    >>> Scores.of([0.9, 0.2, 0.6], [True, False, False])
+    <Scores: accuracy 66.7 %, log loss 0.415, Brier score 0.137>
     """
 
     accuracy: float
@@ -50,30 +55,7 @@ class Scores:
 
     @classmethod
     def of(cls, probabilities: ArrayLike, observed: ArrayLike) -> Scores:
-        """Measure probabilities against outcomes.
-
-        Parameters
-        ----------
-        probabilities : array_like, shape (m,)
-            Predicted probabilities.
-        observed : array_like of bool, shape (m,)
-            What happened.
-
-        Returns
-        -------
-        Scores
-            The three measures.
-
-        Raises
-        ------
-        InvalidOption
-            If the shapes differ, there is nothing to measure, or a probability is not between 0 and 1.
-
-        Examples
-        --------
-        >>> Scores.of([0.9, 0.2, 0.6], [True, False, False])
-        <Scores: accuracy 66.7 %, log loss 0.415, Brier score 0.137>
-        """
+        """Score predicted probabilities of m outcomes, which are True or False."""
         given, seen = np.asarray(probabilities, dtype=np.float64), np.asarray(observed, dtype=bool)
         if given.shape != seen.shape or not given.size:
             raise InvalidOption(f"there must be one probability for each outcome, not {given.shape} and {seen.shape}")
@@ -94,18 +76,14 @@ def log_losses(probabilities: Floats, observed: Flags) -> Floats:
 
 @dataclass(frozen=True)
 class BoundReached:
-    """An estimate whose interval ends where a bound is.
+    """An estimate whose interval ends at a bound.
 
     Attributes
     ----------
-    name : str
-        The estimate.
-    end : {"lower", "upper"}
-        Which bound.
-    bound : float
-        Where it is, in the parameter's unit.
-    wider : float
-        A wider bound.
+    name, end : str
+        The estimate, and its bound: "lower" or "upper".
+    bound, wider : float
+        The bound, and a wider one, in the parameter's unit.
     share : float
         Share of the posterior in the outermost 5 % of the range.
     """

@@ -86,11 +86,11 @@ class Validation:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration(Result):
-    """Blocks that explain which motions overturned a specimen, and what they predict.
+    """Blocks that explain which motions overturned a specimen, and their predictions; from `calibrate`.
 
-    Made by `calibrate`. Its table "ensemble" has a row for each block: parameters of both sides, weight, and the
-    equation of motion; `rocking fragility --ensemble` and its like read it. Its figure has what happened against the
-    fitted probability of every test, and the ensemble of blocks.
+    Its table "ensemble" has a row for each block: parameters of both sides, weight, and the equation of motion;
+    `rocking fragility --ensemble` and its like read it. Its figure has the outcomes against the fitted probability of
+    every test, and the ensemble of blocks.
 
     Attributes
     ----------
@@ -99,23 +99,16 @@ class Calibration(Result):
     weights : ndarray, shape (n,)
         Their weights; they sum to 1.
     estimates : mapping of str to Estimate
-        The population's parameters: "p" (rad/s), "restitution", and "alpha" (rad), of a two-sided block
-        "alpha_plus" and "alpha_minus".
+        The population's parameters: "p" (rad/s), "restitution", and "alpha" (rad), of a two-sided block "alpha_plus"
+        and "alpha_minus".
     draws : mapping of str to ndarray, shape (d,)
         Draws of the posterior of the population's centre, by the same names.
-    probabilities : ndarray, shape (m,)
-        Fitted probability of overturning under each of the motions of the calibration.
-    observed : ndarray of bool, shape (m,)
-        What happened.
-    model : str
-        Equation of motion.
-    lapse : float
-        Chance that an outcome is not that of a rocking block at all.
-    seed : int
-        What the search started from.
+    probabilities, observed : ndarray, shape (m,)
+        Fitted probability of overturning under each motion of the calibration, and the observed outcome (bool).
+    model, lapse, seed : str, float, int
+        As for `calibrate`.
     diagnostics : Diagnostics
-        How far this can be trusted: effective candidates, agreement of runs, bounds that the posterior
-        reaches. Its `notes` say what is to be known before the estimates are believed; they are in the summary.
+        Effective candidates, agreement of runs, bounds that the posterior reaches; its `notes` are in the summary.
     """
 
     TABLES = ("ensemble",)
@@ -143,27 +136,9 @@ class Calibration(Result):
         return {name: estimate.dispersion for name, estimate in self.estimates.items()}
 
     def predict(self, motions: Motions, *, threads: int | None = None, progress: bool | None = None) -> Floats:
-        """Probability that each motion overturns the specimen.
+        """Probability that each of m motions overturns the specimen, shape (m,).
 
-        Parameters
-        ----------
-        motions : Motion or sequence of Motion
-            m motions.
-        threads, progress : optional
-            As for `simulate_many`.
-
-        Returns
-        -------
-        ndarray, shape (m,)
-            Weighted share of the ensemble that overturns, within the lapse of 0 and 1.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (2.0, 3.0, 4.0, 5.0)]
-        >>> found = rocking.calibrate(pulses, [0, 0, 1, 1], p=2.0, restitution=0.9, two_sided=False, candidates=128)
-        >>> bool(found.predict(rocking.pulses.one_sine(9.0, 1.0))[0] > 0.5)
-        True
+        It is the weighted share of the ensemble that overturns, within the lapse of 0 and 1.
         """
         if isinstance(motions, Sized) and not isinstance(motions, Motion) and not len(motions):
             return np.empty(0)
@@ -190,10 +165,8 @@ class Calibration(Result):
         folds, repeats : int
             Number of parts, and of random divisions into parts.
         seed : int
-            Seeds the divisions.
-        threads : int, optional
-            As for `simulate_many`; it changes no result.
-        progress : bool, optional
+            Seed of the divisions.
+        threads, progress : optional
             As for `simulate_many`.
 
         Returns
@@ -205,14 +178,6 @@ class Calibration(Result):
         ------
         InvalidOption
             If there are fewer groups than folds, or labels do not match the motions.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (2.0, 3.0, 4.0, 5.0)]
-        >>> found = rocking.calibrate(pulses, [0, 0, 1, 1], p=2.0, restitution=0.9, two_sided=False, candidates=128)
-        >>> found.cross_validate(folds=2).probabilities.shape
-        (1, 4)
         """
         labels = group_labels(groups, len(self.observed), folds)
         rng = np.random.default_rng(checks.whole(seed, "seed", InvalidOption, 0))
@@ -229,59 +194,18 @@ class Calibration(Result):
         return Validation(probabilities, tuple(Scores.of(row, self.observed) for row in probabilities))
 
     def fragility(self, motions: Motions, *, model: Model | None = None, **options: Any) -> Fragility:
-        """Fit the specimen's fragility: the ensemble with its weights, in the equation of motion of the calibration.
+        """Fit the specimen's fragility by `rocking.fragility`: the weighted ensemble, by default in its own model.
 
-        Parameters
-        ----------
-        motions : Motion, sequence of Motion, or mapping of str to Motion
-            m motions.
-        model : {"linear", "nonlinear"}, optional
-            By default that of the calibration.
-        **options : object
-            Further arguments of `rocking.fragility`: measure, levels, limits, polarity, band, ...
-
-        Returns
-        -------
-        Fragility
-            What is not known of the block, and how it differs from test to test, widens the curve; its band is that of
-            the motions. The lapse of `predict`, chance that a test is not that of a rocking block at all, is not in it:
-            a weak motion does not overturn what it cannot lift.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (2.0, 3.0, 4.0, 5.0)]
-        >>> found = rocking.calibrate(pulses, [0, 0, 1, 1], p=2.0, restitution=0.9, two_sided=False, candidates=128)
-        >>> found.fragility(pulses, levels=[2.0, 3.0, 4.0, 6.0]).model
-        'nonlinear'
+        The uncertainty of the block, and its dispersion from test to test, widen the curve; its band is that of the
+        motions. The lapse of `predict` is left out, because a weak motion does not overturn what it cannot lift.
         """
         return fragility(self.blocks, motions, weights=self.weights, model=model or self.model, **options)
 
     def spectrum(self, motions: Motions, *, model: Model | None = None, **options: Any) -> RockingSpectrum:
-        """Peak rotation of the specimen, and of larger and smaller ones of its shape, with the ensemble's weights.
+        """Peak rotation of the specimen, and of larger and smaller ones of its shape, as `rocking.rocking_spectrum`.
 
-        Parameters
-        ----------
-        motions : Motion, sequence of Motion, or mapping of str to Motion
-            m motions.
-        model : {"linear", "nonlinear"}, optional
-            By default that of the calibration.
-        **options : object
-            Further arguments of `rocking.rocking_spectrum`: p (rad/s, to which the ensemble's median is moved; by
-            default half to twice its own) or size, fractiles, ...
-
-        Returns
-        -------
-        RockingSpectrum
-            Fractiles of the motions and of the ensemble's weight together.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (2.0, 3.0, 4.0, 5.0)]
-        >>> found = rocking.calibrate(pulses, [0, 0, 1, 1], p=2.0, restitution=0.9, two_sided=False, candidates=128)
-        >>> found.spectrum(pulses, p=[1.0, 2.0]).data.sizes["p"]
-        2
+        The ensemble's median is moved to each p, by default half to twice its own, in the calibrated model; fractiles
+        are those of the motions and of the ensemble's weight together.
         """
         return rocking_spectrum(self.blocks, motions, weights=self.weights, model=model or self.model, **options)
 
@@ -398,24 +322,23 @@ def calibrate(
     model : {"nonlinear", "linear"}
         Equation of motion; the linear one is faster and serves slender specimens.
     p, alpha, restitution : float or pair of float
-        A number, or a pair of equal ones, is known and kept, on both sides and in every test; a pair is the lowest and
-        highest value that is thinkable on either side (rad/s; rad; -), with a prior that is even in the logarithm. A
-        body of known size has p = ``Block(width=..., height=...).p``. The restitution may be "housner": it then
-        follows from the slenderness as 1 - 1.5 sin(alpha)^2 (Housner 1963), and of two sides from those of a rectangle
-        whose centre of mass is off the middle, whose p is that of the rectangle.
+        A number, or a pair of equal ones, is known, on both sides and in every test; a pair is the lowest and highest
+        thinkable value on either side (rad/s; rad; -), with a prior that is even in the logarithm. A body of known size
+        has p = ``Block(width=..., height=...).p``. The restitution may be "housner": it then follows from the
+        slenderness as 1 - 1.5 sin(alpha)^2 (Housner 1963), and of two sides from those of a rectangle whose centre of
+        mass is off the middle, whose p is that of the rectangle.
     two_sided : bool
-        Whether the slendernesses of the two sides may differ, by a factor of 3 at most. p and restitution of a rigid
-        body's sides differ by terms of second order in the slenderness only. By default they may, other than in
-        `calibrate_history`: hardly any specimen leans alike to both sides, and outcomes alone would not show it.
+        Whether the slendernesses of the two sides may differ, by a factor of 3 at most. By default they may, other than
+        in `calibrate_history`: hardly any specimen leans alike to both sides, and outcomes alone would not show it.
     lapse : float
         Chance that an outcome is not that of a rocking block at all.
     candidates : int
-        Blocks that are simulated under every motion, about; up to twice as many while runs disagree, or while few of
-        them tell what a typical population does. A motion that is given several times is simulated once.
+        Approximate number of blocks that are simulated under every distinct motion; up to twice as many while runs
+        disagree, or while few of them represent a typical population.
     ensemble : int
-        Most blocks that are kept for predictions.
+        Largest number of blocks for predictions.
     seed : int
-        The same seed gives the same result.
+        Seed of the random draws.
     threads, progress : optional
         As for `simulate_many`.
 
@@ -433,29 +356,20 @@ def calibrate(
     Notes
     -----
     Each test is taken to have its own block, drawn from a population that is lognormal in p, alpha, restitution and in
-    the ratio of the sides' slendernesses. The probability of an outcome is the share of the population that behaves so
-    (and a small lapse). The posterior over populations is drawn by sequential Monte Carlo (Del Moral, Doucet and Jasra
-    2006), with the prior that is given by the bounds and a lognormal prior on each dispersion (median 10 %).
-
-    Two independent runs each fill the bounds evenly, then try blocks where their own fits are good. A candidate weighs
-    what the density of candidates lacks, so that the prior does not change (deterministic mixture; Owen and Zhou 2000).
-    The summary reports runs that disagree, few effective candidates, and a posterior that reaches a bound.
+    the ratio of the sides' slendernesses. The posterior over populations is drawn by sequential Monte Carlo (Del Moral,
+    Doucet and Jasra 2006), with a lognormal prior on each dispersion (median 10 %). Two independent runs each fill the
+    bounds evenly, then try blocks where their own fits are good. A candidate weighs what the density of candidates
+    lacks, so that the prior does not change (deterministic mixture; Owen and Zhou 2000).
 
     Two mirrored blocks often explain the outcomes equally well; then the estimates of each side are wide while the
     predictions are not.
 
     Examples
     --------
-    A block is hidden behind forty outcomes:
-
-    >>> import numpy as np, rocking
-    >>> hidden = rocking.Block.from_parameters(p=3.0, alpha=0.15, restitution=0.9)
-    >>> pulses = [rocking.pulses.one_sine(a, f) for a in range(1, 9) for f in (0.5, 1.0, 1.5, 2.0, 3.0)]
-    >>> times = np.arange(0.0, 3.0, 0.02)
-    >>> motions = [rocking.Motion.from_samples(one.acceleration(times), 0.02) for one in pulses]
-    >>> overturned = [rocking.simulate(hidden, one, model="linear").overturned for one in motions]
-    >>> found = rocking.calibrate(motions, overturned, model="linear", candidates=512, two_sided=False)
-    >>> bool(np.mean((found.predict(motions) > 0.5) == overturned) > 0.9)
+    >>> import rocking
+    >>> pulses = [rocking.pulses.one_sine(a, 1.0) for a in (2.0, 3.0, 4.0, 5.0)]
+    >>> found = calibrate(pulses, [0, 0, 1, 1], p=2.0, restitution=0.9, two_sided=False, candidates=128)
+    >>> bool(found.predict(rocking.pulses.one_sine(9.0, 1.0))[0] > 0.5)
     True
     """
     tested = several_motions(motions)

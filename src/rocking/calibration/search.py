@@ -81,11 +81,7 @@ def log_density(populations: Floats, widened: float, points: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """Blocks that were tried: coordinates (n, k) in a space, and 1 where one overturned under a motion, else 0, (n, m).
-
-    `evenly` of them fill the space; the `guides` say how many were drawn from which populations, those outside
-    included.
-    """
+    """Blocks that were tried: coordinates (n, k), and 1 where one overturned, else 0, (n, m)."""
 
     space: Space
     points: Floats
@@ -132,10 +128,7 @@ class Candidates:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What was observed under m motions (m,), against what n candidates do under them.
-
-    The lapse is the chance that an outcome is not that of a rocking block at all.
-    """
+    """Observed outcomes of m motions (m,), and those of n candidates under them, with the lapse."""
 
     candidates: Candidates
     observed: Flags
@@ -202,10 +195,7 @@ class Evidence:
 
     @cached_property
     def _powers(self) -> NDArray[np.float32]:
-        """Coordinates of the candidates, their squares and their weights, shape (2 k + 1, n).
-
-        They are counted from the candidates' middle: single precision then serves.
-        """
+        """Coordinates of the candidates from their middle, their squares and their weights, shape (2 k + 1, n)."""
         points = self.candidates.points - self._middle
         powers = np.vstack([points.T, points.T**2, self.candidates.log_weights])
         return np.ascontiguousarray(powers, dtype=np.float32)
@@ -216,11 +206,7 @@ class Evidence:
 
 
 def expected_share(share: Floats, effective: ArrayLike) -> Floats:
-    """Mean of a share that was found with so many effective blocks.
-
-    Few blocks tell little of what a population does: a prediction from one block is no certainty. The likelihood takes
-    shares as they are found: it would otherwise favour where candidates are dense.
-    """
+    """Mean of a share that was found with so many effective blocks: a prediction from one block is no certainty."""
     count = np.asarray(effective)
     return np.asarray((count * share + _JEFFREYS) / (count + 2.0 * _JEFFREYS))
 
@@ -331,17 +317,7 @@ def _compared(
 
 
 def r_hat(runs: Floats) -> float:
-    """R-hat of draws of several runs, shape (runs, draws): of their ranks or of their distances from the middle.
-
-    1 where runs differ no more than draws within a run (Vehtari et al. 2021, here without splitting the runs).
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> same = np.random.default_rng(0).normal(size=(2, 500))
-    >>> r_hat(same) < 1.01, r_hat(same + [[0.0], [1.0]]) > 1.1, r_hat(same * [[1.0], [3.0]]) > 1.1
-    (True, True, True)
-    """
+    """R-hat of the ranks, or distances from the middle, of draws (runs, draws); 1 where runs agree."""
     from scipy.special import ndtri
     from scipy.stats import rankdata
 
@@ -364,10 +340,8 @@ def posterior(
 ) -> Floats:
     """Draw populations from the posterior, shape (count, 2 k); with an exponent of the likelihood, from a wider one.
 
-    Sequential Monte Carlo (Del Moral, Doucet and Jasra 2006): particles start with their centres at candidates, so
-    where the search has looked, and follow the geometric path from that density to the posterior. Each step keeps half
-    of them effective, resamples, and moves them in some rounds by differences of other particles (differential
-    evolution), so that several separate optima are all followed.
+    Sequential Monte Carlo (Del Moral, Doucet and Jasra 2006): particles start with their centres at candidates, and
+    each step keeps half of them effective, resamples, and moves them by differences of others (differential evolution).
     """
     space, points = evidence.candidates.space, evidence.candidates.points
     centres = points[rng.choice(len(points), min(4 * count, len(points)), replace=False)]

@@ -50,11 +50,10 @@ Knowledge = float | Range | Literal["housner"]
 
 @dataclass(frozen=True, eq=False)
 class Space:
-    """Blocks in logarithmic coordinates: what is not known of p, slenderness (mean of both sides) and restitution.
+    """Blocks in logarithmic coordinates: unknown ones of p, slenderness (mean of both sides) and restitution.
 
-    The f unknown parameters keep to bounds on each side, whose logarithms are `lower` and `upper`; a restitution that
-    is neither unknown nor known follows from the slenderness. The last coordinate of a two-sided block is the logarithm
-    of the ratio of the slenderness of side + to that of side -, at most `ratio`, which is 0 for symmetric blocks.
+    Their bounds have the logarithms `lower` and `upper`; a restitution that is neither unknown nor known follows from
+    the slenderness. The last coordinate of a two-sided block is the logarithm of the ratio of its slendernesses.
     """
 
     unknown: tuple[str, ...]
@@ -69,7 +68,9 @@ class Space:
         bounds, known = {}, {}
         for name, given in zip(PARAMETERS, (p, alpha, restitution), strict=True):
             if isinstance(given, str):
-                _check_housner(name, given)
+                if name != "restitution" or given != HOUSNER:
+                    wanted = "a value or a pair (lowest, highest)" + f", or {HOUSNER!r}" * (name == "restitution")
+                    raise InvalidOption(f"{{}} must be {wanted}, not {given!r}", name, value=given)
             elif is_known(given):
                 known[name] = known_value(np.ravel(given)[0], name)
             else:
@@ -185,12 +186,6 @@ def known_value(value: object, name: str) -> float:
     if known > HIGHEST[name]:
         raise InvalidOption(f"{{}} must be at most {HIGHEST[name]:g}, not {known:g}", name, value=known)
     return known
-
-
-def _check_housner(name: str, given: str) -> None:
-    if name != "restitution" or given != HOUSNER:
-        wanted = "a value or a pair (lowest, highest)" + (f", or {HOUSNER!r}" if name == "restitution" else "")
-        raise InvalidOption(f"{{}} must be {wanted}, not {given!r}", name, value=given)
 
 
 def value_range(pair: Any, name: str, highest: float) -> Range:

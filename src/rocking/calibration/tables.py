@@ -148,10 +148,7 @@ def _tests_of(table: _Table, **about: Any) -> list[ShakeTest]:
 
 
 def _motions_of(table: _Table, *, channel: Any, dt: Any, units: Any) -> tuple[Motion, ...]:
-    """Read the motion of each row, with its vertical component and times its scale where it has such cells.
-
-    A row's own channel, step (dt_s) and units are before those that are given for all.
-    """
+    """Read the motion of each row, scaled, with its vertical; its own channel, dt_s and units come first."""
     several = len({row["motion"] for _, row in table.rows}) > 1
     read: dict[tuple[object, ...], Motion] = {}
     motions = []
@@ -209,12 +206,8 @@ def read_tests(
         file or a channel; channel, dt_s (step, s) and units are for files that do not say them. What was observed is in
         overturned (1 or 0, yes or no, true or false). The columns name and group are those of `ShakeTest`. Columns of
         other names are left aside, but a column specimen must name one specimen throughout.
-    channel : str, optional
+    channel, dt, units : optional
         As for `rocking.read`, of rows that name none themselves.
-    dt : float, optional
-        Likewise the step, s.
-    units : str, optional
-        Likewise the units.
 
     Returns
     -------
@@ -229,12 +222,11 @@ def read_tests(
     Examples
     --------
     >>> import pathlib, tempfile
-    >>> rows = "motion,scale,overturned", "ridgecrest-clc-090,0.5,0", "ridgecrest-clc-090,3,1"
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     table = pathlib.Path(folder, "tests.csv")
-    ...     _ = table.write_text("\n".join(rows))
+    ...     _ = table.write_text("motion,scale,overturned\nridgecrest-clc-090,0.5,0")
     ...     read_tests(table)
-    [<ShakeTest: ridgecrest-clc-090, stood>, <ShakeTest: ridgecrest-clc-090, overturned>]
+    [<ShakeTest: ridgecrest-clc-090, stood>]
     """
     table = read_table(checks.path(path, "path of a table", UnreadableRecord))
     if not {"motion", "overturned"} <= {*table.columns}:
@@ -247,11 +239,9 @@ def read_observed(
 ) -> dict[str, Any]:
     """Read a table of observed outcomes as arguments of `fit_fragility`.
 
-    It has a column overturned (1 or 0, yes or no; with a column trials, how many of them), and either an intensity
-    (`HEADINGS`; "PGA (g)" is pga_g as well) or a motion (a record file, or a shipped record; with columns scale and
-    channel where wanted), of which the measure is taken. A column group holds labels of outcomes that belong together,
-    as those of one earthquake; tests under one motion do in any case, and so do groups that have a motion in common.
-    A row without a label belongs to no group. Channel, dt and units are what record files do not say.
+    It has a column overturned (with a column trials: how many of them), and either an intensity (`HEADINGS`) or a
+    motion, as in `read_tests`. A column group holds labels of outcomes that belong together; those under one motion do
+    in any case, as do groups that have a motion in common. A row without a label belongs to no group.
     """
     table = read_table(path, heading_of)
     columns = table.columns
@@ -298,10 +288,7 @@ def _under_motions(table: _Table, measure: Measure, **files: Any) -> dict[str, A
 
 
 def _clusters(table: _Table, families: Mapping[str, int]) -> list[int]:
-    """One number for all rows that belong together, because they share a motion or a group, perhaps through others.
-
-    Motions are one where they are multiples of one another, as their ``families`` say by name.
-    """
+    """One number for all rows that share a motion (or a multiple of it) or a group, perhaps through others."""
     clusters = [*range(len(table.rows))]
     first: dict[tuple[str, str | int], int] = {}
     for k, (_, row) in enumerate(table.rows):

@@ -172,13 +172,7 @@ def command_of(arguments: Sequence[str]) -> App:
 
 
 def refuse_unknown_options(given: Iterable[object], arguments: Sequence[str]) -> None:
-    """Check that no name of a record is an option that the command does not have; after "--" any name may be one.
-
-    Raises
-    ------
-    InvalidOption
-        Naming that option, and the one that may be meant.
-    """
+    """Check that no name of a record is an option that the command does not have; after "--" any name may be one."""
     typed = arguments[: arguments.index("--")] if "--" in arguments else arguments
     for name in given:
         if isinstance(name, str) and name.startswith("-") and name.lstrip("-")[:1].isalpha() and name in typed:

@@ -321,13 +321,7 @@ class _RecordOptions(FileOptions):
     ] = False
 
     def read_all(self, names: Sequence[str]) -> ReadRecords:
-        """Return the motions of records, folders of them and patterns, and the pulses, by the name of each.
-
-        Raises
-        ------
-        UnreadableRecord
-            If one cannot be read, or with --keep-going none.
-        """
+        """Return the motions of records, folders of them, patterns and pulses, by the name of each."""
         records, pulses = expanded(names), self.given().get("pulse", ())
         if not records and not pulses:
             raise InvalidOption(

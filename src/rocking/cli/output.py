@@ -50,13 +50,7 @@ class OutputOptions(PrintOptions):
 
 
 def write_results(folder: Path, *, figures: Mapping[str, Callable[[], Figure]], result: Mapping[str, Any]) -> None:
-    """Write figures (PNG and PDF), given by name as what draws them, and a result (JSON) into a folder.
-
-    Raises
-    ------
-    OutputError
-        If one of them cannot be written.
-    """
+    """Write figures (PNG and PDF), given by name as what draws them, and a result (JSON) into a folder."""
     for stem, draw in figures.items():
         with left_out(f"{stem}.png and {stem}.pdf"):
             figure = draw()
@@ -146,13 +140,7 @@ def output_folder(folder: Path, *, listed: bool = False) -> Iterator[Path]:
 
 
 def subfolder(folder: Path, name: str) -> Path:
-    """Make a folder in that of the results, unless it is there.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be made, as where a file has its name.
-    """
+    """Make a folder in that of the results, unless it is there."""
     try:
         (folder / name).mkdir(exist_ok=True)
     except OSError as error:

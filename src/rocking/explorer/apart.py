@@ -35,9 +35,6 @@ _PATIENCE: Final = 60.0
 #: Libraries that would take memory for every processor.
 _ONE_THREAD: Final = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
-#: Digits that a drawing has.
-_DIGITS: Final = 6
-
 #: What `rocking.Solid` is made from, and the sections of its outline.
 Made = tuple[dict[str, Any], Sections]
 
@@ -106,7 +103,7 @@ def _answer(data: bytes) -> dict[str, Any]:
             "path": error.path,
         }
     plain = {name: each.tolist() if isinstance(each, np.ndarray) else each for name, each in made.items()}
-    pieces = [(section, np.round(corners, _DIGITS).tolist()) for section, corners in sections.pieces]
+    pieces = [(section, np.round(corners, 6).tolist()) for section, corners in sections.pieces]
     return {"made": plain, "heights": sections.heights.tolist(), "pieces": pieces}
 
 
@@ -126,11 +123,7 @@ def _limit_this_process() -> None:
             resource.setrlimit(kind, (soft, hard))
 
 
-def _main() -> None:
+if __name__ == "__main__":
     _limit_this_process()
     out, sys.stdout = sys.stdout, sys.stderr
     json.dump(_answer(sys.stdin.buffer.read()), out)
-
-
-if __name__ == "__main__":
-    _main()

@@ -35,17 +35,11 @@ from rocking.simulation.simulate import simulate
 
 #: Levels of a fragility, and points of its curve.
 _LEAST, _MOST = 2, 60
-_POINTS: Final = 121
-
-#: The highest level stands for this share of the sudden velocity that overturns the block at one blow.
-_STRONG: Final = 2.0
 
 #: Levels of the margin are this times the one before, from the lowest that lifts the block, as many at most, and so
 #: many are simulated at once; the first that overturns is then closed in on.
 _STEP: Final = 1.05
-_MOST_FACTORS: Final = 128
 _AT_ONCE: Final = 16
-_HALVINGS: Final = 24
 
 #: Rules of thumb that are shown, what each says, and where it comes from.
 RULES: Final[Mapping[str, str]] = {
@@ -70,10 +64,7 @@ print(found.summary())
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
-    """A case, the entries of its list of records, and to which levels of which measure each is scaled.
-
-    Entries of one station have the same number among ``clusters``.
-    """
+    """A case, the entries of its list of records with ``clusters`` by station, and the levels of a measure."""
 
     case: Case
     entries: list[dict[str, str]]
@@ -99,13 +90,7 @@ class Assessment:
 
 
 def assessment_of(case: Case, texts: Texts, uploads: UploadStore) -> Assessment:
-    """Read what is assessed: ``records`` as `catalogue.entries_of`, ``measure``, its levels, and ``friction``.
-
-    Raises
-    ------
-    InvalidOption
-        If the list is empty, or a text is out of range.
-    """
+    """Read what is assessed: ``records`` as `catalogue.entries_of`, ``measure``, its levels, and ``friction``."""
     given = {name: texts[name].strip() for name in ASSESSMENT if texts.get(name, "").strip()}
     entries = entries_of(given.get("records", ""))
     if not entries:
@@ -215,7 +200,7 @@ def _part(header: dict[str, Any], assessment: Assessment, fallen: list[Floats]) 
     except Unfitted as refused:
         words = phrase("assessment.no_fit", reason=str(refused))
         return Payload({**header, "fit": None, "why": words, "outcomes": count}, arrays)
-    curve, at = fitted.curves[0], np.linspace(0.0, assessment.levels[-1], _POINTS)
+    curve, at = fitted.curves[0], np.linspace(0.0, assessment.levels[-1], 121)
     lower, upper = curve.band(at) if curve.bounded else (np.zeros_like(at), np.ones_like(at))
     fit = {
         "median": curve.median,
@@ -256,11 +241,9 @@ def _rated(case: Case, motion: Motion) -> dict[str, Any]:
 
 
 def _margin(case: Case) -> dict[str, Any] | None:
-    """Return the factor on the case's motion at which it first overturns the block, and the peak acceleration of that.
+    """Return the lowest factor on the case's motion that overturns the block, or None, and the peak acceleration.
 
-    Levels that overturn may be several bands with gaps between: the lowest is looked for in steps from the level that
-    lifts the block. What is thinner than a step is not seen. Where no level overturns, the factor is None and the peak
-    acceleration that of the highest level looked at.
+    Levels that overturn may be several bands; what is thinner than a step from the level of uplift is not seen.
     """
     motion = case.motion
     if motion is None or motion.pga == 0.0:
@@ -277,14 +260,12 @@ def _margin(case: Case) -> dict[str, Any] | None:
     found: dict[str, Any] = {"factor": None, "pga": motion.pga}
     if math.isinf(lifting):
         return found
-    factors = lifting * _STEP ** np.arange(-1.0, _MOST_FACTORS)  # the lowest does not lift the block
+    factors = lifting * _STEP ** np.arange(-1.0, 128)  # the lowest does not lift the block
     for start in range(1, len(factors), _AT_ONCE):
         fallen = np.flatnonzero(fall(factors[start : start + _AT_ONCE]))
         if fallen.size:
             low, high = factors[start + fallen[0] - 1 : start + fallen[0] + 1]
-            factor = bisected(
-                float(low), float(high), lambda each: bool(fall(np.array([each]))[0]), halvings=_HALVINGS
-            )[1]
+            factor = bisected(float(low), float(high), lambda each: bool(fall(np.array([each]))[0]), halvings=24)[1]
             return found | {"factor": factor, "pga": factor * motion.pga}
     return found | {"pga": float(factors[-1]) * motion.pga}
 
@@ -303,7 +284,8 @@ def _sudden(case: Case) -> float:
 
 def _range(case: Case, measure: Measure, motions: Iterable[Motion]) -> tuple[float, float]:
     """Levels from where the first record lifts the block to where half of them are strong enough to overturn it."""
-    lifting, sudden = min(case.block.uplift_thresholds(case.model)), _STRONG * _sudden(case)
+    # Twice the sudden velocity that overturns the block at one blow.
+    lifting, sudden = min(case.block.uplift_thresholds(case.model)), 2.0 * _sudden(case)
     values = [(measure.value(motion), motion.pga, motion.pgv) for motion in motions]
     low = min(lifting * value / pga for value, pga, _ in values)
     high = float(np.median([sudden * value / pgv for value, _, pgv in values]))

@@ -55,31 +55,21 @@ _LINKS: Final = 100
 
 _READING: Final = ("GET", "HEAD")
 
-#: Port of an address that names none.
-_ASSUMED: Final = 80
-
-#: Folders of the page's files.
-_FILES: Final = ("/page/", "/library/")
-
-_OTHER_SERVER: Final = "this address is not served here: open the link that rocking explore printed"
 _UNKNOWN: Final = (
     "this page needs the link that rocking explore printed, which opens once in one browser: open that link, or start "
     "rocking explore again; in a notebook, run the cell again"
 )
-_OTHER_PAGE: Final = "only the page of this server may send this"
 
 
 class RequestAuthentication:
-    """ASGI application that passes on to another one what it lets through.
-
-    The server listens at ``port``, and may be called by the names ``hosts``, which are without it.
-    """
+    """ASGI application that passes on what it lets through, called at ``port`` by the names ``hosts``."""
 
     def __init__(self, application: Application, port: int, hosts: Iterable[str] = LOOPBACK) -> None:
         self._application = application
         # Browsers write names in lower case, and leave out the port that they assume.
         names = [host.lower().encode() for host in hosts]
-        self._hosts = frozenset([b"%s:%d" % (name, port) for name in names] + (names if port == _ASSUMED else []))
+        # The port of an address that names none.
+        self._hosts = frozenset([b"%s:%d" % (name, port) for name in names] + (names if port == 80 else []))
         self._secret = secrets.token_urlsafe(32)
         self._tokens: list[str] = []
         self._lock = threading.Lock()
@@ -113,7 +103,7 @@ class RequestAuthentication:
         """Return status and reason if the request names another server or comes from another page."""
         hosts = _values(scope, b"host")
         if len(hosts) != 1 or hosts[0] not in self._hosts:
-            return 421, _OTHER_SERVER
+            return 421, "this address is not served here: open the link that rocking explore printed"
         origins, sites = _values(scope, b"origin"), _values(scope, b"sec-fetch-site")
         ours = [b"http://" + hosts[0]]
         if scope["method"] in _READING:
@@ -122,7 +112,7 @@ class RequestAuthentication:
             own = origins in ([], ours) and (navigates or sites in ([], [b"same-origin"], [b"none"]))
         else:
             own = origins == ours or (origins == [] and sites == [b"same-origin"])
-        return None if own else (403, _OTHER_PAGE)
+        return None if own else (403, "only the page of this server may send this")
 
     def _redeemed(self, token: bytes) -> bool:
         """Whether a token is known and was not used before; it is used then."""
@@ -137,7 +127,7 @@ class RequestAuthentication:
 def _is_public(scope: Scope) -> bool:
     """Whether a request only reads the page or one of its files."""
     path = scope["path"]
-    return scope["method"] in _READING and (path == "/" or path.startswith(_FILES))
+    return scope["method"] in _READING and (path == "/" or path.startswith(("/page/", "/library/")))
 
 
 def _bearer(scope: Scope) -> bytes:

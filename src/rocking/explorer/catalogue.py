@@ -21,9 +21,6 @@ from rocking.explorer.uploads import UploadStore, measures
 MOST: Final = 160
 _LETTERS: Final = 40_000
 
-#: Components of one station are as long as each other up to this share.
-_AS_LONG: Final = 0.01
-
 #: What names a component at the end of a file's name or of a channel: azimuths, directions, codes of instruments.
 _UP: Final = r"up|ud[12]?|dwn|down|vrt|vert(?:ical)?|u-d|[behls][hln]z|z|v"
 _LEVEL: Final = r"ns[12]?|ew[12]?|n-s|e-w|[behls][hln][ne123xy]|[nexy]|[nsew]\d{1,3}[nsew]|h[12]|[0-3]\d\d"
@@ -67,11 +64,6 @@ class Component:
 def entries_of(text: str) -> list[dict[str, str]]:
     """Read a list from an address: entries with ; between, each the texts of a motion as a query.
 
-    Raises
-    ------
-    InvalidOption
-        If it is too long, or an entry has texts that are not those of a motion.
-
     Examples
     --------
     >>> entries_of("motion=ridgecrest-clc-090&vertical=ridgecrest-clc-up;motion=ridgecrest-clc-360")
@@ -94,11 +86,7 @@ def entries_of(text: str) -> list[dict[str, str]]:
 
 
 def listing(uploads: UploadStore, answers: Iterable[Texts] = ()) -> dict[str, Any]:
-    """Return all records in groups, each of one station, and how much of what may be kept is in use.
-
-    ``answers`` say with which ``dt`` and ``units`` the file of each ``key`` is read. A file that cannot be read
-    with its answer is listed as without one, with what is wrong as the reason of its group.
-    """
+    """Return all records in groups, each of one station; ``answers`` are ``dt`` and ``units`` of each file's key."""
     known = {answer["key"]: answer for answer in answers if "key" in answer}
     files, problems = [], {}
     for key in uploads.kept():
@@ -224,7 +212,7 @@ def _belongs(one: Component, group: list[Component]) -> bool:
         or any(each.key == one.key for each in group)
     ):
         return False
-    if abs(one.samples - first.samples) > _AS_LONG * max(one.samples, first.samples):
+    if abs(one.samples - first.samples) > 0.01 * max(one.samples, first.samples):
         return False
     if one.station and first.station and (one.station, one.event) != (first.station, first.event):
         return False

@@ -11,8 +11,7 @@ from rocking.explorer.inputs import Case
 from rocking.explorer.maps import Axis, MapGrid, sign_of
 from rocking.explorer.motions import arguments_of, is_pulse, pulse_call
 from rocking.explorer.parameters import BLOCK_NAMES, NAMES, QUANTITIES
-from rocking.explorer.periodic import KEPT, PASSED
-from rocking.explorer.sweeps import Sweep, call_at
+from rocking.explorer.periodic import KEPT, PASSED, Sweep, call_at
 from rocking.inputs.texts import command_line
 
 _CHATTERING: Final = """\
@@ -155,10 +154,7 @@ def case_as_command(case: Case) -> str | None:
 
 
 def map_as_python(grid: MapGrid, quantity: str) -> str:
-    """Write a script that computes a quantity of a map; it runs as it stands.
-
-    How the first rocking ends is told by `chattering_map`, everything else by `simulate_many` to the bits of the map.
-    """
+    """Write a script that computes a quantity of a map; it runs as it stands."""
     texts = {"x": grid.x.name, "y": grid.y.name, "xs": _values(grid.x), "ys": _values(grid.y)}
     before = grid.case.motion_before
     if quantity == "outcome":
@@ -195,7 +191,8 @@ def map_as_python(grid: MapGrid, quantity: str) -> str:
 def map_as_command(grid: MapGrid) -> str | None:
     """Write a map of overturning as a command; None for what the command line does not map."""
     texts = grid.case.texts
-    if not _is_overturning_map(grid) or "gravity" in texts:
+    is_of_pulse = texts.get("motion", "").partition(":")[0] in PULSES
+    if not is_of_pulse or (grid.x.name, grid.y.name) != ("omega", "a") or "gravity" in texts:
         return None
     name, given = texts["motion"].partition(":")[0], arguments_of(texts["motion"])
     if "duration" in given:  # the command has no cut pulses
@@ -269,12 +266,6 @@ def block_options(case: Case) -> dict[str, str]:
     return {**case.block_options, **{each: case.texts[each] for each in ("model",) if each in case.texts}}
 
 
-def _is_overturning_map(grid: MapGrid) -> bool:
-    """Whether the map is one of `rocking.overturning_map`: a pulse's amplitude over its frequency."""
-    name = grid.case.texts.get("motion", "").partition(":")[0]
-    return name in PULSES and (grid.x.name, grid.y.name) == ("omega", "a")
-
-
 def _values(axis: Axis) -> str:
     return f"np.linspace({float(axis.values[0])!r}, {float(axis.values[-1])!r}, {len(axis.values)})"
 
@@ -284,10 +275,7 @@ def _range(axis: Axis) -> str:
 
 
 def _block(grid: MapGrid, *, by_size: bool = False) -> str:
-    """Call that makes the block, with the names of the axes among its arguments.
-
-    A pulse of another frequency is the same block of another p, in other units of time: ``by_size`` it is that.
-    """
+    """Call that makes the block, with the axes' names as arguments; ``by_size`` in place of the pulse's frequency."""
     varied = {grid.x.name, grid.y.name} & {"p", "alpha", "restitution", *(["omega"] if by_size else [])}
     texts, sides = grid.case.texts, grid.case.block.sides
     if not varied:

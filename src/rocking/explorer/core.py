@@ -1,25 +1,26 @@
-"""From a case to what a page shows: arrays, numbers and words. It knows no web."""
+"""From a case, or two beside each other, to what a page shows: arrays, numbers and words. It knows no web."""
 
 from __future__ import annotations
 
+import math
 import sys
 import tempfile
 import threading
 from collections import OrderedDict
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
+from rocking.core import checks
 from rocking.core.arrays import Floats
+from rocking.core.tables import named
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.explorer.code import case_as_command, case_as_python
-from rocking.explorer.comparing import as_csv, shift_of
-from rocking.explorer.facts import facts
 from rocking.explorer.inputs import read_case
 from rocking.explorer.meshes import described
 from rocking.explorer.parameters import Texts, names_of
 from rocking.explorer.payload import Payload
-from rocking.explorer.simulated import Simulated
+from rocking.explorer.simulated import Simulated, facts
 from rocking.explorer.uploads import UploadStore
 from rocking.explorer.windows import (
     POINTS,
@@ -31,14 +32,69 @@ from rocking.explorer.windows import (
     lines_in,
     lines_of,
 )
+from rocking.motion.measures import significant_span
 from rocking.response import Response, active_span
+
+
+def _begun(response: Response) -> float:
+    motion = response.motion
+    found = math.nan if motion is None else significant_span(motion, start=0.05)[0]
+    return 0.0 if math.isnan(found) else found
+
+
+def _lifted(response: Response) -> float:
+    times = response.events["time"][response.events["kind"] == "uplift"]
+    return float(times[0]) if len(times) else 0.0
+
+
+#: Moments, s, that are laid over each other; 0 where a response has no such one.
+ALIGNED: Final[Mapping[str, Callable[[Response], float]]] = {
+    "start": lambda _: 0.0,
+    "uplift": _lifted,
+    "arias": _begun,
+}
+
+
+def shift_of(first: Response, second: Response, align: str) -> float:
+    """Return by how much later, s, the second is drawn than it happens, for the chosen moments to coincide.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block = rocking.Block(width=0.24, height=1.1)
+    >>> first, second = (rocking.simulate(block, rocking.pulses.sine(3.0, f, cycles=2)) for f in (1.0, 2.0))
+    >>> f"{shift_of(first, second, 'uplift'):.4f}"
+    '0.0632'
+    """
+    moment = ALIGNED[checks.one_of(align, "align", InvalidOption, list(ALIGNED))]
+    return moment(first) - moment(second)
+
+
+def as_csv(responses: Mapping[str, Response], shift: float) -> str:
+    """Return the histories of two responses below each other, each under its name, in its own time and the common one.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block = rocking.Block(width=0.24, height=1.1)
+    >>> response = rocking.simulate(block, rocking.pulses.sine(3.0, 1.0, cycles=1))
+    >>> as_csv({"one": response, "other": response}, 2.0).splitlines()[0]
+    'case,common_time_s,time_s,rotation_rad,angular_velocity_rad_s,ground_acceleration_m_s2'
+    """
+    import pandas as pd
+
+    frames = []
+    for (name, response), later in zip(responses.items(), (0.0, shift), strict=True):
+        frame = response.to_dataframe("histories").reset_index()
+        frame.insert(0, named("common_time", "s"), frame[named("time", "s")] + later)
+        frame.insert(0, "case", name)
+        frames.append(frame)
+    return str(pd.concat(frames).to_csv(index=False))
+
 
 #: Responses that are kept; their steps and the samples of their motions, some hundreds of MB at most.
 _KEPT: Final = 48
 _KEPT_ROWS: Final = 2_000_000
-
-#: With what a spreadsheet's formulas begin.
-_FORMULA: Final = ("=", "+", "-", "@", "\t", "\r")
 
 #: What a figure or a table can be written as, and the type of its content.
 EXPORTS: Final[Mapping[str, str]] = {
@@ -139,11 +195,7 @@ class Explorer:
         align: str = "start",
         whole: bool = False,
     ) -> Payload:
-        """Return two cases in one window of the first one's time, with chosen moments over each other (`ALIGNED`).
-
-        The second is another case as a ``whole``, or the first with some texts changed: those of its block, or of its
-        motion and its start, go together.
-        """
+        """Return two cases in one window, with chosen moments over each other; the second is ``whole`` or changed."""
         first, second = self._compared(texts, changed, whole=whole)
         shift = shift_of(first.response, second.response, align)
         spans = [active_span(first.response), tuple(end + shift for end in active_span(second.response))]
@@ -179,7 +231,8 @@ class Explorer:
         """Return the histories of two cases as one table, each under its name."""
         first, second = (shown.response for shown in self._compared(texts, changed, whole=whole))
         # A spreadsheet takes no name for a formula.
-        one, other = (f"'{name}" if name.startswith(_FORMULA) else name for name in names)
+        # A formula of a spreadsheet begins so.
+        one, other = (f"'{name}" if name.startswith(("=", "+", "-", "@", "\t", "\r")) else name for name in names)
         other = f"{other} (other)" if one == other else other
         return as_csv({one: first, other: second}, shift_of(first, second, align)).encode()
 
@@ -208,8 +261,15 @@ class Explorer:
             elif form == "nc":
                 response.to_netcdf(file)
             else:
+                shown = None if window is None else checked_window(window, response.duration)
                 with self._drawing:
-                    _draw(response, file, None if window is None else checked_window(window, response.duration))
+                    from matplotlib import rc_context
+
+                    figure = response.plot(window=shown, longest_sequence=bool(len(response.chattering)))
+                    with rc_context({"svg.hashsalt": "rocking"}):
+                        figure.savefig(file, dpi=160)
+                    if "matplotlib.pyplot" in sys.modules:
+                        sys.modules["matplotlib.pyplot"].close(figure)
             return file.read_bytes()
 
     def _rows(self) -> int:
@@ -223,20 +283,7 @@ class Explorer:
 
 
 def _changed(texts: Texts, changed: Texts) -> dict[str, str]:
-    """Texts of a case with others in their place; those of a whole block go together, and of a motion with its start.
-
-    The form of a motion leaves out what begins at rest, so that another motion without a start has none.
-    """
+    """Texts of a case with others in their place; a block's, or a motion's and its start's, go together."""
     together = [(names_of("block"), names_of("block")), (names_of("motion"), names_of("motion", "start"))]
     gone = {name for given, names in together if changed.keys() & {*given} for name in names}
     return {name: value for name, value in texts.items() if name not in gone} | dict(changed)
-
-
-def _draw(response: Response, file: Path, window: tuple[float, float] | None) -> None:
-    from matplotlib import rc_context
-
-    figure = response.plot(window=window, longest_sequence=bool(len(response.chattering)))
-    with rc_context({"svg.hashsalt": "rocking"}):
-        figure.savefig(file, dpi=160)
-    if "matplotlib.pyplot" in sys.modules:
-        sys.modules["matplotlib.pyplot"].close(figure)

@@ -43,12 +43,11 @@ _OF_BLOCKS: Final = frozenset({*names_of("block"), "gravity", "model", "duration
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """What `rocking.simulate` takes, with the texts from which it was read.
+    """Arguments of `rocking.simulate`, with the texts from which they were read.
 
-    ``block_call`` and ``motion_call`` are the expressions that make block and motion, with the line that the latter
-    needs before it, if any, in ``motion_before``; ``block_options`` are the options that describe the block on the
-    command line, and ``words`` the arguments that name the motion: none where it cannot be named. The block of a mesh
-    has the ``body`` of which it is the plane of an ``azimuth``, degrees.
+    ``block_call`` and ``motion_call`` (after the line ``motion_before``, if any) are expressions, ``block_options`` and
+    ``words`` the command line's; None where the motion cannot be named. The block of a mesh has the ``body`` of which
+    it is the plane of an ``azimuth``, degrees.
     """
 
     texts: Texts
@@ -81,17 +80,11 @@ class Case:
 
 
 def read_case(texts: Texts, uploads: UploadStore) -> Case:
-    """Read what is simulated from texts; those that are not given have the command line's defaults.
+    """Read what is simulated from texts by the names of `PARAMETERS`, with the command line's defaults.
 
-    Parameters
-    ----------
-    texts : mapping of str to str
-        Values by the names of `PARAMETERS`; empty ones count as not given. ``motion`` is the name of a shipped record,
-        a pulse (``sine:amplitude=0.3g,frequency=1,cycles=2.5``), ``file:KEY``, ``given:KEY`` or ``none``; ``vertical``
-        is the name of a shipped record, ``file:KEY``, ``file:KEY#CHANNEL``, or a channel of the motion's own file;
-        ``mesh`` is the name of a shipped mesh, or ``file:KEY``.
-    uploads : UploadStore
-        Where the files and motions of keys are.
+    ``motion`` is the name of a shipped record, a pulse (``sine:amplitude=0.3g,frequency=1,cycles=2.5``), ``file:KEY``,
+    ``given:KEY`` or ``none``; ``vertical`` is the name of a shipped record, ``file:KEY``, ``file:KEY#CHANNEL``, or a
+    channel of the motion's own file; ``mesh`` is the name of a shipped mesh, or ``file:KEY``.
 
     Examples
     --------
@@ -233,15 +226,10 @@ def text_at(parameter: Input, step: int) -> str:
 
 
 def tracks(texts: Texts) -> dict[str, list[list[int]]]:
-    """Return the first and the last step of each slider of a case's block, for both sides or for each.
-
-    Beyond them the block would be refused, all else unchanged. A field that the case leaves out has its default; a mesh
-    has no such ends.
+    """Return the first and the last step of each slider of a case's block, beyond which it would be refused.
 
     Examples
     --------
-    A centre of mass is at most a quarter of the width off the middle:
-
     >>> found = tracks({"width": "0.4", "height": "1", "offset": "0.05"})
     >>> [text_at(PARAMETERS["offset"], step) for step in found["offset"][0]]
     ['-0.1', '0.1']

@@ -30,9 +30,6 @@ if TYPE_CHECKING:
 #: Address that nobody but this machine can reach.
 HERE: Final = "127.0.0.1"
 
-#: Pages that may show the explorer in a frame: a notebook that this machine serves.
-_NOTEBOOKS: Final = "http://localhost:* http://127.0.0.1:*"
-
 #: Connections at the same time, and those that wait to be accepted.
 _MOST: Final = 400
 _WAITING: Final = 128
@@ -90,10 +87,7 @@ def served(
     port: int = 0,
     framed_by: str = "'none'",
 ) -> Server:
-    """Bind the explorer's application (`rocking.explorer.server.App`) to an address of this machine and a port.
-
-    Port 0 takes one that is free. `InvalidOption` is raised if it cannot be bound, or if a package is missing.
-    """
+    """Bind the explorer's application to an address of this machine and a port; 0 is one that is free."""
     require_packages()
     import uvicorn
 
@@ -188,6 +182,8 @@ _running: tuple[Explorer, Server] | None = None
 def explore(response: Response, *, height: int = 760) -> Frame:
     """Show a response in the explorer, in a frame of the notebook.
 
+    The page is served by this process on 127.0.0.1, and ends with it.
+
     Parameters
     ----------
     response : Response
@@ -204,11 +200,6 @@ def explore(response: Response, *, height: int = 760) -> Frame:
     ------
     InvalidOption
         If it is not a response, or a package of the ``explorer`` extra is missing.
-
-    Notes
-    -----
-    The page is served by this process on 127.0.0.1, so the notebook must be open on the same machine. It ends with
-    the process.
 
     Examples
     --------
@@ -235,7 +226,8 @@ def _server_of_this_process() -> tuple[Explorer, Server]:
     with _lock:
         if _running is None:
             explorer = Explorer()
-            server = served(explorer, {}, framed_by=_NOTEBOOKS)
+            # Notebooks that this machine serves.
+            server = served(explorer, {}, framed_by="http://localhost:* http://127.0.0.1:*")
             server.run_in_background()
             _running = explorer, server
         return _running

@@ -33,16 +33,10 @@ from rocking.motion.motion import Motion
 #: Points of an axis.
 _FEWEST, _MOST = 8, 400
 
-#: Steps between the points of each level, coarse to fine.
-_STRIDES: Final = (8, 4, 2, 1)
-
 
 @dataclass(frozen=True)
 class AxisKind:
-    """A parameter that a map may vary: its name, its unit, and the ranges that are shown first.
-
-    The close range is for chattering, the wide one for overturning.
-    """
+    """A parameter that a map may vary, and its first ranges: close for chattering, wide for overturning."""
 
     name: str
     unit: str
@@ -61,9 +55,6 @@ AXES: Final = {
         AxisKind("pga", "g", (0.1, 1.0), (0.1, 2.0)),
     )
 }
-
-#: Pairs that would vary the same thing twice.
-_SAME: Final = ({"omega", "p"}, {"a", "pga"})
 
 
 class Axis(NamedTuple):
@@ -109,29 +100,20 @@ def axes_of(case: Case) -> list[str]:
 
 
 def _has_one_slenderness(case: Case) -> bool:
-    """Whether blocks of another slenderness, the same on both sides, follow from this one.
-
-    Their restitution is Housner's where none is given; two p, pivots and eccentric sizes belong to another.
-    """
+    """Whether blocks of another slenderness, the same on both sides, follow from this one."""
     plus, minus = case.block.sides
     return "restitution" in case.texts or (plus.p == minus.p and not {"pivots", "offset", "mesh"} & case.texts.keys())
 
 
 def grid_of(case: Case, texts: Texts) -> MapGrid:
-    """Read the axes of a map: ``x``, ``x_from``, ``x_to``, the same of ``y``, and how many ``points`` each has.
-
-    Raises
-    ------
-    InvalidOption
-        If the case has no motion, or an axis is none of it, varies the same as the other or is out of range.
-    """
+    """Read the axes of a map: ``x``, ``x_from``, ``x_to``, the same of ``y``, and how many ``points`` each has."""
     if case.motion is None or case.motion.pga == 0.0:
         raise InvalidOption("a map needs something that shakes the block: choose a record or a pulse", "motion")
     points = number(texts.get("points", "200"), "points")
     if not (_FEWEST <= points <= _MOST and points == int(points)):
         raise InvalidOption(f"a map has from {_FEWEST} to {_MOST} points on each axis, not {points:g}")
     x, y = (_axis(which, case, texts, int(points)) for which in ("x", "y"))
-    if x.name == y.name or {x.name, y.name} in _SAME:
+    if x.name == y.name or {x.name, y.name} in ({"omega", "p"}, {"a", "pga"}):  # pairs that vary the same thing
         raise InvalidOption("{} and {} vary the same: choose another pair of axes", x.name, y.name)
     # Blocks of a map over the restitution have one on both sides, and the highest comes to rest last.
     eta = [float(axis.values[-1]) for axis in (x, y) if axis.name == "restitution"]
@@ -171,19 +153,15 @@ def parts(grid: MapGrid, threads: int | None = None) -> Generator[Part]:
 
 
 def _passed(grid: MapGrid, thresholds: Floats, factor: float) -> tuple[tuple[float, float], float]:
-    """Thresholds (m/s^2) and gravity with which the motion as it is passes what it passes times a factor.
-
-    A vertical component changes gravity: it is divided, too.
-    """
+    """Thresholds (m/s^2) and gravity, divided, with a vertical component, by the factor of the motion."""
     gravity = grid.case.block.gravity
     return (float(thresholds[0]), float(thresholds[1])), gravity / factor if grid.motion.vertical else gravity
 
 
 def curves(grid: MapGrid) -> dict[str, Floats]:
-    """Critical amplitudes along the x axis: exact, and by the paper's Eq. 76 where that was fitted.
+    """Critical amplitudes along the x axis of a symmetric block under a sine: exact, and by the paper's Eq. 76.
 
-    Empty but for a symmetric block under a sine, with the amplitude upwards. NaN where the sine of that amplitude lifts
-    the block as it begins, or is over before the half period has passed in which the block may come to rest.
+    NaN where the sine of that amplitude lifts the block as it begins, or is over before half a period.
     """
     case = grid.case
     motion = case.texts.get("motion", "")
@@ -339,7 +317,7 @@ def _lifting(grid: MapGrid, alpha: float | None) -> float:
 def _tasks(grid: MapGrid, factors: Floats) -> Iterator[Task]:
     """Tasks level by level, row by row; points of a task share the factor on the motion."""
     rows, columns = grid.shape
-    for level, stride in enumerate(_STRIDES):
+    for level, stride in enumerate((8, 4, 2, 1)):
         for row in range(0, rows, stride):
             done = level > 0 and row % (2 * stride) == 0
             index = row * columns + np.arange(stride if done else 0, columns, 2 * stride if done else stride)
@@ -371,10 +349,7 @@ def _both(pair: list[float]) -> str:
 
 
 def change_pulse(texts: dict[str, str], **numbers: float) -> None:
-    """Change some parameters of the pulse in the texts of a case; one that is cut has as many cycles as before.
-
-    The others stay as they are written, so that what depends on them alone is found not to have changed.
-    """
+    """Change some parameters of the pulse in the texts of a case; one that is cut has as many cycles as before."""
     given = arguments_of(texts["motion"])
     if "duration" in given and "frequency" in numbers:
         numbers["duration"] = given["duration"] * given["frequency"] / numbers["frequency"]

@@ -37,9 +37,6 @@ _File = tuple[str, bytes]
 #: Azimuths of the rose, degrees.
 _AZIMUTHS: Final = np.arange(0.0, 360.0, 2.0)
 
-#: Pieces of sections that the plan has at most.
-_PLANNED: Final = 40
-
 #: Parts that are named at most.
 _NAMED: Final = 6
 
@@ -53,10 +50,7 @@ _READERS: Final[Mapping[str, Callable[[str], Any]]] = {
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A body of a mesh, the name of its file, and its outline.
-
-    ``call`` is the expression that makes it, of names of `rocking`.
-    """
+    """A body of a mesh, its file's name and outline; ``call`` is the expression that makes it."""
 
     solid: Solid
     sections: Sections
@@ -70,7 +64,7 @@ class Body:
     def across(self, azimuth: float) -> Floats:
         """Return its outline as it is seen along the axis across an azimuth, from its centre of mass; shape (n, 6)."""
         outline = self.sections.across(azimuth)
-        outline[:, 2:] -= float(self.solid.centre[:2] @ _towards(azimuth))
+        outline[:, 2:] -= float(self.solid.centre[:2] @ np.asarray(directions(azimuth)[0]))
         return outline
 
     def plane(self, azimuth: float) -> dict[str, Any]:
@@ -87,15 +81,17 @@ class Body:
 def described(body: Body, azimuth: float) -> Payload:
     """Return what the page shows of a body: its plan, its rose, and what is said of it; m from its centre of mass."""
     solid, rose = body.solid, body.rose
-    pieces = body.sections.pieces[:: -(-len(body.sections.pieces) // _PLANNED)]
+    pieces = body.sections.pieces[:: -(-len(body.sections.pieces) // 40)]
     corners = np.vstack([piece.corners for piece in pieces]) - solid.centre[:2]
     support = solid.support - solid.centre[:2]
     parts = [each.name for each in solid.regions]
+    data = solid.rose([azimuth]).data
+    left_out = {name: float(data[name][0]) for name in ("coupling", "aside", "gap")}
     header = {
         "name": solid.description,
         "about": _about(solid),
         "parts": parts,
-        "left_out": _left_out(solid, azimuth),
+        "left_out": phrase("body.left_out", azimuth=azimuth, **left_out),
         "repaired": phrase("body.repaired", repairs="; ".join(solid.repairs))
         if solid.repairs
         else phrase("body.sound"),
@@ -122,13 +118,7 @@ def pivots_of(body: Body, azimuth: float) -> tuple[tuple[float, float], float, f
 
 
 class MeshStore:
-    """Bodies of files that are kept; safe to use from several threads. One file is read at a time.
-
-    Parameters
-    ----------
-    file : callable
-        Returns a file that is kept by its key.
-    """
+    """Bodies of files that are kept by key; safe to use from several threads. One file is read at a time."""
 
     def __init__(self, file: Callable[[str], _File]) -> None:
         self._file = file
@@ -176,14 +166,3 @@ def _about(solid: Solid) -> dict[str, Any]:
     if solid.mass is None:
         return phrase("body.is", name=whole, **size)
     return phrase("body.is_heavy", name=whole, mass=solid.mass, **size)
-
-
-def _left_out(solid: Solid, azimuth: float) -> dict[str, Any]:
-    """Say what planar rocking leaves out towards an azimuth."""
-    data = solid.rose([azimuth]).data
-    coupling, aside, gap = (float(data[name][0]) for name in ("coupling", "aside", "gap"))
-    return phrase("body.left_out", azimuth=azimuth, coupling=coupling, aside=aside, gap=gap)
-
-
-def _towards(azimuth: float) -> Floats:
-    return np.asarray(directions(azimuth)[0])

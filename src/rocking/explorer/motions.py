@@ -113,11 +113,7 @@ def _unscaled(name: str, values: Values, uploads: UploadStore) -> Found:
 
 
 def _from_file(key: str, values: Values, channel: str | None, uploads: UploadStore) -> Found:
-    """Read a channel of a file with the step and the units that the texts give.
-
-    Where the vertical component is a record of its own, these are for the file that does not say them, as the command
-    line has it.
-    """
+    """Read a channel of a file with the step and units of the texts, unless a separate vertical lacks them."""
     given: dict[str, Any] = {name: values[name] for name in ("dt", "units") if name in values}
     vertical = values.get("vertical", "")
     if vertical.startswith("file:") or vertical in records.names():
@@ -135,8 +131,6 @@ def is_pulse(text: str) -> bool:
 
 def arguments_of(text: str) -> dict[str, Any]:
     """Read the parameters of a pulse, in SI units; one that is longer than the page shows is refused.
-
-    A duration is given only where it cuts the pulse: the one that a pulse has by itself goes with its frequency.
 
     Examples
     --------
@@ -198,10 +192,7 @@ def pulse_as_text(motion: Motion) -> str | None:
 
 
 def texts_of_motion(motion: Motion, uploads: UploadStore, factor: float = 1.0) -> dict[str, str]:
-    """Texts of a motion times a factor: of a pulse, or shipped records and their scale, or else the key of the motion.
-
-    What is kept under a key is the motion as it is, once for all factors.
-    """
+    """Texts of a motion times a factor: a pulse, or shipped records and their scale, or else the key of the motion."""
     scaled = motion if factor == 1.0 else motion.scaled(factor)
     pulse = pulse_as_text(scaled)
     if pulse is not None:

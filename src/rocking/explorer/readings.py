@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -10,18 +10,13 @@ from rocking.core.arrays import without_dust
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
 from rocking.explorer.core import Explorer
-from rocking.explorer.facts import verdict
 from rocking.explorer.parameters import READING, Texts
 from rocking.explorer.payload import Payload
 from rocking.explorer.phrases import phrase
-from rocking.explorer.simulated import Simulated
+from rocking.explorer.simulated import Simulated, verdict
 from rocking.explorer.windows import checked_window, extremes
 from rocking.response import Response, active_span
 from rocking.response.figure import boundary_of, course_of, marked
-
-#: Points of a thumbnail, and times at which its rotation is evaluated.
-_POINTS: Final = 300
-_TIMES: Final = 2_000
 
 
 def phase(explorer: Explorer, texts: Texts, window: tuple[float, float]) -> Payload:
@@ -32,7 +27,7 @@ def phase(explorer: Explorer, texts: Texts, window: tuple[float, float]) -> Payl
     >>> texts = {"p": "2", "alpha": "0.2", "motion": "none", "initial_rotation": "0.02"}
     >>> payload = phase(Explorer(), texts, (0.0, 0.5))
     >>> payload.header["needed"], round(float(payload.arrays["potential"][0]), 6)
-    ((1.0, 1.0), 0.189487)
+    ([1.0, 1.0], 0.189487)
     """
     shown = explorer.show(texts)
     start, end = checked_window(window, shown.response.duration)
@@ -57,11 +52,6 @@ def phase(explorer: Explorer, texts: Texts, window: tuple[float, float]) -> Payl
 
 def at(explorer: Explorer, texts: Texts, time: str, window: tuple[float, float] | None = None) -> dict[str, Any]:
     """Return what a case is at a time, as its text says it, in the response that a window (s) shows.
-
-    Raises
-    ------
-    InvalidOption
-        If the text is no time of the response.
 
     Examples
     --------
@@ -128,10 +118,10 @@ def thumbnail(explorer: Explorer, texts: Texts) -> Payload:
     shown = explorer.show(texts)
     response = shown.response
     start, end = active_span(response)
-    times = np.linspace(start, end, _TIMES)
+    times = np.linspace(start, end, 2_000)
     rotation = response.rotation(times)
     plus, minus = (side.alpha for side in response.block.sides)
-    kept = extremes(rotation, _POINTS)
+    kept = extremes(rotation, 300)
     over = np.where(rotation >= 0.0, rotation / plus, rotation / minus)
     words = verdict(response, response.block.uplift_thresholds(shown.case.model))
     return Payload({"verdict": words, "from": start, "to": end}, {"time": times[kept], "rotation": over[kept]})

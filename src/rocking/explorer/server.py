@@ -29,7 +29,7 @@ from starlette.routing import Route
 
 from rocking.core.tables import plain
 from rocking.errors import InvalidOption, RockingError
-from rocking.explorer import assessment, maps, periodic, readings, sweeps
+from rocking.explorer import assessment, maps, periodic, readings
 from rocking.explorer.catalogue import entries_of, listing
 from rocking.explorer.code import map_as_code, sweep_as_code
 from rocking.explorer.core import EXPORTS, Explorer
@@ -47,10 +47,6 @@ _Naming = Callable[[str], str]
 #: Prefix of the texts of the case that is compared with.
 OTHER: Final = "other."
 
-#: Computations at the same time; the rest wait for their turn.
-_THREADS: Final = 4
-_MAPS: Final = 2
-
 #: Types of the page's own files.
 TYPES: Final = {
     ".css": "text/css; charset=utf-8",
@@ -58,9 +54,6 @@ TYPES: Final = {
     ".json": "application/json",
     ".svg": "image/svg+xml",
 }
-
-#: Letters of a name in a table.
-_LONGEST_NAME: Final = 120
 
 #: Files of the plotting library, in the order in which they are loaded.
 LIBRARY: Final = ("bokeh.min.js", "bokeh-api.min.js")
@@ -142,11 +135,7 @@ class Query:
 
 
 class App:
-    """The explorer's application.
-
-    The page opens with the texts of ``opening`` where its address has none, and shows a study as a map. ``framed_by``
-    are the sources of pages that may show it in a frame, as a content security policy writes them.
-    """
+    """The explorer's application; ``opening`` are a bare address's texts, ``framed_by`` pages that may frame it."""
 
     def __init__(
         self,
@@ -162,8 +151,8 @@ class App:
         self.files = page_files()
         self._pages: dict[str, str] = {}
         self.library = {name: (library_folder() / name).read_bytes() for name in LIBRARY}
-        self._threads = anyio.CapacityLimiter(_THREADS)
-        self._maps = anyio.CapacityLimiter(_MAPS)
+        self._threads = anyio.CapacityLimiter(4)  # the other computations wait
+        self._maps = anyio.CapacityLimiter(2)
         answers: dict[str, Callable[[Query], Payload | Any]] = {
             "/api/start": self._start,
             "/api/case": lambda query: explorer.case(query.texts(), query.window),
@@ -288,13 +277,13 @@ class App:
     def _grid(self, query: Query) -> maps.MapGrid:
         return maps.grid_of(self._case(query), query.others)
 
-    def _sweep(self, query: Query) -> sweeps.Sweep:
-        return sweeps.sweep_of(self._case(query), query.others)
+    def _sweep(self, query: Query) -> periodic.Sweep:
+        return periodic.sweep_of(self._case(query), query.others)
 
     def _point_of_sweep(self, query: Query) -> dict[str, str]:
         """Return the texts of the case at a value of the parameter, released from a state where one is given."""
         value, _ = query.numbers("at", "at")
-        return sweeps.texts_at(self._sweep(query), value, query.numbers("u", "v") if query.given.get("u") else None)
+        return periodic.texts_at(self._sweep(query), value, query.numbers("u", "v") if query.given.get("u") else None)
 
     def _study(self) -> StudyView:
         if self.study is None:
@@ -315,8 +304,8 @@ class App:
 
         def begun(query: Query) -> _Stream:
             sweep = self._sweep(query)
-            about = {**sweeps.described(sweep), **sweep_as_code(sweep)}
-            return _Stream(about, sweeps.parts(sweep), lambda part: pack(sweeps.part_payload(sweep, part)))
+            about = {**periodic.described(sweep), **sweep_as_code(sweep)}
+            return _Stream(about, periodic.parts(sweep), lambda part: pack(periodic.part_payload(sweep, part)))
 
         return await self._streamed(request, begun)
 
@@ -378,7 +367,7 @@ class App:
     async def compared(self, request: Request) -> Response:
         """Return two cases as one table."""
         query = Query(request.query_params)
-        first, second = (query.given.get(name, name)[:_LONGEST_NAME] for name in ("first", "second"))
+        first, second = (query.given.get(name, name)[:120] for name in ("first", "second"))
         content = await self._in_thread(
             lambda: self.explorer.compared_as_csv(*query.compared, (first, second), **query.comparison)
         )
@@ -448,21 +437,13 @@ async def _failure(_: Request, error: Exception) -> Response:
     return JSONResponse({"problem": problem, "argument": None}, 500, headers=_FRESH)
 
 
-#: Lowest priority of all: such a thread takes what others leave, and all of it where they leave everything.
-_NICENESS: Final = 19
-
-
 @contextmanager
 def low_priority() -> Iterator[Executor]:
-    """Give an executor of one thread that takes the processor only where nobody else wants it.
-
-    Where the system knows priorities of threads (Linux) those that it starts have the same one; elsewhere it is an
-    ordinary thread.
-    """
+    """Give an executor of one thread that takes the processor only where nobody else wants it (on Linux)."""
     with ThreadPoolExecutor(1, "rocking-low-priority", initializer=_lower_priority) as executor:
         yield executor
 
 
 def _lower_priority() -> None:
     if sys.platform == "linux":
-        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)
+        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), 19)  # lowest priority of all

@@ -41,15 +41,7 @@ QUANTITIES: Final = ("overturned", "peak_rotation", "impacts", "rests", "time_at
 
 
 class StudyView:
-    """A study in a folder, slice by slice.
-
-    Blocks that are all combinations of some parameters are shown over these; others, by their number.
-
-    Parameters
-    ----------
-    folder : path
-        Where the study is kept.
-    """
+    """A study in a folder, slice by slice, over the parameters of its blocks' grid, or else by their number."""
 
     def __init__(self, folder: Path) -> None:
         self.name = folder.name
@@ -70,7 +62,10 @@ class StudyView:
             "scale_index": self._scales, "motion_index": product.motions, "polarity_index": product.signs
         }  # fmt: skip
         self._columns: dict[str, Floats] = {name: getattr(blocks, name)[:, 0] for name in _PARAMETERS}
-        if not (blocks.is_symmetric and _is_grid(list(self._columns.values()))):
+        columns = [*self._columns.values()]
+        different = len(np.unique(np.column_stack(columns), axis=0))
+        combinations = math.prod(np.unique(each).size for each in columns)
+        if not (blocks.is_symmetric and different == len(blocks) == combinations):
             self._columns = {"block": np.arange(1.0, len(blocks) + 1.0)}
         if len(self.axes()) < 2:
             raise StudyError(
@@ -100,11 +95,7 @@ class StudyView:
         }
 
     def slice(self, texts: Mapping[str, str]) -> Payload:
-        """Return one quantity over two parameters ``x`` and ``y``, the others fixed.
-
-        The texts ``motion_index``, ``polarity_index``, ``scale_index``, ``fix_p``, ``fix_alpha``, ``fix_restitution``
-        and ``fix_block`` are the values of what is not drawn.
-        """
+        """Return one quantity over two parameters ``x`` and ``y``; texts as ``motion_index``, ``fix_p`` fix others."""
         axes = self.axes()
         x, y = (texts.get(which, "") for which in ("x", "y"))
         for which, name in {"x": x, "y": y}.items():
@@ -219,9 +210,3 @@ class StudyView:
         blocks = map(self._parameters, self._columns["block"])
         shown = [{name: ", ".join(f"{each:.4g}" for each in pair) for name, pair in block.items()} for block in blocks]
         return [f"p = {each['p']} rad/s, α = {each['alpha']} rad, η = {each['restitution']}" for each in shown]
-
-
-def _is_grid(columns: list[Floats]) -> bool:
-    """Whether blocks of these parameters are all combinations of their values, each once."""
-    different = len(np.unique(np.column_stack(columns), axis=0))
-    return different == len(columns[0]) == math.prod(np.unique(each).size for each in columns)

@@ -44,9 +44,6 @@ _NAME, _HASH = 80, 24
 #: What a file is read with to learn its channels while it is not known what it leaves out.
 _STAND_INS: Final[dict[str, Any]] = {"dt": 1.0, "units": "m/s2"}
 
-#: Steps that are offered for a file that does not say its own, s.
-_STEPS: Final = (0.002, 0.005, 0.01, 0.02)
-
 
 class Upload(NamedTuple):
     """A file: its name without folders, and its content."""
@@ -186,7 +183,7 @@ class UploadStore:
         with self._lock:
             self._read[request] = motion
             self._read.move_to_end(request)
-            while len(self._read) > 1 and sum(_samples(each) for each in self._read.values()) > READ:
+            while len(self._read) > 1 and sum(len(each.breakpoints) for each in self._read.values()) > READ:
                 self._read.popitem(last=False)
         return motion
 
@@ -229,10 +226,6 @@ def _is_full(upload: Upload, others: Mapping[str, Upload]) -> bool:
     return len(others) >= MOST or len(upload.data) + sum(len(each.data) for each in others.values()) > ALL
 
 
-def _samples(motion: Motion) -> int:
-    return len(motion.breakpoints)
-
-
 def _about(channel: Channel) -> dict[str, Any]:
     """Return what the file says of a channel."""
     return {
@@ -269,7 +262,7 @@ def _told(motion: Motion, missing: list[str]) -> dict[str, Any]:
         choices["units"] = [(name, {"peak": peak}) for name, peak in peaks.items()]
     if "dt" in missing:
         steps = motion.duration / _STAND_INS["dt"]
-        choices["dt"] = [(f"{step:g}", {"lasts": steps * step}) for step in _STEPS]
+        choices["dt"] = [(f"{step:g}", {"lasts": steps * step}) for step in (0.002, 0.005, 0.01, 0.02)]
     return {"notes": [], "choices": choices, "measures": None}
 
 

@@ -20,7 +20,6 @@ POINTS: Final = 3_000
 
 #: Narrowest window, s: times have no more digits; and what is shown of a response that lasts no time.
 _NARROWEST: Final = 1e-12
-_OF_NOTHING: Final = 1.0
 
 #: Impacts of a window whose times are added to the line's.
 _MARKED: Final = 2_000
@@ -55,7 +54,7 @@ def about_window(shown: Simulated, start: float, end: float) -> dict[str, Any]:
 
 def ends_of(start: float, end: float) -> dict[str, float]:
     """Return the ends of what is shown, s, apart also where a response lasts no time."""
-    return {"from": start, "to": end if end > start else start + _OF_NOTHING}
+    return {"from": start, "to": end if end > start else start + 1.0}
 
 
 def lines_in(shown: Simulated, start: float, end: float, points: int = POINTS) -> dict[str, Floats]:
@@ -96,10 +95,7 @@ def extremes(values: Floats, most: int) -> Integers:
 
 
 def _shaking(case: Case, start: float, end: float, points: int) -> dict[str, Floats]:
-    """Ground acceleration in a window, g; with a vertical component, the weight, by which thresholds are multiplied.
-
-    A g is the standard one, as in every text of a case, whatever gravity the block has.
-    """
+    """Ground acceleration in a window, standard g; with a vertical component, the weight that multiplies thresholds."""
     motion = case.motion
     if motion is None:
         return {"ground_time": np.empty(0), "ground_g": np.empty(0)}
@@ -150,10 +146,7 @@ def _uncertain(response: Response) -> Floats:
 
 
 def _intervals(response: Response) -> tuple[Floats, Floats]:
-    """Time from each impact to the next of the same rocking, and the ratio of the next interval but one to it; or NaN.
-
-    Where chattering is complete the ratio tends to the product of both restitutions: eta^2.
-    """
+    """Time from each impact to the next, and the ratio of the next interval but one to it (to eta^2); or NaN."""
     impact_times = np.asarray(response.impacts["time"], dtype=float)
     intervals = np.append(np.diff(impact_times), np.nan)[: len(impact_times)]
     uplifts = response.events["time"][response.events["kind"] == "uplift"]

@@ -29,13 +29,7 @@ _FREQUENCY_PARAMETER: Final = (
 
 
 def shape_of(names: Iterable[str], shapes: Sequence[Shape] = SHAPES) -> Shape:
-    """Return the description that names of inputs are of.
-
-    Raises
-    ------
-    InvalidBlock
-        If something is missing of a block, or the inputs belong to different descriptions of it.
-    """
+    """Return the description that names of inputs are of; an InvalidBlock if they are incomplete or of several."""
     given = [name for name in BLOCK if name in {*names} and name != "restitution"]
     for shape in shapes:
         if {*shape.needed} <= {*given} <= {*shape.needed, *shape.optional}:

@@ -36,10 +36,6 @@ def noted_acceleration(text: str, name: str) -> float:
     return value
 
 
-#: What the page writes behind a number in these units; others are SI units.
-_SUFFIXES: Final = {"°": "deg", "g": "g"}
-
-
 @dataclass(frozen=True)
 class Input:
     """An input: an option of the command line, a key of study files, and a field of the page.
@@ -128,7 +124,7 @@ class Input:
     @property
     def suffix(self) -> str:
         """Unit behind a number in the unit that is shown; an azimuth is in degrees without it."""
-        return "" if self.kind == "number" else _SUFFIXES.get(self.unit, "")
+        return "" if self.kind == "number" else {"°": "deg", "g": "g"}.get(self.unit, "")
 
     def _units(self) -> dict[str, float]:
         """Return the size of each unit in the unit that is shown, by plain spellings as in `quantities.UNITS`."""

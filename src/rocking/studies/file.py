@@ -76,7 +76,7 @@ _SIDED: Final = tuple(name for name in BLOCK if INPUTS[name].values != "one")
 
 @dataclasses.dataclass(frozen=True)
 class StudyFile:
-    """What a file describes.
+    """Description of a study in a file.
 
     Attributes
     ----------
@@ -85,11 +85,9 @@ class StudyFile:
     skipped : tuple of str
         A sentence for each record that could not be read, where the file says to go on.
     report : ReportPlan or None
-        What is to be made of the results.
-    outcomes : tuple of str
-        What is kept of each simulation.
-    records : tuple of str
-        Name of the record of each motion, relative to the file; empty of a pulse.
+        Results to make.
+    outcomes, records : tuple of str
+        As for `rocking.study`; and the name of the record of each motion, relative to the file; empty of a pulse.
     """
 
     product: Product

@@ -45,13 +45,7 @@ _TRIES: Final = 3
 
 
 class Folder:
-    """Files of a study, made where there is no folder yet.
-
-    Attributes
-    ----------
-    path : Path
-        Where it is.
-    """
+    """Files of a study, made where there is no folder yet."""
 
     def __init__(self, path: str | Path) -> None:
         self.path = checks.path(path, "the folder of a study", StudyError)
@@ -109,11 +103,7 @@ class Folder:
 
     @contextlib.contextmanager
     def locked(self, lock: str = "lock") -> Iterator[None]:
-        """Hold a lock, a file that names its holder, for as long as the process lives.
-
-        "lock" excludes every other holder; others ("lock.3-10", of a part) exclude the same part and "lock". A file
-        that is left behind locks nothing.
-        """
+        """Hold a lock, a file that names its holder, while the process lives; that of a part excludes it and "lock"."""
         with _refused("locked", self.path / lock):
             self.path.mkdir(parents=True, exist_ok=True)
             file = (self.path / lock).open("a+b", buffering=0)
@@ -184,10 +174,7 @@ _ARRAY: Final = "result"
 
 
 class Store:
-    """Outcomes of a product of blocks, motions, scales and polarities. A unit is done when its file exists.
-
-    `about` is what `study.json` describes, `product` what is simulated, and `grid` how it is cut into units.
-    """
+    """Outcomes of a product, in units of a grid that are done when their files exist; `about` is from `study.json`."""
 
     def __init__(self, folder: Folder, about: dict[str, Any], product: Product) -> None:
         self.folder, self.about, self.product = folder, about, product

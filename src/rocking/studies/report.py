@@ -64,10 +64,9 @@ def polarities_that_count(bodies: Bodies, polarities: int) -> Integers:
 
 
 def peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
-    """Peak rotation over the slenderness, infinite where a block overturned, for a range of blocks after the other.
+    """Peak rotation over slenderness (motions, scales, polarities, blocks), infinite if overturned, by blocks.
 
-    The shape is (motions, scales, polarities, blocks of the range), with one polarity where all blocks of the study are
-    symmetric. It is NaN where the simulation was given up, and 0 of blocks that stand where no peak rotation is kept.
+    It is NaN where the simulation was given up, and 0 of blocks that stand where no peak rotation is kept.
     """
     store.require_complete()
     motions, scales, polarities, _ = store.grid.shape
@@ -225,15 +224,7 @@ class StudySpectrum(BlocksResult):
         title: str = "",
         figsize: tuple[float, float] | None = None,
     ) -> Figure:
-        """Draw a fractile of each block over its frequency parameter and slenderness, at up to four scales.
-
-        Parameters
-        ----------
-        ax, title, figsize : optional
-            As for `Result.plot`; `ax` only if there is one scale.
-        fractile : float
-            Which one; the nearest there is.
-        """
+        """Draw the nearest `fractile` of each block over p and slenderness, at up to four scales, as `Result.plot`."""
         from rocking.plot.maps import blocks_figure
 
         one = self._fractile(fractile)
@@ -487,23 +478,7 @@ _REPORT: Final = "report.json"
 
 @dataclass(frozen=True)
 class FragilityPlan:
-    """Fragility curves that are wanted.
-
-    Attributes
-    ----------
-    measure : str
-        Intensity, as for `rocking.fragility`.
-    period : float or None
-        Period of a spectral acceleration, s.
-    damping : float
-        Its fraction of critical damping.
-    limits : mapping of str to float
-        Limit states: peak rotation over slenderness that is exceeded, or infinity for overturning.
-    blocks : {"each", "together"}
-        A curve for each block, or one for all.
-    confidence : float
-        Probability of the intervals.
-    """
+    """Fragility curves to make, as for `rocking.fragility`: of "each" of the blocks, or of all "together"."""
 
     measure: IntensityName = "pga"
     period: float | None = None
@@ -528,13 +503,7 @@ class FragilityPlan:
 
 @dataclass(frozen=True)
 class SpectrumPlan:
-    """Fractiles that are wanted.
-
-    Attributes
-    ----------
-    fractiles : sequence of float
-        Shares of the motions, in (0, 1), that stay below.
-    """
+    """Fractiles to make, as for `rocking.rocking_spectrum`."""
 
     fractiles: Sequence[float] = FRACTILES
 
@@ -548,15 +517,7 @@ PLANS: Final[Mapping[str, type[FragilityPlan | SpectrumPlan]]] = {"fragility": F
 
 @dataclass(frozen=True)
 class ReportPlan:
-    """All that is wanted.
-
-    Attributes
-    ----------
-    fragility : FragilityPlan or None
-        Fragility curves.
-    spectrum : SpectrumPlan or None
-        Fractiles of the peak rotation.
-    """
+    """Fragility curves and fractiles to make, or None."""
 
     fragility: FragilityPlan | None = None
     spectrum: SpectrumPlan | None = None

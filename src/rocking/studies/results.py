@@ -51,10 +51,7 @@ def write_table(kind: str, path: str | Path, dataset: xr.Dataset, along: str, st
 
 
 def _for_tables(dataset: xr.Dataset) -> xr.Dataset:
-    """Name the scales for what they are, factors or values of a measure, and impacts as other tables do.
-
-    What a measure is stands among the attributes.
-    """
+    """Name the scales as factors or values of a measure, which is an attribute, and impacts as in other tables."""
     if "scale" in dataset.dims:
         dataset = dataset.assign_attrs({name: of for name, of in dataset.scale.attrs.items() if name != "units"})
         names = {"scale": dataset.scale.attrs["measure"], "impacts": "impacts_resolved"}
@@ -93,10 +90,7 @@ def _write_parquet(frames: Iterator[pd.DataFrame], dataset: xr.Dataset, target: 
 
 
 def lazy_outcome(store: Store, name: str, complete: bool) -> xr.Variable:
-    """Outcome of a store over (motion, scale, polarity, block), read when it is needed.
-
-    It has its own type where all units are done, else it is of floats, NaN where a unit is not done.
-    """
+    """Outcome of a store, read when it is needed; of floats, NaN where a unit is not done, if some are not."""
     import xarray as xr
     from xarray.backends import BackendArray
     from xarray.core import indexing
@@ -204,10 +198,7 @@ def critical_scales(store: Store, verdict: StudyVerdict) -> xr.Dataset:
 
 
 def _verdicts(verdict: str, outcomes: Mapping[str, Floats]) -> tuple[Flags, Flags]:
-    """Return whether a verdict holds in each simulation, and whether that is known.
-
-    A block that had not overturned when its simulation was given up or stopped may do so later.
-    """
+    """Return whether a verdict holds in each simulation, and whether that is known: it was not given up or stopped."""
     known = (outcomes["unfinished"] == 0.0) & (outcomes["stopped"] == 0.0)
     if verdict == "overturning":
         return outcomes["overturned"] != 0.0, known

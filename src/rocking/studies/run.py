@@ -73,20 +73,18 @@ class Running:
 
 @dataclass(frozen=True)
 class Status:
-    """How far a study has come.
+    """Progress of a study.
 
     Attributes
     ----------
-    done, units : int
-        Units that are done, of how many.
-    simulations : int
-        Simulations in all units.
+    done, units, simulations : int
+        Units that are done, all units, and simulations in all.
     failed : mapping
         Sentence for each unit that the last run could not compute.
     running : Running or None
-        The run that goes on now, where there is one.
+        The present run, where there is one.
     runs : tuple
-        What happened in every run, as `runs.jsonl` has it, and after it in those of parts.
+        Events of every run, as `runs.jsonl` has them, and after it of those of parts.
     """
 
     done: int
@@ -200,14 +198,12 @@ def _reading(read: Callable[[Any], object], what: object) -> list[str]:
 
 @dataclass(frozen=True)
 class RunReport:
-    """What one run did.
+    """Outcome of one run.
 
     Attributes
     ----------
-    units : int
-        Units that were computed.
-    simulations : int
-        Simulations in them.
+    units, simulations : int
+        Units that were computed, and simulations in them.
     seconds : float
         Time it took.
     failed : mapping
@@ -240,11 +236,7 @@ def run(
     progress: bool | None,
     failing: Callable[[str, str], None],
 ) -> RunReport:
-    """Compute the units of a share that are not done, in threads or by an executor, until SIGTERM asks to stop.
-
-    Units in hand are finished then. `failing` gets the name of each unit that cannot be computed, and why, as it
-    happens. A StudyError is raised if the workers are gone.
-    """
+    """Compute the units of a share that are not done, in threads or by an executor, until SIGTERM."""
     start, units, simulations = time.monotonic(), 0, 0
     failed: dict[str, str] = {}
     done, pending = store.done(), dict[Future[bytes], Key]()
@@ -303,10 +295,7 @@ def _terminated() -> Iterator[threading.Event]:
 
 @contextlib.contextmanager
 def _workers(executor: Any, threads: int | None) -> Iterator[tuple[Callable[[Work], Future[bytes]], Callable[[], int]]]:
-    """Give what hands a unit to a worker, and what counts the workers.
-
-    Threads stop within their units when this is left by an error.
-    """
+    """Give what hands a unit to a worker, and what counts the workers; threads stop when this is left by an error."""
     if executor is None:
         cancelled, pool = threading.Event(), ThreadPoolExecutor(threads or cores())
         try:
@@ -346,10 +335,7 @@ def _gone(why: object) -> StudyError:
 
 @contextlib.contextmanager
 def scheduler_client(address: str) -> Iterator[Any]:
-    """Give a client of a scheduler of dask.distributed, as ``tcp://127.0.0.1:8786``; a StudyError if nobody answers.
-
-    Certificates for ``tls://`` are taken from Dask's configuration.
-    """
+    """Give a client of a scheduler of dask.distributed, with Dask's certificates; a StudyError if nobody answers."""
     try:
         distributed: Any = importlib.import_module("distributed")
     except ImportError:

@@ -49,16 +49,16 @@ if TYPE_CHECKING:
 class Study:
     """Simulations of blocks, motions, scales and polarities, kept in a folder; from `rocking.study`.
 
-    Attributes
-    ----------
-    place : str
-        Folder where it is kept.
-    product : Product
-        What is simulated.
-    outcomes : tuple of str
-        What is kept of each simulation.
-    status : Status
-        How far it has come; may be asked while another process runs it.
+    Examples
+    --------
+    >>> import pathlib, rocking, tempfile
+    >>> block, pulse = rocking.Block.from_parameters(2.0, 0.1, 0.9), rocking.pulses.one_sine(4.0, 1.0)
+    >>> study = rocking.study(tempfile.mkdtemp(), block, pulse, levels=[0.4, 1.0], unit_blocks=512)
+    >>> _ = study.run()
+    >>> table = pathlib.Path(tempfile.mkdtemp(), "all.csv")
+    >>> study.to_csv(table)
+    >>> table.read_text().splitlines()[1][:40]
+    'one-sine,0.4,0,2.0,0.1,0.9,True,1.570796'
     """
 
     _store: Store
@@ -96,7 +96,7 @@ class Study:
         Parameters
         ----------
         threads : int, optional
-            Number of threads; by default one for every core.
+            As for `simulate_many`.
         executor : concurrent.futures.Executor or dask.distributed.Client, optional
             Processes, or the client of a cluster, whose workers compute instead; only this process writes.
         part : str, optional
@@ -108,8 +108,8 @@ class Study:
         Returns
         -------
         RunReport
-            What this run did. SIGTERM finishes the units in hand first; Ctrl-C ends the run at once. Nothing that was
-            stored is lost either way.
+            Units that this run computed. SIGTERM finishes the units in hand first; Ctrl-C ends the run at once. Stored
+            units are kept either way.
 
         Raises
         ------
@@ -119,13 +119,6 @@ class Study:
             If the study is being run elsewhere, was made by another version, or the workers are gone.
         OutputError
             If a unit cannot be written.
-
-        Examples
-        --------
-        >>> import rocking, tempfile
-        >>> block, pulse = rocking.Block.from_parameters(2.0, 0.1, 0.9), rocking.pulses.one_sine(4.0, 1.0)
-        >>> rocking.study(tempfile.mkdtemp(), block, pulse, levels=[0.4, 1.0], unit_blocks=512).run().simulations
-        2
         """
         if threads is not None:
             threads = checks.whole(threads, "threads", InvalidOption, least=1)
@@ -151,24 +144,10 @@ class Study:
         return report
 
     def results(self) -> xr.Dataset:
-        """Outcomes so far, read from the folder when they are needed.
+        """Outcomes so far, read from the folder when they are needed, as `simulate_many` returns them.
 
-        Returns
-        -------
-        xarray.Dataset
-            As from `simulate_many`: over (motion, scale, polarity, block), those that apply, with the outcomes that
-            the study keeps. While units are missing every variable is of floats, NaN where its unit is not done, and a
-            variable ``done`` says which are. A StudyError names a damaged unit when it is read.
-
-        Examples
-        --------
-        >>> import rocking, tempfile
-        >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
-        >>> pulse = rocking.pulses.one_sine(4.0, 1.0)
-        >>> study = rocking.study(tempfile.mkdtemp(), blocks, pulse, levels=[0.4, 1.0], unit_blocks=512)
-        >>> _ = study.run()
-        >>> study.results().impacts.values.tolist()
-        [[[1, 0, 1, 0], [0, 1, 0, 0]]]
+        While units are missing every variable is of floats, NaN where its unit is not done, and a variable ``done``
+        marks the others. A StudyError names a damaged unit when it is read.
         """
         done, grid = self._store.done(), self._store.grid
         complete = len(done) == len(grid)
@@ -194,7 +173,7 @@ class Study:
         Parameters
         ----------
         recompute : int
-            How many units, drawn at random, to compute again.
+            Number of units, drawn at random, to compute again.
         repair : bool
             Whether to compute damaged units again and store them.
         seed : int
@@ -210,17 +189,7 @@ class Study:
         Raises
         ------
         StudyError
-            If units are to be computed again and the study was made by another version, or what says what is computed
-            is damaged.
-
-        Examples
-        --------
-        >>> import rocking, tempfile
-        >>> block, pulse = rocking.Block.from_parameters(2.0, 0.1, 0.9), rocking.pulses.one_sine(4.0, 1.0)
-        >>> study = rocking.study(tempfile.mkdtemp(), block, pulse, levels=[0.4, 1.0], unit_blocks=512)
-        >>> _ = study.run()
-        >>> study.verify(recompute=1)
-        []
+            If units are to be computed again and the study was made by another version, or its inputs are damaged.
         """
         return verified(self._store, recompute, repair, seed, progress)
 
@@ -236,12 +205,10 @@ class Study:
         Returns
         -------
         xarray.Dataset
-            Over ``change``, in order of motion, polarity, block and scale: low and high (scales, in the units of the
-            measure), overturns or completes (whether the verdict holds at the higher one, and not at the lower one),
-            known (whether all verdicts between them are: a simulation may have been given up or stopped, or a rest not
-            be proven); motion, polarity, block and its parameters as coordinates. A block that
-            stands a stronger motion than one that overturns it has several. Brackets are neighbouring scales of the
-            study; where verdicts are not known at scales between two that differ, the bracket is those two.
+            Over ``change``, in order of motion, polarity, block and scale: low and high (neighbouring scales with a
+            known verdict, in the units of the measure), overturns or completes (the verdict at the higher one), known
+            (whether all verdicts between them are), with motion, polarity, block and its parameters. A block that
+            stands a stronger motion than one that overturns it has several.
 
         Raises
         ------
@@ -249,15 +216,6 @@ class Study:
             If units are missing or damaged.
         InvalidOption
             If there is no such verdict, the study does not keep its outcomes, or has no two scales in increasing order.
-
-        Examples
-        --------
-        >>> import rocking, tempfile
-        >>> block, pulse = rocking.Block.from_parameters(2.0, 0.2, 0.9), rocking.pulses.one_sine(4.0, 1.0)
-        >>> study = rocking.study(tempfile.mkdtemp(), block, pulse, levels=[0.4, 1.0], unit_blocks=512)
-        >>> _ = study.run()
-        >>> study.critical_scales().high.values.tolist()
-        [1.0]
         """
         return self._with_records(critical_scales(self._store, verdict))
 
@@ -270,34 +228,9 @@ class Study:
         weights: ArrayLike | None = None,
         clusters: ArrayLike | None = None,
     ) -> Fragility:
-        """Fit the probability that a limit is exceeded to the outcomes of all blocks, as `rocking.fragility` does.
+        """Fit fragility curves to the outcomes of all blocks, with arguments and results as for `rocking.fragility`.
 
-        Parameters
-        ----------
-        measure, limits, confidence, weights, clusters : optional
-            As for `rocking.fragility` and its `Band`. What a motion measures at a scale is its intensity.
-
-        Returns
-        -------
-        Fragility
-            A curve for each limit.
-
-        Raises
-        ------
-        StudyError
-            If units are missing or damaged.
-        InvalidOption
-            If an argument is out of its range, the study does not keep what a limit needs, or no lognormal fits.
-
-        Examples
-        --------
-        >>> import rocking, tempfile
-        >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
-        >>> pulse = rocking.pulses.one_sine(4.0, 1.0)
-        >>> study = rocking.study(tempfile.mkdtemp(), blocks, pulse, levels=[0.4, 0.6, 1.0], unit_blocks=512)
-        >>> _ = study.run()
-        >>> f"{study.fragility().curves[0].median:.3f} m/s^2"
-        '1.662 m/s^2'
+        The intensity is what a motion measures at a scale. A StudyError is raised if units are missing or damaged.
         """
         return pooled_fragility(self._store, Measure.of(measure), limits, confidence, weights, clusters)
 
@@ -310,39 +243,10 @@ class Study:
         clusters: ArrayLike | None = None,
         progress: bool | None = None,
     ) -> BlockFragilities:
-        """Fit a fragility curve to the outcomes of each block.
+        """Fit a fragility curve to the outcomes of each block, with arguments and errors as for `Study.fragility`.
 
         A curve takes some hundredths of a second where motions were scaled to the measure (stripes), and seconds where
-        thousands of outcomes have an intensity each (a cloud).
-
-        Parameters
-        ----------
-        measure, limits, confidence, clusters : optional
-            As for `Study.fragility`.
-        progress : bool, optional
-            As for `simulate_many`.
-
-        Returns
-        -------
-        BlockFragilities
-            A curve for each block and limit, or a sentence that says why no lognormal fits.
-
-        Raises
-        ------
-        StudyError
-            If units are missing or damaged.
-        InvalidOption
-            If an argument is out of its range, or the study does not keep what a limit needs.
-
-        Examples
-        --------
-        >>> import rocking, tempfile
-        >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
-        >>> pulse = rocking.pulses.one_sine(4.0, 1.0)
-        >>> study = rocking.study(tempfile.mkdtemp(), blocks, pulse, levels=[0.4, 1.0], unit_blocks=512)
-        >>> _ = study.run()
-        >>> study.block_fragilities().data.exceeded.values.tolist()
-        [[2.0, 1.0, 2.0, 1.0]]
+        thousands of outcomes have an intensity each (a cloud). Where no lognormal fits, a sentence is kept instead.
         """
         return block_fragilities(self._store, Measure.of(measure), limits, confidence, clusters, progress)
 
@@ -367,67 +271,18 @@ class Study:
             If units are missing or damaged.
         InvalidOption
             If a fractile is out of its range, or the study does not keep overturned and peak_rotation.
-
-        Examples
-        --------
-        >>> import rocking, tempfile
-        >>> block, pulse = rocking.Block.from_parameters(2.0, 0.2, 0.9), rocking.pulses.one_sine(4.0, 1.0)
-        >>> study = rocking.study(tempfile.mkdtemp(), block, pulse, levels=[0.4, 1.0], unit_blocks=512)
-        >>> _ = study.run()
-        >>> study.spectrum([0.5]).data.overturned_share.values.tolist()
-        [[0.0], [1.0]]
         """
         return study_spectrum(self._store, fractiles, progress)
 
     def report(self, *, progress: bool | None = None) -> dict[str, ReportPart]:
-        """Make what the study's file asks for under [report].
+        """Make the results that the study's file lists under [report], by "fragility" and "spectrum".
 
-        Parameters
-        ----------
-        progress : bool, optional
-            As for `simulate_many`.
-
-        Returns
-        -------
-        dict
-            "fragility" and "spectrum", as far as they are asked for: results with a summary and a figure.
-
-        Raises
-        ------
-        StudyError
-            If nothing is asked for, or units are missing or damaged.
-
-        Examples
-        --------
-        >>> import rocking, tempfile
-        >>> block, pulse = rocking.Block.from_parameters(2.0, 0.1, 0.9), rocking.pulses.one_sine(4.0, 1.0)
-        >>> rocking.study(tempfile.mkdtemp(), block, pulse, levels=[0.4, 1.0], unit_blocks=512).report()
-        Traceback (most recent call last):
-        ...
-        rocking.errors.StudyError: ...the study says nothing of a report: add [report.fragility] to its file ...
+        Each has a summary and a figure. A StudyError is raised if the file lists none, or units are missing or damaged.
         """
         return made_report(self._store, progress)
 
     def to_netcdf(self, path: str | Path, *, critical: StudyVerdict | None = None) -> None:
-        """Write the results as `results` returns them to a NetCDF file.
-
-        Parameters
-        ----------
-        path, critical : optional
-            As for `to_csv`.
-
-        Raises
-        ------
-        OutputError, StudyError
-            As `to_csv`.
-
-        Examples
-        --------
-        >>> import rocking, tempfile
-        >>> block, pulse = rocking.Block.from_parameters(2.0, 0.1, 0.9), rocking.pulses.one_sine(4.0, 1.0)
-        >>> study = rocking.study(tempfile.mkdtemp(), block, pulse, levels=[0.4, 1.0], unit_blocks=512)
-        >>> study.to_netcdf(f"{tempfile.mkdtemp()}/all.nc")
-        """
+        """Write the `results` to a NetCDF file, or the critical scales, as `to_csv` does."""
         write_netcdf(path, self._results(critical)[0])
 
     def to_csv(self, path: str | Path, *, critical: StudyVerdict | None = None, progress: bool | None = None) -> None:
@@ -448,73 +303,21 @@ class Study:
             If the file cannot be written.
         StudyError
             If a unit is damaged, or units are missing for critical scales.
-
-        Examples
-        --------
-        >>> import pathlib, rocking, tempfile
-        >>> block, pulse = rocking.Block.from_parameters(2.0, 0.1, 0.9), rocking.pulses.one_sine(4.0, 1.0)
-        >>> study = rocking.study(tempfile.mkdtemp(), block, pulse, levels=[0.4, 1.0], unit_blocks=512)
-        >>> _ = study.run()
-        >>> table = pathlib.Path(tempfile.mkdtemp(), "all.csv")
-        >>> study.to_csv(table)
-        >>> table.read_text().splitlines()[1][:40]
-        'one-sine,0.4,0,2.0,0.1,0.9,True,1.570796'
         """
         write_table("csv", path, *self._results(critical), progress)
 
     def to_json(self, path: str | Path, *, critical: StudyVerdict | None = None, progress: bool | None = None) -> None:
-        """Write an object for each simulation as JSON.
+        """Write an object for each simulation as JSON, with arguments and errors as for `to_csv`.
 
         The keys are those of the columns of `to_csv`, and NaN is null. The attributes of the study and of its measure
         are under "study".
-
-        Parameters
-        ----------
-        path, critical, progress : optional
-            As for `to_csv`.
-
-        Raises
-        ------
-        OutputError, StudyError
-            As `to_csv`.
-
-        Examples
-        --------
-        >>> import json, pathlib, rocking, tempfile
-        >>> block, pulse = rocking.Block.from_parameters(2.0, 0.1, 0.9), rocking.pulses.one_sine(4.0, 1.0)
-        >>> study = rocking.study(tempfile.mkdtemp(), block, pulse, levels=[0.4, 1.0], unit_blocks=512)
-        >>> _ = study.run()
-        >>> file = pathlib.Path(tempfile.mkdtemp(), "all.json")
-        >>> study.to_json(file)
-        >>> len(json.loads(file.read_text())["simulations"])
-        2
         """
         write_table("json", path, *self._results(critical), progress)
 
     def to_parquet(
         self, path: str | Path, *, critical: StudyVerdict | None = None, progress: bool | None = None
     ) -> None:
-        """Write the table of `to_csv` as Parquet.
-
-        Parameters
-        ----------
-        path, critical, progress : optional
-            As for `to_csv`.
-
-        Raises
-        ------
-        OutputError, StudyError
-            As `to_csv`.
-        InvalidOption
-            If pyarrow is not installed.
-
-        Examples
-        --------
-        >>> import rocking, tempfile
-        >>> block, pulse = rocking.Block.from_parameters(2.0, 0.1, 0.9), rocking.pulses.one_sine(4.0, 1.0)
-        >>> study = rocking.study(tempfile.mkdtemp(), block, pulse, levels=[0.4, 1.0], unit_blocks=512)
-        >>> study.to_parquet(f"{tempfile.mkdtemp()}/all.parquet")
-        """
+        """Write the table of `to_csv` as Parquet, with its arguments and errors; requires pyarrow."""
         write_table("parquet", path, *self._results(critical), progress)
 
     def _results(self, critical: StudyVerdict | None) -> tuple[xr.Dataset, str, int]:
@@ -554,8 +357,8 @@ def study(
     model, chattering, levels, measure, polarity, duration : optional
         As for `simulate_many`.
     outcomes : sequence of str, optional
-        Names of what is kept of each simulation, of the variables that `simulate_many` returns; by default all.
-        stalled, unfinished and stopped are always kept: they say which of the others are answers.
+        Variables of `simulate_many` to keep; by default all. stalled, unfinished and stopped are always kept: they say
+        which of the others are answers.
     unit_blocks : int, optional
         Blocks of a unit, a multiple of 512, of one motion, scale and polarity; by default a unit holds as many of all
         as take about five seconds, from a pilot.
@@ -611,11 +414,7 @@ def study_of(
     outcomes: tuple[str, ...] = OUTCOMES,
     records: Sequence[str] = (),
 ) -> Study:
-    """Create the study of a product in a folder, or open the one that is there and check its inputs.
-
-    `plan` (what is to be made of the results) and `records` (the name of the record of each motion, which results then
-    have as well) take the place of what was; `outcomes` are from `chosen_outcomes`.
-    """
+    """Create the study of a product in a folder, or open the one there, check its inputs, replace plan and records."""
     found = None if exists(folder) else _created(folder, product, unit_blocks, outcomes)
     if found is None:
         found = Store.open(folder)

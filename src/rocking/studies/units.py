@@ -48,11 +48,7 @@ class DamagedUnit(Exception):
 
 @dataclass(frozen=True)
 class UnitGrid:
-    """How simulations are cut into units.
-
-    `shape` has the numbers of motions, scales, polarities and blocks, `unit` how many of them a unit holds (the last
-    along an axis may hold fewer), and `outcomes` what is kept of each simulation, in the order of the array.
-    """
+    """How simulations (motions, scales, polarities, blocks) are cut into units, and the outcomes that are kept."""
 
     shape: tuple[int, ...]
     unit: tuple[int, ...]
@@ -123,10 +119,7 @@ def width_of(unit_blocks: int) -> int:
 
 
 def fitting_unit(product: Product) -> tuple[int, int, int, int]:
-    """Units that take about five seconds, or less where there would be too few of them, or too many simulations in one.
-
-    How long one simulation takes is measured with a group of blocks spread over all, under the longest motion.
-    """
+    """Units that take about five seconds, by a pilot under the longest motion, and neither too few nor too large."""
     motions, scales, polarities, count = product.shape
     some = product.bodies.select(np.linspace(0, count - 1, min(count, _GROUP)).astype(np.int64))
     motion = max(product.motions, key=lambda one: len(one.coefficients))
@@ -154,11 +147,7 @@ def program() -> str:
 
 @dataclass(frozen=True, eq=False)
 class Work:
-    """All that a worker needs for a unit.
-
-    The factors on its motions have the shape (motions, scales, polarities); `unit` is what a full unit holds along each
-    axis, `outcomes` what is kept of each simulation, and `program` who must compute it.
-    """
+    """All that a worker needs for a unit; factors have the shape (motions, scales, polarities)."""
 
     setup: Setup
     motions: tuple[Motion, ...]
@@ -169,10 +158,7 @@ class Work:
 
 
 def compute(work: Work, cancelled: threading.Event | None = None) -> bytes:
-    """Simulate a unit, wherever its inputs have been sent, and return its bytes; of no use where it is `cancelled`.
-
-    A StudyError is raised if the program is another one here, whose bits may differ.
-    """
+    """Simulate a unit and return its bytes, unless `cancelled`; a StudyError if the program here is another one."""
     if work.program != program():
         raise StudyError(f"the worker on {socket.gethostname()} has {program()}, the study needs {work.program}")
     # NaN where the unit holds fewer simulations than a full one.
