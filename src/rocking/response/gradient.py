@@ -141,8 +141,6 @@ def gradient(response: Response, of: Quantity = "peak", at: float | None = None)
     >>> response = rocking.simulate(block, record)
     >>> [f"{each:.5f}" for each in rocking.gradient(response).samples]
     ['-0.00175', '-0.01310', '0.01048', '0.04288', '0.03351']
-    >>> [f"{each:.5f}" for each in rocking.gradient(response, "impact", 0).samples]
-    ['0.02102', '0.16678', '0.02122', '0.00000', '0.00000']
     """
     if not isinstance(response, Response):
         raise InvalidOption("{} must be a response, as `rocking.simulate` returns it", "response", value=response)
