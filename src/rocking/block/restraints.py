@@ -226,11 +226,6 @@ class Spring(Restraint):
     stiffness : float
         Moment per rotation, N m/rad. A vertical spring of k N/m at a distance x from the pivot is a `Tendon`.
 
-    Raises
-    ------
-    InvalidBlock
-        If it is not positive.
-
     Examples
     --------
     >>> Spring(1e3)
@@ -257,11 +252,6 @@ class Damper(Restraint):
     ----------
     coefficient : float
         Moment per angular velocity, N m s/rad.
-
-    Raises
-    ------
-    InvalidBlock
-        If it is not positive.
 
     Examples
     --------
