@@ -115,23 +115,7 @@ class Description:
         return ", ".join(f"{name} {value:.5g}" for name, value in self.parameters.items())
 
     def scaled(self, factor: float) -> Description:
-        """Return the description of the motion times a factor.
-
-        Parameters
-        ----------
-        factor : float
-            What the motion is multiplied with.
-
-        Returns
-        -------
-        Description
-            With amplitudes times the factor.
-
-        Examples
-        --------
-        >>> Description("sine", {"amplitude": 2.0, "frequency": 3.0}).scaled(-0.5)
-        <Description: sine, amplitude -1, frequency 3>
-        """
+        """Return the description of the motion times a factor, which multiplies its amplitudes."""
         parameters = {k: v * factor if k.startswith("amplitude") else v for k, v in self.parameters.items()}
         origin = self.origin
         if origin is not None and factor < 0.0:
@@ -140,23 +124,7 @@ class Description:
         return replace(self, parameters=parameters, origin=origin)
 
     def changed(self, how: str) -> Description:
-        """Return the description of a motion that no longer is what its formula says.
-
-        Parameters
-        ----------
-        how : str
-            What was done to it: "delayed", "processed".
-
-        Returns
-        -------
-        Description
-            Its family says so, once.
-
-        Examples
-        --------
-        >>> Description("sine").changed("delayed").changed("delayed")
-        <Description: delayed sine>
-        """
+        """Return the description of a motion that was changed ("delayed", "processed"), which its family names once."""
         family = self.family if self.family.startswith(f"{how} ") else f"{how} {self.family}"
         origin = None if self.origin is None else replace(self.origin, start=None)
         return replace(self, family=family, origin=origin)
@@ -175,12 +143,6 @@ def begins_later(first: Description, second: Description, step: float | None) ->
 
 
 def labelled(name: str, history: Sequence[str], vertical: str = "") -> str:
-    """Return the name of a motion, and of its vertical one, with what was done to it but not what it was scaled to.
-
-    Examples
-    --------
-    >>> labelled("tower-090", ["scaled by 2 to a peak ground acceleration of 2 m/s^2 (0.2039 g)"], "tower-up")
-    'tower-090 with vertical tower-up, scaled by 2'
-    """
+    """Return the name of a motion, and of its vertical one, with what was done to it but not what it was scaled to."""
     both = f"{name} with vertical {vertical}" if vertical else name
     return ", ".join((both, *(_SCALED.sub(r"\1", done) for done in history)))
