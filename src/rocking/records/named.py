@@ -64,13 +64,7 @@ def names_of(motions: Sequence[Motion]) -> list[str]:
 
 
 def numbered(given: Sequence[str]) -> list[str]:
-    """Names, numbered where several are the same.
-
-    Examples
-    --------
-    >>> numbered(["one", "two", "one"])
-    ['one #1', 'two', 'one #2']
-    """
+    """Names, numbered where several are the same."""
     shared = {name for name, count in Counter(given).items() if count > 1}
     taken, seen = {*given}, Counter[str]()
     names = []
@@ -254,18 +248,7 @@ class Contents:
     motions: tuple[Motion, ...] = ()
 
     def summary(self) -> str:
-        """Return the table for people.
-
-        Returns
-        -------
-        str
-            Title and table.
-
-        Examples
-        --------
-        >>> "el-centro-meloland-270" in shipped().summary()
-        True
-        """
+        """Return the table for people, with its title."""
         columns = list(self.entries[0])
         # What has no value is the step of samples that are not evenly spaced.
         rows = [["uneven" if entry[column] is None else entry[column] for column in columns] for entry in self.entries]
@@ -279,18 +262,7 @@ class Contents:
         return f"<Contents: {title}{len(self.entries)} {kind}: {names}>"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the table for machines.
-
-        Returns
-        -------
-        dict
-            The facts, and the entries under their kind.
-
-        Examples
-        --------
-        >>> len(shipped().to_dict()["records"])
-        9
-        """
+        """Return the table for machines: the facts, and the entries under their kind."""
         return {**self.facts, self.kind: self.entries}
 
 

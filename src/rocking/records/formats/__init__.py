@@ -142,11 +142,6 @@ def channels(path: str | os.PathLike[str], *, dt: float | None = None, units: st
     tuple of Channel
         In the file's order.
 
-    Raises
-    ------
-    UnreadableRecord, InvalidMotion
-        As for `read`.
-
     Examples
     --------
     >>> import tempfile

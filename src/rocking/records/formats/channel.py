@@ -193,11 +193,6 @@ class Channel:
         ------
         InvalidMotion
             If there are fewer than two samples, or they are too large for a motion.
-
-        Examples
-        --------
-        >>> Channel("Up", 3, np.array([0.0, 0.1, 0.0]), times=np.array([0.0, 0.1, 0.3])).motion().duration
-        0.3
         """
         facts = {"event": self.event, "station": self.station, "channel": self.label, "units": self.units}
         text = ", ".join(f"{key} {value}" for key, value in {**self.metadata, **facts}.items() if value)

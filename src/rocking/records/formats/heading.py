@@ -158,10 +158,7 @@ class _Names:
         return "time" if words & _TIMES or self._is_unit_of_time(place) else "channel"
 
     def _kind_of_only(self) -> Kind:
-        """Return the kind of a single column, above which a title may stand: times only if it says nothing else.
-
-        "T" by itself is the transverse component.
-        """
+        """Return the kind of a single column, above which a title may stand: times only if it says nothing else."""
         name = self._label(0)
         units = (find_unit, find_time_unit)
         words = {word.lower() for word in _WORD.findall(name) if not any(find(word) for find in units)} - {"in"}
@@ -240,10 +237,7 @@ def _cells(line: str, count: int, delimiter: str) -> tuple[str, ...]:
 
 
 def _ways(delimiter: str) -> Iterator[tuple[Callable[[str], list[str]], bool]]:
-    """Yield ways to split a line of names, those that fit the rows below it first, and whether each is sure.
-
-    What single blanks or brackets divide may as well be a sentence; names begin with that of the times.
-    """
+    """Yield ways to split a line of names, those that fit the rows below it first, and whether each is sure."""
     for sign in ["\t", ";", ","] if delimiter == " " else [delimiter, ";", ",", "\t"]:
         yield functools.partial(_divided, sign), True
     yield lambda line: re.split(r"\t+|\s{2,}", line.strip()), True
