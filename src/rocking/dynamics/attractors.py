@@ -60,13 +60,7 @@ class Attractor:
 
     @property
     def name(self) -> str:
-        """What it is, in words.
-
-        Examples
-        --------
-        >>> Attractor(np.zeros((2, 2)), np.zeros(2), 4, False).name
-        'period 2, 4 impacts'
-        """
+        """What it is, in words."""
         if self.impacts == 0 and np.all(self.states[:, 1] == 0.0):
             return "rest"
         return f"period {self.period}, {'rest' if self.rests else counted(self.impacts, 'impact')}"
@@ -117,10 +111,7 @@ def _fixed_point(strobe: StroboscopicMap, at: Floats, period: int, size: Floats)
 
 
 def _trap(strobe: StroboscopicMap, attractor: Attractor, point: Floats, record: Records, size: Floats) -> Floats | None:
-    """Neighbourhood of a point of an attractor that no state leaves, as a row for `kernels.periodic.settle`.
-
-    None where the check fails however small it is.
-    """
+    """Neighbourhood of a point of an attractor that no state leaves, as a row for `kernels.periodic.settle`."""
     side, u, v = int(record["side"]), float(record["u"]), float(record["v"])
     if side < 0:  # at rest, wherever it came from
         return np.array([side, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -222,10 +213,7 @@ class KnownAttractors:
         return found
 
     def _passing(self, made: Records, periods: int) -> Integers:
-        """Attractor in whose traps each of some states comes within so many periods, -1 where it comes in none.
-
-        Of a long orbit some points have a trap, and what has settled on it may be at another point.
-        """
+        """Attractor in whose traps each of some states comes within so many periods, -1 where it comes in none."""
         return np.append(self.owner, -1)[self.settled(made.copy(), periods, threads=1)[0]]
 
     def settled(self, made: Records, periods: int, threads: int) -> tuple[Integers, Integers]:

@@ -61,35 +61,10 @@ class BifurcationDiagram(DatasetResult):
     TABLES = MappingProxyType({"states": ("coordinate", "velocity"), "orbits": ("period", "impacts")})
 
     def changes(self, direction: str | None = None, start: int = 0) -> list[tuple[float, float, int, int]]:
-        """List where the period changes: the values before and after, and the periods there.
+        """List where the period changes: the values before and after, and the periods there, in the order gone through.
 
-        Parameters
-        ----------
-        direction : str, optional
-            One of those that were gone through; by default the first.
-        start : int
-            Number of the initial state.
-
-        Returns
-        -------
-        list of (float, float, int, int)
-            In the order in which the values were gone through; a period that is none is 0, -1 or -2, as in ``data``.
-
-        Raises
-        ------
-        InvalidOption
-            If there is no such direction or start.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> from rocking import dynamics
-        >>> ball = dynamics.BouncingBall(0.5, gravity=10.0)
-        >>> def case(ratio):
-        ...     return ball, rocking.pulses.sine(10.0 * ratio, 5.0, cycles=1)
-        >>> found = dynamics.bifurcation_diagram(case, [1.4, 1.5, 1.55], [0.1, 0.5], transient=800)
-        >>> found.changes()
-        [(1.5, 1.55, 1, 2)]
+        The direction is by default the first; `start` is the number of the initial state. A period that is none is 0,
+        -1 or -2, as in ``data``. `InvalidOption` if there is no such direction or start.
         """
         ways = self.data.direction.values.tolist()
         way = ways.index(checks.one_of(ways[0] if direction is None else direction, "direction", InvalidOption, ways))
@@ -194,7 +169,7 @@ def bifurcation_diagram(
     model, chattering : str, optional
         As for `stroboscopic_map`.
     progress : bool, optional
-        Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
+        As for `rocking.simulate_many`.
 
     Returns
     -------
@@ -205,8 +180,6 @@ def bifurcation_diagram(
     ------
     InvalidMotion, InvalidBlock
         If the function returns something else than a body and a motion.
-    InvalidOption
-        If an argument is out of its range, or a state is behind a stop.
 
     Notes
     -----

@@ -259,11 +259,6 @@ class ImpactOscillator(LinearBody):
     second_stop : float, optional
         Position of a stop on the other side, m: x <= second_stop.
 
-    Raises
-    ------
-    InvalidBlock
-        If a parameter is out of its range, or the second stop is not above the first.
-
     References
     ----------
     S. W. Shaw and P. J. Holmes, "A periodically forced piecewise linear oscillator", Journal of Sound and Vibration 90
@@ -325,11 +320,6 @@ class InvertedPendulum(LinearBody):
         Distance from the upright position to each wall, m.
     restitution : float
         Speed after an impact over that before.
-
-    Raises
-    ------
-    InvalidBlock
-        If a parameter is out of its range.
 
     References
     ----------

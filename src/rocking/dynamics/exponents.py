@@ -126,8 +126,6 @@ def lyapunov_exponents(
     ------
     InvalidMotion
         If the motion is none, or has no length.
-    InvalidOption
-        If an argument is out of its range.
 
     Notes
     -----
@@ -142,8 +140,6 @@ def lyapunov_exponents(
 
     Examples
     --------
-    A ball that hits once a period, always at one phase: the product of its multipliers is e^2, and they are complex:
-
     >>> import math, rocking
     >>> from rocking import dynamics
     >>> ball = dynamics.BouncingBall(0.5, gravity=10.0)

@@ -328,11 +328,6 @@ def periodic_orbits(
         Each once, those with the shortest period first, then those with the fewest impacts. There may be others, which
         no start led to.
 
-    Raises
-    ------
-    InvalidMotion, InvalidOption
-        As `stroboscopic_map`, and if the period is no whole number from 1, or a start is behind a stop.
-
     Notes
     -----
     Newton's method solves P^n(x) = x for all starts at once, with the derivative of the stroboscopic map P. Where that
@@ -344,8 +339,6 @@ def periodic_orbits(
 
     Examples
     --------
-    A ball on a table that goes up and down with 1.2 g bounces once a period, in two ways, or rests every period:
-
     >>> from rocking import dynamics, pulses
     >>> ball, table = dynamics.BouncingBall(0.5, gravity=10.0), pulses.sine(12.0, 5.0, cycles=1)
     >>> for orbit in dynamics.periodic_orbits(ball, table):
