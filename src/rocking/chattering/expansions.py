@@ -146,11 +146,6 @@ def asymptotic_table(a: float, omega: float, eta: float) -> NDArray[np.void]:
         speed_before and speed_after |phi'|, to their lowest order, eps^(3/2) (Eqs 57 and 58). The last row's time is
         Eq. 65: the table ends where the terms vanish in double precision.
 
-    Raises
-    ------
-    InvalidOption
-        If a parameter is not a single number or out of range.
-
     Notes
     -----
     Source: the paper's Eqs 12, 57, 58, 60, 62, 64 and 65. Corrected: the procedure is to end, as printed, when Eq. 62
@@ -159,12 +154,8 @@ def asymptotic_table(a: float, omega: float, eta: float) -> NDArray[np.void]:
     Examples
     --------
     >>> table = asymptotic_table(1.01, 2.0, 0.92)
-    >>> table["sign"][:3].tolist(), table["order"][:3].tolist()
-    ([-1, 1, -1], [1, 3, 1])
     >>> round(float(table["time"][-1]), 9)
     0.57342594
-    >>> table["speed_before"][:3].round(6).tolist()
-    [0.003771, 0.00347, 0.003862]
     """
     excess = lifting_amplitude(a) - 1.0
     frequency = single(checked_frequency(omega), "omega")
@@ -205,11 +196,6 @@ def first_interval(a: ArrayLike, omega: ArrayLike) -> Floats:
         tau_1 = (4 sqrt(2)/omega) eps^(1/2) + (sqrt(2)/omega) [1 - 32 (omega^2 - 1)/(15 omega^2)] eps^(3/2), with
         eps = a - 1, of the broadcast shape.
 
-    Raises
-    ------
-    InvalidOption
-        If a parameter is NaN, infinite or out of range.
-
     Notes
     -----
     Source: the paper's Eq. 32. Corrected: Eqs 31 and 32 print 32/5 for 32/15, because T_{0;3} stops at Phi^(5) although
@@ -238,11 +224,6 @@ def first_impact_speed(a: ArrayLike, omega: ArrayLike) -> Floats:
     array of float
         phi'_0(tau_1) = (16 sqrt(2)/(3 omega)) eps^(3/2) + (4 sqrt(2)/omega) [1 - 32 (omega^2 - 1)/(15 omega^2)]
         eps^(5/2), with eps = a - 1, of the broadcast shape.
-
-    Raises
-    ------
-    InvalidOption
-        As `first_interval`.
 
     Notes
     -----
@@ -349,11 +330,6 @@ def series_diagnosis(a: ArrayLike, omega: ArrayLike, eta: ArrayLike, *, order: i
     -------
     SeriesDiagnosis
         Arrays of the broadcast shape.
-
-    Raises
-    ------
-    InvalidOption
-        As `series_coefficients`, and for eta = 1.
 
     Notes
     -----
