@@ -294,10 +294,7 @@ def _densities(
 
 
 def _surfaces(parts: Sequence[Part], density: float | Mapping[str, float] | None) -> tuple[list[str], list[Surface]]:
-    """Close the surfaces of the parts, and name them; open ones of one density are joined before.
-
-    A part that lies in another one, with its normals turned the other way, is a cavity of it, unless it has a density.
-    """
+    """Close the surfaces of the parts, and name them; open ones of one density are joined before."""
     names = [part.name for part in parts]
     found = [agreeing(joined(part.vertices, part.faces)) for part in parts]
     is_open = [not is_closed(surface.faces) for surface in found]
