@@ -80,10 +80,7 @@ def meeting(left: Stack, right: Stack) -> tuple[Floats, Floats]:
 
 
 class _Side:
-    """What becomes of one side's boundaries half way to the other: `half`, where it is known already.
-
-    All others keep their place `at` among those that are known.
-    """
+    """What becomes of one side's boundaries half way to the other: `half`, where it is known already."""
 
     def __init__(self, stack: Stack) -> None:
         self.path, self.level, self.at = stack.path, stack.level, stack.level.copy()
@@ -145,10 +142,7 @@ def _overlap(one: tuple[float, float], other: tuple[float, float]) -> bool:
 
 
 def _join(one: _Side, here: slice, other: _Side, there: slice) -> None:
-    """Lead the ends of a part to those of the other side's; where either has one boundary only, both to one point.
-
-    A region that both parts pass is common ground, on either side of which are two parts of their own.
-    """
+    """Lead the ends of a part to those of the other side's; where either has one boundary only, both to one point."""
     for i in range(here.start + 1, here.stop):
         for j in range(there.start + 1, there.stop):
             if one.path[i] == other.path[j]:

@@ -160,10 +160,7 @@ def _look(region: int) -> tuple[str, str]:
 
 
 def _patches(polygons: Mapping[int, Sequence[Floats]], names: Mapping[int, str], frame: float) -> list[Patch]:
-    """Make the handles of the legend for what can be seen; regions that look the same share one.
-
-    `frame` is the area of the whole.
-    """
+    """Make the handles of the legend for what can be seen; regions that look the same share one."""
 
     def area(x: Floats, y: Floats) -> float:
         return 0.5 * abs(float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))))
