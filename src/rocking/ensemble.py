@@ -86,25 +86,7 @@ class Scales:
 
     @classmethod
     def of(cls, levels: ArrayLike | None, measure: MeasureName | Measure) -> Scales:
-        """Scales from arguments.
-
-        Parameters
-        ----------
-        levels : array_like or None
-            Levels of the measure; None takes motions as they are.
-        measure : str or Measure
-            As for `simulate_many`.
-
-        Returns
-        -------
-        Scales
-            With the levels as floats.
-
-        Examples
-        --------
-        >>> Scales.of([0.5, 1.0], "factor").count
-        2
-        """
+        """Create scales from levels of a measure, as `simulate_many` accepts them, or motions as they are."""
         known = Measure.of(measure, among=SCALES)
         if levels is None:
             if known.name != "factor":
@@ -124,24 +106,7 @@ class Scales:
         return {"measure": measure.name, "units": measure.units, **measure.options()}
 
     def factors(self, motion: Motion) -> Floats:
-        """Return the factors that bring a motion to the levels.
-
-        Parameters
-        ----------
-        motion : Motion
-            Motion as it is.
-
-        Returns
-        -------
-        ndarray
-            One for each level.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> Scales.of([1.5, 6.0], "pga").factors(rocking.pulses.one_sine(3.0, 1.0)).round(12).tolist()
-        [0.5, 2.0]
-        """
+        """Return the factors that bring a motion to the levels, one for each."""
         with np.errstate(over="ignore"):
             factors = self.values / measured(self, motion)
             largest = factors.max() * np.abs(motion.coefficients).max()
@@ -365,11 +330,6 @@ def simulate_many(
         the outcome is undecided where it is neither 0 nor 1. Coordinates name the motions and hold the blocks'
         parameters.
 
-    Raises
-    ------
-    InvalidOption, InvalidMotion
-        If an argument is out of its range, or a motion of bodies on a line has a vertical component.
-
     Notes
     -----
     The same engine as `simulate`: every impact is located and chattering is proven. Under evenly sampled records the
@@ -382,8 +342,6 @@ def simulate_many(
     >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
     >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
     >>> result = rocking.simulate_many(blocks, motion, levels=[0.4, 1.0])
-    >>> dict(result.sizes)
-    {'motion': 1, 'scale': 2, 'block': 4}
     >>> result.overturned.sel(scale=0.4).values.tolist()
     [[True, False, True, False]]
     """

@@ -435,10 +435,7 @@ class _Angle(NamedTuple):
 
 
 def _sine_and_cosine(turns: Floats, rest: Floats, phase: float) -> _Angle:
-    """Angle ``2 pi (turns + rest) + phase``, `rest` far below `turns`, without the rounding of a large angle.
-
-    Whole quarter turns are taken off exactly, and the phase is added by the addition theorem.
-    """
+    """Angle ``2 pi (turns + rest) + phase``, `rest` far below `turns`, without the rounding of a large angle."""
     within = (turns - np.rint(turns)) + rest
     quarter = np.rint(4.0 * within)
     turned = _Angle(*piecewise.from_quadrant(quarter, 2.0 * np.pi * (within - 0.25 * quarter)))

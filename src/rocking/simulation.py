@@ -74,21 +74,14 @@ def simulate(
     ------
     InvalidBlock, InvalidMotion
         If the block is no body, or the motion no `Motion` or one with a vertical component for a body on a line.
-    InvalidOption
-        If an argument is out of its range, or the block would never come to rest and no duration is given.
 
     Notes
     -----
     The block sticks to the ground. Whether it would slide at a coefficient of friction, and when, is asked of the
     response: `Response.sliding_time`, ``summary(friction)``.
 
-    Between impacts the rotation is a Taylor series about the last event (paper, Eq. 15); the next impact is the first
-    root of that series divided by time (paper, Eq. 20), found so that none can be missed.
-
     Examples
     --------
-    A slender block is released from a tenth of its slenderness and rocks to rest:
-
     >>> import rocking
     >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     >>> response = rocking.simulate(block, None, model="linear", initial_rotation=0.02)
