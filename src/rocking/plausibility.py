@@ -239,10 +239,7 @@ def _timing_notes(motion: Motion, vertical: Motion) -> Iterator[str]:
 
 
 def is_multiple(motion: Motion, other: Motion, *, reversed_too: bool = True) -> bool:
-    """Whether scaling makes one motion of the other, but for rounding; a negative factor leaves the vertical as it is.
-
-    ``reversed_too``: by factors of either sign; else by positive ones alone.
-    """
+    """Whether scaling makes one motion of the other, but for rounding; `reversed_too`: also by a negative factor."""
     parts = [[part for part in (one, one.vertical) if part is not None] for one in (motion, other)]
     if [part.coefficients.shape for part in parts[0]] != [part.coefficients.shape for part in parts[1]]:
         return False

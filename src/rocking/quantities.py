@@ -174,11 +174,7 @@ def at_a_period(text: str, name: str, quantity: Quantity = acceleration) -> tupl
 
 
 def scaling(given: Mapping[str, str | float | None], quantity: Quantity = acceleration) -> tuple[float, Measure] | None:
-    """Return the level that a motion is scaled to, and the measure that it is of; None where nothing is given.
-
-    Given is at most one of scale (a factor), pga, pgv (m/s) and sa ("0.4g@1.0", at a period, s), as a text or a number;
-    `quantity` reads accelerations.
-    """
+    """Return the level that a motion is scaled to, and the measure that it is of; None where nothing is given."""
     chosen = {name: value for name, value in given.items() if value is not None}
     if not chosen:
         return None

@@ -101,10 +101,7 @@ def response_to(
     name: str | None = None,
     factor: float = 1.0,
 ) -> Response:
-    """Compute a response as `simulate` does, with another ``name`` for the initial coordinate in messages.
-
-    A ``factor`` scales the motion and the initial state; the response keeps the motion as it is.
-    """
+    """Compute a response as `simulate` does, with another ``name`` for the initial coordinate in messages."""
     how, alone, motion = treatment(chattering), one_body(block).alone(), one_motion(motion)
     setup, ground = Setup(alone, model, how, duration, initial), None
     if factor != 1.0:  # repeated simulations leave the cache as it is

@@ -181,10 +181,7 @@ def columns_of(part: xr.Dataset) -> list[Column]:
 
 
 def columns_with_skipped(rows: Sequence[Mapping[str, Any]], unread: Mapping[str, str]) -> list[Column]:
-    """Return rows of records as columns, with a row for each record that could not be read and the reason.
-
-    Whole numbers and truth values stay such beside rows that have none.
-    """
+    """Return rows of records as columns, with a row for each record that could not be read and the reason."""
     import pandas as pd
 
     skipped = [{"record": record, "verdict": f"skipped: {reason}"} for record, reason in unread.items()]

@@ -229,10 +229,7 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
 
 
 def first_arc(a: float, omega: float) -> tuple[float, float]:
-    """Dimensionless time from uplift to the first impact, and the speed before it, however long the arc lasts.
-
-    Both are NaN where the block does not come down within a time of 20, in which it grows by exp(20).
-    """
+    """Dimensionless time from uplift to the first impact, and the speed before it, however long the arc lasts."""
     amplitude, frequency, _ = _single_case(a, omega, 1.0)
     if amplitude == 1.0:
         return 0.0, 0.0
@@ -344,9 +341,6 @@ def _semianalytical_times(a: Floats, omega: Floats, eta: Floats, resolved: int |
 
 
 def resolved_by_default(eta: Floats) -> NDArray[np.int64]:
-    """Return how many impacts Eq. 75 resolves by default.
-
-    After them the speed has fallen as far as after 60 with the paper's restitution.
-    """
+    """Return how many impacts Eq. 75 resolves by default."""
     count = np.ceil(_PAPER_IMPACTS * math.log(_PAPER_RESTITUTION) / np.log(eta))
     return np.maximum(count, _PAPER_IMPACTS).astype(np.int64)

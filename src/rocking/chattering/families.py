@@ -78,14 +78,12 @@ def lobes(block: Block, *, omega: float = 2.0, count: int = 5, model: Model = "n
 
     Parameters
     ----------
-    block : Block
-        What rocks.
+    block, model : Block, str
+        As for `sine`.
     omega : float
         Frequency of the lobes.
     count : int
         How many there are.
-    model : str
-        As for `sine`.
 
     Returns
     -------
@@ -117,12 +115,10 @@ def ricker(
 
     Parameters
     ----------
-    block : Block
-        What rocks.
+    block, model : Block, str
+        As for `sine`.
     kind : {"symmetric", "antisymmetric"}
         Second or third derivative of a Gaussian.
-    model : str
-        As for `sine`.
 
     Returns
     -------
@@ -146,12 +142,10 @@ def mavroeidis_papageorgiou(
 
     Parameters
     ----------
-    block : Block
-        What rocks.
+    block, model : Block, str
+        As for `sine`.
     phase, gamma : float
         As for `rocking.pulses.mavroeidis_papageorgiou`.
-    model : str
-        As for `sine`.
 
     Returns
     -------

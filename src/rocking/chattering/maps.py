@@ -248,10 +248,7 @@ class ChatteringMap(DatasetResult):
 
 
 def last_exceedance(motion: Motion, thresholds: tuple[float, float], gravity: float) -> float | None:
-    """Time, s, at which a motion last passes the thresholds of the two sides (m/s^2); None if it hardly passes one.
-
-    What passes a threshold by no more than rounding lifts no block.
-    """
+    """Time, s, at which a motion last passes the thresholds of the two sides (m/s^2); None if it hardly passes one."""
     # By four ulp a peak that was meant to be the threshold may exceed it.
     plus, minus = (threshold * (1.0 + 2.0**-50) for threshold in thresholds)
     lifts = motion.vertical is None and motion.pga > min(plus, minus)

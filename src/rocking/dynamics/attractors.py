@@ -67,10 +67,7 @@ class Attractor:
 
 
 def attractor_from(strobe: StroboscopicMap, state: Floats, size: Floats) -> Attractor | None:
-    """Periodic attractor on which a state has settled; None where it does not come back, or the orbit is not stable.
-
-    ``size`` is that of the states, (coordinate, velocity).
-    """
+    """Periodic attractor on which a state has settled; None where it does not come back, or the orbit is not stable."""
     orbit = strobe.orbit(state, 2 * LONGEST)
     back = (np.abs(orbit[-1 - LONGEST : -1][::-1] - orbit[-1]) / size).max(axis=1)
     returns = np.flatnonzero(back < RETURN)

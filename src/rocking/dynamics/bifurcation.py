@@ -285,10 +285,7 @@ def _in_front(strobe: StroboscopicMap, states: Floats) -> Floats:
 
 
 def states_after(strobe: StroboscopicMap, at: Floats, transient: int, kept: int) -> tuple[Floats, Integers]:
-    """States at the starts of some periods after others, shape (n, kept, 2), and what became of each: a `Fate`.
-
-    NaN from where a body overturns, or cannot be followed.
-    """
+    """States at the starts of some periods after others, shape (n, kept, 2), and what became of each: a `Fate`."""
     states, now, fates = np.full((len(at), kept, 2), np.nan), at, np.full(len(at), Fate.MOVES.value)
     if transient:
         now, fates, _ = strobe.followed(at, transient)

@@ -125,10 +125,7 @@ class StroboscopicMap(PeriodicForcing):
 
 
 class HalfMap(StroboscopicMap):
-    """Map of a mirrored body under an antisymmetric motion to the mirror image of its state half a period later.
-
-    Its square is the stroboscopic map.
-    """
+    """Map of a mirrored body under an antisymmetric motion to the mirror image of its state half a period later."""
 
     def __init__(self, strobe: StroboscopicMap) -> None:
         super().__init__(strobe.body, strobe.motion, strobe.model, strobe.treatment)

@@ -268,10 +268,7 @@ def orbit_at(strobe: StroboscopicMap, state: Floats, period: int) -> PeriodicOrb
 
 
 def impacts_of(strobe: StroboscopicMap, state: Floats, period: int, change: Floats) -> float:
-    """Impacts in so many periods from a state of this derivative: infinity with complete chattering.
-
-    That is a rest after impacts which is proven, and not made by an impact that leaves no speed.
-    """
+    """Impacts in so many periods from a state of this derivative: infinity with complete chattering."""
     impacts = float(strobe.followed(state, period)[2])
     chatters = impacts > 0.0 and strobe.treatment.bracket > 0.0 and np.max(strobe.bodies.restitution) > 0.0
     return math.inf if chatters and not np.any(change) else impacts
@@ -427,10 +424,7 @@ class _Search:
         return rows
 
     def residuals(self, rows: Floats) -> tuple[Floats, Flags]:
-        """How far states are from where they come to, over the scale, and whether that is only rounding.
-
-        Rounding grows with the derivative, to a limit.
-        """
+        """How far states are from where they come to, over the scale, and whether that is only rounding."""
         size = self.size(rows[:, 2:4] - rows[:, :2])
         allowed = 1e-11 * np.maximum(1.0, np.max(np.abs(rows[:, 4:]), axis=1))
         # What comes back no nearer is called no orbit, however large the derivative.

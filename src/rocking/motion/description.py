@@ -131,10 +131,7 @@ class Description:
 
 
 def begins_later(first: Description, second: Description, step: float | None) -> float:
-    """Return how much later the second of two records begins, s, by the clock of their files.
-
-    It is 0 where that is not known, or less than half a `step` of the samples, s.
-    """
+    """Return how much later the second of two records begins, s, by the clock of their files."""
     one, other = (each.origin or Origin() for each in (first, second))
     if one.start is None or other.start is None or one.format != other.format:
         return 0.0

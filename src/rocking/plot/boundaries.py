@@ -35,10 +35,7 @@ class Stack(NamedTuple):
 
 
 def runs(x: Floats, stacks: Sequence[Stack]) -> Iterator[tuple[Floats, Floats, tuple[int, ...]]]:
-    """Yield runs of abscissae with the same regions: abscissae, levels of shape (regions + 1, abscissae), regions.
-
-    A run begins and ends half way to its neighbours.
-    """
+    """Yield runs of abscissae with the same regions: abscissae, levels of shape (regions + 1, abscissae), regions."""
     starts = [k for k in range(len(x)) if k == 0 or stacks[k].region != stacks[k - 1].region]
     ends = [*starts[1:], len(x)]
     met = [meeting(stacks[end - 1], stacks[end]) for end in ends[:-1]]
@@ -95,11 +92,7 @@ class _Side:
         self.at[part] = np.mean(self.ends(part))
 
     def halves(self) -> Floats:
-        """Levels half way.
-
-        Parts that meet each for themselves may cross their neighbours by a little where many regions crowd: sorting
-        keeps every region on its place between the others.
-        """
+        """Levels half way."""
         known = ~np.isnan(self.half)
         return np.sort(np.where(known, self.half, np.interp(self.at, self.at[known], self.half[known])))
 

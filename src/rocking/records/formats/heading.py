@@ -60,11 +60,7 @@ class Column(NamedTuple):
 
 @dataclass(frozen=True)
 class Heading:
-    """What a heading says of each column, whether it names them and where (the offset of that line).
-
-    Where it names no column as that of times, the first of several is `assumed` to be. It is `doubtful` whether they
-    are times where no name but "T" says so, or a title names a spectrum.
-    """
+    """What a heading says of each column, whether it names them and where (the offset of that line)."""
 
     columns: tuple[Column, ...]
     named: bool
@@ -78,11 +74,7 @@ class Heading:
 
 
 def heading_of(source: Source, end: int, count: int, delimiter: str) -> Heading:
-    """Return what the lines before the offset `end` say of the `count` columns that begin there.
-
-    Without names the first of several columns holds times, in seconds. The delimiter is "," or ";", or " " for blanks
-    and tabs.
-    """
+    """Return what the lines before the offset `end` say of the `count` columns that begin there."""
     at = max(0, end - 10_000)
     lines: list[tuple[str, int]] = []
     for line in source.data[at:end].split(b"\n"):
