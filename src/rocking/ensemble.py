@@ -289,9 +289,7 @@ def simulate_many(
         n blocks, or bodies of another kind (`rocking.body.Bodies`).
     motions : Motion, sequence of Motion, or mapping of str to Motion
         m motions; a mapping gives them its names.
-    model : {"nonlinear", "linear"}
-        As for `simulate`.
-    chattering : str or Treatment
+    model, chattering : str or Treatment
         As for `simulate`.
     levels : array_like, optional
         Simulate every motion scaled to each of these levels of `measure`. Adds the dimension ``scale``.
@@ -303,17 +301,15 @@ def simulate_many(
     duration : float, optional
         As for `simulate`.
     derivatives : bool
-        Whether to differentiate the peaks. Each body that rocks and stands is then followed
-        once more, alone, which takes some twenty times as long.
+        Whether to differentiate the peaks, which takes some twenty times as long.
     times : bool
         Whether to keep the times of the first uplift and of the first and the last rest.
     robust : bool
         Whether to repeat every simulation with the motion scaled by 1 +- 1e-6 and 1 +- 3e-6, as
         `Response.perturbed` does, which takes five times as long.
-    threads : int, optional
-        Number of threads; by default one for every core.
-    progress : bool, optional
-        Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
+    threads, progress : int or bool, optional
+        Number of threads, by default one for every core; whether to draw a progress bar, by default if stderr is a
+        terminal and the work takes long.
 
     Returns
     -------

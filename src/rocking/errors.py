@@ -82,10 +82,8 @@ class RockingError(Exception):
         One sentence; each "{}" in it stands for one of `arguments`.
     *arguments : str
         Names of the arguments that the sentence names, the one that is wrong first.
-    path : str, optional
-        The file that is wrong; the sentence itself does not name it.
-    line : int, optional
-        The line of the file, from 1.
+    path, line : str, int, optional
+        The file that is wrong, which the sentence itself does not name, and its line, from 1.
     value : object, optional
         What was given.
 

@@ -60,10 +60,8 @@ def simulate(
         Time to stop at, s. By default to the end of the motion, and on until rest or overturning, or until it is proven
         that restraints hold the block leaning for ever. Where the duration ends the response while the block still
         moves or the motion goes on, the response is `stopped`, and has no verdict.
-    initial_rotation : float
-        Rotation at time 0, rad; positive leans to side +. Of another body its coordinate.
-    initial_velocity : float
-        Angular velocity at time 0, rad/s.
+    initial_rotation, initial_velocity : float
+        Rotation at time 0, rad, positive to side +, and angular velocity, rad/s. Of another body its coordinate.
 
     Returns
     -------

@@ -46,10 +46,8 @@ class Blocks:
 
     Parameters
     ----------
-    p : array_like
-        Frequency parameters, rad/s.
-    alpha : array_like
-        Slendernesses, rad.
+    p, alpha : array_like
+        Frequency parameters, rad/s, and slendernesses, rad.
     restitution : array_like, optional
         Factors on the angular speed on leaving a side. By default those that conserve angular momentum: Housner's from
         `alpha` where both sides are equal, else of the one rigid body whose sides have these p and alpha.

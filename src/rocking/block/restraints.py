@@ -273,25 +273,19 @@ class Damper(Restraint):
 
 @dataclass(frozen=True)
 class Thrust(Restraint):
-    """Horizontal force of constant size, as that of a vault on a wall.
+    """Horizontal force of constant size, as of a vault on a wall; vertical ground motion does not change it.
 
     Parameters
     ----------
     force : float
         N, positive to side +.
-    height : float
-        Height of the point where it acts, above the base, m.
-    offset : float
-        Distance of that point from the centre of mass of the block without loads, m, positive to side +.
+    height, offset : float
+        Height above the base of the point where it acts, and offset of that point as of a `Load`, m.
 
     Raises
     ------
     InvalidBlock
         If the force is zero, or the height not positive.
-
-    Notes
-    -----
-    Vertical motion of the ground does not change it.
 
     Examples
     --------

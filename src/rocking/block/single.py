@@ -174,10 +174,8 @@ class Block:
 
         Parameters
         ----------
-        p : float or pair
-            Frequency parameter, rad/s.
-        alpha : float or pair
-            Slenderness, rad, between 0 and pi/2.
+        p, alpha : float or pair
+            Frequency parameter, rad/s, and slenderness, rad, between 0 and pi/2.
         restitution : float or pair, optional
             Factor on the angular speed on leaving a side, in (0, 1]. By default the one that conserves angular
             momentum: Housner's where the sides are equal, else of the one rigid body that has these p and alpha.
@@ -240,17 +238,13 @@ class Block:
         ----------
         distances : pair of float
             Horizontal distances from the centre of mass to the pivots (side +, side -), m.
-        height : float
-            Height of the centre of mass above the pivots, m.
-        radius_of_gyration : float
-            sqrt(I/m) about the centre of mass, m.
+        height, radius_of_gyration : float
+            Height of the centre of mass above the pivots, and sqrt(I/m) about the centre of mass, m.
         restitution : float or pair, optional
             Factor on the angular speed on leaving a side. By default angular momentum about the new pivot is
             conserved: e_i = (I + m (h^2 - d+ d-))/(I + m R_j^2), j the other side.
-        mass : float, optional
-            Mass, kg.
-        gravity : float
-            Acceleration of gravity, m/s^2.
+        mass, gravity : float, optional
+            As of `Block`.
         description : str, optional
             What it is, in words; by default its pivots are.
 
@@ -354,10 +348,6 @@ class Block:
         -------
         RestrainedBlock
             With one side.
-
-        Notes
-        -----
-        The law is that of Sorrentino, AlShawa and Decanini (2011).
         """
         from rocking.block.restrained import RestrainedBlock
 

@@ -61,10 +61,8 @@ def critical_amplitude(omega: ArrayLike, eta: ArrayLike, *, method: str = "exact
 
     Parameters
     ----------
-    omega : array_like
-        Forcing frequency over p.
-    eta : array_like
-        Coefficient of restitution.
+    omega, eta : array_like
+        Forcing frequency over p, and coefficient of restitution.
     method : {"exact", "eq76", "eq77", "approximation"}
         "exact": by root finding on certified sequences, to 1e-14. "eq76", "eq77": the paper's fits, off by up to 1.1
         and 5.4 % in eta from 0.5 to 0.97, omega from 0.5 to 8. "approximation": a Chebyshev expansion with a largest

@@ -185,10 +185,8 @@ def first_interval(a: ArrayLike, omega: ArrayLike) -> Floats:
 
     Parameters
     ----------
-    a : array_like
-        Amplitude over g alpha; NaN is returned where a < 1.
-    omega : array_like
-        Forcing frequency over p.
+    a, omega : array_like
+        Amplitude over g alpha, NaN being returned below 1, and forcing frequency over p.
 
     Returns
     -------
@@ -264,10 +262,8 @@ def series_coefficients(omega: ArrayLike, eta: ArrayLike, *, order: int = 4) -> 
 
     Parameters
     ----------
-    omega : array_like
-        Forcing frequency over p.
-    eta : array_like
-        Coefficient of restitution; infinity is returned for 1.
+    omega, eta : array_like
+        Forcing frequency over p, and coefficient of restitution; infinity is returned for 1.
     order : int
         Number of coefficients, 1 to 40.
 

@@ -78,12 +78,8 @@ def lobes(block: Block, *, omega: float = 2.0, count: int = 5, model: Model = "n
 
     Parameters
     ----------
-    block, model : Block, str
-        As for `sine`.
-    omega : float
-        Frequency of the lobes.
-    count : int
-        How many there are.
+    block, omega, count, model : Block, float, int, str
+        As for `sine`, with the frequency of the lobes and their number.
 
     Returns
     -------
@@ -115,10 +111,8 @@ def ricker(
 
     Parameters
     ----------
-    block, model : Block, str
-        As for `sine`.
-    kind : {"symmetric", "antisymmetric"}
-        Second or third derivative of a Gaussian.
+    block, kind, model : Block, {"symmetric", "antisymmetric"}, str
+        As for `sine` and `rocking.pulses.ricker`.
 
     Returns
     -------
@@ -142,10 +136,8 @@ def mavroeidis_papageorgiou(
 
     Parameters
     ----------
-    block, model : Block, str
-        As for `sine`.
-    phase, gamma : float
-        As for `rocking.pulses.mavroeidis_papageorgiou`.
+    block, phase, gamma, model : Block, float, float, str
+        As for `sine` and `rocking.pulses.mavroeidis_papageorgiou`.
 
     Returns
     -------
@@ -178,12 +170,8 @@ def record(
     ----------
     motion : Motion
         What is scaled.
-    alpha : float
-        Slenderness of the blocks, rad.
-    restitution : float, optional
-        Their restitution; by default Housner's.
-    model : str
-        As for `sine`.
+    alpha, restitution, model : float, float, str
+        Slenderness of the blocks, rad, their restitution (by default Housner's), and the model as for `sine`.
 
     Returns
     -------

@@ -42,10 +42,8 @@ class Attractor:
         Coordinate and velocity at the starts of the periods of the motion.
     multipliers : ndarray of complex, shape (2,)
         Eigenvalues of the map's derivative over the orbit's period; zero where it holds a rest.
-    impacts : int
-        Impacts in one of its periods, those that were resolved.
-    rests : bool
-        Whether the body comes to rest on it.
+    impacts, rests : int, bool
+        Impacts in one of its periods, those that were resolved; whether the body comes to rest on it.
     """
 
     states: Floats

@@ -160,10 +160,8 @@ def bifurcation_diagram(
     direction : {"up", "down", "both", "afresh"}
         Up or down: at each value an orbit starts where it was at the value before, and where that is not known, as
         after overturning, again at its initial state. Afresh: at each value from the initial states.
-    transient : int
-        Periods at each value before states are kept.
-    kept : int
-        Periods whose states are kept.
+    transient, kept : int
+        Periods at each value before states are kept, and periods whose states are kept.
     parameter : str
         What the parameter is, with its unit, for tables and figures.
     model, chattering : str, optional

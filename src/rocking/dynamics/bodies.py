@@ -201,10 +201,8 @@ class BouncingBall(LinearBody):
 
     Parameters
     ----------
-    restitution : float
-        Speed after an impact over that before, relative to the table.
-    gravity : float
-        Acceleration of gravity, m/s^2.
+    restitution, gravity : float
+        Speed after an impact over that before, relative to the table, and acceleration of gravity, m/s^2.
 
     Raises
     ------

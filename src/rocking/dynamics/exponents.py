@@ -38,10 +38,8 @@ class LyapunovExponents(Result):
         impacts lose nothing, a period at rest counts as zero: what is near it never rests.
     standard_error : float
         Of both, from the means of 20 consecutive parts of the orbit.
-    period : float
-        Period of the motion, s.
-    periods : int
-        How many were averaged over.
+    period, periods : float, int
+        Period of the motion, s, and how many were averaged over.
     impacts : float
         Impacts per period.
     resting : float

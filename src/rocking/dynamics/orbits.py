@@ -63,10 +63,8 @@ class PeriodicOrbit(Result):
         Floquet multipliers, the largest first: eigenvalues of the derivative of the state after a period of the orbit
         by that before. Exactly zero with a proven rest; one at rest where impacts lose nothing, for what is near it
         never rests.
-    symmetric : bool
-        Whether it is its own mirror image half a period later.
-    rests : bool
-        Whether the body comes to rest in every period of the orbit.
+    symmetric, rests : bool
+        Whether it is its own mirror image half a period later; whether the body comes to rest in every period of it.
     """
 
     TABLES: ClassVar[tuple[str, ...]] = ("states", "impacts", "histories")

@@ -21,22 +21,16 @@ class Origin:
 
     Attributes
     ----------
-    format : str
-        Format of the file.
-    file : str
-        Name of the file, without its folder.
+    format, file : str
+        Format and name of the file, without its folder.
     event, station : str
         Earthquake and place.
-    channel : str
-        Name of the component: "90 Deg", "Up", "HNE", ...
-    number : int or None
-        The channel's number in the file.
+    channel, number : str, int or None
+        Name of the component ("90 Deg", "Up", "HNE", ...) and its number in the file.
     azimuth : float or None
         Direction of positive acceleration, degrees clockwise from north; None if vertical or unknown.
-    units : str
-        Units of the numbers in the file, as it spells them.
-    heading_units : str
-        Units that the heading of a text table names, where it has one.
+    units, heading_units : str
+        Units of the numbers in the file, as it spells them, and units that the heading of a text table names.
     start : float or None
         Instant of the first sample by the file's own clock, s; None where that is not known, or the motion was delayed
         or cut.

@@ -120,10 +120,8 @@ class Motion(Processable):
             Ground acceleration, m/s^2, n >= 2; the first sample is at time 0.
         dt : float
             Sampling step, s, from 1e-9 to 1e9.
-        name : str
-            Short name for tables and figures.
-        description : Description, optional
-            Where the samples come from.
+        name, description : str, Description, optional
+            As of `Motion`.
 
         Returns
         -------

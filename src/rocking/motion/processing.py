@@ -130,10 +130,8 @@ class Processable(Measured):
 
         Parameters
         ----------
-        period : float
-            Natural period of the building, s.
-        damping : float
-            Its fraction of critical damping.
+        period, damping : float
+            Natural period of the building, s, and its fraction of critical damping.
         ringing : float, optional
             Time for which the floor is followed after the motion, s; by default until a free oscillation has faded to a
             thousandth.

@@ -46,10 +46,8 @@ class Measure:
         a block's own dimensionless ones: peak acceleration over the smallest that lifts it, and peak velocity over that
         acceleration in the block's time. Of a free block they are PGA/(g tan alpha) and p PGV/(g tan alpha), in the
         linear model with alpha for tan alpha; what restrains a block, or makes it lean, changes what lifts it.
-    period : float, optional
-        Period of the oscillator of "sa", s.
-    damping : float
-        Its fraction of critical damping.
+    period, damping : float, optional
+        Period of the oscillator of "sa", s, and its fraction of critical damping.
 
     Raises
     ------

@@ -37,14 +37,10 @@ class Record:
         Degrees clockwise from north that positive acceleration points to, or "up".
     state : str
         Whether it was corrected, and how.
-    step : float
-        Sampling step, s.
-    samples : int
-        Number of samples.
-    units : str
-        Unit of the published numbers; `load` converts to m/s^2.
-    denominator : int
-        Published numbers are whole multiples of one over this.
+    step, samples : float, int
+        Sampling step, s, and number of samples.
+    units, denominator : str, int
+        Unit of the published numbers, which are whole multiples of one over the denominator.
     source, terms : str
         Who recorded and processed it, and terms of use.
     """

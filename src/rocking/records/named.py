@@ -311,12 +311,8 @@ def contents(
     ----------
     file : str, path or binary file
         As for `rocking.read`.
-    channel : str, optional
-        The only one to list; by default all.
-    dt : float, optional
-        As for `rocking.read`.
-    units : str, optional
-        As for `rocking.read`.
+    channel, dt, units : str or float, optional
+        As for `rocking.read`; by default all channels are listed.
     several : bool
         Whether the arguments are for several files: those that say their step and units keep them.
 

@@ -127,8 +127,7 @@ def gradient(response: Response, of: Quantity = "peak", at: float | None = None)
 
     Notes
     -----
-    One pass back along the steps of the response, whatever the number of samples: the adjoint of what
-    `Response.sensitivity` carries forwards (see "Impacts: restitution and sensitivity" in the documentation). The time
+    The adjoint of what `Response.sensitivity` carries forwards: one pass, whatever the number of samples. The time
     of an uplift changes with the motion about it alone, and not at all where the motion jumps past the threshold; that
     of a rest follows its impacts up to 0.01 ms before it, and is to first order from there. Numbers are NaN where there
     is no derivative, and `Gradient.reason` says why.

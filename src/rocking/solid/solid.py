@@ -41,20 +41,14 @@ class Solid(Result):
     inertia_over_mass : array_like, shape (3, 3)
         Tensor of inertia about the centre of mass over the mass, m^2: squares of radii of gyration on its diagonal, and
         the negative of the mean products of coordinates beside it.
-    mass : float, optional
-        Mass, kg; rocking does not depend on it.
-    gravity : float
-        Acceleration of gravity, m/s^2.
-    description : str
-        What it is.
-    height : float, optional
-        Its height, m.
+    mass, gravity : float, optional
+        Mass, kg, on which rocking does not depend, and acceleration of gravity, m/s^2.
+    description, height : str, float, optional
+        What it is, and its height, m.
     regions : sequence of Region
         Its parts, each with its name, volume (m^3) and density (kg/m^3).
-    repairs : sequence of str
-        What was done to the mesh to close its surface.
-    notes : sequence of str
-        What looks like a mistake.
+    repairs, notes : sequence of str
+        What was done to the mesh to close its surface, and what looks like a mistake.
 
     Raises
     ------
