@@ -148,15 +148,12 @@ class AsymptoticTime(Treatment):
         threshold = bodies.alpha if model == "linear" else np.tan(bodies.alpha)
         amplitude = abs(factor * parameters["amplitude"]) / (bodies.gravity * threshold)
         frequency = 2.0 * np.pi * parameters["frequency"] / bodies.p
-        complete = (amplitude >= 1.0) & (amplitude < self._critical(frequency, eta))
+        critical, lossy = np.ones(frequency.shape), eta < 1.0
+        critical[lossy] = critical_amplitudes_by(self.critical, frequency[lossy], eta[lossy])
+        complete = (amplitude >= 1.0) & (amplitude < critical)
         cases = zip(amplitude.flat, frequency.flat, eta.flat, strict=True)
         times = np.reshape([eq65_time(*case) for case in cases], amplitude.shape)
         return np.where(complete, times / bodies.p, np.inf)
-
-    def _critical(self, frequency: Floats, restitution: Floats) -> Floats:
-        found, lossy = np.ones(frequency.shape), restitution < 1.0
-        found[lossy] = critical_amplitudes_by(self.critical, frequency[lossy], restitution[lossy])
-        return found
 
 
 @dataclass(frozen=True)

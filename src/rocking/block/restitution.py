@@ -29,7 +29,8 @@ def housner_restitution(alpha: float) -> float:
 def one_sided_restitution(alpha: float) -> float:
     """Restitution of a wall that rocks against transverse walls, by angular momentum at three impacts.
 
-    The wall meets the ground with its inner edge, then the transverse walls with its top, then the ground again.
+    The wall meets the ground with its inner edge, then the transverse walls with its top, then the ground again
+    (Sorrentino, AlShawa and Decanini 2011). A measured value is better.
 
     Parameters
     ----------
@@ -40,10 +41,6 @@ def one_sided_restitution(alpha: float) -> float:
     -------
     float
         The size of (1 - 1.5 sin(alpha)^2)^2 (1 - 1.5 cos(alpha)^2): 0.47 for a slenderness of 0.1.
-
-    Notes
-    -----
-    After Sorrentino, AlShawa and Decanini (2011); a measured value is better.
 
     Examples
     --------
@@ -236,7 +233,7 @@ class FallingRestitution(Restitution):
 
 @dataclass(frozen=True)
 class RandomRestitution(Restitution):
-    """A restitution that is drawn at each impact, evenly between two bounds.
+    """A restitution that is drawn at each impact, evenly between two bounds, by Philox 2x32 with ten rounds.
 
     Parameters
     ----------
@@ -246,10 +243,6 @@ class RandomRestitution(Restitution):
         Whole number from 0 to 2^53. The factor depends on it and on the number of the impact alone: a body draws the
         same ones whatever shakes it, and whether it is simulated alone or with others. Give bodies seeds of their own.
         After a rest it goes on from the impacts that were resolved, of which a finer treatment has more.
-
-    Notes
-    -----
-    Drawn by Philox 2x32 with ten rounds, of the number of the impact and the seed.
 
     References
     ----------

@@ -98,8 +98,7 @@ def chattering_time(
 
     Notes
     -----
-    Source: "Chattering: An overlooked peculiarity of rocking motion", Eqs 4 to 13 (problem), 65 and 75. Large
-    arrays are shared among the processor's cores.
+    Source: "Chattering: An overlooked peculiarity of rocking motion", Eqs 4 to 13 (problem), 65 and 75.
 
     Close to the critical amplitude a_cr the relative error of "exact" is at most 2^-51 nu (pi/omega - tau)/((a_cr - a)
     tau) besides those 1e-13, with an exponent nu of eta alone (`critical_amplitude`): 3e-12 at 1e-8 below a_cr for
@@ -175,7 +174,7 @@ class ChatteringSequence:
 
 
 def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) -> ChatteringSequence:
-    """Resolve one sequence impact by impact until its time of rest is bracketed.
+    """Resolve one sequence impact by impact (paper, Eqs 6, 13, 15 and 20) until its time of rest is bracketed.
 
     Parameters
     ----------
@@ -188,10 +187,6 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
     -------
     ChatteringSequence
         Impacts and bracket.
-
-    Notes
-    -----
-    Source: the paper's Eqs 6, 13, 15 and 20; the certificate is this package's own (documentation, "Theory").
 
     Examples
     --------
@@ -238,7 +233,7 @@ def first_arc(a: float, omega: float) -> tuple[float, float]:
 
 
 def interval_ratios(a: float, omega: float, eta: float, n: int) -> Floats:
-    """Ratios of the intervals between every second impact, which tend to eta^2.
+    """Ratios of the intervals between every second impact, which tend to eta^2 (paper, Eq. 73 and Fig. 3).
 
     Parameters
     ----------
@@ -252,10 +247,6 @@ def interval_ratios(a: float, omega: float, eta: float, n: int) -> Floats:
     array of float, shape (n,)
         Interval k + 2 over interval k, for k = 0 ... n - 1, from resolved impacts; NaN from where an arc outlasts
         half a period, or the intervals fall below 1e-120.
-
-    Notes
-    -----
-    Source: the paper's Eq. 73 and Fig. 3.
 
     Examples
     --------

@@ -210,7 +210,7 @@ def first_interval(a: ArrayLike, omega: ArrayLike) -> Floats:
 
 @_BEYOND_RANGE
 def first_impact_speed(a: ArrayLike, omega: ArrayLike) -> Floats:
-    """Angular velocity just before the first impact, to two orders (Eq. 34).
+    """Angular velocity just before the first impact, to two orders (paper, Eq. 34).
 
     Parameters
     ----------
@@ -222,10 +222,6 @@ def first_impact_speed(a: ArrayLike, omega: ArrayLike) -> Floats:
     array of float
         phi'_0(tau_1) = (16 sqrt(2)/(3 omega)) eps^(3/2) + (4 sqrt(2)/omega) [1 - 32 (omega^2 - 1)/(15 omega^2)]
         eps^(5/2), with eps = a - 1, of the broadcast shape.
-
-    Notes
-    -----
-    Source: the paper's Eq. 34, as printed.
 
     Examples
     --------
@@ -344,21 +340,15 @@ def series_diagnosis(a: ArrayLike, omega: ArrayLike, eta: ArrayLike, *, order: i
     amplitude = checked_amplitude(a)
     longer = _coefficients(checked_frequency(omega), checked_loss(eta), max(order + LOOK_AHEAD, _FEWEST), _FEWEST)
     eps = _excess(amplitude, longer)
-    radius = np.broadcast_to(_radius(longer), eps.shape)
+    # The limit of the ratios of successive coefficients, extrapolated linearly in 1/k; the signs may take turns.
+    k, ratios = longer.shape[-1] - 1, longer[..., :-1] / longer[..., 1:]
+    radius = np.broadcast_to(np.abs(k * ratios[..., -1] - (k - 1) * ratios[..., -2]), eps.shape)
     time = _summed(longer[..., :order], eps)
     last = longer[..., -1] * eps ** (longer.shape[-1] - 0.5)
     inside = eps < radius
     tail = last * (eps / radius) / np.where(inside, 1.0 - eps / radius, 1.0)
     error = np.where(inside, np.abs(_summed(longer, eps) - time + tail), math.inf)
     return SeriesDiagnosis(time[()], error[()], radius.copy()[()])
-
-
-def _radius(coefficients: Floats) -> Floats:
-    """Limit of the ratios of successive coefficients, extrapolated linearly in 1/k."""
-    k = coefficients.shape[-1] - 1
-    ratios = coefficients[..., :-1] / coefficients[..., 1:]
-    radius: Floats = np.abs(k * ratios[..., -1] - (k - 1) * ratios[..., -2])  # the signs may take turns
-    return radius
 
 
 @_BEYOND_RANGE

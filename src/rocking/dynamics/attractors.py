@@ -200,16 +200,13 @@ class KnownAttractors:
             first, known = unsettled[0], len(self.attractors)
             owner = self._add(attractor_from(self.strobe, states[first], self.size))
             if owner == known:  # a new one
-                found[unsettled] = self._passing(made[unsettled], self.attractors[owner].period)
+                passing = self.settled(made[unsettled], self.attractors[owner].period, threads=1)[0]
+                found[unsettled] = np.append(self.owner, -1)[passing]
             if owner < 0 or owner == known:  # what is known already is no try
                 tries -= 1
             found[first] = owner if owner >= 0 else -2
         found[found == -2] = -1
         return found
-
-    def _passing(self, made: Records, periods: int) -> Integers:
-        """Attractor in whose traps each of some states comes within so many periods, -1 where it comes in none."""
-        return np.append(self.owner, -1)[self.settled(made.copy(), periods, threads=1)[0]]
 
     def settled(self, made: Records, periods: int, threads: int) -> tuple[Integers, Integers]:
         """Trap in which each of some states, which are moved on, comes within so many periods, or -1; and how many."""

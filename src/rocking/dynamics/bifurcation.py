@@ -161,7 +161,8 @@ def bifurcation_diagram(
         Up or down: at each value an orbit starts where it was at the value before, and where that is not known, as
         after overturning, again at its initial state. Afresh: at each value from the initial states.
     transient, kept : int
-        Periods at each value before states are kept, and periods whose states are kept.
+        Periods at each value before states are kept, and periods whose states are kept. Near a bifurcation orbits
+        settle slowly: a short transient may find no period there, or that of the orbit before.
     parameter : str
         What the parameter is, with its unit, for tables and figures.
     model, chattering : str, optional
@@ -178,11 +179,6 @@ def bifurcation_diagram(
     ------
     InvalidMotion, InvalidBlock
         If the function returns something else than a body and a motion.
-
-    Notes
-    -----
-    Near a bifurcation orbits settle slowly: with a short transient the period is then not found, or that of the orbit
-    before.
 
     Examples
     --------

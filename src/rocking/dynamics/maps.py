@@ -259,10 +259,6 @@ def stroboscopic_map(
     InvalidOption
         If the model is not one of the body's.
 
-    Notes
-    -----
-    Every impact is located, and chattering is closed by proof, as by `rocking.simulate`: the same kernels march.
-
     Examples
     --------
     >>> from rocking import Block, dynamics, pulses

@@ -119,9 +119,8 @@ def named_motion(
 ) -> Motion:
     """Motion, times a factor, of a record file ("-" is standard input), or of a shipped record where there is no file.
 
-    With `vertical` it has a vertical component, as `named_vertical`. Channel, step and units are as for `rocking.read`.
-    Where they are for several files, those that say their step and units keep them, and those that hold one channel are
-    taken whatever its name; a motion and a vertical one of its own are two.
+    With `several`, arguments are for several files: those that say their step and units keep them, and those that hold
+    one channel are taken whatever its name.
     """
     several = several or (vertical is not None and _stands_alone(vertical))
     if is_shipped(name):
@@ -146,11 +145,7 @@ def named_vertical(
     units: str | None = None,
     several: bool = False,
 ) -> Motion:
-    """Vertical motion by name: a file or a shipped record of its own, or else a channel of the horizontal one's file.
-
-    That file is `record`, and `channel` the horizontal motion in it; `dt` and `units` are for both, as for
-    `named_motion`.
-    """
+    """Vertical motion by name: a file or a shipped record of its own, or else a channel of the horizontal file."""
     if _stands_alone(name):
         return named_motion(name, dt=dt, units=units, several=True)
     if record == STANDARD_INPUT or not is_there(record):
@@ -195,11 +190,7 @@ def is_shipped(name: str) -> bool:
 
 
 def expanded(names: Iterable[str]) -> list[str]:
-    """Return the names of records that files, folders, patterns and shipped records stand for, each once.
-
-    A folder stands for the files in it, by name, hidden ones left out; a pattern for the files that match it, or where
-    none does for the shipped records of such names.
-    """
+    """Return the names of records that files, folders, patterns and shipped records stand for, each once."""
     found: dict[str, None] = {}
     for name in names:
         found.update(dict.fromkeys(_files(name)))
@@ -279,11 +270,6 @@ def shipped(name: str | None = None) -> Contents:
     Contents
         With step, duration and peaks.
 
-    Raises
-    ------
-    UnreadableRecord
-        If no record has that name.
-
     Examples
     --------
     >>> [entry["name"] for entry in shipped().entries][:2]
@@ -320,11 +306,6 @@ def contents(
     -------
     Contents
         With units, step, duration and peaks of each channel.
-
-    Raises
-    ------
-    UnreadableRecord, InvalidMotion
-        As for `rocking.read`.
 
     Examples
     --------

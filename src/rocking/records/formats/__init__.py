@@ -132,9 +132,7 @@ def channels(path: str | os.PathLike[str], *, dt: float | None = None, units: st
     ----------
     path : str or path
         The file.
-    dt : float, optional
-        As for `read`.
-    units : str, optional
+    dt, units : float, str, optional
         As for `read`.
 
     Returns
