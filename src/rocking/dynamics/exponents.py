@@ -120,11 +120,6 @@ def lyapunov_exponents(
     LyapunovExponents
         Per period, with a standard error.
 
-    Raises
-    ------
-    InvalidMotion
-        If the motion is none, or has no length.
-
     Notes
     -----
     On a stable periodic orbit they are the logarithms of the sizes of its multipliers over its period. Their sum is the
