@@ -92,8 +92,11 @@ class Sensitivity:
 
     @cached_property
     def _all(self) -> Changes:
-        """Changes of peak, impacts and events, in a row for each quantity: one pass along the steps for each."""
-        rows = [_varied(self._trail, _NAMES.index(name), self._peak_time, *self._sizes) for name in QUANTITIES]
+        return self._along(QUANTITIES)
+
+    def _along(self, names: Iterable[str]) -> Changes:
+        """Return changes of peak, impacts and events, in a row for each name: one pass along the steps for each."""
+        rows = [_varied(self._trail, _NAMES.index(name), self._peak_time, *self._sizes) for name in names]
         peak, impacts, events = (np.array(values) for values in zip(*rows, strict=True))
         return np.zeros_like(peak) if self._is_peak_fixed else peak, impacts, events
 
