@@ -64,13 +64,7 @@ class Message:
     arguments: tuple[str, ...] = ()
 
     def text(self, spelling: Spelling = as_argument) -> str:
-        """Return the sentence in one line, with names as ``spelling`` writes them.
-
-        Examples
-        --------
-        >>> Message("{} needs {}, in s", ("sa", "period")).text(lambda name: f"--{name}")
-        '--sa needs --period, in s'
-        """
+        """Return the sentence in one line, with names as ``spelling`` writes them."""
         names = map(spelling, self.arguments)
         sentence = _PLACE.sub(lambda place: "{}" if place[0] == "{{}}" else next(names, "{}"), self.template)
         return " ".join(map(_shortened, sentence.split()))
@@ -88,10 +82,8 @@ class RockingError(Exception):
         One sentence; each "{}" in it stands for one of `arguments`.
     *arguments : str
         Names of the arguments that the sentence names, the one that is wrong first.
-    path : str, optional
-        The file that is wrong; the sentence itself does not name it.
-    line : int, optional
-        The line of the file, from 1.
+    path, line : str, int, optional
+        The file that is wrong, which the sentence itself does not name, and its line, from 1.
     value : object, optional
         What was given.
 
@@ -107,8 +99,6 @@ class RockingError(Exception):
     >>> error = InvalidMotion("{} must be positive, in s, not -1", "dt", path="a.csv", line=3, value=-1)
     >>> print(error)
     a.csv, line 3: dt must be positive, in s, not -1
-    >>> error.argument, error.path, error.line, error.value
-    ('dt', 'a.csv', 3, -1)
     """
 
     def __init__(
@@ -129,23 +119,7 @@ class RockingError(Exception):
         return self.message.arguments[0] if self.message.arguments else None
 
     def text(self, spelling: Spelling = as_argument) -> str:
-        """Return file, line and sentence.
-
-        Parameters
-        ----------
-        spelling : callable
-            How a name of an argument is written.
-
-        Returns
-        -------
-        str
-            One line.
-
-        Examples
-        --------
-        >>> InvalidOption("{} must be positive", "half_width").text(lambda name: "--" + name.replace("_", "-"))
-        '--half-width must be positive'
-        """
+        """Return file, line and sentence in one line; `spelling` writes the names of arguments."""
         if self.path is None:
             return self.message.text(spelling)
         path = _shortened(self.path)

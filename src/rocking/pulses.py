@@ -118,11 +118,6 @@ def sine(amplitude: float, frequency: float, *, cycles: float, phase: float = 0.
     Motion
         Of family "sine", which `rocking.AsymptoticTime` asks for.
 
-    Raises
-    ------
-    InvalidMotion
-        If `frequency` or `cycles` is not positive, there are too many cycles, or a number is not finite.
-
     Examples
     --------
     >>> motion = sine(3.0, 2.0, cycles=5)
@@ -304,12 +299,6 @@ def ricker(
     Motion
         The peak is in its middle, or on both sides of it.
 
-    Raises
-    ------
-    InvalidMotion
-        If a number is not finite, `frequency` or `duration` is not positive, `duration` is longer than the pulse, or
-        `kind` is neither.
-
     References
     ----------
     Vassiliou, M. F. and Makris, N. (2011). Estimating time scales and length scales in pulselike earthquake
@@ -375,11 +364,6 @@ def mavroeidis_papageorgiou(amplitude: float, frequency: float, *, phase: float,
     Motion
         It lasts ``gamma / frequency``.
 
-    Raises
-    ------
-    InvalidMotion
-        If a number is not finite, `frequency` is not positive, or `gamma` is not from 1 to 100,000.
-
     References
     ----------
     Mavroeidis, G. P. and Papageorgiou, A. S. (2003). A mathematical representation of near-fault ground
@@ -435,10 +419,7 @@ class _Angle(NamedTuple):
 
 
 def _sine_and_cosine(turns: Floats, rest: Floats, phase: float) -> _Angle:
-    """Angle ``2 pi (turns + rest) + phase``, `rest` far below `turns`, without the rounding of a large angle.
-
-    Whole quarter turns are taken off exactly, and the phase is added by the addition theorem.
-    """
+    """Angle ``2 pi (turns + rest) + phase``, `rest` far below `turns`, without the rounding of a large angle."""
     within = (turns - np.rint(turns)) + rest
     quarter = np.rint(4.0 * within)
     turned = _Angle(*piecewise.from_quadrant(quarter, 2.0 * np.pi * (within - 0.25 * quarter)))

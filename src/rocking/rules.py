@@ -271,8 +271,6 @@ def priestley(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     ------
     InvalidBlock
         If a restitution is so low (below 0.23) that the damping would be critical.
-    InvalidMotion
-        As `Motion.spectral_acceleration`.
 
     Notes
     -----
@@ -318,13 +316,6 @@ def rate(
     -------
     dict of str to Rating
         By the rule's name.
-
-    Raises
-    ------
-    InvalidOption
-        If there is no rule of a name.
-    InvalidBlock, InvalidMotion
-        As the rules do.
 
     Examples
     --------
@@ -501,10 +492,8 @@ def check(
         Names in `RULES`; by default all.
     model : {"nonlinear", "linear"}
         Equation of motion of the simulations.
-    threads : int, optional
-        Number of threads; by default one for every core.
-    progress : bool, optional
-        Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
+    threads, progress : int or bool, optional
+        As for `rocking.simulate_many`.
 
     Returns
     -------
@@ -515,8 +504,6 @@ def check(
     ------
     InvalidOption
         If there is no motion, or no rule of a name, or the block never comes to rest (restitution 1).
-    InvalidBlock, InvalidMotion
-        As the rules, and if a motion is zero throughout.
 
     Notes
     -----

@@ -46,10 +46,8 @@ class Blocks:
 
     Parameters
     ----------
-    p : array_like
-        Frequency parameters, rad/s.
-    alpha : array_like
-        Slendernesses, rad.
+    p, alpha : array_like
+        Frequency parameters, rad/s, and slendernesses, rad.
     restitution : array_like, optional
         Factors on the angular speed on leaving a side. By default those that conserve angular momentum: Housner's from
         `alpha` where both sides are equal, else of the one rigid body whose sides have these p and alpha.
@@ -156,17 +154,6 @@ class Blocks:
         -------
         Blocks
             With its `axes`.
-
-        Raises
-        ------
-        InvalidBlock
-            If a value is out of its range, an axis is empty, or not one of `p` and `size` is given.
-
-        Examples
-        --------
-        >>> blocks = Blocks.grid(p=[1.0, 2.0, 3.0], alpha=[0.1, 0.2], restitution=[0.9])
-        >>> len(blocks), [*blocks.axes]
-        (6, ['p', 'alpha', 'restitution'])
         """
         given = {"p": rates_of(p, size, gravity), "alpha": alpha}
         if restitution is not None:
@@ -199,11 +186,6 @@ class Blocks:
         ------
         InvalidBlock
             If there is none, one is no block, or their gravities differ.
-
-        Examples
-        --------
-        >>> Blocks.of([Block(width=0.4, height=2.0), Block(width=0.2, height=1.0)]).p.shape
-        (2, 2)
         """
         if isinstance(blocks, Blocks):
             return blocks
@@ -356,21 +338,6 @@ class Blocks:
 
         Lengths are then divided by the square of the factor, and forces of restraints keep their ratio to the weight:
         of a tendon prestress, strength and stiffness times length, so that its strain at yield is the same, too.
-
-        Parameters
-        ----------
-        factors : ndarray, shape (n,)
-            Factors on p.
-
-        Returns
-        -------
-        Blocks
-            In the same order.
-
-        Examples
-        --------
-        >>> Blocks(p=[1.0, 2.0], alpha=0.2).resized(np.array([2.0, 0.5])).p[:, 0].tolist()
-        [2.0, 1.0]
         """
         by = factors[:, None]
         terms = {name: values * by ** _POWERS.get(name, 0) for name, values in self.terms.items()}

@@ -74,44 +74,13 @@ class Body(Protocol):
         """Forces of the ground; None where nothing is known of them."""
 
     def uplift_thresholds(self, model: Model = "nonlinear") -> tuple[float, float]:
-        """Ground accelerations that lift it: to side + when -a passes the first, to side - when a passes the second.
+        """Return accelerations (m/s^2) that lift it: to side + when -a passes the first, to side - when a the second.
 
-        Parameters
-        ----------
-        model : {"nonlinear", "linear"}
-            Equation of motion; of a block g tan(alpha), or g alpha for the slender one.
-
-        Returns
-        -------
-        float, float
-            m/s^2; infinite where there is no such side.
-
-        Raises
-        ------
-        InvalidOption
-            If there is no such model.
-
-        Examples
-        --------
-        >>> from rocking import Block
-        >>> Block.from_parameters(p=1.0, alpha=0.2, restitution=0.9, gravity=10.0).uplift_thresholds("linear")
-        (2.0, 2.0)
+        Of a block they are g tan(alpha), or g alpha in the linear model; infinite where there is no such side.
         """
 
     def alone(self) -> Bodies:
-        """Bodies of which it is the only one.
-
-        Returns
-        -------
-        Bodies
-            Of a block `rocking.Blocks`.
-
-        Examples
-        --------
-        >>> from rocking import Block
-        >>> len(Block(width=0.4, height=2.0).alone())
-        1
-        """
+        """Return bodies of which it is the only one: of a block `rocking.Blocks`."""
 
 
 def title_of(body: Body) -> str:
@@ -150,87 +119,16 @@ class Bodies(Protocol):
         """Return one of them."""
 
     def select(self, index: slice | Integers) -> Self:
-        """Return some of them.
-
-        Parameters
-        ----------
-        index : slice or ndarray
-            A slice, a flat array of indices, or a mask.
-
-        Returns
-        -------
-        Bodies
-            Of the same kind.
-
-        Raises
-        ------
-        InvalidBlock
-            If `index` is none of these, or one is out of range.
-
-        Examples
-        --------
-        >>> from rocking import Blocks
-        >>> Blocks(p=[1.0, 2.0, 3.0], alpha=0.2).select(slice(1, None))
-        <Blocks: 2; p from 2 to 3 rad/s, alpha 0.2 rad, restitution 0.9408>
-        """
+        """Return some of them, by a slice, flat array of indices, or mask; `InvalidBlock` if it is none of these."""
 
     def parameters(self) -> Mapping[str, tuple[Floats, str]]:
-        """Return what they are made from, by name.
-
-        Returns
-        -------
-        dict of str to (ndarray, str)
-            Arrays of shape (n, 2), and units.
-
-        Examples
-        --------
-        >>> from rocking import Blocks
-        >>> {name: unit for name, (values, unit) in Blocks(p=2.0, alpha=0.2).parameters().items()}
-        {'p': 'rad/s', 'alpha': 'rad', 'restitution': '1'}
-        """
+        """Return what they are made from, by name: arrays of shape (n, 2), and units."""
 
     def speed_limits(self, share: float) -> Floats:
-        """Return a share of the speed that is natural to each side, of a block p alpha.
-
-        Parameters
-        ----------
-        share : float
-            The share.
-
-        Returns
-        -------
-        ndarray, shape (n, 2)
-            Of blocks rad/s.
-
-        Examples
-        --------
-        >>> from rocking import Blocks
-        >>> Blocks(p=2.0, alpha=0.25).speed_limits(0.5)
-        array([[0.25, 0.25]])
-        """
+        """Return a share of the speed that is natural to each side, shape (n, 2): of a block p alpha, rad/s."""
 
     def kernel_records(self, model: Model, limits: Floats) -> Records:
-        """Return them as kernels take them.
-
-        Parameters
-        ----------
-        model : {"nonlinear", "linear"}
-            Equation of motion.
-        limits : ndarray, shape (n, 2)
-            Limits of a treatment of chattering.
-
-        Returns
-        -------
-        structured ndarray, shape (n,)
-            Of type `kernels.state.BLOCK`.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> from rocking import Blocks
-        >>> Blocks(p=2.0, alpha=0.2).kernel_records("linear", np.zeros((1, 2)))["stiffness"]
-        array([[4., 4.]])
-        """
+        """Return them as kernels take them (`kernels.state.BLOCK`), with the limits of a treatment, shape (n, 2)."""
 
 
 class Kind(Protocol):

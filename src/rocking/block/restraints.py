@@ -226,11 +226,6 @@ class Spring(Restraint):
     stiffness : float
         Moment per rotation, N m/rad. A vertical spring of k N/m at a distance x from the pivot is a `Tendon`.
 
-    Raises
-    ------
-    InvalidBlock
-        If it is not positive.
-
     Examples
     --------
     >>> Spring(1e3)
@@ -258,11 +253,6 @@ class Damper(Restraint):
     coefficient : float
         Moment per angular velocity, N m s/rad.
 
-    Raises
-    ------
-    InvalidBlock
-        If it is not positive.
-
     Examples
     --------
     >>> Damper(200.0)
@@ -283,25 +273,19 @@ class Damper(Restraint):
 
 @dataclass(frozen=True)
 class Thrust(Restraint):
-    """Horizontal force of constant size, as that of a vault on a wall.
+    """Horizontal force of constant size, as of a vault on a wall; vertical ground motion does not change it.
 
     Parameters
     ----------
     force : float
         N, positive to side +.
-    height : float
-        Height of the point where it acts, above the base, m.
-    offset : float
-        Distance of that point from the centre of mass of the block without loads, m, positive to side +.
+    height, offset : float
+        Height above the base of the point where it acts, and offset of that point as of a `Load`, m.
 
     Raises
     ------
     InvalidBlock
         If the force is zero, or the height not positive.
-
-    Notes
-    -----
-    Vertical motion of the ground does not change it.
 
     Examples
     --------

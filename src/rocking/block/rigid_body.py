@@ -95,10 +95,7 @@ def rigid_bodies(p: Floats, alpha: Floats) -> RigidBodies:
 
 
 def refusal(found: RigidBodies, p: Floats, alpha: Floats, index: int = 0) -> str:
-    """Say why a restitution does not follow from p and alpha, arrays of shape (n, 2); nothing where it does.
-
-    A "{}" in the sentence stands for the name of the argument restitution.
-    """
+    """Say why a restitution does not follow from p and alpha, arrays of shape (n, 2); nothing where it does."""
     if found.known[index]:
         return ""
     (p_plus, p_minus), (plus, minus) = p[index].tolist(), alpha[index].tolist()
@@ -138,11 +135,7 @@ def eccentric_rectangles(alpha: Floats) -> tuple[Floats, Floats]:
 
 
 def gyration_squared(half_width: Number, half_height: float, offset: Number) -> Number:
-    """Square of the radius of gyration, m^2, of a rectangle whose centre of mass is off the middle of its width.
-
-    Its mass is spread so that the moment of inertia about the middle is that of an even rectangle, as where one half of
-    the width is of a heavier material than the other.
-    """
+    """Square of the radius of gyration, m^2, of a rectangle whose centre of mass is off the middle of its width."""
     return (half_width * half_width + half_height * half_height) / 3.0 - offset * offset
 
 

@@ -80,12 +80,6 @@ class Block:
     >>> block = Block(half_width=0.2, half_height=1.0)
     >>> round(block.alpha, 6), round(block.p, 6), round(block.restitution, 6)
     (0.197396, 2.685546, 0.942308)
-    >>> round(block.minimum_acceleration, 6)
-    1.96133
-    >>> Block(width=0.4, height=2.0)
-    <Block: rectangular block, 0.4 m x 2 m; p = 2.6855 rad/s, alpha = 0.1974 rad, restitution = 0.94231>
-    >>> [round(side.restitution, 6) for side in Block(width=0.4, height=2.0, offset=0.03).sides]
-    [0.934223, 0.950533]
     """
 
     sides: tuple[Side, Side]
@@ -180,10 +174,8 @@ class Block:
 
         Parameters
         ----------
-        p : float or pair
-            Frequency parameter, rad/s.
-        alpha : float or pair
-            Slenderness, rad, between 0 and pi/2.
+        p, alpha : float or pair
+            Frequency parameter, rad/s, and slenderness, rad, between 0 and pi/2.
         restitution : float or pair, optional
             Factor on the angular speed on leaving a side, in (0, 1]. By default the one that conserves angular
             momentum: Housner's where the sides are equal, else of the one rigid body that has these p and alpha.
@@ -206,16 +198,6 @@ class Block:
         -----
         Depth h and radius of gyration k of the body follow from R_i = h/cos(alpha_i), g R_i/p_i^2 = k^2 + R_i^2. Sides
         that agree to the digits that they are given to (three at least) count as equal. (Derived in the documentation.)
-
-        Examples
-        --------
-        >>> Block.from_parameters(p=1.0, alpha=0.2, restitution=0.92).restitution
-        0.92
-        >>> [side.alpha for side in Block.from_parameters((2.5, 2.2), (0.12, 0.2), (0.9, 0.85)).sides]
-        [0.12, 0.2]
-        >>> statue = Block.from_parameters(p=(2.9858, 3.0053), alpha=(0.27417, 0.155))
-        >>> [round(side.restitution, 3) for side in statue.sides]
-        [0.95, 0.914]
         """
         g = checked_gravity(gravity)
         rates = [checked_parameter(value, "p") for value in checked_pair(p, "p")]
@@ -256,17 +238,13 @@ class Block:
         ----------
         distances : pair of float
             Horizontal distances from the centre of mass to the pivots (side +, side -), m.
-        height : float
-            Height of the centre of mass above the pivots, m.
-        radius_of_gyration : float
-            sqrt(I/m) about the centre of mass, m.
+        height, radius_of_gyration : float
+            Height of the centre of mass above the pivots, and sqrt(I/m) about the centre of mass, m.
         restitution : float or pair, optional
             Factor on the angular speed on leaving a side. By default angular momentum about the new pivot is
             conserved: e_i = (I + m (h^2 - d+ d-))/(I + m R_j^2), j the other side.
-        mass : float, optional
-            Mass, kg.
-        gravity : float
-            Acceleration of gravity, m/s^2.
+        mass, gravity : float, optional
+            As of `Block`.
         description : str, optional
             What it is, in words; by default its pivots are.
 
@@ -283,15 +261,6 @@ class Block:
         Notes
         -----
         R_i = hypot(d_i, h), alpha_i = atan(d_i/h), p_i = sqrt(m g R_i/(I + m R_i^2)).
-
-        Examples
-        --------
-        A rectangle is the body with equal distances and I = m R^2/3:
-
-        >>> rectangle = Block(half_width=0.2, half_height=1.0)
-        >>> body = Block.from_pivots((0.2, 0.2), 1.0, (1.04 / 3) ** 0.5)
-        >>> abs(body.p - rectangle.p) < 1e-15, abs(body.restitution - rectangle.restitution) < 1e-15
-        (True, True)
         """
         plus, minus = (checked_length(value, "distances") for value in checked_pair(distances, "distances"))
         h = checked_length(height, "height")
@@ -338,13 +307,6 @@ class Block:
         -----
         The frame has the column's slenderness, and R' = R (1 + 3 gamma)/(1 + 2 gamma): a heavier beam makes it
         more stable (Makris and Vassiliou 2013; derived in the documentation).
-
-        Examples
-        --------
-        >>> column = Block(half_width=0.5, half_height=3.0)
-        >>> frame = Block.from_frame(half_width=0.5, half_height=3.0, mass_ratio=2.0)
-        >>> frame.alpha == column.alpha, round(frame.radius / column.radius, 12)
-        (True, 1.4)
         """
         b = checked_length(half_width, "half_width")
         h = checked_length(half_height, "half_height")
@@ -386,21 +348,6 @@ class Block:
         -------
         RestrainedBlock
             With one side.
-
-        Raises
-        ------
-        InvalidBlock
-            As of `Block` and `RestrainedBlock`.
-
-        Notes
-        -----
-        The law is that of Sorrentino, AlShawa and Decanini (2011).
-
-        Examples
-        --------
-        >>> wall = Block.one_sided(width=0.4, height=4.0)
-        >>> round(wall.sides[0].restitution, 4)
-        0.4708
         """
         from rocking.block.restrained import RestrainedBlock
 

@@ -146,11 +146,6 @@ def asymptotic_table(a: float, omega: float, eta: float) -> NDArray[np.void]:
         speed_before and speed_after |phi'|, to their lowest order, eps^(3/2) (Eqs 57 and 58). The last row's time is
         Eq. 65: the table ends where the terms vanish in double precision.
 
-    Raises
-    ------
-    InvalidOption
-        If a parameter is not a single number or out of range.
-
     Notes
     -----
     Source: the paper's Eqs 12, 57, 58, 60, 62, 64 and 65. Corrected: the procedure is to end, as printed, when Eq. 62
@@ -159,12 +154,8 @@ def asymptotic_table(a: float, omega: float, eta: float) -> NDArray[np.void]:
     Examples
     --------
     >>> table = asymptotic_table(1.01, 2.0, 0.92)
-    >>> table["sign"][:3].tolist(), table["order"][:3].tolist()
-    ([-1, 1, -1], [1, 3, 1])
     >>> round(float(table["time"][-1]), 9)
     0.57342594
-    >>> table["speed_before"][:3].round(6).tolist()
-    [0.003771, 0.00347, 0.003862]
     """
     excess = lifting_amplitude(a) - 1.0
     frequency = single(checked_frequency(omega), "omega")
@@ -194,21 +185,14 @@ def first_interval(a: ArrayLike, omega: ArrayLike) -> Floats:
 
     Parameters
     ----------
-    a : array_like
-        Amplitude over g alpha; NaN is returned where a < 1.
-    omega : array_like
-        Forcing frequency over p.
+    a, omega : array_like
+        Amplitude over g alpha, NaN being returned below 1, and forcing frequency over p.
 
     Returns
     -------
     array of float
         tau_1 = (4 sqrt(2)/omega) eps^(1/2) + (sqrt(2)/omega) [1 - 32 (omega^2 - 1)/(15 omega^2)] eps^(3/2), with
         eps = a - 1, of the broadcast shape.
-
-    Raises
-    ------
-    InvalidOption
-        If a parameter is NaN, infinite or out of range.
 
     Notes
     -----
@@ -226,7 +210,7 @@ def first_interval(a: ArrayLike, omega: ArrayLike) -> Floats:
 
 @_BEYOND_RANGE
 def first_impact_speed(a: ArrayLike, omega: ArrayLike) -> Floats:
-    """Angular velocity just before the first impact, to two orders (Eq. 34).
+    """Angular velocity just before the first impact, to two orders (paper, Eq. 34).
 
     Parameters
     ----------
@@ -238,15 +222,6 @@ def first_impact_speed(a: ArrayLike, omega: ArrayLike) -> Floats:
     array of float
         phi'_0(tau_1) = (16 sqrt(2)/(3 omega)) eps^(3/2) + (4 sqrt(2)/omega) [1 - 32 (omega^2 - 1)/(15 omega^2)]
         eps^(5/2), with eps = a - 1, of the broadcast shape.
-
-    Raises
-    ------
-    InvalidOption
-        As `first_interval`.
-
-    Notes
-    -----
-    Source: the paper's Eq. 34, as printed.
 
     Examples
     --------
@@ -283,10 +258,8 @@ def series_coefficients(omega: ArrayLike, eta: ArrayLike, *, order: int = 4) -> 
 
     Parameters
     ----------
-    omega : array_like
-        Forcing frequency over p.
-    eta : array_like
-        Coefficient of restitution; infinity is returned for 1.
+    omega, eta : array_like
+        Forcing frequency over p, and coefficient of restitution; infinity is returned for 1.
     order : int
         Number of coefficients, 1 to 40.
 
@@ -350,11 +323,6 @@ def series_diagnosis(a: ArrayLike, omega: ArrayLike, eta: ArrayLike, *, order: i
     SeriesDiagnosis
         Arrays of the broadcast shape.
 
-    Raises
-    ------
-    InvalidOption
-        As `series_coefficients`, and for eta = 1.
-
     Notes
     -----
     Error: the next terms, and a geometric sum with the limit of their ratio. Radius: the ratios c_{k-1}/c_k are
@@ -372,21 +340,15 @@ def series_diagnosis(a: ArrayLike, omega: ArrayLike, eta: ArrayLike, *, order: i
     amplitude = checked_amplitude(a)
     longer = _coefficients(checked_frequency(omega), checked_loss(eta), max(order + LOOK_AHEAD, _FEWEST), _FEWEST)
     eps = _excess(amplitude, longer)
-    radius = np.broadcast_to(_radius(longer), eps.shape)
+    # The limit of the ratios of successive coefficients, extrapolated linearly in 1/k; the signs may take turns.
+    k, ratios = longer.shape[-1] - 1, longer[..., :-1] / longer[..., 1:]
+    radius = np.broadcast_to(np.abs(k * ratios[..., -1] - (k - 1) * ratios[..., -2]), eps.shape)
     time = _summed(longer[..., :order], eps)
     last = longer[..., -1] * eps ** (longer.shape[-1] - 0.5)
     inside = eps < radius
     tail = last * (eps / radius) / np.where(inside, 1.0 - eps / radius, 1.0)
     error = np.where(inside, np.abs(_summed(longer, eps) - time + tail), math.inf)
     return SeriesDiagnosis(time[()], error[()], radius.copy()[()])
-
-
-def _radius(coefficients: Floats) -> Floats:
-    """Limit of the ratios of successive coefficients, extrapolated linearly in 1/k."""
-    k = coefficients.shape[-1] - 1
-    ratios = coefficients[..., :-1] / coefficients[..., 1:]
-    radius: Floats = np.abs(k * ratios[..., -1] - (k - 1) * ratios[..., -2])  # the signs may take turns
-    return radius
 
 
 @_BEYOND_RANGE

@@ -79,14 +79,8 @@ def lobes(block: Block, *, omega: float = 2.0, count: int = 5, model: Model = "n
 
     Parameters
     ----------
-    block : Block
-        What rocks.
-    omega : float
-        Frequency of the lobes.
-    count : int
-        How many there are.
-    model : str
-        As for `sine`.
+    block, omega, count, model : Block, float, int, str
+        As for `sine`, with the frequency of the lobes and their number.
 
     Returns
     -------
@@ -118,12 +112,8 @@ def ricker(
 
     Parameters
     ----------
-    block : Block
-        What rocks.
-    kind : {"symmetric", "antisymmetric"}
-        Second or third derivative of a Gaussian.
-    model : str
-        As for `sine`.
+    block, kind, model : Block, {"symmetric", "antisymmetric"}, str
+        As for `sine` and `rocking.pulses.ricker`.
 
     Returns
     -------
@@ -147,12 +137,8 @@ def mavroeidis_papageorgiou(
 
     Parameters
     ----------
-    block : Block
-        What rocks.
-    phase, gamma : float
-        As for `rocking.pulses.mavroeidis_papageorgiou`.
-    model : str
-        As for `sine`.
+    block, phase, gamma, model : Block, float, float, str
+        As for `sine` and `rocking.pulses.mavroeidis_papageorgiou`.
 
     Returns
     -------
@@ -185,12 +171,8 @@ def record(
     ----------
     motion : Motion
         What is scaled.
-    alpha : float
-        Slenderness of the blocks, rad.
-    restitution : float, optional
-        Their restitution; by default Housner's.
-    model : str
-        As for `sine`.
+    alpha, restitution, model : float, float, str
+        Slenderness of the blocks, rad, their restitution (by default Housner's), and the model as for `sine`.
 
     Returns
     -------

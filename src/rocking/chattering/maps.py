@@ -132,8 +132,7 @@ def chattering_map(
 
     Notes
     -----
-    The paper leaves this open (end of its section 5.2): no criteria for complete chattering exist for waveforms other
-    than the sine. Here each rest is proven by certificate; a point takes one or two milliseconds.
+    Each rest is proven by certificate. The paper has no criteria but for the sine (end of its section 5.2).
 
     Examples
     --------
@@ -228,31 +227,7 @@ class ChatteringMap(DatasetResult):
         """Draw the outcomes, the first parameter upwards, the second to the right.
 
         They are of the first rocking; where the block overturns in a later one, it is hatched.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; by default in a new figure.
-        labels : mapping of str to str, optional
-            What to write at the axes in place of the parameters' names.
-        title : str
-            Title; by default the motion, the block and the model, as far as they are the same all over the map.
-        figsize : (float, float), optional
-            Width and height of a new figure, inches.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            The new figure, or that of `ax`.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> from rocking.chattering import families
-        >>> block = rocking.Block.from_parameters(p=1.0, alpha=0.2, restitution=0.92)
-        >>> found = chattering_map(families.sine(block), {"a": [1.03, 1.05], "omega": [1.0, 2.0]})
-        >>> found.plot(labels={"omega": "ω"}).axes[0].get_xlabel()
-        'ω'
+        `labels` replace the names of the parameters at the axes.
         """
         from rocking.plot.maps import outcome_figure
 
@@ -273,10 +248,7 @@ class ChatteringMap(DatasetResult):
 
 
 def last_exceedance(motion: Motion, thresholds: tuple[float, float], gravity: float) -> float | None:
-    """Time, s, at which a motion last passes the thresholds of the two sides (m/s^2); None if it hardly passes one.
-
-    What passes a threshold by no more than rounding lifts no block.
-    """
+    """Time, s, at which a motion last passes the thresholds of the two sides (m/s^2); None if it hardly passes one."""
     # By four ulp a peak that was meant to be the threshold may exceed it.
     plus, minus = (threshold * (1.0 + 2.0**-50) for threshold in thresholds)
     lifts = motion.vertical is None and motion.pga > min(plus, minus)

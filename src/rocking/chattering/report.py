@@ -90,22 +90,9 @@ class ChatteringReport(Result):
         return "\n".join(f"{name:<30}{text}" for name, text in lines) + f"\n\n{units}"
 
     def table(self) -> str:
-        """Return the first cycles of the paper's iterative procedure, and its last, for people.
+        """Return the first cycles of the paper's iterative procedure, and its last, a row for each.
 
-        Returns
-        -------
-        str
-            A row for each cycle.
-
-        Raises
-        ------
-        InvalidOption
-            Without loss at impacts, when there is no such procedure.
-
-        Examples
-        --------
-        >>> print(chattering_report(1.03, 2.0, 0.92).table().splitlines()[1][:25])
-        0    -1    T_0;1 = 2.8284
+        `InvalidOption` without loss at impacts, when there is no such procedure.
         """
         cycles = self.to_dataframe("cycles").to_dict("records")
         shown = [*cycles[: _SHOWN - 1], cycles[-1]] if len(cycles) > _SHOWN else cycles
@@ -186,11 +173,6 @@ def chattering_report(
     -------
     ChatteringReport
         Time of rest by every method, critical amplitude, first impact.
-
-    Raises
-    ------
-    InvalidOption
-        If a parameter is out of its range.
 
     Examples
     --------
@@ -276,11 +258,6 @@ def critical_report(omega: float, eta: float) -> CriticalReport:
     CriticalReport
         Amplitude by every method.
 
-    Raises
-    ------
-    InvalidOption
-        If a parameter is out of its range.
-
     Examples
     --------
     >>> critical_report(20.0, 0.92).amplitudes["eq76"] is None
@@ -297,10 +274,7 @@ def critical_report(omega: float, eta: float) -> CriticalReport:
 
 
 def _series(a: float, omega: float, eta: float, order: int) -> dict[str, float]:
-    """Time by the expansion, and what is known of its error; NaN for what double precision does not resolve.
-
-    Without loss at impacts there is no expansion.
-    """
+    """Time by the expansion, and what is known of its error; NaN for what double precision does not resolve."""
     order = checks.whole(order, "order", InvalidOption, 1, HIGHEST_ORDER - LOOK_AHEAD)
     if eta == 1.0:
         return {"order": order, "time": math.inf if a > 1.0 else 0.0, "error": math.inf, "radius": 0.0}

@@ -17,34 +17,16 @@ def as_asked(values: Floats) -> Floats:
 
 
 def without_dust(values: ArrayLike, size: float) -> Floats:
-    """Return values, and zeros in place of those that are only rounding beside a size.
-
-    Examples
-    --------
-    >>> without_dust([1e-16, -2e-3, 5.0], 5.0).tolist()
-    [0.0, -0.002, 5.0]
-    """
+    """Return values, and zeros in place of those that are only rounding beside a size."""
     return np.where(np.abs(values) > 2.0**-40 * size, values, 0.0)
 
 
 def evenly(count: int, most: int) -> list[int]:
-    """Return positions of at most so many of a number of things, evenly from the first to the last.
-
-    Examples
-    --------
-    >>> evenly(9, 3), evenly(2, 3)
-    ([0, 4, 8], [0, 1])
-    """
+    """Return positions of at most so many of a number of things, evenly from the first to the last."""
     return sorted({round(k) for k in np.linspace(0, count - 1, min(count, most))})
 
 
 def ranges(count: int, size: int) -> Iterator[slice]:
-    """Yield ranges of at most a size that cover a number of things: for calls of kernels, which no interrupt ends.
-
-    Examples
-    --------
-    >>> list(ranges(5, 2))
-    [slice(0, 2, None), slice(2, 4, None), slice(4, 5, None)]
-    """
+    """Yield ranges of at most a size that cover a number of things: for calls of kernels, which no interrupt ends."""
     for start in range(0, count, size):
         yield slice(start, min(start + size, count))

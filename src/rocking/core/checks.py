@@ -200,10 +200,7 @@ def nearest(name: str, known: Iterable[str], likeness: float = 0.6) -> str | Non
 
 
 def meant(name: str, known: Iterable[str], otherwise: str = "", likeness: float = 0.6) -> str:
-    """Return the end of a sentence that refuses an unknown name: the one that may be meant, or else what else helps.
-
-    A mapping says how each known name is written.
-    """
+    """Return the end of a sentence that refuses an unknown name: the one that may be meant, or else what else helps."""
     found = nearest(name, known, likeness)
     if found is None:
         return otherwise

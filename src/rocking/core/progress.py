@@ -55,10 +55,7 @@ def note(message: Message | str) -> None:
 
 @contextlib.contextmanager
 def notes_for(audience: Audience, spelling: Spelling = as_argument) -> Iterator[None]:
-    """Choose who reads notes while a command runs, and how arguments are named; each note is given once.
-
-    Warnings that a formula is used outside its fit are notes as well.
-    """
+    """Choose who reads notes while a command runs, and how arguments are named; each note is given once."""
     global _listener
 
     def show(message: Warning | str, category: type[Warning], *place: Any) -> None:

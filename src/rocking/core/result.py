@@ -75,13 +75,7 @@ def text_of(rows: Iterable[Row], width: int) -> str:
 
 
 def dictionary_of(rows: Iterable[Row]) -> dict[str, Any]:
-    """Return rows as plain values by name, units in the names; None for what is not a finite number.
-
-    Examples
-    --------
-    >>> dictionary_of([Row("period", 0.5, "s"), Row("rotation", np.array([0.1, np.nan]), "rad")])
-    {'period_s': 0.5, 'rotation_rad': [0.1, None]}
-    """
+    """Return rows as plain values by name, units in the names; None for what is not a finite number."""
     return {named(row.name, row.unit): plain(row.value) for row in rows}
 
 
@@ -101,42 +95,16 @@ class Result(ABC):
 
     @abstractmethod
     def summary(self) -> str:
-        """Summarise the result in words.
-
-        Returns
-        -------
-        str
-            Lines of text and tables.
-
-        Examples
-        --------
-        >>> from rocking.chattering import critical_report
-        >>> print(critical_report(2.0, 0.92).summary().splitlines()[0])
-        exact                   1.03801554
-        """
+        """Return the result in words: lines of text and tables."""
 
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:
-        """Return the result as plain values by name.
-
-        Returns
-        -------
-        dict of str to object
-            Units are in the names, or SI.
-        """
+        """Return the result as plain values by name; units are in the names, or SI."""
 
     def to_json(self, path: str | Path) -> None:
-        """Write the values of `to_dict` as JSON; NaN and infinity are null.
+        """Write the values of `to_dict` as JSON to a file, whole or not at all; NaN and infinity are null.
 
-        Parameters
-        ----------
-        path : str or pathlib.Path
-            File to write, whole or not at all.
-
-        Raises
-        ------
-        OutputError
-            If the file cannot be written.
+        `OutputError` if the file cannot be written.
         """
         write_text(path, to_json(self.to_dict()) + "\n")
 
@@ -145,22 +113,9 @@ class Result(ABC):
         raise NotImplementedError(table)
 
     def to_dataframe(self, table: str | None = None) -> pd.DataFrame:
-        """Return one of the tables as a data frame.
+        """Return one of the tables (`TABLES`), by default the first, as a data frame with units in its columns' names.
 
-        Parameters
-        ----------
-        table : str, optional
-            One of `TABLES`; by default the first.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Columns are named with their units.
-
-        Raises
-        ------
-        InvalidOption
-            If there is no such table.
+        `InvalidOption` if there is no such table.
         """
         names = [*self.TABLES]
         if not names:
@@ -196,12 +151,6 @@ class Result(ABC):
         ------
         InvalidOption
             If the result has no figure, the size is not two positive numbers, or `ax` are no axes.
-
-        Examples
-        --------
-        >>> from rocking.chattering import chattering_report
-        >>> chattering_report(1.03, 2.0, 0.92).plot(figsize=(4.0, 3.0)).get_size_inches().tolist()
-        [4.0, 3.0]
         """
         raise InvalidOption(f"a {type(self).__name__} has no figure; use summary or to_dict")
 
@@ -253,14 +202,6 @@ class DatasetResult(Result):
         ------
         InvalidOption
             If there is no such dimension or label, or numbers over all of that dimension stand in the result.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> blocks = rocking.Blocks.grid(p=[1.0, 2.0], alpha=[0.1, 0.2], restitution=[0.9])
-        >>> spectrum = rocking.rocking_spectrum(blocks, rocking.pulses.one_sine(5.0, 1.0))
-        >>> spectrum.select(alpha=0.2).data.sizes["alpha"]
-        1
         """
         for name in labels.keys() & {*self.POOLED}:
             raise InvalidOption(
@@ -312,13 +253,7 @@ def variable(dims: str | tuple[str, ...], values: Any, meaning: str = "", unit: 
 
 
 def table_of_some(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
-    """Table of at most a dozen rows, evenly from the first to the last; it says so where there are more.
-
-    Examples
-    --------
-    >>> table_of_some(["n"], [[k] for k in range(100)]).splitlines()[-2:]
-    ['99', '(12 of 100 rows)']
-    """
+    """Table of at most a dozen rows, evenly from the first to the last; it says so where there are more."""
     chosen = evenly(len(rows), _SHOWN)
     table = text_table(header, [rows[k] for k in chosen])
     return table if len(chosen) == len(rows) else f"{table}\n({len(chosen)} of {len(rows)} rows)"

@@ -105,13 +105,7 @@ def counted(number: float, noun: str) -> str:
 
 
 def within(value: float, bounds: tuple[float, float], text: Callable[[float], str]) -> str:
-    """Write a number or, outside of bounds, the one that it passes, behind < or >.
-
-    Examples
-    --------
-    >>> [within(x, (0.1, 0.8), "{:g}".format) for x in (0.02, 0.4, 5e11)]
-    ['< 0.1', '0.4', '> 0.8']
-    """
+    """Write a number or, outside of bounds, the one that it passes, behind < or >."""
     low, high = bounds
     sign = "< " if value < low else "> " if value > high else ""
     return sign + text(min(max(value, low), high))
@@ -120,13 +114,7 @@ def within(value: float, bounds: tuple[float, float], text: Callable[[float], st
 def known_digits(
     value: float, interval: tuple[float, float], bounds: tuple[float, float] = (0.0, math.inf)
 ) -> tuple[str, str]:
-    """Value and ends of its interval as text, to the digits that the interval leaves, and two at least; or bounds.
-
-    Examples
-    --------
-    >>> known_digits(464.8, (206.1, 826.0)), known_digits(276.0, (0.0, math.inf))
-    (('460', '210 to 830'), ('280', '0 to infinity'))
-    """
+    """Value and ends of its interval as text, to the digits that the interval leaves, and two at least; or bounds."""
     low, high = interval
     width = high - low
     # Two digits of the width.
@@ -148,24 +136,12 @@ def range_text(values: Floats) -> str:
 
 
 def named(quantity: str, unit: str) -> str:
-    """Name of a column or a field with its unit: the one rule for all files that the package writes.
-
-    Examples
-    --------
-    >>> named("ground_acceleration", "m/s^2"), named("impacts", "1")
-    ('ground_acceleration_m_s2', 'impacts')
-    """
+    """Name of a column or a field with its unit: the one rule for all files that the package writes."""
     return quantity if unit == "1" else f"{quantity}_{unit.replace('/', '_').replace('^', '')}"
 
 
 def as_written(text: str) -> str:
-    r"""Write a text so that a figure shows it as it is: a dollar in a name begins no formula.
-
-    Examples
-    --------
-    >>> print(as_written("$40 a night"))
-    \$40 a night
-    """
+    """Write a text so that a figure shows it as it is: a dollar in a name begins no formula."""
     return text.replace("$", r"\$")
 
 
@@ -205,10 +181,7 @@ def columns_of(part: xr.Dataset) -> list[Column]:
 
 
 def columns_with_skipped(rows: Sequence[Mapping[str, Any]], unread: Mapping[str, str]) -> list[Column]:
-    """Return rows of records as columns, with a row for each record that could not be read and the reason.
-
-    Whole numbers and truth values stay such beside rows that have none.
-    """
+    """Return rows of records as columns, with a row for each record that could not be read and the reason."""
     import pandas as pd
 
     skipped = [{"record": record, "verdict": f"skipped: {reason}"} for record, reason in unread.items()]

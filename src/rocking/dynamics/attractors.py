@@ -42,10 +42,8 @@ class Attractor:
         Coordinate and velocity at the starts of the periods of the motion.
     multipliers : ndarray of complex, shape (2,)
         Eigenvalues of the map's derivative over the orbit's period; zero where it holds a rest.
-    impacts : int
-        Impacts in one of its periods, those that were resolved.
-    rests : bool
-        Whether the body comes to rest on it.
+    impacts, rests : int, bool
+        Impacts in one of its periods, those that were resolved; whether the body comes to rest on it.
     """
 
     states: Floats
@@ -60,23 +58,14 @@ class Attractor:
 
     @property
     def name(self) -> str:
-        """What it is, in words.
-
-        Examples
-        --------
-        >>> Attractor(np.zeros((2, 2)), np.zeros(2), 4, False).name
-        'period 2, 4 impacts'
-        """
+        """What it is, in words."""
         if self.impacts == 0 and np.all(self.states[:, 1] == 0.0):
             return "rest"
         return f"period {self.period}, {'rest' if self.rests else counted(self.impacts, 'impact')}"
 
 
 def attractor_from(strobe: StroboscopicMap, state: Floats, size: Floats) -> Attractor | None:
-    """Periodic attractor on which a state has settled; None where it does not come back, or the orbit is not stable.
-
-    ``size`` is that of the states, (coordinate, velocity).
-    """
+    """Periodic attractor on which a state has settled; None where it does not come back, or the orbit is not stable."""
     orbit = strobe.orbit(state, 2 * LONGEST)
     back = (np.abs(orbit[-1 - LONGEST : -1][::-1] - orbit[-1]) / size).max(axis=1)
     returns = np.flatnonzero(back < RETURN)
@@ -117,10 +106,7 @@ def _fixed_point(strobe: StroboscopicMap, at: Floats, period: int, size: Floats)
 
 
 def _trap(strobe: StroboscopicMap, attractor: Attractor, point: Floats, record: Records, size: Floats) -> Floats | None:
-    """Neighbourhood of a point of an attractor that no state leaves, as a row for `kernels.periodic.settle`.
-
-    None where the check fails however small it is.
-    """
+    """Neighbourhood of a point of an attractor that no state leaves, as a row for `kernels.periodic.settle`."""
     side, u, v = int(record["side"]), float(record["u"]), float(record["v"])
     if side < 0:  # at rest, wherever it came from
         return np.array([side, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -214,19 +200,13 @@ class KnownAttractors:
             first, known = unsettled[0], len(self.attractors)
             owner = self._add(attractor_from(self.strobe, states[first], self.size))
             if owner == known:  # a new one
-                found[unsettled] = self._passing(made[unsettled], self.attractors[owner].period)
+                passing = self.settled(made[unsettled], self.attractors[owner].period, threads=1)[0]
+                found[unsettled] = np.append(self.owner, -1)[passing]
             if owner < 0 or owner == known:  # what is known already is no try
                 tries -= 1
             found[first] = owner if owner >= 0 else -2
         found[found == -2] = -1
         return found
-
-    def _passing(self, made: Records, periods: int) -> Integers:
-        """Attractor in whose traps each of some states comes within so many periods, -1 where it comes in none.
-
-        Of a long orbit some points have a trap, and what has settled on it may be at another point.
-        """
-        return np.append(self.owner, -1)[self.settled(made.copy(), periods, threads=1)[0]]
 
     def settled(self, made: Records, periods: int, threads: int) -> tuple[Integers, Integers]:
         """Trap in which each of some states, which are moved on, comes within so many periods, or -1; and how many."""

@@ -178,11 +178,6 @@ def basins(
         Attractors, basins and their measures; after an interrupt, of the cells that were reached. They come coarse to
         fine.
 
-    Raises
-    ------
-    InvalidMotion, InvalidOption
-        As `stroboscopic_map`, and if an argument is out of its range.
-
     Notes
     -----
     A state is followed until it overturns, or is in a neighbourhood of a stable periodic orbit in which the map
@@ -254,8 +249,6 @@ def basin_entropy(outcomes: ArrayLike, box: int = 5) -> tuple[float, float]:
 
     Examples
     --------
-    A straight boundary through the middle of each second box:
-
     >>> import numpy as np
     >>> from rocking import dynamics
     >>> outcomes = np.arange(8) // 2 % 2 * np.ones((8, 1), dtype=int)

@@ -61,35 +61,10 @@ class BifurcationDiagram(DatasetResult):
     TABLES = MappingProxyType({"states": ("coordinate", "velocity"), "orbits": ("period", "impacts")})
 
     def changes(self, direction: str | None = None, start: int = 0) -> list[tuple[float, float, int, int]]:
-        """List where the period changes: the values before and after, and the periods there.
+        """List where the period changes: the values before and after, and the periods there, in the order gone through.
 
-        Parameters
-        ----------
-        direction : str, optional
-            One of those that were gone through; by default the first.
-        start : int
-            Number of the initial state.
-
-        Returns
-        -------
-        list of (float, float, int, int)
-            In the order in which the values were gone through; a period that is none is 0, -1 or -2, as in ``data``.
-
-        Raises
-        ------
-        InvalidOption
-            If there is no such direction or start.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> from rocking import dynamics
-        >>> ball = dynamics.BouncingBall(0.5, gravity=10.0)
-        >>> def case(ratio):
-        ...     return ball, rocking.pulses.sine(10.0 * ratio, 5.0, cycles=1)
-        >>> found = dynamics.bifurcation_diagram(case, [1.4, 1.5, 1.55], [0.1, 0.5], transient=800)
-        >>> found.changes()
-        [(1.5, 1.55, 1, 2)]
+        The direction is by default the first; `start` is the number of the initial state. A period that is none is 0,
+        -1 or -2, as in ``data``. `InvalidOption` if there is no such direction or start.
         """
         ways = self.data.direction.values.tolist()
         way = ways.index(checks.one_of(ways[0] if direction is None else direction, "direction", InvalidOption, ways))
@@ -185,16 +160,15 @@ def bifurcation_diagram(
     direction : {"up", "down", "both", "afresh"}
         Up or down: at each value an orbit starts where it was at the value before, and where that is not known, as
         after overturning, again at its initial state. Afresh: at each value from the initial states.
-    transient : int
-        Periods at each value before states are kept.
-    kept : int
-        Periods whose states are kept.
+    transient, kept : int
+        Periods at each value before states are kept, and periods whose states are kept. Near a bifurcation orbits
+        settle slowly: a short transient may find no period there, or that of the orbit before.
     parameter : str
         What the parameter is, with its unit, for tables and figures.
     model, chattering : str, optional
         As for `stroboscopic_map`.
     progress : bool, optional
-        Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
+        As for `rocking.simulate_many`.
 
     Returns
     -------
@@ -205,13 +179,6 @@ def bifurcation_diagram(
     ------
     InvalidMotion, InvalidBlock
         If the function returns something else than a body and a motion.
-    InvalidOption
-        If an argument is out of its range, or a state is behind a stop.
-
-    Notes
-    -----
-    Near a bifurcation orbits settle slowly: with a short transient the period is then not found, or that of the orbit
-    before.
 
     Examples
     --------
@@ -312,10 +279,7 @@ def _in_front(strobe: StroboscopicMap, states: Floats) -> Floats:
 
 
 def states_after(strobe: StroboscopicMap, at: Floats, transient: int, kept: int) -> tuple[Floats, Integers]:
-    """States at the starts of some periods after others, shape (n, kept, 2), and what became of each: a `Fate`.
-
-    NaN from where a body overturns, or cannot be followed.
-    """
+    """States at the starts of some periods after others, shape (n, kept, 2), and what became of each: a `Fate`."""
     states, now, fates = np.full((len(at), kept, 2), np.nan), at, np.full(len(at), Fate.MOVES.value)
     if transient:
         now, fates, _ = strobe.followed(at, transient)

@@ -201,10 +201,8 @@ class BouncingBall(LinearBody):
 
     Parameters
     ----------
-    restitution : float
-        Speed after an impact over that before, relative to the table.
-    gravity : float
-        Acceleration of gravity, m/s^2.
+    restitution, gravity : float
+        Speed after an impact over that before, relative to the table, and acceleration of gravity, m/s^2.
 
     Raises
     ------
@@ -258,11 +256,6 @@ class ImpactOscillator(LinearBody):
         mass against it.
     second_stop : float, optional
         Position of a stop on the other side, m: x <= second_stop.
-
-    Raises
-    ------
-    InvalidBlock
-        If a parameter is out of its range, or the second stop is not above the first.
 
     References
     ----------
@@ -325,11 +318,6 @@ class InvertedPendulum(LinearBody):
         Distance from the upright position to each wall, m.
     restitution : float
         Speed after an impact over that before.
-
-    Raises
-    ------
-    InvalidBlock
-        If a parameter is out of its range.
 
     References
     ----------

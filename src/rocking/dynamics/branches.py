@@ -60,12 +60,6 @@ class Bifurcation(NamedTuple):
         the speed of an impact vanishes, the lowest and highest of three extrapolations.
     orbit : PeriodicOrbit
         The orbit there: the last one on the branch where that ends.
-
-    Examples
-    --------
-    >>> from rocking.dynamics import Bifurcation
-    >>> Bifurcation._fields
-    ('kind', 'value', 'bracket', 'orbit')
     """
 
     kind: str
@@ -131,34 +125,7 @@ class Branch(Result):
         return len(self.values)
 
     def orbit(self, index: int) -> PeriodicOrbit:
-        """Return the orbit at a point of the branch.
-
-        Parameters
-        ----------
-        index : int
-            Number of the point.
-
-        Returns
-        -------
-        PeriodicOrbit
-            With its multipliers and its course.
-
-        Raises
-        ------
-        InvalidOption
-            If there is no such point.
-
-        Examples
-        --------
-        >>> from rocking import dynamics, pulses
-        >>> ball = dynamics.BouncingBall(0.5, gravity=10.0)
-        >>> def family(amplitude):
-        ...     return ball, pulses.sine(amplitude, 5.0, cycles=1)
-        >>> stable = next(each for each in dynamics.periodic_orbits(*family(12.0)) if each.is_stable)
-        >>> branch = dynamics.continue_orbit(stable, family, 12.0, (11.0, 13.0))
-        >>> branch.orbit(0).impacts
-        1.0
-        """
+        """Return the orbit at a point of the branch, with its multipliers and its course."""
         index = checks.whole(index, "index", InvalidOption, least=-len(self), most=len(self) - 1)
         body, motion = self.family(float(self.values[index]))
         return orbit_at(StroboscopicMap(body, motion, self.model, self.treatment), self.states[index], self.period)
@@ -227,37 +194,11 @@ class Branch(Result):
         figsize: tuple[float, float] | None = None,
         others: Sequence[Branch] = (),
     ) -> Figure:
-        """Draw the greatest size of the coordinate against the parameter.
+        """Draw the greatest size of the coordinate against the parameter; arguments as of `Result.plot`.
 
-        Where that is the same all along, as between two stops, the coordinate at the start of a period is drawn.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; by default in a new figure.
-        title : str
-            Title; by default one that says what is drawn.
-        figsize : (float, float), optional
-            Width and height of a new figure, inches.
-        others : sequence of Branch
-            Branches along the same parameter that are drawn with it, for example of twice the period.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            Stable orbits as a full line, unstable ones dashed, and a mark at each bifurcation.
-
-        Examples
-        --------
-        >>> from rocking import dynamics, pulses
-        >>> ball = dynamics.BouncingBall(0.5, gravity=10.0)
-        >>> def family(amplitude):
-        ...     return ball, pulses.sine(amplitude, 5.0, cycles=1)
-        >>> stable = next(each for each in dynamics.periodic_orbits(*family(12.0)) if each.is_stable)
-        >>> branch = dynamics.continue_orbit(stable, family, 12.0, (11.0, 16.0), unit="m/s^2")
-        >>> found = dynamics.periodic_orbits(*family(15.8), period=2, starts=64)
-        >>> doubled = next(each for each in found if each.period == 2)
-        >>> figure = branch.plot(others=[dynamics.continue_orbit(doubled, family, 15.8, (15.0, 16.0))])
+        Where that is the same all along, as between two stops, the coordinate at the start of a period is drawn. Stable
+        orbits are a full line, unstable ones dashed, and a mark stands at each bifurcation. `others` are branches along
+        the same parameter that are drawn with it, for example of twice the period.
         """
         from rocking.plot.orbits import branch_figure
 

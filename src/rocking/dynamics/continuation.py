@@ -104,8 +104,6 @@ def continue_orbit(
 
     Examples
     --------
-    A ball bounces once a period of the table from pi/3 g on, and no longer stably beyond 1.5268 g (Luck and Mehta):
-
     >>> from rocking import dynamics, pulses
     >>> ball = dynamics.BouncingBall(0.5, gravity=10.0)
     >>> def family(amplitude):
@@ -373,10 +371,7 @@ def _joined(here: _Walk, new: Floats) -> Bifurcation:
 
 
 def _vanishing(here: _Walk) -> Bifurcation | None:
-    """Grazing, where the speed of the slowest impact vanishes: extrapolated, as the equations are singular there.
-
-    None where the speed has not fallen far enough yet for estimates that agree.
-    """
+    """Grazing, where the speed of the slowest impact vanishes: extrapolated, as the equations are singular there."""
     (least, value), *others = reversed(here.slowest)
     speeds, values = [least], [value]
     for speed, value in others:
@@ -424,10 +419,7 @@ def reason_of_end(equations: OrbitEquations, trajectory: OrbitTrajectory, z: Flo
 def _towards_root(
     solve: Callable[[float], Solved | None], test: Callable[[Solved], float], low: float, high: float
 ) -> tuple[list[tuple[Solved, float]], bool]:
-    """Return points of a branch with values of a test function, the nearest to its root first, and whether it is there.
-
-    None where it does not change its sign. The search ends where there is no point to be found.
-    """
+    """Return points of a branch with values of a test function, the nearest to its root first, and whether there."""
     from scipy.optimize import brentq
 
     found: dict[float, tuple[Solved, float]] = {}

@@ -38,10 +38,8 @@ class LyapunovExponents(Result):
         impacts lose nothing, a period at rest counts as zero: what is near it never rests.
     standard_error : float
         Of both, from the means of 20 consecutive parts of the orbit.
-    period : float
-        Period of the motion, s.
-    periods : int
-        How many were averaged over.
+    period, periods : float, int
+        Period of the motion, s, and how many were averaged over.
     impacts : float
         Impacts per period.
     resting : float
@@ -122,13 +120,6 @@ def lyapunov_exponents(
     LyapunovExponents
         Per period, with a standard error.
 
-    Raises
-    ------
-    InvalidMotion
-        If the motion is none, or has no length.
-    InvalidOption
-        If an argument is out of its range.
-
     Notes
     -----
     On a stable periodic orbit they are the logarithms of the sizes of its multipliers over its period. Their sum is the
@@ -142,8 +133,6 @@ def lyapunov_exponents(
 
     Examples
     --------
-    A ball that hits once a period, always at one phase: the product of its multipliers is e^2, and they are complex:
-
     >>> import math, rocking
     >>> from rocking import dynamics
     >>> ball = dynamics.BouncingBall(0.5, gravity=10.0)

@@ -59,41 +59,12 @@ class StroboscopicMap(PeriodicForcing):
         ------
         InvalidOption
             If the states have another shape, or one is behind a stop.
-
-        Examples
-        --------
-        A ball on a table that shakes gently comes to rest:
-
-        >>> from rocking import dynamics, pulses
-        >>> ball, table = dynamics.BouncingBall(0.5), pulses.sine(5.0, 2.0, cycles=1)
-        >>> dynamics.stroboscopic_map(ball, table)([[0.0, 0.0], [0.05, 0.1]], periods=5).tolist()
-        [[0.0, 0.0], [0.0, 0.0]]
         """
         found, _, _ = self.followed(states, periods)
         return found
 
     def orbit(self, states: ArrayLike, periods: int) -> Floats:
-        """Return states after 0, 1, ... periods.
-
-        Parameters
-        ----------
-        states : array_like, shape (..., 2)
-            As for the map.
-        periods : int
-            Number of periods.
-
-        Returns
-        -------
-        ndarray, shape (..., periods + 1, 2)
-            States; NaN from the period on in which the body overturns.
-
-        Examples
-        --------
-        >>> from rocking import dynamics, pulses
-        >>> ball, table = dynamics.BouncingBall(0.5), pulses.sine(5.0, 2.0, cycles=1)
-        >>> dynamics.stroboscopic_map(ball, table).orbit([0.05, 0.1], 5).shape
-        (6, 2)
-        """
+        """Return states after 0, 1, ... periods, shape (..., periods + 1, 2); otherwise as the map."""
         given, made = self._states(states)
         count = checks.whole(periods, "periods", InvalidOption, least=1)
         rows = np.full((len(made), count, 3), np.nan)
@@ -104,69 +75,18 @@ class StroboscopicMap(PeriodicForcing):
         return whole.reshape(*given.shape[:-1], count + 1, 2)
 
     def followed(self, states: ArrayLike, periods: int = 1) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
-        """Return states after some periods, with what they are and how many impacts there were.
-
-        Parameters
-        ----------
-        states : array_like, shape (..., 2)
-            As for the map.
-        periods : int
-            Number of periods.
-
-        Returns
-        -------
-        states : ndarray, shape (..., 2)
-            As of the map.
-        fates : ndarray, shape (...)
-            What each is: a `Fate`.
-        impacts : ndarray, shape (...)
-            Impacts that were resolved on the way.
-
-        Examples
-        --------
-        >>> from rocking import dynamics, pulses
-        >>> ball, table = dynamics.BouncingBall(0.5), pulses.sine(5.0, 2.0, cycles=1)
-        >>> _, fates, impacts = dynamics.stroboscopic_map(ball, table).followed([0.05, 0.1], periods=5)
-        >>> dynamics.Fate(fates).name, int(impacts) > 5
-        ('RESTS_FOR_EVER', True)
-        """
+        """Return states after some periods as the map does, the `Fate` of each, and the numbers of impacts resolved."""
         given, made = self._states(states)
         self._iterate(made, checks.whole(periods, "periods", InvalidOption, least=1))
         fates, impacts = (np.array(made[name]).reshape(given.shape[:-1]) for name in ("ending", "impacts"))
         return self._known(made).reshape(given.shape), fates, impacts
 
     def derivative(self, states: ArrayLike, periods: int = 1) -> tuple[Floats, Floats]:
-        """Return states after some periods and their derivatives by the states before.
+        """Return states after some periods as the map does, and their derivatives by the states before, (..., 2, 2).
 
-        Parameters
-        ----------
-        states : array_like, shape (..., 2)
-            As for the map.
-        periods : int
-            Number of periods.
-
-        Returns
-        -------
-        states : ndarray, shape (..., 2)
-            As of the map.
-        derivatives : ndarray, shape (..., 2, 2)
-            Exactly zero where the body comes to rest on the way, or is held at rest at the start: it forgets how it
-            began. On a stop that does not hold it, that of the states in front of the stop. NaN where it overturns;
-            infinite at an impact of no speed (a grazing one).
-
-        Notes
-        -----
-        Through an arc the variational equation is solved by the same series as the arc; through an impact by its
-        saltation matrix, which includes the shift of the impact in time.
-
-        Examples
-        --------
-        >>> from rocking import dynamics, pulses
-        >>> ball = dynamics.BouncingBall(0.5, gravity=10.0)
-        >>> table = pulses.sine(15.0, 5.0, cycles=1)
-        >>> _, change = dynamics.stroboscopic_map(ball, table).derivative([0.1, 0.5])
-        >>> f"{np.linalg.det(change):.12f}"
-        '0.250000000000'
+        Derivatives are exactly zero where the body comes to rest on the way, or is held at rest at the start. On a stop
+        that does not hold it, they are those of the states in front of the stop. NaN where it overturns; infinite at a
+        grazing impact. An arc contributes the solution of its variational equation, an impact its saltation matrix.
         """
         given, made = self._states(states)
         total = np.broadcast_to(np.eye(2), (len(made), 2, 2)).copy()
@@ -182,29 +102,10 @@ class StroboscopicMap(PeriodicForcing):
         return found.reshape(given.shape), total.reshape(*given.shape, 2)
 
     def from_impacts(self, impacts: ArrayLike) -> Floats:
-        """Return the states at the end of the period in which bodies leave impacts.
+        """Return the states at the end of the period in which bodies leave impacts, given as for an `ImpactMap`.
 
-        Parameters
-        ----------
-        impacts : array_like, shape (..., 2)
-            Time since the start of the period, s, and velocity just after the impact, as for an `ImpactMap`.
-
-        Returns
-        -------
-        ndarray, shape (..., 2)
-            States at the start of the next period; NaN where the body overturns before.
-
-        Raises
-        ------
-        InvalidOption
-            If the impacts have another shape, or a velocity does not lead away from its stop.
-
-        Examples
-        --------
-        >>> from rocking import dynamics, pulses
-        >>> ball, table = dynamics.BouncingBall(0.5, gravity=10.0), pulses.sine(15.0, 5.0, cycles=1)
-        >>> dynamics.stroboscopic_map(ball, table).from_impacts([0.05, 1.0]).shape
-        (2,)
+        NaN where the body overturns before. `InvalidOption` if the impacts have another shape, or a velocity does not
+        lead away from its stop.
         """
         given = self._pairs(impacts, "impacts", "phase in s")
         made = self._after_impacts(given.reshape(-1, 2))
@@ -224,10 +125,7 @@ class StroboscopicMap(PeriodicForcing):
 
 
 class HalfMap(StroboscopicMap):
-    """Map of a mirrored body under an antisymmetric motion to the mirror image of its state half a period later.
-
-    Its square is the stroboscopic map.
-    """
+    """Map of a mirrored body under an antisymmetric motion to the mirror image of its state half a period later."""
 
     def __init__(self, strobe: StroboscopicMap) -> None:
         super().__init__(strobe.body, strobe.motion, strobe.model, strobe.treatment)
@@ -265,38 +163,11 @@ class ImpactMap(PeriodicForcing):
         -------
         ndarray, shape (..., 2)
             The next ones, with times within the period; NaN where the body rests or overturns first.
-
-        Examples
-        --------
-        >>> from rocking import dynamics, pulses
-        >>> ball, table = dynamics.BouncingBall(0.5, gravity=10.0), pulses.sine(15.0, 5.0, cycles=1)
-        >>> dynamics.impact_map(ball, table)([0.05, 1.0]).round(12).tolist()
-        [0.05, 0.5]
         """
         return self.derivative(impacts)[0]
 
     def derivative(self, impacts: ArrayLike) -> tuple[Floats, Floats]:
-        """Return the next impacts and their derivatives by the impacts before.
-
-        Parameters
-        ----------
-        impacts : array_like, shape (..., 2)
-            As for the map.
-
-        Returns
-        -------
-        impacts : ndarray, shape (..., 2)
-            As of the map.
-        derivatives : ndarray, shape (..., 2, 2)
-            NaN where there is no next impact.
-
-        Examples
-        --------
-        >>> from rocking import dynamics, pulses
-        >>> ball, table = dynamics.BouncingBall(0.5, gravity=10.0), pulses.sine(15.0, 5.0, cycles=1)
-        >>> dynamics.impact_map(ball, table).derivative([0.05, 1.0])[1].shape
-        (2, 2)
-        """
+        """Return the next impacts as the map does, and their derivatives by the impacts before, shape (..., 2, 2)."""
         given = self._pairs(impacts, "impacts", "phase in s")
         made = self._after_impacts(given.reshape(-1, 2))
         start, signs, change = self._rates(made), _signs(made["side"]), np.empty((len(made), 2, 2))
@@ -388,10 +259,6 @@ def stroboscopic_map(
     InvalidOption
         If the model is not one of the body's.
 
-    Notes
-    -----
-    Every impact is located, and chattering is closed by proof, as by `rocking.simulate`: the same kernels march.
-
     Examples
     --------
     >>> from rocking import Block, dynamics, pulses
@@ -416,11 +283,6 @@ def impact_map(body: Body, motion: Motion, *, model: Model | None = None) -> Imp
     -------
     ImpactMap
         A function of impacts (phase in s, velocity after).
-
-    Raises
-    ------
-    InvalidMotion, InvalidOption
-        As `stroboscopic_map`.
 
     Examples
     --------

@@ -63,10 +63,8 @@ class PeriodicOrbit(Result):
         Floquet multipliers, the largest first: eigenvalues of the derivative of the state after a period of the orbit
         by that before. Exactly zero with a proven rest; one at rest where impacts lose nothing, for what is near it
         never rests.
-    symmetric : bool
-        Whether it is its own mirror image half a period later.
-    rests : bool
-        Whether the body comes to rest in every period of the orbit.
+    symmetric, rests : bool
+        Whether it is its own mirror image half a period later; whether the body comes to rest in every period of it.
     """
 
     TABLES: ClassVar[tuple[str, ...]] = ("states", "impacts", "histories")
@@ -268,10 +266,7 @@ def orbit_at(strobe: StroboscopicMap, state: Floats, period: int) -> PeriodicOrb
 
 
 def impacts_of(strobe: StroboscopicMap, state: Floats, period: int, change: Floats) -> float:
-    """Impacts in so many periods from a state of this derivative: infinity with complete chattering.
-
-    That is a rest after impacts which is proven, and not made by an impact that leaves no speed.
-    """
+    """Impacts in so many periods from a state of this derivative: infinity with complete chattering."""
     impacts = float(strobe.followed(state, period)[2])
     chatters = impacts > 0.0 and strobe.treatment.bracket > 0.0 and np.max(strobe.bodies.restitution) > 0.0
     return math.inf if chatters and not np.any(change) else impacts
@@ -328,11 +323,6 @@ def periodic_orbits(
         Each once, those with the shortest period first, then those with the fewest impacts. There may be others, which
         no start led to.
 
-    Raises
-    ------
-    InvalidMotion, InvalidOption
-        As `stroboscopic_map`, and if the period is no whole number from 1, or a start is behind a stop.
-
     Notes
     -----
     Newton's method solves P^n(x) = x for all starts at once, with the derivative of the stroboscopic map P. Where that
@@ -344,8 +334,6 @@ def periodic_orbits(
 
     Examples
     --------
-    A ball on a table that goes up and down with 1.2 g bounces once a period, in two ways, or rests every period:
-
     >>> from rocking import dynamics, pulses
     >>> ball, table = dynamics.BouncingBall(0.5, gravity=10.0), pulses.sine(12.0, 5.0, cycles=1)
     >>> for orbit in dynamics.periodic_orbits(ball, table):
@@ -434,10 +422,7 @@ class _Search:
         return rows
 
     def residuals(self, rows: Floats) -> tuple[Floats, Flags]:
-        """How far states are from where they come to, over the scale, and whether that is only rounding.
-
-        Rounding grows with the derivative, to a limit.
-        """
+        """How far states are from where they come to, over the scale, and whether that is only rounding."""
         size = self.size(rows[:, 2:4] - rows[:, :2])
         allowed = 1e-11 * np.maximum(1.0, np.max(np.abs(rows[:, 4:]), axis=1))
         # What comes back no nearer is called no orbit, however large the derivative.

@@ -40,47 +40,11 @@ class Response(rocking.response.Response):
         return self.peak_rotation
 
     def position(self, time: ArrayLike) -> Floats:
-        """Position relative to the table or the support, at any time.
-
-        Parameters
-        ----------
-        time : array_like
-            Times, s, of any shape.
-
-        Returns
-        -------
-        float or ndarray
-            m; NaN outside the response.
-
-        Examples
-        --------
-        >>> from rocking import dynamics
-        >>> fall = dynamics.simulate(dynamics.BouncingBall(0.5, gravity=10.0), None, initial_position=0.2)
-        >>> f"{fall.position(0.1):.3f}"
-        '0.150'
-        """
+        """Return the position relative to the table or the support at any time, m; NaN outside the response."""
         return as_asked(self.states(time)[..., 0])
 
     def velocity(self, time: ArrayLike) -> Floats:
-        """Velocity relative to the table or the support, at any time; just after an impact at one.
-
-        Parameters
-        ----------
-        time : array_like
-            Times, s, of any shape.
-
-        Returns
-        -------
-        float or ndarray
-            m/s; NaN outside the response.
-
-        Examples
-        --------
-        >>> from rocking import dynamics
-        >>> fall = dynamics.simulate(dynamics.BouncingBall(0.5, gravity=10.0), None, initial_position=0.2)
-        >>> f"{fall.velocity(0.1):.3f}"
-        '-1.000'
-        """
+        """Return the rate of `position`, m/s; just after an impact at one."""
         return as_asked(self.states(time)[..., 1])
 
 
@@ -131,8 +95,6 @@ def simulate(
 
     Examples
     --------
-    A ball falls from 0.2 m and stops after the closed geometric time, 0.2 (1 + 2 e/(1 - e)) s:
-
     >>> from rocking import dynamics
     >>> response = dynamics.simulate(dynamics.BouncingBall(0.8, gravity=10.0), None, initial_position=0.2)
     >>> f"{response.events['time'][0]:.12f}"
@@ -179,11 +141,6 @@ def simulate_many(
         As `rocking.simulate_many`, with ``peak_position`` (m), the highest. Of derivatives there are peak_by_motion,
         peak_by_restitution, peak_by_initial_position (per relative change of the distance from the stop) and
         peak_by_initial_velocity (m); NaN also where the peak is the second stop.
-
-    Raises
-    ------
-    InvalidBlock, InvalidMotion, InvalidOption
-        As `simulate`.
 
     Examples
     --------

@@ -71,13 +71,7 @@ def bodies_of(given: Bodies | Body | Iterable[Body]) -> Bodies:
 
 
 def slenderness_of(bodies: Bodies) -> Floats:
-    """Slenderness of each body as it stands, rad, the smaller one of two sides: in these, rotations are counted.
-
-    Raises
-    ------
-    InvalidOption
-        If bodies of this kind have none.
-    """
+    """Slenderness of each body as it stands, rad, the smaller one of two sides: in these, rotations are counted."""
     found = bodies.parameters().get("alpha")
     if found is None:
         raise InvalidOption(f"this is known of blocks alone, which have a slenderness, not of {bodies.kind}")
@@ -85,10 +79,7 @@ def slenderness_of(bodies: Bodies) -> Floats:
 
 
 def thresholds_of(bodies: Bodies, model: Model) -> tuple[Floats, Floats]:
-    """Ground accelerations that lift each body to each side, and what its own weight makes of them, m/s^2, (n, 2).
-
-    Restraints make the rest, which a vertical motion does not change.
-    """
+    """Ground accelerations that lift each body to each side, and what its own weight makes of them, m/s^2, (n, 2)."""
     made = bodies.kernel_records(model, np.zeros((len(bodies), 2)))
     own = bodies.gravity * made["threshold"]
     return own + bodies.gravity * made["restraint_threshold"], own
@@ -143,10 +134,7 @@ def set_start(
 
 
 def highest(states: state.Records, records: state.Records, stops: Floats) -> Floats:
-    """Peaks of coordinates, from those in the frame of side +: at a second stop exactly its own.
-
-    One at the second stop has been across from the first.
-    """
+    """Peaks of coordinates, from those in the frame of side +: at a second stop exactly its own."""
     peaks: Floats = states["peak"] + stops[..., 0]
     if not records["two_stops"].any():
         return peaks

@@ -79,10 +79,7 @@ class Setup:
         ground: Ground | None = None,
         name: str | None = None,
     ) -> Run:
-        """Return all that kernels need for the bodies under a motion times a factor; all arguments are checked.
-
-        ``ground`` takes the place of that of the motion; ``name`` is what a caller calls the initial coordinate.
-        """
+        """Return all that kernels need for the bodies under a motion times a factor; all arguments are checked."""
         bodies = self.bodies
         check_components(bodies, motion)
         settings = settings_of(bodies, self.model, self.treatment, self.duration, record=record)
@@ -149,13 +146,7 @@ def simulate_each(
 
 
 def require_finished(unfinished: bool) -> None:
-    """Check that a simulation without which there is no answer was not given up.
-
-    Raises
-    ------
-    Unfinished
-        If it was.
-    """
+    """Check that a simulation without which there is no answer was not given up."""
     if unfinished:
         raise Unfinished(
             f"a simulation was given up after more than {BUDGET:,} steps, so that its outcome is not known; "
@@ -170,13 +161,7 @@ def missing_text(missing: Flags | int) -> str:
 
 
 def check_components(bodies: Bodies, motion: Motion | None) -> None:
-    """Check that a motion has no vertical component where bodies move along a line and not over the ground.
-
-    Raises
-    ------
-    InvalidMotion
-        If it has one there.
-    """
+    """Check that a motion has no vertical component where bodies move along a line and not over the ground."""
     if motion is not None and motion.vertical is not None and bodies[0].coordinate.unit != ROTATION.unit:
         raise InvalidMotion(
             f"this {bodies[0].description} moves along one line; give a motion without a vertical component"

@@ -59,35 +59,10 @@ class Treatment(ABC):
 
     @abstractmethod
     def limits(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
-        """Limits of both sides of every body, with which its impacts are compared; what they are, `code` says.
+        """Return the limits of both sides of every body, with which its impacts are compared, shape (n, 2).
 
-        Parameters
-        ----------
-        bodies : Bodies
-            The n bodies.
-        motion : Motion or None
-            What shakes them; None is free rocking.
-        model : {"nonlinear", "linear"}
-            Equation of motion.
-        factor : float
-            What the motion is multiplied by.
-
-        Returns
-        -------
-        ndarray, shape (n, 2)
-            In the treatment's own unit.
-
-        Raises
-        ------
-        InvalidOption
-            If the treatment does not know such bodies or motions.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> block = rocking.Block(width=0.4, height=2.0)
-        >>> rocking.IntervalThreshold(1e-6).limits(block.alone(), None, "nonlinear")
-        array([[1.e-06, 1.e-06]])
+        The unit is that of the measure that `code` names. Without a motion the rocking is free; `factor` multiplies the
+        motion. `InvalidOption` if the treatment does not support such bodies or motions.
         """
 
     def __str__(self) -> str:
@@ -97,28 +72,7 @@ class Treatment(ABC):
 
     @classmethod
     def from_text(cls, value: str) -> Treatment:
-        """Make the treatment of its one parameter as it is written after "NAME=".
-
-        Parameters
-        ----------
-        value : str
-            The parameter.
-
-        Returns
-        -------
-        Treatment
-            One of this class.
-
-        Raises
-        ------
-        InvalidOption
-            If it takes no parameter, or the text is not one.
-
-        Examples
-        --------
-        >>> VelocityThreshold.from_text("1e-6")
-        VelocityThreshold(threshold=1e-06)
-        """
+        """Create the treatment from the text after "NAME="; `InvalidOption` if that is not a parameter of the class."""
         if not fields(cls):
             raise InvalidOption(f"the chattering treatment {cls.name} takes no parameter, not {value!r}")
         try:
@@ -194,15 +148,12 @@ class AsymptoticTime(Treatment):
         threshold = bodies.alpha if model == "linear" else np.tan(bodies.alpha)
         amplitude = abs(factor * parameters["amplitude"]) / (bodies.gravity * threshold)
         frequency = 2.0 * np.pi * parameters["frequency"] / bodies.p
-        complete = (amplitude >= 1.0) & (amplitude < self._critical(frequency, eta))
+        critical, lossy = np.ones(frequency.shape), eta < 1.0
+        critical[lossy] = critical_amplitudes_by(self.critical, frequency[lossy], eta[lossy])
+        complete = (amplitude >= 1.0) & (amplitude < critical)
         cases = zip(amplitude.flat, frequency.flat, eta.flat, strict=True)
         times = np.reshape([eq65_time(*case) for case in cases], amplitude.shape)
         return np.where(complete, times / bodies.p, np.inf)
-
-    def _critical(self, frequency: Floats, restitution: Floats) -> Floats:
-        found, lossy = np.ones(frequency.shape), restitution < 1.0
-        found[lossy] = critical_amplitudes_by(self.critical, frequency[lossy], restitution[lossy])
-        return found
 
 
 @dataclass(frozen=True)
@@ -213,11 +164,6 @@ class Certified(Treatment):
     ----------
     tolerance : float
         Impacts are resolved until the bracket on the time of rest is narrower than this, s.
-
-    Raises
-    ------
-    InvalidOption
-        If the tolerance is not positive and finite.
 
     Examples
     --------
@@ -257,11 +203,6 @@ class VelocityThreshold(Treatment):
     ----------
     threshold : float
         VelTol/(p alpha), the threshold over the side's p and alpha, dimensionless.
-
-    Raises
-    ------
-    InvalidOption
-        If the threshold is not positive and finite.
     """
 
     name: ClassVar[str] = "velocity"
@@ -296,11 +237,6 @@ class GeometricBypass(VelocityThreshold):
     threshold : float
         As for `VelocityThreshold`, over the side's p and alpha.
 
-    Raises
-    ------
-    InvalidOption
-        If the threshold is not positive and finite.
-
     Notes
     -----
     Source: Nordmark, A. B. and Piiroinen, P. T. (2009). Simulation and stability analysis of impacting systems with
@@ -326,11 +262,6 @@ class IntervalThreshold(Treatment):
     ----------
     threshold : float
         Shortest interval between impacts that is resolved, s.
-
-    Raises
-    ------
-    InvalidOption
-        If the threshold is not positive and finite.
     """
 
     name: ClassVar[str] = "interval"

@@ -60,14 +60,7 @@ _ALIKE: Final = 0.75
 
 
 def motion_notes(motion: Motion) -> tuple[str, ...]:
-    """Return what looks like a mistake in a motion that shakes a block; empty if nothing does.
-
-    Examples
-    --------
-    >>> from rocking import Motion
-    >>> motion_notes(Motion.from_samples([0.0, 300.0, -100.0, 0.0], 0.01))
-    ('the peak acceleration is 30.6 g, more than any ground motion has: are the units right?',)
-    """
+    """Return what looks like a mistake in a motion that shakes a block; empty if nothing does."""
     notes = reading_notes(motion)
     direction = _origin(motion).channel
     if _VERTICAL.fullmatch(direction):
@@ -76,17 +69,7 @@ def motion_notes(motion: Motion) -> tuple[str, ...]:
 
 
 def vertical_notes(motion: Motion) -> tuple[str, ...]:
-    """Return what looks like a mistake in the vertical component of a motion; empty if nothing does, or it has none.
-
-    Examples
-    --------
-    >>> from rocking import records
-    >>> horizontal = records.load("el-centro-meloland-270")
-    >>> vertical_notes(horizontal.with_vertical(records.load("el-centro-meloland-up")))
-    ()
-    >>> vertical_notes(horizontal.with_vertical(horizontal))
-    ('the vertical motion is the horizontal one itself: name its own channel or file',)
-    """
+    """Return what looks like a mistake in the vertical component of a motion; empty if nothing does, or it has none."""
     vertical = motion.vertical
     if vertical is None:
         return ()
@@ -133,13 +116,7 @@ def _gap_notes(motion: Motion) -> list[str]:
 
 
 def level_notes(text: str, value: float, name: str) -> tuple[Message, ...]:
-    """Return what looks like a mistake in an acceleration (m/s^2) that a text was taken for; empty if nothing does.
-
-    Examples
-    --------
-    >>> print(*level_notes("0.4", 0.4, "pga"), *level_notes("0.4g", 3.92, "pga"))
-    pga 0.4 is taken for 0.4 m/s^2, 0.0408 g; write 0.4g for 0.4 g
-    """
+    """Return what looks like a mistake in an acceleration (m/s^2) that a text was taken for; empty if nothing does."""
     if _UNITLESS.fullmatch(text.strip()) is None or not 0.0 < value <= _PERHAPS_IN_G:
         return ()
     sentence = f"{{}} {text} is taken for {value:g} m/s^2, {value / STANDARD_GRAVITY:.3g} g; write {text}g for {text} g"
@@ -147,16 +124,7 @@ def level_notes(text: str, value: float, name: str) -> tuple[Message, ...]:
 
 
 def hazard_notes(intensity: Floats, measure: Measure) -> tuple[str, ...]:
-    """Return what looks like a mistake in the units of a hazard curve's intensities; empty if nothing does.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> hazard_notes(9.80665 * np.array([0.1, 0.8]), Measure("pga"))
-    ()
-    >>> print(*hazard_notes(9.80665 * np.array([10.0, 80.0]), Measure("pga")))
-    even the weakest motions of the hazard curve have 98.0665 m/s^2 (10 g): are its units right?
-    """
+    """Return what looks like a mistake in the units of a hazard curve's intensities; empty if nothing does."""
     weakest, strongest = float(intensity[0]), float(intensity[-1])
     least, most = (_WEAKEST * STANDARD_GRAVITY, _STRONGEST * STANDARD_GRAVITY) if measure.units == "m/s^2" else _SPEEDS
     for which, value, is_odd in (("weakest", weakest, weakest > most), ("strongest", strongest, strongest < least)):
@@ -166,14 +134,7 @@ def hazard_notes(intensity: Floats, measure: Measure) -> tuple[str, ...]:
 
 
 def block_notes(block: Block) -> tuple[Message | str, ...]:
-    """Return what looks like a mistake in the sizes or the sides of a block; empty if nothing does.
-
-    Examples
-    --------
-    >>> from rocking import Block
-    >>> block_notes(Block(width=2.0, height=0.5, restitution=0.5))
-    ('the block is wider, 2 m, than it is high, 0.5 m: are the sizes swapped?',)
-    """
+    """Return what looks like a mistake in the sizes or the sides of a block; empty if nothing does."""
     notes = []
     largest = max(2.0 * side.radius for side in block.sides)
     if largest > _LARGEST:
@@ -187,26 +148,14 @@ def block_notes(block: Block) -> tuple[Message | str, ...]:
 
 
 def height_notes(height: float) -> tuple[str, ...]:
-    """Return what looks like a mistake in the height, m, of a body that was read from a mesh; empty if nothing does.
-
-    Examples
-    --------
-    >>> height_notes(1.8), height_notes(1800.0)
-    ((), ('the body is 1800 m high: are its coordinates in metres?',))
-    """
+    """Return what looks like a mistake in the height, m, of a body that was read from a mesh; empty if nothing does."""
     return (
         () if _LOWEST <= height <= _LARGEST else (f"the body is {height:.4g} m high: are its coordinates in metres?",)
     )
 
 
 def density_notes(densities: Sequence[float | None]) -> tuple[str, ...]:
-    """Return what looks like a mistake in densities, kg/m^3, of parts of a body; empty if nothing does.
-
-    Examples
-    --------
-    >>> density_notes([2700.0, None]), density_notes([2.7])
-    ((), ('a density is 2.7 kg/m^3, and no solid is so light or so heavy: is it in kg/m^3?',))
-    """
+    """Return what looks like a mistake in densities, kg/m^3, of parts of a body; empty if nothing does."""
     unlikely = [each for each in densities if each is not None and not _LIGHTEST <= each <= _HEAVIEST]
     return tuple(
         f"a density is {each:g} kg/m^3, and no solid is so light or so heavy: is it in kg/m^3?" for each in unlikely[:1]
@@ -214,17 +163,7 @@ def density_notes(densities: Sequence[float | None]) -> tuple[str, ...]:
 
 
 def restraint_notes(body: RestrainedBlock, top: float | None = None) -> tuple[str, ...]:
-    """Return what looks like a mistake in the restraints of a block; empty if nothing does.
-
-    Examples
-    --------
-    >>> from rocking import Block, RestrainedBlock, Tendon, Thrust
-    >>> column = Block(width=0.4, height=2.0, mass=2000.0)
-    >>> restraint_notes(RestrainedBlock(column, Thrust(5.0, height=3.0)), 2.0)
-    ('a thrust is at a height of 3 m, above the top of the block, 2 m: is it in metres?',)
-    >>> print(*restraint_notes(RestrainedBlock(column, Tendon(2e12))))
-    what a restraint does is 3.9e+06 times the weight or more: are forces in N, and masses in kg?
-    """
+    """Return what looks like a mistake in the restraints of a block; empty if nothing does."""
     notes = []
     for each in body.restraints or ():
         if isinstance(each, (Thrust, Load)) and top is not None and each.height > top * (1.0 + 1e-9):
@@ -300,10 +239,7 @@ def _timing_notes(motion: Motion, vertical: Motion) -> Iterator[str]:
 
 
 def is_multiple(motion: Motion, other: Motion, *, reversed_too: bool = True) -> bool:
-    """Whether scaling makes one motion of the other, but for rounding; a negative factor leaves the vertical as it is.
-
-    ``reversed_too``: by factors of either sign; else by positive ones alone.
-    """
+    """Whether scaling makes one motion of the other, but for rounding; `reversed_too`: also by a negative factor."""
     parts = [[part for part in (one, one.vertical) if part is not None] for one in (motion, other)]
     if [part.coefficients.shape for part in parts[0]] != [part.coefficients.shape for part in parts[1]]:
         return False

@@ -97,13 +97,7 @@ FAMILIES: Final = {family.name: family for family in (PulseFamily(getattr(pulses
 
 
 def pulse_family(name: str) -> PulseFamily:
-    """Family of pulses of a name; blanks, hyphens and underscores are the same.
-
-    Examples
-    --------
-    >>> pulse_family("one_sine").needed
-    ('amplitude', 'frequency')
-    """
+    """Family of pulses of a name; blanks, hyphens and underscores are the same."""
     plain = checks.text(name, "pulse", InvalidOption).strip().lower().replace("_", "-").replace(" ", "-")
     if plain not in FAMILIES:
         hint = checks.meant(plain, [*FAMILIES], f"there are {_listed(FAMILIES)}")
@@ -130,8 +124,6 @@ def named_pulse(text: str) -> Motion:
     ------
     InvalidOption
         If there is no such family or parameter, one is missing or given twice, or a value cannot be read.
-    InvalidMotion
-        If a value is out of its range.
 
     Examples
     --------

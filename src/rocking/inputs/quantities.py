@@ -136,13 +136,7 @@ def _one_or_two(text: str, name: str, quantity: Quantity, wanted: str) -> float 
 
 
 def axis(value: Any, name: str, quantity: Quantity = number) -> Floats:
-    """Return the numbers of a value of a study file: one, a list, or a range.
-
-    Examples
-    --------
-    >>> axis(["10cm", 0.2], "width", length).tolist(), axis("1:3:3", "p").tolist(), axis(2, "p").tolist()
-    ([0.1, 0.2], [1.0, 2.0, 3.0], [2.0])
-    """
+    """Return the numbers of a value of a study file: one, a list, or a range."""
     if isinstance(value, str):
         return values(value, name, quantity)
     numbers = value if isinstance(value, list) else [value]
@@ -180,18 +174,7 @@ def at_a_period(text: str, name: str, quantity: Quantity = acceleration) -> tupl
 
 
 def scaling(given: Mapping[str, str | float | None], quantity: Quantity = acceleration) -> tuple[float, Measure] | None:
-    """Return the level that a motion is scaled to, and the measure that it is of; None where nothing is given.
-
-    Given is at most one of scale (a factor), pga, pgv (m/s) and sa ("0.4g@1.0", at a period, s), as a text or a number;
-    `quantity` reads accelerations.
-
-    Examples
-    --------
-    >>> scaling({"pga": "0.5g"})
-    (4.903325, Measure(name='pga', period=None, damping=0.05))
-    >>> scaling({"scale": "-2"})[0], scaling({"sa": "3@0.5"})[1].period, scaling({})
-    (-2.0, 0.5, None)
-    """
+    """Return the level that a motion is scaled to, and the measure that it is of; None where nothing is given."""
     chosen = {name: value for name, value in given.items() if value is not None}
     if not chosen:
         return None
@@ -224,13 +207,7 @@ def _parts(text: str) -> tuple[float | None, str]:
 
 
 def densities(text: str, name: str) -> float | dict[str, float]:
-    """Return one density, kg/m^3, or those of parts by name, which are written as PART=NUMBER.
-
-    Examples
-    --------
-    >>> densities("2700", "density"), densities("plinth=2700, head=2650", "density")
-    (2700.0, {'plinth': 2700.0, 'head': 2650.0})
-    """
+    """Return one density, kg/m^3, or those of parts by name, which are written as PART=NUMBER."""
     if "=" not in text:
         return number(text, name)
     found = {}

@@ -21,22 +21,16 @@ class Origin:
 
     Attributes
     ----------
-    format : str
-        Format of the file.
-    file : str
-        Name of the file, without its folder.
+    format, file : str
+        Format and name of the file, without its folder.
     event, station : str
         Earthquake and place.
-    channel : str
-        Name of the component: "90 Deg", "Up", "HNE", ...
-    number : int or None
-        The channel's number in the file.
+    channel, number : str, int or None
+        Name of the component ("90 Deg", "Up", "HNE", ...) and its number in the file.
     azimuth : float or None
         Direction of positive acceleration, degrees clockwise from north; None if vertical or unknown.
-    units : str
-        Units of the numbers in the file, as it spells them.
-    heading_units : str
-        Units that the heading of a text table names, where it has one.
+    units, heading_units : str
+        Units of the numbers in the file, as it spells them, and units that the heading of a text table names.
     start : float or None
         Instant of the first sample by the file's own clock, s; None where that is not known, or the motion was delayed
         or cut.
@@ -115,23 +109,7 @@ class Description:
         return ", ".join(f"{name} {value:.5g}" for name, value in self.parameters.items())
 
     def scaled(self, factor: float) -> Description:
-        """Return the description of the motion times a factor.
-
-        Parameters
-        ----------
-        factor : float
-            What the motion is multiplied with.
-
-        Returns
-        -------
-        Description
-            With amplitudes times the factor.
-
-        Examples
-        --------
-        >>> Description("sine", {"amplitude": 2.0, "frequency": 3.0}).scaled(-0.5)
-        <Description: sine, amplitude -1, frequency 3>
-        """
+        """Return the description of the motion times a factor, which multiplies its amplitudes."""
         parameters = {k: v * factor if k.startswith("amplitude") else v for k, v in self.parameters.items()}
         origin = self.origin
         if origin is not None and factor < 0.0:
@@ -140,33 +118,14 @@ class Description:
         return replace(self, parameters=parameters, origin=origin)
 
     def changed(self, how: str) -> Description:
-        """Return the description of a motion that no longer is what its formula says.
-
-        Parameters
-        ----------
-        how : str
-            What was done to it: "delayed", "processed".
-
-        Returns
-        -------
-        Description
-            Its family says so, once.
-
-        Examples
-        --------
-        >>> Description("sine").changed("delayed").changed("delayed")
-        <Description: delayed sine>
-        """
+        """Return the description of a motion that was changed ("delayed", "processed"), which its family names once."""
         family = self.family if self.family.startswith(f"{how} ") else f"{how} {self.family}"
         origin = None if self.origin is None else replace(self.origin, start=None)
         return replace(self, family=family, origin=origin)
 
 
 def begins_later(first: Description, second: Description, step: float | None) -> float:
-    """Return how much later the second of two records begins, s, by the clock of their files.
-
-    It is 0 where that is not known, or less than half a `step` of the samples, s.
-    """
+    """Return how much later the second of two records begins, s, by the clock of their files."""
     one, other = (each.origin or Origin() for each in (first, second))
     if one.start is None or other.start is None or one.format != other.format:
         return 0.0
@@ -175,12 +134,6 @@ def begins_later(first: Description, second: Description, step: float | None) ->
 
 
 def labelled(name: str, history: Sequence[str], vertical: str = "") -> str:
-    """Return the name of a motion, and of its vertical one, with what was done to it but not what it was scaled to.
-
-    Examples
-    --------
-    >>> labelled("tower-090", ["scaled by 2 to a peak ground acceleration of 2 m/s^2 (0.2039 g)"], "tower-up")
-    'tower-090 with vertical tower-up, scaled by 2'
-    """
+    """Return the name of a motion, and of its vertical one, with what was done to it but not what it was scaled to."""
     both = f"{name} with vertical {vertical}" if vertical else name
     return ", ".join((both, *(_SCALED.sub(r"\1", done) for done in history)))

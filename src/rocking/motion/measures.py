@@ -66,24 +66,7 @@ class Measured:
     @overload
     def acceleration(self, time: Sequence[float] | NDArray[Any]) -> Floats: ...
     def acceleration(self, time: float | Sequence[float] | NDArray[Any]) -> float | Floats:
-        """Ground acceleration; zero outside the motion.
-
-        Parameters
-        ----------
-        time : float or array_like
-            Times, s.
-
-        Returns
-        -------
-        float or ndarray
-            m/s^2, shaped like `time`.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> rocking.Motion([0.0, 2.0], [[1.0]]).acceleration([1.0, 3.0])
-        array([1., 0.])
-        """
+        """Return the ground acceleration at times (s), m/s^2, shaped like `time`; zero outside the motion."""
         at = checks.numbers(time, "time", InvalidMotion)
         result = piecewise.at(self.breakpoints, self.coefficients, at)
         result = np.where((at < 0.0) | (at > self.duration), 0.0, result)
@@ -94,24 +77,7 @@ class Measured:
     @overload
     def velocity(self, time: Sequence[float] | NDArray[Any]) -> Floats: ...
     def velocity(self, time: float | Sequence[float] | NDArray[Any]) -> float | Floats:
-        """Ground velocity, from rest; zero before the motion and constant after its end.
-
-        Parameters
-        ----------
-        time : float or array_like
-            Times, s.
-
-        Returns
-        -------
-        float or ndarray
-            m/s, shaped like `time`.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> rocking.Motion([0.0, 2.0], [[1.0]]).velocity([1.0, 3.0])
-        array([1., 2.])
-        """
+        """Return the ground velocity from rest, m/s, as `acceleration`; constant after the end of the motion."""
         at = checks.numbers(time, "time", InvalidMotion)
         result = piecewise.at(self.breakpoints, self._velocity(), at)
         return result if result.ndim else float(result)
@@ -121,24 +87,7 @@ class Measured:
     @overload
     def displacement(self, time: Sequence[float] | NDArray[Any]) -> Floats: ...
     def displacement(self, time: float | Sequence[float] | NDArray[Any]) -> float | Floats:
-        """Ground displacement, from rest; zero before the motion, and after its end at its last velocity.
-
-        Parameters
-        ----------
-        time : float or array_like
-            Times, s.
-
-        Returns
-        -------
-        float or ndarray
-            m, shaped like `time`.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> rocking.Motion([0.0, 2.0], [[1.0]]).displacement([1.0, 3.0])
-        array([0.5, 4. ])
-        """
+        """Return the ground displacement from rest, m, as `acceleration`; after the end at the last velocity."""
         at = checks.numbers(time, "time", InvalidMotion)
         result = piecewise.at(self.breakpoints, self._displacement(), at)
         result = result + self.velocity(self.duration) * np.maximum(at - self.duration, 0.0)
@@ -146,14 +95,7 @@ class Measured:
 
     @property
     def extremes(self) -> tuple[float, float]:
-        """Lowest and highest acceleration, m/s^2, with their signs: the exact extrema of the pieces.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> rocking.Motion.from_samples([0.0, 1.0, -2.0, 0.0], 0.02).extremes
-        (-2.0, 1.0)
-        """
+        """Lowest and highest acceleration, m/s^2, with their signs: the exact extrema of the pieces."""
         return -piecewise.highest(self._widths(), -self.coefficients), piecewise.highest(
             self._widths(), self.coefficients
         )
@@ -190,28 +132,9 @@ class Measured:
         return float(np.sum(np.abs(np.diff(piecewise.value(integral, cuts), axis=1))))
 
     def significant_duration(self, start: float = 0.05, end: float = 0.95) -> float:
-        """Time between two fractions of the Arias intensity, s.
+        """Return the time between two fractions of the Arias intensity, s; NaN if the intensity is zero.
 
-        Parameters
-        ----------
-        start, end : float
-            The fractions.
-
-        Returns
-        -------
-        float
-            NaN if the intensity is zero.
-
-        Raises
-        ------
-        InvalidMotion
-            If not ``0 <= start < end <= 1``.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> round(rocking.Motion([0.0, 2.0], [[1.0]]).significant_duration(0.05, 0.75), 12)
-        1.4
+        `InvalidMotion` if not ``0 <= start < end <= 1``.
         """
         start, end = (checks.finite(value, "ends of a significant duration", InvalidMotion) for value in (start, end))
         if not 0.0 <= start < end <= 1.0:
@@ -249,14 +172,6 @@ class Measured:
         InvalidMotion
             If a period is not positive and finite or below a millionth of the duration (use `pga` there), or the
             damping is out of range.
-
-        Examples
-        --------
-        An undamped oscillator under a long step of acceleration: twice the static response.
-
-        >>> import rocking
-        >>> round(rocking.Motion([0.0, 2.0], [[1.0]]).spectral_acceleration(1.0, 0.0), 12)
-        2.0
         """
         from rocking.kernels import oscillator  # the library: loaded only where it is used
 
@@ -277,24 +192,9 @@ class Measured:
         return result if result.ndim else float(result)
 
     def measures(self, periods: Sequence[float] = ()) -> dict[str, float]:
-        """Intensity measures by name; each name ends in its unit.
+        """Return intensity measures in SI units by name; each name ends in its unit.
 
-        Parameters
-        ----------
-        periods : sequence of float
-            Periods, s, of which the spectral acceleration (5 % damping) is added.
-
-        Returns
-        -------
-        dict of str to float
-            SI units.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> measures = rocking.Motion([0.0, 2.0], [[1.0]]).measures(periods=[0.5])
-        >>> measures["pga_m_s2"], round(measures["spectral_acceleration_0.5s_m_s2"], 6)
-        (1.0, 1.854468)
+        Spectral accelerations (5 % damping) are added for `periods`, s.
         """
         values = {
             named("duration", "s"): self.duration,

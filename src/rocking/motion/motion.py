@@ -65,8 +65,6 @@ class Motion(Processable):
     >>> motion = Motion([0.0, 1.0, 3.0], [[2.0, -1.0], [-1.0, 0.5]], name="kink")
     >>> motion.duration, motion.pga
     (3.0, 2.0)
-    >>> motion.acceleration([0.5, 1.0, 2.0, 9.0])
-    array([ 1.5, -1. , -0.5,  0. ])
     """
 
     breakpoints: Floats
@@ -122,10 +120,8 @@ class Motion(Processable):
             Ground acceleration, m/s^2, n >= 2; the first sample is at time 0.
         dt : float
             Sampling step, s, from 1e-9 to 1e9.
-        name : str
-            Short name for tables and figures.
-        description : Description, optional
-            Where the samples come from.
+        name, description : str, Description, optional
+            As of `Motion`.
 
         Returns
         -------
@@ -136,12 +132,6 @@ class Motion(Processable):
         ------
         InvalidMotion
             If there are fewer than two samples, one of them is not finite, or `dt` is not a number in its range.
-
-        Examples
-        --------
-        >>> motion = Motion.from_samples([0.0, 1.0, -2.0, 0.0], 0.02)
-        >>> motion.duration, motion.pga
-        (0.06, 2.0)
         """
         samples, step = piecewise.checked_samples(acceleration), piecewise.checked_step(dt)
         times = piecewise.even_times(len(samples), step)
@@ -157,33 +147,9 @@ class Motion(Processable):
         name: str = "points",
         description: Description | None = None,
     ) -> Motion:
-        """Motion that is linear between points at uneven times.
+        """Create the motion that is linear between points at uneven times, s; otherwise as `from_samples`.
 
-        Parameters
-        ----------
-        times : array_like, shape (n,)
-            Strictly increasing, s; the motion's time is counted from the first.
-        acceleration : array_like, shape (n,)
-            Ground acceleration at these times, m/s^2, n >= 2.
-        name : str
-            Short name for tables and figures.
-        description : Description, optional
-            Where the points come from.
-
-        Returns
-        -------
-        Motion
-            Of n - 1 pieces.
-
-        Raises
-        ------
-        InvalidMotion
-            If the lengths differ or are below two, a number is not finite, or the times do not increase strictly.
-
-        Examples
-        --------
-        >>> Motion.from_points([0.0, 1.0, 5.0], [0.0, 3.0, 0.0]).acceleration(3.0)
-        1.5
+        Times must increase strictly; the motion's time is counted from the first.
         """
         samples = piecewise.checked_samples(acceleration)
         instants = piecewise.checked_times(times, len(samples))
@@ -194,51 +160,18 @@ class Motion(Processable):
 
     @property
     def end(self) -> float:
-        """Time from which the ground no longer moves, s: that of the last breakpoint of both components.
-
-        Examples
-        --------
-        >>> horizontal, vertical = Motion([0.0, 1.0], [[1.0]]), Motion([0.0, 3.0], [[1.0]])
-        >>> horizontal.with_vertical(vertical).duration, horizontal.with_vertical(vertical).end
-        (1.0, 3.0)
-        """
+        """Time from which the ground no longer moves, s: that of the last breakpoint of both components."""
         return self.duration if self.vertical is None else max(self.duration, self.vertical.duration)
 
     @property
     def label(self) -> str:
-        """Name, with what was done to the motion in a few words and its vertical component, for titles.
-
-        Examples
-        --------
-        >>> motion = Motion([0.0, 2.0], [[1.0]], name="step")
-        >>> motion.label, motion.scaled_to(2.0).label, (-motion).delayed(1.0).label
-        ('step', 'step, scaled by 2', 'step, polarity reversed, delayed by 1 s')
-        """
+        """Name, with what was done to the motion in a few words and its vertical component, for titles."""
         return labelled(self.name, self.history, "" if self.vertical is None else self.vertical.name)
 
     def scaled(self, factor: float) -> Motion:
-        """Return the motion times a factor.
+        """Return the motion times a factor; a negative one reverses the horizontal component alone.
 
-        Parameters
-        ----------
-        factor : float
-            Factor on the acceleration; a negative one reverses the polarity.
-
-        Returns
-        -------
-        Motion
-            Both components; the vertical one by the size of the factor.
-
-        Raises
-        ------
-        InvalidMotion
-            If the factor is not a finite number, or the motion would become stronger than any may be.
-
-        Examples
-        --------
-        >>> motion = Motion([0.0, 2.0], [[1.0]]).scaled(3.0)
-        >>> motion.pga, motion.history
-        (3.0, ('scaled by 3',))
+        `InvalidMotion` if the factor is not a finite number, or the motion would become stronger than any may be.
         """
         by = checks.finite(factor, "factor", InvalidMotion)
         return self._times(by, FACTOR.scaling(by, by))
@@ -265,12 +198,6 @@ class Motion(Processable):
             If `level` is not positive, the motion is zero throughout, or it would become stronger than any may be.
         InvalidOption
             If it is not a measure of a motion alone.
-
-        Examples
-        --------
-        >>> half = Motion([0.0, 2.0], [[1.0]]).scaled_to(0.5 * 9.80665)
-        >>> half.coefficients.round(6), half.history
-        (array([[4.903325]]), ('scaled by 4.90332 to a peak ground acceleration of 4.90332 m/s^2 (0.5 g)',))
         """
         wanted = Measure.of(measure, among=SCALES)
         if wanted.name == "factor":
@@ -285,29 +212,8 @@ class Motion(Processable):
         It is scaled, delayed, processed and added with the horizontal component; reversing the polarity leaves it as it
         is. A record whose channel is called "Down" or "DWN" is turned round.
 
-        Parameters
-        ----------
-        vertical : Motion or None
-            Vertical ground acceleration that starts at the same time, m/s^2, positive upwards; None for none.
-
-        Returns
-        -------
-        Motion
-            Of the same name.
-
-        Raises
-        ------
-        InvalidMotion
-            If `vertical` is no motion, or has a vertical component itself.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> horizontal = rocking.records.load("el-centro-meloland-270")
-        >>> both = horizontal.with_vertical(rocking.records.load("el-centro-meloland-up"))
-        >>> block = rocking.Block(width=0.5, height=2.0)
-        >>> [f"{rocking.simulate(block, motion).peak_rotation:.6f}" for motion in (horizontal, both)]
-        ['0.006366', '0.003524']
+        `vertical` is in m/s^2, positive upwards, and starts at the same time; None removes the component.
+        `InvalidMotion` if it is no motion, or has a vertical component itself.
         """
         origin = vertical.description.origin if isinstance(vertical, Motion) else None
         if vertical is not None and origin is not None and origin.downwards:
@@ -315,28 +221,9 @@ class Motion(Processable):
         return self if vertical is self.vertical else replace(self, vertical=vertical)
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        """Draw the ground acceleration in g over time, and below it the vertical one.
+        """Draw the ground acceleration in g over time, and below it the vertical one; arguments as of `Result.plot`.
 
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw the horizontal acceleration alone; by default in a new figure.
-        title : str
-            Title; by default the motion's label.
-        figsize : (float, float), optional
-            Width and height of a new figure, inches.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            The figure, new or that of `ax`.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> figure = rocking.pulses.sine(3.0, 2.0, cycles=5).plot()
-        >>> figure.axes[0].get_xlabel(), figure.get_suptitle()
-        ('time (s)', 'sine')
+        In `ax` the horizontal acceleration is drawn alone. The title is by default the motion's label.
         """
         from rocking.plot.response import motion_figure
 
@@ -351,24 +238,10 @@ class Motion(Processable):
         )
 
     def drawing_times(self, start: float, end: float) -> Floats:
-        """Return times at which to draw a stretch: ends, breakpoints, and between them where pieces are curved.
+        """Return times (s) at which to draw a stretch: ends, breakpoints, and between them where pieces are curved.
 
-        Where the motion jumps there are two times, one just before; its end is a jump to zero.
-
-        Parameters
-        ----------
-        start, end : float
-            Ends of the stretch, s.
-
-        Returns
-        -------
-        ndarray
-            s, increasing; breakpoints are those of both components.
-
-        Examples
-        --------
-        >>> Motion.from_samples([0.0, 1.0, -2.0, 0.0], 0.5).drawing_times(0.25, 1.25)
-        array([0.25, 0.5 , 1.  , 1.25])
+        Breakpoints are those of both components. Where the motion jumps there are two times, one just before; its end
+        is a jump to zero.
         """
         corners = self.breakpoints
         if self.coefficients.shape[1] > 2:

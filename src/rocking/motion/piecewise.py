@@ -130,10 +130,7 @@ def moved(coefficients: Floats, shift: Floats) -> Floats:
 
 
 def moved_exactly(coefficients: Floats, shift: Floats) -> Floats:
-    """Coefficients about ``x = shift`` of each piece: Horner's rule for all of them, with the error of each operation.
-
-    They are as good as rounded once, even where the terms of a piece are thousands of times larger than its values.
-    """
+    """Coefficients about ``x = shift`` of each piece: Horner's rule, with the error of each operation."""
     by, nothing = shift[:, np.newaxis], np.zeros((len(shift), 1))
     result = errors = np.zeros_like(coefficients)
     for k in range(coefficients.shape[1] - 1, -1, -1):
@@ -171,8 +168,7 @@ def together(one: Piecewise, other: Piecewise) -> tuple[Floats, tuple[Floats, Fl
 def root_candidates(widths: Floats, coefficients: Floats) -> Floats:
     """Points of each piece among which are all its roots; shape (pieces, degree), sorted along each row.
 
-    A row is filled up with points that are not roots (ends of the piece, vertices, real parts): callers look for
-    extrema or split integrals there, where one point more does no harm.
+    Rows are filled up with points that are not roots, which do no harm where callers look for extrema.
     """
     degree = coefficients.shape[1] - 1
     if degree == 0:

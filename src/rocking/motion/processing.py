@@ -85,13 +85,6 @@ class Processable(Measured):
         Notes
         -----
         a(phi) = (a_1 sin(phi_2 - phi) + a_2 sin(phi - phi_1))/sin(phi_2 - phi_1), exactly, piece by piece.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> west, north = (rocking.records.load(f"el-centro-meloland-{azimuth}") for azimuth in (270, 360))
-        >>> [f"{west.rotated(north, azimuth).pga:.3f}" for azimuth in (270, 0, 315)]
-        ['2.927', '3.050', '2.322']
         """
         if not isinstance(other, Processable):
             sentence = f"{{}} must be a Motion, the other horizontal component, not {type(other).__name__}"
@@ -122,29 +115,7 @@ class Processable(Measured):
         )
 
     def delayed(self, delay: float) -> Self:
-        """Return the motion after a time of no acceleration.
-
-        Parameters
-        ----------
-        delay : float
-            That time, s.
-
-        Returns
-        -------
-        Motion
-            With a piece more, both components.
-
-        Raises
-        ------
-        InvalidMotion
-            If `delay` is not a positive number (an early part is cut off by ``processed(trim=...)``).
-
-        Examples
-        --------
-        >>> import rocking
-        >>> rocking.Motion([0.0, 2.0], [[1.0]]).delayed(1.0).acceleration([0.5, 1.5, 3.5])
-        array([0., 1., 0.])
-        """
+        """Return the motion after a time of no acceleration, s; ``processed(trim=...)`` cuts off an early part."""
         wait = checks.positive(delay, "delay", InvalidMotion, "s")
         return self._changed(
             "delayed",
@@ -159,10 +130,8 @@ class Processable(Measured):
 
         Parameters
         ----------
-        period : float
-            Natural period of the building, s.
-        damping : float
-            Its fraction of critical damping.
+        period, damping : float
+            Natural period of the building, s, and its fraction of critical damping.
         ringing : float, optional
             Time for which the floor is followed after the motion, s; by default until a free oscillation has faded to a
             thousandth.
@@ -182,13 +151,6 @@ class Processable(Measured):
         In a building with one mode this is the motion of the floor where the mode's shape times its participation
         factor is 1; ``ground + (floor + -ground) * 0.6`` is that of a floor where it is 0.6. What stands on the floor
         does not act back on it. A fragility against measures of the floor has no hazard curve of the ground.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> floor = rocking.pulses.sine(1.0, 2.0, cycles=10).floor(0.5)
-        >>> round(floor.pga, 2), round(floor.duration, 1)
-        (9.62, 16.0)
         """
         breakpoints, coefficients, error = _floor_pieces(self, period, damping, ringing, self.error)
         done = f"on a floor of period {period:.6g} s, damping {damping:.6g}"
@@ -230,14 +192,6 @@ class Processable(Measured):
         InvalidMotion
             If no step is named, an argument is not usable or out of place, or `baseline` or `band_pass` is applied
             to a motion that is not linear between even samples, or jumps (resample it first, in a call of its own).
-
-        Examples
-        --------
-        >>> import rocking
-        >>> record = rocking.Motion.from_samples([1.0, 2.0, 1.0, 0.0, 1.0], 0.5)
-        >>> done = record.processed(trim=(0.5, 2.0), baseline=0)
-        >>> done.samples[1], done.history
-        (array([ 1.,  0., -1.,  0.]), ('trimmed to 0.5-2 s', 'baseline of degree 0 removed'))
         """
         steps: list[_Step] = []
         kept = None if trim is None else _ends(self, *_pair(trim, "trim"))
@@ -469,13 +423,7 @@ def _marched(ends: Floats) -> Floats:
 
 
 def sine_cosine(degrees: ArrayLike) -> tuple[Floats, Floats]:
-    """Return sine and cosine of angles in degrees, exact at multiples of a right angle.
-
-    Examples
-    --------
-    >>> [part.tolist() for part in sine_cosine([0.0, 90.0, 180.0, -90.0])]
-    [[0.0, 1.0, 0.0, -1.0], [1.0, 0.0, -1.0, 0.0]]
-    """
+    """Return sine and cosine of angles in degrees, exact at multiples of a right angle."""
     angle = np.asarray(degrees, dtype=np.float64)
     quarters = np.rint(angle / 90.0)
     sine, cosine = piecewise.from_quadrant(quarters, np.deg2rad(angle - 90.0 * quarters))
@@ -511,13 +459,7 @@ def _recorded_azimuths(one: Processable, other: Processable, recorded: Any) -> t
 
 
 def shares(recorded: tuple[float, float], azimuth: float) -> tuple[float, float]:
-    """Return the factors on two components whose sum is the component along another azimuth.
-
-    Examples
-    --------
-    >>> shares((90.0, 0.0), 180.0)
-    (0.0, -1.0)
-    """
+    """Return the factors on two components whose sum is the component along another azimuth."""
     first, second = recorded
     sine, _ = sine_cosine([second - azimuth, azimuth - first, second - first])
     return float(sine[0] / sine[2]) + 0.0, float(sine[1] / sine[2]) + 0.0

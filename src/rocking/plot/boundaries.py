@@ -35,10 +35,7 @@ class Stack(NamedTuple):
 
 
 def runs(x: Floats, stacks: Sequence[Stack]) -> Iterator[tuple[Floats, Floats, tuple[int, ...]]]:
-    """Yield runs of abscissae with the same regions: abscissae, levels of shape (regions + 1, abscissae), regions.
-
-    A run begins and ends half way to its neighbours.
-    """
+    """Yield runs of abscissae with the same regions: abscissae, levels of shape (regions + 1, abscissae), regions."""
     starts = [k for k in range(len(x)) if k == 0 or stacks[k].region != stacks[k - 1].region]
     ends = [*starts[1:], len(x)]
     met = [meeting(stacks[end - 1], stacks[end]) for end in ends[:-1]]
@@ -80,10 +77,7 @@ def meeting(left: Stack, right: Stack) -> tuple[Floats, Floats]:
 
 
 class _Side:
-    """What becomes of one side's boundaries half way to the other: `half`, where it is known already.
-
-    All others keep their place `at` among those that are known.
-    """
+    """What becomes of one side's boundaries half way to the other: `half`, where it is known already."""
 
     def __init__(self, stack: Stack) -> None:
         self.path, self.level, self.at = stack.path, stack.level, stack.level.copy()
@@ -98,11 +92,7 @@ class _Side:
         self.at[part] = np.mean(self.ends(part))
 
     def halves(self) -> Floats:
-        """Levels half way.
-
-        Parts that meet each for themselves may cross their neighbours by a little where many regions crowd: sorting
-        keeps every region on its place between the others.
-        """
+        """Levels half way."""
         known = ~np.isnan(self.half)
         return np.sort(np.where(known, self.half, np.interp(self.at, self.at[known], self.half[known])))
 
@@ -145,10 +135,7 @@ def _overlap(one: tuple[float, float], other: tuple[float, float]) -> bool:
 
 
 def _join(one: _Side, here: slice, other: _Side, there: slice) -> None:
-    """Lead the ends of a part to those of the other side's; where either has one boundary only, both to one point.
-
-    A region that both parts pass is common ground, on either side of which are two parts of their own.
-    """
+    """Lead the ends of a part to those of the other side's; where either has one boundary only, both to one point."""
     for i in range(here.start + 1, here.stop):
         for j in range(there.start + 1, there.stop):
             if one.path[i] == other.path[j]:

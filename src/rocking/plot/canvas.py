@@ -171,13 +171,7 @@ def _add_title(figure: Figure, ax: Axes | None, title: str) -> None:
 
 
 def magnified(largest: float) -> tuple[float, str]:
-    """Return a power of a thousand by which values up to this one are drawn, and the words for it in a label.
-
-    Examples
-    --------
-    >>> magnified(0.0154), magnified(0.4)
-    ((1000.0, '$10^{3}$ '), (1.0, ''))
-    """
+    """Return a power of a thousand by which values up to this one are drawn, and the words for it in a label."""
     power = 3 * max(0, math.ceil((-math.log10(largest) - 0.5) / 3.0)) if largest > 0.0 else 0
     return 10.0**power, f"$10^{{{power}}}$ " if power else ""
 

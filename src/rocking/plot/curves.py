@@ -44,10 +44,7 @@ def fragility_figure(
     probability_label: str = "probability",
     **place: Unpack[Place],
 ) -> Figure:
-    """Draw fitted fragility curves with their confidence bands, and the shares that were seen.
-
-    `band_label` says what the bands are, or why there is none.
-    """
+    """Draw fitted fragility curves with their confidence bands, and the shares that were seen."""
     with page_for((5.6, 4.2), **place) as page:
         (axes,) = page.panels()
         for k, line in enumerate(lines):
@@ -112,10 +109,7 @@ class RiskLine(NamedTuple):
 def risk_figure(
     *, intensity: Floats, hazard: HazardLine, lines: Sequence[RiskLine], intensity_label: str, **place: Unpack[Place]
 ) -> Figure:
-    """Draw a hazard curve, dotted where it is extended, and below it where each limit state's rate comes from.
-
-    In `ax`, the shares of the rates are drawn without the hazard curve.
-    """
+    """Draw a hazard curve, dotted where it is extended, and below it where each limit state's rate comes from."""
     with page_for((5.6, 5.2), **place) as page:
         *curves, shares = page.panels(2, sharex=True)
         for axes in curves:
@@ -332,10 +326,7 @@ def outcomes_figure(
     weights: Floats,
     **place: Unpack[Place],
 ) -> Figure:
-    """Draw what happened in every test against its fitted probability, and the blocks behind that by their parameters.
-
-    Probabilities and outcomes have shape (tests,), weights (blocks,). In `ax`, the tests are drawn without the blocks.
-    """
+    """Draw the outcome of every test against its fitted probability, and the blocks behind that by parameters."""
     with page_for((7.0, 4.6), **place) as page:
         if page.ax is None:
             grid = page.figure.add_gridspec(2, len(parameters), height_ratios=(1.2, 1.0))
@@ -363,10 +354,7 @@ def outcomes_figure(
 def measured_figure(
     *, time: Floats, measured: Floats, residual: Floats, fitted_time: Floats, fitted: Floats, **place: Unpack[Place]
 ) -> Figure:
-    """Draw a measured rotation history (rad, over s), that of the fitted block, and what is left between them.
-
-    In `ax`, the histories are drawn without the residuals.
-    """
+    """Draw a measured rotation history (rad, over s), that of the fitted block, and what is left between them."""
     with page_for((7.0, 4.0), **place) as page:
         main, *others = page.panels(2, sharex=True, height_ratios=(2.4, 1.0))
         main.plot(time, measured, ".", color=GROUND, markersize=3.5, markeredgewidth=0.0, label="measured")

@@ -63,11 +63,7 @@ class ScaledMotion(NamedTuple):
 
 
 def ida_figure(*, motions: Sequence[ScaledMotion], level_label: str, **place: Unpack[Place]) -> Figure:
-    """Draw the level of scaled motions against the peak rotation, and beside it the levels that overturn.
-
-    Up to four motions have a style of their own. More are drawn alike, with the fractiles (16, 50, 84 %) of the lowest
-    level at which each reaches a peak rotation. In `ax`, the curves are drawn without the levels that overturn.
-    """
+    """Draw the level of scaled motions against the peak rotation, and beside it the levels that overturn."""
     few = len(motions) <= _FEW
     styles = [*CURVES[: len(motions)]] if few else [{"color": GROUND, "linestyle": "-"}] * len(motions)
     with page_for((7.0, 4.2), **place) as page:
@@ -93,11 +89,7 @@ def ida_figure(*, motions: Sequence[ScaledMotion], level_label: str, **place: Un
 
 
 def levels_reaching(motion: ScaledMotion, peaks: Floats) -> Floats:
-    """Lowest level at which a motion reaches each of these peak rotations; infinite where it never does.
-
-    Between two levels the peak is taken to change evenly; what no level below the lowest that overturns reaches is
-    reached there.
-    """
+    """Lowest level at which a motion reaches each of these peak rotations; infinite where it never does."""
     overturns = float(np.min(motion.bands[:, 0], initial=np.inf))
     below = motion.levels < overturns
     level, peak = motion.levels[below], motion.peak[below]

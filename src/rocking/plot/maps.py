@@ -64,11 +64,7 @@ def outcome_figure(
     y_label: str,
     **place: Unpack[Place],
 ) -> Figure:
-    """Draw which of up to six outcomes each point of a grid has: numbers of shape (len(y), len(x)).
-
-    The meanings are named from the lightest colour to the darkest; the last one stands out. Hatched are the points at
-    which the block overturns later.
-    """
+    """Draw which of up to six outcomes each point of a grid has: numbers of shape (len(y), len(x))."""
     from matplotlib import rc_context
     from matplotlib.colors import BoundaryNorm, ListedColormap
 
@@ -160,10 +156,7 @@ def _look(region: int) -> tuple[str, str]:
 
 
 def _patches(polygons: Mapping[int, Sequence[Floats]], names: Mapping[int, str], frame: float) -> list[Patch]:
-    """Make the handles of the legend for what can be seen; regions that look the same share one.
-
-    `frame` is the area of the whole.
-    """
+    """Make the handles of the legend for what can be seen; regions that look the same share one."""
 
     def area(x: Floats, y: Floats) -> float:
         return 0.5 * abs(float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))))
@@ -202,11 +195,7 @@ def blocks_figure(
     missing_label: str,
     **place: Unpack[Place],
 ) -> Figure:
-    """Draw a number for each block as the colour of a mark, in one panel or several with the same colours.
-
-    Blocks are given by p (rad/s) and alpha (rad), `panels` by their names: arrays of shape (n,). Where a value is not
-    finite, the block has a cross, and `missing_label` says why. In `ax` one panel is drawn.
-    """
+    """Draw a number for each block as the colour of a mark, in one panel or several with the same colours."""
     if place.get("ax") is not None and len(panels) > 1:
         raise InvalidOption(f"{len(panels)} panels need a figure of their own: leave ax out, or select one of them")
     columns = min(len(panels), _BESIDE)
@@ -258,10 +247,7 @@ def basins_figure(
     y_label: str,
     **place: Unpack[Place],
 ) -> Figure:
-    """Draw which attractor each state of a grid goes to: numbers of shape (len(y), len(x)), -1 where it is not known.
-
-    A kind is "orbit", "overturns" or "unsettled"; `orbits` has shape (attractors, points, 2), NaN where there is none.
-    """
+    """Draw which attractor each state of a grid goes to: numbers of shape (len(y), len(x)), -1 where unknown."""
     from matplotlib.colors import BoundaryNorm, ListedColormap
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch

@@ -44,11 +44,7 @@ def orbit_figure(
     labels: tuple[str, str],
     **place: Unpack[Place],
 ) -> Figure:
-    """Draw a periodic orbit: velocity against coordinate with its impacts, and the coordinate over time.
-
-    Times are in periods of the motion, with one just before and one at each impact; `states` are those at the starts of
-    periods; `labels` name coordinate and velocity. In `ax`, the phase plane is drawn alone.
-    """
+    """Draw a periodic orbit: velocity against coordinate with its impacts, and the coordinate over time."""
     with page_for((7.0, 3.2), **place) as page:
         plane, *histories = page.panels(1, 2)
         # Arcs end at impacts: a jump of the velocity is no part of the course.
@@ -78,11 +74,7 @@ def branch_figure(
     labels: tuple[str, str],
     **place: Unpack[Place],
 ) -> Figure:
-    """Draw branches of periodic orbits: stable ones as full lines, unstable ones dashed, and bifurcations by marks.
-
-    A value that is not a number parts a branch from the next. `marks` are names of bifurcations, with the parameter and
-    the height there.
-    """
+    """Draw branches of periodic orbits: stable ones as full lines, unstable ones dashed, and bifurcations by marks."""
     with page_for((5.2, 3.6), **place) as page:
         (axes,) = page.panels()
         for chosen, name, style in ((stable, "stable", _STABLE), (~stable, "unstable", _UNSTABLE)):
@@ -124,10 +116,7 @@ def bifurcation_figure(
     y_label: str,
     **place: Unpack[Place],
 ) -> Figure:
-    """Draw states, shape (len(value), n), of each direction against a parameter; NaN where there is none.
-
-    Where nothing is left, marks at the lower edge say whether the body overturned or could not be followed.
-    """
+    """Draw states, shape (len(value), n), of each direction against a parameter; NaN where there is none."""
     from matplotlib.lines import Line2D
 
     with page_for((5.6, 3.8), **place) as page:
@@ -161,11 +150,7 @@ _MARGIN: Final = 0.03
 
 
 def intervals_figure(*, intervals: Floats, eta: float, **place: Unpack[Place]) -> Figure:
-    """Draw the dimensionless intervals between the impacts of a chattering sequence, and the ratios of every second.
-
-    The first interval is that from the uplift; there may be none. The ratios of a complete sequence tend to eta^2. In
-    `ax`, the intervals are drawn without the ratios.
-    """
+    """Draw the dimensionless intervals between the impacts of a chattering sequence, and the ratios of every second."""
     from matplotlib.ticker import MaxNLocator
 
     with page_for((7.0, 3.2), **place) as page:

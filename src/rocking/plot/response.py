@@ -303,11 +303,7 @@ def phase_figure(
     limit: str = "slenderness",
     **place: Unpack[Place],
 ) -> Figure:
-    """Draw velocity over p times what `limit` names, against the rotation over that.
-
-    Both have gaps (NaN) at impacts, which are dotted lines between the velocities of `jumps`, shape (n, 2), at no
-    rotation; uplift and rest are at the origin. `boundary` has the states with as much energy as at the balance.
-    """
+    """Draw velocity over p times what `limit` names, against the rotation over that."""
     with page_for((4.6, 4.2), **place) as page:
         (axes,) = page.panels()
         axes.axhline(0.0, color=INK, linewidth=0.4)
@@ -339,11 +335,7 @@ def energy_figure(
     rest_intervals: Floats,
     **place: Unpack[Place],
 ) -> Figure:
-    """Draw kinetic, potential and total energy over time, s, over the least energy that overturns the body.
-
-    `needed` is what overturns it to side + and side -; a level is drawn where the energy comes near it.
-    `rest_intervals` have shape (k, 2).
-    """
+    """Draw kinetic, potential and total energy over time, s, over the least energy that overturns the body."""
     with page_for((7.0, 3.0), **place) as page:
         (axes,) = page.panels()
         _shade_rest(axes, np.clip(rest_intervals, time[0], time[-1]))

@@ -26,11 +26,7 @@ def rose_figure(
     weakest: tuple[float, float],
     **place: Unpack[Place],
 ) -> Figure:
-    """Draw the acceleration that lifts a body in each direction, g, around its support; slenderness and p beside it.
-
-    `support`, shape (k, 2), is about the centre of mass and over the height of that: of its corners and edges those
-    accelerations are the distances. Azimuths and the slenderness are in degrees.
-    """
+    """Draw the acceleration that lifts a body in each direction, g, around its support; slenderness and p beside it."""
     from matplotlib.patches import Polygon
 
     with page_for((6.8, 4.0), **place) as page:

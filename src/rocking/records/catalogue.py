@@ -37,14 +37,10 @@ class Record:
         Degrees clockwise from north that positive acceleration points to, or "up".
     state : str
         Whether it was corrected, and how.
-    step : float
-        Sampling step, s.
-    samples : int
-        Number of samples.
-    units : str
-        Unit of the published numbers; `load` converts to m/s^2.
-    denominator : int
-        Published numbers are whole multiples of one over this.
+    step, samples : float, int
+        Sampling step, s, and number of samples.
+    units, denominator : str, int
+        Unit of the published numbers, which are whole multiples of one over the denominator.
     source, terms : str
         Who recorded and processed it, and terms of use.
     """
@@ -64,13 +60,7 @@ class Record:
 
     @property
     def title(self) -> str:
-        """Place and year of the event, station and direction, in few words.
-
-        Examples
-        --------
-        >>> info("ridgecrest-clc-090").title, info("el-centro-meloland-up").title
-        ('Ridgecrest 2019, China Lake, 090', 'Imperial Valley 1979, El Centro Meloland overpass, up')
-        """
+        """Place and year of the event, station and direction, in few words."""
         year = re.search(r"(?:19|20)\d{2}", self.event)
         place, *more = re.sub(r"^(?:[A-Z]{2}\.\w+|\d+) ", "", self.station).split(", ")
         crossing = [part.partition(" / ")[2] for part in more if " / " in part]
@@ -106,11 +96,6 @@ def info(name: str) -> Record:
     -------
     Record
         Without its samples.
-
-    Raises
-    ------
-    UnreadableRecord
-        If no record has that name.
 
     Examples
     --------
@@ -156,11 +141,6 @@ def load(name: str) -> Motion:
     -------
     Motion
         Its `description` has source and terms.
-
-    Raises
-    ------
-    UnreadableRecord
-        If no record has that name.
 
     Examples
     --------

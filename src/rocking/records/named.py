@@ -64,13 +64,7 @@ def names_of(motions: Sequence[Motion]) -> list[str]:
 
 
 def numbered(given: Sequence[str]) -> list[str]:
-    """Names, numbered where several are the same.
-
-    Examples
-    --------
-    >>> numbered(["one", "two", "one"])
-    ['one #1', 'two', 'one #2']
-    """
+    """Names, numbered where several are the same."""
     shared = {name for name, count in Counter(given).items() if count > 1}
     taken, seen = {*given}, Counter[str]()
     names = []
@@ -125,9 +119,8 @@ def named_motion(
 ) -> Motion:
     """Motion, times a factor, of a record file ("-" is standard input), or of a shipped record where there is no file.
 
-    With `vertical` it has a vertical component, as `named_vertical`. Channel, step and units are as for `rocking.read`.
-    Where they are for several files, those that say their step and units keep them, and those that hold one channel are
-    taken whatever its name; a motion and a vertical one of its own are two.
+    With `several`, arguments are for several files: those that say their step and units keep them, and those that hold
+    one channel are taken whatever its name.
     """
     several = several or (vertical is not None and _stands_alone(vertical))
     if is_shipped(name):
@@ -152,11 +145,7 @@ def named_vertical(
     units: str | None = None,
     several: bool = False,
 ) -> Motion:
-    """Vertical motion by name: a file or a shipped record of its own, or else a channel of the horizontal one's file.
-
-    That file is `record`, and `channel` the horizontal motion in it; `dt` and `units` are for both, as for
-    `named_motion`.
-    """
+    """Vertical motion by name: a file or a shipped record of its own, or else a channel of the horizontal file."""
     if _stands_alone(name):
         return named_motion(name, dt=dt, units=units, several=True)
     if record == STANDARD_INPUT or not is_there(record):
@@ -201,11 +190,7 @@ def is_shipped(name: str) -> bool:
 
 
 def expanded(names: Iterable[str]) -> list[str]:
-    """Return the names of records that files, folders, patterns and shipped records stand for, each once.
-
-    A folder stands for the files in it, by name, hidden ones left out; a pattern for the files that match it, or where
-    none does for the shipped records of such names.
-    """
+    """Return the names of records that files, folders, patterns and shipped records stand for, each once."""
     found: dict[str, None] = {}
     for name in names:
         found.update(dict.fromkeys(_files(name)))
@@ -254,18 +239,7 @@ class Contents:
     motions: tuple[Motion, ...] = ()
 
     def summary(self) -> str:
-        """Return the table for people.
-
-        Returns
-        -------
-        str
-            Title and table.
-
-        Examples
-        --------
-        >>> "el-centro-meloland-270" in shipped().summary()
-        True
-        """
+        """Return the table for people, with its title."""
         columns = list(self.entries[0])
         # What has no value is the step of samples that are not evenly spaced.
         rows = [["uneven" if entry[column] is None else entry[column] for column in columns] for entry in self.entries]
@@ -279,18 +253,7 @@ class Contents:
         return f"<Contents: {title}{len(self.entries)} {kind}: {names}>"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the table for machines.
-
-        Returns
-        -------
-        dict
-            The facts, and the entries under their kind.
-
-        Examples
-        --------
-        >>> len(shipped().to_dict()["records"])
-        9
-        """
+        """Return the table for machines: the facts, and the entries under their kind."""
         return {**self.facts, self.kind: self.entries}
 
 
@@ -306,11 +269,6 @@ def shipped(name: str | None = None) -> Contents:
     -------
     Contents
         With step, duration and peaks.
-
-    Raises
-    ------
-    UnreadableRecord
-        If no record has that name.
 
     Examples
     --------
@@ -339,12 +297,8 @@ def contents(
     ----------
     file : str, path or binary file
         As for `rocking.read`.
-    channel : str, optional
-        The only one to list; by default all.
-    dt : float, optional
-        As for `rocking.read`.
-    units : str, optional
-        As for `rocking.read`.
+    channel, dt, units : str or float, optional
+        As for `rocking.read`; by default all channels are listed.
     several : bool
         Whether the arguments are for several files: those that say their step and units keep them.
 
@@ -352,11 +306,6 @@ def contents(
     -------
     Contents
         With units, step, duration and peaks of each channel.
-
-    Raises
-    ------
-    UnreadableRecord, InvalidMotion
-        As for `rocking.read`.
 
     Examples
     --------

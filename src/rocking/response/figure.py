@@ -202,10 +202,7 @@ def course_of(response: Response, start: float, end: float) -> Course:
 
 
 def boundary_of(response: Response) -> tuple[Floats, Floats]:
-    """Rotations and velocities, in units of a `Course`, with as much energy as at the balance.
-
-    What moves outwards beyond them overturns if nothing shakes. Not a number between its branches.
-    """
+    """Rotations and velocities, in units of a `Course`, with as much energy as at the balance."""
     energy, gap = response._energy, np.array([np.nan])
     x: list[Floats] = []
     y: list[Floats] = []

@@ -127,8 +127,7 @@ def gradient(response: Response, of: Quantity = "peak", at: float | None = None)
 
     Notes
     -----
-    One pass back along the steps of the response, whatever the number of samples: the adjoint of what
-    `Response.sensitivity` carries forwards (see "Impacts: restitution and sensitivity" in the documentation). The time
+    The adjoint of what `Response.sensitivity` carries forwards: one pass, whatever the number of samples. The time
     of an uplift changes with the motion about it alone, and not at all where the motion jumps past the threshold; that
     of a rest follows its impacts up to 0.01 ms before it, and is to first order from there. Numbers are NaN where there
     is no derivative, and `Gradient.reason` says why.
@@ -141,8 +140,6 @@ def gradient(response: Response, of: Quantity = "peak", at: float | None = None)
     >>> response = rocking.simulate(block, record)
     >>> [f"{each:.5f}" for each in rocking.gradient(response).samples]
     ['-0.00175', '-0.01310', '0.01048', '0.04288', '0.03351']
-    >>> [f"{each:.5f}" for each in rocking.gradient(response, "impact", 0).samples]
-    ['0.02102', '0.16678', '0.02122', '0.00000', '0.00000']
     """
     if not isinstance(response, Response):
         raise InvalidOption("{} must be a response, as `rocking.simulate` returns it", "response", value=response)

@@ -122,10 +122,7 @@ class History:
         return bisected(float(times[within[-1]]), float(times[min(within[-1] + 1, len(times) - 1)]), is_beyond)[1]
 
     def largest(self) -> tuple[float, float]:
-        """Largest rotation of a block on each side, rad: at the ends of parts of steps, and where it turns within one.
-
-        A part may begin without speed, as an uplift does, and a step may begin inwards and turn outwards.
-        """
+        """Largest rotation of a block on each side, rad: at the ends of parts of steps, or where it turns."""
         nodes = self.trail.nodes
         moving = np.flatnonzero(nodes["side"] >= 0)
         side = nodes["side"][moving]
@@ -201,10 +198,7 @@ def elongation(trail: Trail, rotations: Floats, side: Integers) -> Floats:
 
 
 def plastic_elongations(trail: Trail) -> Floats:
-    """Plastic elongation of a tendon from each node on, m; as `tendon.plastic_after`.
-
-    It changes where the tendon ends to yield, and at a far start.
-    """
+    """Plastic elongation of a tendon from each node on, m; as `tendon.plastic_after`."""
     nodes = trail.nodes
     if not trail.block["yielding"]:
         return np.zeros(len(nodes))

@@ -145,20 +145,7 @@ class Perturbed(Result):
         return next((outcome for outcome in outcomes if outcome != UNMOVED), UNMOVED)
 
     def share(self) -> str:
-        """Return how many simulations have the outcome of factor 1, in words.
-
-        Returns
-        -------
-        str
-            The outcome, the number of simulations that have it, and how far the factors are from 1.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
-        >>> response.perturbed().share()
-        'overturns in 5 of 5 motions within 3e-6'
-        """
+        """Return in words how many simulations have the outcome of factor 1, and how far the factors are from 1."""
         return f"{self.outcome} in {len(self.alike)} of {self.sample}"
 
     def sentence(self) -> str:

@@ -290,11 +290,6 @@ class Response(Result):
         Perturbed
             Outcome, peak and times for each factor, and the ranges of these.
 
-        Raises
-        ------
-        InvalidOption
-            If an argument is out of its range.
-
         Notes
         -----
         An initial rotation (of a body with a stop its distance from the stop) and velocity are scaled with the motion,
@@ -327,22 +322,10 @@ class Response(Result):
         )
 
     def states(self, time: ArrayLike) -> Floats:
-        """Coordinate of the body, its velocity and its acceleration at any time: of a block those of its rotation.
+        """Return coordinate, velocity and acceleration of the body (of a block its rotation) at times, s, of any shape.
 
-        Parameters
-        ----------
-        time : array_like
-            Times, s, of any shape.
-
-        Returns
-        -------
-        ndarray
-            One more dimension, of length 3; NaN at times outside [0, duration], and where a time is NaN.
-
-        Raises
-        ------
-        InvalidOption
-            If `time` contains anything but numbers.
+        They are the last dimension, of length 3; NaN at times outside [0, duration]. `InvalidOption` if `time` contains
+        anything but numbers.
         """
         return self._history.states(time)
 
@@ -378,16 +361,6 @@ class Response(Result):
         InvalidOption
             If `time` contains anything but numbers, the body is no block, one of its tendons yields, or its restraints
             hold it back at any rotation.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> block = rocking.Block(width=0.24, height=1.1)
-        >>> response = rocking.simulate(block, None, initial_rotation=0.5 * block.alpha)
-        >>> time = response.impacts["time"][0] - 1e-9
-        >>> energies = [response.kinetic_energy([0.0, time]), response.potential_energy([0.0, time])]
-        >>> [energy.round(6).tolist() for energy in energies]
-        [[0.0, 0.749278], [0.749278, 0.0]]
         """
         states, sides = self._history.states_and_sides(time)
         return as_asked(self._energy.kinetic(states[..., 1], sides))
@@ -434,29 +407,8 @@ class Response(Result):
     def sliding_time(self, friction: float) -> float:
         """Return the first time, s, at which sticking needs more than a friction coefficient; NaN if it never does.
 
-        Parameters
-        ----------
-        friction : float
-            Coefficient of friction between block and ground, positive and at most 3.
-
-        Returns
-        -------
-        float
-            Time, s, before the block tips (`tipping_time`), without the impulses at impacts. What happens after a slip
-            is not part of the model.
-
-        Raises
-        ------
-        InvalidOption
-            If it is no such number.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> block = rocking.Block(width=0.24, height=1.1)
-        >>> response = rocking.simulate(block, rocking.records.load("ridgecrest-clc-090"))
-        >>> f"{response.required_friction:.4f}, {response.sliding_time(0.24):.4f} s, {response.sliding_time(0.3)}"
-        '0.2489, 234.3559 s, nan'
+        The coefficient is positive and at most 3. The time is before the block tips (`tipping_time`), without the
+        impulses at impacts. What happens after a slip is not part of the model.
         """
         level = friction_coefficient(friction)
         if not self.required_friction > level:
@@ -499,24 +451,6 @@ class Response(Result):
         Times and the peak have the digits that are the same in five simulations with the motion (without one, the
         initial state) scaled by 1, 1 +- 1e-6 and 1 +- 3e-6, at most nine decimals and six digits; where these differ
         by a millisecond, or in the third digit of the peak, their range is given. See `Response.perturbed`.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> block = rocking.Block(width=0.24, height=1.1)
-        >>> print(rocking.simulate(block, rocking.pulses.one_sine(3.0, 1.0)).summary())
-        block               rectangular block, 0.24 m x 1.1 m
-        parameters          p = 3.6146 rad/s, alpha = 0.21482 rad, restitution = 0.93184
-        motion              one-sine, 1.00 s, peak 0.3059 g
-        uplift above        0.2182 g
-        uplift              0.126380 s, to side -
-        overturn            1.53202 s
-        impacts resolved    1
-        peak rotation       1.5708 rad at 1.5320 s, where the block has fallen
-        friction needed     0.2372, until it tips at 0.9319 s
-        least normal force  0.8919 of the weight, until it tips at 0.9319 s
-        outcome             overturns in 5 of 5 motions within 3e-6, at 1.53202 s
-                            overturns in 11 of 11 motions within 0.1 %
         """
         return text_of(self.summary_rows(friction, precision=precision), _WIDTH)
 
@@ -530,21 +464,9 @@ class Response(Result):
     def to_xarray(self, dt: float | None = None) -> xr.Dataset:
         """Return time histories and events as a dataset; its ``to_dataframe`` multiplies all dimensions.
 
-        Parameters
-        ----------
-        dt : float, optional
-            Step of the time axis, s; by default the motion's own, or a two-thousandth of the duration.
-
-        Returns
-        -------
-        xarray.Dataset
-            rotation, angular_velocity and ground_acceleration over time; one dimension each for events, impacts and
-            chattering sequences; units with each variable; the block and the verdict as attributes.
-
-        Raises
-        ------
-        InvalidOption
-            If `dt` is not positive.
+        Rotation, angular velocity and ground acceleration are over time, at steps `dt` (s; by default the motion's own,
+        or a two-thousandth of the duration); events, impacts and chattering sequences have a dimension each. The block
+        and the verdict are attributes.
         """
         return tables.dataset(self, dt)
 
@@ -552,25 +474,10 @@ class Response(Result):
         return tables.columns(self, checks.one_of(table, "table", InvalidOption, self.TABLES), dt)
 
     def to_dataframe(self, table: str | None = None, *, dt: float | None = None) -> pd.DataFrame:
-        """Return one of the response's tables as a data frame; columns are named with their units.
+        """Return a table as a data frame: "histories", "events", "impacts" or "chattering"; units are in the names.
 
-        Parameters
-        ----------
-        table : {"histories", "events", "impacts", "chattering"}, optional
-            Rotation, angular velocity and ground acceleration over time (the index, ``time_s``), or the rows of
-            `events`, `impacts` or `chattering`.
-        dt : float, optional
-            Step of the histories, s; by default the motion's own, or a two-thousandth of the duration.
-
-        Returns
-        -------
-        pandas.DataFrame
-            A row for each time, event, impact or sequence.
-
-        Raises
-        ------
-        InvalidOption
-            If there is no such table, `dt` is not positive, or it is given for another table than the histories.
+        Histories are rotation, angular velocity and ground acceleration over ``time_s``, at steps `dt` as of
+        `to_xarray`.
         """
         frame = frame_of(self._columns(table or "histories", dt))
         return frame.set_index("time_s") if table in (None, "histories") else frame
@@ -609,16 +516,6 @@ class Response(Result):
             Stretch of time, s; by default from a little before the first event to a little after the last.
         longest_sequence : bool
             Whether to show the longest chattering sequence, impact by impact, in a panel of its own.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            The new figure, or that of `ax`.
-
-        Raises
-        ------
-        InvalidOption
-            If there is no such unit, the window is not a stretch of the response, or the size is not one.
         """
         title = title or figure.titled(self)
         return figure.histories(
@@ -637,13 +534,6 @@ class Response(Result):
 
         Rotations are over the slenderness of their side (of a restrained block over its balance), velocities over p
         times that; where a side has no balance, rotations are in rad. `InvalidOption` also as of `kinetic_energy`.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
-        >>> response.plot_phase_plane(window=(0.0, 1.2)).axes[0].get_xlabel()
-        'rotation / slenderness'
         """
         return figure.phase_plane(self, window, title=title or figure.titled(self), ax=ax, figsize=figsize)
 

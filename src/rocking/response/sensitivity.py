@@ -118,25 +118,11 @@ class Sensitivity:
             with the sign of the rotation. 0 at rest; just before an impact, at one; NaN outside the response, and
             throughout where the simulation was not finished.
 
-        Raises
-        ------
-        InvalidOption
-            If `time` contains anything but numbers, or there is no such quantity.
-
         Notes
         -----
         One pass along the response for each quantity, whatever the number of times. At a fixed time the rotation is
         continuous, and its derivative jumps at each impact (see "Impacts: restitution and sensitivity" in the
         documentation).
-
-        Examples
-        --------
-        >>> import rocking
-        >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
-        >>> response = rocking.simulate(block, None, initial_rotation=0.1)
-        >>> changes = response.sensitivity.rotation([0.2, 1.0], of=["p", "restitution_plus"])
-        >>> {name: [f"{each:.5f}" for each in values] for name, values in changes.items()}
-        {'p': ['-0.01640', '-0.09310'], 'restitution_plus': ['0.00000', '-0.11430']}
         """
         found = changes_along(self._history, time, of)
         return {name: np.full_like(values, np.nan) for name, values in found.items()} if self._unfinished else found

@@ -158,13 +158,7 @@ def known_ratio(response: Response) -> float:
 
 
 def time_text(time: float, low: float, high: float) -> str:
-    """Return a time, s, with the digits that its range in repeated simulations leaves, or the range where it is wide.
-
-    Examples
-    --------
-    >>> time_text(230.726244377, 230.72624, 230.72625), time_text(230.726244377, 230.3, 231.1)
-    ('230.72624 s', '230.3 to 231.1 s')
-    """
+    """Return a time, s, with the digits that its range in repeated simulations leaves, or its range if wide."""
     unknown = _unknown(time, low, high)
     decimals = _decimals(unknown)
     if unknown < _SHOWN:

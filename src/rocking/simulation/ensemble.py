@@ -86,25 +86,7 @@ class Scales:
 
     @classmethod
     def of(cls, levels: ArrayLike | None, measure: MeasureName | Measure) -> Scales:
-        """Scales from arguments.
-
-        Parameters
-        ----------
-        levels : array_like or None
-            Levels of the measure; None takes motions as they are.
-        measure : str or Measure
-            As for `simulate_many`.
-
-        Returns
-        -------
-        Scales
-            With the levels as floats.
-
-        Examples
-        --------
-        >>> Scales.of([0.5, 1.0], "factor").count
-        2
-        """
+        """Create scales from levels of a measure, as `simulate_many` accepts them, or motions as they are."""
         known = Measure.of(measure, among=SCALES)
         if levels is None:
             if known.name != "factor":
@@ -124,24 +106,7 @@ class Scales:
         return {"measure": measure.name, "units": measure.units, **measure.options()}
 
     def factors(self, motion: Motion) -> Floats:
-        """Return the factors that bring a motion to the levels.
-
-        Parameters
-        ----------
-        motion : Motion
-            Motion as it is.
-
-        Returns
-        -------
-        ndarray
-            One for each level.
-
-        Examples
-        --------
-        >>> import rocking
-        >>> Scales.of([1.5, 6.0], "pga").factors(rocking.pulses.one_sine(3.0, 1.0)).round(12).tolist()
-        [0.5, 2.0]
-        """
+        """Return the factors that bring a motion to the levels, one for each."""
         with np.errstate(over="ignore"):
             factors = self.values / measured(self, motion)
             largest = factors.max() * np.abs(motion.coefficients).max()
@@ -324,9 +289,7 @@ def simulate_many(
         n blocks, or bodies of another kind (`rocking.block.body.Bodies`).
     motions : Motion, sequence of Motion, or mapping of str to Motion
         m motions; a mapping gives them its names.
-    model : {"nonlinear", "linear"}
-        As for `simulate`.
-    chattering : str or Treatment
+    model, chattering : str or Treatment
         As for `simulate`.
     levels : array_like, optional
         Simulate every motion scaled to each of these levels of `measure`. Adds the dimension ``scale``.
@@ -338,17 +301,15 @@ def simulate_many(
     duration : float, optional
         As for `simulate`.
     derivatives : bool
-        Whether to differentiate the peaks. Each body that rocks and stands is then followed
-        once more, alone, which takes some twenty times as long.
+        Whether to differentiate the peaks, which takes some twenty times as long.
     times : bool
         Whether to keep the times of the first uplift and of the first and the last rest.
     robust : bool
         Whether to repeat every simulation with the motion scaled by 1 +- 1e-6 and 1 +- 3e-6, as
         `Response.perturbed` does, which takes five times as long.
-    threads : int, optional
-        Number of threads; by default one for every core.
-    progress : bool, optional
-        Whether to draw a progress bar; by default if stderr is a terminal and the work takes long.
+    threads, progress : int or bool, optional
+        Number of threads, by default one for every core; whether to draw a progress bar, by default if stderr is a
+        terminal and the work takes long.
 
     Returns
     -------
@@ -365,11 +326,6 @@ def simulate_many(
         the outcome is undecided where it is neither 0 nor 1. Coordinates name the motions and hold the blocks'
         parameters.
 
-    Raises
-    ------
-    InvalidOption, InvalidMotion
-        If an argument is out of its range, or a motion of bodies on a line has a vertical component.
-
     Notes
     -----
     The same engine as `simulate`: every impact is located and chattering is proven. Under evenly sampled records the
@@ -382,8 +338,6 @@ def simulate_many(
     >>> blocks = rocking.Blocks.grid(p=[2.0, 4.0], alpha=[0.1, 0.2], restitution=[0.9])
     >>> motion = rocking.pulses.one_sine(amplitude=4.0, frequency=1.0)
     >>> result = rocking.simulate_many(blocks, motion, levels=[0.4, 1.0])
-    >>> dict(result.sizes)
-    {'motion': 1, 'scale': 2, 'block': 4}
     >>> result.overturned.sel(scale=0.4).values.tolist()
     [[True, False, True, False]]
     """

@@ -48,11 +48,7 @@ def peak_changes(
     threads: int | None,
     progress: bool | None,
 ) -> dict[str, NDArray[np.generic]]:
-    """Find the changes of peaks per relative change of each quantity, for tasks and which bodies overturned in each.
-
-    They lie in arrays of a shape where the keys and the bodies of tasks say, and are NaN where a body has overturned or
-    reached its second stop, the simulation was not finished, or rounding decides whether it touches the ground.
-    """
+    """Find the changes of peaks per relative change of each quantity, for tasks and which bodies overturned in each."""
     portions = [
         (task, slice(first, first + _TOGETHER), overturned[first : first + _TOGETHER])
         for task, overturned in done

@@ -60,10 +60,8 @@ def simulate(
         Time to stop at, s. By default to the end of the motion, and on until rest or overturning, or until it is proven
         that restraints hold the block leaning for ever. Where the duration ends the response while the block still
         moves or the motion goes on, the response is `stopped`, and has no verdict.
-    initial_rotation : float
-        Rotation at time 0, rad; positive leans to side +. Of another body its coordinate.
-    initial_velocity : float
-        Angular velocity at time 0, rad/s.
+    initial_rotation, initial_velocity : float
+        Rotation at time 0, rad, positive to side +, and angular velocity, rad/s. Of another body its coordinate.
 
     Returns
     -------
@@ -74,21 +72,14 @@ def simulate(
     ------
     InvalidBlock, InvalidMotion
         If the block is no body, or the motion no `Motion` or one with a vertical component for a body on a line.
-    InvalidOption
-        If an argument is out of its range, or the block would never come to rest and no duration is given.
 
     Notes
     -----
     The block sticks to the ground. Whether it would slide at a coefficient of friction, and when, is asked of the
     response: `Response.sliding_time`, ``summary(friction)``.
 
-    Between impacts the rotation is a Taylor series about the last event (paper, Eq. 15); the next impact is the first
-    root of that series divided by time (paper, Eq. 20), found so that none can be missed.
-
     Examples
     --------
-    A slender block is released from a tenth of its slenderness and rocks to rest:
-
     >>> import rocking
     >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     >>> response = rocking.simulate(block, None, model="linear", initial_rotation=0.02)
@@ -108,10 +99,7 @@ def response_to(
     name: str | None = None,
     factor: float = 1.0,
 ) -> Response:
-    """Compute a response as `simulate` does, with another ``name`` for the initial coordinate in messages.
-
-    A ``factor`` scales the motion and the initial state; the response keeps the motion as it is.
-    """
+    """Compute a response as `simulate` does, with another ``name`` for the initial coordinate in messages."""
     how, alone, motion = treatment(chattering), one_body(block).alone(), one_motion(motion)
     setup, ground = Setup(alone, model, how, duration, initial), None
     if factor != 1.0:  # repeated simulations leave the cache as it is

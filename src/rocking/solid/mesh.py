@@ -178,10 +178,7 @@ def length_of(unit: object) -> float:
 
 
 def upright(up: object) -> Floats:
-    """Return the rotation, shape (3, 3), by the shortest way, that turns an axis of a mesh to z.
-
-    The axis is x, y or z, with a minus sign or without, or a vector.
-    """
+    """Return the rotation, shape (3, 3), by the shortest way, that turns an axis of a mesh to z."""
     if isinstance(up, str):
         axis = checks.one_of(up, "up", InvalidBlock, ["x", "y", "z", "-x", "-y", "-z"])
         u = np.eye(3)["xyz".index(axis[-1])] * (-1.0 if axis[0] == "-" else 1.0)
@@ -219,10 +216,7 @@ def properties(
     turn: float,
     most: int | None = None,
 ) -> tuple[dict[str, Any], list[Surface]]:
-    """Return what `Solid` is made from, by name, and the closed surfaces of its parts, the lowest corner at height 0.
-
-    The arguments are those of `Solid.from_mesh`; a mesh of more than `most` triangles is refused.
-    """
+    """Return what `Solid` is made from, by name, and closed surfaces of its parts, the lowest corner at height 0."""
     if support is not None and tolerance is not None:
         raise InvalidBlock("{} is how a support is looked for: leave it out where {} is given", "tolerance", "support")
     found = parts_of(mesh, most)
@@ -294,10 +288,7 @@ def _densities(
 
 
 def _surfaces(parts: Sequence[Part], density: float | Mapping[str, float] | None) -> tuple[list[str], list[Surface]]:
-    """Close the surfaces of the parts, and name them; open ones of one density are joined before.
-
-    A part that lies in another one, with its normals turned the other way, is a cavity of it, unless it has a density.
-    """
+    """Close the surfaces of the parts, and name them; open ones of one density are joined before."""
     names = [part.name for part in parts]
     found = [agreeing(joined(part.vertices, part.faces)) for part in parts]
     is_open = [not is_closed(surface.faces) for surface in found]

@@ -205,10 +205,7 @@ def _outward(vertices: Floats, faces: Integers) -> tuple[Integers, tuple[str, ..
 
 
 def surrounds(vertices: Floats, faces: Integers, other: Floats, others: Integers) -> bool:
-    """Whether a surface goes round another one, as that of its corners and triangles says which is least doubtful.
-
-    What both have in common has a half of the one inside, or nearly so.
-    """
+    """Whether a surface goes round another one, as that of its corners and triangles says which is least doubtful."""
     some = others[np.linspace(0, len(others) - 1, 12).astype(np.int64)]
     places = np.vstack([other[some[:, 0]], other[some].mean(axis=1)])
     around = [abs(winding(vertices, faces, place)) for place in np.unique(places, axis=0)]

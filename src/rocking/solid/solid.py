@@ -41,20 +41,14 @@ class Solid(Result):
     inertia_over_mass : array_like, shape (3, 3)
         Tensor of inertia about the centre of mass over the mass, m^2: squares of radii of gyration on its diagonal, and
         the negative of the mean products of coordinates beside it.
-    mass : float, optional
-        Mass, kg; rocking does not depend on it.
-    gravity : float
-        Acceleration of gravity, m/s^2.
-    description : str
-        What it is.
-    height : float, optional
-        Its height, m.
+    mass, gravity : float, optional
+        Mass, kg, on which rocking does not depend, and acceleration of gravity, m/s^2.
+    description, height : str, float, optional
+        What it is, and its height, m.
     regions : sequence of Region
         Its parts, each with its name, volume (m^3) and density (kg/m^3).
-    repairs : sequence of str
-        What was done to the mesh to close its surface.
-    notes : sequence of str
-        What looks like a mistake.
+    repairs, notes : sequence of str
+        What was done to the mesh to close its surface, and what looks like a mistake.
 
     Raises
     ------
@@ -69,8 +63,6 @@ class Solid(Result):
 
     Examples
     --------
-    A cabinet 0.6 m by 0.4 m and 1.8 m high:
-
     >>> inertia = [(0.4**2 + 1.8**2) / 12, (0.6**2 + 1.8**2) / 12, (0.6**2 + 0.4**2) / 12]
     >>> corners = [(0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2)]
     >>> cabinet = Solid(corners, (0.0, 0.0, 0.9), [[inertia[0], 0, 0], [0, inertia[1], 0], [0, 0, inertia[2]]])
@@ -175,11 +167,8 @@ class Solid(Result):
 
         Examples
         --------
-        >>> statue = Solid.from_mesh("statue", density={"plinth": 2700.0, "figure": 2650.0, "head": 2650.0})
-        >>> statue
+        >>> Solid.from_mesh("statue", density={"plinth": 2700.0, "figure": 2650.0, "head": 2650.0})
         <Solid: statue.obj: 1.73 m high, 0.1711 m^3, 455.4 kg>
-        >>> [round(side.alpha, 4) for side in statue.block(90.0).sides]
-        [0.2758, 0.3248]
         """
         made, _ = properties(mesh, density, support, tolerance, up=up, unit=unit, turn=turn)
         return cls(gravity=gravity, **made)
@@ -220,12 +209,6 @@ class Solid(Result):
         ------
         InvalidBlock
             If the body is too stocky to rock that way.
-
-        Examples
-        --------
-        >>> block = Solid.from_mesh("statue").block(90.0)
-        >>> block.sides[0]
-        <Side: p = 3.0024 rad/s, alpha = 0.27478 rad, restitution = 0.87204, R = 0.74035 m>
         """
         plane = plane_of(self, azimuth)
         plus, minus = plane.pivots.distance.tolist()
@@ -240,28 +223,7 @@ class Solid(Result):
         )
 
     def rose(self, azimuths: ArrayLike | None = None) -> Rose:
-        """Resistance in every direction.
-
-        Parameters
-        ----------
-        azimuths : array_like, optional
-            Degrees clockwise from north; by default every five.
-
-        Returns
-        -------
-        Rose
-            Uplift, slenderness, p and restitution over the azimuth, and how large what planar rocking leaves out is.
-
-        Raises
-        ------
-        InvalidOption
-            If an azimuth is no finite number.
-
-        Examples
-        --------
-        >>> Solid.from_mesh("statue").rose()
-        <Rose: statue.obj: lifted first towards 90 deg, at 0.2819 g (72 azimuth, 4 corner)>
-        """
+        """Return the resistance at azimuths (degrees clockwise from north; by default every five) as a `Rose`."""
         at = checked_azimuths(azimuths)
         height = float(self.centre[2])
         return rose_of(self._about_centre, height, self.inertia_over_mass, self.gravity, at, self.description)

@@ -132,20 +132,13 @@ def channels(path: str | os.PathLike[str], *, dt: float | None = None, units: st
     ----------
     path : str or path
         The file.
-    dt : float, optional
-        As for `read`.
-    units : str, optional
+    dt, units : float, str, optional
         As for `read`.
 
     Returns
     -------
     tuple of Channel
         In the file's order.
-
-    Raises
-    ------
-    UnreadableRecord, InvalidMotion
-        As for `read`.
 
     Examples
     --------

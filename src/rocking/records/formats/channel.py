@@ -34,11 +34,7 @@ def first_fault(times: Floats) -> int | None:
 
 
 def even_step(times: Floats) -> float | None:
-    """Return the step of increasing `times` (s) if they are even up to their printed decimals, else None.
-
-    Of all steps that fit, it is the one with the fewest digits: times printed with three decimals at 200 samples per
-    second give exactly 0.005.
-    """
+    """Return the step of increasing `times` (s) if they are even up to their printed decimals, else None."""
     intervals = len(times) - 1
     mean = float(times[-1] - times[0]) / intervals
     rounding = 4.0 * float(np.spacing(np.abs(times).max()))
@@ -56,10 +52,7 @@ def even_step(times: Floats) -> float | None:
 
 
 def prints_as(times: Floats, step: float) -> bool:
-    """Whether even times with this step may be printed as `times` are: with so many decimals or significant digits.
-
-    Some that follow each other may be printed alike.
-    """
+    """Whether even times with this step may be printed as `times` are: with so many decimals or significant digits."""
     sizes = np.abs(times)
     if not sizes.max() <= _LATEST or not np.all(np.diff(times) >= 0.0):
         return False
@@ -193,11 +186,6 @@ class Channel:
         ------
         InvalidMotion
             If there are fewer than two samples, or they are too large for a motion.
-
-        Examples
-        --------
-        >>> Channel("Up", 3, np.array([0.0, 0.1, 0.0]), times=np.array([0.0, 0.1, 0.3])).motion().duration
-        0.3
         """
         facts = {"event": self.event, "station": self.station, "channel": self.label, "units": self.units}
         text = ", ".join(f"{key} {value}" for key, value in {**self.metadata, **facts}.items() if value)
@@ -253,11 +241,7 @@ def channel_of(
     row_at: Callable[[int], int | None] | None = None,
     **known: Any,
 ) -> Channel:
-    """Return the channel of numbers in a unit, which stand at the offset `at` of a file of that format.
-
-    `spelling` is the file's own name of the unit, `facts` are further metadata, and `known` the channel's other fields.
-    Where each number has a row of its own, `row_at` gives its offset.
-    """
+    """Return the channel of numbers in a unit, which stand at the offset `at` of a file of that format."""
     row_at = row_at or (lambda _: at)
     if len(values) < 2:
         raise source.error(f"{len(values)} values are too few for a record; get the whole file", at)
@@ -275,11 +259,7 @@ def channel_of(
 
 
 def gap_at(values: Floats) -> int | None:
-    """Return the index of the first number that stands for a missing value, or None.
-
-    Such numbers (-999, 9999.0, 99999.99, -32768, 1e20, ...) are values as well: they stand for missing ones where the
-    numbers beside them are far smaller.
-    """
+    """Return the index of the first number that stands for a missing value, or None."""
     sizes = np.abs(values)
     marked = np.isin(sizes, _MARKS) | (sizes >= 1e9)
     if not marked.any():

@@ -60,11 +60,7 @@ class Column(NamedTuple):
 
 @dataclass(frozen=True)
 class Heading:
-    """What a heading says of each column, whether it names them and where (the offset of that line).
-
-    Where it names no column as that of times, the first of several is `assumed` to be. It is `doubtful` whether they
-    are times where no name but "T" says so, or a title names a spectrum.
-    """
+    """What a heading says of each column, whether it names them and where (the offset of that line)."""
 
     columns: tuple[Column, ...]
     named: bool
@@ -78,11 +74,7 @@ class Heading:
 
 
 def heading_of(source: Source, end: int, count: int, delimiter: str) -> Heading:
-    """Return what the lines before the offset `end` say of the `count` columns that begin there.
-
-    Without names the first of several columns holds times, in seconds. The delimiter is "," or ";", or " " for blanks
-    and tabs.
-    """
+    """Return what the lines before the offset `end` say of the `count` columns that begin there."""
     at = max(0, end - 10_000)
     lines: list[tuple[str, int]] = []
     for line in source.data[at:end].split(b"\n"):
@@ -158,10 +150,7 @@ class _Names:
         return "time" if words & _TIMES or self._is_unit_of_time(place) else "channel"
 
     def _kind_of_only(self) -> Kind:
-        """Return the kind of a single column, above which a title may stand: times only if it says nothing else.
-
-        "T" by itself is the transverse component.
-        """
+        """Return the kind of a single column, above which a title may stand: times only if it says nothing else."""
         name = self._label(0)
         units = (find_unit, find_time_unit)
         words = {word.lower() for word in _WORD.findall(name) if not any(find(word) for find in units)} - {"in"}
@@ -240,10 +229,7 @@ def _cells(line: str, count: int, delimiter: str) -> tuple[str, ...]:
 
 
 def _ways(delimiter: str) -> Iterator[tuple[Callable[[str], list[str]], bool]]:
-    """Yield ways to split a line of names, those that fit the rows below it first, and whether each is sure.
-
-    What single blanks or brackets divide may as well be a sentence; names begin with that of the times.
-    """
+    """Yield ways to split a line of names, those that fit the rows below it first, and whether each is sure."""
     for sign in ["\t", ";", ","] if delimiter == " " else [delimiter, ";", ",", "\t"]:
         yield functools.partial(_divided, sign), True
     yield lambda line: re.split(r"\t+|\s{2,}", line.strip()), True

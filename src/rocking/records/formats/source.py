@@ -111,11 +111,7 @@ class Source:
         return min((place for place in places if place >= 0), default=None)
 
     def error(self, message: str, at: int | None = None, *arguments: str, value: object = None) -> UnreadableRecord:
-        """Return the error that says `message` about this file, at the line that holds the offset `at`.
-
-        Each "{}" in the message stands for one of the `arguments` of `rocking.read`; the first is what is missing
-        or wrong, and was given as `value`.
-        """
+        """Return the error that says `message` about this file, at the line that holds the offset `at`."""
         line = None if at is None else self.line_number(at)
         return UnreadableRecord(message, *arguments, path=self.path, line=line, value=value)
 

@@ -67,11 +67,7 @@ def numeric_end(source: Source, start: int) -> int:
 def read_values(
     source: Source, start: int, end: int, layout: Layout | None = None, stated: Stated | None = None
 ) -> Floats:
-    """Return all numbers between the offsets `start` and `end`, which begin lines; as many as are stated.
-
-    Numbers are taken as blank-separated; where that fails or does not give so many of them, by the columns of
-    `layout`, so that numbers which touch are split where the Fortran program that wrote them meant it.
-    """
+    """Return all numbers between the offsets `start` and `end`, which begin lines; as many as are stated."""
     values, reached = _in_blocks(source, start, end, _SPACE, lambda block: convert(block.split()))
     further = reached
     if layout is not None and (reached < end or (stated is not None and len(values) != stated.values)):
