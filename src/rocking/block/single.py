@@ -198,6 +198,16 @@ class Block:
         -----
         Depth h and radius of gyration k of the body follow from R_i = h/cos(alpha_i), g R_i/p_i^2 = k^2 + R_i^2. Sides
         that agree to the digits that they are given to (three at least) count as equal. (Derived in the documentation.)
+
+        Examples
+        --------
+        >>> Block.from_parameters(p=1.0, alpha=0.2, restitution=0.92).restitution
+        0.92
+        >>> [side.alpha for side in Block.from_parameters((2.5, 2.2), (0.12, 0.2), (0.9, 0.85)).sides]
+        [0.12, 0.2]
+        >>> statue = Block.from_parameters(p=(2.9858, 3.0053), alpha=(0.27417, 0.155))
+        >>> [round(side.restitution, 3) for side in statue.sides]
+        [0.95, 0.914]
         """
         g = checked_gravity(gravity)
         rates = [checked_parameter(value, "p") for value in checked_pair(p, "p")]
@@ -261,6 +271,15 @@ class Block:
         Notes
         -----
         R_i = hypot(d_i, h), alpha_i = atan(d_i/h), p_i = sqrt(m g R_i/(I + m R_i^2)).
+
+        Examples
+        --------
+        A rectangle is the body with equal distances and I = m R^2/3:
+
+        >>> rectangle = Block(half_width=0.2, half_height=1.0)
+        >>> body = Block.from_pivots((0.2, 0.2), 1.0, (1.04 / 3) ** 0.5)
+        >>> abs(body.p - rectangle.p) < 1e-15, abs(body.restitution - rectangle.restitution) < 1e-15
+        (True, True)
         """
         plus, minus = (checked_length(value, "distances") for value in checked_pair(distances, "distances"))
         h = checked_length(height, "height")
@@ -307,6 +326,13 @@ class Block:
         -----
         The frame has the column's slenderness, and R' = R (1 + 3 gamma)/(1 + 2 gamma): a heavier beam makes it
         more stable (Makris and Vassiliou 2013; derived in the documentation).
+
+        Examples
+        --------
+        >>> column = Block(half_width=0.5, half_height=3.0)
+        >>> frame = Block.from_frame(half_width=0.5, half_height=3.0, mass_ratio=2.0)
+        >>> frame.alpha == column.alpha, round(frame.radius / column.radius, 12)
+        (True, 1.4)
         """
         b = checked_length(half_width, "half_width")
         h = checked_length(half_height, "half_height")
@@ -348,6 +374,12 @@ class Block:
         -------
         RestrainedBlock
             With one side.
+
+        Examples
+        --------
+        >>> wall = Block.one_sided(width=0.4, height=4.0)
+        >>> round(wall.sides[0].restitution, 4)
+        0.4708
         """
         from rocking.block.restrained import RestrainedBlock
 

@@ -132,6 +132,12 @@ class Motion(Processable):
         ------
         InvalidMotion
             If there are fewer than two samples, one of them is not finite, or `dt` is not a number in its range.
+
+        Examples
+        --------
+        >>> motion = Motion.from_samples([0.0, 1.0, -2.0, 0.0], 0.02)
+        >>> motion.duration, motion.pga
+        (0.06, 2.0)
         """
         samples, step = piecewise.checked_samples(acceleration), piecewise.checked_step(dt)
         times = piecewise.even_times(len(samples), step)
