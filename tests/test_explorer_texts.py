@@ -86,7 +86,11 @@ def in_python():
             elif isinstance(first, ast.Name):
                 keys = [r"sweep\.(overturns|given_up)"]
             else:
-                keys = [re.escape(part.value) for part in ast.walk(first) if isinstance(part, ast.Constant)]
+                keys = [
+                    re.escape(part.value)
+                    for part in ast.walk(first)
+                    if isinstance(part, ast.Constant) and isinstance(part.value, str)
+                ]
             found.append((file.name, keys, names))
     return found
 
