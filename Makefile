@@ -13,7 +13,7 @@ FAST := "not thorough and not slow and not browser"
 LIMITED := -o faulthandler_timeout=400
 QUICKLY := -m $(FAST) --hypothesis-profile=few $(LIMITED)
 # Something of every library that the package needs, for other versions than those that are pinned; `make lowest EVERY_PART=tests` runs all.
-EVERY_PART := $(addprefix tests/test_,reference.py core/result.py plot.py cli.py response.py chattering_maps.py processing.py explorer_server.py first_response.py)
+EVERY_PART := $(addprefix tests/test_,reference.py result.py plot.py cli.py response.py chattering_maps.py processing.py explorer_server.py first_response.py)
 # What the compiled kernels are built from.
 SOURCES := $(shell find src/rocking/kernels compiling -name '*.py') hatch_build.py
 
