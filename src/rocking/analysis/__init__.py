@@ -1,4 +1,4 @@
-"""What engineers ask of many simulations: spectra, overturning maps, scaling, fragility, risk, rules."""
+"""Analyses of many simulations: spectra, overturning maps, scaling, fragility, risk."""
 
 import lazy_loader
 

@@ -130,7 +130,7 @@ class Fragility(Result):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is to be known before the curves are believed, a sentence each."""
+        """Limits of the curves: small samples, poor fits, undecided outcomes; one sentence each."""
         notes = [text for text in (self.missing, self.undecided) if text]
         if self.one_way:
             notes.append(
@@ -440,7 +440,7 @@ def fragility(
     outcomes = _outcomes(table, how, x, ratio, states)
     if weights is not None:
         outcomes["weight"] = trials
-    # What a block without weight does is told, but is none of the data; nor is what was given up.
+    # Simulations that were given up, and those of a block without weight, are reported but are not data.
     counts = (trials > 0.0) & ~missing.ravel()
     x, trials, groups = x[counts], trials[counts], groups.ravel()[counts]
     data = {name: (x, trials * passed(ratio, limit, name).ravel()[counts], trials) for name, limit in states.items()}
@@ -477,7 +477,7 @@ def weights_of(weights: ArrayLike | None, count: int) -> Floats:
 
 
 def of_polarities(polarity: Polarity, *, is_symmetric: bool) -> str:
-    """Say, behind a description, which polarities outcomes come from where both were asked for."""
+    """Append to a description which polarities the outcomes come from, where both were requested."""
     if polarity != "both":
         return ""
     return ", one polarity, since a symmetric block does the same in both" if is_symmetric else ", both polarities"
