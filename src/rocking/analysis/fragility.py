@@ -440,7 +440,7 @@ def fragility(
     outcomes = _outcomes(table, how, x, ratio, states)
     if weights is not None:
         outcomes["weight"] = trials
-    # Simulations that were given up, and those of a block without weight, are reported but are not data.
+    # Simulations that were given up, and those of a block of weight 0, are reported but are not data.
     counts = (trials > 0.0) & ~missing.ravel()
     x, trials, groups = x[counts], trials[counts], groups.ravel()[counts]
     data = {name: (x, trials * passed(ratio, limit, name).ravel()[counts], trials) for name, limit in states.items()}
