@@ -17,12 +17,10 @@ from rocking.core.bisection import bisected
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption, Unfitted
 from rocking.explorer.catalogue import clusters_of, entries_of, title_of
-from rocking.explorer.code import block_options
 from rocking.explorer.inputs import Case, require_rest
 from rocking.explorer.motions import Found, read_motion
 from rocking.explorer.parameters import ASSESSMENT, Texts
-from rocking.explorer.payload import Payload
-from rocking.explorer.phrases import phrase
+from rocking.explorer.payload import Payload, phrase
 from rocking.explorer.uploads import UploadStore
 from rocking.inputs.quantities import number
 from rocking.inputs.texts import command_line
@@ -327,8 +325,8 @@ def as_command(assessment: Assessment) -> str | None:
         return None
     first = assessment.entries[0]
     options = {
-        **block_options(case),
-        **{name: case.texts[name] for name in ("chattering",) if name in case.texts},
+        **case.block_options,
+        **{name: text for name, text in case.texts.items() if name in ("model", "chattering")},
         **{name: first[name] for name in ("dt", "units", "channel") if name in first},
         "measure": measure.name,
         **({} if measure.period is None else {"period": repr(measure.period)}),

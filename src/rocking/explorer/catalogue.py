@@ -14,7 +14,7 @@ from rocking import records
 from rocking.analysis.levels import numbered
 from rocking.errors import InvalidOption, RockingError
 from rocking.explorer.parameters import PARAMETERS, Texts, field_label, names_of
-from rocking.explorer.phrases import phrase
+from rocking.explorer.payload import phrase
 from rocking.explorer.uploads import UploadStore, measures
 
 #: Entries of a list in an address at most, and their letters: forty records of two components, and as many again.

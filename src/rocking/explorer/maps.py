@@ -24,7 +24,7 @@ from rocking.errors import InvalidOption
 from rocking.explorer.inputs import Case, require_possible, require_rest
 from rocking.explorer.motions import arguments_of, is_pulse, pulse_of, pulse_text
 from rocking.explorer.parameters import BLOCK_NAMES, QUANTITIES, Texts, names_of
-from rocking.explorer.phrases import phrase
+from rocking.explorer.payload import phrase
 from rocking.inputs.declared import SCALINGS
 from rocking.inputs.pulses import pulse_texts
 from rocking.inputs.quantities import number

@@ -21,8 +21,7 @@ from rocking.explorer.inputs import Case, require_possible
 from rocking.explorer.maps import AXES, Axis, change_pulse
 from rocking.explorer.motions import arguments_of, is_pulse, pulse_call, pulse_of
 from rocking.explorer.parameters import Texts
-from rocking.explorer.payload import Payload
-from rocking.explorer.phrases import phrase
+from rocking.explorer.payload import Payload, phrase
 from rocking.inputs.declared import SCALINGS
 from rocking.inputs.quantities import number
 from rocking.motion.motion import Motion

@@ -11,8 +11,7 @@ from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
 from rocking.explorer.core import Explorer
 from rocking.explorer.parameters import READING, Texts
-from rocking.explorer.payload import Payload
-from rocking.explorer.phrases import phrase
+from rocking.explorer.payload import Payload, phrase
 from rocking.explorer.simulated import Simulated, verdict
 from rocking.explorer.windows import checked_window, extremes
 from rocking.response import Response, active_span

@@ -15,7 +15,7 @@ from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.engine.treatment import Certified
 from rocking.explorer.inputs import Case
-from rocking.explorer.phrases import phrase
+from rocking.explorer.payload import phrase
 from rocking.inputs.notes import block_notes, motion_notes
 from rocking.motion.motion import Motion
 from rocking.response import Response, in_words, known_ratio
