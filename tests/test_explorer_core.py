@@ -17,7 +17,7 @@ from explorer_texts import in_english
 import rocking
 from rocking.chattering import chattering_map, critical_amplitude, families
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingError, StudyError, UnreadableRecord
-from rocking.explorer import maps, readings, windows
+from rocking.explorer import maps, readings
 from rocking.explorer.code import case_as_command, case_as_python, map_as_python
 from rocking.explorer.core import Explorer
 from rocking.explorer.inputs import read_case, texts_of
@@ -25,9 +25,9 @@ from rocking.explorer.motions import pulse_of
 from rocking.explorer.parameters import DEFAULT
 from rocking.explorer.payload import pack
 from rocking.explorer.periodic import sweep_of
+from rocking.explorer.simulated import extremes
 from rocking.explorer.studies import StudyView
 from rocking.explorer.uploads import LARGEST, MOST, UploadStore, bare_name
-from rocking.explorer.windows import extremes
 from rocking.motion.exceedance import exceedances
 
 STATUE = {"width": "0.24", "height": "1.1", "motion": "ridgecrest-clc-090", "pga": "0.4g"}
@@ -1041,7 +1041,6 @@ def test_what_only_rounding_leaves_of_a_number_is_shown_as_zero(explorer, pulse)
     found = [readings.at(explorer, texts, time)["ground_g"] for time in ("0", "0.25", "0.5", "1")]
     assert [abs(each) > 0.2 for each in found] == [False, True, False, False]
     assert [found[k] for k in (0, 2, 3)] == [0.0, 0.0, 0.0]
-    shown = explorer.show(texts)
-    drawn = np.abs(windows._shaking(shown.case, 0.0, 1.0, 200)["ground_g"])
+    drawn = np.abs(explorer.window(texts, (0.0, 1.0)).arrays["ground_g"])
     assert not np.any((drawn > 0.0) & (drawn < 1e-9))
     assert np.any(drawn == 0.0)

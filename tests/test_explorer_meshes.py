@@ -45,8 +45,8 @@ def here(monkeypatch):
     """Read files in this process: what reads them apart is tested by itself."""
 
     def made(name, data, options):
-        found = apart._answer(json.dumps({"name": name, "options": dict(options)}).encode() + b"\n" + data)
-        return apart._found(json.dumps(found))
+        found = apart.answered(json.dumps({"name": name, "options": dict(options)}).encode() + b"\n" + data)
+        return apart.made_of(json.dumps(found))
 
     monkeypatch.setattr(meshes, "made_apart", made)
 

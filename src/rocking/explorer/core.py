@@ -16,18 +16,19 @@ from rocking.explorer.inputs import read_case
 from rocking.explorer.meshes import described
 from rocking.explorer.parameters import Texts, names_of
 from rocking.explorer.payload import Payload
-from rocking.explorer.simulated import Simulated, facts
-from rocking.explorer.uploads import Recent, UploadStore
-from rocking.explorer.windows import (
+from rocking.explorer.simulated import (
     POINTS,
+    Simulated,
     about_window,
     begun_window,
     checked_window,
     ends_of,
+    facts,
     ground_in,
     lines_in,
     lines_of,
 )
+from rocking.explorer.uploads import Recent, UploadStore
 from rocking.response import active_span
 
 #: Responses that are kept; their steps and the samples of their motions, some hundreds of MB at most.

@@ -245,15 +245,8 @@ class UploadStore:
 
 def _about(channel: Channel) -> dict[str, Any]:
     """Return what the file says of a channel."""
-    return {
-        "number": channel.number,
-        "name": channel.name,
-        "station": channel.station,
-        "event": channel.event,
-        "azimuth": channel.azimuth,
-        "samples": len(channel.acceleration),
-        "step": channel.dt,
-    }
+    said = {name: getattr(channel, name) for name in ("number", "name", "station", "event", "azimuth")}
+    return {**said, "samples": len(channel.acceleration), "step": channel.dt}
 
 
 def _request(dt: float | None, units: str | None, channel: str | None = None) -> Request:
