@@ -680,8 +680,8 @@ def test_the_curves_over_a_map_are_the_critical_amplitudes():
         ({"x": "mass", "y": "a"}, "mapped over"),
         ({"x": "omega", "y": "a", "points": "4000"}, "from 8 to 400"),
         ({"x": "omega", "y": "a", "points": "10.5"}, "from 8 to 400"),
-        ({"x": "omega", "y": "a", "x_from": "3", "x_to": "2"}, "positive start below its end"),
-        ({"x": "omega", "y": "a", "x_from": "-1", "x_to": "2"}, "positive start below its end"),
+        ({"x": "omega", "y": "a", "x_from": "3", "x_to": "2"}, "must be positive and below"),
+        ({"x": "omega", "y": "a", "x_from": "-1", "x_to": "2"}, "must be positive and below"),
     ],
 )
 def test_axes_that_are_none_are_refused(axes, words):

@@ -263,8 +263,8 @@ def test_a_part_of_a_sweep_is_sent_with_rotations_over_slenderness():
         ("ridgecrest-clc-090", {}, "needs a sine"),
         (sine(3.0), {"sweep": "mass"}, "over a or omega"),
         (sine(3.0), {"sweep_points": "7"}, "from 8 to 400"),
-        (sine(3.0), {"sweep_from": "3", "sweep_to": "2"}, "positive start below its end"),
-        (sine(3.0), {"sweep_from": "0"}, "positive start below its end"),
+        (sine(3.0), {"sweep_from": "3", "sweep_to": "2"}, "must be positive and below"),
+        (sine(3.0), {"sweep_from": "0"}, "must be positive and below"),
     ],
 )
 def test_a_sweep_that_is_none_is_refused(motion, asked, words):

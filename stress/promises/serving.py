@@ -49,7 +49,6 @@ ROUTES: Final[dict[str, dict[str, int]]] = {
     "/api/case?p=nothing": {"GET": 422},
     "/api/code?p=2&alpha=0.2": {"GET": 200},
     "/api/list": {"GET": 200},
-    "/api/tracks?p=2&alpha=0.2": {"GET": 200},
     "/api/summary?p=2&alpha=0.2&motion=one-sine:amplitude=3,frequency=1": {"GET": 200},
     "/api/compare?p=nothing": {"GET": 422},
     "/api/assessment?p=nothing": {"GET": 422},

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import PurePath
 from typing import Any, Final
 from urllib.parse import parse_qsl
@@ -131,8 +131,9 @@ def _shipped() -> tuple[Component, ...]:
     for name in records.names():
         record = records.info(name)
         place, up = record.title.rpartition(", ")[0], record.direction == "up"
-        component = Component({"motion": name}, record.title, record.direction, up, measures(records.load(name)))
-        found.append(replace(component, station=place, stem=name.rpartition("-")[0]))
+        texts, stem = {"motion": name}, name.rpartition("-")[0]
+        known = measures(records.load(name))
+        found.append(Component(texts, record.title, record.direction, up, known, station=place, stem=stem))
     return tuple(found)
 
 
@@ -148,11 +149,13 @@ def _of_file(uploads: UploadStore, key: str, answer: Texts) -> list[Component]:
         texts = {"motion": f"file:{key}"} | ({"channel": str(each["number"])} if several else {})
         texts |= {one: given[one] for one in needed if one in given}
         stem, label, is_up, sensor = _parted(name, each["name"], each["azimuth"], several)
-        component = Component(texts, f"{name}, {each['name']}" if several else name, label, is_up, each["measures"])
         found.append(
-            replace(
-                component,
-                **{fact: each[fact] for fact in ("event", "station", "samples", "step", "choices")},
+            Component(
+                texts,
+                f"{name}, {each['name']}" if several else name,
+                label,
+                is_up,
+                **{fact: each[fact] for fact in ("measures", "event", "station", "samples", "step", "choices")},
                 stem=key if several else stem,
                 sensor=sensor,
                 key=key,

@@ -67,7 +67,9 @@ _QUANTITY: Final = {
 }
 
 _SWEEP: Final = """\
-{imports}import numpy as np
+import math
+
+import numpy as np
 
 import rocking
 from rocking import dynamics
@@ -166,7 +168,6 @@ def sweep_as_python(sweep: Sweep) -> str:
         block=case.block_call,
         motion=call_at(sweep),
         options="".join(f", {option}={value!r}" for option, value in given.items() if value is not None),
-        imports="import math\n\n" if name == "omega" else "",
         name=name,
         at=sweep.value,
         values=_values(sweep.axis),

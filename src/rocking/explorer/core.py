@@ -20,13 +20,13 @@ from rocking.explorer.simulated import (
     POINTS,
     Simulated,
     about_window,
-    begun_window,
     checked_window,
     ends_of,
     facts,
     ground_in,
     lines_in,
     lines_of,
+    shown_window,
 )
 from rocking.explorer.uploads import Recent, UploadStore
 from rocking.response import active_span
@@ -99,8 +99,7 @@ class Explorer:
         """Return all that the page says of a case, and its arrays in a window (s; by default where it moves)."""
         shown = self.show(texts)
         response = shown.response
-        window = begun_window(window, response.duration)
-        start, end = active_span(response) if window is None else checked_window(window, response.duration)
+        start, end = shown_window(window, response.duration, active_span(response))
         header = {**facts(shown), "window": about_window(shown, start, end)}
         profile = {} if shown.outline is None else {"profile": shown.outline.ravel()}
         return Payload(header, {**lines_in(shown, start, end), **lines_of(response), **profile})
@@ -123,12 +122,8 @@ class Explorer:
         first = self.show(texts)
         both = {"first": first, "second": self.show(changed if whole else _changed(first.case.texts, changed))}
         longest = max(shown.response.duration for shown in both.values())
-        window = begun_window(window, longest)
-        if window is None:
-            starts, ends = zip(*(active_span(shown.response) for shown in both.values()), strict=True)
-            start, end = min(starts), max(ends)
-        else:
-            start, end = checked_window(window, longest)
+        starts, ends = zip(*(active_span(shown.response) for shown in both.values()), strict=True)
+        start, end = shown_window(window, longest, (min(starts), max(ends)))
         header = {"window": ends_of(start, end), "duration": longest, "cases": [facts(each) for each in both.values()]}
         arrays: dict[str, Floats] = {}
         for name, shown in both.items():

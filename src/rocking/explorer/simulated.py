@@ -188,9 +188,11 @@ def checked_window(window: tuple[float, float], duration: float) -> tuple[float,
     return start, end
 
 
-def begun_window(window: tuple[float, float] | None, duration: float) -> tuple[float, float] | None:
-    """Return a window, s, or None where it begins when a response is over: it was chosen for a longer one."""
-    return None if window is not None and window[0] >= duration else window
+def shown_window(
+    window: tuple[float, float] | None, duration: float, usual: tuple[float, float]
+) -> tuple[float, float]:
+    """Return a window, s, or the usual one where none is given or it was chosen for a longer response."""
+    return usual if window is None or window[0] >= duration else checked_window(window, duration)
 
 
 def about_window(shown: Simulated, start: float, end: float) -> dict[str, Any]:
