@@ -3,7 +3,7 @@
 import math
 import re
 
-from rocking.explorer.phrases import english
+from rocking.explorer.payload import english
 
 #: Kinds of quantities in texts: the unit in which the page shows them unless another is chosen, in SI units.
 MEASURES = {"angle": (math.radians(1.0), "°"), "acceleration": (9.80665, " g"), "length": (1.0, " m")}

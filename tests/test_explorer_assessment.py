@@ -1,8 +1,5 @@
 """The assessment of a case's block: the package's own fragility bit for bit, friction, rules of thumb, margin."""
 
-import json
-import shlex
-
 import numpy as np
 import pytest
 from explorer_texts import in_english
@@ -56,18 +53,6 @@ def test_the_curve_is_that_of_the_script_to_the_last_bit(case, texts):
     assert 0 < fit["exceeded"] < part.header["outcomes"]
     undecided, *notes = names["found"].notes  # the page counts no undecided outcomes
     assert undecided.startswith("undecided within 3e-6") and fit["notes"] == notes
-
-
-@pytest.mark.thorough
-def test_the_command_computes_the_same_curve_and_is_none_where_there_is_none(run):
-    found = assessed(STATUE, records=f"{PLAIN};motion=el-centro-meloland-360", **LEVELS)
-    assert described(found)["command"].endswith(" --clusters 0,1,2,0")
-    code, out, _ = run(*shlex.split(described(found)["command"])[1:], "--json")
-    assert code == 0
-    fit = last(found).header["fit"]
-    curve = json.loads(out)["curves"][0]
-    assert (curve["median"], curve["median_interval"][0]) == (fit["median"], fit["median_interval"][0])
-    assert described(assessed(STATUE, records=RISING, **LEVELS))["command"] is None
 
 
 def test_every_record_adds_a_row_of_its_own_and_the_curve_so_far():

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import rocking.explorer
-from rocking.explorer.phrases import english
+from rocking.explorer.payload import english
 
 PAGE = Path(rocking.explorer.__file__).parent / "page"
 STYLE = (PAGE / "style.css").read_text("utf-8")

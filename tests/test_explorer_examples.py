@@ -106,7 +106,7 @@ def more_is_less(shown):
 
 
 def statue_falls(shown):
-    assert shown.header["tipping_time"] < shown.header["overturn_time"]
+    assert shown.response.tipping_time < shown.header["overturn_time"]
     return [shown.pga, shown.fall]
 
 
@@ -182,7 +182,7 @@ def last_rest(shown):
 
 
 def rocks_on(shown):
-    lifted, tipped = shown.events("uplift")["time"][-1], shown.header["tipping_time"]
+    lifted, tipped = shown.events("uplift")["time"][-1], shown.response.tipping_time
     assert shown.start < shown.events("rest")["time"][-1] < lifted < tipped < shown.end
     return [f"{tipped - lifted:.1f}", f"{tipped:.2f}"]
 

@@ -12,7 +12,7 @@ from rocking.explorer.parameters import (
     field_label,
     specification,
 )
-from rocking.explorer.phrases import english
+from rocking.explorer.payload import english
 from rocking.inputs import quantities
 from rocking.inputs.pulses import FAMILIES, named_pulse
 

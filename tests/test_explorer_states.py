@@ -16,8 +16,6 @@ NUMBERS = {
     "peak_time": "peak_time_s",
     "overturned": "overturned",
     "overturn_time": "overturn_time_s",
-    "tipping_time": "tipping_time_s",
-    "unfinished": "unfinished",
     "duration": "duration_s",
     "impacts": "impacts_resolved",
     "time_at_rest": "time_at_rest_s",

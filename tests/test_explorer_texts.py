@@ -9,10 +9,8 @@ import pytest
 from explorer_texts import in_english
 
 import rocking
-from rocking.explorer.core import Explorer
 from rocking.explorer.parameters import ASSESSMENT, MAP, PARAMETERS, READING, SWEEP, specification
-from rocking.explorer.phrases import english, filled, preferred
-from rocking.explorer.server import App
+from rocking.explorer.payload import english, filled
 
 FOLDER = Path(rocking.__file__).parent / "explorer"
 TEXTS = {key: text for key, text in english().items() if key}
@@ -146,30 +144,8 @@ def test_a_count_chooses_its_form(count, expected):
 
 
 def test_the_page_comes_filled_in_with_every_text_and_no_place_is_left():
-    page = filled((FOLDER / "page" / "index.html").read_text("utf-8"), "en", TEXTS | {"save.copy": "</script><b>"})
+    page = filled((FOLDER / "page" / "index.html").read_text("utf-8"), TEXTS | {"save.copy": "</script><b>"})
     found = re.search(r'<script type="application/json" id="texts">(.*?)</script>', page, re.S)
     assert json.loads(found[1])["save.copy"] == "</script><b>" and len(json.loads(found[1])) == len(TEXTS)
     rest = page.replace(found[0], "")
-    assert not re.search(r"\{[a-z]+\.|TEXTS|LANGUAGE", rest) and "&lt;/script&gt;&lt;b&gt;" in rest
-
-
-def test_another_language_is_chosen_by_the_browser_where_a_file_of_it_is_there():
-    files = {"texts.json": b"", "texts.de.json": b""}
-    cases = {
-        "": "en",
-        "de": "de",
-        "de-AT,de;q=0.9,en;q=0.8": "de",
-        "en-US,en;q=0.9,de;q=0.8": "en",
-        "fr": "en",
-        "*;q=x,../de": "en",
-        "en;q=0.5,de": "de",
-    }
-    assert {accepted: preferred(accepted, files) for accepted in cases} == cases
-
-
-def test_a_page_in_another_language_falls_back_to_english_for_what_is_not_translated():
-    app = App(Explorer(), {})
-    app.files["texts.de.json"] = json.dumps({"view.map": "Karte"}).encode()
-    german = app._page("de")
-    assert '<html lang="de">' in german and ">Karte<" in german and ">Compare<" in german
-    assert ">Map<" in app._page("en")
+    assert not re.search(r"\{[a-z]+\.|TEXTS", rest) and "&lt;/script&gt;&lt;b&gt;" in rest

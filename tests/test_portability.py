@@ -5,14 +5,13 @@ import os
 import re
 import socket
 import sys
-import threading
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 from rocking.core import threads
-from rocking.explorer import apart, launch, server
+from rocking.explorer import apart, launch
 from rocking.studies import folder
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -81,17 +80,6 @@ def test_cores_are_all_where_no_affinity_is_known(monkeypatch: pytest.MonkeyPatc
     assert threads.cores() == 7
     monkeypatch.setattr(os, "cpu_count", lambda: None)
     assert threads.cores() == 1
-
-
-@pytest.mark.parametrize(("system", "asked"), [("linux", 1), ("darwin", 0), ("win32", 0)])
-def test_only_linux_knows_the_priority_of_a_thread(monkeypatch: pytest.MonkeyPatch, system: str, asked: int) -> None:
-    # Elsewhere the same call would lower the whole process, or is not there.
-    calls: list[tuple[int, ...]] = []
-    monkeypatch.setattr(sys, "platform", system)
-    monkeypatch.setattr(os, "setpriority", lambda *given: calls.append(given), raising=False)
-    monkeypatch.setattr(os, "PRIO_PROCESS", 0, raising=False)
-    server._lower_priority()
-    assert calls == [(0, threading.get_native_id(), 19)] * asked
 
 
 def limits(refused: set[int]) -> tuple[SimpleNamespace, dict[int, tuple[int, int]]]:

@@ -51,28 +51,22 @@ def made_apart(name: str, data: bytes, options: Mapping[str, Any]) -> Made:
     head = json.dumps({"name": name, "options": dict(options)}).encode()
     places = os.pathsep.join(each for each in sys.path if each)
     environment = {**os.environ, **dict.fromkeys(_ONE_THREAD, "1"), "PYTHONPATH": places}
+    command, sent = [sys.executable, "-P", "-m", __name__], head + b"\n" + data
     try:
-        done = subprocess.run(
-            [sys.executable, "-P", "-m", __name__],
-            input=head + b"\n" + data,
-            capture_output=True,
-            timeout=_PATIENCE,
-            env=environment,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        raise _too_much(name) from None
-    if done.returncode:
-        raise _too_much(name)
-    return _found(done.stdout)
+        done = subprocess.run(command, input=sent, capture_output=True, timeout=_PATIENCE, env=environment, check=True)
+    except subprocess.SubprocessError:
+        limits = f"{_SECONDS} s or {_MEMORY // 2**30} GiB"
+        sentence = f"takes more than {limits} to read: make the mesh coarser, or use it in Python"
+        raise InvalidBlock(sentence, path=name) from None
+    return made_of(done.stdout)
 
 
-def _found(answer: str | bytes) -> Made:
+def made_of(answer: str | bytes) -> Made:
     """Read what the process has answered."""
     found = json.loads(answer)
     if "error" in found:
-        kind = getattr(errors, found["error"])
-        raise kind(found["template"], *found["arguments"], path=found["path"])
+        kind, template, arguments, path = found["error"]
+        raise getattr(errors, kind)(template, *arguments, path=path)
     made = found["made"]
     arrays = {each: np.array(made[each]) for each in ("support", "centre", "inertia_over_mass")}
     regions = [Region(*each) for each in made["regions"]]
@@ -80,14 +74,7 @@ def _found(answer: str | bytes) -> Made:
     return {**made, **arrays, "regions": regions}, Sections(np.array(found["heights"]), pieces)
 
 
-def _too_much(name: str) -> InvalidBlock:
-    return InvalidBlock(
-        f"takes more than {_SECONDS} s or {_MEMORY // 2**30} GiB to read: make the mesh coarser, or use it in Python",
-        path=name,
-    )
-
-
-def _answer(data: bytes) -> dict[str, Any]:
+def answered(data: bytes) -> dict[str, Any]:
     """Read what `made_apart` sends, and return what it reads."""
     head, _, content = data.partition(b"\n")
     asked = json.loads(head)
@@ -96,12 +83,7 @@ def _answer(data: bytes) -> dict[str, Any]:
     try:
         made, sections = made_here(stream, asked["options"])
     except RockingError as error:
-        return {
-            "error": type(error).__name__,
-            "template": error.message.template,
-            "arguments": error.message.arguments,
-            "path": error.path,
-        }
+        return {"error": [type(error).__name__, error.message.template, error.message.arguments, error.path]}
     plain = {name: each.tolist() if isinstance(each, np.ndarray) else each for name, each in made.items()}
     pieces = [(section, np.round(corners, 6).tolist()) for section, corners in sections.pieces]
     return {"made": plain, "heights": sections.heights.tolist(), "pieces": pieces}
@@ -126,4 +108,4 @@ def _limit_this_process() -> None:
 if __name__ == "__main__":
     _limit_this_process()
     out, sys.stdout = sys.stdout, sys.stderr
-    json.dump(_answer(sys.stdin.buffer.read()), out)
+    json.dump(answered(sys.stdin.buffer.read()), out)

@@ -17,15 +17,12 @@ from rocking.core.bisection import bisected
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption, Unfitted
 from rocking.explorer.catalogue import clusters_of, entries_of, title_of
-from rocking.explorer.code import block_options
 from rocking.explorer.inputs import Case, require_rest
 from rocking.explorer.motions import Found, read_motion
 from rocking.explorer.parameters import ASSESSMENT, Texts
-from rocking.explorer.payload import Payload
-from rocking.explorer.phrases import phrase
+from rocking.explorer.payload import Payload, phrase
 from rocking.explorer.uploads import UploadStore
 from rocking.inputs.quantities import number
-from rocking.inputs.texts import command_line
 from rocking.motion.exceedance import lifting_factors
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import FACTOR, Measure
@@ -156,7 +153,6 @@ def described(assessment: Assessment) -> dict[str, Any]:
         "case": None if case.motion is None else _rated(case, case.motion),
         "notes": notes,
         "python": as_python(assessment),
-        "command": as_command(assessment),
     }
 
 
@@ -315,25 +311,3 @@ def as_python(assessment: Assessment) -> str:
         levels=f"np.linspace({assessment.levels[0]!s}, {assessment.levels[-1]!s}, {len(assessment.levels)})",
         options="".join(f", {name}={value!r}" for name, value in given.items() if value is not None),
     )
-
-
-def as_command(assessment: Assessment) -> str | None:
-    """Write the command that computes the same curve; None where its options hold not for all records alike."""
-    case, levels, measure = assessment.case, assessment.levels, assessment.measure
-    alike = {tuple(entry.get(name, "") for name in ("dt", "units", "channel")) for entry in assessment.entries}
-    beyond = {name for entry in assessment.entries for name in entry} - {"motion", "dt", "units", "channel"}
-    words = [assessment.record(k).words for k in range(len(assessment.entries))]
-    if beyond or len(alike) > 1 or "gravity" in case.texts or not all(len(each) == 1 for each in words):
-        return None
-    first = assessment.entries[0]
-    options = {
-        **block_options(case),
-        **{name: case.texts[name] for name in ("chattering",) if name in case.texts},
-        **{name: first[name] for name in ("dt", "units", "channel") if name in first},
-        "measure": measure.name,
-        **({} if measure.period is None else {"period": repr(measure.period)}),
-        "levels": f"{levels[0]!s}:{levels[-1]!s}:{len(levels)}",
-        "polarity": "both",
-        **({} if assessment.stations is None else {"clusters": ",".join(map(str, assessment.clusters))}),
-    }
-    return command_line(["rocking", "fragility", *(each[0] for each in words)], options)

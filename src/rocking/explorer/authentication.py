@@ -47,9 +47,6 @@ LOOPBACK: Final = ("127.0.0.1", "localhost", "[::1]")
 #: Where a token is exchanged for the secret.
 EXCHANGE: Final = "/api/secret"
 
-#: What the state of a request says that carried the secret.
-KNOWN: Final = "known"
-
 #: Links that were made and not opened yet, at most.
 _LINKS: Final = 100
 
@@ -91,10 +88,7 @@ class RequestAuthentication:
             await _answer(send, *refused)
         elif scope["path"] == EXCHANGE and scope["method"] == "POST":
             await _answer(send, *((200, self._secret) if self._redeemed(_bearer(scope)) else (403, _UNKNOWN)))
-        elif hmac.compare_digest(_bearer(scope), self._secret.encode()):
-            scope.setdefault("state", {})[KNOWN] = True
-            await self._application(scope, receive, send)
-        elif _is_public(scope):
+        elif hmac.compare_digest(_bearer(scope), self._secret.encode()) or _is_public(scope):
             await self._application(scope, receive, send)
         else:
             await _answer(send, 403, _UNKNOWN)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import PurePath
 from typing import Any, Final
 from urllib.parse import parse_qsl
@@ -14,7 +14,6 @@ from rocking import records
 from rocking.analysis.levels import numbered
 from rocking.errors import InvalidOption, RockingError
 from rocking.explorer.parameters import PARAMETERS, Texts, field_label, names_of
-from rocking.explorer.phrases import phrase
 from rocking.explorer.uploads import UploadStore, measures
 
 #: Entries of a list in an address at most, and their letters: forty records of two components, and as many again.
@@ -98,7 +97,7 @@ def listing(uploads: UploadStore, answers: Iterable[Texts] = ()) -> dict[str, An
     groups = [_described(group, "") for group in _by_station(_shipped())]
     for group in _by_station(files):
         wrong = [problems[each.key] for each in group if each.key in problems]
-        groups.append(_described(group, " ".join(wrong) or _reason(group)))
+        groups.append(_described(group, " ".join(wrong)))
     return {"groups": groups, "usage": uploads.usage()}
 
 
@@ -132,8 +131,9 @@ def _shipped() -> tuple[Component, ...]:
     for name in records.names():
         record = records.info(name)
         place, up = record.title.rpartition(", ")[0], record.direction == "up"
-        component = Component({"motion": name}, record.title, record.direction, up, measures(records.load(name)))
-        found.append(replace(component, station=place, stem=name.rpartition("-")[0]))
+        texts, stem = {"motion": name}, name.rpartition("-")[0]
+        known = measures(records.load(name))
+        found.append(Component(texts, record.title, record.direction, up, known, station=place, stem=stem))
     return tuple(found)
 
 
@@ -149,11 +149,13 @@ def _of_file(uploads: UploadStore, key: str, answer: Texts) -> list[Component]:
         texts = {"motion": f"file:{key}"} | ({"channel": str(each["number"])} if several else {})
         texts |= {one: given[one] for one in needed if one in given}
         stem, label, is_up, sensor = _parted(name, each["name"], each["azimuth"], several)
-        component = Component(texts, f"{name}, {each['name']}" if several else name, label, is_up, each["measures"])
         found.append(
-            replace(
-                component,
-                **{fact: each[fact] for fact in ("event", "station", "samples", "step", "choices")},
+            Component(
+                texts,
+                f"{name}, {each['name']}" if several else name,
+                label,
+                is_up,
+                **{fact: each[fact] for fact in ("measures", "event", "station", "samples", "step", "choices")},
                 stem=key if several else stem,
                 sensor=sensor,
                 key=key,
@@ -228,20 +230,7 @@ def _as_vertical(upward: Component, beside: Component) -> str:
     return channel if upward.key == beside.key else f"{name}#{channel}"
 
 
-def _reason(group: list[Component]) -> dict[str, Any] | str:
-    """Say by what the components of files were put together."""
-    first = group[0]
-    if len(group) == 1:
-        return ""
-    if len({each.key for each in group}) == 1:
-        return phrase("records.channels")
-    headings = bool(first.station) and first.station == group[1].station
-    if first.step is None or "dt" in first.missing:
-        return phrase("records.by_headings" if headings else "records.by_names")
-    return phrase("records.by_headings_step" if headings else "records.by_names_step", step=first.step)
-
-
-def _described(group: list[Component], reason: dict[str, Any] | str) -> dict[str, Any]:
+def _described(group: list[Component], reason: str) -> dict[str, Any]:
     first = group[0]
     place = ", ".join(part for part in (first.event, first.station) if part)
     return {"title": place or first.stem or first.file, "reason": reason, "rows": [each.described() for each in group]}

@@ -2,95 +2,34 @@
 
 from __future__ import annotations
 
-import math
 import sys
 import tempfile
 import threading
-from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.core.tables import named
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.explorer.code import case_as_command, case_as_python
 from rocking.explorer.inputs import read_case
 from rocking.explorer.meshes import described
 from rocking.explorer.parameters import Texts, names_of
 from rocking.explorer.payload import Payload
-from rocking.explorer.simulated import Simulated, facts
-from rocking.explorer.uploads import UploadStore
-from rocking.explorer.windows import (
+from rocking.explorer.simulated import (
     POINTS,
+    Simulated,
     about_window,
-    begun_window,
     checked_window,
     ends_of,
+    facts,
     ground_in,
     lines_in,
     lines_of,
+    shown_window,
 )
-from rocking.motion.measures import significant_span
-from rocking.response import Response, active_span
-
-
-def _begun(response: Response) -> float:
-    motion = response.motion
-    found = math.nan if motion is None else significant_span(motion, start=0.05)[0]
-    return 0.0 if math.isnan(found) else found
-
-
-def _lifted(response: Response) -> float:
-    times = response.events["time"][response.events["kind"] == "uplift"]
-    return float(times[0]) if len(times) else 0.0
-
-
-#: Moments, s, that are laid over each other; 0 where a response has no such one.
-ALIGNED: Final[Mapping[str, Callable[[Response], float]]] = {
-    "start": lambda _: 0.0,
-    "uplift": _lifted,
-    "arias": _begun,
-}
-
-
-def shift_of(first: Response, second: Response, align: str) -> float:
-    """Return by how much later, s, the second is drawn than it happens, for the chosen moments to coincide.
-
-    Examples
-    --------
-    >>> import rocking
-    >>> block = rocking.Block(width=0.24, height=1.1)
-    >>> first, second = (rocking.simulate(block, rocking.pulses.sine(3.0, f, cycles=2)) for f in (1.0, 2.0))
-    >>> f"{shift_of(first, second, 'uplift'):.4f}"
-    '0.0632'
-    """
-    moment = ALIGNED[checks.one_of(align, "align", InvalidOption, list(ALIGNED))]
-    return moment(first) - moment(second)
-
-
-def as_csv(responses: Mapping[str, Response], shift: float) -> str:
-    """Return the histories of two responses below each other, each under its name, in its own time and the common one.
-
-    Examples
-    --------
-    >>> import rocking
-    >>> block = rocking.Block(width=0.24, height=1.1)
-    >>> response = rocking.simulate(block, rocking.pulses.sine(3.0, 1.0, cycles=1))
-    >>> as_csv({"one": response, "other": response}, 2.0).splitlines()[0]
-    'case,common_time_s,time_s,rotation_rad,angular_velocity_rad_s,ground_acceleration_m_s2'
-    """
-    import pandas as pd
-
-    frames = []
-    for (name, response), later in zip(responses.items(), (0.0, shift), strict=True):
-        frame = response.to_dataframe("histories").reset_index()
-        frame.insert(0, named("common_time", "s"), frame[named("time", "s")] + later)
-        frame.insert(0, "case", name)
-        frames.append(frame)
-    return str(pd.concat(frames).to_csv(index=False))
-
+from rocking.explorer.uploads import Recent, UploadStore
+from rocking.response import active_span
 
 #: Responses that are kept; their steps and the samples of their motions, some hundreds of MB at most.
 _KEPT: Final = 48
@@ -121,9 +60,8 @@ class Explorer:
 
     def __init__(self) -> None:
         self.uploads = UploadStore()
-        self._lock = threading.Lock()
         self._drawing = threading.Lock()
-        self._kept: OrderedDict[tuple[tuple[str, str], ...], Simulated] = OrderedDict()
+        self._kept = Recent[Simulated](_KEPT_ROWS, _rows)
 
     def take_record(self, name: str, data: bytes) -> dict[str, Any]:
         """Keep a record file, and say what it is."""
@@ -135,7 +73,7 @@ class Explorer:
         key = uploads.add_mesh(name, data)
         found = {"key": key, "name": uploads.file(key).name, "azimuth": 0.0}
         try:
-            return found | {"azimuth": uploads.meshes.body(f"file:{key}", {}, None, None).solid.weakest_azimuth}
+            return found | {"azimuth": uploads.body(f"file:{key}", {}, None, None).solid.weakest_azimuth}
         except InvalidBlock as error:
             if error.argument is None:
                 uploads.remove(key)
@@ -145,32 +83,23 @@ class Explorer:
     def forget(self, key: str) -> dict[str, int]:
         """Forget a file with the responses that are of it, and say how many files are kept."""
         self.uploads.remove(key)
-        with self._lock:
-            for case in [case for case in self._kept if any(f"file:{key}" in text for _, text in case)]:
-                del self._kept[case]
+        self._kept.forget(f"file:{key}")
         return self.uploads.usage()
 
     def show(self, texts: Texts) -> Simulated:
         """Return a case with its response."""
-        key = tuple(sorted((name, value) for name, value in texts.items() if value))
-        with self._lock:
-            if key in self._kept:
-                self._kept.move_to_end(key)
-                return self._kept[key]
-        case = read_case(texts, self.uploads)
-        shown = Simulated(case, case.simulate())
-        with self._lock:
-            self._kept[key] = shown
-            while len(self._kept) > 1 and (len(self._kept) > _KEPT or self._rows() > _KEPT_ROWS):
-                self._kept.popitem(last=False)
-        return shown
+
+        def simulated() -> Simulated:
+            case = read_case(texts, self.uploads)
+            return Simulated(case, case.simulate())
+
+        return self._kept.get(tuple(sorted(f"{name}={value}" for name, value in texts.items() if value)), simulated)
 
     def case(self, texts: Texts, window: tuple[float, float] | None = None) -> Payload:
         """Return all that the page says of a case, and its arrays in a window (s; by default where it moves)."""
         shown = self.show(texts)
         response = shown.response
-        window = begun_window(window, response.duration)
-        start, end = active_span(response) if window is None else checked_window(window, response.duration)
+        start, end = shown_window(window, response.duration, active_span(response))
         header = {**facts(shown), "window": about_window(shown, start, end)}
         profile = {} if shown.outline is None else {"profile": shown.outline.ravel()}
         return Payload(header, {**lines_in(shown, start, end), **lines_of(response), **profile})
@@ -187,35 +116,21 @@ class Explorer:
         return Payload({"window": about_window(shown, start, end)}, arrays)
 
     def compare(
-        self,
-        texts: Texts,
-        changed: Texts,
-        window: tuple[float, float] | None = None,
-        *,
-        align: str = "start",
-        whole: bool = False,
+        self, texts: Texts, changed: Texts, window: tuple[float, float] | None = None, *, whole: bool = False
     ) -> Payload:
-        """Return two cases in one window, with chosen moments over each other; the second is ``whole`` or changed."""
-        first, second = self._compared(texts, changed, whole=whole)
-        shift = shift_of(first.response, second.response, align)
-        spans = [active_span(first.response), tuple(end + shift for end in active_span(second.response))]
-        longest = max(first.response.duration, second.response.duration + shift)
-        window = begun_window(window, longest)
-        if window is None:
-            start, end = max(0.0, min(span[0] for span in spans)), max(span[1] for span in spans)
-        else:
-            start, end = checked_window(window, longest)
-        header: dict[str, Any] = {"window": ends_of(start, end), "duration": longest, "shift": shift, "cases": []}
+        """Return two cases in one window; the second is ``whole``, or the first with some texts changed."""
+        first = self.show(texts)
+        both = {"first": first, "second": self.show(changed if whole else _changed(first.case.texts, changed))}
+        longest = max(shown.response.duration for shown in both.values())
+        starts, ends = zip(*(active_span(shown.response) for shown in both.values()), strict=True)
+        start, end = shown_window(window, longest, (min(starts), max(ends)))
+        header = {"window": ends_of(start, end), "duration": longest, "cases": [facts(each) for each in both.values()]}
         arrays: dict[str, Floats] = {}
-        for name, shown, by in (("first", first, 0.0), ("second", second, shift)):
-            header["cases"].append(facts(shown))
-            begin, stop = max(start - by, 0.0), min(end - by, shown.response.duration)
-            if begin < stop:
-                here = lines_in(shown, begin, stop)
-                for key in ("time", "impact", "ground_time"):
-                    here[key] += begin + by - start
-                arrays |= {f"{name}_{key}": values for key, values in here.items()}
-            arrays[f"{name}_rest"] = shown.response.rest_intervals.ravel() + by
+        for name, shown in both.items():
+            stop = min(end, shown.response.duration)
+            if start < stop:
+                arrays |= {f"{name}_{key}": values for key, values in lines_in(shown, start, stop).items()}
+            arrays[f"{name}_rest"] = shown.response.rest_intervals.ravel()
         return Payload(header, arrays)
 
     def body(self, texts: Texts) -> Payload:
@@ -224,21 +139,6 @@ class Explorer:
         if case.body is None:
             raise InvalidOption("this block is of no {}: open one", "mesh")
         return described(case.body, case.azimuth)
-
-    def compared_as_csv(
-        self, texts: Texts, changed: Texts, names: tuple[str, str], *, align: str = "start", whole: bool = False
-    ) -> bytes:
-        """Return the histories of two cases as one table, each under its name."""
-        first, second = (shown.response for shown in self._compared(texts, changed, whole=whole))
-        # A spreadsheet takes no name for a formula.
-        # A formula of a spreadsheet begins so.
-        one, other = (f"'{name}" if name.startswith(("=", "+", "-", "@", "\t", "\r")) else name for name in names)
-        other = f"{other} (other)" if one == other else other
-        return as_csv({one: first, other: second}, shift_of(first, second, align)).encode()
-
-    def _compared(self, texts: Texts, changed: Texts, *, whole: bool) -> tuple[Simulated, Simulated]:
-        first = self.show(texts)
-        return first, self.show(changed if whole else _changed(first.case.texts, changed))
 
     def summary(self, texts: Texts) -> list[tuple[str, str]]:
         """Return the summary of a response row by row: what, and how much."""
@@ -272,14 +172,12 @@ class Explorer:
                         sys.modules["matplotlib.pyplot"].close(figure)
             return file.read_bytes()
 
-    def _rows(self) -> int:
-        """Return the steps of all responses that are kept, and the samples of their motions, which many may share."""
-        motions = {}
-        for shown in self._kept.values():
-            for motion in (shown.case.motion, shown.case.motion and shown.case.motion.vertical):
-                if motion is not None:
-                    motions[id(motion)] = len(motion.breakpoints)
-        return sum(motions.values()) + sum(len(shown.response.solution.trail.nodes) for shown in self._kept.values())
+
+def _rows(shown: Simulated) -> int:
+    """Return the steps of a response and the samples of its motion, at least its share of `_KEPT` responses."""
+    motion = shown.case.motion
+    samples = 0 if motion is None else len(motion.breakpoints) * (1 if motion.vertical is None else 2)
+    return max(samples + len(shown.response.solution.trail.nodes), _KEPT_ROWS // _KEPT)
 
 
 def _changed(texts: Texts, changed: Texts) -> dict[str, str]:

@@ -6,22 +6,20 @@ The texts are those of the page's address: names of the command line's options a
 
 from __future__ import annotations
 
-import bisect
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from rocking.block import Block
 from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.engine.treatment import Treatment, treatment
-from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption, RockingError
+from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
 from rocking.explorer.meshes import Body, pivots_of
 from rocking.explorer.motions import motion_of, texts_of_motion
-from rocking.explorer.parameters import BLOCK_NAMES, NAMES, PARAMETERS, SHAPES, Texts, Values, given_texts, names_of
+from rocking.explorer.parameters import BLOCK_NAMES, NAMES, PARAMETERS, SHAPES, Texts, Values, given_texts
 from rocking.explorer.uploads import UploadStore
 from rocking.inputs.bodies import block_of, call_of
-from rocking.inputs.declared import Input
 from rocking.motion.motion import Motion
 from rocking.motion.piecewise import STRONGEST, TOO_STRONG
 from rocking.response import Response
@@ -32,13 +30,6 @@ _LIVELIEST: Final = 0.998
 
 #: Shortest duration, s: below it arithmetic, and not mechanics, says what is shown.
 _SHORTEST: Final = 1e-12
-
-
-#: Steps of a slider from its low to its high end, as the page has them.
-STEPS: Final = 1000
-
-#: Texts that say whether a block can be made and simulated.
-_OF_BLOCKS: Final = frozenset({*names_of("block"), "gravity", "model", "duration"})
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,7 +192,7 @@ def _block(given: Texts, values: Values, uploads: UploadStore) -> _FoundBlock:
 
 def _of_mesh(given: Texts, values: Values, uploads: UploadStore) -> _FoundBlock:
     """Make the block that the body of a mesh is in the plane of an azimuth."""
-    body = uploads.meshes.body(given["mesh"], given, values.get("tolerance"), values.get("gravity"))
+    body = uploads.body(given["mesh"], given, values.get("tolerance"), values.get("gravity"))
     azimuth, restitution = values["azimuth"], values.get("restitution")
     block = body.solid.block(azimuth, restitution=restitution)
     distances, height, gyration = pivots_of(body, azimuth)
@@ -210,63 +201,3 @@ def _of_mesh(given: Texts, values: Values, uploads: UploadStore) -> _FoundBlock:
         options["restitution"] = given["restitution"]
     python = f"{body.call}.block({azimuth!r}" + ("" if restitution is None else f", restitution={restitution!r}") + ")"
     return _FoundBlock(block, python, options, body)
-
-
-def text_at(parameter: Input, step: int) -> str:
-    """Write the number at a step of a parameter's slider as the page does.
-
-    Examples
-    --------
-    >>> text_at(PARAMETERS["width"], 0), text_at(PARAMETERS["alpha"], 1000)
-    ('0.02', '40deg')
-    """
-    part, (low, high) = step / STEPS, (parameter.low, parameter.high)
-    number = low * (high / low) ** part if parameter.logarithmic else low + part * (high - low)
-    return f"{float(f'{number:.3g}')!r}".removesuffix(".0") + parameter.suffix
-
-
-def tracks(texts: Texts) -> dict[str, list[list[int]]]:
-    """Return the first and the last step of each slider of a case's block, beyond which it would be refused.
-
-    Examples
-    --------
-    >>> found = tracks({"width": "0.4", "height": "1", "offset": "0.05"})
-    >>> [text_at(PARAMETERS["offset"], step) for step in found["offset"][0]]
-    ['-0.1', '0.1']
-    """
-    given = {name: text for name, text in texts.items() if name in _OF_BLOCKS and text}
-    if "mesh" in given:  # it is turned all the way round
-        return {}
-    fields = {name: text for name, text in given.items() if PARAMETERS[name].group == "block"}
-    if "width" in fields:
-        fields.setdefault("offset", "0")
-    return {name: [_track(given, name, fields[name], k) for k in range(fields[name].count(",") + 1)] for name in fields}
-
-
-def _track(given: Texts, name: str, text: str, side: int) -> list[int]:
-    """Return the ends of the stretch of steps about the present one in which the block can be made."""
-    parameter, sides = PARAMETERS[name], text.split(",")
-
-    def refused(step: int) -> bool:
-        changed = ",".join([*sides[:side], text_at(parameter, step), *sides[side + 1 :]])
-        try:
-            read_case({**given, name: changed, "motion": "none"}, UploadStore())
-        except RockingError:
-            return True
-        return False
-
-    here = _nearest(parameter, sides[side])
-    return [here - _reach(lambda k: refused(here - k), here), here + _reach(lambda k: refused(here + k), STEPS - here)]
-
-
-def _nearest(parameter: Input, text: str) -> int:
-    def value(of: str) -> float:
-        found = parameter.read(of)
-        return float(found[0] if isinstance(found, tuple) else found)
-
-    return min(bisect.bisect_left(range(STEPS + 1), value(text), key=lambda k: value(text_at(parameter, k))), STEPS)
-
-
-def _reach(refused: Callable[[int], bool], most: int) -> int:
-    """Return the number of steps before the first that is refused, which all beyond it are."""
-    return max(bisect.bisect_left(range(most + 1), True, key=refused) - 1, 0)

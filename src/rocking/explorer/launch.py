@@ -91,7 +91,6 @@ def served(
     require_packages()
     import uvicorn
 
-    from rocking.explorer.connections import BoundedProtocol
     from rocking.explorer.server import App
 
     application = App(explorer, opening, study, framed_by).asgi
@@ -105,7 +104,8 @@ def served(
         log_level="error",
         access_log=False,
         ws="none",
-        http=BoundedProtocol,
+        http="h11",
+        timeout_keep_alive=10,
         backlog=_WAITING,
         server_header=False,
         limit_concurrency=_MOST,
@@ -205,8 +205,8 @@ def explore(response: Response, *, height: int = 760) -> Frame:
     --------
     >>> import rocking
     >>> response = rocking.simulate(rocking.Block(width=0.24, height=1.1), rocking.pulses.one_sine(3.0, 1.0))
-    >>> rocking.explore(response).texts["motion"]
-    'one-sine:amplitude=3.0,frequency=1.0'
+    >>> rocking.explore(response).texts["width"]
+    '0.24'
     """
     if not isinstance(response, Response):
         raise InvalidOption(

@@ -24,7 +24,7 @@ from rocking.errors import InvalidOption
 from rocking.explorer.inputs import Case, require_possible, require_rest
 from rocking.explorer.motions import arguments_of, is_pulse, pulse_of, pulse_text
 from rocking.explorer.parameters import BLOCK_NAMES, QUANTITIES, Texts, names_of
-from rocking.explorer.phrases import phrase
+from rocking.explorer.payload import phrase
 from rocking.inputs.declared import SCALINGS
 from rocking.inputs.pulses import pulse_texts
 from rocking.inputs.quantities import number
@@ -109,10 +109,7 @@ def grid_of(case: Case, texts: Texts) -> MapGrid:
     """Read the axes of a map: ``x``, ``x_from``, ``x_to``, the same of ``y``, and how many ``points`` each has."""
     if case.motion is None or case.motion.pga == 0.0:
         raise InvalidOption("a map needs something that shakes the block: choose a record or a pulse", "motion")
-    points = number(texts.get("points", "200"), "points")
-    if not (_FEWEST <= points <= _MOST and points == int(points)):
-        raise InvalidOption(f"a map has from {_FEWEST} to {_MOST} points on each axis, not {points:g}")
-    x, y = (_axis(which, case, texts, int(points)) for which in ("x", "y"))
+    x, y = (_axis(which, case, texts) for which in ("x", "y"))
     if x.name == y.name or {x.name, y.name} in ({"omega", "p"}, {"a", "pga"}):  # pairs that vary the same thing
         raise InvalidOption("{} and {} vary the same: choose another pair of axes", x.name, y.name)
     # Blocks of a map over the restitution have one on both sides, and the highest comes to rest last.
@@ -249,23 +246,26 @@ def _described(axis: Axis) -> dict[str, Any]:
     return {"name": axis.name, "label": phrase(f"axis.{kind.name}"), "unit": kind.unit, "values": axis.values.tolist()}
 
 
-def _axis(which: str, case: Case, texts: Texts, points: int) -> Axis:
+def _axis(which: str, case: Case, texts: Texts) -> Axis:
     name = texts.get(which, "")
     if name not in axes_of(case):
         why = "; the slenderness of a mesh follows from its azimuth, which no map varies" if case.body else ""
         raise InvalidOption(f"this case is mapped over {', '.join(axes_of(case))}, not over {name[:20]!r}{why}")
     if which == "x" and name in ("a", "pga"):
         raise InvalidOption("amplitudes go upwards: choose another parameter for the axis to the right")
-    kind = AXES[name]
-    low, high = (
-        number(texts.get(f"{which}_{end}", "") or repr(default), f"{which}_{end}")
-        for end, default in zip(("from", "to"), kind.close, strict=True)
+    return axis_of(name, texts, (f"{which}_from", f"{which}_to", "points"), AXES[name].close)
+
+
+def axis_of(name: str, texts: Texts, keys: tuple[str, str, str], ends: tuple[float, float]) -> Axis:
+    """Read the values of a parameter: the texts of the keys are its ends, by default these, and how many there are."""
+    low, high, count = (
+        number(texts.get(key) or repr(usual), key) for key, usual in zip(keys, (*ends, 200), strict=True)
     )
+    if not (_FEWEST <= count <= _MOST and count == int(count)):
+        raise InvalidOption(f"{{}} must be a whole number from {_FEWEST} to {_MOST}, not {count:g}", keys[2])
     if not 0.0 < low < high < math.inf:
-        raise InvalidOption(
-            f"the axis of {{}} needs a positive start below its end, not {low:g} to {high:g}", name, value=(low, high)
-        )
-    return Axis(name, np.linspace(low, high, points))
+        raise InvalidOption(f"{{}} must be positive and below {{}}; got {low:g} and {high:g}", *keys[:2], value=low)
+    return Axis(name, np.linspace(low, high, int(count)))
 
 
 def _points(grid: MapGrid) -> tuple[Blocks, Floats, Floats]:

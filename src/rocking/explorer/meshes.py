@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import threading
-from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,27 +10,24 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
-from rocking.errors import InvalidBlock, RockingError
+from rocking.errors import RockingError
 from rocking.explorer.apart import made_apart, made_here
-from rocking.explorer.payload import Payload
-from rocking.explorer.phrases import phrase
+from rocking.explorer.payload import Payload, phrase
 from rocking.inputs.quantities import densities, number
 from rocking.solid import Rose, Solid
-from rocking.solid.mesh import SHIPPED
 from rocking.solid.solid import Plane, plane_of
 from rocking.solid.support import directions
 
 if TYPE_CHECKING:
     from rocking.solid.support import Sections
 
-#: Bodies that are kept.
-_KEPT: Final = 12
-
 #: Name and content of a file.
 _File = tuple[str, bytes]
+
+#: Held while a mesh is read, which takes much memory.
+_reading = threading.Lock()
 
 #: Azimuths of the rose, degrees.
 _AZIMUTHS: Final = np.arange(0.0, 360.0, 2.0)
@@ -117,41 +112,19 @@ def pivots_of(body: Body, azimuth: float) -> tuple[tuple[float, float], float, f
     return (plus, minus), plane.height, plane.gyration
 
 
-class MeshStore:
-    """Bodies of files that are kept by key; safe to use from several threads. One file is read at a time."""
-
-    def __init__(self, file: Callable[[str], _File]) -> None:
-        self._file = file
-        self._reading = threading.Lock()
-        self._known: OrderedDict[str, Body | RockingError] = OrderedDict()
-
-    def body(self, name: str, texts: Mapping[str, str], tolerance: float | None, gravity: float | None) -> Body:
-        """Return the body of a mesh, ``statue`` or ``file:KEY``, read with the texts that a case has of it."""
-        key = name.removeprefix("file:")
-        upload = self._file(key) if name.startswith("file:") else None
-        if upload is None:
-            checks.one_of(name, "mesh", InvalidBlock, [*SHIPPED])
-        given = {each: read(texts[each]) for each, read in _READERS.items() if each in texts}
-        given |= {each: value for each, value in (("tolerance", tolerance), ("gravity", gravity)) if value is not None}
-        request = json.dumps([name, upload and upload[0], given])
-        found = self._known.get(request)
-        if found is None:
-            with self._reading:
-                found = self._known.get(request) or _read(name, upload, given)
-                self._known[request] = found
-                while len(self._known) > _KEPT:
-                    self._known.popitem(last=False)
-        if isinstance(found, RockingError):
-            raise found
-        return found
+def options_of(texts: Mapping[str, str], tolerance: float | None, gravity: float | None) -> dict[str, Any]:
+    """Read the texts that a case has of a body as arguments of `rocking.Solid.from_mesh`."""
+    given = {name: read(texts[name]) for name, read in _READERS.items() if name in texts}
+    return given | {name: each for name, each in (("tolerance", tolerance), ("gravity", gravity)) if each is not None}
 
 
-def _read(name: str, upload: _File | None, given: Mapping[str, Any]) -> Body | RockingError:
-    """Read a mesh; what is wrong with it is kept, too, as it would take as long again."""
+def read_body(name: str, upload: _File | None, given: Mapping[str, Any]) -> Body | RockingError:
+    """Read a mesh, one at a time; what is wrong with it is returned, to be kept, as it would take as long again."""
     options = {each: value for each, value in given.items() if each != "gravity"}
     written = "".join(f", {each}={value!r}" for each, value in given.items())
     try:
-        made, sections = made_here(name, options) if upload is None else made_apart(*upload, options)
+        with _reading:
+            made, sections = made_here(name, options) if upload is None else made_apart(*upload, options)
         solid = Solid(gravity=given.get("gravity", STANDARD_GRAVITY), **made)
     except RockingError as error:
         return error

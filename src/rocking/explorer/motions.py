@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
-
-import numpy as np
 
 from rocking import records
 from rocking.core import checks
@@ -15,7 +12,7 @@ from rocking.errors import InvalidMotion, InvalidOption
 from rocking.explorer.parameters import PARAMETERS, PULSES, Texts, Values, given_texts, names_of
 from rocking.explorer.uploads import UploadStore
 from rocking.inputs.declared import SCALINGS
-from rocking.inputs.pulses import FAMILIES, pulse_values
+from rocking.inputs.pulses import pulse_values
 from rocking.inputs.quantities import acceleration, scaling
 from rocking.inputs.texts import arguments as written_arguments
 from rocking.inputs.texts import as_option, as_path
@@ -168,65 +165,7 @@ def pulse_call(text: str, arguments: Mapping[str, str]) -> str:
     return f"rocking.pulses.{pulse_values(text)[0].make.__name__}({written})"
 
 
-def pulse_as_text(motion: Motion) -> str | None:
-    """Write a motion that is one of the pulses, bit for bit and without a vertical component, as text; else None.
-
-    Examples
-    --------
-    >>> pulse_as_text(pulse_of("one-sine:amplitude=3,frequency=2").scaled(2.0))
-    'one-sine:amplitude=6.0,frequency=2.0'
-    """
-    name = motion.description.family.lower().replace(" ", "-")
-    given: dict[str, Any] = dict(motion.description.parameters)
-    if name.endswith("-ricker"):
-        name, given["kind"] = "ricker", name.removesuffix("-ricker")
-    if name not in PULSES or motion.vertical is not None:
-        return None
-    parameters = [*FAMILIES[name].needed, *FAMILIES[name].optional]
-    text = pulse_text(name, {each: value for each, value in given.items() if each in parameters})
-    made = pulse_of(text)
-    same = np.array_equal(made.breakpoints, motion.breakpoints) and np.array_equal(
-        made.coefficients, motion.coefficients
-    )
-    return pulse_text(text, arguments_of(text)) if same else None
-
-
 def texts_of_motion(motion: Motion, uploads: UploadStore, factor: float = 1.0) -> dict[str, str]:
-    """Texts of a motion times a factor: a pulse, or shipped records and their scale, or else the key of the motion."""
-    scaled = motion if factor == 1.0 else motion.scaled(factor)
-    pulse = pulse_as_text(scaled)
-    if pulse is not None:
-        return {"motion": pulse}
-    shipped = _texts_of_shipped(scaled)
-    if shipped is not None:
-        return shipped
+    """Texts of a motion times a factor, which the store keeps under a key."""
     kept = {"motion": f"given:{uploads.add_motion(motion)}"}
     return kept if factor == 1.0 else kept | {"scale": repr(factor)}
-
-
-def _texts_of_shipped(motion: Motion) -> dict[str, str] | None:
-    """Texts of a shipped record times a factor, its vertical component a shipped one as well; None of any other."""
-    components = [motion] if motion.vertical is None else [motion, motion.vertical]
-    if not all(each.name in records.names() for each in components):
-        return None
-    bases = [records.load(each.name) for each in components]
-    factor = _factor_of(motion, bases[0])
-    factors = factor, abs(factor)  # as `Motion.scaled` has it
-    if not all(map(_is_times, components, bases, factors)):
-        return None
-    names = dict(zip(("motion", "vertical"), (each.name for each in components), strict=False))
-    return names if factor == 1.0 else names | {"scale": repr(factor)}
-
-
-def _factor_of(motion: Motion, base: Motion) -> float:
-    """Factor that may make one motion of the other; NaN if none can."""
-    if motion.coefficients.shape != base.coefficients.shape:
-        return math.nan
-    largest = np.unravel_index(np.argmax(np.abs(base.coefficients)), base.coefficients.shape)
-    return float(motion.coefficients[largest] / base.coefficients[largest])
-
-
-def _is_times(motion: Motion, base: Motion, factor: float) -> bool:
-    """Whether a factor makes one motion of the other, bit for bit."""
-    same = np.array_equal(motion.breakpoints, base.breakpoints)
-    return same and np.array_equal(base.coefficients * factor, motion.coefficients)

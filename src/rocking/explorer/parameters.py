@@ -14,7 +14,7 @@ from rocking import records
 from rocking.core.constants import VERSION
 from rocking.engine.treatment import treatment
 from rocking.errors import InvalidOption
-from rocking.explorer.phrases import english
+from rocking.explorer.payload import english
 from rocking.inputs.declared import INPUTS, SCALINGS, Input, by_name
 from rocking.inputs.declared import SHAPES as ALL_SHAPES
 from rocking.inputs.pulses import FAMILIES

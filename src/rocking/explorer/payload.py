@@ -1,16 +1,24 @@
-"""What is sent to the page: plain values and arrays, and their bytes."""
+"""What is sent to the page: plain values, arrays and the keys of texts (the page has the words), and their bytes."""
 
 from __future__ import annotations
 
+import functools
 import json
+import re
 import struct
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from html import escape
+from importlib import resources
+from typing import Any, Final
 
 import numpy as np
 
 from rocking.core.arrays import Floats
 from rocking.core.tables import plain
+
+#: Places of the page that are filled in with a text.
+_PLACE: Final = re.compile(r"\{([a-z]+\.[a-z_]+)\}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,3 +44,34 @@ def pack(payload: Payload) -> bytes:
     header += b" " * (-(4 + len(header)) % 8)
     arrays = (np.ascontiguousarray(values, "<f8").tobytes() for values in payload.arrays.values())
     return b"".join([struct.pack("<I", len(header)), header, *arrays])
+
+
+def phrase(key: str, **values: Any) -> dict[str, Any]:
+    """Return something that the page says: the key of a text, and what is put at its places.
+
+    Examples
+    --------
+    >>> phrase("verdict.overturns", time=1.5)
+    {'phrase': 'verdict.overturns', 'values': {'time': 1.5}}
+    """
+    return {"phrase": key, "values": values}
+
+
+def filled(page: str, texts: Mapping[str, Any]) -> str:
+    """Return the page with its texts: each ``{key}`` is its text, and all texts stand in it for its scripts.
+
+    Examples
+    --------
+    >>> filled('<b title="{save.copy}">{save.copy}</b>TEXTS', {"save.copy": "Copy"})
+    '<b title="Copy">Copy</b>{"save.copy": "Copy"}'
+    """
+    said = json.dumps({key: text for key, text in texts.items() if key}, ensure_ascii=False).replace("<", "\\u003c")
+    return _PLACE.sub(lambda place: escape(texts[place[1]]), page).replace("TEXTS", said, 1)
+
+
+@functools.cache
+def english() -> dict[str, Any]:
+    """Return the English texts by their keys; one that has several forms is a dictionary of them."""
+    file = resources.files("rocking.explorer") / "page" / "texts.json"
+    found: dict[str, Any] = json.loads(file.read_text("utf-8"))
+    return found

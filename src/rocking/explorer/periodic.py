@@ -18,13 +18,11 @@ from rocking.dynamics.maps import Fate, StroboscopicMap, stroboscopic_map
 from rocking.dynamics.orbits import multipliers_at
 from rocking.errors import InvalidOption
 from rocking.explorer.inputs import Case, require_possible
-from rocking.explorer.maps import AXES, Axis, change_pulse
+from rocking.explorer.maps import AXES, Axis, axis_of, change_pulse
 from rocking.explorer.motions import arguments_of, is_pulse, pulse_call, pulse_of
 from rocking.explorer.parameters import Texts
-from rocking.explorer.payload import Payload
-from rocking.explorer.phrases import phrase
+from rocking.explorer.payload import Payload, phrase
 from rocking.inputs.declared import SCALINGS
-from rocking.inputs.quantities import number
 from rocking.motion.motion import Motion
 from rocking.response import Response
 from rocking.simulation.simulate import simulate
@@ -256,8 +254,7 @@ def _trajectory(case: Case, response: Response) -> dict[str, Floats]:
     return {"rotation": line[:, 0], "velocity": line[:, 1], "before": before[:, 1], "after": after[:, 1]}
 
 
-#: Values of a sweep, the steps between those of each level, and how many come at once.
-_LEAST, _MOST = 8, 400
+#: Values of a sweep that come at once.
 _AT_ONCE: Final = 10
 
 _FROM_REST: Final = (0.0, 0.0)
@@ -301,21 +298,10 @@ def sweep_of(case: Case, texts: Texts) -> Sweep:
     name = texts.get("sweep") or "a"
     if name not in ("a", "omega"):
         raise InvalidOption(f"a case is swept over a or omega, not over {name[:20]!r}")
-    points = number(texts.get("sweep_points") or "200", "sweep_points")
-    if not (_LEAST <= points <= _MOST and points == int(points)):
-        raise InvalidOption(f"a sweep has from {_LEAST} to {_MOST} values, not {points:g}")
     omega = values_of(case, sine)["omega"]
     ends = (0.9, float(f"{max(1.5, 2.5 * omega):.2g}")) if name == "a" else AXES["omega"].close
-    low, high = (
-        number(texts.get(end) or repr(default), end)
-        for end, default in zip(("sweep_from", "sweep_to"), ends, strict=True)
-    )
-    if not 0.0 < low < high < math.inf:
-        raise InvalidOption(
-            f"a sweep needs a positive start below its end, not {low:g} to {high:g}", "sweep_from", value=low
-        )
-    sweep = Sweep(case, sine, Axis(name, np.linspace(low, high, int(points))))
-    require_possible(sweep.sine_at(high).amplitude)
+    sweep = Sweep(case, sine, axis_of(name, texts, ("sweep_from", "sweep_to", "sweep_points"), ends))
+    require_possible(sweep.sine_at(float(sweep.axis.values[-1])).amplitude)
     return sweep
 
 

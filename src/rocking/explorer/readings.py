@@ -11,10 +11,8 @@ from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption
 from rocking.explorer.core import Explorer
 from rocking.explorer.parameters import READING, Texts
-from rocking.explorer.payload import Payload
-from rocking.explorer.phrases import phrase
-from rocking.explorer.simulated import Simulated, verdict
-from rocking.explorer.windows import checked_window, extremes
+from rocking.explorer.payload import Payload, phrase
+from rocking.explorer.simulated import Simulated, checked_window, extremes, verdict
 from rocking.response import Response, active_span
 from rocking.response.figure import boundary_of, course_of, marked
 

@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 import math
-import os
 import secrets
 import struct
-import sys
-import threading
-from collections.abc import AsyncIterator, Awaitable, Callable, Generator, Iterator, Mapping
-from concurrent.futures import Executor, ThreadPoolExecutor
-from contextlib import contextmanager
+from collections.abc import AsyncIterator, Awaitable, Callable, Generator, Mapping
 from dataclasses import asdict
 from functools import cached_property
-from importlib import metadata, resources, util
+from importlib import metadata, resources
 from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeVar
-from urllib.parse import quote
 
 import anyio
 import anyio.to_thread
@@ -31,18 +24,16 @@ from rocking.core.tables import plain
 from rocking.errors import InvalidOption, RockingError
 from rocking.explorer import assessment, maps, periodic, readings
 from rocking.explorer.catalogue import entries_of, listing
-from rocking.explorer.code import map_as_code, sweep_as_code
+from rocking.explorer.code import map_as_python, sweep_as_python
 from rocking.explorer.core import EXPORTS, Explorer
-from rocking.explorer.inputs import Case, read_case, tracks
-from rocking.explorer.parameters import PARAMETERS, field_label, specification
-from rocking.explorer.payload import Payload, pack
-from rocking.explorer.phrases import ENGLISH, file_name, filled, phrase, preferred
+from rocking.explorer.inputs import Case, read_case
+from rocking.explorer.parameters import PARAMETERS, QUANTITIES, field_label, specification
+from rocking.explorer.payload import Payload, filled, pack, phrase
 from rocking.explorer.studies import StudyView
-from rocking.explorer.uploads import LARGEST
+from rocking.explorer.uploads import LARGEST, TOO_LARGE
 from rocking.inputs.quantities import number
 
 T = TypeVar("T")
-_Naming = Callable[[str], str]
 
 #: Prefix of the texts of the case that is compared with.
 OTHER: Final = "other."
@@ -75,15 +66,7 @@ def page_files() -> dict[str, bytes]:
 
 def library_folder() -> Path:
     """Return where the plotting library lies in its installed package, without importing that."""
-    version = metadata.version("bokeh")
-    if version.split(".")[0] != "3":
-        raise InvalidOption(f"the explorer needs bokeh 3.9 or a later 3, not {version}: pip install 'bokeh>=3.9,<4'")
-    found = util.find_spec("bokeh")
-    places = found.submodule_search_locations if found else None
-    folder = Path(next(iter(places or ["bokeh"]))) / "server" / "static" / "js"
-    if not all((folder / name).is_file() for name in LIBRARY):
-        raise InvalidOption(f"bokeh {version} is not installed completely: install it again")
-    return folder
+    return Path(str(metadata.distribution("bokeh").locate_file("bokeh/server/static/js")))
 
 
 class Query:
@@ -100,16 +83,6 @@ class Query:
     def others(self) -> dict[str, str]:
         """All that does not belong to the case."""
         return {name: value for name, value in self.given.items() if name not in PARAMETERS}
-
-    @property
-    def compared(self) -> tuple[dict[str, str], dict[str, str]]:
-        """Texts of two cases, or of one and what the other has in their place."""
-        return self.texts(), self.texts(OTHER)
-
-    @property
-    def comparison(self) -> dict[str, Any]:
-        """How two cases are compared: which moments are laid over each other, and whether the other is a whole case."""
-        return {"align": self.given.get("align") or "start", "whole": self.given.get("compare") == "case"}
 
     def number(self, name: str) -> float | None:
         """Return a finite number; None where it is not given."""
@@ -134,6 +107,13 @@ class Query:
         return self.numbers("from", "to") if self.given.get("from") and self.given.get("to") else None
 
 
+class Download(NamedTuple):
+    """A file to be saved: its form, one of `EXPORTS`, and its content."""
+
+    form: str
+    content: bytes
+
+
 class App:
     """The explorer's application; ``opening`` are a bare address's texts, ``framed_by`` pages that may frame it."""
 
@@ -149,11 +129,11 @@ class App:
         self.study = study
         self.framed_by = framed_by
         self.files = page_files()
-        self._pages: dict[str, str] = {}
+        self.html = filled(self.files["index.html"].decode(), json.loads(self.files["texts.json"]))
         self.library = {name: (library_folder() / name).read_bytes() for name in LIBRARY}
         self._threads = anyio.CapacityLimiter(4)  # the other computations wait
-        self._maps = anyio.CapacityLimiter(2)
-        answers: dict[str, Callable[[Query], Payload | Any]] = {
+        self._streams = anyio.CapacityLimiter(2)
+        answers: dict[str, Callable[[Query], Any]] = {
             "/api/start": self._start,
             "/api/case": lambda query: explorer.case(query.texts(), query.window),
             "/api/window": self._window,
@@ -162,94 +142,69 @@ class App:
             "/api/summary": lambda query: explorer.summary(query.texts()),
             "/api/body": lambda query: explorer.body(query.texts()),
             "/api/code": lambda query: explorer.code(query.texts()),
-            "/api/tracks": lambda query: tracks(query.texts()),
-            "/api/compare": lambda query: explorer.compare(*query.compared, query.window, **query.comparison),
-            "/api/map/point": lambda query: maps.texts_at(self._grid(query), *query.numbers("at_x", "at_y")),
-            "/api/map/response": lambda query: readings.thumbnail(
-                explorer, maps.texts_at(self._grid(query), *query.numbers("at_x", "at_y"))
-            ),
+            "/api/compare": self._compare,
+            "/api/export": self._export,
+            "/api/map/point": self._point_of_map,
+            "/api/map/response": lambda query: readings.thumbnail(explorer, self._point_of_map(query)),
             "/api/orbit": lambda query: periodic.orbit(self._case(query)),
             "/api/sweep/point": self._point_of_sweep,
-            "/api/sweep/code": lambda query: sweep_as_code(self._sweep(query)),
+            "/api/sweep/code": lambda query: {"python": sweep_as_python(self._sweep(query))},
             "/api/list": lambda query: listing(explorer.uploads, entries_of(query.given.get("answers", ""))),
+            "/api/records/{key}": self._record,
             "/api/study": lambda query: self._study().slice(query.others),
-            "/api/study/point": lambda query: self._study().texts_at(query.others, explorer.uploads),
-            "/api/study/response": lambda query: readings.thumbnail(
-                explorer, self._study().texts_at(query.others, explorer.uploads)
-            ),
+            "/api/study/point": self._point_of_study,
+            "/api/study/response": lambda query: readings.thumbnail(explorer, self._point_of_study(query)),
         }
+        streams = {"/api/map": self._map, "/api/sweep": self._swept, "/api/assessment": self._assessment}
         self.asgi = Starlette(
             routes=[
                 Route("/", self.page),
                 Route("/page/{name}", self.file),
                 Route("/library/{name}", self.script),
                 *(Route(path, self._answering(work)) for path, work in answers.items()),
-                Route("/api/map", self.map),
-                Route("/api/sweep", self.sweep),
-                Route("/api/assessment", self.assessment),
-                Route("/api/export", self.export),
-                Route("/api/compare/table", self.compared),
+                *(Route(path, self._streaming(begin)) for path, begin in streams.items()),
                 Route("/api/records", self._receiving(explorer.take_record), methods=["POST"]),
                 Route("/api/meshes", self._receiving(explorer.take_mesh), methods=["POST"]),
-                Route("/api/records/{key}", self.record),
-                Route("/api/records/{key}", self.forget, methods=["DELETE"]),
+                Route(
+                    "/api/records/{key}",
+                    self._answering(lambda query: explorer.forget(query.given["key"])),
+                    methods=["DELETE"],
+                ),
             ],
-            exception_handlers={RockingError: self._refusal, Exception: _failure},
+            exception_handlers={RockingError: _refusal, Exception: _failure},
         )
         self.asgi.router.redirect_slashes = False
 
-    async def page(self, request: Request) -> Response:
-        """Return the page in the language of the browser, with a nonce of its own."""
+    async def page(self, _: Request) -> Response:
+        """Return the page, with a nonce of its own."""
         nonce = secrets.token_urlsafe(16)
         policy = (
             "default-src 'none'; script-src 'self'; connect-src 'self'; "
             f"style-src 'self' 'nonce-{nonce}'; img-src 'self' data:; base-uri 'none'; form-action 'none'; "
             f"frame-ancestors {self.framed_by}"
         )
-        html = self._page(self._language(request)).replace("NONCE", nonce)
+        html = self.html.replace("NONCE", nonce)
         return Response(html, media_type="text/html", headers={**_FRESH, "content-security-policy": policy})
 
     async def file(self, request: Request) -> Response:
-        """Return one of the page's own files, in the language of the browser where it has texts."""
-        name = request.path_params["name"]
-        there = file_name(name, self._language(request))
-        return _static(
-            self.files, there if there in self.files else name, {**_SENT_WITH_ALL, "cache-control": "no-cache"}
-        )
-
-    def _language(self, request: Request) -> str:
-        return preferred(request.headers.get("accept-language", ""), self.files)
-
-    def _texts(self, language: str) -> dict[str, Any]:
-        """Return the texts in a language, in English where they are not translated yet."""
-        found: dict[str, Any] = json.loads(self.files["texts.json"])
-        return found if language == ENGLISH else found | json.loads(self.files[file_name("texts.json", language)])
-
-    def _naming(self, request: Request) -> _Naming:
-        """Return what calls an argument as the page does: the label of its field, under the motion of the request."""
-        motion, texts = request.query_params.get("motion", ""), self._texts(self._language(request))
-        return lambda name: field_label(name, motion, texts)
-
-    async def _refusal(self, request: Request, error: Exception) -> Response:
-        assert isinstance(error, RockingError)
-        return JSONResponse(_problem(error, self._naming(request)), 422, headers=_FRESH)
-
-    def _page(self, language: str) -> str:
-        if language not in self._pages:
-            self._pages[language] = filled(self.files["index.html"].decode(), language, self._texts(language))
-        return self._pages[language]
+        """Return one of the page's own files."""
+        return _static(self.files, request.path_params["name"], {**_SENT_WITH_ALL, "cache-control": "no-cache"})
 
     async def script(self, request: Request) -> Response:
         """Return a file of the plotting library."""
         return _static(self.library, request.path_params["name"], _FOR_GOOD)
 
-    def _answering(self, work: Callable[[Query], Payload | Any]) -> Callable[[Request], Awaitable[Response]]:
-        """Return what answers a request with a payload, or with plain values, made in a thread."""
+    def _answering(self, work: Callable[[Query], Any]) -> Callable[[Request], Awaitable[Response]]:
+        """Return what answers a request with a payload, a file, or plain values, made in a thread."""
 
         async def answer(request: Request) -> Response:
-            found = await anyio.to_thread.run_sync(work, Query(request.query_params), limiter=self._threads)
+            query = Query({**request.query_params, **request.path_params})
+            found = await self._in_thread(lambda: work(query))
             if isinstance(found, Payload):
                 return Response(pack(found), media_type="application/octet-stream", headers=_FRESH)
+            if isinstance(found, Download):
+                headers = {**_FRESH, "content-disposition": f"attachment; filename=rocking-response.{found.form}"}
+                return Response(found.content, media_type=EXPORTS[found.form], headers=headers)
             return JSONResponse(plain(found), headers=_FRESH)
 
         return answer
@@ -271,6 +226,21 @@ class App:
         points, ground = int(query.number("points") or 3000), query.given.get("ground") == "1"
         return self.explorer.window(query.texts(), query.numbers("from", "to"), ground=ground, points=points)
 
+    def _compare(self, query: Query) -> Payload:
+        """Return two cases in one window."""
+        whole = query.given.get("compare") == "case"
+        return self.explorer.compare(query.texts(), query.texts(OTHER), query.window, whole=whole)
+
+    def _export(self, query: Query) -> Download:
+        """Return a figure or a table of a case as a file."""
+        form = query.given.get("form", "")
+        return Download(form, self.explorer.export(query.texts(), form, query.window))
+
+    def _record(self, query: Query) -> dict[str, Any]:
+        """Say what a file that is kept is, read with the step and the units that are given now."""
+        units = query.given.get("units") or None
+        return self.explorer.uploads.contents(query.given["key"], query.number("dt"), units)
+
     def _case(self, query: Query) -> Case:
         return read_case(query.texts(), self.explorer.uploads)
 
@@ -279,6 +249,9 @@ class App:
 
     def _sweep(self, query: Query) -> periodic.Sweep:
         return periodic.sweep_of(self._case(query), query.others)
+
+    def _point_of_map(self, query: Query) -> dict[str, str]:
+        return maps.texts_at(self._grid(query), *query.numbers("at_x", "at_y"))
 
     def _point_of_sweep(self, query: Query) -> dict[str, str]:
         """Return the texts of the case at a value of the parameter, released from a state where one is given."""
@@ -290,59 +263,43 @@ class App:
             raise InvalidOption("no study is open: start with rocking explore FOLDER")
         return self.study
 
-    async def map(self, request: Request) -> Response:
-        """Stream a map, coarse to fine: what it shows, then parts of it."""
+    def _point_of_study(self, query: Query) -> dict[str, str]:
+        return self._study().texts_at(query.others, self.explorer.uploads)
 
-        def begun(query: Query) -> _Stream:
-            grid = self._grid(query)
-            return _Stream({**maps.described(grid), **map_as_code(grid)}, maps.parts(grid), _part_of_map)
+    def _map(self, query: Query) -> _Stream:
+        grid = self._grid(query)
+        python = {quantity: map_as_python(grid, quantity) for quantity in QUANTITIES}
+        return _Stream({**maps.described(grid), "python": python}, maps.parts(grid), _part_of_map)
 
-        return await self._streamed(request, begun)
+    def _swept(self, query: Query) -> _Stream:
+        sweep = self._sweep(query)
+        about = {**periodic.described(sweep), "python": sweep_as_python(sweep)}
+        return _Stream(about, periodic.parts(sweep), lambda part: pack(periodic.part_payload(sweep, part)))
 
-    async def sweep(self, request: Request) -> Response:
-        """Stream a sweep under periodic motion, coarse to fine: what is swept, then parts of it, each a payload."""
+    def _assessment(self, query: Query) -> _Stream:
+        found = assessment.assessment_of(self._case(query), query.others, self.explorer.uploads)
+        return _Stream(assessment.described(found), assessment.parts(found), pack)
 
-        def begun(query: Query) -> _Stream:
-            sweep = self._sweep(query)
-            about = {**periodic.described(sweep), **sweep_as_code(sweep)}
-            return _Stream(about, periodic.parts(sweep), lambda part: pack(periodic.part_payload(sweep, part)))
+    def _streaming(self, begin: Callable[[Query], _Stream]) -> Callable[[Request], Awaitable[Response]]:
+        """Return what answers a request part by part, coarse to fine: what is shown, then the parts."""
 
-        return await self._streamed(request, begun)
+        async def answer(request: Request) -> Response:
+            stream = await self._in_thread(lambda: begin(Query(request.query_params)))
+            parts = self._parts(stream, request.query_params.get("motion", ""))
+            return StreamingResponse(parts, media_type="application/octet-stream", headers=_FRESH)
 
-    async def assessment(self, request: Request) -> Response:
-        """Stream an assessment: what it is of, then what each record adds to it, each a payload."""
+        return answer
 
-        def begun(query: Query) -> _Stream:
-            found = assessment.assessment_of(self._case(query), query.others, self.explorer.uploads)
-            return _Stream(assessment.described(found), assessment.parts(found), pack)
-
-        return await self._streamed(request, begun)
-
-    async def _streamed(self, request: Request, begin: Callable[[Query], _Stream]) -> Response:
-        stream = await self._in_thread(lambda: begin(Query(request.query_params)))
-        return StreamingResponse(
-            self._parts(stream, self._naming(request)), media_type="application/octet-stream", headers=_FRESH
-        )
-
-    async def _parts(self, stream: _Stream, naming: _Naming) -> AsyncIterator[bytes]:
+    async def _parts(self, stream: _Stream, motion: str) -> AsyncIterator[bytes]:
         """Parts of a stream as bytes; the work ends with the reader."""
         yield _framed(json.dumps({**stream.about, "problem": None}).encode())
-        async with self._maps:
-            with low_priority() as executor:
-                try:
-                    while (part := await asyncio.wrap_future(executor.submit(_next, stream, naming))) is not None:
-                        yield part
-                finally:
-                    with anyio.CancelScope(shield=True):
-                        await asyncio.wrap_future(executor.submit(stream.parts.close))
-
-    async def export(self, request: Request) -> Response:
-        """Return a figure or a table of a case as a file."""
-        query = Query(request.query_params)
-        form = query.given.get("form", "")
-        content = await self._in_thread(lambda: self.explorer.export(query.texts(), form, query.window))
-        headers = {**_FRESH, "content-disposition": f"attachment; filename=rocking-response.{quote(form)}"}
-        return Response(content, media_type=EXPORTS[form], headers=headers)
+        async with self._streams:
+            try:
+                while (part := await anyio.to_thread.run_sync(_next, stream, motion)) is not None:
+                    yield part
+            finally:
+                with anyio.CancelScope(shield=True):
+                    await anyio.to_thread.run_sync(stream.parts.close)
 
     def _receiving(self, take: Callable[[str, bytes], dict[str, Any]]) -> Callable[[Request], Awaitable[Response]]:
         """Return what takes a file, the raw body, and says what it is."""
@@ -364,28 +321,6 @@ class App:
 
         return receive
 
-    async def compared(self, request: Request) -> Response:
-        """Return two cases as one table."""
-        query = Query(request.query_params)
-        first, second = (query.given.get(name, name)[:120] for name in ("first", "second"))
-        content = await self._in_thread(
-            lambda: self.explorer.compared_as_csv(*query.compared, (first, second), **query.comparison)
-        )
-        headers = {**_FRESH, "content-disposition": "attachment; filename=rocking-compare.csv"}
-        return Response(content, media_type=EXPORTS["csv"], headers=headers)
-
-    async def record(self, request: Request) -> Response:
-        """Say what a file that is kept is, read with the step and the units that are given now."""
-        query, uploads = Query(request.query_params), self.explorer.uploads
-        key, units = request.path_params["key"], query.given.get("units") or None
-        found = await self._in_thread(lambda: uploads.contents(key, query.number("dt"), units))
-        return JSONResponse(found, headers=_FRESH)
-
-    async def forget(self, request: Request) -> Response:
-        """Forget a file that is kept."""
-        usage = await self._in_thread(lambda: self.explorer.forget(request.path_params["key"]))
-        return JSONResponse(usage, headers=_FRESH)
-
 
 class _Stream(NamedTuple):
     """What comes in parts: what is said of it first, the parts, and how one is written."""
@@ -395,12 +330,12 @@ class _Stream(NamedTuple):
     written: Callable[[Any], bytes]
 
 
-def _next(stream: _Stream, naming: _Naming) -> bytes | None:
+def _next(stream: _Stream, motion: str) -> bytes | None:
     """Return the next part as bytes, or what went wrong; None when all have come."""
     try:
         part = next(stream.parts, None)
     except RockingError as error:
-        return _framed(json.dumps(_problem(error, naming)).encode())
+        return _framed(json.dumps(_problem(error, motion)).encode())
     return None if part is None else _framed(stream.written(part))
 
 
@@ -422,28 +357,20 @@ def _static(files: Mapping[str, bytes], name: str, headers: Mapping[str, str]) -
     return Response(files[name], media_type=TYPES[suffix], headers=dict(headers))
 
 
-def _problem(error: RockingError, naming: _Naming) -> dict[str, str | None]:
+def _problem(error: RockingError, motion: str) -> dict[str, str | None]:
     """Return the sentence of an error, in which fields are called as the page calls them, and the argument."""
-    return {"problem": error.text(naming), "argument": error.argument}
+    return {"problem": error.text(lambda name: field_label(name, motion)), "argument": error.argument}
+
+
+async def _refusal(request: Request, error: Exception) -> Response:
+    assert isinstance(error, RockingError)
+    return JSONResponse(_problem(error, request.query_params.get("motion", "")), 422, headers=_FRESH)
 
 
 def _too_large() -> Response:
-    problem = f"a file may be {LARGEST // 2**20} MiB large: cut a record into smaller files, or make a mesh coarser"
-    return JSONResponse({"problem": problem, "argument": None}, 413, headers={**_FRESH, "connection": "close"})
+    return JSONResponse({"problem": TOO_LARGE, "argument": None}, 413, headers={**_FRESH, "connection": "close"})
 
 
 async def _failure(_: Request, error: Exception) -> Response:
     problem = f"this could not be computed ({type(error).__name__}); please report it"
     return JSONResponse({"problem": problem, "argument": None}, 500, headers=_FRESH)
-
-
-@contextmanager
-def low_priority() -> Iterator[Executor]:
-    """Give an executor of one thread that takes the processor only where nobody else wants it (on Linux)."""
-    with ThreadPoolExecutor(1, "rocking-low-priority", initializer=_lower_priority) as executor:
-        yield executor
-
-
-def _lower_priority() -> None:
-    if sys.platform == "linux":
-        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), 19)  # lowest priority of all

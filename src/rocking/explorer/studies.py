@@ -17,8 +17,7 @@ from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import InvalidOption, StudyError
 from rocking.explorer.motions import texts_of_motion
-from rocking.explorer.payload import Payload
-from rocking.explorer.phrases import phrase
+from rocking.explorer.payload import Payload, phrase
 from rocking.explorer.uploads import UploadStore
 from rocking.inputs.quantities import number
 from rocking.inputs.texts import as_path

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import io
+import json
 import threading
 from collections import OrderedDict
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import PurePosixPath, PureWindowsPath
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, Generic, NamedTuple, TypeVar
 
-from rocking.errors import InvalidMotion, RockingError, UnreadableRecord
-from rocking.explorer.meshes import MeshStore
+from rocking.core import checks
+from rocking.errors import InvalidBlock, InvalidMotion, RockingError, UnreadableRecord
+from rocking.explorer.meshes import Body, options_of, read_body
 from rocking.explorer.parameters import MESH_KINDS
 from rocking.inputs.notes import motion_notes
 from rocking.motion.motion import Motion
@@ -20,14 +22,23 @@ from rocking.records import formats
 from rocking.records.formats.channel import Channel
 from rocking.records.formats.source import Request
 from rocking.records.units import CHOICES, find_unit
+from rocking.solid.mesh import SHIPPED
+
+V = TypeVar("V")
 
 #: Largest file, bytes: twenty times a long record of three channels.
 LARGEST: Final = 16 * 2**20
+TOO_LARGE: Final = (
+    f"a file may be {LARGEST // 2**20} MiB large: cut a record into smaller files, or make a mesh coarser"
+)
 
 #: Files that are kept, forty stations of three components, and their bytes; of records more are refused, since none
 #: goes unseen.
 MOST: Final = 120
 ALL: Final = 256 * 2**20
+
+#: Bodies of meshes that are kept.
+_BODIES: Final = 12
 
 #: Samples of one channel at most: an hour and a half at a hundred a second. A motion takes some 120 bytes for each.
 LONGEST: Final = 500_000
@@ -58,24 +69,48 @@ class Upload(NamedTuple):
         return stream
 
 
+class Recent(Generic[V]):
+    """Values that were used last, as many as their weights allow; safe to use from several threads."""
+
+    def __init__(self, most: float, weight: Callable[[V], float] = lambda _: 1.0) -> None:
+        self._most, self._weight = most, weight
+        self._lock = threading.Lock()
+        self._values: OrderedDict[tuple[str, ...], V] = OrderedDict()
+
+    def get(self, key: tuple[str, ...], make: Callable[[], V]) -> V:
+        """Return the value of a key, made now unless it is kept."""
+        with self._lock:
+            if key in self._values:
+                self._values.move_to_end(key)
+                return self._values[key]
+        value = make()
+        with self._lock:
+            self._values[key] = value
+            while len(self._values) > 1 and sum(map(self._weight, self._values.values())) > self._most:
+                self._values.popitem(last=False)
+        return value
+
+    def forget(self, name: str) -> None:
+        """Forget all values whose keys contain a name."""
+        with self._lock:
+            for key in [key for key in self._values if any(name in part for part in key)]:
+                del self._values[key]
+
+
 class UploadStore:
     """Files and motions by keys; safe to use from several threads."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._files: OrderedDict[str, Upload] = OrderedDict()
-        self._read: OrderedDict[tuple[str, ...], Motion] = OrderedDict()
-        self._told: dict[tuple[str, ...], dict[str, Any]] = {}
+        self._files: dict[str, Upload] = {}
         self._motions: dict[str, Motion] = {}
-        self.meshes = MeshStore(lambda key: self.file(key, "mesh"))
+        self._read = Recent[Motion](READ, lambda motion: len(motion.breakpoints))
+        self._told = Recent[dict[str, Any]](4 * MOST)
+        self._bodies = Recent["Body | RockingError"](_BODIES)
 
     def add_file(self, name: str, data: bytes) -> str:
         """Keep a record, and return its key."""
         upload = Upload(bare_name(name), data)
-        if len(data) > LARGEST:
-            raise UnreadableRecord(
-                f"larger than {LARGEST // 2**20} MiB; cut the record into smaller files", path=upload.name
-            )
         if (lines := max(data.count(b"\n"), data.count(b"\r"))) > _MOST_LINES and b"\0" not in data:
             raise UnreadableRecord(
                 f"{lines} lines, of which at most {_MOST_LINES} are read here; cut the record into smaller files",
@@ -89,30 +124,21 @@ class UploadStore:
         if not _is_mesh(upload.name):
             kinds = ", ".join(MESH_KINDS)
             raise UnreadableRecord(f"is no mesh by its name: files of {kinds} are read here", path=upload.name)
-        if len(data) > LARGEST:
-            raise UnreadableRecord(f"larger than {LARGEST // 2**20} MiB; make the mesh coarser", path=upload.name)
         return self._kept(upload)
 
     def _kept(self, upload: Upload) -> str:
-        key = hashlib.sha256(upload.data).hexdigest()[:_HASH]
+        key, usage = hashlib.sha256(upload.data).hexdigest()[:_HASH], self.usage()
+        if len(upload.data) > LARGEST:
+            raise UnreadableRecord(TOO_LARGE, path=upload.name)
+        if key not in self._files and (usage["files"] >= MOST or usage["bytes"] + len(upload.data) > ALL):
+            raise UnreadableRecord(
+                f"it cannot be kept: {MOST} files and {ALL // 2**20} MiB are kept at most; take some out of "
+                "the list of records first",
+                path=upload.name,
+            )
+        # What was made of a content has the name under which that came first, which stays.
         with self._lock:
-            others = {known: each for known, each in self._files.items() if known != key}
-            # No list shows meshes, so that nobody could take one out: the oldest are removed where there are too many.
-            for mesh in [known for known, each in others.items() if _is_mesh(each.name)]:
-                if _is_full(upload, others):
-                    del others[mesh]
-            if _is_full(upload, others):
-                raise UnreadableRecord(
-                    f"it cannot be kept: {MOST} files and {ALL // 2**20} MiB are kept at most; take some out of "
-                    "the list of records first",
-                    path=upload.name,
-                )
-            # What was made of a content has the name under which that came first, which stays.
-            same = self._files.get(key)
-            if same is None or _is_mesh(same.name) != _is_mesh(upload.name):
-                self._files[key] = upload
-            for mesh in self._files.keys() - {*others, key}:
-                del self._files[mesh]
+            self._files.setdefault(key, upload)
         return key
 
     def take(self, name: str, data: bytes) -> dict[str, Any]:
@@ -129,9 +155,8 @@ class UploadStore:
         self.file(key)
         with self._lock:
             self._files.pop(key, None)
-            for store in (self._read, self._told):
-                for request in [each for each in store if each[0] == key]:
-                    store.pop(request, None)
+        for store in (self._read, self._told, self._bodies):
+            store.forget(key)
 
     def kept(self) -> tuple[str, ...]:
         """Return the keys of the records that are kept, in the order in which they came."""
@@ -173,30 +198,27 @@ class UploadStore:
     def read(self, key: str, channel: str | None, dt: float | None, units: str | None) -> Motion:
         """Return the motion of a file; arguments as for `rocking.read`."""
         upload = self.file(key)
-        request = (key, str(channel), str(dt), str(units))
-        with self._lock:
-            known = self._read.get(request)
-            if known is not None:
-                self._read.move_to_end(request)
-                return known
-        motion = _shown(upload, formats.chosen(upload.stream(), _request(dt, units, channel)))
-        with self._lock:
-            self._read[request] = motion
-            self._read.move_to_end(request)
-            while len(self._read) > 1 and sum(len(each.breakpoints) for each in self._read.values()) > READ:
-                self._read.popitem(last=False)
-        return motion
+        request = _request(dt, units, channel)
+        return self._read.get(
+            (key, str(channel), str(dt), str(units)), lambda: _shown(upload, formats.chosen(upload.stream(), request))
+        )
+
+    def body(self, name: str, texts: Mapping[str, str], tolerance: float | None, gravity: float | None) -> Body:
+        """Return the body of a mesh, ``statue`` or ``file:KEY``, read with the texts that a case has of it."""
+        upload = self.file(name.removeprefix("file:"), "mesh") if name.startswith("file:") else None
+        if upload is None:
+            checks.one_of(name, "mesh", InvalidBlock, [*SHIPPED])
+        given = options_of(texts, tolerance, gravity)
+        key = name, upload.name if upload else "", json.dumps(given)
+        found = self._bodies.get(key, lambda: read_body(name, upload, given))
+        if isinstance(found, RockingError):
+            raise found
+        return found
 
     def contents(self, key: str, dt: float | None = None, units: str | None = None) -> dict[str, Any]:
         """Say what a file is: its format, its channels, and which arguments it needs before it can be read."""
-        upload, request = self.file(key), (key, str(dt), str(units))
-        if request not in self._told:
-            told = self._contents(key, upload, dt, units)
-            with self._lock:
-                if len(self._told) >= 4 * MOST:
-                    self._told.clear()
-                self._told[request] = told
-        return self._told[request]
+        upload = self.file(key)
+        return self._told.get((key, str(dt), str(units)), lambda: self._contents(key, upload, dt, units))
 
     def _contents(self, key: str, upload: Upload, dt: float | None, units: str | None) -> dict[str, Any]:
         given: dict[str, Any] = {"dt": dt, "units": units}
@@ -221,22 +243,10 @@ class UploadStore:
         }
 
 
-def _is_full(upload: Upload, others: Mapping[str, Upload]) -> bool:
-    """Whether a file and others together are more than are kept."""
-    return len(others) >= MOST or len(upload.data) + sum(len(each.data) for each in others.values()) > ALL
-
-
 def _about(channel: Channel) -> dict[str, Any]:
     """Return what the file says of a channel."""
-    return {
-        "number": channel.number,
-        "name": channel.name,
-        "station": channel.station,
-        "event": channel.event,
-        "azimuth": channel.azimuth,
-        "samples": len(channel.acceleration),
-        "step": channel.dt,
-    }
+    said = {name: getattr(channel, name) for name in ("number", "name", "station", "event", "azimuth")}
+    return {**said, "samples": len(channel.acceleration), "step": channel.dt}
 
 
 def _request(dt: float | None, units: str | None, channel: str | None = None) -> Request:

@@ -91,7 +91,7 @@ export class View {
           this.page.remember({assessment: {...assessment}});
           this.fill();
           this.facts();
-          showExports("assessment", this.about.python, this.about.command, [], problem);
+          showExports("assessment", this.about.python, null, [], problem);
           continue;
         }
         this.last = unpacked(/** @type {ArrayBuffer} */ (frame.buffer));
@@ -104,7 +104,7 @@ export class View {
       if (this.key === key) this.key = "";
       throw error;
     }
-    showExports("assessment", this.about.python, this.about.command, [
+    showExports("assessment", this.about.python, null, [
       ["rocking-fragility.svg", phrase("save.svg"), () => this.picture("svg")], ["rocking-fragility.png", phrase("save.png"), () => this.picture("png")],
       ["rocking-fragility.csv", phrase("assessment.curve"), async () => new Blob([this.curve()], {type: "text/csv"})],
       ["rocking-records.csv", phrase("assessment.table"), async () => new Blob([this.table()], {type: "text/csv"})],

@@ -1,6 +1,6 @@
 // Two responses over each other: another treatment of chattering, another block, another motion.
 
-import {Latest, file, payload} from "./api.js";
+import {Latest, payload} from "./api.js";
 import {BlockForm, MotionForm, TreatmentForm} from "./forms.js";
 import {Histories} from "./histories.js";
 import {offer} from "./exports.js";
@@ -23,8 +23,6 @@ export class View {
     this.page = page;
     this.with = /** @type {HTMLSelectElement} */ (one("compare-with"));
     this.with.addEventListener("change", () => { page.state.compare = this.with.value; page.state.other = {}; this.form(); this.update(); });
-    this.align = /** @type {HTMLSelectElement} */ (one("compare-align"));
-    this.align.addEventListener("change", () => { page.state.align = this.align.value; page.state.window = null; this.update(); });
     this.histories = new Histories(one("compare-plots"), {window: (chosen) => { page.state.window = chosen; this.update(); }, asked: () => page.state.window, load: () => this.load});
     this.load = new Latest(() => this.run(), (error) => page.problem(error, "view-compare"));
     this.restore();
@@ -38,7 +36,6 @@ export class View {
   /** Show what the state says. */
   restore() {
     this.with.value = this.page.state.compare;
-    this.align.value = this.page.state.align;
     this.form();
   }
 
@@ -75,22 +72,22 @@ export class View {
 
   async run() {
     const {state} = this.page;
-    const {texts, other: chosen, compare: kind, align, good} = state, asked = {...texts, ...this.asked()};
+    const {texts, other: chosen, compare: kind, good} = state, asked = {...texts, ...this.asked()};
     const none = !Object.keys(chosen).length;
     for (const id of DRAWN) one(id).hidden = none;
     if (none) {
       offer([], () => {});
-      this.page.remember({other: chosen, compare: kind, align});
+      this.page.remember({other: chosen, compare: kind});
       return;
     }
     const {header, arrays} = await payload("/api/compare", {...asked, ...ends(state)});
     if (state.good !== good || state.view !== "compare") return; // somebody went back, or elsewhere, meanwhile
     if (state.window && state.window[0] >= header.duration) state.window = null; // it was of longer responses
-    this.page.remember({other: chosen, compare: kind, align, window: state.window});
+    this.page.remember({other: chosen, compare: kind, window: state.window});
     this.draw(header, arrays, kind, chosen);
     // Both blocks have the gravity of the case.
     if (state.other === chosen) this.block?.show({...chosen, gravity: texts.gravity}, header.cases[1].block.sides);
-    this.files(header, kind, asked);
+    this.files(header, kind);
     counted("compared");
   }
 
@@ -109,27 +106,25 @@ export class View {
     const name = kind === "treatment" ? treatmentName(other.treatment) : pinnedAs(chosen)?.name;
     const found = {verdict: inWords(other.verdict), difference: difference(one_, other)};
     tell(one("compare-verdict"), (name ? phrase("compare.verdict_named", {name, ...found}) : phrase("compare.verdict", found)).trim());
-    legend("compare-legend", [["line", phrase("compare.this")], ["second", shifted(header.shift)], ["rest", phrase("compare.at_rest")], ["impact", phrase("compare.impacts")]]);
+    legend("compare-legend", [["line", phrase("compare.this")], ["second", phrase("compare.other")], ["rest", phrase("compare.at_rest")], ["impact", phrase("compare.impacts")]]);
   }
 
-  /** What may be saved: both cases, each under its name. @param {any} header @param {string} kind of what is compared
-   * @param {Texts} texts with which they were asked for */
-  files({cases: [first, other]}, kind, texts) {
+  /** What may be saved: both cases, each under its name. @param {any} header @param {string} kind of what is compared */
+  files({cases: [first, other]}, kind) {
     const [one_, second] = [caseName(first), kind === "treatment" ? phrase("compare.treated", {name: caseName(other), treatment: treatmentName(other.treatment)}) : caseName(other)];
     const name = `rocking-compare-${slug(one_)}-and-${slug(second)}`;
-    const asked = {...texts, first: one_, second};
     /** @type {[string, string][]} */
     const entries = [[phrase("compare.entry_this", {name: one_}), colour("ink")], [phrase("compare.entry_other", {name: second}), colour("second")]];
     const drawn = (/** @type {"svg" | "png"} */ form) => this.histories.picture(form, entries);
     offer([
-      [`${name}.svg`, phrase("compare.svg"), () => drawn("svg")], [`${name}.png`, phrase("compare.png"), () => drawn("png")], [`${name}.csv`, phrase("compare.csv"), () => file("/api/compare/table", asked)],
+      [`${name}.svg`, phrase("compare.svg"), () => drawn("svg")], [`${name}.png`, phrase("compare.png"), () => drawn("png")],
     ], (error) => this.page.problem(error, "exports"));
   }
 
   /** What is asked of the server besides the case and the window. @returns {Texts} */
   asked() {
-    const {other, compare, align} = this.page.state;
-    return {...Object.fromEntries(Object.entries(other).map(([name, value]) => [`other.${name}`, value])), compare, align};
+    const {other, compare} = this.page.state;
+    return {...Object.fromEntries(Object.entries(other).map(([name, value]) => [`other.${name}`, value])), compare};
   }
 }
 
@@ -156,12 +151,6 @@ function larger(texts) {
   const resized = (/** @type {string} */ text, factor = 1) =>
     (factor === 1 ? text : text.split(",").map((each) => String(Number((factor * parseFloat(each)).toPrecision(12))) + each.replace(/^[\s\d.eE+-]+/, "")).join(","));
   return Object.fromEntries(namesOf("block").filter((name) => texts[name]).map((name) => [name, resized(texts[name], factors[parameter(name).kind])]));
-}
-
-/** What the other response is called, where it was moved in time. @param {number} by s */
-function shifted(by) {
-  const time = short(Math.abs(by));
-  return by > 0 ? phrase("compare.other_later", {time}) : by < 0 ? phrase("compare.other_earlier", {time}) : phrase("compare.other");
 }
 
 /** @param {any} first @param {any} second */

@@ -61,16 +61,9 @@ class NumberControl {
     this.slider.setAttribute("aria-valuetext", `${written} ${this.spec.unit}`.trim());
   }
 
-  /** Let the track end where Python would refuse the number. @param {number[]} ends first and last step */
-  track([first, last]) {
-    this.slider.min = String(first);
-    this.slider.max = String(last);
-    this.show(this.text);
-  }
-
   slid() {
     const part = Number(this.slider.value) / this.steps;
-    const {low, high, logarithmic, suffix} = this.spec.own ?? this.spec; // rounded in the unit in which the server says where tracks end
+    const {low, high, logarithmic, suffix} = this.spec.own ?? this.spec; // rounded in its own unit, whatever unit is shown
     this.text = Number((logarithmic ? low * (high / low) ** part : low + part * (high - low)).toPrecision(3)) + suffix;
     const written = shown(this.value(this.text));
     this.field.value = written;
@@ -135,14 +128,6 @@ export class BlockForm {
       else if (name === "restitution" && this.known) this.put(name, this.known.map((side) => String(side.restitution)));
     }
     this.showFields();
-  }
-
-  /** @param {Record<string, number[][]>} found steps between which the block can be made, by name for both sides or for each */
-  tracks(found) {
-    for (const [name, ends] of Object.entries(found)) {
-      const {both, pair} = this.controls[name];
-      for (const [k, control] of [both, ...pair].entries()) control.track(ends[Math.max(0, k - 1)] ?? ends[0]);
-    }
   }
 
   /** @param {string} name @param {string[]} texts one, or one for each side */

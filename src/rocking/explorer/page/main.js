@@ -146,7 +146,6 @@ const afterPause = new Latest(async () => {
   if (!shown || shown === rested) return;
   const {header} = shown, of = texts;
   if (state.texts === of) forms.block.show(of, header.block.sides);
-  const tracks = json("/api/tracks", of).catch(() => ({}));
   entitle(header);
   showNotes(header);
   showLegend(header);
@@ -160,10 +159,8 @@ const afterPause = new Latest(async () => {
     const {python, command} = await json("/api/code", of);
     if (texts === of && !ofOwn(state.view)) showCode("case", python, command);
   }
-  const found = await tracks;
   rested = shown;
   if (state.texts !== of) return;
-  forms.block.tracks(found);
   counted("rested");
 }, (error) => { if (error) problem(error); }); // that all is well with what is shown says nothing of what is in the fields
 

@@ -273,10 +273,10 @@ export class View {
 
   /** What can be saved: the picture, the numbers, and code that computes them again. */
   offer() {
-    const {python, command} = this.about;
+    const {python, command = null} = this.about;
     const name = this.study ? "rocking-study" : "rocking-map";
     const {quantity} = this.page.state.map;
-    showExports("map", this.study ? python : python[quantity], (this.study ? command : command[quantity]) ?? null, !this.complete ? [] : [
+    showExports("map", this.study ? python : python[quantity], command, !this.complete ? [] : [
       [`${name}.svg`, phrase("save.svg"), () => this.picture.file("svg")], [`${name}.png`, phrase("save.png"), () => this.picture.file("png")],
       [`${name}.csv`, phrase("save.numbers"), async () => new Blob([this.table()], {type: "text/csv"})],
     ], (error) => this.page.problem(error, "exports"));

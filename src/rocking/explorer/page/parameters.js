@@ -8,9 +8,9 @@ import {one} from "./words.js";
 import {known, phrase} from "./texts.js";
 
 /** @typedef {import("./api.js").Texts} Texts */
-/** @typedef {{view: string, texts: Texts, other: Texts, compare: string, align: string, window: [number, number] | null, at: number | null, lecture: boolean, example: {name: string, step: number} | null, map: Texts, sweep: Texts, assessment: Texts, good: Good}} State */
+/** @typedef {{view: string, texts: Texts, other: Texts, compare: string, window: [number, number] | null, at: number | null, lecture: boolean, example: {name: string, step: number} | null, map: Texts, sweep: Texts, assessment: Texts, good: Good}} State */
 /** What was answered last of each part of the state: it alone enters the address.
- * @typedef {{texts: Texts, other: Texts, compare: string, align: string, window: [number, number] | null, map: Texts, sweep: Texts, assessment: Texts}} Good */
+ * @typedef {{texts: Texts, other: Texts, compare: string, window: [number, number] | null, map: Texts, sweep: Texts, assessment: Texts}} Good */
 /** @typedef {{name: string, label: string, group: string, kind: string, unit: string, suffix: string, default: string, units: Record<string, number>, low: number, high: number, logarithmic: boolean, step: number, values: string, explanation: string, own?: Parameter}} Parameter `own` is as the server says, where the page shows another unit */
 
 /** @type {any} */
@@ -54,8 +54,6 @@ export function pulseOf(text) {
 
 const VIEWS = ["response", "block", "map", "periodic", "compare", "records", "assessment"];
 const COMPARED = ["treatment", "block", "motion", "case"];
-/** Which moments of two responses are laid over each other. */
-const ALIGNED = ["start", "uplift", "arias"];
 
 /** @returns {State} */
 export function readAddress() {
@@ -70,7 +68,7 @@ export function readAddress() {
   const from = Number(given.get("from") ?? NaN), to = Number(given.get("to") ?? NaN), time = Number(given.get("at") || NaN);
   const parts = {
     texts: complete(Object.keys(texts).length ? texts : opening), other: those(namesOf(), "other."),
-    compare: COMPARED.find((each) => each === given.get("compare")) ?? COMPARED[0], align: ALIGNED.find((each) => each === given.get("align")) ?? ALIGNED[0],
+    compare: COMPARED.find((each) => each === given.get("compare")) ?? COMPARED[0],
     window: /** @type {[number, number] | null} */ (from < to ? [from, to] : null), map: those(specification.map), sweep: those(specification.sweep), assessment: those(specification.assessment),
   };
   return {
@@ -120,7 +118,6 @@ export function writeNow(state) {
   put(good.texts, namesOf());
   if (state.view === "compare") {
     given.set("compare", good.compare);
-    if (good.align !== ALIGNED[0]) given.set("align", good.align);
     put(good.other, namesOf(), "other.");
   }
   if (state.view === "map") put(good.map, specification.map);

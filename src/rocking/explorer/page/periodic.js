@@ -362,8 +362,8 @@ export class View {
 
   /** What can be saved: the picture, the numbers, and code that computes them again. */
   offerFiles() {
-    const {python, command} = this.about;
-    showExports("diagram", python, command, !this.complete ? [] : [
+    const {python} = this.about;
+    showExports("diagram", python, null, !this.complete ? [] : [
       ["rocking-diagram.svg", phrase("save.svg"), () => this.picture("svg")], ["rocking-diagram.png", phrase("save.png"), () => this.picture("png")],
       ["rocking-diagram.csv", phrase("save.numbers"), async () => new Blob([this.table()], {type: "text/csv"})],
     ], (error) => this.page.problem(error, "exports"));
