@@ -8,7 +8,7 @@ import numpy as np
 from rocking.kernels import ground, state
 from rocking.kernels.lanes import pool_of
 from rocking.kernels.periodic import TRAP, Setting
-from rocking.kernels.sine import lanes, sequence
+from rocking.kernels.sine import sequence
 from rocking.kernels.trace import Trail
 
 
@@ -65,9 +65,7 @@ def signatures() -> dict[str, tuple[Any, ...]]:
         "sine.sequence.fitted_amplitudes": (given(), given(), True, reals()),
         "population.shares": (*shares, reals(1, 1, kind=np.float32), reals()),
         "population.log_density": (reals(1, 1), reals(1, 1), reals(), reals()),
-        "sine.arc.first_impact": (1.0, 1.0),
-        "sine.lanes.rest_phases": (sequences, count, np.zeros(1, lanes.GROUP), lanes.Answers(reals(), statuses)),
-        "sine.sequence.rest_phase": (1.0, 1.0, 1.0),
+        "sine.sequence.rest_phases": (sequences, reals(), statuses),
         "sine.sequence.resolve": (1.0, 1.0, 1.0, 1.0, np.zeros(1, sequence.IMPACT)),
         "sine.sequence.semianalytical_phases": (sequences, count, reals(), statuses),
         "sine.sequence.critical_amplitudes": (given(), given(), reals()),
