@@ -1,6 +1,5 @@
 """The theory over its whole range of frequency and restitution, against many digits and against limits."""
 
-
 import numpy as np
 import pytest
 from flint import arb, ctx
