@@ -131,7 +131,7 @@ class AsymptoticTime(Treatment):
 
     def limits(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
         """Chattering time of every side, s; infinite where chattering is not complete."""
-        from rocking.kernels.sine.series import eq65_time
+        from rocking.kernels.sine.series import eq65_sums
 
         if motion is None or motion.description.family != "sine":
             raise InvalidOption(
@@ -151,8 +151,9 @@ class AsymptoticTime(Treatment):
         critical, lossy = np.ones(frequency.shape), eta < 1.0
         critical[lossy] = critical_amplitudes_by(self.critical, frequency[lossy], eta[lossy])
         complete = (amplitude >= 1.0) & (amplitude < critical)
-        cases = zip(amplitude.flat, frequency.flat, eta.flat, strict=True)
-        times = np.reshape([eq65_time(*case) for case in cases], amplitude.shape)
+        first, third = np.reshape([eq65_sums(e) for e in eta.flat], (*eta.shape, 2)).T
+        excess = np.where(complete, amplitude - 1.0, 0.0).T
+        times = (np.sqrt(excess) * (first + excess * third) / frequency.T).T
         return np.where(complete, times / bodies.p, np.inf)
 
 

@@ -8,9 +8,9 @@ import numpy as np
 from rocking.kernels.arc import restoring, sign_of
 from rocking.kernels.certificate import Proof, prove_rest
 from rocking.kernels.compiled import inlined, shared
+from rocking.kernels.events import is_drawn, middle_factor
 from rocking.kernels.ground import Ground, coefficient, length_of, start_of
 from rocking.kernels.remaining import THIRD, Pair
-from rocking.kernels.restitution import is_drawn, middle_factor
 from rocking.kernels.state import PROVEN_PER_ITERATION, Record, Records, RestRule, write_impact, write_node
 
 ULP = 2.0**-52
