@@ -191,7 +191,9 @@ def finish_step(ground: Ground, settings: Record, state: Record, end: StepEnd, l
     """Move the state to the end of a step; returns what ended it (`Outcome`)."""
     if end.peak > state.peak:
         raise_peak(state, end.peak, time_of(ground, state) + end.peak_time)
-    stopped = end.outcome == Outcome.STEP and end.time >= left and is_last(ground, settings, state)
+    until_stop = settings.stop - start_of(ground, state.piece) - state.offset
+    is_last = until_stop <= length_of(ground, state.piece) - state.offset
+    stopped = end.outcome == Outcome.STEP and end.time >= left and is_last
     start = state.offset
     state.offset += end.time
     if state.offset == start:  # an ulp at least, so that every march ends
@@ -290,13 +292,6 @@ def time_left(ground: Ground, settings: Record, state: Record) -> float:
     """Time to the end of the piece, or of the response where that comes first."""
     until_stop = settings.stop - start_of(ground, state.piece) - state.offset
     return min(length_of(ground, state.piece) - state.offset, until_stop)
-
-
-@inlined
-def is_last(ground: Ground, settings: Record, state: Record) -> bool:
-    """Whether the response ends within the piece."""
-    until_stop = settings.stop - start_of(ground, state.piece) - state.offset
-    return bool(until_stop <= length_of(ground, state.piece) - state.offset)
 
 
 @inlined

@@ -60,7 +60,6 @@ def signatures() -> dict[str, tuple[Any, ...]]:
         "sine.series.eq65_sums": (1.0,),
         "sine.series.eq65_terms": (1.0, reals(), reals()),
         "sine.series.series_arcs": (reals(1, 1), True, 1.0, 1.0, reals(1, 1), reals(1, 1), reals(1, 1, 1)),
-        "sine.sequence.fitted_amplitudes": (given(), given(), True, reals()),
         "population.shares": (*shares, reals(1, 1, kind=np.float32), reals()),
         "population.log_density": (reals(1, 1), reals(1, 1), reals(), reals()),
         "sine.sequence.rest_phases": (sequences, reals(), statuses),
