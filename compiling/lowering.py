@@ -41,7 +41,6 @@ from numba.core.types.misc import unliteral
 from numba.extending import register_model
 
 from rocking.kernels import compiled
-from rocking.kernels.library import layout
 
 #: Modules of the kernels that one process translates; a second one translates the others, which takes about as long.
 MARCHES = ("march", "lanes", "periodic")
@@ -166,12 +165,12 @@ class Part:
 def described(kind: Any) -> Any:
     """Describe a type of numba's for the manifest (see `rocking.kernels.library`)."""
     if isinstance(kind, types.Record):
-        return {"record": layout(support.as_dtype(kind))}
+        return {"record": str(support.as_dtype(kind).descr)}
     if isinstance(kind, types.Array):
         if kind.layout != "C":
             raise TypeError(f"{kind} is not contiguous")
         about = {"dimensions": kind.ndim, "readonly": not kind.mutable, "aligned": kind.aligned}
-        return {"items": layout(support.as_dtype(kind.dtype)), **about}
+        return {"items": str(support.as_dtype(kind.dtype).descr), **about}
     if isinstance(kind, types.BaseTuple):
         return {"tuple": [described(member) for member in kind.types]}
     for name, plain in (("bool", types.Boolean), ("int", (types.Integer, types.IntEnumMember)), ("float", types.Float)):

@@ -5,7 +5,6 @@ import pytest
 from oracles.sine_chattering import rest_time
 
 from rocking import chattering
-from rocking.chattering import duration
 from rocking.kernels.sine import Verdict
 from rocking.kernels.sine.sequence import semianalytical_phases
 
@@ -146,21 +145,3 @@ def test_every_method_broadcasts_and_knows_the_ends(method):
     assert np.isnan(times[0]).all() and (times[1] == 0.0).all()
     single = chattering.chattering_time(1.01, 2.0, 0.92, method=method)
     assert np.ndim(single) == 0 and single == pytest.approx(times[2, 1, 2], rel=1e-14)
-
-
-def test_a_time_does_not_depend_on_its_neighbours_in_the_array():
-    a, omega, eta = random_parameters(3000, seed=7)
-    together = chattering.chattering_time(a, omega, eta)
-    alone = np.array([chattering.chattering_time(*case) for case in zip(a[:300], omega[:300], eta[:300], strict=True)])
-    assert (np.isnan(together[:300]) == np.isnan(alone)).all()
-    away = chattering.critical_amplitude(omega[:300], eta[:300]) - a[:300] > 1e-4
-    assert np.count_nonzero(away & np.isfinite(alone)) >= 100
-    assert np.nanmax(np.abs(together[:300] / alone - 1.0)[away]) < 1e-12
-
-
-def test_threads_give_the_same_bits(monkeypatch):
-    a, omega, eta = random_parameters(40_000, seed=8)
-    monkeypatch.setattr(duration, "cores", lambda: 3)
-    shared_out = chattering.chattering_time(a, omega, eta)
-    monkeypatch.setattr(duration, "cores", lambda: 1)
-    assert np.array_equal(shared_out, chattering.chattering_time(a, omega, eta), equal_nan=True)

@@ -8,7 +8,6 @@ import pytest
 
 from rocking import Block, InvalidBlock, InvalidMotion, InvalidOption, RockingError, chattering, dynamics, pulses
 from rocking.chattering import chattering_map, chattering_time, families
-from rocking.chattering.duration import first_arc
 from rocking.dynamics import BouncingBall, ImpactOscillator, InvertedPendulum, simulate, simulate_many
 
 BLOCK = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.8)
@@ -104,7 +103,6 @@ CALLS = [
     (lambda: chattering.sequence([1.03, 1.04], 2.0, 0.92), InvalidOption, "single number"),
     (lambda: chattering.sequence(0.99, 2.0, 0.92), InvalidOption, "does not lift off"),
     (lambda: chattering.sequence(1.03, 2.0, 0.92, tolerance=0.0), InvalidOption, "tolerance"),
-    (lambda: first_arc(0.9, 2.0), InvalidOption, "a must be at least 1"),
     (lambda: chattering.critical_amplitude(2.0, 0.92, method="eq78"), InvalidOption, "method must be"),
     *(
         (lambda omega=omega, eta=eta: chattering.critical_amplitude(omega, eta, method="approximation"),

@@ -8,8 +8,17 @@ from hypothesis import strategies as st
 from kernel_records import in_units_of_g, numbers, one_sided, rocking_block, rules_for, state_of
 from oracles.taylor import System, after, coefficients, mp
 
-from rocking.kernels.arc import converged, evaluate, expand, expand_nonlinear, linear_order, step_length
-from rocking.kernels.series import NEGLIGIBLE, linear_coefficients, shortened_linear
+from rocking.kernels.arc import (
+    NEGLIGIBLE,
+    converged,
+    evaluate,
+    expand,
+    expand_checked,
+    linear_order,
+    shortened,
+    step_length,
+)
+from rocking.kernels.series import linear_coefficients
 from rocking.kernels.state import ORDER, Record, new_scratch
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
@@ -66,12 +75,13 @@ def linear_series(
     scratch["ground"][: len(A)] = A
     degree = len(A) - 1
     order = linear_order(lam, h) if degree <= 1 else ORDER
-    linear_coefficients(one_sided(lam, gain, threshold, 0.5), start, scratch, degree, order)
+    body = one_sided(lam, gain, threshold, 0.5)
+    linear_coefficients(body, start, scratch, degree, order)
     if degree > 1:
         order = converged(scratch["rotation"], degree, h)
         if order > ORDER:
             scratch["weight"][0] = 1.0
-            order, h = ORDER, shortened_linear(scratch, lam, 0, h)
+            order, h = ORDER, shortened(body, rules_for(), 0, scratch, (degree, 0), h)
     return scratch["rotation"], order, h
 
 
@@ -83,7 +93,7 @@ def nonlinear_series(
     scratch["weight"][0] = 1.0
     block = rocking_block((p, p), (alpha, alpha), nonlinear=True)
     block["stiffness"] = lam
-    order, h = expand_nonlinear(block, state_of(0, u, v), scratch, (len(A) - 1, 0), h)
+    order, h = expand_checked(block, rules_for(nonlinear=True), state_of(0, u, v), scratch, (len(A) - 1, 0), h)
     return scratch["rotation"], order, h
 
 

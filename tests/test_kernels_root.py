@@ -1,6 +1,5 @@
 """The search for the first root, against exact rational arithmetic."""
 
-import itertools
 import math
 from collections.abc import Sequence
 
@@ -11,8 +10,6 @@ from hypothesis import strategies as st
 from kernel_records import ULP
 from oracles.exact import as_float, exact, polynomial, real_roots
 
-from rocking.kernels import events
-from rocking.kernels.compiled import UNCOMPILED
 from rocking.kernels.events import curvature_bound, first_root
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
@@ -169,36 +166,3 @@ def test_the_curvature_is_never_below_its_bound(terms: list[float], lead: int, h
     curvature = np.polynomial.Polynomial(terms).deriv(2)(np.linspace(0.0, h, 101))
     assert bound >= 0.0
     assert np.all(curvature >= -bound * (1.0 + 1e-12) - 1e-12)
-
-
-@pytest.fixture
-def visited(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """Times at which the uncompiled search evaluates its series."""
-    seen: list[float] = []
-    evaluate = events.deflated
-
-    def counted(c: np.ndarray, lead: int, order: int, t: float) -> tuple[float, float]:
-        seen.append(t)
-        return evaluate(c, lead, order, t)
-
-    monkeypatch.setattr(events, "deflated", counted)
-    return seen
-
-
-uncompiled = pytest.mark.skipif(not UNCOMPILED, reason="counts the calls of an uncompiled kernel")
-
-
-@uncompiled
-@pytest.mark.parametrize("third", [0.0, -1.0, 1.0])
-def test_a_simple_root_takes_few_steps_which_double_its_digits(visited: list[float], third: float) -> None:
-    found = first_root(np.array([1.0, -1.5, -0.4, third]), 0, 3, 1.0)
-    errors = [found - t for t in visited if found - t > 1e-15]
-    assert len(visited) <= 7
-    assert all(after <= 3.0 * before**2 for before, after in itertools.pairwise(errors))
-
-
-@uncompiled
-@pytest.mark.parametrize("scale", [1e-3, 1e-6, 1e-12])
-def test_an_arc_much_shorter_than_the_interval_takes_few_steps(visited: list[float], scale: float) -> None:
-    first_root(np.array([1e-6 * scale**3, 1e-6 * scale**2, scale, -1.0]), 0, 3, 1.0)
-    assert len(visited) <= 80

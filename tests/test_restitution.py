@@ -20,7 +20,7 @@ from rocking import (
     one_sided_restitution,
 )
 from rocking.block import housner_restitution
-from rocking.kernels.restitution import factor, uniform
+from rocking.kernels.events import factor, uniform
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 

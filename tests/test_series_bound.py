@@ -7,7 +7,7 @@ import pytest
 from kernel_records import in_units_of_g, rocking_block, rules_for, state_of
 from oracles.taylor import System, angles, coefficients, mp
 
-from rocking.kernels import series
+from rocking.kernels import arc, series
 from rocking.kernels.arc import ORDER, evaluate, expand
 from rocking.kernels.state import new_scratch
 
@@ -91,9 +91,9 @@ def test_the_bound_holds_all_that_a_series_leaves_out(nonlinear: bool, order: in
             sine, cosine = angles(alpha, c, order)
             scratch["sine"][:order] = [float(x) for x in sine[:order]]
             scratch["cosine"][:order] = [float(x) for x in cosine[:order]]
-            bound, _ = series.truncation_nonlinear(scratch, 1.0, (len(push) - 1, len(weight) - 1), order, h)
+            bound, _ = arc.truncation_nonlinear(scratch, 1.0, (len(push) - 1, len(weight) - 1), order, h)
         else:
-            bound, _ = series.truncation_linear(scratch, 1.0, len(weight) - 1, order, h)
+            bound, _ = arc.truncation_linear(scratch, 1.0, len(weight) - 1, order, h)
         left_out = float(mp.fsum(abs(k * c[k]) * mp.mpf(h) ** k for k in range(order + 1, terms)))
         if math.isinf(bound):
             continue
@@ -125,7 +125,7 @@ def test_the_bound_of_nine_terms_is_that_of_any_number(count: int) -> None:
         if sizes.sum() > 0.25 or lam * strength[0] > 0.25 or angles.sum() > 0.4:
             continue
         judged += 1
-        bound, _ = series.truncation_nonlinear(scratch, lam, (1, 1), 9, 1.0)
+        bound, _ = arc.truncation_nonlinear(scratch, lam, (1, 1), 9, 1.0)
         nothing, rest = series.truncation_is_negligible(tuple(sizes), tuple(angles), lam, strength)
         assert rest == pytest.approx(np.arange(2.0, 9.0) @ sizes[2:])
         if nothing:

@@ -9,9 +9,6 @@ from hypothesis import strategies as st
 
 import rocking
 from rocking.chattering import critical_amplitude, sequence
-from rocking.kernels.sine.sequence import distance_exponent
-
-pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 
 FREQUENCIES = st.floats(math.log(0.02), math.log(200.0)).map(math.exp)
 
@@ -27,13 +24,6 @@ def test_two_bounds_hold_for_the_critical_amplitude_at_any_restitution(omega, et
 def test_the_bounds_are_reached_in_the_limits():
     assert critical_amplitude(0.05, 0.5) == pytest.approx(math.hypot(1.0, 0.05), abs=1e-9)
     assert critical_amplitude(1e4, 1e-8) == pytest.approx(math.hypot(1.0, math.pi / 2.0 - 2.0 / math.pi), rel=1e-3)
-
-
-def test_the_exponent_has_the_limits_of_the_page():
-    assert distance_exponent(0.9999) == pytest.approx(0.6, abs=1e-6)
-    for eta in (1e-3, 1e-4):
-        z = 1.0 - eta / math.sqrt(2.0)
-        assert distance_exponent(eta) == pytest.approx(-math.log(1.0 - z) / math.log(4.0 / (1.0 - z)), rel=1e-3)
 
 
 def test_intervals_alternate_about_the_restitution_and_repeat_with_its_square():

@@ -27,16 +27,11 @@ from rocking.core.tables import counted
 from rocking.core.threads import cores, in_threads
 from rocking.errors import InvalidOption
 from rocking.kernels.sine import Verdict
-from rocking.kernels.sine.arc import first_impact
-from rocking.kernels.sine.lanes import GROUP, GROUPS, WIDTH, Answers, rest_phases
 from rocking.kernels.sine.sequence import IMPACT as RESOLVED
-from rocking.kernels.sine.sequence import resolve, semianalytical_phases
+from rocking.kernels.sine.sequence import resolve, rest_phases, semianalytical_phases
 
-#: Sequences of a part, which is sorted and computed by one thread: few enough for a core's own cache.
-_PART: Final = 1 << 14
-
-#: Classes of eta, and of the excess of a over one as a share of 1 - eta, by which sequences are sorted.
-_CLASSES: Final = 255
+#: Sequences that one thread computes at a time.
+_PART: Final = 1 << 12
 
 #: Impacts that the paper resolves, and at which restitution.
 _PAPER_IMPACTS: Final = 60
@@ -223,15 +218,6 @@ def sequence(a: float, omega: float, eta: float, *, tolerance: float = 1e-12) ->
     return ChatteringSequence(impacts, False, math.nan, math.nan, math.nan)
 
 
-def first_arc(a: float, omega: float) -> tuple[float, float]:
-    """Dimensionless time from uplift to the first impact, and the speed before it, however long the arc lasts."""
-    amplitude, frequency, _ = _single_case(a, omega, 1.0)
-    if amplitude == 1.0:
-        return 0.0, 0.0
-    status, phase, speed = first_impact(amplitude - 1.0, frequency)
-    return (phase / frequency, speed / frequency) if status == Verdict.FOUND else (math.nan, math.nan)
-
-
 def interval_ratios(a: float, omega: float, eta: float, n: int) -> Floats:
     """Ratios of the intervals between every second impact, which tend to eta^2 (paper, Eq. 73 and Fig. 3).
 
@@ -287,32 +273,20 @@ def _resolved(
 
 def _exact_times(a: Floats, omega: Floats, eta: Floats) -> Floats:
     shape, (amplitudes, frequencies, restitutions) = broadcast(a, omega, eta)
-    phases = np.where(amplitudes == 1.0, 0.0, math.nan)
-    statuses = np.full(phases.size, Verdict.FOUND, np.int8)
+    times = np.where(amplitudes == 1.0, 0.0, math.nan)
+    rock = np.flatnonzero((amplitudes > 1.0) & (restitutions < 1.0))
 
-    def part(some: slice) -> None:
-        sequences = amplitudes[some], frequencies[some], restitutions[some]
-        order = _alike_together(sequences[0], sequences[2])
-        rest_phases(sequences, order, np.zeros(GROUPS + 1, GROUP), Answers(phases[some], statuses[some]))
+    def part(start: int) -> None:
+        some = rock[start : start + _PART]
+        phases, statuses = np.zeros(some.size), np.zeros(some.size, np.int8)
+        rest_phases((amplitudes[some], frequencies[some], restitutions[some]), phases, statuses)
+        phases[statuses == Verdict.INCOMPLETE] = math.nan
+        phases[statuses == Verdict.UNRESOLVED] = math.inf
+        times[some] = phases / frequencies[some]
 
-    # The compiled function holds no lock.
-    parts = [slice(start, start + _PART) for start in range(0, phases.size, _PART)]
-    for _ in in_threads(part, parts, threads=cores()):
+    for _ in in_threads(part, range(0, rock.size, _PART), threads=cores()):  # the compiled function holds no lock
         pass
-    phases[statuses == Verdict.INCOMPLETE] = math.nan
-    phases[statuses == Verdict.UNRESOLVED] = math.inf
-    return (phases / frequencies).reshape(shape)[()]
-
-
-def _alike_together(a: Floats, eta: Floats) -> NDArray[np.int64]:
-    """Pick the sequences that rock, sorted coarsely by eta and then by a: those of a block take like steps."""
-    rock = np.flatnonzero((a > 1.0) & (eta < 1.0))
-    if rock.size <= WIDTH:
-        return rock
-    loss = 1.0 - eta[rock]
-    classes = (_CLASSES * loss).astype(np.uint16)
-    share = (_CLASSES * np.minimum((a[rock] - 1.0) / loss, 1.0)).astype(np.uint16)
-    return rock[np.argsort(classes * np.uint16(_CLASSES) + share, kind="stable")]
+    return times.reshape(shape)[()]
 
 
 def _semianalytical_times(a: Floats, omega: Floats, eta: Floats, resolved: int | None) -> Floats:

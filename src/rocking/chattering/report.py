@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.chattering.amplitude import critical_amplitude
-from rocking.chattering.duration import chattering_time, first_arc, sequence
+from rocking.chattering.duration import chattering_time, sequence
 from rocking.chattering.expansions import (
     HIGHEST_ORDER,
     LOOK_AHEAD,
@@ -149,7 +149,7 @@ class ChatteringReport(Result):
 
     def _pair(self, values: dict[str, float], equation: str, *, time: bool) -> str:
         if math.isnan(values["exact"]):
-            return f"none, the block does not come down; Eq. {equation[2:]} means nothing here"
+            return f"none within half a period; Eq. {equation[2:]} means nothing here"
         approximate = f"{values[equation]:.9g} by Eq. {equation[2:]}"
         exact = self._time(values["exact"]) if time else f"{values['exact']:.9g}"
         return f"{exact} exact, {approximate}"
@@ -183,8 +183,8 @@ def chattering_report(
     if p is not None:
         p = checks.positive(p, "p", InvalidOption, "rad/s")
     exact = sequence(a, omega, eta)
-    impacts = [(row["interval"], row["speed_before"]) for row in exact.impacts[:1]]
-    interval, speed = impacts[0] if impacts else first_arc(a, omega)
+    no_arc = 0.0 if exact.complete else math.nan
+    interval, speed = exact.impacts[["interval", "speed_before"]][0] if exact.impacts.size else (no_arc, no_arc)
     series = _series(a, omega, eta, order)
     times = {
         method: float(chattering_time(a, omega, eta, method=method, resolved=resolved))

@@ -19,7 +19,7 @@ from rocking.dynamics.forcing import parts_of
 from rocking.dynamics.maps import StroboscopicMap
 from rocking.dynamics.orbits import multipliers_at, sizes_of
 from rocking.errors import InvalidOption
-from rocking.kernels.periodic import TRAP, settle
+from rocking.kernels.periodic import TRAP, iterate
 from rocking.kernels.state import Records, new_scratch
 
 #: Longest period of an attractor, in periods of the motion, and how near a state must come back to be on one, over the
@@ -106,7 +106,7 @@ def _fixed_point(strobe: StroboscopicMap, at: Floats, period: int, size: Floats)
 
 
 def _trap(strobe: StroboscopicMap, attractor: Attractor, point: Floats, record: Records, size: Floats) -> Floats | None:
-    """Neighbourhood of a point of an attractor that no state leaves, as a row for `kernels.periodic.settle`."""
+    """Neighbourhood of a point of an attractor that no state leaves, as a row for `kernels.periodic.iterate`."""
     side, u, v = int(record["side"]), float(record["u"]), float(record["v"])
     if side < 0:  # at rest, wherever it came from
         return np.array([side, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -210,11 +210,11 @@ class KnownAttractors:
 
     def settled(self, made: Records, periods: int, threads: int) -> tuple[Integers, Integers]:
         """Trap in which each of some states, which are moved on, comes within so many periods, or -1; and how many."""
-        setting, traps = self.strobe._setting(), self.traps
+        setting, traps, orbits = self.strobe._setting(), self.traps, np.empty((len(made), 0, 3))
         found, taken = np.empty(len(made), dtype=np.int64), np.empty(len(made), dtype=np.int64)
 
         def follow(part: slice) -> None:
-            settle(setting, new_scratch(), made[part], periods, traps, found[part], taken[part])
+            iterate(setting, new_scratch(), made[part], periods, orbits[part], traps, found[part], taken[part])
 
         for _ in in_threads(follow, parts_of(len(made), periods), threads=threads):
             pass

@@ -16,8 +16,8 @@ from rocking.dynamics.forcing import PeriodicForcing, parts_of, repeated
 from rocking.engine.treatment import Treatment, VelocityThreshold
 from rocking.errors import InvalidOption
 from rocking.kernels import state
+from rocking.kernels.periodic import TRAP, differentiate, iterate, to_next_impact
 from rocking.kernels.periodic import Fate as Fate
-from rocking.kernels.periodic import differentiate, iterate, to_next_impact
 from rocking.motion.motion import Motion
 
 #: Fields of a body's record that are a side's own.
@@ -115,10 +115,11 @@ class StroboscopicMap(PeriodicForcing):
     def _iterate(self, made: state.Records, periods: int = 1, rows: Floats | None = None) -> None:
         setting = self._setting()
         orbits = np.empty((len(made), 0, 3)) if rows is None else rows
-        impacts = np.zeros(len(made), dtype=np.int64)
+        traps, counts = np.empty((0, TRAP)), np.zeros((2, len(made)), dtype=np.int64)
 
         def follow(part: slice) -> None:
-            iterate(setting, state.new_scratch(), made[part], periods, orbits[part], impacts[part])
+            found, taken = counts[:, part]
+            iterate(setting, state.new_scratch(), made[part], periods, orbits[part], traps, found, taken)
 
         for _ in in_threads(follow, parts_of(len(made), periods), threads=cores()):
             pass

@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields
 from typing import ClassVar, Final, Literal, get_args
 
 import numpy as np
+from numpy.polynomial import polynomial
 
 from rocking.block import Blocks
 from rocking.block.body import Bodies
@@ -131,7 +132,7 @@ class AsymptoticTime(Treatment):
 
     def limits(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
         """Chattering time of every side, s; infinite where chattering is not complete."""
-        from rocking.kernels.sine.series import eq65_time
+        from rocking.kernels.sine.series import eq65_sums
 
         if motion is None or motion.description.family != "sine":
             raise InvalidOption(
@@ -151,8 +152,9 @@ class AsymptoticTime(Treatment):
         critical, lossy = np.ones(frequency.shape), eta < 1.0
         critical[lossy] = critical_amplitudes_by(self.critical, frequency[lossy], eta[lossy])
         complete = (amplitude >= 1.0) & (amplitude < critical)
-        cases = zip(amplitude.flat, frequency.flat, eta.flat, strict=True)
-        times = np.reshape([eq65_time(*case) for case in cases], amplitude.shape)
+        first, third = np.reshape([eq65_sums(e) for e in eta.flat], (*eta.shape, 2)).T
+        excess = np.where(complete, amplitude - 1.0, 0.0).T
+        times = (np.sqrt(excess) * (first + excess * third) / frequency.T).T
         return np.where(complete, times / bodies.p, np.inf)
 
 
@@ -308,15 +310,26 @@ def treatment(chattering: str | Treatment) -> Treatment:
         raise InvalidOption(sentence, "chattering", *error.message.arguments) from None
 
 
+#: The paper's fits of the critical amplitude: row i, column j has the coefficient of eta^i omega^j.
+_EQ76: Final = np.array([
+    [1.079, 0.1405, -0.02818, 0.00176],
+    [-0.1885, -0.1903, 0.03236, -0.00185],
+    [0.6442, 0.06413, -0.003045, 0.0],
+    [-0.7372, -0.0187, 0.0, 0.0],
+    [0.2146, 0.0, 0.0, 0.0],
+])  # fmt: skip
+_EQ77: Final = np.array([[1.271], [-0.45], [0.5763], [-0.3941]])
+
+
 def critical_amplitudes_by(method: str, omega: Floats, eta: Floats) -> Floats:
     """Critical amplitudes over g alpha, flat: "exact", or by the paper's fits "eq76" and "eq77"."""
-    from rocking.kernels.sine.sequence import critical_amplitudes, fitted_amplitudes
+    from rocking.kernels.sine.sequence import critical_amplitudes
 
-    found = np.ones(omega.size)
     if method != "exact":
         warn_outside_fit(method, omega, eta)
-        fitted_amplitudes(omega, eta, method == "eq76", found)
-        return found
+        fitted: Floats = polynomial.polyval2d(eta, omega, _EQ76 if method == "eq76" else _EQ77)
+        return fitted
+    found = np.ones(omega.size)
     lossy = np.flatnonzero(eta < 1.0)
     for some in ranges(lossy.size, _CRITICAL_TOGETHER):
         here = np.zeros(lossy[some].size)

@@ -13,18 +13,17 @@ from enum import IntEnum
 from rocking.core.arrays import Floats
 from rocking.kernels.arc import evaluate, expand, restoring, sign_of
 from rocking.kernels.compiled import inlined, kernel, shared
+from rocking.kernels.events import middle_factor
 from rocking.kernels.ground import absolute_sums, has_vertical, vertical_of
-from rocking.kernels.restitution import middle_factor
+from rocking.kernels.restraints import apply_tendon_law, plastic_after
 from rocking.kernels.series import variation_coefficients
 from rocking.kernels.state import Record, Records, TendonLaw
-from rocking.kernels.tendon import apply_tendon_law, plastic_after
 from rocking.kernels.trace import (
     Quantity,
     Trail,
-    add_restraints,
     elapsed,
     elongation_rate,
-    expand_coefficients,
+    expand_free,
     is_impact,
     is_jump,
     plastic_by_start,
@@ -268,10 +267,7 @@ def back_through(
     """Take ``change`` back through a time t of the arc from a node, expanded to the order and of the degree given."""
     order, degree = orders
     x = work.change
-    expand_coefficients(trail, scratch, work, node.side, degree, order)
-    add_restraints(trail, scratch, work, node.side, order)
-    for j in range(order - 1):
-        work.forcing[j] = 0.0
+    expand_free(trail, scratch, work, node.side, degree, order)
     drag = trail.block.damping[node.side]
     x[0], x[1] = 1.0, 0.0
     variation_coefficients(work, drag, order)

@@ -17,6 +17,7 @@ import numpy as np
 from rocking.core.arrays import Floats
 from rocking.kernels.arc import restoring, sign_of, weight_series
 from rocking.kernels.compiled import inlined, shared
+from rocking.kernels.events import least_factor, middle_factor
 from rocking.kernels.ground import (
     ROUNDING,
     Ground,
@@ -29,9 +30,8 @@ from rocking.kernels.ground import (
     vertical_of,
 )
 from rocking.kernels.remaining import Pair, Restoring, deviation, refined_bracket, remaining_time
-from rocking.kernels.restitution import least_factor, middle_factor
+from rocking.kernels.restraints import may_change_below
 from rocking.kernels.state import Record
-from rocking.kernels.tendon import may_change_below
 
 #: Window of the proof over the first estimate of the remaining time.
 _WINDOW = 1.5
@@ -158,7 +158,8 @@ def prove_rest(ground: Ground, block: Record, settings: Record, scratch: Record,
         return unproven()
     least, change = min(first.least, second.least), max(first.change, second.change)
     height = v * v * (1.0 + 2.0 * change / least) / least
-    if has_vertical(ground) and not is_greatest_at_zero(block, height):
+    # Up to twice the slenderness the weight's part of the restoring acceleration is greatest at zero rotation.
+    if has_vertical(ground) and not height <= 2.0 * min(block.slenderness[0], block.slenderness[1]):
         return unproven()
     if (block.two_stops and height >= block.overturn_angle) or (
         block.yielding and may_change_below(block, settings, state.plastic, height)
@@ -204,12 +205,6 @@ def bounds_on_motion(ground: Ground, block: Record, state: Record, window: float
         limits = (limits[0], np.inf) if state.side == 0 else (-np.inf, limits[1])
     horizontal = bounds_over(ground, state.piece, state.offset, window, limits, scratch.ground)
     return MotionBounds(widened(horizontal, ground.error), vertical)
-
-
-@inlined
-def is_greatest_at_zero(block: Record, height: float) -> bool:
-    """Whether the weight's part of the restoring acceleration is nowhere up to a height above that at zero rotation."""
-    return height <= 2.0 * min(block.slenderness[0], block.slenderness[1])
 
 
 class Horizon(NamedTuple):
@@ -346,9 +341,7 @@ def side_bounds(block: Record, settings: Record, j: int, motion: MotionBounds) -
         spring += 0.5 * abs(block.prestress[j])
     stiffness = (abs(block.stiffness[j]) * bend + spring) * (1.0 + ROUNDING)
     per_push = (block.stiffness[j] if settings.nonlinear else block.threshold_slope[j]) * (1.0 + ROUNDING)
-    per_weight = (
-        block.threshold_slope[j] * threshold * (1.0 + ROUNDING)
-    )  # largest at zero rotation: `is_greatest_at_zero`
+    per_weight = block.threshold_slope[j] * threshold * (1.0 + ROUNDING)  # largest at zero rotation: see `prove_rest`
     return Bounds(
         stiffness,
         block.threshold_slope[j]

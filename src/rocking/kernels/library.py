@@ -192,32 +192,15 @@ def _record_taker(kind: dict[str, Any]) -> Taker:
     return take
 
 
-def _layout_check(expected: Any) -> Callable[[np.dtype[Any]], None]:
+def _layout_check(expected: str) -> Callable[[np.dtype[Any]], None]:
     """Return a check of types, which compares the layout of another type than the last one only."""
     known: np.dtype[Any] | None = None
 
     def check(kind: np.dtype[Any]) -> None:
         nonlocal known
         if kind is not known:
-            if layout(kind) != expected:
+            if str(kind.descr) != expected:
                 raise TypeError(f"items of type {kind} are laid out otherwise")
             known = kind
 
     return check
-
-
-def layout(kind: np.dtype[Any]) -> Any:
-    """Describe a type of array items or records for the manifest: names, offsets and types of all fields.
-
-    Examples
-    --------
-    >>> layout(np.dtype([("u", "f8"), ("sides", "i8", (2,))]))
-    {'size': 24, 'fields': [['u', 0, 'f8'], ['sides', 8, ['i8', 2]]]}
-    """
-    if kind.subdtype is not None:
-        items, shape = kind.subdtype
-        return [layout(items), *shape]
-    if kind.fields is not None:
-        fields = [[name, kind.fields[name][1], layout(kind.fields[name][0])] for name in kind.names or ()]
-        return {"size": kind.itemsize, "fields": fields}
-    return f"{kind.kind}{kind.itemsize}" if kind.isnative else kind.str

@@ -10,7 +10,6 @@ from rocking.kernels.certificate import unproven
 from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.events import StepEnd, advance, apply_impact, first_root, raise_peak
 from rocking.kernels.ground import Ground, has_vertical, is_straight, last_piece, length_of, start_of
-from rocking.kernels.leaning import leaning_at
 from rocking.kernels.rest import (
     ULP,
     Rest,
@@ -21,6 +20,7 @@ from rocking.kernels.rest import (
     rest_after_impact,
     time_of,
 )
+from rocking.kernels.restraints import apply_tendon_law, change_law, elongation_at, leaning_at, next_law
 from rocking.kernels.short_arc import short_step, undecided
 from rocking.kernels.state import (
     AT_REST,
@@ -38,7 +38,6 @@ from rocking.kernels.state import (
     write_node,
     write_sequence,
 )
-from rocking.kernels.tendon import apply_tendon_law, change_law, elongation_at, next_law
 from rocking.kernels.uplift import is_hardly_pushed, next_uplift
 
 #: Distance from zero rotation that is within rounding, over the highest rotation so far.
@@ -91,7 +90,11 @@ def march_step(ground: Ground, block: Record, settings: Record, table: Records, 
     if outcome == Outcome.IMPACT or (outcome == Outcome.OVERTURN and block.two_stops):
         return pass_impact(ground, block, settings, table, scratch, state)
     if outcome == Outcome.OVERTURN:
-        return end_by_overturning(ground, block, settings, table, state)
+        state.end = state.peak_time = time_of(ground, state)
+        state.peak = block.overturn_angle
+        write_node(ground, settings, table, state)
+        write_event(settings, table, state, state.end, EventKind.OVERTURN)
+        return Ending.OVERTURNED
     if outcome == Outcome.STOPPED:
         state.end = settings.stop
         state.peak_time = min(state.peak_time, settings.stop)  # a peak there may be a rounding later
@@ -188,15 +191,23 @@ def finish_step(ground: Ground, settings: Record, state: Record, end: StepEnd, l
     """Move the state to the end of a step; returns what ended it (`Outcome`)."""
     if end.peak > state.peak:
         raise_peak(state, end.peak, time_of(ground, state) + end.peak_time)
-    stopped = end.outcome == Outcome.STEP and end.time >= left and is_last(ground, settings, state)
-    advance_time(state, end.time)
+    until_stop = settings.stop - start_of(ground, state.piece) - state.offset
+    is_last = until_stop <= length_of(ground, state.piece) - state.offset
+    stopped = end.outcome == Outcome.STEP and end.time >= left and is_last
+    start = state.offset
+    state.offset += end.time
+    if state.offset == start:  # an ulp at least, so that every march ends
+        state.offset += ULP * start
     state.u = end.u
     state.v = end.v
     state.continuous_uplift = False
     if stopped:
         return Outcome.STOPPED
-    if end.outcome == Outcome.STEP:
-        enter_piece(ground, state, end.time >= left)
+    if end.outcome == Outcome.STEP and end.time >= left:
+        state.piece += 1
+        state.offset = 0.0
+    elif end.outcome == Outcome.STEP:
+        normalize_offset(ground, state)  # the piece may be over by rounding
     return end.outcome
 
 
@@ -277,46 +288,10 @@ def come_to_rest(ground: Ground, block: Record, settings: Record, table: Records
 
 
 @inlined
-def end_by_overturning(ground: Ground, block: Record, settings: Record, table: Records, state: Record) -> int:
-    """End a march in overturning."""
-    state.end = state.peak_time = time_of(ground, state)
-    state.peak = block.overturn_angle
-    write_node(ground, settings, table, state)
-    write_event(settings, table, state, state.end, EventKind.OVERTURN)
-    return Ending.OVERTURNED
-
-
-@inlined
 def time_left(ground: Ground, settings: Record, state: Record) -> float:
     """Time to the end of the piece, or of the response where that comes first."""
     until_stop = settings.stop - start_of(ground, state.piece) - state.offset
     return min(length_of(ground, state.piece) - state.offset, until_stop)
-
-
-@inlined
-def is_last(ground: Ground, settings: Record, state: Record) -> bool:
-    """Whether the response ends within the piece."""
-    until_stop = settings.stop - start_of(ground, state.piece) - state.offset
-    return bool(until_stop <= length_of(ground, state.piece) - state.offset)
-
-
-@inlined
-def advance_time(state: Record, t: float) -> None:
-    """Advance the time by t, and by an ulp at least, so that every march ends."""
-    start = state.offset
-    state.offset += t
-    if state.offset == start:
-        state.offset += ULP * start
-
-
-@inlined
-def enter_piece(ground: Ground, state: Record, over: bool) -> None:
-    """After a step: the start of the next piece if this one is over, by the step's length or by rounding."""
-    if over:
-        state.piece += 1
-        state.offset = 0.0
-    else:
-        normalize_offset(ground, state)
 
 
 @inlined

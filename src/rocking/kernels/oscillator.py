@@ -4,6 +4,7 @@ import math
 
 from rocking.core.arrays import Floats
 from rocking.kernels.compiled import inlined, kernel, shared
+from rocking.kernels.events import deflated
 from rocking.kernels.ground import move
 
 #: Length of the work array beyond the columns of the motion: 0.25**16 / 16! = 1e-23.
@@ -73,7 +74,7 @@ def _advance(series: Floats, force: Floats, h: float, frequency: float, damping:
         restoring = 2.0 * damping * frequency * (k + 1) * series[k + 1] + frequency * frequency * series[k]
         series[k + 2] = -(acceleration + restoring) / ((k + 1) * (k + 2))
     peak = _larger(series, h, peak)
-    series[0], series[1] = _value(series, h), _slope(series, h)
+    series[0], series[1] = deflated(series, 0, len(series) - 1, h)[0], _slope(series, h)
     return peak
 
 
@@ -90,7 +91,7 @@ def _larger(series: Floats, h: float, peak: float) -> float:
     at, width = 0, _FINEST
     left = abs(series[0])
     while at < _FINEST:
-        right = abs(_value(series, h * ((at + width) / _FINEST)))
+        right = abs(deflated(series, 0, len(series) - 1, h * ((at + width) / _FINEST))[0])
         peak = max(peak, right)
         d = h * (width / _FINEST)
         if width > 1 and max(left, right) + 0.125 * bend * d * d > peak * _ROUNDED_UP and bend < math.inf:
@@ -100,15 +101,6 @@ def _larger(series: Floats, h: float, peak: float) -> float:
         while at % (2 * width) == 0 and at < _FINEST:
             width *= 2
     return peak
-
-
-@inlined
-def _value(series: Floats, x: float) -> float:
-    """Value of a series at x."""
-    result = 0.0
-    for k in range(len(series) - 1, -1, -1):
-        result = result * x + series[k]
-    return result
 
 
 @inlined

@@ -14,12 +14,12 @@ import numpy as np
 from rocking.core.arrays import Floats, Integers
 from rocking.kernels.arc import evaluate, expand, restoring, sign_of
 from rocking.kernels.compiled import inlined, kernel, shared
+from rocking.kernels.events import factor, relative_slope
 from rocking.kernels.ground import ROUNDING, Ground, length_of, start_of
 from rocking.kernels.march import march
-from rocking.kernels.restitution import factor, relative_slope
 from rocking.kernels.series import variation_coefficients
 from rocking.kernels.state import AT_REST, Ending, Record, Records
-from rocking.kernels.trace import Trail, add_restraints, expand_coefficients
+from rocking.kernels.trace import Trail, expand_free
 from rocking.kernels.uplift import next_uplift
 
 #: Turns of a march that one period, or one impact, may take, and the coordinate and the speed from which on none is
@@ -53,42 +53,26 @@ class Setting(NamedTuple):
     steps: Floats
 
 
-@kernel
-def iterate(setting: Setting, scratch: Record, states: Records, periods: int, orbit: Floats, impacts: Integers) -> None:
-    """Take states through some periods; ``ending`` of each is then its `Fate`.
-
-    Row n of ``orbit[k]``, where it has rows, is (u, v, side) after n + 1 periods, NaN after the last known one;
-    ``impacts[k]`` counts the impacts.
-    """
-    for k in range(states.shape[0]):
-        state = states[k]
-        fate = Fate.RESTS.value if state.side < 0 else Fate.MOVES.value
-        for n in range(periods):
-            fate = pass_period(setting, scratch, state)
-            if fate == Fate.RESTS_FOR_EVER:
-                for later in range(n, orbit.shape[1]):
-                    write_state(orbit[k, later], state)
-                break
-            if fate == Fate.OVERTURNED or fate == Fate.UNFINISHED:
-                break
-            if n < orbit.shape[1]:
-                write_state(orbit[k, n], state)
-        state.ending = fate
-        impacts[k] = state.impacts
-
-
 #: Columns of a trap: its side (negative at rest), its middle (u, v), and a, b, c of a du^2 + 2 b du dv + c dv^2 <= 1.
 TRAP = 6
 
 
 @kernel
-def settle(
-    setting: Setting, scratch: Record, states: Records, periods: int, traps: Floats, found: Integers, taken: Integers
+def iterate(
+    setting: Setting,
+    scratch: Record,
+    states: Records,
+    periods: int,
+    orbit: Floats,
+    traps: Floats,
+    found: Integers,
+    taken: Integers,
 ) -> None:
     """Take each state through at most so many periods, until it is in one of the traps, overturns or rests for ever.
 
-    ``found[k]`` is the row of its trap in ``traps``, of shape (n, `TRAP`), or -1; ``taken[k]`` counts the periods and
-    ``ending`` is its `Fate`.
+    ``ending`` of each is then its `Fate`, ``found[k]`` the row of its trap in ``traps``, of shape (n, `TRAP`), or -1,
+    and ``taken[k]`` counts the periods. Row n of ``orbit[k]``, where it has rows, is (u, v, side) after n + 1 periods,
+    and stays as it is after the last known one.
     """
     for k in range(states.shape[0]):
         state = states[k]
@@ -97,10 +81,13 @@ def settle(
         taken[k] = periods
         for n in range(periods):
             fate = pass_period(setting, scratch, state)
-            if fate != Fate.OVERTURNED and fate != Fate.UNFINISHED:
+            known = fate != Fate.OVERTURNED and fate != Fate.UNFINISHED
+            if known:
                 rests = fate == Fate.RESTS or fate == Fate.RESTS_FOR_EVER
                 found[k] = trap_of(traps, state, rests, setting.block.two_stops)
-            if found[k] >= 0 or (fate != Fate.MOVES and fate != Fate.RESTS):
+                for later in range(n, orbit.shape[1] if fate == Fate.RESTS_FOR_EVER else min(n + 1, orbit.shape[1])):
+                    write_state(orbit[k, later], state)
+            if found[k] >= 0 or fate == Fate.RESTS_FOR_EVER or not known:
                 taken[k] = n + 1
                 break
         state.ending = fate
@@ -356,10 +343,7 @@ def carry_on(trail: Trail, scratch: Record, work: Record, node: Record, followin
             h += length_of(ground, piece)
         h += following.offset
     order, _, degree = expand(ground, block, settings, scratch, node, h)
-    expand_coefficients(trail, scratch, work, node.side, degree, order)
-    for j in range(order - 1):
-        work.forcing[j] = 0.0
-    add_restraints(trail, scratch, work, node.side, order)
+    expand_free(trail, scratch, work, node.side, degree, order)
     for column in range(2):
         work.change[0], work.change[1] = M[0, column], M[1, column]
         variation_coefficients(work, block.damping[node.side], order)

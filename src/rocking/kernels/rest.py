@@ -8,9 +8,9 @@ import numpy as np
 from rocking.kernels.arc import restoring, sign_of
 from rocking.kernels.certificate import Proof, prove_rest
 from rocking.kernels.compiled import inlined, shared
+from rocking.kernels.events import is_drawn, middle_factor
 from rocking.kernels.ground import Ground, coefficient, length_of, start_of
 from rocking.kernels.remaining import THIRD, Pair
-from rocking.kernels.restitution import is_drawn, middle_factor
 from rocking.kernels.state import PROVEN_PER_ITERATION, Record, Records, RestRule, write_impact, write_node
 
 ULP = 2.0**-52
@@ -123,22 +123,15 @@ def rest_after_impact(ground: Ground, block: Record, settings: Record, state: Re
         left = geometric_time(ground, block, state)
         if state.v <= block.limit[state.side] and left >= 0.0:
             return Rest(np.nan, np.nan, left, False)
-    elif is_imposed(
-        settings, block.limit[state.side], state.v, time - state.last_impact_time, time - state.last_uplift_time
-    ):
-        return Rest(np.nan, np.nan, 0.0, False)
+    else:
+        limit = block.limit[state.side]
+        by_speed = settings.treatment == RestRule.VELOCITY and state.v <= limit
+        by_interval = settings.treatment == RestRule.INTERVAL and time - state.last_impact_time <= limit
+        by_time = settings.treatment == RestRule.TIME and time - state.last_uplift_time >= limit
+        if by_speed or by_interval or by_time:
+            return Rest(np.nan, np.nan, 0.0, False)
     stalled = has_stalled(ground, block, state)
     return Rest(np.nan, np.nan, 0.0 if stalled or state.v == 0.0 else np.nan, stalled)
-
-
-@inlined
-def is_imposed(settings: Record, limit: float, v: float, interval: float, since_uplift: float) -> bool:
-    """Whether a treatment other than the certificate brings the block to rest at this impact."""
-    if settings.treatment == RestRule.VELOCITY:
-        return v <= limit
-    if settings.treatment == RestRule.INTERVAL:
-        return interval <= limit
-    return settings.treatment == RestRule.TIME and since_uplift >= limit
 
 
 @inlined

@@ -1,4 +1,4 @@
-"""The Taylor series of an arc: all recurrences for its coefficients, side by side, and where a series may end.
+"""The Taylor series of an arc: all recurrences for its coefficients, side by side.
 
 The rotation u >= 0 is counted in the frame of the block's side, and so is the ground acceleration A(t) = i a(t)/g with
 i the sign of that side. A vertical ground acceleration changes the weight: W(t) = 1 + a_v(t)/g. The equations are
@@ -7,20 +7,28 @@ i the sign of that side. A vertical ground acceleration changes the weight: W(t)
     nonlinear   u'' = -lam (W sin(alpha - u) + A cos(alpha - u))
 
 In the linear model lam may have any sign: p^2 for a rocking block (whose gain is p^2, too), 0 for a ball, negative for
-an oscillator with a stop. What restraints and damping add is in `restrained`.
+an oscillator with a stop.
 
-Each equation is written three times, for three purposes: to any order into arrays (`arc`); nine terms of one arc in
-registers (`short_arc`); and some ten terms of many lanes at once (`lane_steps`). One form for all was measured: as
-loops over tuples it takes twelve times as long in lanes, which then do not vectorise; unrolled, it changes the last bit
-of some results, since each form adds its terms in the order that makes the shortest chain of operations for it. So one
-test compares all forms with one calculation in 40 digits.
+A body may be held back: by tendons, springs, thrusts, loads and dampers. With the weight W + W' and the push A + A' in
+place of W and A, since what a thrust or an elastic tendon adds is of the form of sin and cos(alpha - u),
+
+    linear      u'' = (lam (W + W') - s) u - gain (threshold (W + W') + A + A') - H - c u'
+    nonlinear   u'' = -lam ((W + W') sin(alpha - u) + (A + A') cos(alpha - u)) - H cos(u/2) - s u - c u'
+
+with H for the prestress of tendons, s for springs, c for dampers: see "Restraints" in the documentation.
+
+Without these each equation is written three times, for three purposes: to any order into arrays (`arc`); nine terms of
+one arc in registers (`short_arc`); and some ten terms of many lanes at once (`lanes`). One form for all was measured:
+as loops over tuples it takes twelve times as long in lanes, which then do not vectorise; unrolled, it changes the last
+bit of some results, since each form adds its terms in the order that makes the shortest chain of operations for it. So
+one test compares all forms with one calculation in 40 digits.
 
 A NaN among the arguments makes every later coefficient NaN.
 """
 
 import numpy as np
 
-from rocking.kernels.compiled import inlined, shared
+from rocking.kernels.compiled import inlined
 from rocking.kernels.state import ORDER, Record
 
 #: A quantity that is linear in time: its value, and its slope or its change over a step.
@@ -99,6 +107,55 @@ def angle_coefficients(scratch: Record, k: int) -> None:
         cosine += rate * S[k - j]
     S[k + 1] = sine * _INTEGRATED[k + 1]
     C[k + 1] = cosine * _INTEGRATED[k + 1]
+
+
+@inlined
+def restrained_force(
+    block: Record, side: int, scratch: Record, degrees: tuple[int, int], nonlinear: bool, k: int
+) -> float:
+    """Coefficient k of u'' + c u', from the coefficients of the rotation up to k."""
+    c, A, W = scratch.rotation, scratch.ground, scratch.weight
+    lam = block.stiffness[side]
+    value = -block.spring[side] * c[k]
+    if nonlinear:
+        value += nonlinear_coefficient(lam, scratch, degrees, k) / INTEGRATED_TWICE[k]
+        return value - block.prestress[side] * scratch.half_cosine[k]
+    if k <= degrees[0]:
+        value -= block.threshold_slope[side] * A[k]
+    if k <= degrees[1]:
+        value -= block.threshold_slope[side] * (block.threshold[side] * W[k])
+    if k == 0:
+        value -= block.prestress[side]
+    for j in range(min(k, degrees[1]) + 1):
+        value += lam * W[j] * c[k - j]
+    return value
+
+
+@inlined
+def half_angle_coefficients(scratch: Record, k: int) -> None:
+    """Write the coefficients k + 1 of sin and cos(u/2), from those before and c[1] to c[k + 1]."""
+    c, S, C = scratch.rotation, scratch.half_sine, scratch.half_cosine
+    sine = 0.0
+    cosine = 0.0
+    for j in range(k + 1):
+        rate = 0.5 * (j + 1) * c[j + 1]
+        sine += rate * C[k - j]
+        cosine -= rate * S[k - j]
+    S[k + 1] = sine / (k + 1)
+    C[k + 1] = cosine / (k + 1)
+
+
+@inlined
+def next_coefficient(
+    block: Record, settings: Record, side: int, scratch: Record, degrees: tuple[int, int], k: int
+) -> float:
+    """Coefficient c[k + 2] of an arc from those before it, for a motion and a weight of these degrees."""
+    if block.restrained:
+        force = restrained_force(block, side, scratch, degrees, settings.nonlinear, k)
+        return (force - block.damping[side] * ((k + 1) * scratch.rotation[k + 1])) * INTEGRATED_TWICE[k]
+    if settings.nonlinear:
+        return nonlinear_coefficient(block.stiffness[side], scratch, degrees, k)
+    return weighted_coefficient(block, side, scratch, degrees[0], k)
 
 
 @inlined
@@ -237,131 +294,12 @@ def nonlinear_rates(r1: float, angle: Line, l2: float, push: Line, weight: Line 
     return (r1, r2, r3, r4, r5, r6, r7, r8, r9), angles
 
 
-# ---- Where a series may end: bounds on all terms of an arc's velocity that are left out ----
-# The derivations are in the documentation ("Where a series may end"). A NaN among the numbers makes a bound NaN.
-
-#: Terms of the velocity below this fraction of the largest one are negligible. (Those of the rotation are no measure:
-#: over a step that is short beside 1/p they are negligible beside u long before the velocity has converged.)
-NEGLIGIBLE = 2.0**-56
-
-#: Largest bound on the truncation of a velocity, over its largest term: a quarter of the last place.
-TRUNCATION = 2.0**-54
+# ---- Where nine terms are enough; see "Where a series may end" in the documentation ----
 
 #: Nine times the largest bound on the truncation of a nonlinear velocity after nine terms, over the sum of their
 #: absolute values. The bound is a few times the truncation. It holds where two sums are below a quarter.
 _TRUNCATION_OF_NINE = 9.0 * 2.0**-52
 _QUARTER = 0.25
-
-#: Smaller terms of the velocity are negligible.
-SMALLEST = 1e-290
-
-#: Largest number of times that a step is shortened; each time by a tenth at least.
-SHORTENINGS = 200
-
-
-@shared
-def shortened_linear(scratch: Record, lam: float, changes: int, h: float) -> float:
-    """Step, not longer than h, over which the truncation of a full linear series is negligible.
-
-    ``changes`` is the degree of the weight.
-    """
-    for _ in range(SHORTENINGS):
-        beyond, largest = truncation_linear(scratch, lam, changes, ORDER, h)
-        excess = beyond / max(TRUNCATION * largest, SMALLEST)
-        if excess <= 1.0:
-            break
-        h *= shortening(excess)
-    return h
-
-
-@inlined
-def shortening(excess: float) -> float:
-    """Factor on a step whose series has so many times the truncation that is allowed."""
-    return max(0.5, 0.9 * excess ** (-1.0 / ORDER))
-
-
-@shared
-def truncation_linear(scratch: Record, lam: float, changes: int, order: int, h: float) -> tuple[float, float]:
-    """Bound on the truncation of a linear arc's velocity over h, and its largest term; both times h.
-
-    With u_k = |c_k| h^k and w_j = |W_j| h^j the products w_j u_k with j + k >= order - 1 are left out of u'' h^2, and
-    all terms that follow from them: see "Where a series may end" in the documentation. The motion's degree is below
-    order - 1. inf: h is too long for a bound.
-    """
-    c, W, d = scratch.rotation, scratch.weight, scratch.other
-    power = 1.0
-    largest = 0.0
-    for k in range(order + 1):
-        d[k] = abs(c[k]) * power
-        largest = max(largest, k * d[k])
-        power *= h
-    for k in range(order - 1, order - 2 - changes, -1):  # from here on: sums of all later terms
-        d[k] += d[k + 1]
-    weight = products = 0.0
-    power = 1.0
-    for j in range(changes + 1):
-        weight += abs(W[j]) * power
-        products += abs(W[j]) * power * d[order - 1 - j]
-        power *= h
-    stiffness = abs(lam) * h * h
-    feedback = stiffness * weight / (order * (order + 1))
-    return (stiffness * products / (order * (1.0 - feedback)) if feedback < 1.0 else np.inf), largest
-
-
-@shared
-def truncation_nonlinear(
-    scratch: Record, lam: float, degrees: tuple[int, int], order: int, h: float
-) -> tuple[float, float]:
-    """Bound on the truncation of a nonlinear arc's velocity over h, and its largest term; both times h.
-
-    With r the velocity's terms, z those of sin and cos(alpha - u), b those of motion and weight, the products r z from
-    order - 2 on are left out of z', and b z from order - 1 on of u'', and all terms that follow from them. See "Where a
-    series may end" in the documentation. inf: h is too long for a bound.
-    """
-    c, A, W = scratch.rotation, scratch.ground, scratch.weight
-    S, C, d = scratch.sine, scratch.cosine, scratch.other
-    last = order - 2
-    largest = 0.0
-    power = h
-    for k in range(order):
-        d[k] = (k + 1) * abs(c[k + 1]) * power
-        largest = max(largest, d[k])
-        power *= h
-    for k in range(order - 2, -1, -1):  # from here on: sums of all later terms
-        d[k] += d[k + 1]
-    angle_products = d[last]
-    angles = 1.0
-    power = h
-    for k in range(1, last + 1):
-        term = (abs(S[k]) + abs(C[k])) * power
-        angles += term
-        angle_products += term * d[last - k]
-        power *= h
-    velocity = d[0]
-    d[0] = 1.0
-    power = h
-    for k in range(1, last + 1):
-        d[k] = (abs(S[k]) + abs(C[k])) * power
-        power *= h
-    for k in range(last - 1, -1, -1):
-        d[k] += d[k + 1]
-    degree, changes = degrees
-    strength = push_products = 0.0
-    power = 1.0
-    for j in range(max(degree, changes) + 1):
-        push = ((abs(A[j]) if j <= degree else 0.0) + (abs(W[j]) if j <= changes else 0.0)) * power
-        strength += push
-        if j > 0:
-            push_products += push * d[max(0, last + 1 - j)]
-        power *= h
-    # The truncation of z is at most (angle_products + velocity z + (that of u') (angles + z))/(order - 1), with z below
-    # 1; that of u' at most stiffness (push_products + strength z)/order.
-    stiffness = abs(lam) * h * h
-    feedback = (velocity + stiffness * strength * (angles + 1.0) / order) / (order - 1)
-    if not feedback < 0.5:
-        return np.inf, largest
-    z = (angle_products + stiffness * push_products * (angles + 1.0) / order) / ((order - 1) * (1.0 - feedback))
-    return (stiffness * (push_products + strength * z) / order if z < 1.0 else np.inf), largest
 
 
 @inlined

@@ -8,7 +8,7 @@ import numpy as np
 from rocking.kernels import ground, state
 from rocking.kernels.lanes import pool_of
 from rocking.kernels.periodic import TRAP, Setting
-from rocking.kernels.sine import lanes, sequence
+from rocking.kernels.sine import sequence
 from rocking.kernels.trace import Trail
 
 
@@ -47,8 +47,7 @@ def signatures() -> dict[str, tuple[Any, ...]]:
         "trace.vary": (trail, scratch, state.record(state.VARIATION), 0, given(), reals(), reals(), reals()),
         "adjoint.adjoint": (trail, scratch, state.record(state.VARIATION), 0, 0.0, reals(3), reals(2, 2)),
         "adjoint.adjoint_of_final_state": (trail, scratch, 0, reals(3), reals(2, 2)),
-        "periodic.iterate": (setting, scratch, states, 1, reals(1, 1, 3), count),
-        "periodic.settle": (setting, scratch, states, 1, reals(1, TRAP), count, count),
+        "periodic.iterate": (setting, scratch, states, 1, reals(1, 1, 3), reals(1, TRAP), count, count),
         "periodic.differentiate": (trail, scratch, state.record(state.VARIATION), table, states, reals(1, 2, 2)),
         "periodic.stretch": (trail, scratch, state.record(state.VARIATION), table, states[0], reals(3, 2), reals(1, 2)),
         "periodic.to_next_impact": (trail, scratch, state.record(state.VARIATION), table, states, reals(1, 2, 2)),
@@ -58,16 +57,12 @@ def signatures() -> dict[str, tuple[Any, ...]]:
         "lanes.run_lanes": (seen, settings, scratch, pool, 0),
         "lanes.march_each": (seen, settings, scratch, pool),
         "oscillator.peak_displacements": (given(3), given(2, 2), given(), 0.05, reals(), reals()),
-        "sine.series.eq65_time": (1.0, 1.0, 1.0),
         "sine.series.eq65_sums": (1.0,),
         "sine.series.eq65_terms": (1.0, reals(), reals()),
         "sine.series.series_arcs": (reals(1, 1), True, 1.0, 1.0, reals(1, 1), reals(1, 1), reals(1, 1, 1)),
-        "sine.sequence.fitted_amplitudes": (given(), given(), True, reals()),
         "population.shares": (*shares, reals(1, 1, kind=np.float32), reals()),
         "population.log_density": (reals(1, 1), reals(1, 1), reals(), reals()),
-        "sine.arc.first_impact": (1.0, 1.0),
-        "sine.lanes.rest_phases": (sequences, count, np.zeros(1, lanes.GROUP), lanes.Answers(reals(), statuses)),
-        "sine.sequence.rest_phase": (1.0, 1.0, 1.0),
+        "sine.sequence.rest_phases": (sequences, reals(), statuses),
         "sine.sequence.resolve": (1.0, 1.0, 1.0, 1.0, np.zeros(1, sequence.IMPACT)),
         "sine.sequence.semianalytical_phases": (sequences, count, reals(), statuses),
         "sine.sequence.critical_amplitudes": (given(), given(), reals()),

@@ -13,12 +13,11 @@ import numpy as np
 from rocking.core.arrays import Floats, Integers
 from rocking.kernels.arc import evaluate, expand, restoring, sign_of, weight_at
 from rocking.kernels.compiled import inlined, kernel, shared
-from rocking.kernels.events import first_root
+from rocking.kernels.events import factor, first_root, middle_factor, relative_slope
 from rocking.kernels.ground import Ground, acceleration, has_vertical, length_of, slope, start_of, vertical_of
-from rocking.kernels.restitution import factor, middle_factor, relative_slope
+from rocking.kernels.restraints import apply_tendon_law, law_of_standing, plastic_after
 from rocking.kernels.series import INTEGRATED_TWICE, variation_coefficients
 from rocking.kernels.state import NODE_ROW, Record, Records, TendonLaw, records
-from rocking.kernels.tendon import apply_tendon_law, law_of_standing, plastic_after
 
 #: Nodes of a response before its march.
 NO_NODES = records(0, NODE_ROW)
@@ -333,6 +332,15 @@ def add_restraints(trail: Trail, scratch: Record, work: Record, side: int, order
     if trail.settings.nonlinear and trail.block.prestress[side] != 0.0:
         for k in range(order - 1):
             work.stiffness[k] += 0.5 * trail.block.prestress[side] * scratch.half_sine[k]
+
+
+@inlined
+def expand_free(trail: Trail, scratch: Record, work: Record, side: int, degree: int, order: int) -> None:
+    """Write the series of d u''/d u, and no forcing, to ``work``."""
+    expand_coefficients(trail, scratch, work, side, degree, order)
+    for k in range(order - 1):
+        work.forcing[k] = 0.0
+    add_restraints(trail, scratch, work, side, order)
 
 
 @inlined

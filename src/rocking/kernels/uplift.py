@@ -19,8 +19,8 @@ from rocking.kernels.ground import (
     start_of,
     vertical_of,
 )
+from rocking.kernels.restraints import apply_tendon_law, plastic_after
 from rocking.kernels.state import AT_REST, Record, Records, stop_of
-from rocking.kernels.tendon import apply_tendon_law, plastic_after
 from rocking.kernels.trace import Trail
 
 #: Accelerations closer to a threshold than this fraction of it are at the threshold.

@@ -1,9 +1,4 @@
-"""One arc: the functions of time that it is a sum of, its duration and impact, and the first arc beyond half a period.
-
-Beyond half a period the first side's restoring acceleration P = 1 - cos x - kappa sin x is negative in the first part
-of each period, up to 2 arctan(kappa), and positive in the second. Where it is positive, an arc that has come down to
-zero goes on falling (U'' = delta U - P), so that its sign at the end shows whether there is an impact. Where it is
-negative, the height is convex as long as it is positive, so that its minimum shows it.
+"""One arc: the functions of time that it is a sum of, its duration and its impact.
 
 No number may be NaN; a search that finds nothing is UNRESOLVED.
 """
@@ -11,16 +6,14 @@ No number may be NaN; a search that finds nothing is UNRESOLVED.
 import math
 from typing import Final, NamedTuple
 
-from rocking.kernels.compiled import inlined, kernel, shared
+from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.sine import Verdict
 
 #: Orders of the sums, and the largest t^2 (1 + delta) at which so many terms reach full precision.
-BRIEF: Final = 2
 SHORT: Final = 3
 MEDIUM: Final = 5
 LONG: Final = 9
 LONGEST: Final = 14
-REACH_BRIEF: Final = 0.0012
 REACH_SHORT: Final = 0.003
 REACH_MEDIUM: Final = 0.12
 REACH_LONG: Final = 1.5
@@ -148,24 +141,6 @@ def estimated_duration(start: State, s: float, delta: float) -> float:
     value = V * (1.0 + _SIXTH * growth) - t * (G * (0.5 + 0.25 * _SIXTH * growth) + _SIXTH * (bend + 0.25 * twist))
     slope = 2.0 * _SIXTH * V * delta * t - (G * (0.5 + 0.125 * growth) + 2.0 * _SIXTH * bend + 0.125 * twist)
     return t - value / slope
-
-
-@inlined
-def estimated_brief_duration(start: State, s: float, delta: float) -> float:
-    """Estimate the duration of a brief arc to a relative 1e-4: root of the series to t^2, expanded in the speed."""
-    V, P, D = start
-    inverse = 1.0 / pull(P, s)
-    curved = (2.0 / 3.0) * V * inverse * inverse * (delta * V - s * D)
-    return 2.0 * V * inverse * (1.0 + curved * (1.0 + 2.0 * curved))
-
-
-@inlined
-def is_brief(entered: State, delta: float) -> bool:
-    """Whether both arcs after entering the second side are brief: little growth, small changes of acceleration."""
-    V, P, D = entered
-    least = min(P, 2.0 - P)
-    steady = V * (delta * V + abs(D)) <= 0.03 * (least * least)
-    return steady & (V * V * (1.0 + delta * least) <= 1.5e-4 * (least * least * least))
 
 
 @inlined
@@ -302,63 +277,3 @@ def first_arc(excess: float, delta: float) -> tuple[int, float, State]:
 def bounced(impact: State, eta: float) -> State:
     """State after an impact."""
     return State(eta * impact.V, impact.P, impact.D)
-
-
-#: Longest arc that is followed, as a time p t: rounding grows by its exponential.
-_LONGEST_ARC: Final = 20.0
-
-_MOST_HALVINGS: Final = 2_000
-
-
-@kernel
-def first_impact(excess: float, omega: float) -> tuple[int, float, float]:
-    """Phase of the first impact for a = 1 + excess > 1, and the speed before it; INCOMPLETE if none comes in time."""
-    delta = 1.0 / (omega * omega)
-    start = uplift_state(excess)
-    negative = 2.0 * math.atan(-start.D)
-    for period in range(1 + int(_LONGEST_ARC * omega / (2.0 * math.pi))):
-        begin = 2.0 * math.pi * period
-        middle = begin + negative
-        end = begin + 2.0 * math.pi
-        if period > 0:
-            lowest = lowest_point(begin, middle, start, delta)
-            if height(lowest, start, 1.0, delta, basis(lowest, delta)) <= 0.0:
-                return impact_between(begin, lowest, start, delta)
-        if height(end, start, 1.0, delta, basis(end, delta)) <= 0.0:
-            return impact_between(middle, end, start, delta)
-    return Verdict.INCOMPLETE, end, 0.0
-
-
-@inlined
-def lowest_point(low: float, high: float, start: State, delta: float) -> float:
-    """Phase at which an arc that is convex while it is up is lowest; if it comes down, one at which it is not up."""
-    if rise(low, start, 1.0, delta, basis(low, delta)) >= 0.0:
-        return low
-    if rise(high, start, 1.0, delta, basis(high, delta)) <= 0.0:
-        return high
-    for _ in range(_MOST_HALVINGS):
-        middle = 0.5 * (low + high)
-        if not low < middle < high:
-            break
-        at = basis(middle, delta)
-        if height(middle, start, 1.0, delta, at) <= 0.0:
-            return middle
-        if rise(middle, start, 1.0, delta, at) < 0.0:
-            low = middle
-        else:
-            high = middle
-    return low
-
-
-@shared
-def impact_between(low: float, high: float, start: State, delta: float) -> tuple[int, float, float]:
-    """Status, phase and speed of the one impact between two phases."""
-    for _ in range(_MOST_HALVINGS):
-        middle = 0.5 * (low + high)
-        if not low < middle < high:
-            break
-        if height(middle, start, 1.0, delta, basis(middle, delta)) > 0.0:
-            low = middle
-        else:
-            high = middle
-    return Verdict.FOUND, high, corrected_duration(high, start, 1.0, delta, basis(high, delta)).impact.V

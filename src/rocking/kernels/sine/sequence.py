@@ -118,18 +118,25 @@ _MAXIMUM_PAIRS: Final = 5_000_000
 IMPACT: Final = np.dtype((np.record, [("interval", np.float64), ("before", np.float64), ("after", np.float64)]))
 
 
+#: Amplitudes, frequencies and coefficients of restitution.
+Sequences = tuple[Floats, Floats, Floats]
+
+
 @kernel
+def rest_phases(sequences: Sequences, phases: Floats, statuses: NDArray[np.int8]) -> None:
+    """Write status and phase of rest of each sequence (a > 1, omega, eta)."""
+    a, omega, eta = sequences
+    for i in range(phases.size):
+        statuses[i], phases[i] = rest_phase(a[i] - 1.0, 1.0 / (omega[i] * omega[i]), eta[i])
+
+
+@shared
 def rest_phase(excess: float, delta: float, eta: float) -> tuple[int, float]:
     """Status and phase omega tau_ch of rest for a = 1 + excess > 1; the phase is valid only where it is FOUND."""
     status, x, impact = first_arc(excess, delta)
     if status != Verdict.FOUND:
         return status, x
-    return rest_after_impact(x, bounced(impact, eta), delta, eta)
-
-
-@shared
-def rest_after_impact(x: float, entered: State, delta: float, eta: float) -> tuple[int, float]:
-    """Status and phase of rest of a block that enters the second side at phase x."""
+    entered = bounced(impact, eta)
     weights = richardson_weights(eta)
     row = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     passed = 0.0
@@ -193,12 +200,7 @@ def resolve(
 
 
 @kernel
-def semianalytical_phases(
-    sequences: tuple[Floats, Floats, Floats],
-    resolved: Integers,
-    phases: Floats,
-    statuses: NDArray[np.int8],
-) -> None:
+def semianalytical_phases(sequences: Sequences, resolved: Integers, phases: Floats, statuses: NDArray[np.int8]) -> None:
     """Write status and phase of rest by Eq. 75 for each (a > 1, omega, eta), with so many resolved intervals."""
     a, omega, eta = sequences
     for i in range(phases.size):
@@ -230,116 +232,16 @@ def semianalytical_phase(excess: float, delta: float, eta: float, resolved: int)
 #: Width of the final bracket on a - 1, over a: half an ulp.
 _WIDTH: Final = 2.0**-53
 
-#: Distance kept from the extrapolated critical value, over the distance it was extrapolated.
-_CAUTION: Final = 0.01
-
-#: Relative width of the bracket below which extrapolation starts.
-_NEAR: Final = 0.1
-
-_MAXIMUM_STEPS: Final = 400
-
-#: Least part of the half period that the critical sequence leaves over at an impact: its inverse does not overflow.
-_LEAST_LEFT: Final = 1e-300
-
 
 @kernel
 def critical_amplitudes(omega: Floats, eta: Floats, amplitudes: Floats) -> None:
-    """Write the critical amplitude for each omega and eta < 1 into ``amplitudes``."""
+    """Write the critical amplitude, the largest with complete chattering, for each omega and eta < 1."""
     for i in range(amplitudes.size):
-        amplitudes[i] = 1.0 + critical_excess(1.0 / (omega[i] * omega[i]), eta[i])
-
-
-@shared
-def critical_excess(delta: float, eta: float) -> float:
-    """Largest a - 1 with complete chattering, by a bracket that is narrowed around an extrapolated value.
-
-    Near it pi - x_rest ~ (critical - excess)^nu, so (pi - x_rest)^(1/nu) is extrapolated to zero from the last two
-    complete sequences. Trials a little below and above the result narrow the bracket from both ends; every third one
-    halves it, which bounds the number of steps however good the extrapolation is.
-    """
-    power = 1.0 / distance_exponent(eta)
-    low = 0.0
-    high = LARGEST_EXCESS
-    low_gap = math.pi**power
-    older = -1.0
-    older_gap = low_gap
-    for step in range(_MAXIMUM_STEPS):
-        if high - low <= _WIDTH * (1.0 + low):
-            break
-        trial = 0.5 * (low + high)
-        if step % 3 > 0 and high - low < _NEAR * high and older_gap > low_gap:
-            guess = low + low_gap * (low - older) / (older_gap - low_gap)
-            caution = max(_CAUTION * abs(guess - low), 0.25 * _WIDTH)
-            aimed = guess - caution if step % 3 == 1 else guess + caution
-            trial = aimed if low < aimed < high else trial
-        status, x = rest_phase(trial, delta, eta)
-        if status == Verdict.FOUND:
-            older = low
-            older_gap = low_gap
-            low = trial
-            low_gap = (math.pi - x) ** power
-        else:
-            high = trial
-    return low
-
-
-@inlined
-def distance_exponent(eta: float) -> float:
-    """Exponent nu of pi - x_rest ~ (critical - excess)^nu.
-
-    Close to x = pi the second side's restoring acceleration is proportional to the phase s that is left, and the
-    impact map scales: with speed w = v s^2 times a constant, an arc of duration z s has v = z/2 - z^2/6, after which
-    s (1 - z) is left and v' = eta^2 (z/2 - z^2/3)/(1 - z)^2. The critical sequence is the fixed point; the distance of
-    a neighbouring one grows by the factor dv'/dv per pair while s falls by 1 - z.
-    """
-    # Of the fixed point's cubic in 1 - z = eta t: for a small eta, t is known to the last digits, and z is not.
-    low = 0.5
-    high = 1.0
-    for _ in range(53):
-        t = 0.5 * (low + high)
-        if eta * t * (t * t - 2.0) + 2.0 * t * t < 1.0:
-            low = t
-        else:
-            high = t
-    left = max(0.5 * eta * (low + high), _LEAST_LEFT)
-    z = 1.0 - left
-    relative_growth = (0.5 - 2.0 * z / 3.0) / (0.5 * z - z * z / 3.0) + 2.0 / left
-    growth = relative_growth * (0.5 * z - z * z / 6.0) / (0.5 - z / 3.0)
-    return -math.log(left) / math.log(growth)
-
-
-# ---- The paper's fits of the critical amplitude ----
-
-
-@inlined
-def eq76(omega: float, eta: float) -> float:
-    """Fitted critical amplitude (Eq. 76)."""
-    return (
-        1.079
-        - 0.1885 * eta
-        + 0.1405 * omega
-        + 0.6442 * eta**2
-        - 0.1903 * eta * omega
-        - 0.02818 * omega**2
-        - 0.7372 * eta**3
-        + 0.06413 * eta**2 * omega
-        + 0.03236 * eta * omega**2
-        + 0.00176 * omega**3
-        + 0.2146 * eta**4
-        - 0.0187 * eta**3 * omega
-        - 0.003045 * eta**2 * omega**2
-        - 0.00185 * eta * omega**3
-    )
-
-
-@inlined
-def eq77(eta: float) -> float:
-    """Fitted critical amplitude without the frequency (Eq. 77)."""
-    return -0.3941 * eta**3 + 0.5763 * eta**2 - 0.45 * eta + 1.271
-
-
-@kernel
-def fitted_amplitudes(omega: Floats, eta: Floats, with_frequency: bool, amplitudes: Floats) -> None:
-    """Write Eq. 76 (with the frequency) or Eq. 77 for each omega and eta into ``amplitudes``; NaN gives NaN."""
-    for i in range(amplitudes.size):
-        amplitudes[i] = eq76(omega[i], eta[i]) if with_frequency else eq77(eta[i])
+        low, high = 0.0, LARGEST_EXCESS
+        while high - low > _WIDTH * (1.0 + low):
+            middle = 0.5 * (low + high)
+            if rest_phase(middle, 1.0 / (omega[i] * omega[i]), eta[i])[0] == Verdict.FOUND:
+                low = middle
+            else:
+                high = middle
+        amplitudes[i] = 1.0 + low

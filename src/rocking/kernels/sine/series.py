@@ -397,17 +397,6 @@ _MAXIMUM_NEWTON_STEPS: Final = 60
 
 
 @kernel
-def eq65_time(a: float, omega: float, eta: float) -> float:
-    """Asymptotic chattering time (Eq. 65) for numbers; NaN for a < 1 and for a NaN, infinite for eta = 1."""
-    if not a >= 1.0:
-        return math.nan
-    if a == 1.0:
-        return 0.0
-    first, third = eq65_sums(eta)
-    return math.sqrt(a - 1.0) * (first + (a - 1.0) * third) / omega
-
-
-@kernel
 def eq65_sums(eta: float) -> tuple[float, float]:
     """Return the sums of omega T_{n;1} (n even) and omega T_{n;3} (n odd) in Eq. 65; infinite for eta = 1 and NaN."""
     if not eta < 1.0:
