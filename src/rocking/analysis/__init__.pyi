@@ -1,4 +1,4 @@
-from .curve import Band, FragilityCurve
+from .curve import FragilityCurve
 from .directions import ResponseRose
 from .efficiency import MeasureComparison
 from .incremental import IncrementalDynamicAnalysis
@@ -9,7 +9,6 @@ from .spectrum import RockingSpectrum
 from .survey import Survey
 
 __all__ = [
-    "Band",
     "FragilityCurve",
     "Goodness",
     "IncrementalDynamicAnalysis",

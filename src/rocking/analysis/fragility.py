@@ -9,44 +9,53 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from rocking.analysis import nrml
-from rocking.analysis.curve import Band, FragilityCurve, fitted_curve, in_units, interval_text, median_text, passed
+from rocking.analysis.curve import (
+    FragilityCurve,
+    LossCategory,
+    fitted_curve,
+    fragility_model,
+    in_units,
+    interval_text,
+    median_text,
+    openquake_measure,
+)
 from rocking.analysis.hazard import HazardCurve
 from rocking.analysis.levels import (
     clusters_of,
     groups_of,
     motions_in_words,
-    normalised_weights,
+    of_polarities,
+    outcomes_of,
+    passed,
     pooled,
     ratios_of,
     simulate_levels,
     single_block,
-    undecided_text,
     units_of,
     values_of,
+    weights_of,
 )
 from rocking.analysis.probit import groups
-from rocking.analysis.risk import Risk, Survival, mean_of_blocks, risk_of
+from rocking.analysis.risk import Risk, Survival, risk_of
 from rocking.block.body import Bodies, Body
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.core.progress import spelled
 from rocking.core.result import Result
-from rocking.core.tables import Column, as_written, counted, text_table
+from rocking.core.tables import Column, as_written, counted, text_table, write_text
 from rocking.engine.problem import bodies_of, slenderness_of
-from rocking.engine.tasks import Setup, missing_text
-from rocking.engine.treatment import Treatment, treatment
+from rocking.engine.tasks import missing_text
+from rocking.engine.treatment import Treatment
 from rocking.errors import InvalidOption, Message, Unfitted
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.records.named import Motions, several_motions
-from rocking.simulation.ensemble import SIGNS, Polarity, simulate_many
+from rocking.simulation.ensemble import Polarity, simulate_many
 
 if TYPE_CHECKING:
     import pandas as pd
-    import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -80,9 +89,8 @@ class Fragility(Result):
         outcomes of several blocks count together.
     source : str
         Origin of a cluster of outcomes: a motion, or, where outcomes were given, a cluster.
-    undecided, missing : str
-        How many outcomes of a sample change within 3e-6 of the motion, and how many simulations were given up, which
-        the curves leave out; empty where there are none.
+    missing : str
+        How many simulations were given up, which the curves leave out; empty where there are none.
 
     Examples
     --------
@@ -105,7 +113,6 @@ class Fragility(Result):
     with_vertical: bool = False
     several_blocks: bool = False
     source: str = "motion"
-    undecided: str = ""
     missing: str = ""
 
     def summary(self) -> str:
@@ -130,8 +137,8 @@ class Fragility(Result):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Limits of the curves: small samples, poor fits, undecided outcomes; one sentence each."""
-        notes = [text for text in (self.missing, self.undecided) if text]
+        """Limits of the curves: small samples, poor fits; one sentence each."""
+        notes = [self.missing] if self.missing else []
         if self.one_way:
             notes.append(
                 "the sides differ, and motions came in one polarity only: reversed ones give another curve; "
@@ -167,16 +174,10 @@ class Fragility(Result):
             "description": self.description,
             "measure": {"name": self.measure.name, "units": self.measure.units, **self.measure.options()},
             "model": self.model,
-            "band": self.band_kind,
             "curves": [curve.to_dict() for curve in self.curves],
             "notes": list(self.notes),
             "outcomes": None if self.outcomes is None else self.outcomes.to_dict("records"),
         }
-
-    @property
-    def band_kind(self) -> str:
-        """Where intervals and bands come from: "likelihood" or "bootstrap"."""
-        return "likelihood" if math.isnan(self.curves[0].degenerate) else "bootstrap"
 
     def _headline(self) -> str:
         curves = ", ".join(
@@ -226,12 +227,7 @@ class Fragility(Result):
         """
         curve = self.curve(limit_state)
         rate = None if hazard is None else self.annual_rate(hazard).rate(limit_state)
-        mean = math.nan
-        if hazard is not None and self.several_blocks and self.outcomes is not None:
-            mean = mean_of_blocks(self.outcomes, self.measure.column, limit_state, hazard, years)
-        return Survival(
-            curve, self.measure, self.description, years, confidence, hazard, rate, self.several_blocks, mean
-        )
+        return Survival(curve, self.measure, self.description, years, confidence, hazard, rate, self.several_blocks)
 
     @property
     def range(self) -> tuple[float, float]:
@@ -255,15 +251,15 @@ class Fragility(Result):
         path: str | Path,
         *,
         taxonomy: str = "rocking-block",
-        format: nrml.Format = "continuous",
         block: Body | None = None,
         model_id: str = "rocking",
-        loss_category: nrml.LossCategory = "contents",
+        loss_category: LossCategory = "contents",
         asset_category: str = "contents",
     ) -> None:
         """Write the curves as an OpenQuake fragility model, NRML 0.5.
 
-        PGA and SA are written in g, PGV in cm/s, a measure in a block's own unit as PGA or PGV of that block. The
+        The lognormals are written by mean and standard deviation of the intensity, not of its logarithm. PGA and SA are
+        written in g, PGV in cm/s, a measure in a block's own unit as PGA or PGV of that block. The
         uplift acceleration is the limit of no damage of PGA, unless a vertical motion was simulated, which lowers it.
 
         Parameters
@@ -272,9 +268,6 @@ class Fragility(Result):
             File to write.
         taxonomy : str
             Identifier of the fragility function, which the exposure model refers to.
-        format : {"continuous", "discrete"}
-            Lognormals by the mean and the standard deviation of the intensity (not of its logarithm, as OpenQuake wants
-            them), or probabilities at 40 intensities.
         block : Block, optional
             Block whose unit a dimensionless measure counts in, where the curves come from several.
         model_id, loss_category, asset_category : str
@@ -289,24 +282,21 @@ class Fragility(Result):
         OutputError
             If the file cannot be written.
         """
-        chosen = self.block
         if block is not None:
             bodies_of(block)
-            chosen = block
-        scale = nrml.scale_of(self.measure, chosen, self.model)
+        chosen = self.block if block is None else block
+        imt = openquake_measure(self.measure, chosen, self.model)
         lifting = None
-        if chosen is not None and scale.imt == "PGA" and not self.with_vertical:
+        if chosen is not None and imt[0] == "PGA" and not self.with_vertical:
             lifting = min(chosen.uplift_thresholds(self.model)) / STANDARD_GRAVITY
-        function = nrml.fragility_function(self.curves, scale, self.range, lifting, taxonomy, format)
-        states = [curve.limit_state for curve in self.curves]
         about = {"id": model_id, "assetCategory": asset_category, "lossCategory": loss_category}
-        nrml.write(path, function, states, self.description, **about)
+        write_text(path, fragility_model(self.curves, imt, self.range, lifting, taxonomy, self.description, **about))
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         from rocking.plot.curves import FragilityLine, fragility_figure
 
         first = self.curves[0]
-        band_text = f"band: {100 * first.confidence:g} % confidence ({self.band_kind})"
+        band_text = f"band: {100 * first.confidence:g} % confidence (likelihood)"
         if not first.bounded:
             band_text = f"no band: {self._too_few}"
         intensity, scale = np.linspace(0.0, self.range[1], _POINTS), self.measure.scale
@@ -337,7 +327,6 @@ class Fragility(Result):
 
 #: Intensities, in SI units, far beyond any motion.
 _INTENSITIES: Final = (1e-50, 1e50)
-_LIKELIHOOD: Final = Band()
 
 #: Limit states: peak rotation over slenderness that is exceeded; infinity is overturning.
 OVERTURNING: Final[Mapping[str, float]] = {"overturning": math.inf}
@@ -355,7 +344,7 @@ def fragility(
     polarity: Polarity = "+",
     weights: ArrayLike | None = None,
     clusters: ArrayLike | None = None,
-    band: Band = _LIKELIHOOD,
+    confidence: float = 0.9,
     threads: int | None = None,
     progress: bool | None = None,
 ) -> Fragility:
@@ -384,8 +373,8 @@ def fragility(
     clusters : "station" or array_like of labels, shape (m,), optional
         Which motions belong together, for intervals. "station" joins components of one station in one earthquake, as
         their files name them. By default each motion is a cluster; multiples of one another always are one.
-    band : Band
-        How intervals and bands are made.
+    confidence : float
+        Probability of the intervals and bands, between 0 and 1.
     threads, progress : optional
         As for `simulate_many`.
 
@@ -415,7 +404,7 @@ def fragility(
     slenderness = slenderness_of(many)
     shares = weights_of(weights, len(many))
     mirrored = checks.one_of(polarity, "polarity", InvalidOption, get_args(Polarity)) == "both" and many.is_symmetric
-    _check_band(band)
+    checks.share(confidence, "confidence", InvalidOption)
     states = _limit_states(limits, "limits")
     stripes = None if levels is None else checks.increasing_numbers(levels, "levels", InvalidOption)
     if stripes is not None and stripes.size < 2:
@@ -437,7 +426,7 @@ def fragility(
     ratio = ratios_of(table.peak_rotation.values, table.overturned.values, missing, slenderness[:, None])
     groups = np.broadcast_to(together[None, :, None, None], ratio.shape)
     x, trials = (np.broadcast_to(each, ratio.shape).ravel() for each in (intensity, shares[:, None]))
-    outcomes = _outcomes(table, how, x, ratio, states)
+    outcomes = outcomes_of(table, how, x, ratio, states)
     if weights is not None:
         outcomes["weight"] = trials
     # Simulations that were given up, and those of a block of weight 0, are reported but are not data.
@@ -445,13 +434,10 @@ def fragility(
     x, trials, groups = x[counts], trials[counts], groups.ravel()[counts]
     data = {name: (x, trials * passed(ratio, limit, name).ravel()[counts], trials) for name, limit in states.items()}
     try:
-        curves = [fitted_curve(name, data[name], groups, band, how, states[name]) for name in states]
+        curves = [fitted_curve(name, data[name], groups, confidence, how, states[name]) for name in states]
     except Unfitted as refused:
         refused.outcomes = outcomes
         raise
-    scales = 1.0 if stripes is None else stripes[:, None, None] * units / values[:, None]
-    factors = np.asarray(scales)[..., None] * np.array(SIGNS[options["polarity"]])
-    setup = Setup(many, model, treatment(chattering))
     kind = "cloud" if levels is None else counted(len(intensity), "stripe")
     text = f"{pooled(blocks, weights)}, {motions_in_words(together, clusters)}, {kind}, {model} model"
     return Fragility(
@@ -465,46 +451,7 @@ def fragility(
         with_vertical="vertical" in table.coords,
         several_blocks=bool(np.count_nonzero(shares) > 1),
         source="motion" if clusters is None else "cluster",
-        undecided=undecided_text(setup, shaken, factors, table.overturned.values, threads),
         missing=missing_text(missing),
-    )
-
-
-def weights_of(weights: ArrayLike | None, count: int) -> Floats:
-    """Weights of blocks, 1 in the mean of those that have any: outcomes are as many as without the others."""
-    shares = normalised_weights(weights, count)
-    return np.asarray(shares / shares[shares > 0.0].mean())
-
-
-def of_polarities(polarity: Polarity, *, is_symmetric: bool) -> str:
-    """Append to a description which polarities the outcomes come from, where both were requested."""
-    if polarity != "both":
-        return ""
-    return ", one polarity, since a symmetric block does the same in both" if is_symmetric else ", both polarities"
-
-
-def _outcomes(
-    table: xr.Dataset, measure: Measure, intensity: Floats, ratio: Floats, limits: Mapping[str, float]
-) -> pd.DataFrame:
-    import pandas as pd
-
-    def along(values: NDArray[Any]) -> NDArray[Any]:
-        return np.broadcast_to(values, ratio.shape).ravel()  # of (level, motion, block, polarity)
-
-    signs = table.polarity.values if "polarity" in table.coords else np.array(["+"])
-    motions = [name for name in ("motion", "vertical") if name in table.coords]
-    return pd.DataFrame(
-        {
-            **{name: along(table[name].values[:, None, None]) for name in motions},
-            "block": along(np.arange(table.sizes["block"])[:, None]),
-            "polarity": along(signs),
-            measure.column: intensity,
-            "peak_rotation_rad": table.peak_rotation.values.ravel(),
-            "peak_over_alpha": ratio.ravel(),
-            "overturned": table.overturned.values.ravel(),
-            "unfinished": table.unfinished.values.ravel(),
-            **{f"exceeded_{name}": passed(ratio, limit, name).ravel().astype(bool) for name, limit in limits.items()},
-        }
     )
 
 
@@ -515,7 +462,7 @@ def fit_fragility(
     trials: ArrayLike = 1,
     clusters: ArrayLike | None = None,
     measure: IntensityName | Measure = "pga",
-    band: Band = _LIKELIHOOD,
+    confidence: float = 0.9,
     block: Body | None = None,
     description: str = "observed outcomes",
 ) -> Fragility:
@@ -534,7 +481,7 @@ def fit_fragility(
         Which outcomes belong together (the motion, for instance), for the bands; by default each is on its own, as is
         one whose label is NaN, None or empty. With fewer than three clusters of several outcomes intervals go from 0 to
         infinity.
-    measure, band : optional
+    measure, confidence : optional
         As for `fragility`.
     block : Block, optional
         Tested block, for the units of `Fragility.to_nrml`.
@@ -577,19 +524,12 @@ def fit_fragility(
     count = _whole(trials, "trials", x.size, 1.0, 2.0**53)
     outcomes = _limit_states(exceeded if isinstance(exceeded, Mapping) else {"overturning": exceeded}, "exceeded")
     groups = None if clusters is None else groups_of(clusters, "clusters", x.size)
-    _check_band(band)
+    checks.share(confidence, "confidence", InvalidOption)
     curves = [
-        fitted_curve(name, (x, _whole(values, "exceeded", x.size, 0.0, count), count), groups, band, how)
+        fitted_curve(name, (x, _whole(values, "exceeded", x.size, 0.0, count), count), groups, confidence, how)
         for name, values in outcomes.items()
     ]
     return Fragility(tuple(curves), how, description, block, "nonlinear", None, source="cluster")
-
-
-def _check_band(band: object) -> None:
-    if not isinstance(band, Band):
-        raise InvalidOption(
-            f'{{}} must be a Band, as Band("bootstrap", samples=500), not {checks.shown(band)}', "band", value=band
-        )
 
 
 def _limit_states(given: Mapping[str, Any], name: str) -> Mapping[str, Any]:
