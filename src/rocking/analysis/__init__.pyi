@@ -1,6 +1,5 @@
 from .curve import FragilityCurve
 from .directions import ResponseRose
-from .efficiency import MeasureComparison
 from .incremental import IncrementalDynamicAnalysis
 from .overturning import Mode, OverturningMap, mode_name
 from .probit import Goodness, Likelihood, Probit
@@ -13,7 +12,6 @@ __all__ = [
     "Goodness",
     "IncrementalDynamicAnalysis",
     "Likelihood",
-    "MeasureComparison",
     "Mode",
     "OverturningMap",
     "Probit",
