@@ -290,8 +290,8 @@ def _corners(rate: Floats) -> tuple[Integers, Floats]:
     return kept, np.where(first, lowest, lowest * (1.0 - 1e-9))[kept]
 
 
-def log_parts(fits: Probit, hazard: HazardCurve, until: float = math.inf) -> Floats:
-    """Logarithms of integrals below the hazard curve, over each of its segments, and above, up to `until` (ln x).
+def log_parts(fits: Probit, hazard: HazardCurve) -> Floats:
+    """Logarithms of integrals below the hazard curve, over each of its segments, and above.
 
     Their shape is (fits, n + 1). On a segment rate(x) = c x^-k, and with P = Phi(z), z = a + b ln x, the part is c
     exp(k a/b + k^2/(2 b^2)) [Phi(z + k/b)]. Where both ends lie on one side of z = -k/b the large terms cancel: with
@@ -301,7 +301,7 @@ def log_parts(fits: Probit, hazard: HazardCurve, until: float = math.inf) -> Flo
 
     k, log_c = (_extended(values) for values in powers(hazard))
     corners = np.concatenate([[-np.inf], np.log(hazard.intensity), [np.inf]])  # of the segments, and beyond them
-    ends = [np.minimum(each, until) for each in (corners[:-1], corners[1:])]
+    ends = corners[:-1], corners[1:]
     a, b = (values[:, None] for values in fits)
     with np.errstate(all="ignore"):
         shift = k / b
@@ -323,8 +323,8 @@ def _extended(values: Floats) -> Floats:
     return np.concatenate([values[:1], values, values[-1:]])
 
 
-def _log_total(fitted: Probit, hazard: HazardCurve, until: float = math.inf) -> float:
-    return float(np.logaddexp.reduce(log_parts(fitted, hazard, until)[0]))
+def _log_total(fitted: Probit, hazard: HazardCurve) -> float:
+    return float(np.logaddexp.reduce(log_parts(fitted, hazard)[0]))
 
 
 def _log_seen(fitted: Probit, hazard: HazardCurve, log_at: Floats) -> tuple[Floats, Floats]:
@@ -346,35 +346,6 @@ def shares_beyond(fitted: Probit, hazard: HazardCurve) -> tuple[float, float]:
         below = np.exp(parts[0] - total) * max(-math.expm1(min(first - parts[0], 0.0)), 0.0)
         above = np.exp(np.logaddexp(parts[-1], last) - total)
     return float(below), float(above)
-
-
-def quantile_intensities(fitted: Probit, hazard: HazardCurve) -> tuple[float, float, float]:
-    """Intensities below which the quantiles of a rate arise: shares of the motions P(x) |d rate(x)|."""
-    from scipy.optimize import brentq
-
-    total, (k, log_c) = _log_total(fitted, hazard), powers(hazard)
-    if not math.isfinite(total):
-        return 0.0, 0.0, 0.0
-
-    def excess(log_at: float, share: float) -> float:
-        product = _log_seen(fitted, hazard, np.array([log_at]))[0][0]
-        return float(np.exp(_log_total(fitted, hazard, log_at) - total) - np.exp(product - total)) - share
-
-    def found(share: float) -> float:
-        # What comes from above x is at most rate(x): where that is what remains of the whole rate, x is high enough.
-        left = total + math.log1p(-share)
-        segment = np.searchsorted(-np.log(hazard.rate[1:-1]), -left)
-        low = high = float((log_c[segment] - left) / k[segment])
-        step = 1.0
-        while excess(high, share) < 0.0:  # by rounding
-            high += 1.0
-        while excess(low, share) > 0.0:
-            low, step = low - step, 2.0 * step
-        return float(np.exp(brentq(excess, low, high, args=(share,), xtol=1e-13)))
-
-    with np.errstate(all="ignore"):
-        sixteenth, half, rest = (found(share) for share in (0.16, 0.5, 0.84))
-    return sixteenth, half, rest
 
 
 def share_density(fitted: Probit, hazard: HazardCurve, at: Floats) -> Floats:

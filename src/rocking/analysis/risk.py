@@ -14,10 +14,8 @@ from rocking.analysis.hazard import (
     HazardCurve,
     hazard_line,
     log_parts,
-    quantile_intensities,
     share_density,
     shares_beyond,
-    shown_range,
 )
 from rocking.analysis.probit import Probit
 from rocking.core import checks
@@ -51,14 +49,12 @@ class Rate:
     below, above : float
         Shares of the rate from motions below the hazard curve's first point and above its last, where its lines are
         only extended.
-    intensities : (float, float, float)
-        Intensities (SI) of the motions below which 16, 50 and 84 % of the rate arise.
     bounds : (float, float)
         Rates between which the hazard curve can tell the rate; texts state the bound in place of a rate beyond them.
 
     Examples
     --------
-    >>> round(Rate("overturning", 1e-3, (5e-4, 2e-3), 0.0, 0.0, (1.0, 2.0, 3.0)).probability(50.0), 4)
+    >>> round(Rate("overturning", 1e-3, (5e-4, 2e-3), 0.0, 0.0).probability(50.0), 4)
     0.0488
     """
 
@@ -67,7 +63,6 @@ class Rate:
     interval: tuple[float, float]
     below: float
     above: float
-    intensities: tuple[float, float, float]
     bounds: tuple[float, float] = (0.0, math.inf)
 
     def __repr__(self) -> str:
@@ -146,8 +141,7 @@ class Risk(Result):
     def summary(self, years: float = 50.0) -> str:
         """Write rates, return periods, and probabilities in a time (years) as a table."""
         years = checks.positive(years, "years", InvalidOption)
-        scale, confidence = self.hazard.measure.scale, 100 * self.curves[0].confidence
-        rows = []
+        confidence, rows = 100 * self.curves[0].confidence, []
         for one in self.rates:
             chances = [-math.expm1(-rate * years) for rate in (one.annual_rate, *one.interval, *one.bounds)]
             rows.append(
@@ -156,14 +150,12 @@ class Risk(Result):
                     *known_digits(one.annual_rate, one.interval, one.bounds),
                     *one._period_digits(),
                     *known_digits(chances[0], (chances[1], chances[2]), (chances[3], chances[4])),
-                    ", ".join(within(scale * x, shown_range(self.hazard), "{:.3g}".format) for x in one.intensities),
                 ]
             )
         between = f"{confidence:g} % between"
         header = [
             "limit state", "annual rate", between, "once in (years)", between,
             f"probability in {counted(years, 'year')}", between,
-            f"{self.hazard.measure.label} below which 16, 50, 84 % of the rate arises",
         ]  # fmt: skip
         notes = [note for one in self.rates for note in beyond_notes(one)]
         notes += [
@@ -194,7 +186,6 @@ class Risk(Result):
                     "probability": one.probability(years),
                     "share_below_hazard_curve": one.below,
                     "share_above_hazard_curve": one.above,
-                    f"intensities_of_16_50_84_percent_{self.hazard.measure.column}": list(one.intensities),
                 }
                 for one in self.rates
             ],
@@ -203,15 +194,11 @@ class Risk(Result):
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         from rocking.plot.curves import RiskLine, risk_figure
 
-        scale, ends = self.hazard.measure.scale, [*self.hazard.intensity[[0, -1]]]
-        for one in self.rates:  # around where the rates come from
-            low, _, high = one.intensities
-            if low > 0.0 and high < math.inf:
-                reach = (high / low) ** 2
-                ends += [end for end in (low / reach, high * reach) if 0.0 < end < math.inf]
-        at = np.geomspace(min(ends), max(ends), 400)
+        # The figure ends where next to nothing of the rates comes from.
+        low, high = self.hazard.intensity[[0, -1]]
+        at = np.geomspace(1e-2 * low, 1e2 * high, 800)
         return risk_figure(
-            intensity=scale * at,
+            intensity=self.hazard.measure.scale * at,
             hazard=hazard_line(self.hazard, at),
             lines=[
                 RiskLine(f"{one.limit_state}: {one.in_words()}", share_density(curve.fitted, self.hazard, at))
@@ -271,10 +258,8 @@ def _rate(curve: FragilityCurve, hazard: HazardCurve) -> Rate:
     below, above = shares_beyond(curve.fitted, hazard)
     # Motions above the last point add no more than its rate; of a rate that is mostly theirs only the bound is known.
     least = (1.0 - above) * rate + float(hazard.rate[-1]) if above > 0.5 else 0.0
-    intensities = quantile_intensities(curve.fitted, hazard)
-    return Rate(
-        curve.limit_state, rate, (lower, upper), below, above, intensities, (least, max(least, float(hazard.rate[0])))
-    )
+    bounds = least, max(least, float(hazard.rate[0]))
+    return Rate(curve.limit_state, rate, (lower, upper), below, above, bounds)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

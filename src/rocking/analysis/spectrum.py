@@ -132,7 +132,7 @@ def rocking_spectrum(
     resized = gathered.select(np.repeat(np.arange(n), count)).resized(np.tile(rates / median, n))
     table = simulate_many(resized, shaken, **options)
     peaks = [table[name].transpose("motion", "block").values.reshape(-1, n, count) for name in _SIMULATED]
-    ratio = ratios_of(*peaks, resized.alpha.min(axis=1).reshape(n, count))
+    ratio = ratios_of(*peaks, gathered.alpha.min(axis=1)[:, None])
     flat, each = ratio.reshape(-1, count), np.tile(weight, len(ratio))
     found = ("p",), weighted_fractiles(flat, each, shares), overturned_share(flat, each)
     data = _dataset(table, ("block", "p"), (*peaks[:2], ratio), found, {"p": rates}, shares, gathered.gravity)
