@@ -404,7 +404,7 @@ def test_outcomes_without_a_best_lognormal_are_refused_in_one_sentence(intensity
         ({"clusters": [1, 2]}, "clusters"),
         ({"clusters": [[1], [1, 2], 3]}, "clusters"),
         ({"clusters": "abc"}, "clusters"),
-        ({"intensity": [1e-60, 1.0, 2.0]}, "units"),
+        ({"intensity": [1e-60, 1.0, 2.0]}, "intensity"),
         ({"trials": 1e300}, "trials"),
         ({"confidence": 1.0}, "confidence"),
     ],

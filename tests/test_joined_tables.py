@@ -116,7 +116,7 @@ def test_a_block_that_overturns_has_no_largest_rotation_in_any_table(tmp_path):
     found = survey(block, motions)
     peaks = [row["peak_over_slenderness"] for row in found.rows()]
     assert peaks[0] == math.inf and 0.0 < peaks[1] < 1.0
-    found.write(tmp_path)
+    found.to_csv(tmp_path / "summary.csv")
     assert table(tmp_path / "summary.csv").peak_over_slenderness.tolist() == pytest.approx(peaks)
     fallen = found.responses[0]
     assert fallen.to_dict()["peak_over_slenderness"] is None

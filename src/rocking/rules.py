@@ -449,18 +449,17 @@ class Check(BlockUnderRecords):
 
     def _disagreements(self, rules: list[str]) -> list[str]:
         """Say how often each rule is wrong; records under which no single number can be right are not counted."""
-        lines = []
-        less = self.falls_under_less
+        lines, less = [], self.falls_under_less
+        kept = [
+            (ratios, response.overturned)
+            for ratios, response, is_left_out in zip(self.ratios, self.responses, less, strict=True)
+            if not (is_left_out or response.unfinished)
+        ]
         for rule in rules:
-            said = [
-                (ratios[rule] >= 1.0, response.overturned)
-                for ratios, response, is_left_out in zip(self.ratios, self.responses, less, strict=True)
-                if not (is_left_out or response.unfinished)
-            ]
-            unsafe = sum(not yes and real for yes, real in said)
-            wary = sum(yes and not real for yes, real in said)
-            right = len(said) - unsafe - wary
-            lines.append(f"{TITLES[rule]}: right {right}, unsafe {unsafe}, over-conservative {wary} of {len(said)}")
+            unsafe = sum(ratios[rule] < 1.0 and fell for ratios, fell in kept)
+            wary = sum(ratios[rule] >= 1.0 and not fell for ratios, fell in kept)
+            right = len(kept) - unsafe - wary
+            lines.append(f"{TITLES[rule]}: right {right}, unsafe {unsafe}, over-conservative {wary} of {len(kept)}")
         if any(less):
             lines.append(
                 f"not counted: {sum(less)} of {len(less)}, where the block stands under the motion as it is, but falls "

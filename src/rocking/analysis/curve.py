@@ -7,7 +7,7 @@ import re
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, Literal, get_args
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,6 +23,9 @@ from rocking.core.tables import within
 from rocking.errors import InvalidOption, Unfitted
 from rocking.motion.measures import DAMPING
 from rocking.motion.scaling import Measure, intensities
+
+if TYPE_CHECKING:
+    from rocking.plot.curves import FragilityLine
 
 NAMESPACE: Final = "http://openquake.org/xmlns/nrml/0.5"
 
@@ -237,6 +240,35 @@ def fitted_curve(
         goodness=probit.goodness(outcomes, fitted, independent=independent),
         region=probit.likely_region(outcomes, fitted, None if independent else clusters, confidence),
     )
+
+
+def fragility_line(curve: FragilityCurve, intensity: Floats, measure: Measure) -> FragilityLine:
+    """Curve at intensities with its band, and the shares seen in the groups that the fit is tested in, as drawn."""
+    from rocking.plot.curves import FragilityLine
+
+    group = probit.groups(np.log(curve.intensity), curve.trials)
+    held = np.bincount(group, curve.trials).astype(np.float64)
+    at, seen = (np.bincount(group, sums) / held for sums in (curve.trials * curve.intensity, curve.exceeded))
+    is_rotation = curve.limit is not None and math.isfinite(curve.limit)
+    limit = f" (rotation of {curve.limit:g} of the slenderness)" if is_rotation else ""
+    at_half = f"median {in_units(curve.median, measure)}, dispersion {curve.dispersion:.3g}"
+    chance = curve.probability(intensity)
+    band, scale = curve.band(intensity) if curve.bounded else (chance, chance), measure.scale
+    text = f"{curve.limit_state}{limit}: {at_half}"
+    return FragilityLine(text, scale * intensity, chance, *band, scale * at, seen, held)
+
+
+def whole_numbers(values: ArrayLike, name: str, size: int, least: float, most: ArrayLike) -> Floats:
+    """Whole numbers, one for each intensity, between two bounds."""
+    given = checks.answers_or_numbers(values, name, InvalidOption)
+    try:
+        numbers = np.broadcast_to(given, size)
+    except ValueError:
+        raise InvalidOption(f"{{}} must hold one number for each of the {size} intensities", name) from None
+    if not np.all((numbers >= least) & (numbers <= np.asarray(most)) & (numbers == np.floor(numbers))):
+        bound = f"{most:g}" if isinstance(most, float) else "the trials"
+        raise InvalidOption(f"{{}} must be whole numbers, at least {least:g} and no more than {bound}", name)
+    return numbers
 
 
 def extremes(region: Probit, quantity: Callable[[Probit], Floats]) -> tuple[Floats, Floats]:

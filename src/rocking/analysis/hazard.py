@@ -200,15 +200,13 @@ def hazard_line(hazard: HazardCurve, intensity: Floats) -> HazardLine:
 
 def _check_order(what: str, values: Floats, way: float) -> None:
     """Check that values are positive, and increase (`way` 1) or decrease (-1)."""
-    sound = np.isfinite(values) & (values > 0.0)
-    sound[1:] &= way * np.diff(values) > 0.0
-    if not np.all(sound):
+    sound = np.isfinite(values) & (values > 0.0) & (way * np.diff(values, prepend=-way * np.inf) > 0.0)
+    if not sound.all():
         k = int(np.argmin(sound))
         after = f" after {values[k - 1]:g}" if k else ""
-        ordered = "increase" if way > 0.0 else "decrease"
         raise InvalidOption(
-            f"the {what} of a hazard curve must be positive and {ordered} from point to point, but "
-            f"that of point {k + 1} is {values[k]:g}{after}; correct it or leave the point out"
+            f"the {what} of a hazard curve must be positive and {'increase' if way > 0.0 else 'decrease'} from point "
+            f"to point, but that of point {k + 1} is {values[k]:g}{after}; correct it or leave the point out"
         )
 
 
@@ -254,30 +252,26 @@ def _from_openquake(lines: list[str], site: int, period: float | None) -> tuple[
     """Intensities (SI), annual rates and measure of a site in a file of OpenQuake's."""
     said = dict(re.findall(r"(\w+)='?([^,'\"]+)'?", lines[0]))
     kind, _, rest = said.get("imt", "").partition("(")
-    rows = list(csv.reader(lines[1:]))
-    levels = [re.compile(r"poe-([0-9.eE+-]+)").fullmatch(cell.strip()) for cell in rows[0]] if rows else []
-    if kind not in _OPENQUAKE or not any(levels):
+    header, *rows = [*csv.reader(lines[1:])] or [[]]
+    levels = {k: cell.strip()[4:] for k, cell in enumerate(header) if cell.strip().startswith("poe-")}
+    if kind not in _OPENQUAKE or not levels:
         raise InvalidOption(f"no hazard curve of {', '.join(_OPENQUAKE)}: imt is {said.get('imt', 'not given')}")
-    if not 0 <= site < len(rows) - 1:
-        raise InvalidOption(f"there is no site {site}; it holds {len(rows) - 1}, counted from 0")
-    columns = [k for k, level in enumerate(levels) if level]
+    if site >= len(rows):
+        raise InvalidOption(f"there is no site {site}; it holds {len(rows)}, counted from 0")
     try:
-        intensity = np.array([float(level[1]) for level in levels if level])
-        exceeded = np.array([float(rows[1 + site][k]) for k in columns])
+        intensity = np.array([float(level) for level in levels.values()])
+        exceeded = np.array([float(rows[site][k]) for k in levels])
         years = float(said["investigation_time"])
         at = float(rest.rstrip(")")) if kind == "SA" else None
     except (ValueError, IndexError, KeyError) as error:
         raise InvalidOption(f"site {site}: {error}; it is not a whole hazard curve") from None
-    if not 0.0 < years < math.inf:
-        raise InvalidOption(f"the investigation_time is {years:g} years; it must be above 0")
-    if period is not None and period != at:
+    if period not in (None, at):
         raise InvalidOption(f"{{}} is {period:g} s, and this curve is of {said['imt']}: leave it out", "period")
     measure_name, factor = _OPENQUAKE[kind]
     measure = Measure(measure_name) if at is None else Measure("sa", at)
     # Probabilities that are printed as 0 or 1 say nothing of the rate.
     useful = (exceeded > 0.0) & (exceeded < 1.0)
-    rate = -np.log1p(-exceeded[useful]) / years
-    kept, rate = _corners(rate)
+    kept, rate = _corners(-np.log1p(-exceeded[useful]) / checks.positive(years, "investigation_time", InvalidOption))
     return factor * intensity[useful][kept], rate, measure
 
 

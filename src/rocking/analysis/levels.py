@@ -231,6 +231,17 @@ def checked_limit(limit: float, name: str) -> float:
     return least
 
 
+#: Limit states: peak rotation over slenderness that is exceeded; infinity is overturning.
+OVERTURNING: Final[Mapping[str, float]] = {"overturning": math.inf}
+
+
+def limit_states(given: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    """Return what is given for each limit state by its name, of which there is one at least."""
+    for state in checks.mapping(given, name, InvalidOption, "{'overturning': inf}"):
+        checks.text(state, f"name of a limit state in {name}", InvalidOption)
+    return given
+
+
 def outcomes_of(
     table: xr.Dataset, measure: Measure, intensity: Floats, ratio: Floats, limits: Mapping[str, float]
 ) -> pd.DataFrame:

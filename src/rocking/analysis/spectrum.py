@@ -118,10 +118,12 @@ def rocking_spectrum(
         checks.grid_size({"motions": len(shaken), "blocks": len(gathered)}, InvalidOption)
         names, shape = (*(name for name in axes if name != "p"), "p"), [*map(len, axes.values())]
         table = simulate_many(gathered, shaken, **options)
-        peaks = [np.moveaxis(table[name].values.reshape(-1, *shape), 1, -1) for name in _SIMULATED]
-        ratio = ratios_of(*peaks, axes["alpha"].reshape(-1, *[1] * (len(names) - 1)))
+        peak, overturned, unfinished = (
+            np.moveaxis(table[name].values.reshape(-1, *shape), 1, -1) for name in _SIMULATED
+        )
+        ratio = ratios_of(peak, overturned, unfinished, axes["alpha"].reshape(-1, *[1] * (len(names) - 1)))
         found = names, fractiles_of(ratio, shares), overturned_share(ratio)
-        return RockingSpectrum(_dataset(table, names, (*peaks[:2], ratio), found, axes, shares, gathered.gravity))
+        return RockingSpectrum(_dataset(table, names, (peak, overturned, ratio), found, axes, shares, gathered.gravity))
     weight = normalised_weights(weights, len(gathered))
     median = float(weighted_fractiles(gathered.p.mean(axis=1), weight, _HALF)[0])
     rates = median * np.geomspace(0.5, 2.0, 25)
@@ -131,11 +133,13 @@ def rocking_spectrum(
     checks.grid_size({"motions": len(shaken), "blocks": n, "p": count}, InvalidOption)
     resized = gathered.select(np.repeat(np.arange(n), count)).resized(np.tile(rates / median, n))
     table = simulate_many(resized, shaken, **options)
-    peaks = [table[name].transpose("motion", "block").values.reshape(-1, n, count) for name in _SIMULATED]
-    ratio = ratios_of(*peaks, gathered.alpha.min(axis=1)[:, None])
+    peak, overturned, unfinished = (
+        table[name].transpose("motion", "block").values.reshape(-1, n, count) for name in _SIMULATED
+    )
+    ratio = ratios_of(peak, overturned, unfinished, gathered.alpha.min(axis=1)[:, None])
     flat, each = ratio.reshape(-1, count), np.tile(weight, len(ratio))
     found = ("p",), weighted_fractiles(flat, each, shares), overturned_share(flat, each)
-    data = _dataset(table, ("block", "p"), (*peaks[:2], ratio), found, {"p": rates}, shares, gathered.gravity)
+    data = _dataset(table, ("block", "p"), (peak, overturned, ratio), found, {"p": rates}, shares, gathered.gravity)
     return RockingSpectrum(data.assign_coords(weight=("block", weight)).assign_attrs(blocks=pooled(gathered, weights)))
 
 

@@ -7,24 +7,21 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from rocking.block.body import Body
 from rocking.core.constants import STANDARD_GRAVITY
-from rocking.core.progress import Progress, note
+from rocking.core.progress import Progress
 from rocking.core.result import Result
 from rocking.core.tables import Column, columns_with_skipped, counted, decimal, named, text_table
 from rocking.engine.problem import one_body
-from rocking.errors import InvalidOption, install
+from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.records.named import Motions, motions_by_name, names_of
 from rocking.response import PRECISION, Response, in_brief, ratio_text, steps_within
 from rocking.response.contact import friction_coefficient
 from rocking.simulation.ensemble import body_coordinates, verticals_of
 from rocking.simulation.simulate import simulate
-
-if TYPE_CHECKING:
-    pass
 
 #: Columns for people; files hold all.
 _SHOWN: Final = {
@@ -125,16 +122,6 @@ class Survey(BlockUnderRecords):
         }
         friction = {} if self.friction is None else {"friction": self.friction}
         return {"block": block, **friction, "records": self.rows(), "skipped": dict(self.skipped)}
-
-    def write(self, folder: str | Path) -> None:
-        """Write summary.csv, summary.json and, if openpyxl is installed, summary.xlsx into a folder that exists."""
-        folder = Path(folder)
-        self.to_csv(folder / "summary.csv")
-        try:
-            self.to_excel(folder / "summary.xlsx")
-        except InvalidOption:
-            note(f"no summary.xlsx: {install('excel')} for a workbook; summary.csv contains the same table")
-        self.to_json(folder / "summary.json")
 
 
 def survey(

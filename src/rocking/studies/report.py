@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking.analysis.curve import fitted_curve
-from rocking.analysis.fragility import OVERTURNING, Fragility, fit_fragility
+from rocking.analysis.fragility import Fragility, fit_fragility
 from rocking.analysis.levels import (
+    OVERTURNING,
     checked_limit,
     clusters_of,
     motions_in_words,
