@@ -2,7 +2,7 @@ from .curve import FragilityCurve
 from .directions import ResponseRose
 from .incremental import IncrementalDynamicAnalysis
 from .overturning import Mode, OverturningMap, mode_name
-from .probit import Goodness, Likelihood, Probit
+from .probit import Goodness, Probit
 from .risk import Rate, Risk, Survival
 from .spectrum import RockingSpectrum
 from .survey import Survey
@@ -11,7 +11,6 @@ __all__ = [
     "FragilityCurve",
     "Goodness",
     "IncrementalDynamicAnalysis",
-    "Likelihood",
     "Mode",
     "OverturningMap",
     "Probit",

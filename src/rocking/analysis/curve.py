@@ -61,8 +61,8 @@ class FragilityCurve:
         Inverse of Fisher's expected information of intercept and slope.
     confidence : float
         Probability of the intervals and bands.
-    likelihood : Likelihood
-        At its maximum, and against one probability for all intensities.
+    log_likelihood : float
+        Its logarithm at the maximum, without binomial coefficients.
     region : Probit
         Fits that are about as likely, on the boundary of their region: intervals are extremes in it. From the profile
         likelihood, adjusted to the differences between clusters where these hold several outcomes (Chandler and Bate
@@ -91,7 +91,7 @@ class FragilityCurve:
     confidence: float
     clusters: int
     independent: bool
-    likelihood: probit.Likelihood
+    log_likelihood: float
     goodness: probit.Goodness
     region: Probit
 
@@ -188,9 +188,7 @@ class FragilityCurve:
             "outcomes": round(float(self.trials.sum())),
             "exceeded": round(float(self.exceeded.sum())),
             "clusters": self.clusters,
-            "log_likelihood": self.likelihood.logarithm,
-            "likelihood_ratio": self.likelihood.ratio,
-            "likelihood_ratio_p_value": self.likelihood.p_value,
+            "log_likelihood": self.log_likelihood,
             "goodness_statistic": self.goodness.statistic,
             "goodness_freedom": self.goodness.freedom,
             "goodness_p_value": self.goodness.p_value,
@@ -236,7 +234,7 @@ def fitted_curve(
         confidence=confidence,
         clusters=count,
         independent=independent,
-        likelihood=probit.gain(outcomes, fitted, independent=independent),
+        log_likelihood=float(probit.likelihood(outcomes.alone(), np.column_stack(fitted))[0]),
         goodness=probit.goodness(outcomes, fitted, independent=independent),
         region=probit.likely_region(outcomes, fitted, None if independent else clusters, confidence),
     )
@@ -328,9 +326,8 @@ def fragility_model(
     (OpenQuake's unit) nothing moves; `about` has the model's id, assetCategory and lossCategory.
     """
     checks.one_of(about["lossCategory"], "loss_category", InvalidOption, get_args(LossCategory))
-    check_names([taxonomy], "taxonomy")
-    check_names([about["id"]], "model_id")
-    check_names([about["assetCategory"]], "asset_category")
+    for what, name in (("taxonomy", taxonomy), ("model_id", about["id"]), ("asset_category", about["assetCategory"])):
+        check_names([name], what)
     check_names([curve.limit_state for curve in curves], "a limit state")
     low, high = (imt[1] * end for end in valid)
     low = max(low, no_damage or 0.0)

@@ -231,18 +231,14 @@ def _from_table(lines: list[str], period: float | None) -> tuple[Floats, Floats,
     kind, factor = HEADINGS[found[0]]
     intensity, rate = np.empty(len(rows)), np.empty(len(rows))
     for k, (line, row) in enumerate(rows):
-        if len(row) != len(heading):
-            raise InvalidOption(
-                f"this row has {len(row)} cells, and the heading {len(heading)}: make them as many", line=line
-            )
         try:
-            intensity[k], rate[k] = (float(row[heading.index(name)]) for name in (found[0], "annual_rate"))
-        except (ValueError, IndexError):
-            raise InvalidOption(f"{','.join(row)} is not an intensity and a rate", line=line) from None
-    if kind == "sa" and period is None:
-        raise InvalidOption("{} must be given, in s, for a spectral acceleration", "period")
-    if kind != "sa" and period is not None:
-        raise InvalidOption(f"{{}} belongs to a spectral acceleration, and this curve is of {kind}", "period")
+            cells = dict(zip(heading, row, strict=True))
+            intensity[k], rate[k] = (float(cells[name]) for name in (found[0], "annual_rate"))
+        except ValueError:
+            sentence = f"{','.join(row)} is not an intensity and a rate, in {len(heading)} cells as the heading"
+            raise InvalidOption(sentence, line=line) from None
+    if (kind == "sa") != (period is not None):
+        raise InvalidOption(f"{{}} (s) is for a spectral acceleration, and needed there; it is {kind}", "period")
     measure = Measure("sa", period) if kind == "sa" else Measure(kind)
     with np.errstate(over="ignore"):  # what becomes infinite is refused as such
         return factor * intensity, rate, measure

@@ -337,10 +337,20 @@ class _Levels:
     def __init__(self, level: xr.DataArray) -> None:
         self.scale, self.at = level.scale, level.scale * level.values
         self.unit = {"m/s^2": " g", "m/s": " m/s", "1": ""}[level.units]
+        low, high = (f"{end:.5g}" for end in self.at[[0, -1]])
+        self.range = f"{low}{self.unit}" if low == high else f"{low} to {high}{self.unit}"
 
     def summary(self, lowest_uplift: float) -> str:
         """Say what was looked at, and whether it is all below the level (SI) from which on a motion lifts a block."""
-        text = f"looked at: {counted(len(self.at), 'level')}, {self._range(self.at[0], self.at[-1])}{self._step()}"
+        text = f"looked at: {counted(len(self.at), 'level')}, {self.range}"
+        if len(self.at) > 1:
+            steps, ratios = np.diff(self.at), self.at[1:] / self.at[:-1]
+            apart = f"up to {steps.max():.5g}{self.unit}"
+            if np.allclose(steps, steps[0], rtol=1e-6):
+                apart = f"{steps[0]:.5g}{self.unit}"
+            elif np.allclose(ratios, ratios[0], rtol=1e-6):
+                apart = f"{100.0 * (ratios[0] - 1.0):.3g} %"
+            text += f", {apart} apart; bands and gaps that lie between two of them are not seen"
         lifting = self.scale * lowest_uplift
         if self.at[-1] < lifting:
             text += f"\nnone of them lifts a block; that begins at {lifting:.5g}{self.unit}: are the levels right?"
@@ -348,33 +358,17 @@ class _Levels:
 
     def overturning(self, bands: Sequence[tuple[float, float]]) -> str:
         """Bands that overturn (SI); beyond the levels nothing is known of them, which is NaN."""
-        if not bands:
-            return f"at no level looked at, {self._range(self.at[0], self.at[-1])}"
-        return "; ".join(self._band(self.scale * low, self.scale * high) for low, high in bands)
+        return "; ".join(self._band(*(self.scale * end for end in band)) for band in bands) or (
+            f"at no level looked at, {self.range}"
+        )
 
     def _band(self, low: float, high: float) -> str:
         if not (math.isnan(low) or math.isnan(high)):
             return f"{low:.5g} to {high:.5g}"
         if math.isnan(low) and math.isnan(high):
-            return f"at every level looked at, {self._range(self.at[0], self.at[-1])}"
+            return f"at every level looked at, {self.range}"
         open_end = f"up to {high:.5g}{self.unit}" if math.isnan(low) else f"from {low:.5g}{self.unit} on"
         return f"at all levels looked at {open_end}"
-
-    def _range(self, low: float, high: float) -> str:
-        return f"{low:.5g}{self.unit}" if low == high else f"{low:.5g} to {high:.5g}{self.unit}"
-
-    def _step(self) -> str:
-        """How far neighbouring levels are apart; what lies between two of the same verdict is not seen."""
-        if len(self.at) == 1:
-            return ""
-        steps, ratios = np.diff(self.at), self.at[1:] / self.at[:-1]
-        if np.allclose(steps, steps[0], rtol=1e-6):
-            apart = f"{steps[0]:.5g}{self.unit} apart"
-        elif np.allclose(ratios, ratios[0], rtol=1e-6):
-            apart = f"{100.0 * (ratios[0] - 1.0):.3g} % apart"
-        else:
-            apart = f"up to {steps.max():.5g}{self.unit} apart"
-        return f", {apart}; bands and gaps that lie between two of them are not seen"
 
 
 _NO_BALANCE: Final = (

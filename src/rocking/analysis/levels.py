@@ -113,10 +113,8 @@ def normalised_weights(weights: ArrayLike | None, count: int) -> Floats:
     if weights is None:
         return np.ones(count)
     given = checks.numbers(weights, "weights", InvalidOption)
-    if given.shape != (count,):
-        raise InvalidOption(f"weights must hold one number for each of {counted(count, 'block')}, not {given.shape}")
-    if not (np.all(np.isfinite(given) & (given >= 0.0)) and np.any(given > 0.0)):
-        raise InvalidOption("weights must be finite numbers of 0 or more, and not all 0")
+    if given.shape != (count,) or not (np.all(np.isfinite(given) & (given >= 0.0)) and np.any(given > 0.0)):
+        raise InvalidOption(f"{{}} must be {count} numbers of 0 or more, not all 0, one for each block", "weights")
     given = given / given.max()  # else sums of very large or very small weights overflow
     return np.asarray(given * (count / given.sum()))
 

@@ -19,7 +19,7 @@ from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.constants import VERSION, Model
 from rocking.core.progress import Progress
 from rocking.core.result import DatasetResult, table_of_some, variable
-from rocking.core.tables import as_written, cell, named, text_table
+from rocking.core.tables import as_written, cell, named, records_of, text_table
 from rocking.engine.tasks import OUTCOME, Setup, missing_text, simulate_each
 from rocking.engine.treatment import Certified
 from rocking.errors import InvalidMotion, InvalidOption
@@ -189,7 +189,8 @@ def overturning_map(
 
     row, column = (index.ravel() for index in np.indices((levels.size, ratios.size)))
     with Progress("mapping", row.size, show=progress) as bar:
-        modes, peaks = (each.reshape(levels.size, -1) for each in followed(column, levels[row], bar.advance))
+        modes, peaks = followed(column, levels[row], bar.advance)
+    modes, peaks = modes.reshape(levels.size, -1), peaks.reshape(levels.size, -1)
     edges = boundaries(levels, modes, lambda *at: followed(*at)[0], tolerance=width, progress=progress)
     attributes = {
         "program": f"rocking {VERSION}",
@@ -295,8 +296,6 @@ class OverturningMap(DatasetResult):
         return f"{amplitudes[0]:g} or less" if is_open_below else f"none of those up to {amplitudes[-1]:g}"
 
     def to_dict(self) -> dict[str, Any]:
-        names = ("boundary_frequency", "boundary_amplitude", "mode_below", "mode_above")
-        columns = (self.data[name].values for name in names)
         return {
             "pulse": self.data.pulse,
             "block": self.data.block,
@@ -308,7 +307,7 @@ class OverturningMap(DatasetResult):
             "amplitude": self.data.amplitude.values,
             "mode": self.data.mode.values,
             "overturning_amplitude": self.data.overturning_amplitude.values,
-            "boundaries": [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)],
+            "boundaries": records_of(self._columns("boundaries")),
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:

@@ -90,26 +90,6 @@ def probabilities(fits: Probit, z: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
-class Likelihood:
-    """Likelihood of a fit.
-
-    Attributes
-    ----------
-    logarithm : float
-        Without binomial coefficients.
-    ratio : float
-        Twice its gain over one probability for all intensities.
-    p_value : float
-        Probability of a larger gain if the intensity did not matter (chi-squared, one degree of freedom); NaN where
-        outcomes belong together.
-    """
-
-    logarithm: float
-    ratio: float
-    p_value: float
-
-
-@dataclass(frozen=True)
 class Goodness:
     """Pearson's test of fit between groups of outcomes and the fitted probabilities.
 
@@ -143,21 +123,15 @@ def unidentified(data: Outcomes, shown: Callable[[float], str]) -> str | None:
     """Say why no rising lognormal fits a data set best, intensities as `shown` writes them; None where one does."""
     z, exceeded, trials = data
     yes, no, count = z[exceeded > 0], z[exceeded < trials], round(float(trials.sum()))
-    if not yes.size:
-        which = "the only outcome does not exceed" if count == 1 else f"none of the {count} outcomes exceeds"
-        return f"{which} the limit, {_tried(z, shown)}: stronger motions are needed"
-    if not no.size:
-        which = "the only outcome exceeds" if count == 1 else f"all of the {count} outcomes exceed"
-        return f"{which} the limit, {_tried(z, shown)}: weaker motions are needed"
+    if not yes.size or not no.size:
+        which, wanted = ("no", "stronger") if not yes.size else ("every", "weaker")
+        return f"{which} outcome of {count} exceeds the limit, {_tried(z, shown)}: {wanted} motions are needed"
     if z.min() == z.max():
         return f"all outcomes are at one intensity, {shown(math.exp(z[0]))}: others are needed"
     if no.max() <= yes.min() + _overlap(z):
         low, high = math.exp(no.max()), math.exp(yes.min())
-        where = (
-            f"below {shown(low)} and all do above it"
-            if low >= high
-            else f"up to {shown(low)} and all do from {shown(high)} on"
-        )
+        last, first = ("below", "above it") if low >= high else ("up to", f"from {shown(high)} on")
+        where = f"{last} {shown(low)} and all do {first}"
         return (
             f"the outcomes are separated, none exceeds the limit {where}: the fragility is a step there, and motions "
             "near it are needed"
@@ -226,17 +200,6 @@ def _standardised(data: Outcomes, fitted: Probit) -> tuple[Outcomes, Probit, flo
     centre, spread = float(data.z.mean()), float(data.z.std())
     scaled = data._replace(z=(data.z - centre) / spread)
     return scaled, Probit(fitted.intercept + fitted.slope * centre, fitted.slope * spread), centre, spread
-
-
-def gain(data: Outcomes, fitted: Probit, *, independent: bool) -> Likelihood:
-    """Likelihood of one fit, and its gain over one probability for all intensities."""
-    from scipy.special import gammaincc, xlogy
-
-    here = likelihood(data.alone(), np.column_stack(fitted))
-    yes, total = data.exceeded.sum(), data.trials.sum()
-    without = xlogy(yes, yes / total) + xlogy(total - yes, 1.0 - yes / total)
-    ratio = max(0.0, 2.0 * float(here[0] - without))
-    return Likelihood(float(here[0]), ratio, float(gammaincc(0.5, 0.5 * ratio)) if independent else math.nan)
 
 
 def groups(z: Floats, trials: Floats) -> Integers:

@@ -158,13 +158,6 @@ class Risk(Result):
             f"probability in {counted(years, 'year')}", between,
         ]  # fmt: skip
         notes = [note for one in self.rates for note in beyond_notes(one)]
-        notes += [
-            f"{one.limit_state}: the upper end, {one.interval[1]:.2g} a year, is above the highest rate of the hazard "
-            "curve: it comes from weaker motions, to which the first line of the curve is extended; more motions "
-            "narrow the interval"
-            for one in self.rates
-            if self.hazard.rate[0] < one.interval[1] < math.inf
-        ]
         if any(one.interval[0] == 0.0 or math.isinf(one.interval[1]) for one in self.rates):
             notes.append("intervals are those of the fragility, whose summary says why they have no end")
         return "\n".join([text_table(header, rows), *notes])
