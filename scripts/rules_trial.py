@@ -13,9 +13,9 @@ from pages import markdown, write
 
 import rocking
 from rocking import rules
+from rocking.analysis.survey import title_of
 from rocking.core.constants import MODELS
 from rocking.plot.canvas import CURVES, add_labels, add_legend, figure_for, handles_of
-from rocking.rules import TITLES
 
 #: Heights, m, and slendernesses of the blocks: from a bottle to a monument.
 HEIGHTS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
@@ -109,7 +109,7 @@ def verdict_table(blocks, motions, ratios, fell):
         falls, stands = int(np.sum(lifted & fell)), int(np.sum(lifted & ~fell))
         right = 1.0 - (unsafe + wary) / (falls + stands)
         rows.append(
-            (TITLES[name], f"{100 * unsafe / falls:.1f}", f"{100 * wary / stands:.1f}", f"{100 * right:.1f}", unsafe)
+            (title_of(name), f"{100 * unsafe / falls:.1f}", f"{100 * wary / stands:.1f}", f"{100 * right:.1f}", unsafe)
         )
     head = ("rule", "unsafe, % of the falls", "over-conservative, % of the others", "right, % of all", "unsafe cases")
     total = (f"{len(motions)} records, {len(blocks)} blocks", f"{falls} falls", f"{stands} others", "", "")
@@ -123,7 +123,7 @@ def capacity_table(ratios, capacities):
         share = (1.0 / ratio / capacities)[np.isfinite(capacities)]
         low, median, high = np.quantile(share, [0.05, 0.5, 0.95])
         numbers = (f"{value:.2f}" for value in (low, median, high, share.max()))
-        rows.append((TITLES[name], *numbers, f"{100.0 * np.mean(share > 1.0):.0f}"))
+        rows.append((title_of(name), *numbers, f"{100.0 * np.mean(share > 1.0):.0f}"))
     return markdown(("rule", "5 %", "median", "95 %", "largest", "above 1, %"), rows)
 
 
@@ -161,7 +161,7 @@ def figure(ratios, capacities):
         axes = drawn.add_subplot()
         for (name, ratio), curve in zip(ratios.items(), STYLES, strict=True):
             share = np.sort((1.0 / ratio / capacities)[np.isfinite(capacities)])
-            axes.step(share, np.arange(1, share.size + 1) / share.size, where="post", label=TITLES[name], **curve)
+            axes.step(share, np.arange(1, share.size + 1) / share.size, where="post", label=title_of(name), **curve)
         axes.axvline(1.0, color="0.35", linewidth=0.8)
         axes.set_xscale("log")
         ticks = [0.1, 0.2, 0.5, 1.0, 2.0, 3.0]

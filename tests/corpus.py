@@ -31,7 +31,6 @@ import numpy as np
 
 import rocking
 from rocking import chattering, dynamics, pulses
-from rocking.analysis import Band
 from rocking.chattering import families
 
 FILE: Final = Path(__file__).parent / "data" / "corpus.json"
@@ -631,12 +630,8 @@ def fragilities() -> Iterator[Item]:
 
 @group(digits=6)
 def bands() -> Iterator[Item]:
-    options = {"trials": [10, 10, 10, 9, 10]}
-    for kind in ("likelihood", "bootstrap"):
-        band = Band(kind, confidence=0.95, samples=80, seed=4)
-        yield from of_result(rocking.fit_fragility([1.0, 2.0, 3.0, 4.0, 5.0], [0, 2, 4, 7, 9], band=band, **options))
-    found = rocking.fragility(SLENDER, suite(), levels=LEVELS, band=Band("bootstrap", samples=60, seed=1), **QUIET)
-    yield from of_result(found)
+    options = {"trials": [10, 10, 10, 9, 10], "confidence": 0.95}
+    yield from of_result(rocking.fit_fragility([1.0, 2.0, 3.0, 4.0, 5.0], [0, 2, 4, 7, 9], **options))
 
 
 SITE: Final = rocking.HazardCurve([0.3, 0.5, 1.0, 2.0, 5.0, 10.0], [0.2, 0.1, 0.02, 0.004, 2e-4, 1e-5])
@@ -649,11 +644,6 @@ def risks() -> Iterator[Item]:
     yield from of_result(SITE)
     yield from of_result(fitted.survival(1000.0, SITE))
     yield from of_result(fitted.survival(500.0))
-
-
-@group(digits=6, fast=False)
-def efficiencies() -> Iterator[Item]:
-    yield from of_result(rocking.compare_measures(STATUE, suite(), periods=[0.5, 1.0], **QUIET))
 
 
 @group(digits=6)
@@ -934,7 +924,6 @@ COMMANDS: Final = {
         f"ida {TWO} {SIZES} --levels 1:6:6",
         "map one-sine --p 2 --alpha 0.2 --amplitudes 1:6:6 --frequencies 1,2",
         f"check {TWO} {SIZES}",
-        f"measures {TWO} el-centro-meloland-up {SIZES}",
     ],
     "catalogues": ["records", f"records {RECORD}", "pulses", "pulses --json"],
     "chattering": ["chatter 1.03 2 0.92", "chatter 1.03 2 0.92 --table", "critical 2 0.92"],
@@ -1019,7 +1008,7 @@ ON_FILES: Final = {
     "fragility": [
         "fragility --outcomes observed.csv --hazard rates.csv --years 50 --out fitted",
         f"fragility {TWO} ridgecrest-tow2-090 --p 1 --alpha 0.25 --levels 0.5:30:12 --limits overturning,half=0.5",
-        "fragility --outcomes observed.csv --bootstrap 50 --seed 3 --json",
+        "fragility --outcomes observed.csv --confidence 0.8 --json",
     ],
     "tests": [
         f"validate tests.csv {SIZES} --peak-error 0.1deg --lapse 0.01 --out judged",

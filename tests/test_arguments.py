@@ -8,7 +8,6 @@ import pytest
 
 import rocking
 from rocking import Block, Blocks, InvalidBlock, InvalidMotion
-from rocking.analysis import Band
 from rocking.analysis.survey import survey
 from rocking.inputs.pulses import named_pulse
 
@@ -142,8 +141,7 @@ TAKES_ONE_THING = {
     "limits": lambda value: rocking.fragility(BLOCK, [MOTION], limits=value),
     "polarity": lambda value: rocking.fragility(BLOCK, [MOTION], polarity=value),
     "polarity of an ensemble": lambda value: rocking.simulate_many(BLOCK, MOTION, polarity=value),
-    "band": lambda value: rocking.fit_fragility([2.0, 3.0], [1, 2], trials=3, band=value),
-    "kind of a band": Band,
+    "confidence": lambda value: rocking.fit_fragility([2.0, 3.0], [1, 2], trials=3, confidence=value),
     "hazard curve": lambda value: fitted().annual_rate(value),
     "limit state": lambda value: fitted().curve(value),
     "intensity of a probability": lambda value: fitted().curves[0].probability(value),
@@ -153,7 +151,6 @@ TAKES_ONE_THING = {
     "file of a fragility": lambda value: fitted().to_csv(value),
     "NRML file": lambda value: fitted().to_nrml(value),
     "NRML taxonomy": lambda value: fitted().to_nrml("unwritten.xml", taxonomy=value),
-    "NRML format": lambda value: fitted().to_nrml("unwritten.xml", format=value),
     "file of a response": lambda value: rocking.simulate(BLOCK, None, initial_rotation=0.1).to_csv(value),
     "file of histories": lambda value: rocking.simulate(BLOCK, None, initial_rotation=0.1).to_netcdf(value),
     "file of a hazard curve": rocking.HazardCurve.read,

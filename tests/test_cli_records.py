@@ -119,7 +119,7 @@ def test_without_openpyxl_a_note_says_why_there_is_no_workbook(run, folder, tmp_
         monkeypatch.setitem(sys.modules, name, None)
     code, _, err = run("simulate", folder, *BLOCK, "--out", tmp_path)
     assert code == 0
-    assert "note: no summary.xlsx: run pip install '.[excel]' in the source folder of rocking" in err
+    assert "note: summary.xlsx left out: a workbook needs openpyxl: run pip install '.[excel]' in the source" in err
     assert not (tmp_path / "summary.xlsx").exists()
 
 

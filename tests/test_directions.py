@@ -69,7 +69,7 @@ def test_the_figure_has_the_full_circle(statue, pairs):
 @pytest.mark.parametrize(
     ("change", "error", "sentence"),
     [
-        ({"pairs": []}, InvalidOption, "pairs must hold a pair"),
+        ({"pairs": []}, InvalidOption, "pairs must hold the two horizontal"),
         ({"pairs": [Motion([0.0, 1.0], [[1.0]])]}, InvalidOption, "two horizontal components of each place"),
         ({"pairs": Motion([0.0, 1.0], [[1.0]])}, InvalidOption, "pairs must be a list"),
         ({"pairs": [("a.at2", "b.at2")]}, InvalidMotion, "rocking.read"),

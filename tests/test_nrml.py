@@ -10,11 +10,11 @@ from scipy import stats
 
 import rocking
 from rocking import fit_fragility, fragility
-from rocking.analysis.nrml import NAMESPACE
 
 G = 9.80665
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
 PULSES = [rocking.pulses.one_sine(1.0, frequency) for frequency in np.linspace(0.3, 1.5, 13)]
+NAMESPACE = "http://openquake.org/xmlns/nrml/0.5"
 NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")
 
 
@@ -52,15 +52,13 @@ def check_shape(root):
         assert imls.tag == tag("imls")
         assert re.fullmatch(r"PGA|PGV|SA\(\d+(\.\d+)?\)", imls.get("imt"))
         assert [entry.get("ls") for entry in rest] == names
-        if function.get("format") == "continuous":
-            check_continuous(function, imls, rest)
-        else:
-            check_discrete(function, imls, rest)
+        check_continuous(function, imls, rest)
     return functions
 
 
 def check_continuous(function, imls, params):
     assert set(function.attrib) == {"id", "format", "shape"}
+    assert function.get("format") == "continuous"
     assert function.get("shape") == "logncdf"
     assert set(imls.attrib) - {"noDamageLimit"} == {"imt", "minIML", "maxIML"}
     assert 0.0 < float(imls.get("minIML")) < float(imls.get("maxIML"))
@@ -71,19 +69,6 @@ def check_continuous(function, imls, params):
         assert float(entry.get("stddev")) > 0.0
 
 
-def check_discrete(function, imls, poes):
-    assert set(function.attrib) == {"id", "format"}
-    assert set(imls.attrib) - {"noDamageLimit"} == {"imt"}
-    levels = np.array(imls.text.split(), dtype=float)
-    assert np.all(np.diff(levels, prepend=float(imls.get("noDamageLimit", 0.0))) > 0.0)
-    for entry in poes:
-        assert entry.tag == tag("poes")
-        probabilities = np.array(entry.text.split(), dtype=float)
-        assert probabilities.shape == levels.shape
-        assert np.all((probabilities >= 0.0) & (probabilities <= 1.0))
-        assert np.all(np.diff(probabilities) >= 0.0)
-
-
 def openquakes_probability(params, level):
     """Lognormal from the mean and the standard deviation of the intensity."""
     mean, deviation = float(params.get("mean")), float(params.get("stddev"))
@@ -91,11 +76,8 @@ def openquakes_probability(params, level):
     return stats.lognorm.cdf(level, sigma, scale=mean / math.sqrt(1.0 + (deviation / mean) ** 2))
 
 
-@pytest.mark.parametrize("format", ["continuous", "discrete"])
-def test_a_model_has_the_documented_shape(result, tmp_path, format):
-    root = written(result, tmp_path / "model.xml", format=format, taxonomy="statue_A")
-    (function,) = check_shape(root)
-    assert function.get("format") == format
+def test_a_model_has_the_documented_shape(result, tmp_path):
+    (function,) = check_shape(written(result, tmp_path / "model.xml", taxonomy="statue_A"))
     assert function.get("id") == "statue_A"
     assert (tmp_path / "model.xml").read_text("utf-8").startswith("<?xml version='1.0' encoding='UTF-8'?>")
 
@@ -111,17 +93,6 @@ def test_a_continuous_function_gives_the_probabilities_of_the_curve(result, tmp_
     at = np.linspace(1.0, 5.0, 9)
     for curve, entry in zip(result.curves, params, strict=True):
         np.testing.assert_allclose(openquakes_probability(entry, at / G), curve.probability(at), atol=1e-6)
-
-
-def test_a_discrete_function_gives_the_probabilities_of_the_curve(result, tmp_path):
-    (function,) = check_shape(written(result, tmp_path / "model.xml", format="discrete"))
-    imls, *poes = function
-    levels = np.array(imls.text.split(), dtype=float)
-    assert len(levels) == 40
-    for curve, entry in zip(result.curves, poes, strict=True):
-        np.testing.assert_allclose(
-            np.array(entry.text.split(), dtype=float), curve.probability(levels * G), rtol=1e-5, atol=1e-12
-        )
 
 
 @pytest.mark.parametrize(
@@ -171,7 +142,6 @@ def test_pooled_blocks_need_one_to_count_for(tmp_path):
         ({"taxonomy": "two words"}, "taxonomy"),
         ({"model_id": "a/b"}, "model_id"),
         ({"loss_category": "people"}, "loss_category"),
-        ({"format": "table"}, "format"),
     ],
 )
 def test_what_nrml_does_not_allow_is_refused(result, tmp_path, options, word):
@@ -186,16 +156,14 @@ def test_a_limit_state_that_is_no_identifier_is_refused(tmp_path):
         named.to_nrml(tmp_path / "model.xml")
 
 
-def test_a_curve_too_flat_for_a_mean_is_refused_as_continuous_and_written_as_discrete(tmp_path):
+def test_a_curve_too_flat_for_a_mean_is_refused(tmp_path):
     flat = fit_fragility([1.0, 2.0, 3.0], [4999, 5000, 5010], trials=10000)
     assert flat.curves[0].dispersion > 100.0
-    with pytest.raises(rocking.InvalidOption, match="discrete"):
+    with pytest.raises(rocking.InvalidOption, match="too wide for the mean"):
         flat.to_nrml(tmp_path / "model.xml")
-    check_shape(written(flat, tmp_path / "model.xml", format="discrete"))
 
 
 def test_data_below_the_blocks_uplift_have_no_range_of_validity(tmp_path):
     below = fit_fragility([0.5, 1.0, 1.5], [1, 2, 3], trials=4, block=BLOCK)
-    for form in ("continuous", "discrete"):
-        with pytest.raises(rocking.InvalidOption, match="below the one that lifts the block"):
-            below.to_nrml(tmp_path / "model.xml", format=form)
+    with pytest.raises(rocking.InvalidOption, match="below the one that lifts the block"):
+        below.to_nrml(tmp_path / "model.xml")

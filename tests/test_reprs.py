@@ -14,7 +14,6 @@ import xarray as xr
 
 import rocking
 from rocking import records
-from rocking.analysis import Band
 from rocking.analysis.survey import survey
 from rocking.kernels.trace import Trail
 
@@ -61,9 +60,6 @@ RESULTS = {
     "solid": lambda path: SOLID,
     "rose": lambda path: SOLID.rose(),
     "fragility": lambda path: rocking.fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10),
-    "bootstrapped fragility": lambda path: rocking.fit_fragility(
-        [2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10, band=Band("bootstrap", samples=50)
-    ),
     "risk": lambda path: rocking.fit_fragility([2.0, 3.0, 4.0], [1, 4, 7], trials=10).annual_rate(SITE),
     "survey": lambda path: survey(BLOCK, {"one": RECORD, "two": -RECORD}),
     "rule": lambda path: rocking.rules.west([BLOCK, rocking.Block(half_width=0.2, half_height=1.0)], RECORD),

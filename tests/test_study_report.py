@@ -221,7 +221,7 @@ def test_a_block_that_no_curve_fits_says_why(tmp_path):
     study.run()
     found = study.block_fragilities()
     assert found.data.fault.values[0, 0] == ""
-    assert "none of the 72 outcomes exceeds the limit" in found.data.fault.values[0, 1]
+    assert "no outcome of 72 exceeds the limit" in found.data.fault.values[0, 1]
     assert np.isnan(found.data["median"].values[0, 1])
     assert "; 1 curve cannot be fitted (fault says why)" in found.summary()
 

@@ -1,10 +1,8 @@
 from . import analysis, calibration, chattering, dynamics, pulses, records, rules, solid, studies
-from .analysis.critical import CriticalScale, critical_scale
 from .analysis.directions import response_rose
-from .analysis.efficiency import compare_measures
 from .analysis.fragility import Fragility, fit_fragility, fragility
 from .analysis.hazard import HazardCurve
-from .analysis.incremental import incremental_dynamic_analysis
+from .analysis.incremental import CriticalScale, critical_scale, incremental_dynamic_analysis
 from .analysis.overturning import overturning_map
 from .analysis.spectrum import rocking_spectrum
 from .analysis.survey import survey
@@ -132,7 +130,6 @@ __all__ = [
     "calibrate_history",
     "calibration",
     "chattering",
-    "compare_measures",
     "critical_scale",
     "dynamics",
     "explore",

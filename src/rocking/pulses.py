@@ -71,9 +71,10 @@ def rectangular(amplitude: float, duration: float) -> Motion:
     >>> rectangular(2.0, 0.5).pgv
     1.0
     """
-    amplitude, duration = _amplitude(amplitude), checks.positive(duration, "duration", InvalidMotion, "s")
-    description = Description("rectangular", {"amplitude": amplitude, "duration": duration}, "constant")
-    return Motion(np.array([0.0, duration]), np.array([[amplitude]]), name="rectangular", description=description)
+    numbers = _checked(amplitude=amplitude, duration=duration)
+    description = Description("rectangular", numbers, "constant")
+    points = np.array([0.0, numbers["duration"]]), np.array([[numbers["amplitude"]]])
+    return Motion(*points, name="rectangular", description=description)
 
 
 def triangular(amplitude: float, duration: float) -> Motion:
@@ -94,10 +95,9 @@ def triangular(amplitude: float, duration: float) -> Motion:
     >>> triangular(2.0, 0.5).pgv
     0.5
     """
-    amplitude, duration = _amplitude(amplitude), checks.positive(duration, "duration", InvalidMotion, "s")
-    formula = "linear from 0 to amplitude at duration/2 and back to 0"
-    description = Description("triangular", {"amplitude": amplitude, "duration": duration}, formula)
-    points = [0.0, 0.5 * duration, duration], [0.0, amplitude, 0.0]
+    numbers = _checked(amplitude=amplitude, duration=duration)
+    description = Description("triangular", numbers, "linear from 0 to amplitude at duration/2 and back to 0")
+    points = [0.0, 0.5 * numbers["duration"], numbers["duration"]], [0.0, numbers["amplitude"], 0.0]
     return Motion.from_points(*points, name="triangular", description=description)
 
 
@@ -217,44 +217,47 @@ def n_lobe(amplitude: float | Sequence[float], frequency: float, *, lobes: int |
     array([ 1., -3.,  2.])
     """
     amplitudes = _lobe_amplitudes(amplitude, lobes)
-    frequency = _checked_frequency(frequency)
+    frequency = _checked(frequency=frequency)["frequency"]
     per_lobe = _PIECES_PER_CYCLE // 2
     breakpoints = np.arange(len(amplitudes) * per_lobe + 1.0) / (_PIECES_PER_CYCLE * frequency)
     unit = _sine_pieces(breakpoints, frequency, 0.0)
     one = np.ndim(amplitude) == 0
     numbers = {"amplitude" if one else f"amplitude_{k}": a for k, a in enumerate(amplitudes)}
     formula = "amplitude sin(2 pi frequency t), an amplitude for each half cycle"
-    return Motion(
-        breakpoints,
-        unit * np.repeat(amplitudes, per_lobe)[:, np.newaxis],
-        name=f"{len(amplitudes)} lobes",
-        description=Description("n-lobe", numbers | {"frequency": frequency, "lobes": len(amplitudes)}, formula),
-        error=_ERROR * max(map(abs, amplitudes)),
-    )
+    about = Description("n-lobe", numbers | {"frequency": frequency, "lobes": len(amplitudes)}, formula)
+    series = unit * np.repeat(amplitudes, per_lobe)[:, np.newaxis]
+    return _made(breakpoints, series, max(map(abs, amplitudes)), about, f"{len(amplitudes)} lobes")
 
 
-def _amplitude(value: float) -> float:
-    return checks.finite(value, "amplitude", InvalidMotion)
+def _checked(**numbers: float) -> dict[str, float]:
+    """Return numbers of a pulse: an amplitude and a phase may be any, a duration is positive, a frequency a pulse's."""
+    found = {}
+    for name, value in numbers.items():
+        if name in ("amplitude", "phase"):
+            found[name] = checks.finite(value, name, InvalidMotion)
+        elif name == "duration":
+            found[name] = checks.positive(value, name, InvalidMotion, "s")
+        else:
+            positive = checks.positive(value, name, InvalidMotion, "Hz")
+            found[name] = checks.within(positive, "frequency of a pulse", InvalidMotion, 1e-9, 1e6, "Hz")
+    return found
+
+
+def _made(breakpoints: Floats, series: Floats, peak: float, about: Description, name: str = "") -> Motion:
+    """Return the motion of pieces (about their starts), whose error is in proportion to a peak acceleration."""
+    return Motion(breakpoints, series, name=name or about.family, description=about, error=_ERROR * abs(peak))
 
 
 def _sine(family: str, amplitude: float, frequency: float, cycles: float, phase: float) -> Motion:
-    amplitude, phase, frequency = (
-        _amplitude(amplitude),
-        checks.finite(phase, "phase", InvalidMotion),
-        _checked_frequency(frequency),
-    )
+    numbers = _checked(amplitude=amplitude, frequency=frequency, phase=phase)
     cycles = checks.positive(cycles, "number of cycles", InvalidMotion, "cycles")
     if cycles > _MOST_CYCLES:
         raise InvalidMotion(f"a sine may have at most {_MOST_CYCLES} {{}}, not {cycles:g}", "cycles", value=cycles)
+    amplitude, frequency, phase = numbers.values()
     breakpoints = np.linspace(0.0, cycles / frequency, _whole_pieces(_PIECES_PER_CYCLE * cycles))
     numbers = {"amplitude": amplitude, "frequency": frequency, "cycles": cycles, "phase": phase}
-    return Motion(
-        breakpoints,
-        amplitude * _sine_pieces(breakpoints, frequency, phase),
-        name=family,
-        description=Description(family, numbers, "amplitude sin(2 pi frequency t + phase) over the given cycles"),
-        error=_ERROR * abs(amplitude),
-    )
+    about = Description(family, numbers, "amplitude sin(2 pi frequency t + phase) over the given cycles")
+    return _made(breakpoints, amplitude * _sine_pieces(breakpoints, frequency, phase), amplitude, about)
 
 
 def _lobe_amplitudes(amplitude: float | Sequence[float], lobes: int | None) -> list[float]:
@@ -310,7 +313,7 @@ def ricker(
     >>> round(pulse.pga, 12), abs(pulse.velocity(pulse.duration)) < 1e-15
     (2.0, True)
     """
-    amplitude, frequency = _amplitude(amplitude), _checked_frequency(frequency)
+    amplitude, frequency = _checked(amplitude=amplitude, frequency=frequency).values()
     kinds = ("symmetric", "antisymmetric")
     symmetric = checks.one_of(kind, "kind of a Ricker pulse", InvalidMotion, kinds) == "symmetric"
     rate = math.sqrt(2.0) * math.pi * frequency if symmetric else 2.0 * math.pi * frequency / math.sqrt(3.0)
@@ -328,14 +331,9 @@ def ricker(
         if symmetric
         else "(amplitude/1.3801) (x^2 - 3) x exp(-x^2/2), x = 2 pi frequency (t - duration/2)/sqrt(3)"
     )
-    parameters = {"amplitude": amplitude, "frequency": frequency, "duration": length}
-    return Motion(
-        breakpoints,
-        _about_starts(breakpoints, series * (amplitude / peak)),
-        name=f"{kind} Ricker",
-        description=Description(f"{kind} Ricker", parameters, formula),
-        error=_ERROR * abs(amplitude),
-    )
+    numbers = {"amplitude": amplitude, "frequency": frequency, "duration": length}
+    about = Description(f"{kind} Ricker", numbers, formula)
+    return _made(breakpoints, _about_starts(breakpoints, series * (amplitude / peak)), amplitude, about)
 
 
 def mavroeidis_papageorgiou(amplitude: float, frequency: float, *, phase: float, gamma: float) -> Motion:
@@ -375,11 +373,8 @@ def mavroeidis_papageorgiou(amplitude: float, frequency: float, *, phase: float,
     >>> pulse.duration, round(pulse.pgv, 12)
     (4.0, 0.8)
     """
-    amplitude, phase, frequency = (
-        _amplitude(amplitude),
-        checks.finite(phase, "phase", InvalidMotion),
-        _checked_frequency(frequency),
-    )
+    numbers = _checked(amplitude=amplitude, frequency=frequency, phase=phase)
+    amplitude, frequency, phase = numbers.values()
     gamma = checks.positive(gamma, "gamma", InvalidMotion, "cycles")
     if not 1.0 <= gamma <= _MOST_CYCLES:
         sentence = f"{{}} of a Mavroeidis-Papageorgiou pulse must be from 1 to {_MOST_CYCLES}, not {gamma}"
@@ -397,18 +392,13 @@ def mavroeidis_papageorgiou(amplitude: float, frequency: float, *, phase: float,
         + 0.25 * (1.0 - shift) * _sine_series(_sum_of_angles(carrier, envelope, -1.0), rate * (1.0 - shift))
     )
     peak = rate * amplitude
-    return Motion(
-        breakpoints,
-        _about_starts(breakpoints, -peak * series),
-        name="Mavroeidis-Papageorgiou",
-        description=Description(
-            "Mavroeidis-Papageorgiou",
-            {"amplitude": amplitude, "frequency": frequency, "phase": phase, "gamma": gamma},
-            "derivative of amplitude/2 [1 + cos(2 pi frequency s/gamma)] cos(2 pi frequency s + phase), "
-            "s = t - gamma/(2 frequency); amplitude is a velocity, m/s",
-        ),
-        error=_ERROR * abs(peak),
+    about = Description(
+        "Mavroeidis-Papageorgiou",
+        numbers | {"gamma": gamma},
+        "derivative of amplitude/2 [1 + cos(2 pi frequency s/gamma)] cos(2 pi frequency s + phase), "
+        "s = t - gamma/(2 frequency); amplitude is a velocity, m/s",
     )
+    return _made(breakpoints, _about_starts(breakpoints, -peak * series), peak, about)
 
 
 class _Angle(NamedTuple):
@@ -475,9 +465,3 @@ def _gaussian_derivative(order: int, times: Floats, rate: float) -> Floats:
 def _scaled_powers(rate: float, powers: NDArray[np.int_]) -> Floats:
     """Return ``rate**n / n!``."""
     return rate ** powers.astype(np.float64) / np.array([math.factorial(n) for n in powers], dtype=np.float64)
-
-
-def _checked_frequency(frequency: float) -> float:
-    """Return a frequency, Hz, or raise InvalidMotion if it is no pulse's."""
-    checked = checks.positive(frequency, "frequency", InvalidMotion, "Hz")
-    return checks.within(checked, "frequency of a pulse", InvalidMotion, 1e-9, 1e6, "Hz")

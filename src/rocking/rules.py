@@ -15,19 +15,19 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from rocking.analysis.incremental import incremental_dynamic_analysis
-from rocking.analysis.levels import MIRROR_NOTE, values_of
-from rocking.analysis.survey import BlockUnderRecords, motion_of
+from rocking.analysis.levels import values_of
+from rocking.analysis.survey import Check
 from rocking.block import Block, Blocks, one_block
 from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.core.constants import STANDARD_GRAVITY, Model
+from rocking.core.constants import Model
 from rocking.core.progress import Progress
-from rocking.core.tables import decimal, named, range_text, text_table
+from rocking.core.tables import counted, range_text
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
 from rocking.records.named import Motions, motions_by_name, several_motions
-from rocking.response import PRECISION, Response, in_brief, known_ratio
+from rocking.response import Response
 from rocking.simulation.simulate import simulate
 
 __all__ = ["RULES", "Check", "Rating", "asce_43_05", "check", "housner", "ishiyama", "priestley", "rate", "west"]
@@ -65,7 +65,7 @@ class Rating:
     def __repr__(self) -> str:
         unit = "" if self.unit == "1" else f" {self.unit}"
         demand, capacity, ratio = map(range_text, (self.demand, self.capacity, self.ratio))
-        count = f"{len(self.demand)} blocks" if len(self.demand) > 1 else "1 block"
+        count = counted(len(self.demand), "block")
         return f"<Rating: {self.rule}, {count}; demand {demand}{unit}, capacity {capacity}{unit}, ratio {ratio}>"
 
     @property
@@ -86,9 +86,8 @@ Comparison = Callable[[Blocks, Motion], tuple[Any, Floats]]
 
 _rules: dict[str, Rule] = {}
 
-#: Rules by name, and their names for people.
+#: Rules by name.
 RULES: Final[Mapping[str, Rule]] = MappingProxyType(_rules)
-TITLES: Final[dict[str, str]] = {}
 
 #: Sections that the documentation of every rule shares.
 _DOCUMENTATION: Final = """{}
@@ -112,7 +111,7 @@ _DOCUMENTATION: Final = """{}
     """
 
 
-def _rule(title: str, unit: str, example: str) -> Callable[[Comparison], Rule]:
+def _rule(unit: str, example: str) -> Callable[[Comparison], Rule]:
     """Make a rule of a comparison, with the unit of its numbers and the ratio that its example shows."""
 
     def rule_of(comparison: Comparison) -> Rule:
@@ -126,7 +125,7 @@ def _rule(title: str, unit: str, example: str) -> Callable[[Comparison], Rule]:
         first, _, rest = (comparison.__doc__ or "").partition("\n\n")
         rule.__doc__ = _DOCUMENTATION.format(first, rest.rstrip(), name, example)
         del rule.__wrapped__  # its arguments are not those of the rule
-        _rules[name], TITLES[name] = rule, title
+        _rules[name] = rule
         return rule
 
     return rule_of
@@ -140,7 +139,7 @@ def _free(blocks: Blocks | Block | Iterable[Block]) -> Blocks:
     return many
 
 
-@_rule("West", "m/s^2", "0.895")
+@_rule("m/s^2", "0.895")
 def west(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     """Compare the peak acceleration with the static threshold g tan(alpha): West's formula.
 
@@ -161,7 +160,7 @@ def west(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     return motion.pga, blocks.gravity * np.tan(blocks.alpha)
 
 
-@_rule("Ishiyama", "1", "0.895")
+@_rule("1", "0.895")
 def ishiyama(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     """Ask for a peak acceleration as well as a peak velocity: Ishiyama's criteria.
 
@@ -192,7 +191,7 @@ def overturning_velocity(blocks: Blocks) -> Floats:
     return np.asarray(2.0 * blocks.gravity * np.sin(0.5 * blocks.alpha) / (blocks.p * np.cos(blocks.alpha)))
 
 
-@_rule("Housner", "rad", "1.840")
+@_rule("rad", "1.840")
 def housner(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     """Compare energies: a block may overturn from alpha = S_v sqrt(m R/(g I)) = p S_v/g on (Housner).
 
@@ -226,7 +225,7 @@ def mean_spectral_velocity(motion: Motion) -> float:
     return float(np.trapezoid(velocities, periods) / (periods[-1] - periods[0]))
 
 
-@_rule("ASCE 43-05", "m/s^2", "1.579")
+@_rule("m/s^2", "1.579")
 def asce_43_05(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     """Replace the block by an oscillator with its energy and damping: the approximate method of ASCE/SEI 43-05.
 
@@ -257,7 +256,7 @@ def asce_43_05(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     return _least_ratio(blocks, motion, _reserve_energy)
 
 
-@_rule("Priestley", "m", "1.070")
+@_rule("m", "1.070")
 def priestley(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     """Replace the block by an oscillator with the period of free rocking: Priestley, Evison and Carr, in FEMA 356.
 
@@ -374,103 +373,6 @@ def _least_ratio(
     return demand, capacity
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Check(BlockUnderRecords):
-    """Rules of thumb compared with simulations, for a block under several motions; from `check`.
-
-    Attributes
-    ----------
-    ratios : tuple of mapping of str to float
-        For each motion, demand over capacity by each rule.
-    margins : tuple of float
-        For each motion, one over the lowest factor on it at which the block overturns; NaN if it overturns at none.
-    block, records, responses, skipped
-        The block, the name of each motion, the simulated response to each, and why records could not be read.
-    """
-
-    ratios: tuple[Mapping[str, float], ...]
-    margins: tuple[float, ...]
-
-    @property
-    def falls_under_less(self) -> tuple[bool, ...]:
-        """Whether the block stands under each motion as it is, and falls under the same motion times less than 1."""
-        each = zip(self.responses, self.margins, strict=True)
-        return tuple(margin > 1.0 and not (one.overturned or one.unfinished) for one, margin in each)
-
-    def rows(self) -> list[dict[str, Any]]:
-        return [
-            {
-                **label,
-                named("pga", "g"): decimal(motion_of(response).pga / STANDARD_GRAVITY),
-                named("pgv", "m/s"): motion_of(response).pgv,
-                **ratios,
-                "simulated": margin,
-                "lowest_factor": 1.0 / margin,
-                "peak_over_slenderness": response.peak_over_slenderness,
-                "overturned": response.overturned,
-                "falls_under_less": less,
-                "verdict": in_brief(response, PRECISION) + (f"; overturns at x {_short(1.0 / margin)}" if less else ""),
-            }
-            for label, response, ratios, margin, less in zip(
-                self._labels(), self.responses, self.ratios, self.margins, self.falls_under_less, strict=True
-            )
-        ]
-
-    def summary(self) -> str:
-        rules = [*self.ratios[0]]
-        shown = {"record": "record", named("pga", "g"): "PGA, g", named("pgv", "m/s"): "PGV, m/s"}
-        shown |= {rule: TITLES[rule] for rule in rules}
-        shown |= {"simulated": "simulated", "peak_over_slenderness": "peak/slenderness", "verdict": "outcome"}
-        known = [{"peak_over_slenderness": known_ratio(response)} for response in self.responses]
-        rows = [row | each for row, each in zip(self.rows(), known, strict=True)]
-        # No rule of thumb is better than to three digits.
-        cells = [[float(f"{x:.3g}") if isinstance(x := row[name], float) else x for name in shown] for row in rows]
-        table = text_table(list(shown.values()), cells)
-        return "\n".join(
-            [
-                str(self.block),
-                "demand over capacity: from 1 on a rule predicts overturning; simulated: one over the lowest factor on "
-                "the motion that was found to overturn the block, in steps of 5 %",
-                "",
-                table,
-                *(["", *self._disagreements(rules)] if rules else []),
-                *(f"note: {note}" for note in self._notes()),
-            ]
-        )
-
-    def to_dict(self) -> dict[str, Any]:
-        return super().to_dict() | {"notes": self._notes()}
-
-    def _notes(self) -> list[str]:
-        return [] if self.block.alone().is_symmetric else [MIRROR_NOTE]
-
-    def _headline(self) -> str:
-        return f"{super()._headline()}; by {', '.join(self.ratios[0]) or 'no rule'}"
-
-    def _disagreements(self, rules: list[str]) -> list[str]:
-        """Say how often each rule is wrong; records under which no single number can be right are not counted."""
-        lines = []
-        less = self.falls_under_less
-        for rule in rules:
-            said = [
-                (ratios[rule] >= 1.0, response.overturned)
-                for ratios, response, is_left_out in zip(self.ratios, self.responses, less, strict=True)
-                if not (is_left_out or response.unfinished)
-            ]
-            unsafe = sum(not yes and real for yes, real in said)
-            wary = sum(yes and not real for yes, real in said)
-            right = len(said) - unsafe - wary
-            lines.append(f"{TITLES[rule]}: right {right}, unsafe {unsafe}, over-conservative {wary} of {len(said)}")
-        if any(less):
-            lines.append(
-                f"not counted: {sum(less)} of {len(less)}, where the block stands under the motion as it is, but falls "
-                "under the same motion scaled down"
-            )
-        if unfinished := sum(response.unfinished for response in self.responses):
-            lines.append(f"not counted: {unfinished} of {len(less)}, whose simulation was not finished")
-        return lines
-
-
 def check(
     block: Block,
     motions: Motions,
@@ -549,8 +451,3 @@ def _margin(response: Response, block: Block, motion: Motion, model: Model, thre
     # The level is the middle of a bracket: where that holds the motion itself, which stands, the change lies above it.
     is_near = 1.0 <= margin <= 1.0 + _TOLERANCE and not response.unfinished
     return float(np.nextafter(1.0, 0.0)) if is_near else margin
-
-
-def _short(factor: float) -> str:
-    """Write a factor below 1, with more digits near 1."""
-    return f"{factor:.2f}" if factor < 0.985 else f"{factor:.4f}"

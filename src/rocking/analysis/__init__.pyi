@@ -1,20 +1,16 @@
-from .curve import Band, FragilityCurve
+from .curve import FragilityCurve
 from .directions import ResponseRose
-from .efficiency import MeasureComparison
 from .incremental import IncrementalDynamicAnalysis
 from .overturning import Mode, OverturningMap, mode_name
-from .probit import Goodness, Likelihood, Probit
+from .probit import Goodness, Probit
 from .risk import Rate, Risk, Survival
 from .spectrum import RockingSpectrum
 from .survey import Survey
 
 __all__ = [
-    "Band",
     "FragilityCurve",
     "Goodness",
     "IncrementalDynamicAnalysis",
-    "Likelihood",
-    "MeasureComparison",
     "Mode",
     "OverturningMap",
     "Probit",

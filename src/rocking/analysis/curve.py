@@ -1,71 +1,41 @@
-"""A fragility curve: a lognormal fitted to outcomes of one limit state, with its confidence band."""
+"""A fragility curve: a lognormal fitted to outcomes of one limit state, with its confidence band, and as NRML."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, Literal, get_args
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking.analysis import probit
+from rocking.analysis.levels import units_of
 from rocking.analysis.probit import Outcomes, Probit, normal_scores, probabilities
-from rocking.analysis.regions import FEWEST, Confidence, Ends, LikelyRegion, Quantity, Resamples
+from rocking.block.body import Body
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers, as_asked
+from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.core.tables import within
 from rocking.errors import InvalidOption, Unfitted
+from rocking.motion.measures import DAMPING
 from rocking.motion.scaling import Measure, intensities
 
-BandKind = Literal["likelihood", "bootstrap"]
+if TYPE_CHECKING:
+    from rocking.plot.curves import FragilityLine
 
+NAMESPACE: Final = "http://openquake.org/xmlns/nrml/0.5"
+
+LossCategory = Literal["structural", "nonstructural", "contents", "business_interruption"]
+
+#: Square of the widest dispersion whose lognormal has a standard deviation that is a number.
+_WIDEST: Final = 700.0
 
 #: How many times beyond the data a median is still believed.
 _FARTHEST: Final = 1000.0
-
-
-@dataclass(frozen=True)
-class Band:
-    """How confidence intervals and bands of a fragility are made.
-
-    Parameters
-    ----------
-    kind : {"likelihood", "bootstrap"}
-        Whether they come from the profile likelihood, adjusted to the differences between clusters where these hold
-        several outcomes (Chandler and Bate 2007); or from fits to clusters drawn with replacement (BCa, Efron 1987).
-    confidence : float
-        Probability of the intervals and bands, between 0 and 1.
-    samples, seed : int
-        How many times the bootstrap draws, and the seed of its random numbers.
-
-    Examples
-    --------
-    >>> from rocking import fit_fragility
-    >>> found = fit_fragility([2.0, 3.0, 4.0], [1, 4, 7], trials=10, band=Band(confidence=0.5))
-    >>> found.curves[0].confidence
-    0.5
-    """
-
-    kind: BandKind = "likelihood"
-    confidence: float = 0.9
-    samples: int = 1000
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        checks.one_of(self.kind, "kind", InvalidOption, get_args(BandKind))
-        checks.share(self.confidence, "confidence", InvalidOption)
-        checks.whole(self.samples, "samples", InvalidOption, 1)
-        checks.whole(self.seed, "seed", InvalidOption, 0)
-        # In the mean two samples lie beyond the ends of an interval, at least.
-        if self.kind == "bootstrap" and self.samples * (1.0 - self.confidence) < 2.0:
-            least = math.ceil(2.0 / (1.0 - self.confidence))
-            raise InvalidOption(
-                f"so few {{}} as {self.samples} do not reach the ends of an interval of {self.confidence:g}; take "
-                f"{least} or more",
-                "samples",
-            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,8 +61,12 @@ class FragilityCurve:
         Inverse of Fisher's expected information of intercept and slope.
     confidence : float
         Probability of the intervals and bands.
-    likelihood : Likelihood
-        At its maximum, and against one probability for all intensities.
+    log_likelihood : float
+        Its logarithm at the maximum, without binomial coefficients.
+    region : Probit
+        Fits that are about as likely, on the boundary of their region: intervals are extremes in it. From the profile
+        likelihood, adjusted to the differences between clusters where these hold several outcomes (Chandler and Bate
+        2007).
     goodness : Goodness
         Pearson's test between groups of outcomes and the fit: one group for each intensity where each has five outcomes
         or more (stripes), else up to ten of equal size along the intensity (cloud; Hosmer and Lemeshow). It takes all
@@ -117,9 +91,9 @@ class FragilityCurve:
     confidence: float
     clusters: int
     independent: bool
-    likelihood: probit.Likelihood
+    log_likelihood: float
     goodness: probit.Goodness
-    _uncertainty: Confidence
+    region: Probit
 
     def __repr__(self) -> str:
         median, dispersion = median_text(self, 1.0), interval_text(self.dispersion_interval, 4)
@@ -148,30 +122,21 @@ class FragilityCurve:
         return 1.0 / self._slope
 
     @property
-    def degenerate(self) -> float:
-        """Share of resampled data sets that are separated, all alike or fall, as limits; NaN without a bootstrap."""
-        return self._uncertainty.degenerate if isinstance(self._uncertainty, Resamples) else math.nan
-
-    @property
     def bounded(self) -> bool:
         """Whether intervals and bands bound anything: fewer than three clusters of several outcomes do not."""
-        return isinstance(self._uncertainty, Resamples) or self._uncertainty.bounded
+        return bool(np.all(np.isfinite(self.region.intercept)))
 
     @property
     def median_interval(self) -> tuple[float, float]:
         """Confidence interval of the median; 0 or infinite where the data allow a curve that does not rise."""
-        logarithm = math.log(self.median)
-        gradient = np.array([[-1.0 / self._slope], [-logarithm / self._slope]])
-        low, high = interval_of(self, _log_medians, gradient)
+        low, high = extremes(self.region, _log_medians)
         with np.errstate(over="ignore"):
             return float(np.exp(low[0])), float(np.exp(high[0]))
 
     @property
     def dispersion_interval(self) -> tuple[float, float]:
         """Confidence interval of the dispersion; infinite where the data allow a curve that does not rise."""
-        gradient = np.array([[0.0], [1.0]])
-        flattest, steepest = interval_of(self, lambda fits: fits.slope[:, None], gradient)
-        return _dispersion(float(steepest[0])), _dispersion(float(flattest[0]))
+        return _dispersion(float(self.region.slope.max())), _dispersion(float(self.region.slope.min()))
 
     def probability(self, intensity: ArrayLike) -> Floats:
         """Fitted probability at intensities of 0 or more (SI units, or a block's own), shaped like them."""
@@ -207,9 +172,7 @@ class FragilityCurve:
 
         at = intensities(intensity)
         z = _logarithm(at).ravel()
-        finite = np.where(np.isfinite(z), z, 0.0)
-        gradient = np.stack([np.ones_like(finite), finite])
-        ends = interval_of(self, lambda fits: normal_scores(fits, z), gradient)
+        ends = extremes(self.region, lambda fits: normal_scores(fits, z))
         low, high = (as_asked(np.asarray(ndtr(end)).reshape(at.shape)) for end in ends)
         return low, high
 
@@ -225,13 +188,10 @@ class FragilityCurve:
             "outcomes": round(float(self.trials.sum())),
             "exceeded": round(float(self.exceeded.sum())),
             "clusters": self.clusters,
-            "log_likelihood": self.likelihood.logarithm,
-            "likelihood_ratio": self.likelihood.ratio,
-            "likelihood_ratio_p_value": self.likelihood.p_value,
+            "log_likelihood": self.log_likelihood,
             "goodness_statistic": self.goodness.statistic,
             "goodness_freedom": self.goodness.freedom,
             "goodness_p_value": self.goodness.p_value,
-            "degenerate_resamples": self.degenerate,
         }
 
 
@@ -239,7 +199,7 @@ def fitted_curve(
     name: str,
     data: tuple[Floats, Floats, Floats],
     clusters: Integers | None,
-    band: Band,
+    confidence: float,
     measure: Measure,
     limit: float | None = None,
 ) -> FragilityCurve:
@@ -263,11 +223,6 @@ def fitted_curve(
         )
     count = round(float(trials.sum())) if clusters is None else int(clusters.max()) + 1
     independent = clusters is None or (count == z.size and bool(np.all(trials <= 1.0)))
-    uncertainty: Confidence
-    if band.kind == "bootstrap" and (independent or count >= FEWEST):
-        uncertainty = Resamples.of(outcomes, fitted, clusters, band.samples, band.seed)
-    else:
-        uncertainty = LikelyRegion.of(outcomes, fitted, None if independent else clusters, band.confidence)
     return FragilityCurve(
         limit_state=name,
         limit=limit,
@@ -276,42 +231,48 @@ def fitted_curve(
         trials=trials,
         fitted=fitted,
         covariance=probit.covariance(outcomes, fitted),
-        confidence=band.confidence,
+        confidence=confidence,
         clusters=count,
         independent=independent,
-        likelihood=probit.gain(outcomes, fitted, independent=independent),
+        log_likelihood=float(probit.likelihood(outcomes.alone(), np.column_stack(fitted))[0]),
         goodness=probit.goodness(outcomes, fitted, independent=independent),
-        _uncertainty=uncertainty,
+        region=probit.likely_region(outcomes, fitted, None if independent else clusters, confidence),
     )
 
 
-def interval_of(curve: FragilityCurve, quantity: Quantity, gradient: Floats | None = None) -> Ends:
-    """Return the confidence interval of a quantity of fits, from its gradient (2, n), by default of differences."""
-    estimate = quantity(curve.fitted)[0]
-    if gradient is None:
-        rows = []
-        for name in Probit._fields:
-            value = getattr(curve.fitted, name)
-            step = 1e-5 * np.maximum(np.abs(value), 1.0)
-            up, down = (quantity(curve.fitted._replace(**{name: value + sign * step}))[0] for sign in (1.0, -1.0))
-            rows.append((up - down) / (2.0 * step))
-        gradient = np.array(rows)
-    return curve._uncertainty.interval(quantity, estimate, gradient, curve.confidence)
+def fragility_line(curve: FragilityCurve, intensity: Floats, measure: Measure) -> FragilityLine:
+    """Curve at intensities with its band, and the shares seen in the groups that the fit is tested in, as drawn."""
+    from rocking.plot.curves import FragilityLine
+
+    group = probit.groups(np.log(curve.intensity), curve.trials)
+    held = np.bincount(group, curve.trials).astype(np.float64)
+    at, seen = (np.bincount(group, sums) / held for sums in (curve.trials * curve.intensity, curve.exceeded))
+    is_rotation = curve.limit is not None and math.isfinite(curve.limit)
+    limit = f" (rotation of {curve.limit:g} of the slenderness)" if is_rotation else ""
+    at_half = f"median {in_units(curve.median, measure)}, dispersion {curve.dispersion:.3g}"
+    chance = curve.probability(intensity)
+    band, scale = curve.band(intensity) if curve.bounded else (chance, chance), measure.scale
+    text = f"{curve.limit_state}{limit}: {at_half}"
+    return FragilityLine(text, scale * intensity, chance, *band, scale * at, seen, held)
 
 
-def passed(ratio: Floats, limit: float, name: str) -> Floats:
-    """Whether peak rotation over slenderness passes a limit: 1 or 0; infinite is overturning."""
-    limit = checked_limit(limit, name)
-    return np.asarray(np.isinf(ratio) if math.isinf(limit) else ratio > limit, dtype=np.float64)
+def whole_numbers(values: ArrayLike, name: str, size: int, least: float, most: ArrayLike) -> Floats:
+    """Whole numbers, one for each intensity, between two bounds."""
+    given = checks.answers_or_numbers(values, name, InvalidOption)
+    try:
+        numbers = np.broadcast_to(given, size)
+    except ValueError:
+        raise InvalidOption(f"{{}} must hold one number for each of the {size} intensities", name) from None
+    if not np.all((numbers >= least) & (numbers <= np.asarray(most)) & (numbers == np.floor(numbers))):
+        bound = f"{most:g}" if isinstance(most, float) else "the trials"
+        raise InvalidOption(f"{{}} must be whole numbers, at least {least:g} and no more than {bound}", name)
+    return numbers
 
 
-def checked_limit(limit: float, name: str) -> float:
-    """Return a limit of peak rotation over slenderness, checked."""
-    what = f"the limit {name!r} (rotation over slenderness)"
-    least = checks.number(limit, what, InvalidOption)
-    if not least >= 0.0:
-        raise InvalidOption(f"{{}} must be 0 or more, not {limit!r}", what, value=limit)
-    return least
+def extremes(region: Probit, quantity: Callable[[Probit], Floats]) -> tuple[Floats, Floats]:
+    """Lowest and highest of quantities (fits, n) in a region of fits."""
+    values = quantity(region)
+    return values.min(axis=0), values.max(axis=0)
 
 
 def in_units(intensity: float, measure: Measure) -> str:
@@ -348,3 +309,81 @@ def _dispersion(slope: float) -> float:
 def _logarithm(intensity: Floats) -> Floats:
     with np.errstate(divide="ignore"):
         return np.asarray(np.log(intensity))
+
+
+def fragility_model(
+    curves: Sequence[FragilityCurve],
+    imt: tuple[str, float],
+    valid: tuple[float, float],
+    no_damage: float | None,
+    taxonomy: str,
+    description: str,
+    **about: str,
+) -> str:
+    """Fragility model of OpenQuake, NRML 0.5, of one function: lognormals by the moments of the intensity itself.
+
+    `imt` is OpenQuake's measure and its unit's factor; `valid` the range (SI) of the data; up to `no_damage`
+    (OpenQuake's unit) nothing moves; `about` has the model's id, assetCategory and lossCategory.
+    """
+    checks.one_of(about["lossCategory"], "loss_category", InvalidOption, get_args(LossCategory))
+    for what, name in (("taxonomy", taxonomy), ("model_id", about["id"]), ("asset_category", about["assetCategory"])):
+        check_names([name], what)
+    check_names([curve.limit_state for curve in curves], "a limit state")
+    low, high = (imt[1] * end for end in valid)
+    low = max(low, no_damage or 0.0)
+    if not high > low * (1.0 + 1e-5):
+        raise InvalidOption(
+            f"a fragility model needs a range of intensities, not {low:.6g} to {high:.6g}: the data are all at one "
+            "intensity, or below the one that lifts the block"
+        )
+    root = ET.Element("nrml", {"xmlns": NAMESPACE})
+    model = ET.SubElement(root, "fragilityModel", about)
+    # The manual asks for a brief string in ASCII.
+    ET.SubElement(model, "description").text = description.encode("ascii", "replace").decode("ascii")
+    ET.SubElement(model, "limitStates").text = " ".join(curve.limit_state for curve in curves)
+    kind = {"id": taxonomy, "format": "continuous", "shape": "logncdf"}
+    function = ET.SubElement(model, "fragilityFunction", kind)
+    levels = {"imt": imt[0]} | ({} if no_damage is None else {"noDamageLimit": f"{no_damage:.8g}"})
+    ET.SubElement(function, "imls", levels | {"minIML": f"{low:.8g}", "maxIML": f"{high:.8g}"})
+    for curve in curves:
+        variance = curve.dispersion**2
+        if variance > _WIDEST:
+            raise InvalidOption(f"a dispersion of {curve.dispersion:.3g} is too wide for the mean and stddev of NRML")
+        mean = imt[1] * curve.median * math.exp(0.5 * variance)
+        moments = {"mean": f"{mean:.8g}", "stddev": f"{mean * math.sqrt(math.expm1(variance)):.8g}"}
+        ET.SubElement(function, "params", {"ls": curve.limit_state} | moments)
+    ET.indent(root)
+    return f"<?xml version='1.0' encoding='UTF-8'?>\n{ET.tostring(root, encoding='unicode')}\n"
+
+
+def check_names(names: Iterable[str], what: str) -> None:
+    """Raise an InvalidOption unless NRML allows all these names of something."""
+    for name in names:
+        if not re.fullmatch(r"[A-Za-z0-9_-]{1,100}", checks.text(name, what, InvalidOption)):
+            raise InvalidOption(
+                f"{{}} of NRML may have letters, digits, dashes and underscores, and 100 of them at most, not {name!r}",
+                what,
+                value=name,
+            )
+
+
+def openquake_measure(measure: Measure, block: Body | None, model: Model) -> tuple[str, float]:
+    """OpenQuake's type for a measure, and the factor from SI units or the block's own: PGA and SA in g, PGV in cm/s.
+
+    SA(T) does not say its damping: it is that of ground-motion models.
+    """
+    if measure.in_block_units and block is None:
+        raise InvalidOption(
+            f"{measure.name} counts in a block's own unit; give {{}} to write it as PGA or PGV", "block"
+        )
+    own = 1.0 if block is None else float(units_of(block.alone(), measure, model)[0])
+    if measure.of_motion == "pgv":
+        return "PGV", 100.0 * own
+    if measure.damping != DAMPING:
+        raise InvalidOption(
+            f"the {{}} of OpenQuake's spectral accelerations is {DAMPING:g} of critical, not {measure.damping:g}: fit "
+            "the fragility against a measure of that damping",
+            "damping",
+            value=measure.damping,
+        )
+    return "PGA" if measure.of_motion == "pga" else f"SA({measure.period:g})", own / STANDARD_GRAVITY

@@ -231,19 +231,15 @@ class ResponseRose(DatasetResult):
 def _named_pairs(pairs: Pairs) -> dict[str, Pair]:
     """Pairs of motions by name, or refuse what is none."""
     given = [*pairs.values()] if isinstance(pairs, Mapping) else checks.several(pairs, "pairs", InvalidOption)
-    found: list[Pair] = []
-    for pair in given:
-        components = [] if isinstance(pair, Motion) else several_motions(pair)
-        if len(components) != 2:
-            raise InvalidOption(
-                "{} must hold the two horizontal components of each place, as [(first, second)]", "pairs", value=pairs
-            )
-        found.append((components[0], components[1]))
-    if not found:
-        raise InvalidOption("{} must hold a pair of horizontal components or more", "pairs")
+    found = [several_motions(pair) for pair in given if not isinstance(pair, Motion)]
+    if not found or len(found) < len(given) or any(len(components) != 2 for components in found):
+        raise InvalidOption(
+            "{} must hold the two horizontal components of each place, as [(first, second)]", "pairs", value=pairs
+        )
     names = [f"{one.name} and {other.name}" for one, other in found]
     numbered = [f"{name} #{k + 1}" if names.count(name) > 1 else name for k, name in enumerate(names)]
-    return dict(zip(map(str, pairs) if isinstance(pairs, Mapping) else numbered, found, strict=True))
+    both = ((one, other) for one, other in found)
+    return dict(zip(map(str, pairs) if isinstance(pairs, Mapping) else numbered, both, strict=True))
 
 
 def _factors(scales: Scales, pair: Pair) -> Any:

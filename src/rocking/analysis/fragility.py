@@ -9,44 +9,55 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from rocking.analysis import nrml
-from rocking.analysis.curve import Band, FragilityCurve, fitted_curve, in_units, interval_text, median_text, passed
+from rocking.analysis.curve import (
+    FragilityCurve,
+    LossCategory,
+    fitted_curve,
+    fragility_line,
+    fragility_model,
+    in_units,
+    interval_text,
+    median_text,
+    openquake_measure,
+    whole_numbers,
+)
 from rocking.analysis.hazard import HazardCurve
 from rocking.analysis.levels import (
+    OVERTURNING,
     clusters_of,
     groups_of,
+    limit_states,
     motions_in_words,
-    normalised_weights,
+    of_polarities,
+    outcomes_of,
+    passed,
     pooled,
     ratios_of,
     simulate_levels,
     single_block,
-    undecided_text,
     units_of,
     values_of,
+    weights_of,
 )
-from rocking.analysis.probit import groups
-from rocking.analysis.risk import Risk, Survival, mean_of_blocks, risk_of
+from rocking.analysis.risk import Risk, Survival, risk_of
 from rocking.block.body import Bodies, Body
 from rocking.core import checks
-from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY, Model
 from rocking.core.progress import spelled
 from rocking.core.result import Result
-from rocking.core.tables import Column, as_written, counted, text_table
+from rocking.core.tables import Column, as_written, counted, text_table, write_text
 from rocking.engine.problem import bodies_of, slenderness_of
-from rocking.engine.tasks import Setup, missing_text
-from rocking.engine.treatment import Treatment, treatment
+from rocking.engine.tasks import missing_text
+from rocking.engine.treatment import Treatment
 from rocking.errors import InvalidOption, Message, Unfitted
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.records.named import Motions, several_motions
-from rocking.simulation.ensemble import SIGNS, Polarity, simulate_many
+from rocking.simulation.ensemble import Polarity, simulate_many
 
 if TYPE_CHECKING:
     import pandas as pd
-    import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -58,8 +69,7 @@ _POINTS: Final = 201
 class Fragility(Result):
     """Fragility curves of one or several limit states against one intensity measure; from `fragility`.
 
-    Its tables are "curves" (limit state, intensity in SI units, probability, lower and upper end of the band) and,
-    where blocks were simulated, "outcomes". Its figure has the curves with their bands and the observed shares.
+    Its tables are "curves" and, of simulated blocks, "outcomes"; its figure has curves, bands and observed shares.
 
     Attributes
     ----------
@@ -72,17 +82,14 @@ class Fragility(Result):
     block : Block or None
         The block, where there is one.
     outcomes : pandas.DataFrame or None
-        Every simulation: motion, block (position), polarity, the measure with its unit (SI, as pga_m_s2),
-        peak_rotation_rad, peak_over_alpha (infinite where it overturned, NaN where unfinished), overturned, unfinished,
-        whether each limit state was exceeded, and the weight of the block if any; None where outcomes were given.
+        Every simulation: motion, block (position), polarity, the measure (SI, as pga_m_s2), peak_rotation_rad,
+        peak_over_alpha (infinite: overturned, NaN: unfinished), overturned, unfinished, whether each limit state was
+        exceeded, and the weight of the block if any; None where outcomes were given.
     one_way, with_vertical, several_blocks : bool
-        Whether sides that differ met motions in one polarity only; whether a vertical motion was simulated; whether
-        outcomes of several blocks count together.
-    source : str
-        Origin of a cluster of outcomes: a motion, or, where outcomes were given, a cluster.
-    undecided, missing : str
-        How many outcomes of a sample change within 3e-6 of the motion, and how many simulations were given up, which
-        the curves leave out; empty where there are none.
+        Whether sides that differ met motions in one polarity only, a vertical motion was simulated, and outcomes of
+        several blocks count together.
+    source, missing : str
+        Origin of a cluster of outcomes ("motion" or "cluster"); how many simulations were given up, if any.
 
     Examples
     --------
@@ -105,7 +112,6 @@ class Fragility(Result):
     with_vertical: bool = False
     several_blocks: bool = False
     source: str = "motion"
-    undecided: str = ""
     missing: str = ""
 
     def summary(self) -> str:
@@ -122,16 +128,15 @@ class Fragility(Result):
             ]
             for curve in self.curves
         ]
-        between_text = f"{100 * self.curves[0].confidence:g} % between"
-        header = ["limit state", "exceeded", "median", between_text, "dispersion", between_text, "p of fit"]
-        table = text_table(header, rows)
+        between = f"{100 * self.curves[0].confidence:g} % between"
+        table = text_table(["limit state", "exceeded", "median", between, "dispersion", between, "p of fit"], rows)
         notes = [f"note: {sentence}" for sentence in self.notes]
         return "\n".join([f"{self.description}; intensity: {self.measure.label}", "", table, *notes])
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Limits of the curves: small samples, poor fits, undecided outcomes; one sentence each."""
-        notes = [text for text in (self.missing, self.undecided) if text]
+        """Limits of the curves: small samples, poor fits; one sentence each."""
+        notes = [self.missing] if self.missing else []
         if self.one_way:
             notes.append(
                 "the sides differ, and motions came in one polarity only: reversed ones give another curve; "
@@ -140,10 +145,9 @@ class Fragility(Result):
         if not self.curves[0].bounded:
             notes.append(f"intervals and bands go from 0 to infinity: {self._too_few}")
         independent = self.curves[0].independent
-        wanted = "outcome" if independent else self.source
         notes += [
             f"{curve.limit_state}: intervals without an end say that the data allow a curve which does not rise with "
-            f"the intensity; more {wanted}s are needed"
+            f"the intensity; more {'outcome' if independent else self.source}s are needed"
             for curve in self.curves
             if curve.bounded and math.isinf(curve.dispersion_interval[1])
         ]
@@ -167,16 +171,10 @@ class Fragility(Result):
             "description": self.description,
             "measure": {"name": self.measure.name, "units": self.measure.units, **self.measure.options()},
             "model": self.model,
-            "band": self.band_kind,
             "curves": [curve.to_dict() for curve in self.curves],
             "notes": list(self.notes),
             "outcomes": None if self.outcomes is None else self.outcomes.to_dict("records"),
         }
-
-    @property
-    def band_kind(self) -> str:
-        """Where intervals and bands come from: "likelihood" or "bootstrap"."""
-        return "likelihood" if math.isnan(self.curves[0].degenerate) else "bootstrap"
 
     def _headline(self) -> str:
         curves = ", ".join(
@@ -193,8 +191,8 @@ class Fragility(Result):
     def annual_rate(self, hazard: HazardCurve) -> Risk:
         """Annual rates of exceeding the limit states at a site, from its hazard curve of this measure.
 
-        The integral of rate(x) dP(x) over all intensities x is in closed form: a lognormal against a power of x on each
-        segment of the hazard curve. For one power k all along, it is rate(median) exp((k dispersion)^2/2) (Cornell).
+        The integral of rate(x) dP(x) over all intensities x is in closed form, of one power k all along
+        rate(median) exp((k dispersion)^2/2) (Cornell).
         """
         return risk_of(self.curves, hazard, self.measure, self.description)
 
@@ -211,27 +209,22 @@ class Fragility(Result):
         Parameters
         ----------
         years : float
-            Time for which the block has stood, or has not exceeded the limit state.
+            Time for which the limit state was not exceeded.
         hazard : HazardCurve, optional
             Annual rates of the intensities, for the probability of the survival.
         confidence : float
             Probability with which the limit would have been exceeded, were shaking any stronger or more frequent.
         limit_state : str
-            Name of the limit that was not exceeded.
+            Name of the limit.
 
         Returns
         -------
         Survival
-            Intensity that was most likely never reached, largest annual rates, and the probability of surviving.
+            Intensity most likely never reached, largest annual rates, and the probability of surviving.
         """
         curve = self.curve(limit_state)
         rate = None if hazard is None else self.annual_rate(hazard).rate(limit_state)
-        mean = math.nan
-        if hazard is not None and self.several_blocks and self.outcomes is not None:
-            mean = mean_of_blocks(self.outcomes, self.measure.column, limit_state, hazard, years)
-        return Survival(
-            curve, self.measure, self.description, years, confidence, hazard, rate, self.several_blocks, mean
-        )
+        return Survival(curve, self.measure, self.description, years, confidence, hazard, rate, self.several_blocks)
 
     @property
     def range(self) -> tuple[float, float]:
@@ -255,92 +248,63 @@ class Fragility(Result):
         path: str | Path,
         *,
         taxonomy: str = "rocking-block",
-        format: nrml.Format = "continuous",
         block: Body | None = None,
         model_id: str = "rocking",
-        loss_category: nrml.LossCategory = "contents",
+        loss_category: LossCategory = "contents",
         asset_category: str = "contents",
     ) -> None:
         """Write the curves as an OpenQuake fragility model, NRML 0.5.
 
-        PGA and SA are written in g, PGV in cm/s, a measure in a block's own unit as PGA or PGV of that block. The
-        uplift acceleration is the limit of no damage of PGA, unless a vertical motion was simulated, which lowers it.
+        Lognormals are written by mean and standard deviation of the intensity (PGA and SA in g, PGV in cm/s, a measure
+        in a block's own unit as PGA or PGV of that block). The uplift acceleration is the limit of no damage of PGA,
+        unless a vertical motion was simulated, which lowers it.
 
         Parameters
         ----------
         path : path
             File to write.
         taxonomy : str
-            Identifier of the fragility function, which the exposure model refers to.
-        format : {"continuous", "discrete"}
-            Lognormals by the mean and the standard deviation of the intensity (not of its logarithm, as OpenQuake wants
-            them), or probabilities at 40 intensities.
+            Identifier of the function, which the exposure model refers to.
         block : Block, optional
-            Block whose unit a dimensionless measure counts in, where the curves come from several.
+            Block whose unit a dimensionless measure counts in, of curves of several.
         model_id, loss_category, asset_category : str
-            Further attributes of the model; the loss category is one of structural, nonstructural, contents and
-            business_interruption.
+            Attributes of the model; the category is structural, nonstructural, contents or business_interruption.
 
         Raises
         ------
         InvalidOption
-            If a name has a character that NRML does not allow, a block is needed, a spectral acceleration is of another
-            damping than 5 % of critical, which OpenQuake's are of, or the dispersion is too wide.
-        OutputError
-            If the file cannot be written.
+            If NRML does not allow a name, a block is needed, a spectral acceleration is not of 5 % damping, as
+            OpenQuake's are, or the dispersion is too wide; `OutputError` if the file cannot be written.
         """
-        chosen = self.block
         if block is not None:
             bodies_of(block)
-            chosen = block
-        scale = nrml.scale_of(self.measure, chosen, self.model)
+        chosen = self.block if block is None else block
+        imt = openquake_measure(self.measure, chosen, self.model)
         lifting = None
-        if chosen is not None and scale.imt == "PGA" and not self.with_vertical:
+        if chosen is not None and imt[0] == "PGA" and not self.with_vertical:
             lifting = min(chosen.uplift_thresholds(self.model)) / STANDARD_GRAVITY
-        function = nrml.fragility_function(self.curves, scale, self.range, lifting, taxonomy, format)
-        states = [curve.limit_state for curve in self.curves]
         about = {"id": model_id, "assetCategory": asset_category, "lossCategory": loss_category}
-        nrml.write(path, function, states, self.description, **about)
+        write_text(path, fragility_model(self.curves, imt, self.range, lifting, taxonomy, self.description, **about))
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.curves import FragilityLine, fragility_figure
+        from rocking.plot.curves import fragility_figure
 
         first = self.curves[0]
-        band_text = f"band: {100 * first.confidence:g} % confidence ({self.band_kind})"
+        band_text = f"band: {100 * first.confidence:g} % confidence (likelihood)"
         if not first.bounded:
             band_text = f"no band: {self._too_few}"
-        intensity, scale = np.linspace(0.0, self.range[1], _POINTS), self.measure.scale
-        lines, states = [], [curve.limit_state for curve in self.curves]
-        for curve in self.curves:
-            group = groups(np.log(curve.intensity), curve.trials)  # those that the fit is tested in
-            held = np.bincount(group, curve.trials).astype(np.float64)
-            at, seen = (np.bincount(group, sums) / held for sums in (curve.trials * curve.intensity, curve.exceeded))
-            is_rotation = curve.limit is not None and math.isfinite(curve.limit)
-            limit = f" (rotation of {curve.limit:g} of the slenderness)" if is_rotation else ""
-            at_half = f"median {in_units(curve.median, self.measure)}, dispersion {curve.dispersion:.3g}"
-            text = f"{curve.limit_state}{limit}: {at_half}"
-            chance = curve.probability(intensity)
-            band = curve.band(intensity) if curve.bounded else (chance, chance)
-            lines.append(FragilityLine(text, scale * intensity, chance, *band, scale * at, seen, held))
+        intensity = np.linspace(0.0, self.range[1], _POINTS)
+        states = [curve.limit_state for curve in self.curves]
         return fragility_figure(
-            lines=lines,
+            lines=[fragility_line(curve, intensity, self.measure) for curve in self.curves],
             intensity_label=self.measure.label,
             band_label=band_text,
-            probability_label="probability of "
-            + ("" if [*states] == ["overturning"] else "exceeding ")
+            probability_label=f"probability of {'' if states == ['overturning'] else 'exceeding '}"
             + (states[0] if len(states) == 1 else "the limit state"),
             title=title or as_written(self.description),
             ax=ax,
             figsize=figsize,
         )
-
-
-#: Intensities, in SI units, far beyond any motion.
-_INTENSITIES: Final = (1e-50, 1e50)
-_LIKELIHOOD: Final = Band()
-
-#: Limit states: peak rotation over slenderness that is exceeded; infinity is overturning.
-OVERTURNING: Final[Mapping[str, float]] = {"overturning": math.inf}
 
 
 def fragility(
@@ -355,7 +319,7 @@ def fragility(
     polarity: Polarity = "+",
     weights: ArrayLike | None = None,
     clusters: ArrayLike | None = None,
-    band: Band = _LIKELIHOOD,
+    confidence: float = 0.9,
     threads: int | None = None,
     progress: bool | None = None,
 ) -> Fragility:
@@ -364,8 +328,8 @@ def fragility(
     Parameters
     ----------
     blocks : Blocks, Block, RestrainedBlock or sequence of one kind
-        One block; or several whose outcomes are pooled: against a measure in their own units, or of an ensemble that
-        stands for one block that is not quite known, with `weights` (`Calibration.fragility` does so).
+        One block; or several whose outcomes are pooled, as those of an ensemble that stands for one block, with
+        `weights` (`Calibration.fragility` does so).
     motions : optional
         As for `simulate_many`: m motions.
     measure : {"pga", "pgv", "pga_ratio", "pgv_ratio"} or Measure
@@ -373,8 +337,7 @@ def fragility(
     levels : array_like, optional
         Stripes: every motion scaled to each of these levels. Without them a cloud: every motion as it is.
     limits : mapping of str to float
-        Limit states: peak rotation over slenderness (of the block as it stands, the smaller one of two sides) that is
-        exceeded; ``math.inf`` stands for overturning, the default.
+        Limit states: peak rotation over slenderness (the smaller one of two sides); ``math.inf`` is overturning.
     model, chattering : optional
         As for `simulate`.
     polarity : {"+", "-", "both"}
@@ -382,10 +345,10 @@ def fragility(
     weights : array_like, optional
         Weight of the outcomes of each block; by default all alike. Those of weight 0 are simulated, but are no data.
     clusters : "station" or array_like of labels, shape (m,), optional
-        Which motions belong together, for intervals. "station" joins components of one station in one earthquake, as
-        their files name them. By default each motion is a cluster; multiples of one another always are one.
-    band : Band
-        How intervals and bands are made.
+        Which motions belong together, for intervals: by default each alone, and multiples of one another. "station"
+        joins components of one station in one earthquake, as their files name them.
+    confidence : float
+        Probability of the intervals and bands, between 0 and 1.
     threads, progress : optional
         As for `simulate_many`.
 
@@ -397,10 +360,8 @@ def fragility(
     Raises
     ------
     InvalidOption
-        If an argument is out of its range, or a lognormal cannot be fitted because the outcomes are all alike or
-        separated.
-    InvalidMotion
-        If a motion is zero throughout.
+        If an argument is out of its range, or no lognormal can be fitted (`fit_fragility`); `InvalidMotion` if a motion
+        is zero throughout.
 
     Examples
     --------
@@ -415,29 +376,28 @@ def fragility(
     slenderness = slenderness_of(many)
     shares = weights_of(weights, len(many))
     mirrored = checks.one_of(polarity, "polarity", InvalidOption, get_args(Polarity)) == "both" and many.is_symmetric
-    _check_band(band)
-    states = _limit_states(limits, "limits")
+    checks.share(confidence, "confidence", InvalidOption)
+    states = limit_states(limits, "limits")
     stripes = None if levels is None else checks.increasing_numbers(levels, "levels", InvalidOption)
     if stripes is not None and stripes.size < 2:
         raise InvalidOption("a fragility needs {} that differ: give two or more", "levels", value=levels)
     shaken = several_motions(motions)
     values, together, units = values_of(shaken, how), clusters_of(shaken, clusters), units_of(many, how, model)
-    options: dict[str, Any] = {"chattering": chattering, "polarity": "+" if mirrored else polarity}
-    options |= {"threads": threads, "progress": progress}
+    options: dict[str, Any] = {"chattering": chattering, "threads": threads, "progress": progress}
+    options["polarity"] = "+" if mirrored else polarity
     if stripes is None:
         table = simulate_many(many, shaken, model=model, **options).expand_dims("level")
         intensity = (values[:, None] / units)[None, :, :, None]
     else:
         table = simulate_levels(many, shaken, how, stripes, model=model, **options)
         intensity = stripes[:, None, None, None]
-    if "polarity" not in table.dims:
-        table = table.expand_dims("polarity")
+    table = table if "polarity" in table.dims else table.expand_dims("polarity")
     table = table.transpose("level", "motion", "block", "polarity")
     missing = table.unfinished.values
     ratio = ratios_of(table.peak_rotation.values, table.overturned.values, missing, slenderness[:, None])
     groups = np.broadcast_to(together[None, :, None, None], ratio.shape)
     x, trials = (np.broadcast_to(each, ratio.shape).ravel() for each in (intensity, shares[:, None]))
-    outcomes = _outcomes(table, how, x, ratio, states)
+    outcomes = outcomes_of(table, how, x, ratio, states)
     if weights is not None:
         outcomes["weight"] = trials
     # Simulations that were given up, and those of a block of weight 0, are reported but are not data.
@@ -445,13 +405,10 @@ def fragility(
     x, trials, groups = x[counts], trials[counts], groups.ravel()[counts]
     data = {name: (x, trials * passed(ratio, limit, name).ravel()[counts], trials) for name, limit in states.items()}
     try:
-        curves = [fitted_curve(name, data[name], groups, band, how, states[name]) for name in states]
+        curves = [fitted_curve(name, data[name], groups, confidence, how, states[name]) for name in states]
     except Unfitted as refused:
         refused.outcomes = outcomes
         raise
-    scales = 1.0 if stripes is None else stripes[:, None, None] * units / values[:, None]
-    factors = np.asarray(scales)[..., None] * np.array(SIGNS[options["polarity"]])
-    setup = Setup(many, model, treatment(chattering))
     kind = "cloud" if levels is None else counted(len(intensity), "stripe")
     text = f"{pooled(blocks, weights)}, {motions_in_words(together, clusters)}, {kind}, {model} model"
     return Fragility(
@@ -465,46 +422,7 @@ def fragility(
         with_vertical="vertical" in table.coords,
         several_blocks=bool(np.count_nonzero(shares) > 1),
         source="motion" if clusters is None else "cluster",
-        undecided=undecided_text(setup, shaken, factors, table.overturned.values, threads),
         missing=missing_text(missing),
-    )
-
-
-def weights_of(weights: ArrayLike | None, count: int) -> Floats:
-    """Weights of blocks, 1 in the mean of those that have any: outcomes are as many as without the others."""
-    shares = normalised_weights(weights, count)
-    return np.asarray(shares / shares[shares > 0.0].mean())
-
-
-def of_polarities(polarity: Polarity, *, is_symmetric: bool) -> str:
-    """Append to a description which polarities the outcomes come from, where both were requested."""
-    if polarity != "both":
-        return ""
-    return ", one polarity, since a symmetric block does the same in both" if is_symmetric else ", both polarities"
-
-
-def _outcomes(
-    table: xr.Dataset, measure: Measure, intensity: Floats, ratio: Floats, limits: Mapping[str, float]
-) -> pd.DataFrame:
-    import pandas as pd
-
-    def along(values: NDArray[Any]) -> NDArray[Any]:
-        return np.broadcast_to(values, ratio.shape).ravel()  # of (level, motion, block, polarity)
-
-    signs = table.polarity.values if "polarity" in table.coords else np.array(["+"])
-    motions = [name for name in ("motion", "vertical") if name in table.coords]
-    return pd.DataFrame(
-        {
-            **{name: along(table[name].values[:, None, None]) for name in motions},
-            "block": along(np.arange(table.sizes["block"])[:, None]),
-            "polarity": along(signs),
-            measure.column: intensity,
-            "peak_rotation_rad": table.peak_rotation.values.ravel(),
-            "peak_over_alpha": ratio.ravel(),
-            "overturned": table.overturned.values.ravel(),
-            "unfinished": table.unfinished.values.ravel(),
-            **{f"exceeded_{name}": passed(ratio, limit, name).ravel().astype(bool) for name, limit in limits.items()},
-        }
     )
 
 
@@ -515,7 +433,7 @@ def fit_fragility(
     trials: ArrayLike = 1,
     clusters: ArrayLike | None = None,
     measure: IntensityName | Measure = "pga",
-    band: Band = _LIKELIHOOD,
+    confidence: float = 0.9,
     block: Body | None = None,
     description: str = "observed outcomes",
 ) -> Fragility:
@@ -526,15 +444,14 @@ def fit_fragility(
     intensity : array_like, shape (n,)
         Positive intensities, in SI units.
     exceeded : array_like, shape (n,), or mapping of str to array_like
-        At each intensity, whether the limit was exceeded, or in how many trials; for several limit states a mapping
-        from their names. One without a name is called "overturning".
+        At each intensity, whether the limit (by default "overturning") was exceeded, or in how many trials; or these
+        for several limit states by their names.
     trials : array_like
         Number of trials at each intensity.
     clusters : array_like of labels, shape (n,), optional
         Which outcomes belong together (the motion, for instance), for the bands; by default each is on its own, as is
-        one whose label is NaN, None or empty. With fewer than three clusters of several outcomes intervals go from 0 to
-        infinity.
-    measure, band : optional
+        one whose label is NaN, None or empty. Fewer than three clusters of several outcomes bound nothing.
+    measure, confidence : optional
         As for `fragility`.
     block : Block, optional
         Tested block, for the units of `Fragility.to_nrml`.
@@ -549,14 +466,12 @@ def fit_fragility(
     Raises
     ------
     InvalidOption
-        If an argument is out of its range, or no rising lognormal fits best: the outcomes are all alike, separated
-        (none up to some intensity and all from there on), at one intensity, or exceed the limit no more often at higher
-        intensities, or put the median at more than 1000 times any intensity.
+        If an argument is out of its range, or no rising lognormal fits best: the outcomes are all alike, separated, at
+        one intensity, or no more frequent at higher ones, or put the median at more than 1000 times any intensity.
 
     Notes
     -----
-    The likelihood of P = Phi(ln(x/median)/dispersion) is that of independent binomial counts (Baker 2015). It has one
-    maximum, or none where the outcomes are separated.
+    The likelihood of P = Phi(ln(x/median)/dispersion) is that of independent binomial counts (Baker 2015).
 
     References
     ----------
@@ -571,42 +486,14 @@ def fit_fragility(
     """
     how = Measure.of(measure)
     x = checks.positive_numbers(intensity, "intensity", InvalidOption)
-    if x.min() < _INTENSITIES[0] or x.max() > _INTENSITIES[1]:
-        low, high = _INTENSITIES
-        raise InvalidOption(f"{{}} must be from {low:g} to {high:g}: check its units", "intensity", value=intensity)
-    count = _whole(trials, "trials", x.size, 1.0, 2.0**53)
-    outcomes = _limit_states(exceeded if isinstance(exceeded, Mapping) else {"overturning": exceeded}, "exceeded")
+    for end in (x.min(), x.max()):
+        checks.within(float(end), "intensity", InvalidOption, 1e-50, 1e50)
+    count = whole_numbers(trials, "trials", x.size, 1.0, 2.0**53)
+    outcomes = limit_states(exceeded if isinstance(exceeded, Mapping) else {"overturning": exceeded}, "exceeded")
     groups = None if clusters is None else groups_of(clusters, "clusters", x.size)
-    _check_band(band)
+    checks.share(confidence, "confidence", InvalidOption)
     curves = [
-        fitted_curve(name, (x, _whole(values, "exceeded", x.size, 0.0, count), count), groups, band, how)
+        fitted_curve(name, (x, whole_numbers(values, "exceeded", x.size, 0.0, count), count), groups, confidence, how)
         for name, values in outcomes.items()
     ]
     return Fragility(tuple(curves), how, description, block, "nonlinear", None, source="cluster")
-
-
-def _check_band(band: object) -> None:
-    if not isinstance(band, Band):
-        raise InvalidOption(
-            f'{{}} must be a Band, as Band("bootstrap", samples=500), not {checks.shown(band)}', "band", value=band
-        )
-
-
-def _limit_states(given: Mapping[str, Any], name: str) -> Mapping[str, Any]:
-    """Return what is given for each limit state by its name, of which there is one at least."""
-    for state in checks.mapping(given, name, InvalidOption, "{'overturning': inf}"):
-        checks.text(state, f"name of a limit state in {name}", InvalidOption)
-    return given
-
-
-def _whole(values: ArrayLike, name: str, size: int, least: float, most: ArrayLike) -> Floats:
-    """Whole numbers, one for each intensity, between two bounds."""
-    given = checks.answers_or_numbers(values, name, InvalidOption)
-    try:
-        numbers = np.broadcast_to(given, size)
-    except ValueError:
-        raise InvalidOption(f"{{}} must hold one number for each of the {size} intensities", name) from None
-    if not np.all((numbers >= least) & (numbers <= np.asarray(most)) & (numbers == np.floor(numbers))):
-        bound = f"{most:g}" if isinstance(most, float) else "the trials"
-        raise InvalidOption(f"{{}} must be whole numbers, at least {least:g} and no more than {bound}", name)
-    return numbers

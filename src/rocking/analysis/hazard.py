@@ -200,15 +200,13 @@ def hazard_line(hazard: HazardCurve, intensity: Floats) -> HazardLine:
 
 def _check_order(what: str, values: Floats, way: float) -> None:
     """Check that values are positive, and increase (`way` 1) or decrease (-1)."""
-    sound = np.isfinite(values) & (values > 0.0)
-    sound[1:] &= way * np.diff(values) > 0.0
-    if not np.all(sound):
+    sound = np.isfinite(values) & (values > 0.0) & (way * np.diff(values, prepend=-way * np.inf) > 0.0)
+    if not sound.all():
         k = int(np.argmin(sound))
         after = f" after {values[k - 1]:g}" if k else ""
-        ordered = "increase" if way > 0.0 else "decrease"
         raise InvalidOption(
-            f"the {what} of a hazard curve must be positive and {ordered} from point to point, but "
-            f"that of point {k + 1} is {values[k]:g}{after}; correct it or leave the point out"
+            f"the {what} of a hazard curve must be positive and {'increase' if way > 0.0 else 'decrease'} from point "
+            f"to point, but that of point {k + 1} is {values[k]:g}{after}; correct it or leave the point out"
         )
 
 
@@ -233,18 +231,14 @@ def _from_table(lines: list[str], period: float | None) -> tuple[Floats, Floats,
     kind, factor = HEADINGS[found[0]]
     intensity, rate = np.empty(len(rows)), np.empty(len(rows))
     for k, (line, row) in enumerate(rows):
-        if len(row) != len(heading):
-            raise InvalidOption(
-                f"this row has {len(row)} cells, and the heading {len(heading)}: make them as many", line=line
-            )
         try:
-            intensity[k], rate[k] = (float(row[heading.index(name)]) for name in (found[0], "annual_rate"))
-        except (ValueError, IndexError):
-            raise InvalidOption(f"{','.join(row)} is not an intensity and a rate", line=line) from None
-    if kind == "sa" and period is None:
-        raise InvalidOption("{} must be given, in s, for a spectral acceleration", "period")
-    if kind != "sa" and period is not None:
-        raise InvalidOption(f"{{}} belongs to a spectral acceleration, and this curve is of {kind}", "period")
+            cells = dict(zip(heading, row, strict=True))
+            intensity[k], rate[k] = (float(cells[name]) for name in (found[0], "annual_rate"))
+        except ValueError:
+            sentence = f"{','.join(row)} is not an intensity and a rate, in {len(heading)} cells as the heading"
+            raise InvalidOption(sentence, line=line) from None
+    if (kind == "sa") != (period is not None):
+        raise InvalidOption(f"{{}} (s) is for a spectral acceleration, and needed there; it is {kind}", "period")
     measure = Measure("sa", period) if kind == "sa" else Measure(kind)
     with np.errstate(over="ignore"):  # what becomes infinite is refused as such
         return factor * intensity, rate, measure
@@ -254,30 +248,26 @@ def _from_openquake(lines: list[str], site: int, period: float | None) -> tuple[
     """Intensities (SI), annual rates and measure of a site in a file of OpenQuake's."""
     said = dict(re.findall(r"(\w+)='?([^,'\"]+)'?", lines[0]))
     kind, _, rest = said.get("imt", "").partition("(")
-    rows = list(csv.reader(lines[1:]))
-    levels = [re.compile(r"poe-([0-9.eE+-]+)").fullmatch(cell.strip()) for cell in rows[0]] if rows else []
-    if kind not in _OPENQUAKE or not any(levels):
+    header, *rows = [*csv.reader(lines[1:])] or [[]]
+    levels = {k: cell.strip()[4:] for k, cell in enumerate(header) if cell.strip().startswith("poe-")}
+    if kind not in _OPENQUAKE or not levels:
         raise InvalidOption(f"no hazard curve of {', '.join(_OPENQUAKE)}: imt is {said.get('imt', 'not given')}")
-    if not 0 <= site < len(rows) - 1:
-        raise InvalidOption(f"there is no site {site}; it holds {len(rows) - 1}, counted from 0")
-    columns = [k for k, level in enumerate(levels) if level]
+    if site >= len(rows):
+        raise InvalidOption(f"there is no site {site}; it holds {len(rows)}, counted from 0")
     try:
-        intensity = np.array([float(level[1]) for level in levels if level])
-        exceeded = np.array([float(rows[1 + site][k]) for k in columns])
+        intensity = np.array([float(level) for level in levels.values()])
+        exceeded = np.array([float(rows[site][k]) for k in levels])
         years = float(said["investigation_time"])
         at = float(rest.rstrip(")")) if kind == "SA" else None
     except (ValueError, IndexError, KeyError) as error:
         raise InvalidOption(f"site {site}: {error}; it is not a whole hazard curve") from None
-    if not 0.0 < years < math.inf:
-        raise InvalidOption(f"the investigation_time is {years:g} years; it must be above 0")
-    if period is not None and period != at:
+    if period not in (None, at):
         raise InvalidOption(f"{{}} is {period:g} s, and this curve is of {said['imt']}: leave it out", "period")
     measure_name, factor = _OPENQUAKE[kind]
     measure = Measure(measure_name) if at is None else Measure("sa", at)
     # Probabilities that are printed as 0 or 1 say nothing of the rate.
     useful = (exceeded > 0.0) & (exceeded < 1.0)
-    rate = -np.log1p(-exceeded[useful]) / years
-    kept, rate = _corners(rate)
+    kept, rate = _corners(-np.log1p(-exceeded[useful]) / checks.positive(years, "investigation_time", InvalidOption))
     return factor * intensity[useful][kept], rate, measure
 
 
@@ -290,8 +280,8 @@ def _corners(rate: Floats) -> tuple[Integers, Floats]:
     return kept, np.where(first, lowest, lowest * (1.0 - 1e-9))[kept]
 
 
-def log_parts(fits: Probit, hazard: HazardCurve, until: float = math.inf) -> Floats:
-    """Logarithms of integrals below the hazard curve, over each of its segments, and above, up to `until` (ln x).
+def log_parts(fits: Probit, hazard: HazardCurve) -> Floats:
+    """Logarithms of integrals below the hazard curve, over each of its segments, and above.
 
     Their shape is (fits, n + 1). On a segment rate(x) = c x^-k, and with P = Phi(z), z = a + b ln x, the part is c
     exp(k a/b + k^2/(2 b^2)) [Phi(z + k/b)]. Where both ends lie on one side of z = -k/b the large terms cancel: with
@@ -301,7 +291,7 @@ def log_parts(fits: Probit, hazard: HazardCurve, until: float = math.inf) -> Flo
 
     k, log_c = (_extended(values) for values in powers(hazard))
     corners = np.concatenate([[-np.inf], np.log(hazard.intensity), [np.inf]])  # of the segments, and beyond them
-    ends = [np.minimum(each, until) for each in (corners[:-1], corners[1:])]
+    ends = corners[:-1], corners[1:]
     a, b = (values[:, None] for values in fits)
     with np.errstate(all="ignore"):
         shift = k / b
@@ -323,8 +313,8 @@ def _extended(values: Floats) -> Floats:
     return np.concatenate([values[:1], values, values[-1:]])
 
 
-def _log_total(fitted: Probit, hazard: HazardCurve, until: float = math.inf) -> float:
-    return float(np.logaddexp.reduce(log_parts(fitted, hazard, until)[0]))
+def _log_total(fitted: Probit, hazard: HazardCurve) -> float:
+    return float(np.logaddexp.reduce(log_parts(fitted, hazard)[0]))
 
 
 def _log_seen(fitted: Probit, hazard: HazardCurve, log_at: Floats) -> tuple[Floats, Floats]:
@@ -346,35 +336,6 @@ def shares_beyond(fitted: Probit, hazard: HazardCurve) -> tuple[float, float]:
         below = np.exp(parts[0] - total) * max(-math.expm1(min(first - parts[0], 0.0)), 0.0)
         above = np.exp(np.logaddexp(parts[-1], last) - total)
     return float(below), float(above)
-
-
-def quantile_intensities(fitted: Probit, hazard: HazardCurve) -> tuple[float, float, float]:
-    """Intensities below which the quantiles of a rate arise: shares of the motions P(x) |d rate(x)|."""
-    from scipy.optimize import brentq
-
-    total, (k, log_c) = _log_total(fitted, hazard), powers(hazard)
-    if not math.isfinite(total):
-        return 0.0, 0.0, 0.0
-
-    def excess(log_at: float, share: float) -> float:
-        product = _log_seen(fitted, hazard, np.array([log_at]))[0][0]
-        return float(np.exp(_log_total(fitted, hazard, log_at) - total) - np.exp(product - total)) - share
-
-    def found(share: float) -> float:
-        # What comes from above x is at most rate(x): where that is what remains of the whole rate, x is high enough.
-        left = total + math.log1p(-share)
-        segment = np.searchsorted(-np.log(hazard.rate[1:-1]), -left)
-        low = high = float((log_c[segment] - left) / k[segment])
-        step = 1.0
-        while excess(high, share) < 0.0:  # by rounding
-            high += 1.0
-        while excess(low, share) > 0.0:
-            low, step = low - step, 2.0 * step
-        return float(np.exp(brentq(excess, low, high, args=(share,), xtol=1e-13)))
-
-    with np.errstate(all="ignore"):
-        sixteenth, half, rest = (found(share) for share in (0.16, 0.5, 0.84))
-    return sixteenth, half, rest
 
 
 def share_density(fitted: Probit, hazard: HazardCurve, at: Floats) -> Floats:

@@ -1,10 +1,10 @@
-"""Incremental dynamic analysis: motions scaled up until the block overturns, and on."""
+"""Incremental dynamic analysis: motions scaled up until the block overturns, and on; and the scale where one does."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
@@ -18,13 +18,13 @@ from rocking.analysis.levels import (
     described,
     labels_of,
     simulate_levels,
-    undecided_text,
     units_of,
     values_of,
 )
 from rocking.block.body import Bodies, Body
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
+from rocking.core.bisection import bisected
 from rocking.core.constants import Model
 from rocking.core.result import DatasetResult
 from rocking.core.tables import as_written, counted, named, text_table
@@ -35,7 +35,9 @@ from rocking.errors import InvalidOption
 from rocking.motion.exceedance import lifting_factors
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import IntensityName, Measure
-from rocking.records.named import Motions, several_motions
+from rocking.records.named import Motions, one_motion, several_motions
+from rocking.response import Gradient, Response, gradient
+from rocking.simulation.simulate import simulate
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -143,13 +145,7 @@ def incremental_dynamic_analysis(
     flat = grid.reshape(len(grid), -1).astype(np.int64)
     edges = boundaries(table.level.values, flat, overturned, tolerance=width, progress=progress)
     found = _dataset(table, flat, edges, slenderness, how)
-    scales = (table.level.values[:, None, None] * factors)[..., None]
-    about = {
-        "blocks": described(blocks),
-        "lowest_uplift": first,
-        "sides_differ": int(not many.is_symmetric),
-        "undecided": undecided_text(Setup(many, model, Certified()), shaken, scales, grid[..., None], threads),
-    }
+    about = {"blocks": described(blocks), "lowest_uplift": first, "sides_differ": int(not many.is_symmetric)}
     return IncrementalDynamicAnalysis(found.assign_attrs(about))
 
 
@@ -165,8 +161,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         one that does not overturn) and overturned. Over (motion, block): overturning_level, the lowest; NaN where no
         level overturns, or the first one already does. Over (band): band_motion and band_block (positions along these
         dimensions), band_start and band_end; NaN where the band goes on below or above the
-        levels. Its attribute lowest_uplift is the level from which on a motion lifts a block; its attribute undecided,
-        how many outcomes of a sample change within 3e-6 of the motion.
+        levels. Its attribute lowest_uplift is the level from which on a motion lifts a block.
     """
 
     TABLES = MappingProxyType(
@@ -221,7 +216,6 @@ class IncrementalDynamicAnalysis(DatasetResult):
         table = text_table([what, *(["block"] if many else []), "overturns"], rows)
         head = f"{blocks}, {data.model} model; {data.level.label} that overturns"
         notes = [f"note: {MIRROR_NOTE}"] if data.sides_differ else []
-        notes.append(f"note: {data.undecided}")
         notes += [f"note: {text}"] if (text := missing_text(np.isnan(data.peak_over_alpha.values))) else []
         return "\n".join([head, looked_at.summary(data.lowest_uplift), "", table, *notes])
 
@@ -236,7 +230,6 @@ class IncrementalDynamicAnalysis(DatasetResult):
             **{name: data.level.attrs[name] for name in ("period", "damping") if name in data.level.attrs},
             named("level", units): data.level.values,
             named("lowest_uplift", units): data.lowest_uplift,
-            "undecided": data.undecided,
             "motions": [
                 {
                     "name": str(data.motion.values[m]),
@@ -344,10 +337,20 @@ class _Levels:
     def __init__(self, level: xr.DataArray) -> None:
         self.scale, self.at = level.scale, level.scale * level.values
         self.unit = {"m/s^2": " g", "m/s": " m/s", "1": ""}[level.units]
+        low, high = (f"{end:.5g}" for end in self.at[[0, -1]])
+        self.range = f"{low}{self.unit}" if low == high else f"{low} to {high}{self.unit}"
 
     def summary(self, lowest_uplift: float) -> str:
         """Say what was looked at, and whether it is all below the level (SI) from which on a motion lifts a block."""
-        text = f"looked at: {counted(len(self.at), 'level')}, {self._range(self.at[0], self.at[-1])}{self._step()}"
+        text = f"looked at: {counted(len(self.at), 'level')}, {self.range}"
+        if len(self.at) > 1:
+            steps, ratios = np.diff(self.at), self.at[1:] / self.at[:-1]
+            apart = f"up to {steps.max():.5g}{self.unit}"
+            if np.allclose(steps, steps[0], rtol=1e-6):
+                apart = f"{steps[0]:.5g}{self.unit}"
+            elif np.allclose(ratios, ratios[0], rtol=1e-6):
+                apart = f"{100.0 * (ratios[0] - 1.0):.3g} %"
+            text += f", {apart} apart; bands and gaps that lie between two of them are not seen"
         lifting = self.scale * lowest_uplift
         if self.at[-1] < lifting:
             text += f"\nnone of them lifts a block; that begins at {lifting:.5g}{self.unit}: are the levels right?"
@@ -355,30 +358,129 @@ class _Levels:
 
     def overturning(self, bands: Sequence[tuple[float, float]]) -> str:
         """Bands that overturn (SI); beyond the levels nothing is known of them, which is NaN."""
-        if not bands:
-            return f"at no level looked at, {self._range(self.at[0], self.at[-1])}"
-        return "; ".join(self._band(self.scale * low, self.scale * high) for low, high in bands)
+        return "; ".join(self._band(*(self.scale * end for end in band)) for band in bands) or (
+            f"at no level looked at, {self.range}"
+        )
 
     def _band(self, low: float, high: float) -> str:
         if not (math.isnan(low) or math.isnan(high)):
             return f"{low:.5g} to {high:.5g}"
         if math.isnan(low) and math.isnan(high):
-            return f"at every level looked at, {self._range(self.at[0], self.at[-1])}"
+            return f"at every level looked at, {self.range}"
         open_end = f"up to {high:.5g}{self.unit}" if math.isnan(low) else f"from {low:.5g}{self.unit} on"
         return f"at all levels looked at {open_end}"
 
-    def _range(self, low: float, high: float) -> str:
-        return f"{low:.5g}{self.unit}" if low == high else f"{low:.5g} to {high:.5g}{self.unit}"
 
-    def _step(self) -> str:
-        """How far neighbouring levels are apart; what lies between two of the same verdict is not seen."""
-        if len(self.at) == 1:
-            return ""
-        steps, ratios = np.diff(self.at), self.at[1:] / self.at[:-1]
-        if np.allclose(steps, steps[0], rtol=1e-6):
-            apart = f"{steps[0]:.5g}{self.unit} apart"
-        elif np.allclose(ratios, ratios[0], rtol=1e-6):
-            apart = f"{100.0 * (ratios[0] - 1.0):.3g} % apart"
-        else:
-            apart = f"up to {steps.max():.5g}{self.unit} apart"
-        return f", {apart}; bands and gaps that lie between two of them are not seen"
+_NO_BALANCE: Final = (
+    "the outcome changes without the block coming to the balance point: by a touch of the ground without speed, or at "
+    "a rest"
+)
+
+
+@dataclass(frozen=True)
+class CriticalScale:
+    """Where a block begins to overturn along the scale of a motion, with derivatives; made by `critical_scale`.
+
+    Attributes
+    ----------
+    scale : float
+        The least scale, to the last digit, that overturns the block, next to one that does not.
+    gradient : Gradient
+        Its derivatives by the motion as it was given (unscaled) and by the start, per unit of each; `Gradient.value` is
+        the scale. Where the outcome changes there without the block coming to the balance point, all derivatives are
+        NaN, and `Gradient.reason` says so.
+    p, alpha, restitution : float
+        Its change per relative change of these of both sides together: times 1e-3 it is that by 0.1 % more.
+    """
+
+    scale: float
+    gradient: Gradient
+    p: float
+    alpha: float
+    restitution: float
+
+
+def critical_scale(
+    block: Body,
+    motion: Motion,
+    low: float,
+    high: float,
+    *,
+    model: Model = "nonlinear",
+    initial_rotation: float = 0.0,
+    initial_velocity: float = 0.0,
+) -> CriticalScale:
+    """Find a scale of a motion at which a block begins to overturn, and its derivatives.
+
+    Parameters
+    ----------
+    block : Block
+        Block, or another body that can overturn.
+    motion : Motion
+        Motion that is scaled, both components alike.
+    low, high : float
+        Positive scales between which it is: the block stands at the lower one and overturns at the higher one. Where
+        the outcome changes several times between them, one of the changes is found.
+    model, initial_rotation, initial_velocity : optional
+        As for `simulate`.
+
+    Returns
+    -------
+    CriticalScale
+        The scale, and derivatives by every sample, the start and the block's parameters.
+
+    Raises
+    ------
+    InvalidMotion
+        If the motion is no `Motion`.
+    InvalidOption
+        If there is none, the block overturns at the lower scale, or not at the higher one, or the scales are not
+        positive and in this order.
+
+    Notes
+    -----
+    At the critical scale the response comes to the balance point and stays. The derivatives follow by the implicit
+    function theorem: see "Impacts: restitution and sensitivity" in the documentation.
+
+    Examples
+    --------
+    >>> import rocking
+    >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
+    >>> record = rocking.Motion.from_samples([0.0, 3.0, -4.0, 3.0, 0.0], 0.3)
+    >>> f"{rocking.critical_scale(block, record, 2.0, 6.0).scale:.6f}"
+    '3.256134'
+    """
+    if one_motion(motion) is None:
+        raise InvalidOption("there is no {} to scale: give one", "motion")
+    least, most = (checks.positive(value, name, InvalidOption) for value, name in ((low, "low"), (high, "high")))
+    if least >= most:
+        raise InvalidOption(f"{{}} = {least:g} must be below {{}} = {most:g}", "low", "high", value=low)
+
+    def response(scale: float) -> Response:
+        return simulate(
+            block, motion * scale, model=model, initial_rotation=initial_rotation, initial_velocity=initial_velocity
+        )
+
+    for value, name, expected in ((least, "low", False), (most, "high", True)):
+        if response(value).overturned is not expected:
+            does, wanted = ("does not overturn", "raise") if expected else ("overturns", "lower")
+            raise InvalidOption(f"the block {does} at the scale {{}} = {value:g}: {wanted} it", name, value=value)
+    _, scale = bisected(least, most, lambda scale: response(scale).overturned)
+    last = response(scale)
+    by_scale = {name: float(last.sensitivity.events[name][-1]) for name in ("motion", "p", "alpha", "restitution")}
+    turned, share = gradient(last, "event", -1), -scale / by_scale["motion"]
+    reason = turned.reason
+    if not abs(by_scale["motion"]) > 1e6:
+        reason, share = _NO_BALANCE, math.nan
+    by_motion = replace(
+        turned,
+        value=scale,
+        coefficients=scale * share * turned.coefficients,
+        vertical=None if turned.vertical is None else scale * share * turned.vertical,
+        initial_rotation=share * turned.initial_rotation,
+        initial_velocity=share * turned.initial_velocity,
+        reason=reason,
+        motion=motion,
+    )
+    p, alpha, restitution = (share * by_scale[name] for name in ("p", "alpha", "restitution"))
+    return CriticalScale(scale, by_motion, p, alpha, restitution)

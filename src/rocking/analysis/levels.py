@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
@@ -18,16 +18,16 @@ from rocking.core.constants import Model
 from rocking.core.progress import Progress, note
 from rocking.core.tables import counted
 from rocking.engine.problem import bodies_of
-from rocking.engine.tasks import Setup, Task, missing_text, simulate_tasks
+from rocking.engine.tasks import missing_text
 from rocking.errors import InvalidOption, Message
 from rocking.inputs.notes import is_multiple
 from rocking.motion.description import Origin, labelled
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
-from rocking.response import COUNT, RELATIVE, factors_near, percent
-from rocking.simulation.ensemble import body_coordinates, simulate_many
+from rocking.simulation.ensemble import Polarity, body_coordinates, simulate_many
 
 if TYPE_CHECKING:
+    import pandas as pd
     import xarray as xr
 
 
@@ -113,10 +113,8 @@ def normalised_weights(weights: ArrayLike | None, count: int) -> Floats:
     if weights is None:
         return np.ones(count)
     given = checks.numbers(weights, "weights", InvalidOption)
-    if given.shape != (count,):
-        raise InvalidOption(f"weights must hold one number for each of {counted(count, 'block')}, not {given.shape}")
-    if not (np.all(np.isfinite(given) & (given >= 0.0)) and np.any(given > 0.0)):
-        raise InvalidOption("weights must be finite numbers of 0 or more, and not all 0")
+    if given.shape != (count,) or not (np.all(np.isfinite(given) & (given >= 0.0)) and np.any(given > 0.0)):
+        raise InvalidOption(f"{{}} must be {count} numbers of 0 or more, not all 0, one for each block", "weights")
     given = given / given.max()  # else sums of very large or very small weights overflow
     return np.asarray(given * (count / given.sum()))
 
@@ -166,8 +164,8 @@ def motions_in_words(clusters: Integers, labels: object) -> str:
     return text if labels is None else f"{text} in {counted(len(np.unique(clusters)), 'cluster')}"
 
 
-def families_of(motions: Sequence[Motion], *, reversed_too: bool = True) -> Integers:
-    """Whole numbers, the same for motions that are multiples of one another, ``reversed_too`` by negative factors."""
+def families_of(motions: Sequence[Motion]) -> Integers:
+    """Whole numbers, the same for motions that are multiples of one another, by negative factors, too."""
     # None of these changes with the scale or the sign: only motions that are alike in all are compared in full.
     alike = np.empty((len(motions), 2))
     for k, motion in enumerate(motions):
@@ -177,7 +175,7 @@ def families_of(motions: Sequence[Motion], *, reversed_too: bool = True) -> Inte
     families = np.empty(len(motions), dtype=np.int64)
     for k, motion in enumerate(motions):
         near = np.flatnonzero(np.all(np.abs(alike[firsts] - alike[k]) <= 1e-9, axis=1))
-        same = (int(j) for j in near if is_multiple(motions[firsts[j]], motion, reversed_too=reversed_too))
+        same = (int(j) for j in near if is_multiple(motions[firsts[j]], motion))
         families[k] = next(same, len(firsts))
         if families[k] == len(firsts):
             firsts.append(k)
@@ -216,33 +214,75 @@ def ratios_of(peak: Floats, overturned: Flags, unfinished: Flags, slenderness: F
     return np.asarray(np.where(unfinished, np.nan, np.where(overturned, np.inf, peak / slenderness)))
 
 
+def passed(ratio: Floats, limit: float, name: str) -> Floats:
+    """Whether peak rotation over slenderness passes a limit: 1 or 0; infinite is overturning."""
+    limit = checked_limit(limit, name)
+    return np.asarray(np.isinf(ratio) if math.isinf(limit) else ratio > limit, dtype=np.float64)
+
+
+def checked_limit(limit: float, name: str) -> float:
+    """Return a limit of peak rotation over slenderness, checked."""
+    what = f"the limit {name!r} (rotation over slenderness)"
+    least = checks.number(limit, what, InvalidOption)
+    if not least >= 0.0:
+        raise InvalidOption(f"{{}} must be 0 or more, not {limit!r}", what, value=limit)
+    return least
+
+
+#: Limit states: peak rotation over slenderness that is exceeded; infinity is overturning.
+OVERTURNING: Final[Mapping[str, float]] = {"overturning": math.inf}
+
+
+def limit_states(given: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    """Return what is given for each limit state by its name, of which there is one at least."""
+    for state in checks.mapping(given, name, InvalidOption, "{'overturning': inf}"):
+        checks.text(state, f"name of a limit state in {name}", InvalidOption)
+    return given
+
+
+def outcomes_of(
+    table: xr.Dataset, measure: Measure, intensity: Floats, ratio: Floats, limits: Mapping[str, float]
+) -> pd.DataFrame:
+    """Table of every simulation of (level, motion, block, polarity), and which limits it exceeds."""
+    import pandas as pd
+
+    def along(values: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+        return np.broadcast_to(values, ratio.shape).ravel()  # of (level, motion, block, polarity)
+
+    signs = table.polarity.values if "polarity" in table.coords else np.array(["+"])
+    motions = [name for name in ("motion", "vertical") if name in table.coords]
+    return pd.DataFrame(
+        {
+            **{name: along(table[name].values[:, None, None]) for name in motions},
+            "block": along(np.arange(table.sizes["block"])[:, None]),
+            "polarity": along(signs),
+            measure.column: intensity,
+            "peak_rotation_rad": table.peak_rotation.values.ravel(),
+            "peak_over_alpha": ratio.ravel(),
+            "overturned": table.overturned.values.ravel(),
+            "unfinished": table.unfinished.values.ravel(),
+            **{f"exceeded_{name}": passed(ratio, limit, name).ravel().astype(bool) for name, limit in limits.items()},
+        }
+    )
+
+
+def weights_of(weights: ArrayLike | None, count: int) -> Floats:
+    """Weights of blocks, 1 in the mean of those that have any: outcomes are as many as without the others."""
+    shares = normalised_weights(weights, count)
+    return np.asarray(shares / shares[shares > 0.0].mean())
+
+
+def of_polarities(polarity: Polarity, *, is_symmetric: bool) -> str:
+    """Append to a description which polarities the outcomes come from, where both were requested."""
+    if polarity != "both":
+        return ""
+    return ", one polarity, since a symmetric block does the same in both" if is_symmetric else ", both polarities"
+
+
 def note_missing(unfinished: Flags) -> None:
     """Report simulations that were given up, where each counts as half overturned."""
     if text := missing_text(unfinished):
         note(f"{text}, and each counts as half overturned")
-
-
-def undecided_text(
-    setup: Setup, motions: Sequence[Motion], factors: Floats, overturned: Flags, threads: int | None
-) -> str:
-    """Repeat a sample of simulations with motions scaled by 1 +- 3e-6, and return in words how many outcomes change."""
-    shape = overturned.shape
-    drawn = np.random.default_rng(0).permutation(overturned.size)[:30]
-    sample = np.unravel_index(np.sort(drawn), shape)
-    near = factors_near(RELATIVE, COUNT)
-    factor = np.broadcast_to(factors, shape)[sample]
-    tasks = (
-        Task(slice(b, b + 1), motions[m], float(factor[k] * scale), (k,))
-        for k, (m, b) in enumerate(zip(sample[1], sample[2], strict=True))
-        for scale in (near[0], near[-1])
-    )
-    changed = np.zeros(len(factor), dtype=bool)
-    for task, outcomes in simulate_tasks(setup, tasks, threads=threads):
-        changed[task.key[0]] |= outcomes["overturned"][0] != overturned[sample][task.key[0]]
-    return (
-        f"undecided within {percent(near[-1] - 1.0)} of the motion: {np.count_nonzero(changed)} of a sample of "
-        f"{counted(len(changed), 'outcome')}"
-    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.constants import VERSION, Model
 from rocking.core.progress import Progress
 from rocking.core.result import DatasetResult, table_of_some, variable
-from rocking.core.tables import as_written, cell, named, text_table
+from rocking.core.tables import as_written, cell, named, records_of, text_table
 from rocking.engine.tasks import OUTCOME, Setup, missing_text, simulate_each
 from rocking.engine.treatment import Certified
 from rocking.errors import InvalidMotion, InvalidOption
@@ -157,19 +157,41 @@ def overturning_map(
     slowest = min(side.p for side in block.sides)
     made, own = _pulse_function(pulse, parameters), slowest / (2.0 * math.pi)
     unit = _called(made, 1.0, own)
-    for ratio in {ratios[0], ratios[-1]}:
-        _check_shape(unit, made, own, float(ratio))
-    chattering = Certified(width * unit.end)
+    for ratio in {float(ratios[0]), float(ratios[-1])}:
+        stronger = 1.0 + ratio
+        other = _called(made, stronger, ratio * own)
+        pairs = (unit, other), (unit.vertical, other.vertical)
+        if not all(_is_alike(first, second, stronger, ratio) for first, second in pairs):
+            raise InvalidOption(
+                "the {} must have one shape: a function of amplitude and frequency whose motion is proportional to the "
+                f"amplitude, and over in half the time at twice the frequency; that of {own:g} Hz is another one "
+                f"than that of {ratio * own:g} Hz",
+                "pulse",
+            )
     p, alpha, restitution = (
         np.array([getattr(side, name) for side in block.sides]) for name in ("p", "alpha", "restitution")
     )
     # Blocks of one shape, and of p such that the pulse, of the block's own frequency, has these ratios to it.
     blocks = Blocks(p / ratios[:, None], alpha[None, :], restitution[None, :], gravity=block.gravity)
-    setup = Setup(blocks, model, chattering)
+    setup, threshold = Setup(blocks, model, Certified(width * unit.end)), min(block.uplift_thresholds(model))
     count = None if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
-    problem = _PulseProblem(setup, unit, min(block.uplift_thresholds(model)), count)
-    modes, peaks = problem.grid(levels, progress)
-    edges = boundaries(levels, modes, problem.modes, tolerance=width, progress=progress)
+
+    def followed(
+        column: Integers, level: Floats, done: Callable[[int], None] = lambda count: None
+    ) -> tuple[Integers, Floats]:
+        """Mode and peak rotation of each block given by its column, under its own level."""
+        ends = np.empty(column.size, dtype=OUTCOME)
+        here = replace(setup, bodies=setup.bodies.select(column))
+        for task, outcomes in simulate_each(here, unit, threshold * level, threads=count):
+            ends[task.bodies] = outcomes
+            done(len(outcomes))
+        return np.where(ends["unfinished"], Mode.UNFINISHED, modes_of(ends, unit.end)), ends["peak_rotation"]
+
+    row, column = (index.ravel() for index in np.indices((levels.size, ratios.size)))
+    with Progress("mapping", row.size, show=progress) as bar:
+        modes, peaks = followed(column, levels[row], bar.advance)
+    modes, peaks = modes.reshape(levels.size, -1), peaks.reshape(levels.size, -1)
+    edges = boundaries(levels, modes, lambda *at: followed(*at)[0], tolerance=width, progress=progress)
     attributes = {
         "program": f"rocking {VERSION}",
         "model": model,
@@ -274,8 +296,6 @@ class OverturningMap(DatasetResult):
         return f"{amplitudes[0]:g} or less" if is_open_below else f"none of those up to {amplitudes[-1]:g}"
 
     def to_dict(self) -> dict[str, Any]:
-        names = ("boundary_frequency", "boundary_amplitude", "mode_below", "mode_above")
-        columns = (self.data[name].values for name in names)
         return {
             "pulse": self.data.pulse,
             "block": self.data.block,
@@ -287,7 +307,7 @@ class OverturningMap(DatasetResult):
             "amplitude": self.data.amplitude.values,
             "mode": self.data.mode.values,
             "overturning_amplitude": self.data.overturning_amplitude.values,
-            "boundaries": [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)],
+            "boundaries": records_of(self._columns("boundaries")),
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
@@ -317,37 +337,6 @@ class OverturningMap(DatasetResult):
             for name in (named("alpha", "rad"), "restitution")
         )
         return f"alpha = {alpha} rad, restitution = {restitution}"
-
-
-@dataclass(frozen=True)
-class _PulseProblem:
-    """Blocks, one for every frequency, under multiples of one pulse."""
-
-    setup: Setup
-    unit: Motion
-    threshold: float
-    threads: int | None
-
-    def grid(self, levels: Floats, progress: bool | None) -> tuple[Integers, Floats]:
-        """Modes and peak rotations at every level, shape (levels, blocks)."""
-        shape = levels.size, len(self.setup.bodies)
-        row, column = (index.ravel() for index in np.indices(shape))
-        with Progress("mapping", row.size, show=progress) as bar:
-            modes, peaks = self._followed(column, levels[row], bar.advance)
-        return modes.reshape(shape), peaks.reshape(shape)
-
-    def modes(self, column: Integers, level: Floats) -> Integers:
-        """Mode of each block given by its column, under its own level."""
-        return self._followed(column, level, lambda count: None)[0]
-
-    def _followed(self, column: Integers, level: Floats, done: Callable[[int], None]) -> tuple[Integers, Floats]:
-        setup = replace(self.setup, bodies=self.setup.bodies.select(column))
-        ends = np.empty(column.size, dtype=OUTCOME)
-        for task, outcomes in simulate_each(setup, self.unit, self.threshold * level, threads=self.threads):
-            ends[task.bodies] = outcomes
-            done(len(outcomes))
-        modes = np.where(ends["unfinished"], Mode.UNFINISHED, modes_of(ends, self.unit.end))
-        return modes, ends["peak_rotation"]
 
 
 def _pulse_function(
@@ -380,20 +369,6 @@ def _called(pulse: Callable[[float, float], Motion], amplitude: float, frequency
             f"the pulse of amplitude {amplitude:g} and frequency {frequency:g} is None; return a Motion"
         )
     return motion
-
-
-def _check_shape(unit: Motion, pulse: Callable[[float, float], Motion], frequency: float, ratio: float) -> None:
-    """Refuse a pulse whose motion is another one than `unit` when it is as many times as fast, and stronger."""
-    stronger = 1.0 + ratio
-    other = _called(pulse, stronger, ratio * frequency)
-    pairs = (unit, other), (unit.vertical, other.vertical)
-    if not all(_is_alike(first, second, stronger, ratio) for first, second in pairs):
-        raise InvalidOption(
-            "the {} must have one shape: a function of amplitude and frequency whose motion is proportional to the "
-            f"amplitude, and over in half the time at twice the frequency; that of {frequency:g} Hz is another one "
-            f"than that of {ratio * frequency:g} Hz",
-            "pulse",
-        )
 
 
 def _is_alike(first: Motion | None, second: Motion | None, factor: float, ratio: float) -> bool:

@@ -1,4 +1,4 @@
-"""Maximum likelihood for a lognormal fragility.
+"""Maximum likelihood for a lognormal fragility, and the region of curves that are about as likely.
 
 The probability of exceedance at intensity x is Phi(ln(x/median)/dispersion). In z = ln x it is a probit, Phi(a + b z)
 with b = 1/dispersion and a = -b ln(median), whose likelihood is concave: it has one maximum, or none where the outcomes
@@ -24,6 +24,15 @@ STEEP: Final = 1e9
 
 #: Outcomes in a group of the test of fit, at least; and groups of binary outcomes, at most (Hosmer and Lemeshow).
 _GROUP: Final = 5
+
+#: Directions in which a region is measured: between them 4e-5 of an interval's width is lost.
+_RAYS: Final = 360
+
+#: Relative width of the end of a ray.
+_SAME: Final = 1e-9
+
+#: Clusters that tell how far they differ, at least.
+_FEWEST: Final = 3
 
 
 class Outcomes(NamedTuple):
@@ -60,6 +69,11 @@ class Probit(NamedTuple):
         return f"<Probit: intercept {float(self.intercept[0]):.5g}, slope {float(self.slope[0]):.5g}>"
 
 
+#: Level curves at 0 and 1, and steps at intensities below and above all that there are.
+_STEPS_AT: Final = 1000.0 * STEEP
+_WHOLE_PLANE: Final = Probit(np.array([-np.inf, np.inf, _STEPS_AT, -_STEPS_AT]), np.array([0.0, 0.0, STEEP, STEEP]))
+
+
 def normal_scores(fits: Probit, z: Floats) -> Floats:
     """Return normal scores of the probability at logarithms of the intensity, shape (fits, len(z)); -inf at 0."""
     finite = np.isfinite(z)
@@ -73,26 +87,6 @@ def probabilities(fits: Probit, z: Floats) -> Floats:
 
     result: Floats = ndtr(normal_scores(fits, z))
     return result
-
-
-@dataclass(frozen=True)
-class Likelihood:
-    """Likelihood of a fit.
-
-    Attributes
-    ----------
-    logarithm : float
-        Without binomial coefficients.
-    ratio : float
-        Twice its gain over one probability for all intensities.
-    p_value : float
-        Probability of a larger gain if the intensity did not matter (chi-squared, one degree of freedom); NaN where
-        outcomes belong together.
-    """
-
-    logarithm: float
-    ratio: float
-    p_value: float
 
 
 @dataclass(frozen=True)
@@ -129,21 +123,15 @@ def unidentified(data: Outcomes, shown: Callable[[float], str]) -> str | None:
     """Say why no rising lognormal fits a data set best, intensities as `shown` writes them; None where one does."""
     z, exceeded, trials = data
     yes, no, count = z[exceeded > 0], z[exceeded < trials], round(float(trials.sum()))
-    if not yes.size:
-        which = "the only outcome does not exceed" if count == 1 else f"none of the {count} outcomes exceeds"
-        return f"{which} the limit, {_tried(z, shown)}: stronger motions are needed"
-    if not no.size:
-        which = "the only outcome exceeds" if count == 1 else f"all of the {count} outcomes exceed"
-        return f"{which} the limit, {_tried(z, shown)}: weaker motions are needed"
+    if not yes.size or not no.size:
+        which, wanted = ("no", "stronger") if not yes.size else ("every", "weaker")
+        return f"{which} outcome of {count} exceeds the limit, {_tried(z, shown)}: {wanted} motions are needed"
     if z.min() == z.max():
         return f"all outcomes are at one intensity, {shown(math.exp(z[0]))}: others are needed"
     if no.max() <= yes.min() + _overlap(z):
         low, high = math.exp(no.max()), math.exp(yes.min())
-        where = (
-            f"below {shown(low)} and all do above it"
-            if low >= high
-            else f"up to {shown(low)} and all do from {shown(high)} on"
-        )
+        last, first = ("below", "above it") if low >= high else ("up to", f"from {shown(high)} on")
+        where = f"{last} {shown(low)} and all do {first}"
         return (
             f"the outcomes are separated, none exceeds the limit {where}: the fragility is a step there, and motions "
             "near it are needed"
@@ -172,11 +160,11 @@ def fit(data: Outcomes) -> Probit:
     most = np.einsum("fn,jn,kn->fjk", data.trials, powers, powers)
     for _ in range(_ITERATIONS):
         with np.errstate(all="ignore"):
-            gradient, information = scores(scaled, beta)
-            step = solved(information, gradient)
+            gradient, information = _scores(scaled, beta)
+            step = _solved(information, gradient)
         # Far from the maximum the information may vanish to rounding; the complete data's (EM) still leads uphill.
         lost = ~np.isfinite(step).all(axis=1)
-        step[lost] = solved(most[lost], gradient[lost])
+        step[lost] = _solved(most[lost], gradient[lost])
         step, then = _uphill(scaled, beta, step, now)
         beta, now = beta + step, then
         if np.all(np.abs(step) <= 1e-11 * np.abs(beta).max(axis=1, keepdims=True)):
@@ -199,28 +187,19 @@ def likelihood(data: Outcomes, beta: Floats) -> Floats:
 
 def covariance(data: Outcomes, fitted: Probit) -> Floats:
     """Inverse of Fisher's expected information of intercept and slope, shape (2, 2), of one fit."""
-    scaled, about, centre, spread = standardised(data, fitted)
+    scaled, about, centre, spread = _standardised(data, fitted)
     counts = scaled._replace(exceeded=np.zeros_like(data.trials))
     change = np.array([[1.0, -centre / spread], [0.0, 1.0 / spread]])
-    return np.asarray(change @ np.linalg.inv(scores(counts, np.column_stack(about))[1][0]) @ change.T, dtype=np.float64)
+    return np.asarray(
+        change @ np.linalg.inv(_scores(counts, np.column_stack(about))[1][0]) @ change.T, dtype=np.float64
+    )
 
 
-def standardised(data: Outcomes, fitted: Probit) -> tuple[Outcomes, Probit, float, float]:
+def _standardised(data: Outcomes, fitted: Probit) -> tuple[Outcomes, Probit, float, float]:
     """Return data and fits with z about its mean and over its deviation, and these two, so that digits suffice."""
     centre, spread = float(data.z.mean()), float(data.z.std())
     scaled = data._replace(z=(data.z - centre) / spread)
     return scaled, Probit(fitted.intercept + fitted.slope * centre, fitted.slope * spread), centre, spread
-
-
-def gain(data: Outcomes, fitted: Probit, *, independent: bool) -> Likelihood:
-    """Likelihood of one fit, and its gain over one probability for all intensities."""
-    from scipy.special import gammaincc, xlogy
-
-    here = likelihood(data.alone(), np.column_stack(fitted))
-    yes, total = data.exceeded.sum(), data.trials.sum()
-    without = xlogy(yes, yes / total) + xlogy(total - yes, 1.0 - yes / total)
-    ratio = max(0.0, 2.0 * float(here[0] - without))
-    return Likelihood(float(here[0]), ratio, float(gammaincc(0.5, 0.5 * ratio)) if independent else math.nan)
 
 
 def groups(z: Floats, trials: Floats) -> Integers:
@@ -253,31 +232,6 @@ def goodness(data: Outcomes, fitted: Probit, *, independent: bool) -> Goodness:
     return Goodness(statistic, freedom, chance_of_more)
 
 
-def limits(data: Outcomes) -> tuple[Probit, Flags]:
-    """Limits that likelihoods of rising curves without a maximum tend to, and which of the fits have a maximum."""
-    from scipy.special import ndtri
-
-    z, exceeded, trials = data
-    yes, no = exceeded > 0, exceeded < trials
-    lowest_yes, highest_no = np.where(yes, z, np.inf).min(axis=1), np.where(no, z, -np.inf).max(axis=1)
-    never, always = ~yes.any(axis=1), ~no.any(axis=1)
-    step = (highest_no <= lowest_yes + _overlap(z)) & ~never & ~always
-    slope = np.where(step, STEEP, 0.0)
-    # A curve that would fall is level at best: one probability, 0 or 1 without either kind of outcome.
-    intercept = ndtri(exceeded.sum(axis=1) / trials.sum(axis=1))
-    intercept[step] = -0.5 * STEEP * (highest_no + lowest_yes)[step]
-    return Probit(intercept, slope), ~step & _rises(data)
-
-
-def fit_or_limits(data: Outcomes) -> tuple[Probit, Flags]:
-    """Fit several data sets, by limits where a likelihood has no maximum; and which of them have one."""
-    fits, regular = limits(data)
-    if regular.any():
-        found = fit(data.of(regular))
-        fits.intercept[regular], fits.slope[regular] = found.intercept, found.slope
-    return fits, regular
-
-
 def _overlap(z: Floats) -> float:
     """Overlap of the outcomes of either kind that is too narrow for a slope to be found from it."""
     return 1e-6 * float(z.max() - z.min())
@@ -292,7 +246,7 @@ def _rises(data: Outcomes) -> Flags:
     return np.asarray(pull > 1e-12 * np.sum(trials * np.abs(centred), axis=1))
 
 
-def solved(matrix: Floats, right: Floats) -> Floats:
+def _solved(matrix: Floats, right: Floats) -> Floats:
     """Solve symmetric positive systems of two equations, shapes (fits or 1, 2, 2) and (fits, 2)."""
     a, b, c = matrix[:, 0, 0], matrix[:, 0, 1], matrix[:, 1, 1]
     ratio = b / a
@@ -300,17 +254,17 @@ def solved(matrix: Floats, right: Floats) -> Floats:
     return np.stack([right[:, 0] / a - ratio * second, second], axis=1)
 
 
-def scores(data: Outcomes, beta: Floats) -> tuple[Floats, Floats]:
+def _scores(data: Outcomes, beta: Floats) -> tuple[Floats, Floats]:
     """Gradient of the likelihood and Fisher's expected information, shapes (fits, 2) and (fits, 2, 2)."""
     z, exceeded, trials = data
-    density, below, above = logarithms(beta[:, :1] + beta[:, 1:] * z)
+    density, below, above = _logarithms(beta[:, :1] + beta[:, 1:] * z)
     pull = exceeded * np.exp(density - below) - (trials - exceeded) * np.exp(density - above)
     weight = trials * np.exp(2.0 * density - below - above)
     powers = np.stack([np.ones_like(z), z])
     return np.einsum("fn,jn->fj", pull, powers), np.einsum("fn,jn,kn->fjk", weight, powers, powers)
 
 
-def logarithms(at: Floats) -> tuple[Floats, Floats, Floats]:
+def _logarithms(at: Floats) -> tuple[Floats, Floats, Floats]:
     """Logarithms of the normal density, and of the probabilities below and above."""
     from scipy.special import log_ndtr
 
@@ -327,3 +281,96 @@ def _uphill(data: Outcomes, beta: Floats, step: Floats, now: Floats) -> tuple[Fl
         step[falling] *= 0.5
         then[falling] = likelihood(data.of(falling), (beta + step)[falling])
     return step, then
+
+
+def likely_region(data: Outcomes, fitted: Probit, clusters: Integers | None, confidence: float) -> Probit:
+    """Fits on the boundary of those whose likelihood is not significantly below the maximum; it ends where none rises.
+
+    Intervals are extremes in it, as of the profile likelihood. Where clusters hold several outcomes each, it is
+    stretched to their covariance (Chandler and Bate 2007) by Student's distribution; of fewer than three clusters it is
+    the whole plane. Without clusters every outcome is on its own.
+    """
+    from scipy.special import chdtri, stdtrit
+
+    scaled, best, centre, spread = _standardised(data, fitted)
+    if clusters is None:
+        around = _around(scaled, best, 0.5 * float(chdtri(1.0, 1.0 - confidence)))
+    elif (count := int(clusters.max()) + 1) < _FEWEST:
+        return _WHOLE_PLANE
+    else:
+        around = _around(scaled, best, 0.5 * float(stdtrit(count - 1.0, 0.5 + 0.5 * confidence)) ** 2)
+        around = np.column_stack(best) + (around - np.column_stack(best)) @ _stretch(scaled, clusters, best).T
+    intercepts, slopes = _cut_where_level(around).T
+    slopes = slopes / spread
+    return Probit(intercepts - slopes * centre, slopes)
+
+
+def _around(data: Outcomes, best: Probit, drop: float) -> Floats:
+    """Points all around the maximum where the logarithm of the likelihood is lower by `drop`, shape (rays, 2)."""
+    z, level = np.unique(data.z, return_inverse=True)
+    yes, trials = (
+        np.broadcast_to(np.bincount(level, counts).astype(np.float64), (_RAYS, z.size)) for counts in data[1:]
+    )
+    rays = Outcomes(z, yes, trials)
+    top = np.column_stack(best)
+    floor = likelihood(Outcomes(z, yes[:1], trials[:1]), top)[0] - drop
+    angle = np.linspace(0.0, 2.0 * math.pi, _RAYS, endpoint=False)
+    wide = np.linalg.cholesky(covariance(Outcomes(z, yes[0], trials[0]), best))
+    directions = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ wide.T
+    reach = np.ones(_RAYS)
+    for _ in range(100):
+        short = likelihood(rays, top + reach[:, None] * directions) > floor
+        if not short.any():
+            break
+        reach[short] *= 2.0
+    # From beyond, Newton's rule does not overshoot the root of a concave function.
+    for _ in range(80):
+        here = top + reach[:, None] * directions
+        above = likelihood(rays, here) - floor
+        with np.errstate(over="ignore", invalid="ignore"):
+            fall = -np.sum(_scores(rays, here)[0] * directions, axis=1)
+        beyond = (above < 0.0) & (fall > 0.0)
+        step = above[beyond] / fall[beyond]
+        reach[beyond] += step
+        if np.all(np.abs(step) <= _SAME * reach[beyond]):
+            break
+    return np.asarray(top + reach[:, None] * directions)
+
+
+def _cut_where_level(around: Floats) -> Floats:
+    """Cut the region off where the slope is 0."""
+    after = np.roll(around, -1, axis=0)
+    (intercept, slope), (next_intercept, next_slope) = around.T, after.T
+    up = slope >= 0.0
+    cut = up != (next_slope >= 0.0)
+    share = slope[cut] / (slope[cut] - next_slope[cut])
+    corners = intercept[cut] + share * (next_intercept[cut] - intercept[cut])
+    return np.vstack([around[up], np.column_stack([corners, np.zeros(share.size)])])
+
+
+def _stretch(data: Outcomes, clusters: Integers, best: Probit) -> Floats:
+    """Map from the likelihood's covariance to that which the clusters show."""
+    pulls, bends = _by_cluster(data, clusters, best)
+    count = len(pulls)
+    root = np.linalg.cholesky(np.linalg.inv(bends.sum(axis=0)))
+    # Without the cluster the information is less by its leverage, so that its score moves the parameters further.
+    leverage, axes = np.linalg.eigh(root.T @ bends @ root)
+    freed = np.einsum("cij,cj,ckj->cik", axes, 1.0 / (1.0 - np.minimum(leverage, 0.9)), axes)
+    moved = np.einsum("cij,cj->ci", freed, pulls @ root)
+    variance, axis = np.linalg.eigh(moved.T @ moved * (count - 1.0) / count)
+    wide = axis * np.sqrt(np.maximum(variance, 0.0)) @ axis.T
+    return np.asarray(root @ wide @ np.linalg.inv(root))
+
+
+def _by_cluster(data: Outcomes, clusters: Integers, fitted: Probit) -> tuple[Floats, Floats]:
+    """Score and observed information of each cluster, shapes (clusters, 2) and (clusters, 2, 2)."""
+    z, exceeded, trials = data
+    at = fitted.intercept + fitted.slope * z
+    density, below, above = _logarithms(at)
+    up, down = np.exp(density - below), np.exp(density - above)
+    pull = exceeded * up - (trials - exceeded) * down
+    bend = exceeded * up * (up + at) + (trials - exceeded) * down * (down - at)
+    pulls = np.stack([np.bincount(clusters, pull * power) for power in (np.ones_like(z), z)], axis=1)
+    level, mixed, square = (np.bincount(clusters, bend * power) for power in (np.ones_like(z), z, z * z))
+    bends = np.stack([level, mixed, mixed, square], axis=1).reshape(-1, 2, 2)
+    return np.asarray(pulls, dtype=np.float64), np.asarray(bends, dtype=np.float64)

@@ -9,17 +9,15 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from rocking.analysis.curve import FragilityCurve, in_units, interval_of
+from rocking.analysis.curve import FragilityCurve, extremes, in_units
 from rocking.analysis.hazard import (
     HazardCurve,
     hazard_line,
     log_parts,
-    quantile_intensities,
     share_density,
     shares_beyond,
-    shown_range,
 )
-from rocking.analysis.probit import Outcomes, Probit, fit_or_limits
+from rocking.analysis.probit import Probit
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.result import Result
@@ -28,16 +26,12 @@ from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 #: Probabilities of exceedance of the intensities in the table of a survival, and those between which its figure is.
 _CHANCES: Final = (0.05, 0.16, 0.5, 0.84, 0.95)
 _SHOWN: Final = (0.01, 0.999)
-
-#: An integral over a normal distribution: its farthest ends, and its points.
-_FARTHEST: Final = 38.0
 
 
 @dataclass(frozen=True)
@@ -55,14 +49,12 @@ class Rate:
     below, above : float
         Shares of the rate from motions below the hazard curve's first point and above its last, where its lines are
         only extended.
-    intensities : (float, float, float)
-        Intensities (SI) of the motions below which 16, 50 and 84 % of the rate arise.
     bounds : (float, float)
         Rates between which the hazard curve can tell the rate; texts state the bound in place of a rate beyond them.
 
     Examples
     --------
-    >>> round(Rate("overturning", 1e-3, (5e-4, 2e-3), 0.0, 0.0, (1.0, 2.0, 3.0)).probability(50.0), 4)
+    >>> round(Rate("overturning", 1e-3, (5e-4, 2e-3), 0.0, 0.0).probability(50.0), 4)
     0.0488
     """
 
@@ -71,7 +63,6 @@ class Rate:
     interval: tuple[float, float]
     below: float
     above: float
-    intensities: tuple[float, float, float]
     bounds: tuple[float, float] = (0.0, math.inf)
 
     def __repr__(self) -> str:
@@ -150,8 +141,7 @@ class Risk(Result):
     def summary(self, years: float = 50.0) -> str:
         """Write rates, return periods, and probabilities in a time (years) as a table."""
         years = checks.positive(years, "years", InvalidOption)
-        scale, confidence = self.hazard.measure.scale, 100 * self.curves[0].confidence
-        rows = []
+        confidence, rows = 100 * self.curves[0].confidence, []
         for one in self.rates:
             chances = [-math.expm1(-rate * years) for rate in (one.annual_rate, *one.interval, *one.bounds)]
             rows.append(
@@ -160,23 +150,14 @@ class Risk(Result):
                     *known_digits(one.annual_rate, one.interval, one.bounds),
                     *one._period_digits(),
                     *known_digits(chances[0], (chances[1], chances[2]), (chances[3], chances[4])),
-                    ", ".join(within(scale * x, shown_range(self.hazard), "{:.3g}".format) for x in one.intensities),
                 ]
             )
         between = f"{confidence:g} % between"
         header = [
             "limit state", "annual rate", between, "once in (years)", between,
             f"probability in {counted(years, 'year')}", between,
-            f"{self.hazard.measure.label} below which 16, 50, 84 % of the rate arises",
         ]  # fmt: skip
         notes = [note for one in self.rates for note in beyond_notes(one)]
-        notes += [
-            f"{one.limit_state}: the upper end, {one.interval[1]:.2g} a year, is above the highest rate of the hazard "
-            "curve: it comes from weaker motions, to which the first line of the curve is extended; more motions "
-            "narrow the interval"
-            for one in self.rates
-            if self.hazard.rate[0] < one.interval[1] < math.inf
-        ]
         if any(one.interval[0] == 0.0 or math.isinf(one.interval[1]) for one in self.rates):
             notes.append("intervals are those of the fragility, whose summary says why they have no end")
         return "\n".join([text_table(header, rows), *notes])
@@ -198,7 +179,6 @@ class Risk(Result):
                     "probability": one.probability(years),
                     "share_below_hazard_curve": one.below,
                     "share_above_hazard_curve": one.above,
-                    f"intensities_of_16_50_84_percent_{self.hazard.measure.column}": list(one.intensities),
                 }
                 for one in self.rates
             ],
@@ -207,15 +187,11 @@ class Risk(Result):
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         from rocking.plot.curves import RiskLine, risk_figure
 
-        scale, ends = self.hazard.measure.scale, [*self.hazard.intensity[[0, -1]]]
-        for one in self.rates:  # around where the rates come from
-            low, _, high = one.intensities
-            if low > 0.0 and high < math.inf:
-                reach = (high / low) ** 2
-                ends += [end for end in (low / reach, high * reach) if 0.0 < end < math.inf]
-        at = np.geomspace(min(ends), max(ends), 400)
+        # The figure ends where next to nothing of the rates comes from.
+        low, high = self.hazard.intensity[[0, -1]]
+        at = np.geomspace(1e-2 * low, 1e2 * high, 800)
         return risk_figure(
-            intensity=scale * at,
+            intensity=self.hazard.measure.scale * at,
             hazard=hazard_line(self.hazard, at),
             lines=[
                 RiskLine(f"{one.limit_state}: {one.in_words()}", share_density(curve.fitted, self.hazard, at))
@@ -269,16 +245,14 @@ def _rate(curve: FragilityCurve, hazard: HazardCurve) -> Rate:
     def logarithm(fits: Probit) -> Floats:
         return np.asarray(np.logaddexp.reduce(log_parts(fits, hazard), axis=1)[:, None])
 
-    low, high = interval_of(curve, logarithm)
+    low, high = extremes(curve.region, logarithm)
     with np.errstate(over="ignore", under="ignore"):
         rate, lower, upper = (float(np.exp(value)) for value in (total, low[0], high[0]))
     below, above = shares_beyond(curve.fitted, hazard)
     # Motions above the last point add no more than its rate; of a rate that is mostly theirs only the bound is known.
     least = (1.0 - above) * rate + float(hazard.rate[-1]) if above > 0.5 else 0.0
-    intensities = quantile_intensities(curve.fitted, hazard)
-    return Rate(
-        curve.limit_state, rate, (lower, upper), below, above, intensities, (least, max(least, float(hazard.rate[0])))
-    )
+    bounds = least, max(least, float(hazard.rate[0]))
+    return Rate(curve.limit_state, rate, (lower, upper), below, above, bounds)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -288,9 +262,9 @@ class Survival(Result):
     Its figure has the largest rates that fit with the survival, and the hazard curve beside them.
 
     A curve of several blocks (for example an ensemble that stands for one block which is not quite known) does not
-    separate their dispersion from that of the motions. Rates and `probability` are then those of motions that each meet
-    another of the blocks. If one of the blocks has stood all the time, the probability is `mean_probability`, and
-    `most_probable` bounds it.
+    separate their dispersion from that of the motions: rates and `probability` are those of motions that each meet
+    another of the blocks. If one of them has stood all the time, the probability is the mean of those of the blocks,
+    each by a curve of its own.
 
     Attributes
     ----------
@@ -304,9 +278,6 @@ class Survival(Result):
         Annual rates of intensities at the site.
     rate : Rate or None
         Annual rate of the limit state under that hazard curve.
-    mean_probability : float
-        Mean, by the weights of several blocks, of the probabilities of survival under the hazard curve, each by a
-        fragility curve of its own. NaN of one block, without a hazard curve, and where outcomes are not kept.
     """
 
     curve: FragilityCurve
@@ -317,7 +288,6 @@ class Survival(Result):
     hazard: HazardCurve | None
     rate: Rate | None
     several_blocks: bool = False
-    mean_probability: float = math.nan
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "years", checks.positive(self.years, "years", InvalidOption))
@@ -359,25 +329,24 @@ class Survival(Result):
 
     @property
     def most_probable(self) -> float:
-        """The largest `probability` that fits with all that is known: with the interval, the hazard curve, the blocks.
+        """The largest `probability` that fits with the interval and the hazard curve.
 
         It is at the upper end of the interval, and without motions below the hazard curve's first point or above its
-        last, where its lines are only extended. Of several blocks it is that of one which has stood all the time, and
-        of which the intensity alone decides whether it falls: the integral of exp(-rate(x) years) dP(x).
+        last, where its lines are only extended.
         """
-        if self.rate is None or self.hazard is None:
+        if self.hazard is None:
             return math.nan
-        hazard, years = self.hazard, self.years
-        if not self.several_blocks:
-            low, _ = interval_of(self.curve, lambda fits: _log_rate_within(fits, hazard))
-            return math.exp(-math.exp(float(low[0])) * years)
-        _, high = interval_of(self.curve, lambda fits: _log_standing(fits, hazard, years))
-        return math.exp(min(float(high[0]), 0.0))
+        hazard = self.hazard
+        low, _ = extremes(self.curve.region, lambda fits: _log_rate_within(fits, hazard))
+        return math.exp(-math.exp(float(low[0])) * self.years)
 
     @property
     def contradicts(self) -> bool:
-        """Whether the survival, at its `most_probable`, is less probable than 1 - confidence."""
-        return self.most_probable < 1.0 - self.confidence
+        """Whether the survival, at its `most_probable`, is less probable than 1 - confidence; never of several blocks.
+
+        One of several blocks may be much stronger than their curve says.
+        """
+        return not self.several_blocks and self.most_probable < 1.0 - self.confidence
 
     def summary(self) -> str:
         measure, share = self.measure, f"{100.0 * self.confidence:g} %"
@@ -425,21 +394,15 @@ class Survival(Result):
         low, high = rate.bounds
         bounds = math.exp(-high * self.years), math.exp(-low * self.years)
         chance, between = known_digits(self.probability, self.interval, bounds)
-        pooled = f"{chance} ({100.0 * self.curve.confidence:g} % interval {between})"
-        has_mean = not math.isnan(self.mean_probability)
-        likely = self.mean_probability if has_mean else self.probability
-        if self.several_blocks:
-            mean = f"{likely:.2g} in the mean and " if has_mean else ""
-            pooled = (
-                f"{mean}at most {self.most_probable:.2g} if one of the blocks has stood all the time, and {pooled} if "
-                "each motion met another of them"
-            )
         name = "" if self.hazard is None else self.hazard.name
         text = (
-            f"under the hazard curve {name!r} the probability of {counted(self.years, 'year')} without it is {pooled}"
+            f"under the hazard curve {name!r} the probability of {counted(self.years, 'year')} without it is "
+            f"{chance} ({100.0 * self.curve.confidence:g} % interval {between})"
         )
         least = f"{1.0 - self.confidence:.3g}"
-        if likely >= 1.0 - self.confidence:
+        if self.several_blocks:
+            return f"{text} if each motion met another of the blocks; of one block that stood all the time it is higher"
+        if self.probability >= 1.0 - self.confidence:
             return f"{text}, so they do not contradict each other"
         if not self.contradicts:
             return f"{text}; below {least} they would contradict each other, which is not settled"
@@ -466,7 +429,6 @@ class Survival(Result):
             "probability": self.probability,
             "probability_interval": [*self.interval],
             "most_probable": self.most_probable,
-            "mean_probability": self.mean_probability,
             "share_below_hazard_curve": math.nan if self.rate is None else self.rate.below,
             "share_above_hazard_curve": math.nan if self.rate is None else self.rate.above,
             "contradicts": self.contradicts,
@@ -498,21 +460,6 @@ class Survival(Result):
         return f"{self.curve.limit_state}: not in {counted(self.years, 'year')}; most likely never {self._never}"
 
 
-def mean_of_blocks(outcomes: pd.DataFrame, column: str, limit_state: str, hazard: HazardCurve, years: float) -> float:
-    """Mean of the probabilities that blocks survive, each by a curve fitted to its own outcomes."""
-    table = outcomes.sort_values("block", kind="stable")
-    blocks = table.drop_duplicates("block")
-    intensity, exceeded = (
-        table[name].to_numpy(np.float64).reshape(len(blocks), -1) for name in (column, f"exceeded_{limit_state}")
-    )
-    fits, _ = fit_or_limits(Outcomes(np.log(intensity[0]), exceeded, np.ones_like(exceeded)))
-    # Of a curve that does not rise, motions below the hazard curve would exceed the limit as often as they come.
-    parts = np.where(fits.slope[:, None] > 0.0, log_parts(fits, hazard), -np.inf)
-    parts[fits.slope <= 0.0, :1] = _log_rate_within(fits, hazard)[fits.slope <= 0.0]
-    rates = np.exp(np.logaddexp.reduce(parts, axis=1))
-    return float(np.average(np.exp(-years * rates), weights=blocks.get("weight")))
-
-
 def _log_rate_within(fits: Probit, hazard: HazardCurve) -> Floats:
     """Logarithms of the integrals of P(x) |d rate(x)| between the ends of the hazard curve, shape (fits, 1)."""
     from scipy.special import ndtr
@@ -523,20 +470,3 @@ def _log_rate_within(fits: Probit, hazard: HazardCurve) -> Floats:
     between = np.where(fits.slope > 0.0, np.exp(log_parts(fits, hazard)[:, 1:-1]).sum(axis=1), 0.0)
     rate = first * hazard.rate[0] - last * hazard.rate[-1] + between
     return np.asarray(np.log(np.maximum(rate, np.finfo(float).tiny)))[:, None]
-
-
-def _log_standing(fits: Probit, hazard: HazardCurve, years: float) -> Floats:
-    """Logarithms of the integral of exp(-rate(x) years) dP(x) over the hazard curve, shape (fits, 1)."""
-    from scipy.special import log_ndtr
-
-    a, b = (values[:, None] for values in fits)
-    log_x, log_rate = np.log(hazard.intensity), np.log(hazard.rate)
-    with np.errstate(all="ignore"):
-        first, last = (np.clip(a + b * end, -_FARTHEST, _FARTHEST) for end in log_x[[0, -1]])
-        z = first + (last - first) * np.linspace(0.0, 1.0, 4001)
-        density = -0.5 * z * z - years * np.exp(np.interp((z - a) / b, log_x, log_rate))
-        between = np.logaddexp(density[:, 1:], density[:, :-1]) + np.log(np.diff(z) * math.sqrt(0.125 / math.pi))
-        # Under a curve that does not rise, what falls at all falls under the weakest motions.
-        between = np.where(b > 0.0, between, -np.inf)
-        parts = np.column_stack([log_ndtr(first) - years * hazard.rate[0], between, log_ndtr(-last)])
-        return np.asarray(np.logaddexp.reduce(parts, axis=1)[:, None])

@@ -18,12 +18,11 @@ from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import Model
 from rocking.core.result import DatasetResult, table_of_some, variable
-from rocking.core.tables import as_written
+from rocking.core.tables import as_written, named
 from rocking.engine.problem import bodies_of
 from rocking.engine.tasks import missing_text
 from rocking.engine.treatment import Treatment
 from rocking.errors import InvalidOption
-from rocking.motion.motion import Motion
 from rocking.records.named import Motions, several_motions
 from rocking.simulation.ensemble import simulate_many
 
@@ -38,6 +37,8 @@ Abscissa = Literal["p", "period", "size"]
 _HALF: Final = np.array([0.5])
 
 _SIMULATED: Final = ("peak_rotation", "overturned", "unfinished")
+
+_AXES: Final = ("p", "period", "size", "alpha", "restitution", "fractile")
 
 _UNITS: Final = {"p": "rad/s", "alpha": "rad", "restitution": "1", "fractile": "1"}
 
@@ -113,17 +114,33 @@ def rocking_spectrum(
     gathered, shaken = bodies_of(blocks), several_motions(motions)
     if not isinstance(gathered, Blocks):
         raise InvalidOption(f"a spectrum is of blocks, which have a size, not of {gathered.kind}")
-    if gathered.axes is not None and p is None and size is None and weights is None:
+    if (axes := gathered.axes) is not None and p is None and size is None and weights is None:
         checks.grid_size({"motions": len(shaken), "blocks": len(gathered)}, InvalidOption)
+        names, shape = (*(name for name in axes if name != "p"), "p"), [*map(len, axes.values())]
         table = simulate_many(gathered, shaken, **options)
-        return RockingSpectrum(_grid_spectrum(table, gathered.axes, gathered.gravity, shares))
+        peak, overturned, unfinished = (
+            np.moveaxis(table[name].values.reshape(-1, *shape), 1, -1) for name in _SIMULATED
+        )
+        ratio = ratios_of(peak, overturned, unfinished, axes["alpha"].reshape(-1, *[1] * (len(names) - 1)))
+        found = names, fractiles_of(ratio, shares), overturned_share(ratio)
+        return RockingSpectrum(_dataset(table, names, (peak, overturned, ratio), found, axes, shares, gathered.gravity))
     weight = normalised_weights(weights, len(gathered))
     median = float(weighted_fractiles(gathered.p.mean(axis=1), weight, _HALF)[0])
     rates = median * np.geomspace(0.5, 2.0, 25)
     if p is not None or size is not None:
         rates = checks.positive_numbers(rates_of(p, size, gathered.gravity), "p", InvalidOption)
-    found = _ensemble_spectrum(gathered, weight, shaken, rates / median, rates, shares, options)
-    return RockingSpectrum(found.assign_attrs(blocks=pooled(gathered, weights)))
+    count, n = len(rates), len(gathered)
+    checks.grid_size({"motions": len(shaken), "blocks": n, "p": count}, InvalidOption)
+    resized = gathered.select(np.repeat(np.arange(n), count)).resized(np.tile(rates / median, n))
+    table = simulate_many(resized, shaken, **options)
+    peak, overturned, unfinished = (
+        table[name].transpose("motion", "block").values.reshape(-1, n, count) for name in _SIMULATED
+    )
+    ratio = ratios_of(peak, overturned, unfinished, gathered.alpha.min(axis=1)[:, None])
+    flat, each = ratio.reshape(-1, count), np.tile(weight, len(ratio))
+    found = ("p",), weighted_fractiles(flat, each, shares), overturned_share(flat, each)
+    data = _dataset(table, ("block", "p"), (peak, overturned, ratio), found, {"p": rates}, shares, gathered.gravity)
+    return RockingSpectrum(data.assign_coords(weight=("block", weight)).assign_attrs(blocks=pooled(gathered, weights)))
 
 
 def fractiles_of(peaks: Floats, shares: Floats) -> Floats:
@@ -212,12 +229,7 @@ class RockingSpectrum(DatasetResult):
             **({"blocks": data.sizes["block"], "weights": data.weight.values} if self._of_ensemble else {}),
             "model": data.model,
             "chattering_treatment": data.chattering,
-            "p_rad_s": data.p.values,
-            "period_s": data.period.values,
-            "size_m": data["size"].values,
-            **({} if self._of_ensemble else {"alpha_rad": data.alpha.values}),
-            **({"restitution": data.restitution.values} if "restitution" in data.dims else {}),
-            "fractile": data.fractile.values,
+            **{named(name, data[name].units): data[name].values for name in _AXES if name in data.coords},
             "axes": axes,
             "fractile_over_alpha": data.fractile_over_alpha.transpose("fractile", *axes).values,
             "overturned_share": data.overturned_share.values,
@@ -276,61 +288,19 @@ class RockingSpectrum(DatasetResult):
         return np.asarray(weighted_fractiles(peaks, one.weight.values, _HALF)[0])
 
 
-def _ensemble_spectrum(
-    blocks: Blocks,
-    weight: Floats,
-    motions: Sequence[Motion],
-    factors: Floats,
-    rates: Floats,
-    shares: Floats,
-    options: dict[str, Any],
-) -> xr.Dataset:
-    """Spectrum of an ensemble, whose blocks are all made larger or smaller by factors on their p, p last."""
-    import xarray as xr
-
-    count, n = len(rates), len(blocks)
-    checks.grid_size({"motions": len(motions), "blocks": n, "p": count}, InvalidOption)
-    resized = blocks.select(np.repeat(np.arange(n), count)).resized(np.tile(factors, n))
-    table = simulate_many(resized, motions, **options)
-    peak, overturned, unfinished = (
-        table[name].transpose("motion", "block").values.reshape(-1, n, count) for name in _SIMULATED
-    )
-    over_alpha = ratios_of(peak, overturned, unfinished, blocks.alpha.min(axis=1)[:, None])
-    flat, weights = over_alpha.reshape(-1, count), np.tile(weight, len(peak))
-    found = ("p",), weighted_fractiles(flat, weights, shares), overturned_share(flat, weights)
-    axes, peaks = {"p": rates, "fractile": shares}, (peak, over_alpha, overturned)
-    spectrum = _described_spectrum(table, ("block", "p"), peaks, found, axes, blocks.gravity)
-    return spectrum.assign_coords(weight=xr.DataArray(weight, dims="block"))
-
-
-def _grid_spectrum(table: xr.Dataset, axes: dict[str, Floats], gravity: float, shares: Floats) -> xr.Dataset:
-    """Arrange simulations of a grid of blocks as a spectrum, p last."""
-    names = (*(name for name in axes if name != "p"), "p")
-
-    def on_grid(values: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-        return np.moveaxis(values.reshape(len(values), *map(len, axes.values())), 1, -1)
-
-    peak, overturned, unfinished = (on_grid(table[name].values) for name in _SIMULATED)
-    over_alpha = ratios_of(peak, overturned, unfinished, axes["alpha"].reshape(-1, *[1] * (len(names) - 1)))
-    found = names, fractiles_of(over_alpha, shares), overturned_share(over_alpha)
-    return _described_spectrum(
-        table, names, (peak, over_alpha, overturned), found, {**axes, "fractile": shares}, gravity
-    )
-
-
-def _described_spectrum(
+def _dataset(
     table: xr.Dataset,
     names: tuple[str, ...],
-    peaks: tuple[Floats, Floats, np.ndarray[Any, Any]],
+    peaks: tuple[Floats, Floats, Floats],
     found: tuple[tuple[str, ...], Floats, Floats],
     axes: dict[str, Floats],
+    shares: Floats,
     gravity: float,
 ) -> xr.Dataset:
-    """Peaks over (motion, *names), and the fractiles and shares found over their own dimensions, with their meaning."""
+    """Peaks, verdicts and ratios over (motion, *names), and fractiles and shares found over their own dimensions."""
     import xarray as xr
 
-    peak, over_alpha, overturned = peaks
-    dims, fractiles, share = found
+    (peak, overturned, over_alpha), (dims, fractiles, share) = peaks, found
     words = "over the slenderness; infinite where the block overturns"
     return xr.Dataset(
         {
@@ -345,7 +315,10 @@ def _described_spectrum(
         {
             "motion": table.motion,
             **{name: table[name] for name in ("vertical",) if name in table.coords},
-            **{name: variable(name, values, unit=_UNITS[name]) for name, values in axes.items()},
+            **{
+                name: variable(name, values, unit=_UNITS[name])
+                for name, values in (axes | {"fractile": shares}).items()
+            },
             "period": variable("p", 2.0 * np.pi / axes["p"], "2 pi/p", "s"),
             "size": variable("p", 0.75 * gravity / axes["p"] ** 2, "half diagonal of the rectangular block", "m"),
         },

@@ -1,4 +1,4 @@
-"""One block under many records: what becomes of it under each, in a row."""
+"""One block under many records: what becomes of it under each, in a row, and what rules of thumb say."""
 
 from __future__ import annotations
 
@@ -7,24 +7,22 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
+from rocking.analysis.levels import MIRROR_NOTE
 from rocking.block.body import Body
 from rocking.core.constants import STANDARD_GRAVITY
-from rocking.core.progress import Progress, note
+from rocking.core.progress import Progress
 from rocking.core.result import Result
 from rocking.core.tables import Column, columns_with_skipped, counted, decimal, named, text_table
 from rocking.engine.problem import one_body
-from rocking.errors import InvalidOption, install
+from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.records.named import Motions, motions_by_name, names_of
-from rocking.response import PRECISION, Response, in_brief, ratio_text, steps_within
+from rocking.response import PRECISION, Response, in_brief, known_ratio, ratio_text, steps_within
 from rocking.response.contact import friction_coefficient
 from rocking.simulation.ensemble import body_coordinates, verticals_of
 from rocking.simulation.simulate import simulate
-
-if TYPE_CHECKING:
-    pass
 
 #: Columns for people; files hold all.
 _SHOWN: Final = {
@@ -89,9 +87,8 @@ class Survey(BlockUnderRecords):
     precision: float = PRECISION
 
     def rows(self) -> list[dict[str, Any]]:
-        rows = []
+        friction, rows = self.friction, []
         for label, response in zip(self._labels(), self.responses, strict=True):
-            friction = self.friction
             sliding = {} if friction is None else {"friction": friction, _SLIDING: response.sliding_time(friction)}
             rows.append(label | _row(response, self.precision) | sliding)
         return rows
@@ -126,15 +123,111 @@ class Survey(BlockUnderRecords):
         friction = {} if self.friction is None else {"friction": self.friction}
         return {"block": block, **friction, "records": self.rows(), "skipped": dict(self.skipped)}
 
-    def write(self, folder: str | Path) -> None:
-        """Write summary.csv, summary.json and, if openpyxl is installed, summary.xlsx into a folder that exists."""
-        folder = Path(folder)
-        self.to_csv(folder / "summary.csv")
-        try:
-            self.to_excel(folder / "summary.xlsx")
-        except InvalidOption:
-            note(f"no summary.xlsx: {install('excel')} for a workbook; summary.csv contains the same table")
-        self.to_json(folder / "summary.json")
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Check(BlockUnderRecords):
+    """Rules of thumb compared with simulations, for a block under several motions; from `check`.
+
+    Attributes
+    ----------
+    ratios : tuple of mapping of str to float
+        For each motion, demand over capacity by each rule.
+    margins : tuple of float
+        For each motion, one over the lowest factor on it at which the block overturns; NaN if it overturns at none.
+    block, records, responses, skipped
+        The block, the name of each motion, the simulated response to each, and why records could not be read.
+    """
+
+    ratios: tuple[Mapping[str, float], ...]
+    margins: tuple[float, ...]
+
+    @property
+    def falls_under_less(self) -> tuple[bool, ...]:
+        """Whether the block stands under each motion as it is, and falls under the same motion times less than 1."""
+        each = zip(self.responses, self.margins, strict=True)
+        return tuple(margin > 1.0 and not (one.overturned or one.unfinished) for one, margin in each)
+
+    def rows(self) -> list[dict[str, Any]]:
+        return [
+            {
+                **label,
+                named("pga", "g"): decimal(motion_of(response).pga / STANDARD_GRAVITY),
+                named("pgv", "m/s"): motion_of(response).pgv,
+                **ratios,
+                "simulated": margin,
+                "lowest_factor": 1.0 / margin,
+                "peak_over_slenderness": response.peak_over_slenderness,
+                "overturned": response.overturned,
+                "falls_under_less": less,
+                "verdict": in_brief(response, PRECISION) + (f"; overturns at x {_short(1.0 / margin)}" if less else ""),
+            }
+            for label, response, ratios, margin, less in zip(
+                self._labels(), self.responses, self.ratios, self.margins, self.falls_under_less, strict=True
+            )
+        ]
+
+    def summary(self) -> str:
+        rules = [*self.ratios[0]]
+        shown = {"record": "record", named("pga", "g"): "PGA, g", named("pgv", "m/s"): "PGV, m/s"}
+        shown |= {rule: title_of(rule) for rule in rules}
+        shown |= {"simulated": "simulated", "peak_over_slenderness": "peak/slenderness", "verdict": "outcome"}
+        known = [{"peak_over_slenderness": known_ratio(response)} for response in self.responses]
+        rows = [row | each for row, each in zip(self.rows(), known, strict=True)]
+        # No rule of thumb is better than to three digits.
+        cells = [[float(f"{x:.3g}") if isinstance(x := row[name], float) else x for name in shown] for row in rows]
+        table = text_table(list(shown.values()), cells)
+        return "\n".join(
+            [
+                str(self.block),
+                "demand over capacity: from 1 on a rule predicts overturning; simulated: one over the lowest factor on "
+                "the motion that was found to overturn the block, in steps of 5 %",
+                "",
+                table,
+                *(["", *self._disagreements(rules)] if rules else []),
+                *(f"note: {note}" for note in self._notes()),
+            ]
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        return super().to_dict() | {"notes": self._notes()}
+
+    def _notes(self) -> list[str]:
+        return [] if self.block.alone().is_symmetric else [MIRROR_NOTE]
+
+    def _headline(self) -> str:
+        return f"{super()._headline()}; by {', '.join(self.ratios[0]) or 'no rule'}"
+
+    def _disagreements(self, rules: list[str]) -> list[str]:
+        """Say how often each rule is wrong; records under which no single number can be right are not counted."""
+        lines, less = [], self.falls_under_less
+        kept = [
+            (ratios, response.overturned)
+            for ratios, response, is_left_out in zip(self.ratios, self.responses, less, strict=True)
+            if not (is_left_out or response.unfinished)
+        ]
+        for rule in rules:
+            unsafe = sum(ratios[rule] < 1.0 and fell for ratios, fell in kept)
+            wary = sum(ratios[rule] >= 1.0 and not fell for ratios, fell in kept)
+            right = len(kept) - unsafe - wary
+            lines.append(f"{title_of(rule)}: right {right}, unsafe {unsafe}, over-conservative {wary} of {len(kept)}")
+        if any(less):
+            lines.append(
+                f"not counted: {sum(less)} of {len(less)}, where the block stands under the motion as it is, but falls "
+                "under the same motion scaled down"
+            )
+        if unfinished := sum(response.unfinished for response in self.responses):
+            lines.append(f"not counted: {unfinished} of {len(less)}, whose simulation was not finished")
+        return lines
+
+
+def title_of(rule: str) -> str:
+    """Name a rule of thumb as people do."""
+    return "ASCE 43-05" if rule == "asce_43_05" else rule.capitalize()
+
+
+def _short(factor: float) -> str:
+    """Write a factor below 1, with more digits near 1."""
+    return f"{factor:.2f}" if factor < 0.985 else f"{factor:.4f}"
 
 
 def survey(

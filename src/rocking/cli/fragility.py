@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import Parameter
 
-from rocking.analysis import nrml
-from rocking.analysis.curve import Band
+from rocking.analysis.curve import check_names
 from rocking.analysis.fragility import Fragility, fit_fragility
 from rocking.analysis.fragility import fragility as run
 from rocking.analysis.hazard import HazardCurve
@@ -55,8 +54,6 @@ def fragility(
     polarity: Annotated[Polarity, Parameter(allow_leading_hyphen=True)] = "+",
     clusters: str | None = None,
     confidence: float = 0.9,
-    bootstrap: Annotated[int, WHOLE] = 0,
-    seed: Annotated[int, WHOLE] = 0,
     taxonomy: str = "rocking-block",
     hazard: Path | None = None,
     site: Annotated[int, WHOLE] = 0,
@@ -74,7 +71,7 @@ def fragility(
     ensemble of a calibration stands for it (--ensemble). With --levels every motion is scaled to each (stripes);
     without, motions are taken as they are (a cloud). Or outcomes that were observed are fitted (--outcomes), without
     records and block. --out holds fragility.png, .pdf, .csv, outcomes.csv (record, intensity, peak, outcome),
-    result.json, and fragility-continuous.xml and -discrete.xml (NRML 0.5).
+    result.json, and fragility.xml (NRML 0.5).
 
     Parameters
     ----------
@@ -91,10 +88,6 @@ def fragility(
         files name them; or a label for each record, with commas between. By default each is on its own.
     confidence
         Probability of the intervals and bands.
-    bootstrap
-        Draws of the bootstrap for the bands; 0: the profile likelihood.
-    seed
-        Seed of its random numbers.
     taxonomy
         Identifier of the fragility function in NRML.
     hazard
@@ -121,19 +114,18 @@ def fragility(
     curve = _hazard(hazard, site, years, measure.period)
     states = _limits(limits)
     if output.out is not None:
-        nrml.check_names([taxonomy], "taxonomy")
-        nrml.check_names(states, "a limit state")
+        check_names([taxonomy], "taxonomy")
+        check_names(states, "a limit state")
     if standing is not None:
         checks.positive(standing, "standing", InvalidOption)
         not_passed = _limit_of_standing([*states])
-    checks.whole(bootstrap, "bootstrap", InvalidOption, 0)
-    band = Band("bootstrap" if bootstrap != 0 else "likelihood", confidence, samples=bootstrap or 1, seed=seed)
+    checks.share(confidence, "confidence", InvalidOption)
     with output.folder() as folder:
         read = None
         if outcomes is not None:
             observed = read_observed(outcomes, measure.wanted, **motion.about())
             _check_hazard(curve, observed["measure"])
-            fitted = fit_fragility(**observed, band=band)
+            fitted = fit_fragility(**observed, confidence=confidence)
         else:
             _check_hazard(curve, measure.wanted)
             read = motion.read_all(names)
@@ -145,7 +137,7 @@ def fragility(
                     limits=states,
                     polarity=polarity,
                     clusters=labels_of(clusters),
-                    band=band,
+                    confidence=confidence,
                 )
         found, text = fitted.to_dict() | ({} if read is None else read.to_dict()), [fitted.summary()]
         figures: dict[str, Callable[[], Figure]] = {"fragility": fitted.plot}
@@ -158,9 +150,8 @@ def fragility(
             found["survival"], figures["survival"] = survived.to_dict(), survived.plot
             text.append(survived.summary())
         if folder is not None:
-            for form in ("continuous", "discrete"):
-                with left_out(name := f"fragility-{form}.xml"):
-                    fitted.to_nrml(folder / name, taxonomy=taxonomy, format=form)
+            with left_out(name := "fragility.xml"):
+                fitted.to_nrml(folder / name, taxonomy=taxonomy)
             fitted.to_csv(folder / "fragility.csv")
             if fitted.outcomes is not None:
                 _with_records(fitted, found.get("records", [])).to_csv(folder / "outcomes.csv", "outcomes")

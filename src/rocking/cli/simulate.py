@@ -25,7 +25,7 @@ from rocking.cli.options import (
     TreatmentOptions,
     read_each,
 )
-from rocking.cli.output import OUTPUT, OutputOptions, PrintOptions, print_result, subfolder, write_results
+from rocking.cli.output import OUTPUT, OutputOptions, PrintOptions, left_out, print_result, subfolder, write_results
 from rocking.core.progress import note
 from rocking.core.tables import text_table, to_json
 from rocking.errors import InvalidOption, UnreadableRecord
@@ -103,7 +103,10 @@ def simulate(
                 raise InvalidOption("{} draws single responses; of several records give {}, too", "energy", "each")
             found = replace(survey(body, read.motions, **shown, **options), skipped=read.skipped)
             if folder is not None:
-                found.write(folder)
+                found.to_csv(folder / "summary.csv")
+                found.to_json(folder / "summary.json")
+                with left_out("summary.xlsx"):
+                    found.to_excel(folder / "summary.xlsx")
             if folder is not None and each:
                 folders = folder_names(found.records)
                 for name, record, response in zip(folders, found.records, found.responses, strict=True):

@@ -13,9 +13,22 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.analysis.curve import Band, checked_limit, fitted_curve, passed
-from rocking.analysis.fragility import OVERTURNING, Fragility, fit_fragility, of_polarities, weights_of
-from rocking.analysis.levels import clusters_of, motions_in_words, pooled, ratios_of, single_block, units_of, values_of
+from rocking.analysis.curve import fitted_curve
+from rocking.analysis.fragility import Fragility, fit_fragility
+from rocking.analysis.levels import (
+    OVERTURNING,
+    checked_limit,
+    clusters_of,
+    motions_in_words,
+    of_polarities,
+    passed,
+    pooled,
+    ratios_of,
+    single_block,
+    units_of,
+    values_of,
+    weights_of,
+)
 from rocking.analysis.spectrum import fractiles_of, overturned_share
 from rocking.block.body import Bodies
 from rocking.core import checks
@@ -289,7 +302,7 @@ def pooled_fragility(
     require_limits(store.grid.outcomes, limits)
     product = store.product
     units, which = np.unique(units_of(product.bodies, measure, product.model), return_inverse=True)
-    shares, band = weights_of(weights, len(product.bodies)), Band(confidence=confidence)
+    shares = weights_of(weights, len(product.bodies))
     motions, scales, _, _ = product.shape
     counts = {name: np.zeros((motions, scales, len(units))) for name in limits}
     trials, missing = np.zeros((motions, scales, len(units))), 0
@@ -306,7 +319,7 @@ def pooled_fragility(
     groups = np.broadcast_to(together[:, None, None], x.shape).ravel()[found]
     x, trials = x.ravel()[found], trials.ravel()[found]
     curves = [
-        fitted_curve(name, (x, count.ravel()[found], trials), groups, band, measure, limits[name])
+        fitted_curve(name, (x, count.ravel()[found], trials), groups, confidence, measure, limits[name])
         for name, count in counts.items()
     ]
     text = f"{pooled(product.bodies, weights)}, {motions_in_words(together, clusters)}, {counted(scales, 'scale')}"
@@ -343,7 +356,7 @@ def block_fragilities(
     intensities = _intensities(store.product, measure).ravel()
     units = units_of(store.product.bodies, measure, store.product.model)
     together, missing = np.repeat(clusters_of(store.product.motions, clusters), scales), 0
-    options: dict[str, Any] = {"measure": measure, "band": Band(confidence=confidence)}
+    options: dict[str, Any] = {"measure": measure, "confidence": confidence}
     with Progress("fitting", count * len(limits), show=progress) as bar:
         for blocks, ratios in peak_ratios(store):
             counted = polarities_that_count(store.product.bodies.select(blocks), ratios.shape[2])

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rocking.analysis.fragility import OVERTURNING, Fragility
+from rocking.analysis.fragility import Fragility
+from rocking.analysis.levels import OVERTURNING
 from rocking.block.body import Bodies, Body
 from rocking.core import checks
 from rocking.core.constants import Model
