@@ -17,8 +17,11 @@ from rocking.plot.curves import (
     HazardLine,
     Parameter,
     RiskLine,
+    ScaledMotion,
     SpectrumCurves,
     fragility_figure,
+    ida_figure,
+    levels_reaching,
     measured_figure,
     outcomes_figure,
     reliability_figure,
@@ -26,11 +29,9 @@ from rocking.plot.curves import (
     spectrum_figure,
     survival_figure,
 )
-from rocking.plot.ida import ScaledMotion, ida_figure, levels_reaching
-from rocking.plot.maps import basins_figure, outcome_figure, regions_figure
+from rocking.plot.maps import basins_figure, outcome_figure, regions_figure, rose_figure, shares_figure
 from rocking.plot.orbits import bifurcation_figure, branch_figure, intervals_figure, orbit_figure
 from rocking.plot.response import DrawnSequence, energy_figure, phase_figure, response_figure
-from rocking.plot.rose import rose_figure, shares_figure
 
 COLUMN, PAGE = 86.0 / 25.4, 174.0 / 25.4
 LONG = "rectangular block, 0.24 m x 1.1 m, restitution = 0.9318234567890123, under ridgecrest-clc-090, nonlinear model"
@@ -330,29 +331,11 @@ def test_where_blocks_overturn_the_lines_of_a_spectrum_end_in_crosses():
     peaks = np.array([[0.1, 0.2, np.inf, 0.4, np.inf, 0.6, 0.7]])
     curve = SpectrumCurves("", peaks, peaks, np.isinf(peaks[0]).astype(float))
     figure = spectrum_figure(x=x, curves=[curve], fractiles=[0.5], motions=["a"], x_label="p")
-    _, crosses = figure.axes[0].lines
+    (crosses,) = [line for line in figure.axes[0].lines if line.get_marker() == "x"]
     np.testing.assert_array_equal(crosses.get_xydata(), [[2.0, 0.2], [4.0, 0.4], [6.0, 0.6]])
     assert entries(figure) == ["beyond: overturns"]
     standing = curve._replace(singles=0.0 * np.nan_to_num(peaks, posinf=0.0))
     assert not spectrum_figure(x=x, curves=[standing], fractiles=[0.5], motions=["a"], x_label="p").legends
-
-
-def test_the_cross_of_a_fall_is_on_the_curve_where_that_leaves_the_frame():
-    time = np.linspace(0.0, 2.0, 201)
-    for sign in (1.0, -1.0):
-        rotation = (
-            sign * 0.02 * np.expm1(3.0 * time)
-        )  # passes twice the slenderness, 0.2, at 1.01 s, and then the frame
-        figure = response_of(
-            time=time, rotation=rotation, overturn_time=2.0, motion_time=np.empty(0), duration=2.0, chattering=None,
-            impact_times=np.empty(0), uplift_times=np.empty(0), rest_intervals=np.empty((0, 2)),
-        )  # fmt: skip
-        axes = figure.axes[0]
-        (cross,) = [line for line in axes.lines if line.get_marker() == "X"]
-        (at,), (height,) = cross.get_xdata(), cross.get_ydata()
-        assert height == axes.get_ylim()[0 if sign < 0 else 1]
-        assert height == pytest.approx(np.interp(at, time, rotation / 0.2), rel=1e-12)
-        assert 1.0 < at < 1.2
 
 
 def test_the_lowest_level_that_reaches_a_peak_is_on_the_curve_before_it_turns_back():

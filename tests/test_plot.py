@@ -124,7 +124,8 @@ def test_the_fall_of_an_overturned_block_is_marked_where_its_curve_leaves_the_fr
     assert high - low < 5.0
     mark = labelled(axes, "overturned at 9.750 s")
     at, height = mark.get_xdata()[0], mark.get_ydata()[0]
-    assert height == (high if side > 0.0 else low)  # where the curve leaves the frame, on its way to the fall
+    edge = high if side > 0.0 else low
+    assert height == pytest.approx(edge, rel=0.02)  # where the curve leaves the frame, on its way to the fall
     curve = max(axes.lines, key=lambda line: len(line.get_xdata()))
     assert np.interp(at, curve.get_xdata(), curve.get_ydata()) == pytest.approx(height, rel=1e-3) and at < 9.75
     assert mark.get_marker() != labelled(axes, "uplift").get_marker()
@@ -133,7 +134,7 @@ def test_the_fall_of_an_overturned_block_is_marked_where_its_curve_leaves_the_fr
 
 def test_the_zoom_shows_every_interval_against_the_time_to_rest():
     times = bouncing_times(9.8, 0.5, 0.8, 60)
-    zoom = figure_of(chattering=DrawnSequence(times, 9.8 - 1e-9, 9.8 + 1e-9)).axes[2]
+    zoom = figure_of(chattering=DrawnSequence(times, 9.8 - 1e-9, 9.8 + 1e-9)).axes[1]
     (points,) = zoom.lines
     to_rest, intervals = points.get_data()
     assert to_rest.size == 59

@@ -1,4 +1,4 @@
-"""Maps over two parameters: outcomes of points, regions between boundaries, basins, a number for each block."""
+"""Maps over two parameters: outcomes, regions, basins, a number for each block; and roses over all directions."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rocking.core.arrays import Floats
 from rocking.core.tables import as_written
 from rocking.errors import InvalidOption
-from rocking.plot.canvas import ABOVE, INK, Place, add_labels, cell_edges, page_for
+from rocking.plot.canvas import ABOVE, GROUND, INK, REST, Place, add_labels, cell_edges, page_for, styles_of
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -268,3 +268,68 @@ def basins_figure(
         add_labels(axes, x_label, y_label)
         page.handles = handles
     return page.figure
+
+
+def rose_figure(
+    *,
+    azimuth: Floats,
+    acceleration: Floats,
+    slenderness: Floats,
+    p: Floats,
+    support: Floats,
+    weakest: tuple[float, float],
+    **place: Unpack[Place],
+) -> Figure:
+    """Draw the acceleration that lifts a body in each direction, g, around its support; slenderness and p beside it."""
+    from matplotlib.patches import Polygon
+
+    with page_for((6.8, 4.0), **place) as page:
+        main, *beside = page.mosaic("AB;AC", width_ratios=(1.6, 1.0))
+        for axes, values, label in zip(beside, (slenderness, p), ("slenderness (deg)", "p (rad/s)"), strict=False):
+            axes.plot(*_closed(azimuth, values), color=INK, linewidth=1.2)
+            axes.set(xlim=(0.0, 360.0), xticks=(0.0, 180.0, 360.0))
+            axes.grid(True)
+            add_labels(axes, "azimuth (deg)" if axes is beside[-1] else "", label)
+        _look_down(main, float(max(acceleration.max(), np.abs(support).max())))
+        label = "support over height of centre of mass"
+        main.add_patch(Polygon(support, facecolor=REST, edgecolor=GROUND, linewidth=1.0, label=label))
+        main.plot(*_around(azimuth, acceleration), color=INK, linewidth=1.4, label="ground acceleration that lifts it")
+        label = f"least: {weakest[1]:.3g} g at {weakest[0]:.3g} deg"
+        end = _around(np.array([weakest[0]]), np.array([weakest[1]]))[:, :1]
+        main.plot(*np.insert(end, 0, 0.0, axis=1), color=ABOVE, linewidth=1.6, linestyle=(0, (4, 1.5)), label=label)
+        add_labels(main, "towards west and east (g)", "towards south and north (g)")
+    return page.figure
+
+
+def shares_figure(*, azimuth: Floats, shares: Floats, labels: Sequence[str], **place: Unpack[Place]) -> Figure:
+    """Draw shares, shape (curves, azimuths), over the azimuth: towards the north up, and the full circle is all."""
+    with page_for((4.8, 4.8), **place) as page:
+        (axes,) = page.panels()
+        _look_down(axes, 1.0)
+        for share, label, style in zip(shares, labels, styles_of(len(labels)), strict=True):
+            look = {"linewidth": 1.4, "marker": "o", "markersize": 2.0, "label": as_written(label), **style}
+            axes.plot(*_around(azimuth, share), **look)
+        add_labels(axes, "share towards west and east", "share towards south and north")
+    return page.figure
+
+
+def _closed(azimuth: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Values over the azimuth, with the first once more a turn later."""
+    return np.append(azimuth, azimuth[0] + 360.0), np.append(values, values[0])
+
+
+def _around(azimuth: Floats, values: Floats) -> Floats:
+    """Places at distances towards azimuths, in a closed line; shape (2, n)."""
+    turned, distances = _closed(azimuth, values)
+    angle = np.deg2rad(turned)
+    return distances * np.array([np.sin(angle), np.cos(angle)])
+
+
+def _look_down(axes: Axes, most: float) -> None:
+    """Show as far as a distance to every side, with the distance from the middle on both axes."""
+    axes.set(aspect="equal", xlim=(-1.1 * most, 1.1 * most), ylim=(-1.1 * most, 1.1 * most))
+    axes.locator_params(nbins=5)
+    axes.grid(True)
+    axes.plot(0.0, 0.0, "+", color=INK)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(lambda value, _: f"{abs(value):g}")

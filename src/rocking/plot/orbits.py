@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any, Final, Unpack
 import numpy as np
 
 from rocking.core.arrays import Flags, Floats, Integers
-from rocking.plot.canvas import ABOVE, GROUND, INK, Place, add_labels, page_for
+from rocking.plot.canvas import ABOVE, GROUND, INK, Place, add_labels, add_ticks, page_for
 
 if TYPE_CHECKING:
-    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -117,26 +116,18 @@ def bifurcation_figure(
     **place: Unpack[Place],
 ) -> Figure:
     """Draw states, shape (len(value), n), of each direction against a parameter; NaN where there is none."""
-    from matplotlib.lines import Line2D
-
     with page_for((5.6, 3.8), **place) as page:
         (axes,) = page.panels()
-        handles: list[Artist] = []
         looks = _ALONE if len(states) == 1 else _LOOKS
         for (way, kept), (colour, area) in zip(states.items(), looks, strict=True):
-            x = np.broadcast_to(value[:, None], kept.shape).ravel()
-            axes.scatter(x, kept.ravel(), s=area, marker="o", color=colour, linewidths=0.0, rasterized=True)
-            size = area**0.5 + 1.0
-            handles.append(Line2D([], [], linestyle="", marker="o", color=colour, markersize=size, label=_WORDS[way]))
+            look: dict[str, Any] = {"linestyle": "", "marker": "o", "color": colour, "markeredgewidth": 0.0}
+            axes.plot(value, kept, markersize=area**0.5, rasterized=True, **look)
+            axes.plot([], [], markersize=area**0.5 + 1.0, label=_WORDS[way], **look)
         for gone, marker, label in ((overturned, "|", "overturned"), (not_followed, "x", "not followed")):
-            if gone is None or not gone.any():
-                continue
-            look: dict[str, Any] = {"linestyle": "", "marker": marker, "color": GROUND}
-            axes.plot(value[gone], 0.015 + 0.0 * value[gone], transform=axes.get_xaxis_transform(), **look)
-            handles.append(Line2D([], [], label=label, **look))
+            if gone is not None and gone.any():
+                add_ticks(axes, value[gone], 0.015, marker, color=GROUND, label=label)
         axes.set_xlim(value[0], value[-1] if value.size > 1 else None)
         add_labels(axes, x_label, y_label)
-        page.handles = handles
     return page.figure
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import textwrap
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, Unpack
 
 import numpy as np
@@ -19,6 +21,12 @@ RotationUnits = Literal["slenderness", "rad", "deg"]
 
 #: Rotations beyond this multiple of the slenderness leave the frame: past it a block only falls.
 LARGEST_RATIO_SHOWN: Final = 2.0
+
+_BOUNDARY: Final[dict[str, Any]] = {"color": ABOVE, "linewidth": 0.9, "linestyle": (0, (6, 2, 1, 2))}
+_JUMP: Final[dict[str, Any]] = {"color": GROUND, "linewidth": 1.1, "linestyle": (0, (1, 1.5))}
+
+#: Rotations and velocities beyond this leave the frame: past it a block only falls.
+_FARTHEST: Final = 2.0
 
 #: A figure at least so wide (inches) has space for the chattering sequence beside the histories.
 _WIDE: Final = 5.5
@@ -37,19 +45,6 @@ class DrawnSequence(NamedTuple):
     rest_upper: float
     off: float = 0.0
     sample: str = ""
-
-
-class _Scale(NamedTuple):
-    """From rotation (rad) to what is drawn: factors of the sides + and -."""
-
-    plus: float
-    minus: float
-
-    def of(self, rotation: Floats) -> Floats:
-        return np.where(rotation >= 0.0, rotation * self.plus, rotation * self.minus)
-
-    def back(self, drawn: Floats) -> Floats:
-        return np.where(drawn >= 0.0, drawn / self.plus, drawn / self.minus)
 
 
 def response_figure(
@@ -86,76 +81,61 @@ def response_figure(
     rotation is drawn without the other panels.
     """
     shown = float(time[0]), float(time[-1])
-    scale = _scale("rad" if label else units, slenderness)
-    drawn = scale.of(rotation)
-    zoom = None
-    if place.get("ax") is None and chattering and chattering.impact_times.size > 1:
-        zoom = chattering if math.isfinite(chattering.rest_upper - chattering.rest_lower) else None
+    factors = (math.degrees(1.0),) * 2 if units == "deg" and not label else (1.0, 1.0)
+    if units == "slenderness" and not label:
+        factors = (1.0 / slenderness[0], 1.0 / slenderness[1])
+
+    def factor(values: Floats) -> Floats:
+        return np.where(values >= 0.0, *factors)
+
+    drawn = rotation * factor(rotation)
+    zoom = None if place.get("ax") is not None else chattering
+    if zoom and (zoom.impact_times.size < 2 or not math.isfinite(zoom.rest_upper - zoom.rest_lower)):
+        zoom = None
     histories = 1 if not motion_time.size else 2 if vertical_acceleration_g is None else 3
     with page_for((7.0, 4.4 if histories < 3 else 5.4), **place) as page:
-        (main, *grounds), sequence = _panels(page, histories, zoomed=zoom is not None)
+        main, *grounds = _panels(page, histories, zoomed=zoom is not None)
         _shade_rest(main, np.clip(rest_intervals, *shown))
-        _draw_rotation(main, time, drawn, scale.of(np.array([-slenderness[1], slenderness[0]])), limit)
+        _draw_rotation(main, time, drawn, np.array([-slenderness[1], slenderness[0]]) * factors[::-1], limit)
         if units != "deg" and not label:
-            to_degrees = (lambda y: np.degrees(scale.back(y)), lambda y: scale.of(np.radians(y)))
+            to_degrees = (lambda y: np.degrees(y / factor(y)), lambda y: np.radians(y) * factor(y))
             main.secondary_yaxis("right", functions=to_degrees).set_ylabel("rotation (°)")
         if slenderness[0] != slenderness[1]:
-            _tell_sides(main, grounds[0] if grounds else None, thresholds_g, scale)
-        _mark_impacts(main, _within(impact_times, shown), _within(uplift_times, shown))
+            _tell_sides(main, factors)
+        _mark_times(main, shown, impact_times, 0.055, "resolved impacts ({})")
+        _mark_times(main, shown, uplift_times, 0.13, "uplift", marker="^", color=ABOVE, markersize=4.5)
         if overturn_time is not None:
-            _mark_overturning(main, time, drawn, overturn_time)
+            _mark_fall(main, time, drawn, f"overturned at {overturn_time:.3f} s")
         main.set_xlim(*shown)
-        if grounds:
-            _draw_motion(grounds[0], motion_time, motion_acceleration_g, thresholds_g)
-        if vertical_acceleration_g is not None and len(grounds) > 1:
-            _draw_ground(grounds[1], motion_time, vertical_acceleration_g, 0.6)
-        labels = label or _Y_LABELS[units].format(limit), "ground acceleration (g)", "vertical (g)"
-        for axes, name in zip(page.drawn, labels, strict=False):
-            is_last = axes is page.drawn[-1]
-            axes.tick_params(labelbottom=is_last)
-            add_labels(axes, _time_label(shown, duration) if is_last else "", name)
-        if zoom and sequence is not None:
-            start, at = float(zoom.impact_times[0]), main.get_xaxis_transform()
-            main.plot([start, zoom.rest_upper], [0.95, 0.95], "|-", color=ABOVE, linewidth=1.3, transform=at)
-            look = {"ha": "center", "va": "bottom", "color": ABOVE, "fontweight": "bold", "xycoords": at}
-            write(main, "A", (0.5 * (start + zoom.rest_upper), 0.955), (0, 2), **look)
-            _draw_sequence(sequence, zoom)
+        for axes, acceleration in zip(grounds, (motion_acceleration_g, vertical_acceleration_g), strict=False):
+            _draw_ground(axes, motion_time, np.asarray(acceleration), 0.6)
+        for axes in grounds[:1]:
+            _draw_thresholds(axes, motion_time, motion_acceleration_g, thresholds_g)
+        _label_panels([main, *grounds], label or _Y_LABELS[units].format(limit), _time_label(shown, duration))
+        if zoom:
+            _draw_sequence(main, page.drawn[-1], zoom)
     return page.figure
 
 
-def _panels(page: Page, histories: int, *, zoomed: bool) -> tuple[list[Axes], Axes | None]:
-    """Panels of the rotation and of the motion, and of the chattering sequence: beside the others, or below them."""
-    if page.ax is not None:
-        return page.panels(), None
-    figure = page.figure
-    beside = zoomed and figure.get_figwidth() >= _WIDE
-    below = zoomed and not beside
-    heights = (1.3, 1.0, 0.7)[:histories] + (1.0,) * below
-    widths = (3.0, 1.0)[: 1 + beside]
-    grid = figure.add_gridspec(len(heights), len(widths), height_ratios=heights, width_ratios=widths)
-    rotation = figure.add_subplot(grid[0, 0])
-    grounds = [figure.add_subplot(grid[k, 0], sharex=rotation) for k in range(1, histories)]
-    sequence = figure.add_subplot(grid[:, 1] if beside else grid[-1, 0]) if zoomed else None
-    page.drawn = [rotation, *grounds]
-    return page.drawn, sequence
-
-
-def _within(times: Floats, shown: tuple[float, float]) -> Floats:
-    return times[(times >= shown[0]) & (times <= shown[1])]
+def _panels(page: Page, histories: int, *, zoomed: bool) -> list[Axes]:
+    """Panels of the rotation and of the motion; that of the chattering sequence is beside the others, or below them."""
+    rows, options = [*"RGV"[:histories]], {"height_ratios": [1.3, 1.0, 0.7][:histories]}
+    if zoomed and page.figure.get_figwidth() >= _WIDE:
+        rows, options = [f"{row}Z" for row in rows], options | {"width_ratios": [3.0, 1.0]}
+    elif zoomed:
+        rows, options["height_ratios"] = [*rows, "Z"], [*options["height_ratios"], 1.0]
+    panels = page.mosaic(";".join(rows), **options)
+    if zoomed:
+        sequence = panels.pop(1 if len(rows[0]) > 1 else -1)
+        page.drawn = [*panels, sequence]
+    for axes in panels[1:]:
+        axes.sharex(panels[0])
+    return panels
 
 
 def _shade_rest(axes: Axes, rest_intervals: Floats) -> None:
-    label = "at rest"
     for start, end in rest_intervals[rest_intervals[:, 0] < rest_intervals[:, 1]]:
-        axes.axvspan(start, end, color=REST, linewidth=0.0, label=label)
-        label = ""
-
-
-def _scale(units: RotationUnits, slenderness: tuple[float, float]) -> _Scale:
-    if units == "slenderness":
-        return _Scale(1.0 / slenderness[0], 1.0 / slenderness[1])
-    factor = math.degrees(1.0) if units == "deg" else 1.0
-    return _Scale(factor, factor)
+        axes.axvspan(start, end, color=REST, linewidth=0.0, label="at rest")
 
 
 def _draw_rotation(axes: Axes, time: Floats, drawn: Floats, tipping: Floats, limit: str) -> None:
@@ -169,68 +149,46 @@ def _draw_rotation(axes: Axes, time: Floats, drawn: Floats, tipping: Floats, lim
     low, high = axes.set_ylim(lowest - 0.28 * span, highest + 0.1 * span)
     label = "tipping, θ = ±α" if limit == "slenderness" else "unstable balance without ground motion"
     for level in tipping[(tipping > low) & (tipping < high)]:
-        axes.axhline(level, color=ABOVE, linewidth=0.8, linestyle=(0, (6, 2, 1, 2)), label=label)
-        label = ""
+        axes.axhline(level, label=label, **_BOUNDARY)
 
 
-def _tell_sides(
-    rotation: Axes, motion: Axes | None, thresholds: tuple[Floats | float, Floats | float], scale: _Scale
-) -> None:
-    """Name the sides: where rotations are theirs, with what 1 is on each, and to which one a threshold lifts."""
-    plus, minus = (float(np.ravel(threshold)[0]) for threshold in thresholds)
-    names = ["side +", "side −"]
-    if scale.plus != scale.minus:
-        names = [f"{name}: 1 is {math.degrees(1.0 / factor):.3g}°" for name, factor in zip(names, scale, strict=True)]
-    places = [(rotation, 0.0, names[0], "bottom"), (rotation, 0.0, names[1], "top")]
-    if motion is not None:
-        places += [(motion, minus, "lifts to side −", "top"), (motion, -plus, "lifts to side +", "bottom")]
-    for axes, level, words, place in places:
-        look = {"va": place, "color": INK, "fontsize": "small", "zorder": 5}
-        write(
-            axes, words, (0.0, level), (3, 2 if place == "bottom" else -2), xycoords=axes.get_yaxis_transform(), **look
-        )
-
-
-def _mark_impacts(axes: Axes, impact_times: Floats, uplift_times: Floats) -> None:
-    if impact_times.size:
-        add_ticks(axes, impact_times, 0.055, label=f"resolved impacts ({impact_times.size})")
-    if uplift_times.size:
-        add_ticks(axes, uplift_times, 0.13, "^", color=ABOVE, markersize=4.5, markeredgewidth=0.0, label="uplift")
-
-
-def _mark_overturning(axes: Axes, time: Floats, drawn: Floats, overturn_time: float) -> None:
-    """Put a cross on the curve: at the time of the fall, where it ends, or where it has left the frame before."""
-    look: dict[str, Any] = {"color": ABOVE, "markersize": 7, "markeredgecolor": "white", "markeredgewidth": 0.5}
-    height, label = float(np.clip(drawn[-1], *axes.get_ylim())), f"overturned at {overturn_time:.3f} s"
-    at = overturn_time
-    inside = np.flatnonzero((drawn - height) * (drawn[-1] - height) < 0.0)
+def _mark_times(axes: Axes, shown: tuple[float, float], times: Floats, height: float, name: str, **look: Any) -> None:
+    inside = times[(times >= shown[0]) & (times <= shown[1])]
     if inside.size:
-        k = inside[-1]
-        at = float(time[k] + (height - drawn[k]) / (drawn[k + 1] - drawn[k]) * (time[k + 1] - time[k]))
-    axes.plot(at, height, "X", clip_on=False, zorder=4, label=label, **look)
+        add_ticks(axes, inside, height, label=name.format(inside.size), **look)
 
 
-def _draw_motion(
+def _mark_fall(axes: Axes, time: Floats, drawn: Floats, label: str) -> None:
+    """Put a cross where the curve ends, or where it has left the frame before."""
+    low, high = axes.get_ylim()
+    end = np.flatnonzero((drawn >= low) & (drawn <= high))[-1]
+    axes.plot(time[end], drawn[end], "X", color=ABOVE, markersize=7, clip_on=False, zorder=4, label=label)
+
+
+def _tell_sides(axes: Axes, factors: tuple[float, float]) -> None:
+    """Name the sides where rotations are theirs, with what 1 is on each."""
+    for name, place, off, factor in zip(("side +", "side −"), ("bottom", "top"), (2, -2), factors, strict=True):
+        words = name if factors[0] == factors[1] else f"{name}: 1 is {math.degrees(1.0 / factor):.3g}°"
+        look = {"va": place, "color": INK, "fontsize": "small", "xycoords": axes.get_yaxis_transform()}
+        write(axes, words, (0.0, 0.0), (3, off), **look)
+
+
+def _label_panels(panels: Sequence[Axes], rotation: str, time: str) -> None:
+    for axes, name in zip(panels, (rotation, "ground acceleration (g)", "vertical (g)"), strict=False):
+        axes.tick_params(labelbottom=axes is panels[-1])
+        add_labels(axes, time if axes is panels[-1] else "", name)
+
+
+def _draw_thresholds(
     axes: Axes, time: Floats, acceleration: Floats, thresholds: tuple[Floats | float, Floats | float]
 ) -> None:
     plus, minus = (np.broadcast_to(threshold, time.shape) for threshold in thresholds)
-    _draw_ground(axes, time, acceleration, 0.6)
     above: dict[str, Any] = {"color": ABOVE, "linewidth": 0.9, "interpolate": True, "zorder": 3}
-    label = "beyond a threshold"
     for threshold, beyond in ((minus, acceleration > minus), (-plus, acceleration < -plus)):
         if np.any(beyond):
-            axes.fill_between(time, acceleration, threshold, where=beyond, label=label, **above)
-            label = ""
-    moves = any(bool(np.ptp(threshold)) for threshold in (plus, minus) if np.isfinite(threshold).all())
-    label = "uplift thresholds" + (", which change with the weight" if moves else "")
-    for threshold in (minus, -plus):
-        if not np.isfinite(threshold).all():
-            continue  # nothing lifts it to that side
-        if moves:
-            axes.plot(time, threshold, color=INK, linewidth=0.5, label=label)
-        else:
-            axes.axhline(float(threshold[0]), color=INK, linewidth=0.8, linestyle=(0, (5, 2)), label=label)
-        label = ""
+            axes.fill_between(time, acceleration, threshold, where=beyond, label="beyond a threshold", **above)
+        if np.isfinite(threshold).all():  # else nothing lifts it to that side
+            axes.plot(time, threshold, color=INK, linewidth=0.8, linestyle=(0, (5, 2)), label="uplift thresholds")
 
 
 def _draw_ground(axes: Axes, time: Floats, acceleration: Floats, linewidth: float) -> None:
@@ -246,26 +204,28 @@ def _time_label(shown: tuple[float, float], duration: float | None) -> str:
     return f"time (s); shown: {start:.{digits}f}–{end:.{digits}f} s of {duration:.{digits}f} s"
 
 
-def _draw_sequence(axes: Axes, sequence: DrawnSequence) -> None:
-    rest = 0.5 * (sequence.rest_lower + sequence.rest_upper)
-    start = sequence.impact_times[:-1]
-    interval = np.diff(sequence.impact_times)
+def _draw_sequence(main: Axes, axes: Axes, sequence: DrawnSequence) -> None:
+    """Draw a sequence impact by impact, and where it is among the histories."""
+    first, last, at = float(sequence.impact_times[0]), sequence.rest_upper, main.get_xaxis_transform()
+    main.plot([first, last], [0.95, 0.95], "|-", color=ABOVE, linewidth=1.3, transform=at)
+    look: dict[str, Any] = {"ha": "center", "va": "bottom", "color": ABOVE, "fontweight": "bold", "xycoords": at}
+    write(main, "A", (0.5 * (first + last), 0.955), (0, 2), **look)
+    rest, off = 0.5 * (sequence.rest_lower + sequence.rest_upper), sequence.off
+    start, interval = sequence.impact_times[:-1], np.diff(sequence.impact_times)
     # Where impacts lie closer than the spacing of floating point times, neither axis has a logarithm.
     shown = (interval > 0.0) & (rest > start)
-    look: dict[str, Any] = {"color": INK, "markersize": 2.6, "markerfacecolor": "white", "markeredgewidth": 0.6}
+    look = {"color": INK, "markersize": 2.6, "markerfacecolor": "white", "markeredgewidth": 0.6}
     axes.loglog(rest - start[shown], interval[shown], "o", **look)
     axes.invert_xaxis()
     add_labels(axes, "time to rest (s)", "interval to next impact (s)")
     axes.grid(True)
-    width = sequence.rest_upper - sequence.rest_lower
-    off = sequence.off
     decimals = 6 if off < 1e-6 else 0 if math.isnan(off) else max(0, math.floor(-math.log10(off)))
     axes.set_title(f"A: at rest at {rest:.{decimals}f}\N{NO-BREAK SPACE}s", color=ABOVE, loc="left", wrap=True)
-    moves = "not" if math.isnan(off) else f"± {off:.0e} s"
-    known = "" if off < 1e-6 else f"{moves} in all\n{sequence.sample.replace(' within', chr(10) + 'within')};\n"
+    known = "" if off < 1e-6 else f"{'not' if math.isnan(off) else f'± {off:.0e} s'} in all {sequence.sample}; "
+    words = f"{known}bracket of the computation {sequence.rest_upper - sequence.rest_lower:.0e} s"
     # Below the falling line there is space.
-    words = f"{known}bracket of the\ncomputation\n{width:.0e} s"
-    axes.text(0.04, 0.03, words, color=ABOVE, fontsize=7.0, transform=axes.transAxes, ha="left", va="bottom")
+    look = {"color": ABOVE, "fontsize": 7.0, "transform": axes.transAxes, "va": "bottom"}
+    axes.text(0.04, 0.03, textwrap.fill(words, 16), **look)
 
 
 def motion_figure(
@@ -283,13 +243,6 @@ def motion_figure(
             add_labels(axes, "time (s)" if axes is panels[-1] else "", label)
         page.handles = []
     return page.figure
-
-
-#: Rotations and velocities beyond this leave the frame: past it a block only falls.
-_FARTHEST: Final = 2.0
-
-_BOUNDARY: Final[dict[str, Any]] = {"color": ABOVE, "linewidth": 0.9, "linestyle": (0, (6, 2, 1, 2))}
-_JUMP: Final[dict[str, Any]] = {"color": GROUND, "linewidth": 1.1, "linestyle": (0, (1, 1.5))}
 
 
 def phase_figure(
