@@ -212,7 +212,7 @@ def spectrum_figure(
     where the block of the next point overturns. In `ax`, the peak rotations are drawn without the shares.
     """
     middle = min(fractiles, key=lambda share: abs(share - 0.5))
-    chosen = fractiles if len(curves) <= _WITH_ALL_FRACTILES else [middle]
+    chosen = fractiles if len(motions) > 1 and len(curves) <= _WITH_ALL_FRACTILES else [middle]
     widths = {share: 1.8 if share == middle else 0.9 for share in chosen}
     named, with_singles = evenly(len(curves), _NAMED), len(curves) <= _WITH_ALL_MOTIONS
     with page_for((5.6, 4.8), **place) as page:
@@ -223,7 +223,8 @@ def spectrum_figure(
                 singles = np.where(np.isfinite(curve.singles), curve.singles, np.nan)
                 peaks.plot(x, singles.T, color=style["color"], linewidth=0.5, alpha=0.35)
             for share, width in widths.items():
-                _draw(peaks, x, curve.fractiles[[*fractiles].index(share)], width, style)
+                fractile = curve.fractiles[[*fractiles].index(share)]
+                _draw(peaks, x, curve.singles[0] if len(motions) == 1 else fractile, width, style)
             for panel in shares:
                 panel.step(x, curve.overturned, where="mid", linewidth=1.2, **style)
         if len(named) < len(curves):
