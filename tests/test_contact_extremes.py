@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 import rocking
 from rocking import Block, Motion, Response, simulate
-from rocking.response.contact import friction_demand
+from rocking.response.mechanics import friction_demand
 
 GRAVITY = 9.80665
 COUNT, PARTS = 100, 5

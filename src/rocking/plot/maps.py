@@ -322,7 +322,7 @@ def _around(azimuth: Floats, values: Floats) -> Floats:
     """Places at distances towards azimuths, in a closed line; shape (2, n)."""
     turned, distances = _closed(azimuth, values)
     angle = np.deg2rad(turned)
-    return distances * np.array([np.sin(angle), np.cos(angle)])
+    return np.asarray(distances * np.array([np.sin(angle), np.cos(angle)]))
 
 
 def _look_down(axes: Axes, most: float) -> None:

@@ -17,11 +17,11 @@ from rocking.engine.problem import thresholds_of
 from rocking.errors import InvalidOption
 from rocking.plot.canvas import Place
 from rocking.plot.response import DrawnSequence, RotationUnits, energy_figure, phase_figure, response_figure
+from rocking.response.simulated import Simulated
+from rocking.response.summary import line
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from rocking.response.response import Response
 
 #: Even times of a drawn line: a history, and a course in the phase plane.
 _EVEN_TIMES: Final = 4001
@@ -34,13 +34,13 @@ _SHORT: Final = (0.5, 12.0)
 _POINTS_OF_SHORT: Final = 12
 
 
-def titled(response: Response) -> str:
+def titled(response: Simulated) -> str:
     """Return what was simulated, for the title of a figure."""
     shaken = "no motion" if response.motion is None else response.motion.label
     return as_written(f"{title_of(response.body)} under {shaken}")
 
 
-def active_span(response: Response) -> tuple[float, float]:
+def active_span(response: Simulated) -> tuple[float, float]:
     """Stretch worth drawing: from a little before the first event to a little after the last."""
     times = np.concatenate([response.events["time"], response.impacts["time"]])
     if len(times) == 0:
@@ -50,7 +50,7 @@ def active_span(response: Response) -> tuple[float, float]:
     return max(0.0, first - margin), min(response.duration, float(times.max()) + margin)
 
 
-def shown_span(response: Response, window: Sequence[float] | None) -> tuple[float, float]:
+def shown_span(response: Simulated, window: Sequence[float] | None) -> tuple[float, float]:
     """Return a window of a response, s, or else what is worth drawing; refuse what is no stretch of the response."""
     if window is None:
         return active_span(response)
@@ -64,7 +64,7 @@ def shown_span(response: Response, window: Sequence[float] | None) -> tuple[floa
     return float(ends[0]), float(ends[1])
 
 
-def drawing_times(response: Response, start: float, end: float) -> Floats:
+def drawing_times(response: Simulated, start: float, end: float) -> Floats:
     """Return times dense enough for a smooth line: even ones, and those of steps that are long enough to see."""
     even = np.linspace(start, end, _EVEN_TIMES)
     steps = _within(response._history.trail.nodes["time"], start, end)
@@ -76,7 +76,7 @@ def _within(times: Floats, start: float, end: float) -> Floats:
     return times[(times >= start) & (times <= end)]
 
 
-def picture(response: Response) -> str:
+def picture(response: Simulated) -> str:
     """Draw the rotation for a notebook, cut at twice the slenderness: past it a block only falls."""
     times = drawing_times(response, *active_span(response))
     coordinate, (plus, minus) = response.body.coordinate, response.balance
@@ -84,11 +84,11 @@ def picture(response: Response) -> str:
     if coordinate.limit and math.isfinite(min(plus, minus)):
         drawn = drawn / np.where((drawn >= 0.0) & math.isfinite(plus) | (not math.isfinite(minus)), plus, minus)
         drawn, label = np.clip(drawn, -2.0, 2.0), f"{coordinate.name} / {coordinate.limit}"
-    return svg.captioned(f"Response: {response._headline()}", svg.history(times, drawn, label))
+    return svg.captioned(f"Response: {line(response)}", svg.history(times, drawn, label))
 
 
 def histories(
-    response: Response,
+    response: Simulated,
     units: RotationUnits,
     window: Sequence[float] | None,
     *,
@@ -127,7 +127,7 @@ def histories(
     )
 
 
-def _longest_sequence(response: Response, start: float, end: float) -> DrawnSequence | None:
+def _longest_sequence(response: Simulated, start: float, end: float) -> DrawnSequence | None:
     """Chattering sequence with the most impacts in the stretch."""
     inside = response.chattering[(response.chattering["start"] >= start) & (response.chattering["end"] <= end)]
     longest = max(inside, key=lambda row: row["impacts"], default=None)
@@ -167,7 +167,7 @@ class Course(NamedTuple):
         return np.insert(values, self.before + 1, np.nan)
 
 
-def course_of(response: Response, start: float, end: float) -> Course:
+def course_of(response: Simulated, start: float, end: float) -> Course:
     """Follow a response, of a body whose energy is known, from a time to a later one, s."""
     history, energy = response._history, response._energy
     even, step = np.linspace(start, end, _EVEN_TIMES_OF_COURSE, retstep=True)
@@ -201,7 +201,7 @@ def course_of(response: Response, start: float, end: float) -> Course:
     )
 
 
-def boundary_of(response: Response) -> tuple[Floats, Floats]:
+def boundary_of(response: Simulated) -> tuple[Floats, Floats]:
     """Rotations and velocities, in units of a `Course`, with as much energy as at the balance."""
     energy, gap = response._energy, np.array([np.nan])
     x: list[Floats] = []
@@ -216,14 +216,14 @@ def boundary_of(response: Response) -> tuple[Floats, Floats]:
     return np.concatenate(x), np.concatenate(y)
 
 
-def marked(response: Response, start: float, end: float) -> dict[str, Floats]:
+def marked(response: Simulated, start: float, end: float) -> dict[str, Floats]:
     """Return the times of uplift and rest within a stretch, s."""
     events = response.events
     inside = (events["time"] >= start) & (events["time"] <= end)
     return {kind: np.asarray(events["time"][inside & (events["kind"] == kind)], float) for kind in ("uplift", "rest")}
 
 
-def phase_plane(response: Response, window: Sequence[float] | None, **place: Unpack[Place]) -> Figure:
+def phase_plane(response: Simulated, window: Sequence[float] | None, **place: Unpack[Place]) -> Figure:
     """Draw velocity against rotation in a window."""
     start, end = shown_span(response, window)
     course = course_of(response, start, end)
@@ -238,7 +238,7 @@ def phase_plane(response: Response, window: Sequence[float] | None, **place: Unp
     )
 
 
-def energies(response: Response, window: Sequence[float] | None, **place: Unpack[Place]) -> Figure:
+def energies(response: Simulated, window: Sequence[float] | None, **place: Unpack[Place]) -> Figure:
     """Draw kinetic, potential and total energy in a window."""
     course = course_of(response, *shown_span(response, window))
     return energy_figure(
