@@ -1,6 +1,7 @@
 """Figures of studies: what they show is explained, and no text leaves them at the widths that journals print."""
 
 import dataclasses
+import functools
 import re
 
 import numpy as np
@@ -31,7 +32,6 @@ from rocking.plot.curves import (
 )
 from rocking.plot.maps import basins_figure, outcome_figure, regions_figure, rose_figure, shares_figure
 from rocking.plot.orbits import bifurcation_figure, branch_figure, intervals_figure, orbit_figure
-from rocking.plot.response import DrawnSequence, energy_figure, phase_figure, response_figure
 
 COLUMN, PAGE = 86.0 / 25.4, 174.0 / 25.4
 LONG = "rectangular block, 0.24 m x 1.1 m, restitution = 0.9318234567890123, under ridgecrest-clc-090, nonlinear model"
@@ -95,53 +95,23 @@ def map_of(**options):
     )
 
 
+@functools.cache
+def response():
+    """A block that uplifts, chatters and comes to rest; its motion has a vertical component."""
+    shaken = rocking.pulses.sine(3.0, 1.0, cycles=2).with_vertical(rocking.pulses.sine(1.0, 0.5, cycles=2))
+    return rocking.simulate(rocking.Block.from_parameters(p=2.2, alpha=(0.24, 0.25), restitution=0.8), shaken)
+
+
 def response_of(**options):
-    time = np.linspace(229.0, 241.0, 1201)
-    times = 239.0 - 2.5 * 0.8 ** np.arange(60)
-    arrays = {
-        "time": time,
-        "rotation": 0.25 * np.sin(4.0 * time),
-        "slenderness": (0.2, 0.2),
-        "impact_times": times,
-        "rest_intervals": np.array([[229.0, 230.0]]),
-        "uplift_times": np.array([230.0]),
-        "overturn_time": 241.0,
-        "motion_time": time,
-        "motion_acceleration_g": np.sin(9.0 * time),
-        "thresholds_g": (0.2, 0.2),
-        "duration": 319.0,
-        "chattering": DrawnSequence(times, 239.0 - 1e-9, 239.0),
-    }
-    return response_figure(**(arrays | options))
+    return response().plot(longest_sequence=True, window=(0.0, response().duration), **options)
 
 
 def phase_of(**options):
-    angle = np.linspace(0.0, 20.0, 800)
-    rotation, velocity = 0.9 * np.exp(-0.05 * angle) * np.array([np.cos(angle), np.sin(angle)])
-    ends = np.array([-1.0, 0.0, np.nan, 0.0, 1.0])
-    arrays = {
-        "rotation": rotation,
-        "velocity": velocity,
-        "jumps": np.array([[-0.8, -0.7], [0.6, 0.5]]),
-        "boundary": (ends, 1.0 - np.abs(ends)),
-        "uplifts": True,
-        "rests": True,
-    }
-    return phase_figure(**(arrays | options))
+    return response().plot_phase_plane(**options)
 
 
 def energy_over_time_of(**options):
-    time = np.linspace(0.0, 10.0, 1001)
-    energy = 1.1 * np.exp(-0.3 * time)
-    arrays = {
-        "time": time,
-        "kinetic": energy * np.sin(3.0 * time) ** 2,
-        "potential": energy * np.cos(3.0 * time) ** 2,
-        "needed": (1.0, 1.4),
-        "impact_times": np.arange(0.5, 9.0),
-        "rest_intervals": np.array([[9.0, 10.0]]),
-    }
-    return energy_figure(**(arrays | options))
+    return response().plot_energy(**options)
 
 
 def outcomes_of(**options):

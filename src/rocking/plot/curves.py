@@ -431,3 +431,26 @@ def reliability_figure(
         axes.grid(True)
         add_labels(axes, "predicted probability of overturning", "share that overturned")
     return page.figure
+
+
+def draw_ground(axes: Axes, time: Floats, acceleration: Floats, linewidth: float) -> None:
+    """Draw an acceleration over time, about a line at zero."""
+    axes.axhline(0.0, color=INK, linewidth=0.4)
+    axes.plot(time, acceleration, color=GROUND, linewidth=linewidth, label="_ground acceleration")
+
+
+def motion_figure(
+    *, time: Floats, acceleration_g: Floats, vertical_g: Floats | None = None, **place: Unpack[Place]
+) -> Figure:
+    """Draw a ground acceleration (g) over time (s), and a vertical one below it; in `ax`, the horizontal one alone."""
+    traces = {"ground acceleration (g)": acceleration_g}
+    if vertical_g is not None and place.get("ax") is None:
+        traces["vertical acceleration (g)"] = vertical_g
+    with page_for((7.0, 0.6 + 1.8 * len(traces)), **place) as page:
+        panels = page.panels(len(traces), sharex=True)
+        for axes, (label, trace) in zip(panels, traces.items(), strict=True):
+            draw_ground(axes, time, trace, 0.8)
+            axes.set_xlim(time[0], time[-1])
+            add_labels(axes, "time (s)" if axes is panels[-1] else "", label)
+        page.handles = []
+    return page.figure

@@ -14,8 +14,8 @@ from rocking.core import checks
 from rocking.core.result import Row, dictionary_of, text_of
 from rocking.core.tables import Column, frame_of, named, records_of, write_csv, write_netcdf
 from rocking.errors import InvalidOption
-from rocking.plot.response import RotationUnits
 from rocking.response import figure, summary
+from rocking.response.figure import RotationUnits
 from rocking.response.history import even_times
 from rocking.response.perturbed import PRECISION, steps_within
 from rocking.response.simulated import Simulated
