@@ -62,8 +62,7 @@ def ida_of(count, **options):
 def fragility_of(**options):
     x = np.linspace(0.0, 8.0, 50)
     p = x / 9.0
-    held = np.array([6.0, 7.0, 8.0])
-    line = FragilityLine("overturning: median 4.149", x, p, 0.8 * p, 1.1 * p, x[[9, 19, 29]], p[[9, 19, 29]], held)
+    line = FragilityLine("overturning: median 4.149", x, p, 0.8 * p, 1.1 * p, x[[9, 19, 29]], p[[9, 19, 29]])
     texts = {"intensity_label": "peak ground acceleration (m/s²)", "band_label": "band: 90 % confidence (likelihood)"}
     return fragility_figure(lines=[line, line._replace(label="half: median 3.6")], **(texts | options))
 
@@ -98,7 +97,7 @@ def map_of(**options):
 @functools.cache
 def response():
     """A block that uplifts, chatters and comes to rest; its motion has a vertical component."""
-    shaken = rocking.pulses.sine(3.0, 1.0, cycles=2).with_vertical(rocking.pulses.sine(1.0, 0.5, cycles=2))
+    shaken = rocking.pulses.sine(2.6, 1.0, cycles=2).with_vertical(rocking.pulses.sine(1.0, 0.5, cycles=2))
     return rocking.simulate(rocking.Block.from_parameters(p=2.2, alpha=(0.24, 0.25), restitution=0.8), shaken)
 
 
@@ -329,9 +328,7 @@ def test_the_intervals_of_a_sequence_are_drawn_with_the_limit_of_their_ratios():
     ratios = np.concatenate([line.get_ydata() for line in figure.axes[1].lines[1:]])
     np.testing.assert_allclose(ratios, 0.81)
     assert figure.axes[0].get_yscale() == "log"
-    none = intervals_of(0)
-    none.draw_without_rendering()
-    assert [axes.texts[0].get_text() for axes in none.axes] == ["no such impacts"] * 2
+    intervals_of(0).draw_without_rendering()
 
 
 def test_tests_are_drawn_in_the_order_of_their_probability_and_blocks_by_weight():
@@ -349,7 +346,7 @@ def test_tests_are_drawn_in_the_order_of_their_probability_and_blocks_by_weight(
 
 def test_dots_of_a_fragility_say_what_they_pool():
     figure = fragility_of()
-    assert entries(figure)[-1] == "dot: share of 6 to 8 outcomes at about its intensity"
+    assert entries(figure)[-1] == "dot: share of outcomes at about its intensity"
     assert figure.axes[0].get_xlim() == pytest.approx((0.0, 8.0))
     marks = [line for line in figure.axes[0].lines if line.get_marker() != "None" and len(line.get_xdata())]
     np.testing.assert_allclose(marks[0].get_xdata(), np.linspace(0.0, 8.0, 50)[[9, 19, 29]])

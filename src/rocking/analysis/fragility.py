@@ -321,7 +321,7 @@ class Fragility(Result):
             text = f"{curve.limit_state}{limit}: {at_half}"
             chance = curve.probability(intensity)
             band = curve.band(intensity) if curve.bounded else (chance, chance)
-            lines.append(FragilityLine(text, scale * intensity, chance, *band, scale * at, seen, held))
+            lines.append(FragilityLine(text, scale * intensity, chance, *band, scale * at, seen))
         return fragility_figure(
             lines=lines,
             intensity_label=self.measure.label,

@@ -105,7 +105,7 @@ def figure_for(
     with mpl.rc_context(STYLE):
         figure = _new_figure(_size(default if figsize is None else figsize))
         if short:
-            line = textwrap.fill(short, _letters((1.0 - 2.0 * _TITLE_AT) * figure.bbox.width, figure))
+            line = textwrap.fill(short, _letters((1.0 - 2.0 * _TITLE_AT) * figure.bbox.width, figure.dpi))
             figure.suptitle(line, x=_TITLE_AT, ha="left")
         yield figure
         _make_ticks(figure)
@@ -130,13 +130,7 @@ class Page:
         self.drawn: list[Axes] = []
         self.handles: list[Any] | None = None
 
-    def panels(self, rows: int = 1, columns: int = 1, **options: Any) -> list[Axes]:
-        """Make panels, the main one first, or return the caller's axes alone."""
-        grid: Any = self.ax or self.figure.subplots(rows, columns, **options)
-        self.drawn = np.ravel(grid).tolist()
-        return self.drawn
-
-    def mosaic(self, places: str, **options: Any) -> list[Axes]:
+    def panels(self, places: Any = "A", **options: Any) -> list[Axes]:
         """Make panels at the letters of a mosaic, the main one first, or return the caller's axes alone."""
         self.drawn = [self.ax] if self.ax else [*self.figure.subplot_mosaic(places, **options).values()]
         return self.drawn
@@ -152,9 +146,9 @@ def page_for(default: tuple[float, float], **place: Unpack[Place]) -> Iterator[P
         add_legend(figure, ax, handles_of(*page.drawn) if page.handles is None else page.handles)
 
 
-def _letters(width: float, figure: Figure, letter: float = _LETTER) -> int:
+def _letters(width: float, dpi: float, letter: float = _LETTER) -> int:
     """Return how many letters of the style's font a width, in pixels, has space for."""
-    return max(_FEWEST_LETTERS, int(width / (letter * figure.dpi * float(STYLE["font.size"]) / 72.0)))
+    return max(_FEWEST_LETTERS, int(width / (letter * dpi * float(STYLE["font.size"]) / 72.0)))
 
 
 def magnified(largest: float) -> tuple[float, str]:
@@ -165,11 +159,9 @@ def magnified(largest: float) -> tuple[float, str]:
 
 def add_labels(axes: Axes, x_label: str, y_label: str) -> None:
     """Name both axes, in lines about as long as they are."""
-    root = axes.get_figure(root=True)
-    assert root is not None
     lengths = _LINE[0] * axes.bbox.width, _LINE[1] * axes.bbox.height
     for axis, label, length in zip((axes.xaxis, axes.yaxis), (x_label, y_label), lengths, strict=True):
-        axis.set_label_text(textwrap.fill(label, _letters(length, root), break_long_words=False))
+        axis.set_label_text(textwrap.fill(label, _letters(length, axes.figure.dpi), break_long_words=False))
 
 
 def styles_of(count: int) -> list[dict[str, Any]]:
@@ -219,7 +211,7 @@ def add_legend(figure: Figure, ax: Axes | None, handles: Sequence[Artist]) -> No
     if ax is not None and handles:
         ax.legend(handles=handles)
     elif handles:
-        space = _letters(figure.bbox.width, figure, _WIDE_LETTER)
+        space = _letters(figure.bbox.width, figure.dpi, _WIDE_LETTER)
         labels = [textwrap.fill(str(handle.get_label()), space - _HANDLE) for handle in handles]
         longest = _HANDLE + max(len(line) for label in labels for line in label.splitlines())
         columns = min(max(1, space // longest), len(handles))
@@ -238,9 +230,7 @@ def handles_of(*panels: Axes) -> list[Artist]:
 def _size(figsize: tuple[float, float]) -> tuple[float, float]:
     sides = checks.positive_numbers(figsize, "figsize", InvalidOption)
     if sides.size != 2:
-        raise InvalidOption(
-            f"{{}} must be (width, height), in inches, not {sides.size} numbers", "figsize", value=figsize
-        )
+        raise InvalidOption("{} must be (width, height), in inches", "figsize", value=figsize)
     return float(sides[0]), float(sides[1])
 
 

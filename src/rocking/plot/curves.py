@@ -22,7 +22,6 @@ class FragilityLine(NamedTuple):
     """A fitted curve with its confidence band, and the shares seen among outcomes of about one intensity.
 
     seen_at, seen (groups,) : mean intensity of each group of outcomes, and the share of them that exceeds the limit
-    outcomes (groups,) : how many outcomes a group has
     """
 
     label: str
@@ -32,7 +31,6 @@ class FragilityLine(NamedTuple):
     upper: Floats
     seen_at: Floats
     seen: Floats
-    outcomes: Floats
 
 
 def fragility_figure(
@@ -54,9 +52,7 @@ def fragility_figure(
             axes.plot(line.seen_at, line.seen, "os^D"[k % 4], color=style["color"], clip_on=False, **_DOT)
         is_bounded = any(np.any(line.lower < line.upper) for line in lines)
         axes.fill_between([], [], color=GROUND, alpha=0.4 * is_bounded, linewidth=0.0, label=band_label)
-        pooled = np.concatenate([line.outcomes for line in lines])
-        count = " to ".join(f"{number:.0f}" for number in np.unique([pooled.min(), pooled.max()]))
-        axes.plot([], [], "o", color=GROUND, label=f"dot: share of {count} outcomes at about its intensity", **_DOT)
+        axes.plot([], [], "o", color=GROUND, label="dot: share of outcomes at about its intensity", **_DOT)
         axes.set(xlim=(0.0, float(lines[0].intensity[-1])), ylim=(0.0, 1.0))
         axes.grid(True)
         add_labels(axes, intensity_label, probability_label)
@@ -104,7 +100,7 @@ def risk_figure(
 ) -> Figure:
     """Draw a hazard curve, dotted where it is extended, and below it where each limit state's rate comes from."""
     with page_for((5.6, 5.2), **place) as page:
-        *curves, shares = page.panels(2, sharex=True)
+        *curves, shares = page.panels("A;B", sharex=True)
         for axes in curves:
             _draw_hazard(axes, intensity, hazard)
         for k, line in enumerate(lines):
@@ -139,17 +135,12 @@ def survival_figure(
         scale_by_ratio(axes, intensity)
         if hazard is not None:
             _draw_hazard(axes, intensity, hazard)
-            above = hazard.rate > largest
-            axes.fill_between(
-                intensity, largest, hazard.rate, where=above.tolist(), color=ABOVE, alpha=0.2, linewidth=0.0,
-                label="more often than the block allows" if above.any() else "",
-            )  # fmt: skip
+            above: dict[str, Any] = {"color": ABOVE, "alpha": 0.2, "label": "more often than the block allows"}
+            axes.fill_between(intensity, largest, np.maximum(largest, hazard.rate), linewidth=0.0, **above)
         axes.plot(intensity, largest, label=largest_label, linewidth=1.5, **CURVES[1])
-        axes.set_yscale("log")
-        lowest, highest = float(largest.min()), float(largest[largest < np.inf].max())
-        if hazard is not None:
-            lowest, highest = min(lowest, float(hazard.rate.min())), float(hazard.rate.max())
-        axes.set(xlim=(float(intensity[0]), float(intensity[-1])), ylim=(0.5 * lowest, min(_MARGIN * highest, 10.0)))
+        rate = largest[largest < np.inf] if hazard is None else hazard.rate
+        lowest, highest = 0.5 * min(float(largest.min()), float(rate.min())), _MARGIN * float(rate.max())
+        axes.set(yscale="log", xlim=(intensity[0], intensity[-1]), ylim=(lowest, min(highest, 10.0)))
         axes.grid(True)
         add_labels(axes, intensity_label, "exceeded, times a year")
     return page.figure
@@ -216,7 +207,7 @@ def spectrum_figure(
     widths = {share: 1.8 if share == middle else 0.9 for share in chosen}
     named, with_singles = evenly(len(curves), _NAMED), len(curves) <= _WITH_ALL_MOTIONS
     with page_for((5.6, 4.8), **place) as page:
-        peaks, *shares = panels = page.panels(2, sharex=True, height_ratios=(3.2, 1.0))
+        peaks, *shares = panels = page.panels("A;B", sharex=True, height_ratios=(3.2, 1.0))
         for k, (style, curve) in enumerate(zip(styles_of(len(curves)), curves, strict=True)):
             peaks.plot([], [], linewidth=1.4, label=as_written(curve.label) if k in named else "", **style)
             if with_singles:
@@ -257,11 +248,7 @@ def _draw(axes: Axes, x: Floats, values: Floats, width: float, style: dict[str, 
 
 
 #: Shares of the motions that fractiles are of, and their lines.
-_FRACTILES: Final[Mapping[float, dict[str, Any]]] = {
-    0.16: {"linewidth": 1.1, "linestyle": (0, (1, 1))},
-    0.5: {"linewidth": 1.8, "linestyle": "-"},
-    0.84: {"linewidth": 1.1, "linestyle": (0, (5, 1.5))},
-}
+_FRACTILES: Final[Mapping[float, Any]] = {0.16: (0, (1, 1)), 0.5: "-", 0.84: (0, (5, 1.5))}
 
 
 class ScaledMotion(NamedTuple):
@@ -285,7 +272,7 @@ def ida_figure(*, motions: Sequence[ScaledMotion], level_label: str, **place: Un
     stands = np.concatenate([motion.levels[np.isfinite(motion.peak)] for motion in motions])
     last = max(float(motion.levels[-1]) for motion in motions)
     with page_for((7.0, 4.2), **place) as page:
-        curves, *strips = page.panels(1, 2, sharey=True, width_ratios=(2.0, 1.0))
+        curves, *strips = page.panels("AB", sharey=True, width_ratios=(2.0, 1.0))
         for k, motion in enumerate(motions):
             style = CURVES[k] if few else {"color": GROUND, "linewidth": 0.6}
             peak = np.where(np.isfinite(motion.peak), motion.peak, np.nan)
@@ -299,11 +286,11 @@ def ida_figure(*, motions: Sequence[ScaledMotion], level_label: str, **place: Un
         if not few:
             peaks = np.linspace(0.0, max(float(np.nanmax(line.get_xdata())) for line in curves.lines), 200)[1:]
             reached = np.sort([levels_reaching(motion, peaks) for motion in motions], axis=0)
-            for share, look in _FRACTILES.items():
+            for share, linestyle in _FRACTILES.items():
                 # The lowest level that is enough for this share of the motions.
                 level = reached[int(np.ceil(share * len(motions))) - 1]
-                label = f"level that suffices for {100 * share:g} % of them"
-                curves.plot(peaks, np.where(np.isfinite(level), level, np.nan), color=ABOVE, label=label, **look)
+                look = {"linestyle": linestyle, "label": f"level that suffices for {100 * share:g} % of them"}
+                curves.plot(peaks, np.where(np.isfinite(level), level, np.nan), color=ABOVE, **look)
         curves.set(xlim=(0.0, None), ylim=(0.0, min(1.5 * float(stands.max(initial=0.0)) or last, last)))
         curves.grid(True)
         add_labels(curves, "peak rotation / slenderness", level_label)
@@ -360,7 +347,7 @@ def outcomes_figure(
     """Draw the outcome of every test against its fitted probability, and the blocks behind that by parameters."""
     with page_for((7.0, 4.6), **place) as page:
         below = "ABCDEFGHI"[: len(parameters)]
-        tests, *panels = page.mosaic(f"{'T' * len(parameters)};{below}", height_ratios=(1.2, 1.0))
+        tests, *panels = page.panels(f"{'T' * len(parameters)};{below}", height_ratios=(1.2, 1.0))
         # In increasing order, and each outcome where a sure prediction would put it.
         order = np.argsort(probabilities, kind="stable")
         number, fell = np.arange(1, order.size + 1), overturned[order]
@@ -383,7 +370,7 @@ def measured_figure(
 ) -> Figure:
     """Draw a measured rotation history (rad, over s), that of the fitted block, and what is left between them."""
     with page_for((7.0, 4.0), **place) as page:
-        main, *others = page.panels(2, sharex=True, height_ratios=(2.4, 1.0))
+        main, *others = page.panels("A;B", sharex=True, height_ratios=(2.4, 1.0))
         main.plot(time, measured, ".", color=GROUND, markersize=3.5, markeredgewidth=0.0, label="measured")
         main.plot(fitted_time, fitted, color=ABOVE, linewidth=0.9, label="fitted")
         main.set_xlim(time[0], time[-1])
@@ -409,8 +396,7 @@ def _draw_parameter(axes: Axes, parameter: Parameter, weights: Floats) -> None:
         median, low, high = parameter.estimates[k]
         at = axes.get_xaxis_transform()
         height = 0.97 - 0.07 * k
-        axes.plot([low, high], [height] * 2, color=style["color"], linewidth=1.0, transform=at)
-        axes.plot(median, height, "|", color=style["color"], markersize=7.0, transform=at)
+        axes.plot([low, median, high], [height] * 3, "|-", color=style["color"], linewidth=1.0, transform=at)
     axes.plot([], [], "|-", color=GROUND, linewidth=1.0, markersize=7.0, label="centre: median and 90 %")
     axes.set_ylim(0.0, 1.3 * axes.get_ylim()[1])
     axes.set_yticks([])
@@ -447,7 +433,7 @@ def motion_figure(
     if vertical_g is not None and place.get("ax") is None:
         traces["vertical acceleration (g)"] = vertical_g
     with page_for((7.0, 0.6 + 1.8 * len(traces)), **place) as page:
-        panels = page.panels(len(traces), sharex=True)
+        panels = page.panels(";".join("AB"[: len(traces)]), sharex=True)
         for axes, (label, trace) in zip(panels, traces.items(), strict=True):
             draw_ground(axes, time, trace, 0.8)
             axes.set_xlim(time[0], time[-1])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final, Unpack
@@ -204,15 +203,14 @@ def blocks_figure(
     """Draw a number for each block as the colour of a mark, in one panel or several with the same colours."""
     if place.get("ax") is not None and len(panels) > 1:
         raise InvalidOption(f"{len(panels)} panels need a figure of their own: leave ax out, or select one of them")
-    columns = min(len(panels), _BESIDE)
-    rows = math.ceil(len(panels) / columns)
+    names, columns = [*panels], min(len(panels), _BESIDE)
+    rows = [[*names[k : k + columns], *"." * (columns - len(names[k:]))] for k in range(0, len(names), columns)]
     every = np.concatenate([*panels.values()])
     finite = every[np.isfinite(every)] if np.isfinite(every).any() else np.array([0.0, 1.0])
     shades: dict[str, Any] = {"cmap": "cividis_r", "vmin": finite.min(), "vmax": finite.max()}
     size: dict[str, Any] = {"s": float(np.clip(9000.0 / len(p), 6.0, 60.0))}
-    with page_for((columns * _PANEL[0] + 0.6, rows * _PANEL[1] + 0.4), **place) as page:
-        axes = page.panels(rows, columns)
-        for each, (name, values) in zip(axes, panels.items(), strict=False):
+    with page_for((columns * _PANEL[0] + 0.6, len(rows) * _PANEL[1] + 0.4), **place) as page:
+        for each, (name, values) in zip(page.panels(rows), panels.items(), strict=True):
             there, degrees = np.isfinite(values), np.degrees(alpha)
             marks = each.scatter(p[there], degrees[there], c=values[there], marker="s", linewidth=0.0, **size, **shades)
             if not there.all():
@@ -221,9 +219,6 @@ def blocks_figure(
             add_labels(each, "p (rad/s)", "slenderness (degrees)")
             if len(panels) > 1:
                 each.set_title(as_written(name), color=INK)
-        page.drawn = axes[: len(panels)]
-        for spare in axes[len(panels) :]:
-            spare.remove()
         page.figure.colorbar(marks, ax=page.drawn, label=value_label, shrink=0.9)
     return page.figure
 
@@ -284,7 +279,7 @@ def rose_figure(
     from matplotlib.patches import Polygon
 
     with page_for((6.8, 4.0), **place) as page:
-        main, *beside = page.mosaic("AB;AC", width_ratios=(1.6, 1.0))
+        main, *beside = page.panels("AB;AC", width_ratios=(1.6, 1.0))
         for axes, values, label in zip(beside, (slenderness, p), ("slenderness (deg)", "p (rad/s)"), strict=False):
             axes.plot(*_closed(azimuth, values), color=INK, linewidth=1.2)
             axes.set(xlim=(0.0, 360.0), xticks=(0.0, 180.0, 360.0))

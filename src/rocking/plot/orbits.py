@@ -45,7 +45,7 @@ def orbit_figure(
 ) -> Figure:
     """Draw a periodic orbit: velocity against coordinate with its impacts, and the coordinate over time."""
     with page_for((7.0, 3.2), **place) as page:
-        plane, *histories = page.panels(1, 2)
+        plane, *histories = page.panels("AB")
         # Arcs end at impacts: a jump of the velocity is no part of the course.
         at = np.searchsorted(time, impact_times, side="right") - 1  # division may have made two times one
         x, v = (np.insert(each, at, np.nan) for each in (coordinate, velocity))
@@ -133,9 +133,6 @@ def bifurcation_figure(
 
 _DOTS: Final[dict[str, Any]] = {"linestyle": "", "marker": "o", "color": INK, "markersize": 3.2, "markeredgewidth": 0.6}
 
-#: Up to so many intervals are joined by a line, which shows how they take turns.
-_JOINED: Final = 100
-
 #: Space beside the first and the last impact, over their number.
 _MARGIN: Final = 0.03
 
@@ -146,7 +143,7 @@ def intervals_figure(*, intervals: Floats, eta: float, **place: Unpack[Place]) -
 
     with page_for((7.0, 3.2), **place) as page:
         # Panels are beside each other where the figure is wider than high.
-        panels = page.panels(*((1, 2) if page.figure.get_figwidth() > page.figure.get_figheight() else (2, 1)))
+        panels = page.panels("AB" if page.figure.get_figwidth() > page.figure.get_figheight() else "A;B")
         number = np.arange(1, intervals.size + 1)
         margin = max(0.5, _MARGIN * intervals.size)
         _draw(panels[0], number, intervals)
@@ -167,12 +164,8 @@ def intervals_figure(*, intervals: Floats, eta: float, **place: Unpack[Place]) -
 
 def _draw(axes: Axes, number: Integers, values: Floats) -> None:
     """Draw values by the number of the impact; those of the first side filled, those of the second open."""
-    if values.size <= _JOINED:
-        axes.plot(number, values, color=INK, linewidth=0.4, alpha=0.6, label="_in turn")
+    axes.plot(number, values, color=INK, linewidth=0.4, alpha=0.6, label="_in turn")
     for first, face, label in ((1, INK, "impacts 1, 3, ..."), (0, "white", "impacts 2, 4, ...")):
         chosen = number % 2 == first
         if chosen.any():
             axes.plot(number[chosen], values[chosen], markerfacecolor=face, label=label, **_DOTS)
-    if not values.size:
-        axes.annotate("no such impacts", (0.5, 0.7), xycoords="axes fraction", ha="center", color=INK)
-        axes.set_xticks([])

@@ -19,7 +19,7 @@ from rocking.errors import InvalidOption
 from rocking.plot.canvas import ABOVE, GROUND, INK, REST, Page, Place, add_labels, add_ticks, page_for, write
 from rocking.plot.curves import draw_ground
 from rocking.response.simulated import Simulated
-from rocking.response.summary import line
+from rocking.response.summary import line, time_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,9 +36,6 @@ _MOST_IMPACTS: Final = 2000
 
 #: Rotations and velocities beyond this leave the frame: past it a block only falls.
 _FARTHEST: Final = 2.0
-
-#: A figure at least so wide (inches) has space for the chattering sequence beside the histories.
-_WIDE: Final = 5.5
 
 _BOUNDARY: Final[dict[str, Any]] = {"color": ABOVE, "linewidth": 0.9, "linestyle": (0, (6, 2, 1, 2))}
 
@@ -127,7 +124,7 @@ def histories(
     drawn = rotation * scale(rotation)
     sequence = _longest_sequence(response, *shown) if longest_sequence and place.get("ax") is None else None
     traces = _ground_traces(response, *shown)
-    with page_for((7.0, 4.4 if len(traces) < 2 else 5.4), **place) as page:
+    with page_for((7.0, 4.4 + (len(traces) > 1) + 1.4 * (sequence is not None)), **place) as page:
         main, *grounds = _panels(page, 1 + len(traces), zoomed=sequence is not None)
         _shade_rest(main, np.clip(response.rest_intervals, *shown))
         _draw_rotation(main, time, drawn, np.array([-minus, plus]) * scales[::-1], coordinate.limit)
@@ -148,7 +145,7 @@ def histories(
         label = names[units] if is_rotation else f"{coordinate.name} ({coordinate.unit})"
         for axes, name in zip(panels, (label, *traces), strict=False):
             axes.tick_params(labelbottom=axes is panels[-1])
-            add_labels(axes, _time_label(shown, response.duration) if axes is panels[-1] else "", name)
+            add_labels(axes, _time_label(*shown, response.duration) if axes is panels[-1] else "", name)
         if sequence is not None:
             _draw_sequence(main, page.drawn[-1], response, sequence)
     return page.figure
@@ -182,19 +179,13 @@ def _longest_sequence(response: Simulated, start: float, end: float) -> np.void 
 
 
 def _panels(page: Page, histories: int, *, zoomed: bool) -> list[Axes]:
-    """Panels of the rotation and of the motion; that of the chattering sequence is beside the others, or below them."""
-    rows, options = [*"RGV"[:histories]], {"height_ratios": [1.3, 1.0, 0.7][:histories]}
-    if zoomed and page.figure.get_figwidth() >= _WIDE:
-        rows, options = [f"{row}Z" for row in rows], options | {"width_ratios": [3.0, 1.0]}
-    elif zoomed:
-        rows, options["height_ratios"] = [*rows, "Z"], [*options["height_ratios"], 1.0]
-    panels = page.mosaic(";".join(rows), **options)
-    if zoomed:
-        sequence = panels.pop(1 if len(rows[0]) > 1 else -1)
-        page.drawn = [*panels, sequence]
-    for axes in panels[1:]:
+    """Panels of the rotation and of the motion; below them that of the chattering sequence."""
+    panels = page.panels(
+        ";".join("RGV"[:histories] + "Z" * zoomed), height_ratios=[*(1.3, 1.0, 0.7)[:histories]] + [1.0] * zoomed
+    )
+    for axes in panels[1:histories]:
         axes.sharex(panels[0])
-    return panels
+    return panels[:histories]
 
 
 def _shade_rest(axes: Axes, rest_intervals: Floats) -> None:
@@ -254,18 +245,15 @@ def _draw_thresholds(axes: Axes, response: Simulated, time: Floats, acceleration
         axes.plot(time, threshold, color=INK, linewidth=0.8, linestyle=(0, (5, 2)), label="uplift thresholds")
 
 
-def _time_label(shown: tuple[float, float], duration: float) -> str:
-    start, end = shown
-    if start <= 0.0 and end >= duration * (1.0 - 1e-9):
-        return "time (s)"
-    digits = max(0, 1 - math.floor(math.log10(end - start)))
-    return f"time (s); shown: {start:.{digits}f}–{end:.{digits}f} s of {duration:.{digits}f} s"
+def _time_label(start: float, end: float, duration: float) -> str:
+    is_all = start <= 0.0 and end >= duration * (1.0 - 1e-9)
+    return "time (s)" if is_all else f"time (s); shown: {start:.4g}–{end:.4g} s of {duration:.4g} s"
 
 
 def _draw_sequence(main: Axes, axes: Axes, response: Simulated, sequence: np.void) -> None:
     """Draw a sequence impact by impact, and where it is among the histories."""
-    times, near = _within(response.impacts["time"], sequence["start"], sequence["end"]), response.perturbed()
-    off = float(near.event_spreads[response.events["time"] == sequence["end"]].max(initial=0.0))
+    times = _within(response.impacts["time"], sequence["start"], sequence["end"])
+    low, high = response.perturbed().event_ranges[response.events["time"] == sequence["end"]].T.max(axis=1)
     first, last, at = float(times[0]), float(sequence["upper"]), main.get_xaxis_transform()
     main.plot([first, last], [0.95, 0.95], "|-", color=ABOVE, linewidth=1.3, transform=at)
     look: dict[str, Any] = {"ha": "center", "va": "bottom", "color": ABOVE, "fontweight": "bold", "xycoords": at}
@@ -278,14 +266,9 @@ def _draw_sequence(main: Axes, axes: Axes, response: Simulated, sequence: np.voi
     axes.invert_xaxis()
     add_labels(axes, "time to rest (s)", "interval to next impact (s)")
     axes.grid(True)
-    decimals = 6 if off < 1e-6 else 0 if math.isnan(off) else max(0, math.floor(-math.log10(off)))
-    axes.set_title(f"A: at rest at {rest:.{decimals}f}\N{NO-BREAK SPACE}s", color=ABOVE, loc="left", wrap=True)
-    known = "" if off < 1e-6 else f"{'not' if math.isnan(off) else f'± {off:.0e} s'} in all {near.sample}; "
-    words = f"{known}bracket of the computation {sequence['upper'] - sequence['lower']:.0e} s"
-    # Below the falling line there is space.
-    look = {"color": ABOVE, "fontsize": 7.0, "transform": axes.transAxes, "va": "bottom"}
-    letters = 16 if axes.bbox.width < axes.bbox.height else 40
-    axes.text(0.04, 0.03, textwrap.fill(words, letters), **look)
+    known = f"about {rest:.0f} s, if at all" if math.isnan(low) else time_text(rest, low, high)
+    words = f"A: at rest at {known}; bracket of the computation {sequence['upper'] - sequence['lower']:.0e} s"
+    axes.set_title(textwrap.fill(words, max(20, int(axes.bbox.width / axes.figure.dpi * 14))), color=ABOVE, loc="left")
 
 
 class Course(NamedTuple):

@@ -41,12 +41,8 @@ def friction_coefficient(value: object) -> float:
     """Return a coefficient of friction; refuse one that is not positive, or larger than that of any two materials."""
     coefficient = checks.positive(value, "friction", InvalidOption)
     if coefficient > _ROUGHEST:
-        raise InvalidOption(
-            "{} must be a coefficient (friction over normal force, about 0.6 of stone on stone) of at most "
-            f"{_ROUGHEST:g}, not {coefficient:g}; of an angle of friction take the tangent",
-            "friction",
-            value=value,
-        )
+        text = f"{{}} must be at most {_ROUGHEST:g}, not {coefficient:g}; of an angle of friction take the tangent"
+        raise InvalidOption(text, "friction", value=value)
     return coefficient
 
 

@@ -216,11 +216,8 @@ class Response(Simulated):
             dt = step if step and step <= 0.01 * self.duration else max(self.duration, 1e-3) / _POINTS
         step = checks.positive(dt, "dt", InvalidOption, "s")
         if self.duration > _MOST_POINTS * step:
-            raise InvalidOption(
-                f"{{}} = {step:g} s makes more than {_MOST_POINTS:,} points of {self.duration:g} s; take a longer step",
-                "dt",
-                value=dt,
-            )
+            most = f"more than {_MOST_POINTS:,} points of {self.duration:g} s"
+            raise InvalidOption(f"{{}} = {step:g} s makes {most}; take a longer step", "dt", value=dt)
         times = even_times(self.duration, step)
         states = self.states(times)
         columns = [

@@ -29,8 +29,7 @@ from rocking.response.mechanics import (
     linear_balance,
     pull,
 )
-from rocking.response.perturbed import COUNT, OVERTURNS, RELATIVE, STANDS, UNMOVED, Perturbed, Repeat
-from rocking.response.perturbed import repeated as repeated_with
+from rocking.response.perturbed import COUNT, OVERTURNS, RELATIVE, STANDS, UNMOVED, Perturbed, Repeat, checked_factors
 from rocking.response.sensitivity import Sensitivity, ambiguities, carried_errors
 
 
@@ -252,10 +251,9 @@ class Simulated(Result):
         practical purpose; one that is the same in a few simulations may still change between them.
         """
         if (relative, count) not in self._repeated:
+            repeats = tuple(self._repeat(factor) for factor in checked_factors(relative, count))
             scaled = "initial states" if self.motion is None else "motions"
-            self._repeated[relative, count] = repeated_with(
-                self._as_repeat(1.0), self._repeat, relative, count, self.body.coordinate, scaled
-            )
+            self._repeated[relative, count] = Perturbed(float(relative), repeats, self.body.coordinate, scaled)
         return self._repeated[relative, count]
 
     @cached_property
@@ -264,17 +262,13 @@ class Simulated(Result):
 
     def _repeat(self, factor: float) -> Repeat:
         try:
-            again: Simulated = self.solution.again(factor)
-            return again._as_repeat(factor)
+            again: Simulated = self if factor == 1.0 else self.solution.again(factor)
         except InvalidOption:  # a state of balance: `simulate` requires a duration
             return Repeat(factor, "balances", math.nan, math.nan, math.nan, math.nan, self.events[:0])
-
-    def _as_repeat(self, factor: float) -> Repeat:
-        rests = self.events["time"][self.events["kind"] == "rest"]
-        last_rest = float(rests[-1]) if len(rests) and not self.moves_at_end else math.nan
-        return Repeat(
-            factor, self.outcome, self.peak_rotation, self.peak_time, self.overturn_time, last_rest, self.events
-        )
+        rests = again.events["time"][again.events["kind"] == "rest"]
+        last_rest = float(rests[-1]) if len(rests) and not again.moves_at_end else math.nan
+        peak, peak_time = again.peak_rotation, again.peak_time
+        return Repeat(factor, again.outcome, peak, peak_time, again.overturn_time, last_rest, again.events)
 
     def states(self, time: ArrayLike) -> Floats:
         """Return coordinate, velocity and acceleration of the body (of a block its rotation) at times, s, of any shape.

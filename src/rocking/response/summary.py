@@ -173,20 +173,6 @@ def tipping_text(response: Simulated) -> str:
     return f"{about}{response.tipping_time:.{min(_decimals(unknown), _SHORT)}f} s"
 
 
-def peak_time_text(response: Simulated) -> str:
-    """Time of the peak, as far as it is known."""
-    return _short_text(response.peak_time, *response.perturbed().peak_time_range)
-
-
-def digits_of(value: float, unknown: float) -> int:
-    """Digits that are known of a value of which so much is unknown."""
-    if not math.isfinite(unknown):
-        return 1
-    if not (unknown > 0.0 and value != 0.0):
-        return _MOST_DIGITS
-    return min(max(math.floor(-math.log10(unknown / abs(value))), 1), _MOST_DIGITS)
-
-
 def _motion_text(response: Simulated) -> str:
     """Say what shakes the body; here and below a g is the standard one, as wherever accelerations are given in g."""
     motion = response.motion
@@ -253,7 +239,7 @@ def _peak_rows(response: Simulated) -> list[Row]:
     value = f"{response.peak_rotation:.{digits}g}"
     if spread := digits < _FEWEST_DIGITS and math.isfinite(high):
         value = f"{low:.{_FEWEST_DIGITS}g} to {high:.{_FEWEST_DIGITS}g}"
-    note = f" at {peak_time_text(response)}"
+    note = f" at {_short_text(response.peak_time, *near.peak_time_range)}"
     if response.overturned:
         note += ", where the block has fallen"
     elif response._reaches_second_stop:
@@ -298,8 +284,14 @@ def _when_stopped(response: Simulated) -> str:
 
 
 def _peak_digits(response: Simulated) -> int:
+    """Digits that are known of the peak."""
     unknown = _unknown(response.peak_rotation, *response.perturbed().peak_range)
-    return digits_of(response.peak_rotation - response.body.stops[0], unknown)
+    value = abs(response.peak_rotation - response.body.stops[0])
+    if not math.isfinite(unknown):
+        return 1
+    if not (unknown > 0.0 and value != 0.0):
+        return _MOST_DIGITS
+    return min(max(math.floor(-math.log10(unknown / value)), 1), _MOST_DIGITS)
 
 
 def _unknown(value: float, low: float, high: float) -> float:
