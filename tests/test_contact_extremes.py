@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 import rocking
 from rocking import Block, Motion, Response, simulate
-from rocking.response.contact import friction_demand
+from rocking.response.mechanics import friction_demand
 
 GRAVITY = 9.80665
 COUNT, PARTS = 100, 5
@@ -118,27 +118,6 @@ def test_the_ground_that_lets_go_asks_for_infinite_friction() -> None:
     released = [response for _, response in under_vertical_motions() if response.minimum_normal_force <= 0.0]
     assert len(released) >= 12
     assert all(response.required_friction == np.inf for response in released)
-
-
-@pytest.mark.parametrize("model", ["linear", "nonlinear"])
-def test_a_jump_of_the_ground_counts_from_both_sides(model: str) -> None:
-    """While the block leans, the ground's acceleration drops: the worst is just before the drop."""
-    block = Block.from_parameters(p=2.0, alpha=0.3, restitution=0.9)
-    motion = Motion([0.0, 0.3, 0.31], [[0.5 * GRAVITY, 4.0 * GRAVITY], [0.0, 0.0]])
-    response = simulate(block, motion, model=model)
-    before = float(np.nextafter(0.3, 0.0))
-    assert response.required_friction >= float(response.friction_demand(before)) - 1e-12
-    assert response.required_friction >= float(response.friction_demand(0.3))
-    assert response.minimum_normal_force <= min(float(response.normal_force(t)) for t in (before, 0.3)) + 1e-12
-
-
-def test_free_rocking_has_its_extremes_right_after_and_before_impacts() -> None:
-    block = Block.from_parameters(p=(2.0, 3.0), alpha=(0.3, 0.2), restitution=0.9)
-    response = rocking.simulate(block, None, initial_rotation=0.25)
-    struck = response.impacts["time"][:20]
-    times = np.concatenate([struck, np.nextafter(struck, 0.0), np.linspace(0.0, response.duration, 40_001)])
-    assert response.required_friction >= float(np.max(response.friction_demand(times))) - 1e-9
-    assert response.minimum_normal_force <= float(np.min(response.normal_force(times))) + 1e-9
 
 
 @pytest.mark.parametrize(

@@ -368,8 +368,5 @@ def test_the_time_of_overturning_has_derivatives_though_the_peak_has_none() -> N
 def test_what_is_not_told_is_refused_in_a_sentence(of: Any, at: Any, match: str) -> None:
     with pytest.raises(InvalidOption, match=match):
         gradient(rocking.simulate(BLOCK, RECORD), of, at)
-
-
-def test_a_response_without_impacts_has_none_to_ask_for() -> None:
     with pytest.raises(InvalidOption, match="has no impact"):
         gradient(rocking.simulate(BLOCK, RECORD * 0.01), "impact", 0)

@@ -234,8 +234,7 @@ def test_the_figure_names_every_mode_that_it_shows():
         "overturns after 1 impact",
         "overturns without impact",
     } <= set(texts)
-    regions = [shape for shape in figure.axes[0].collections[:-1] if shape.get_hatch() is None]
-    filled = [path for shape in regions for path in shape.get_paths()]
+    filled = [path for shape in figure.axes[0].collections for path in shape.get_paths()]
     areas = [abs(np.sum(np.diff(p.vertices[:, 0]) * (p.vertices[1:, 1] + p.vertices[:-1, 1]) / 2)) for p in filled]
     # The regions fill the whole of the axes.
     assert sum(areas) == pytest.approx((6.0 - 2.0) * (10.0 - 0.5), rel=1e-9)

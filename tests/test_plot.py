@@ -1,4 +1,4 @@
-"""Figures of one response: what is drawn is what was given, and nothing covers anything else."""
+"""Figures of one response: what is drawn is what was simulated, and nothing covers anything else."""
 
 import io
 import math
@@ -6,39 +6,16 @@ import math
 import numpy as np
 import pytest
 
-from rocking.plot.response import DrawnSequence, response_figure
+import rocking
 
-NO_TIMES = np.array([])
-NO_INTERVALS = np.empty((0, 2))
 ALPHA = (0.2, 0.25)
-
-
-def bouncing_times(rest: float, first_interval: float, ratio: float, count: int) -> np.ndarray:
-    """Impact times whose intervals shrink by ``ratio`` and accumulate at ``rest``."""
-    return rest - first_interval / (1.0 - ratio) * ratio ** np.arange(count)
-
-
-def figure_of(**changes):
-    time = np.linspace(0.0, 10.0, 1001)
-    arrays = {
-        "time": time,
-        "rotation": 0.08 * np.sin(time) * np.exp(-0.3 * time),
-        "slenderness": ALPHA,
-        "impact_times": np.pi * np.arange(1, 4),
-        "rest_intervals": np.array([[0.0, 0.2], [9.8, 10.0]]),
-        "uplift_times": np.array([0.2]),
-        "overturn_time": None,
-        "motion_time": time,
-        "motion_acceleration_g": -0.3 * np.sin(time),
-        "thresholds_g": (0.2, 0.25),
-        "title": "A block",
-    }
-    return response_figure(**(arrays | changes))
+BLOCK = rocking.Block.from_parameters(p=2.0, alpha=ALPHA, restitution=0.85)
+SHAKEN = rocking.simulate(BLOCK, rocking.pulses.sine(3.0, 1.0, cycles=2))
+FALLEN = {side: rocking.simulate(BLOCK, side * rocking.pulses.sine(8.0, 1.0, cycles=1)) for side in (1.0, -1.0)}
 
 
 def labelled(axes, label):
-    (artist,) = [line for line in axes.lines if line.get_label() == label]
-    return artist
+    return [line for line in axes.lines if line.get_label() == label]
 
 
 def legend_of(figure):
@@ -49,114 +26,92 @@ def legend_of(figure):
     ("units", "plus", "minus"),
     [("slenderness", 1.0 / ALPHA[0], 1.0 / ALPHA[1]), ("rad", 1.0, 1.0), ("deg", 180.0 / math.pi, 180.0 / math.pi)],
 )
-def test_the_rotation_and_the_motion_are_drawn_as_given(units, plus, minus):
-    figure = figure_of(units=units)
-    rotation, motion = figure.axes
-    time = np.linspace(0.0, 10.0, 1001)
-    theta = 0.08 * np.sin(time) * np.exp(-0.3 * time)
-    drawn = labelled(rotation, "_rotation").get_ydata()
-    np.testing.assert_allclose(drawn, np.where(theta >= 0.0, plus * theta, minus * theta), rtol=1e-15)
-    np.testing.assert_array_equal(labelled(motion, "_ground acceleration").get_ydata(), -0.3 * np.sin(time))
+def test_the_rotation_and_the_motion_are_drawn_as_simulated(units, plus, minus):
+    rotation, motion = SHAKEN.plot(units=units).axes
+    (line,) = labelled(rotation, "_rotation")
+    theta = SHAKEN.rotation(line.get_xdata())
+    np.testing.assert_allclose(line.get_ydata(), np.where(theta >= 0.0, plus * theta, minus * theta), rtol=1e-15)
+    (line,) = labelled(motion, "_ground acceleration")
+    expected = SHAKEN.motion.acceleration(line.get_xdata()) / 9.80665
+    np.testing.assert_allclose(line.get_ydata(), expected, rtol=1e-15)
 
 
 @pytest.mark.cases(fast=1)
 @pytest.mark.parametrize("units", ["slenderness", "rad"])
 def test_an_axis_in_degrees_stands_on_the_right(units):
-    figure = figure_of(units=units, rotation=np.linspace(-0.1, 0.15, 1001))
+    figure = SHAKEN.plot(units=units)
     figure.draw_without_rendering()
     (degrees,) = figure.axes[0].child_axes
     assert degrees.get_ylabel() == "rotation (°)"
     low, high = figure.axes[0].get_ylim()
     plus, minus = ALPHA if units == "slenderness" else (1.0, 1.0)
     np.testing.assert_allclose(degrees.get_ylim(), np.degrees([low * minus, high * plus]))
-    assert not figure_of(units="deg").axes[0].child_axes
+    assert not SHAKEN.plot(units="deg").axes[0].child_axes
 
 
 def test_the_angles_of_tipping_are_drawn_where_they_are_in_the_frame():
-    figure = figure_of(rotation=np.linspace(-0.3, 0.19, 1001), units="rad")
-    dashed = [line.get_ydata()[0] for line in figure.axes[0].lines if line.is_dashed()]
-    assert sorted(dashed) == [-ALPHA[1], ALPHA[0]]
+    figure = FALLEN[1.0].plot(units="rad")
+    (low, high), dashed = figure.axes[0].get_ylim(), labelled(figure.axes[0], "tipping, θ = ±α")
+    assert {line.get_ydata()[0] for line in dashed} == {at for at in (ALPHA[0], -ALPHA[1]) if low < at < high} != set()
     assert legend_of(figure).count("tipping, θ = ±α") == 1
-    assert "tipping, θ = ±α" not in legend_of(figure_of())
 
 
 def test_what_is_not_drawn_is_not_in_the_legend():
-    assert legend_of(figure_of()) == [
-        "at rest",
-        "resolved impacts (3)",
-        "uplift",
-        "beyond a threshold",
-        "uplift thresholds",
-    ]
-    outside = {"impact_times": np.array([12.0]), "uplift_times": np.array([11.0]), "rest_intervals": [[11.0, 12.0]]}
-    quiet = figure_of(motion_acceleration_g=np.full(1001, 0.1), **{k: np.array(v) for k, v in outside.items()})
-    assert legend_of(quiet) == ["uplift thresholds"]
+    quiet = rocking.simulate(BLOCK, rocking.pulses.sine(1.0, 1.0, cycles=2)).plot()
+    assert legend_of(quiet) == ["at rest", "uplift thresholds"]
 
 
-def test_side_plus_is_uplifted_by_a_negative_acceleration():
-    motion = figure_of(thresholds_g=(0.2, 0.25)).axes[1]
-    dashed = [line.get_ydata()[0] for line in motion.lines if line.is_dashed()]
-    assert sorted(dashed) == [-0.2, 0.25]
-
-
-def test_only_the_stretches_beyond_a_threshold_are_filled():
-    motion = figure_of(thresholds_g=(0.2, 0.25)).axes[1]
+def test_side_plus_is_uplifted_by_a_negative_acceleration_and_stretches_beyond_are_filled():
+    motion = SHAKEN.plot().axes[1]
+    levels = sorted(line.get_ydata()[0] for line in labelled(motion, "uplift thresholds"))
+    assert levels == pytest.approx([-math.tan(ALPHA[0]), math.tan(ALPHA[1])])
     heights = np.concatenate([p.vertices[:, 1] for c in motion.collections for p in c.get_paths()])
-    assert heights.max() == pytest.approx(0.3, abs=1e-4)
-    assert heights.min() == pytest.approx(-0.3, abs=1e-4)
-    assert (heights[heights < 0.0].max(), heights[heights > 0.0].min()) == pytest.approx((-0.2, 0.25), rel=1e-12)
+    assert (heights[heights < 0.0].max(), heights[heights > 0.0].min()) == pytest.approx(levels, rel=1e-12)
 
 
 def test_impacts_uplifts_and_rests_are_marked_at_their_times():
-    rotation = figure_of().axes[0]
-    np.testing.assert_array_equal(labelled(rotation, "resolved impacts (3)").get_xdata(), np.pi * np.arange(1, 4))
-    np.testing.assert_array_equal(labelled(rotation, "uplift").get_xdata(), [0.2])
+    rotation = SHAKEN.plot().axes[0]
+    (impacts,) = labelled(rotation, f"resolved impacts ({len(SHAKEN.impacts)})")
+    np.testing.assert_array_equal(impacts.get_xdata(), SHAKEN.impacts["time"])
+    (uplifts,) = labelled(rotation, "uplift")
+    np.testing.assert_array_equal(uplifts.get_xdata(), SHAKEN.events["time"][SHAKEN.events["kind"] == "uplift"])
     spans = [(p.get_x(), p.get_x() + p.get_width()) for p in rotation.patches]
-    np.testing.assert_allclose(spans, [[0.0, 0.2], [9.8, 10.0]], rtol=1e-15)
+    shown = np.clip(SHAKEN.rest_intervals, *rotation.get_xlim())
+    np.testing.assert_allclose(spans, shown[shown[:, 0] < shown[:, 1]], rtol=1e-12)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_the_fall_of_an_overturned_block_is_marked_where_its_curve_leaves_the_frame(side):
-    time = np.linspace(0.0, 10.0, 1001)
-    figure = figure_of(rotation=side * np.exp(time) * 1e-4, overturn_time=9.75)
-    axes = figure.axes[0]
+    fallen = FALLEN[side]
+    axes = fallen.plot().axes[0]
     low, high = axes.get_ylim()
-    assert high - low < 5.0
-    mark = labelled(axes, "overturned at 9.750 s")
+    (mark,) = labelled(axes, f"overturned at {fallen.overturn_time:.3f} s")
     at, height = mark.get_xdata()[0], mark.get_ydata()[0]
-    assert height == (high if side > 0.0 else low)  # where the curve leaves the frame, on its way to the fall
-    curve = max(axes.lines, key=lambda line: len(line.get_xdata()))
-    assert np.interp(at, curve.get_xdata(), curve.get_ydata()) == pytest.approx(height, rel=1e-3) and at < 9.75
-    assert mark.get_marker() != labelled(axes, "uplift").get_marker()
-    assert "overturned at 9.750 s" in legend_of(figure)
+    edge = high if fallen.rotation(at) > 0.0 else low
+    assert height == pytest.approx(edge, rel=0.02) and at < fallen.overturn_time
+    alpha = ALPHA[0] if edge > 0.0 else ALPHA[1]
+    assert fallen.rotation(at) / alpha == pytest.approx(height, rel=1e-12)
 
 
 def test_the_zoom_shows_every_interval_against_the_time_to_rest():
-    times = bouncing_times(9.8, 0.5, 0.8, 60)
-    zoom = figure_of(chattering=DrawnSequence(times, 9.8 - 1e-9, 9.8 + 1e-9)).axes[2]
-    (points,) = zoom.lines
+    free = rocking.simulate(BLOCK, None, initial_rotation=0.15)
+    figure = free.plot(longest_sequence=True)
+    (points,) = figure.axes[1].lines
     to_rest, intervals = points.get_data()
-    assert to_rest.size == 59
-    np.testing.assert_allclose(intervals, 0.2 * to_rest, rtol=1e-6)
-    assert zoom.get_xscale() == zoom.get_yscale() == "log"
-    assert "9.800000" in zoom.get_title(loc="left")
-    assert len(figure_of().axes) == 2
+    (sequence,) = free.chattering
+    times = free.impacts["time"][free.impacts["time"] >= sequence["start"]]
+    np.testing.assert_allclose(to_rest, 0.5 * (sequence["lower"] + sequence["upper"]) - times[:-1], rtol=1e-9)
+    np.testing.assert_array_equal(intervals, np.diff(times))
+    assert figure.axes[1].get_xscale() == figure.axes[1].get_yscale() == "log"
+    assert len(free.plot().axes) == 1
 
 
-@pytest.mark.cases(fast=1, thorough=7)
+@pytest.mark.cases(fast=1, thorough=3)
 @pytest.mark.parametrize("extension", ["png", "pdf", "svg"])
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {},
-        {"impact_times": NO_TIMES, "uplift_times": NO_TIMES, "rest_intervals": NO_INTERVALS},
-        {"motion_time": NO_TIMES, "motion_acceleration_g": NO_TIMES},
-        {"rotation": np.zeros(1001)},
-        {"chattering": DrawnSequence(bouncing_times(9.8, 0.5, 0.8, 60), 9.8 - 1e-9, 9.8 + 1e-9)},
-    ],
-    ids=["full", "no events", "free rocking", "never moved", "chattering"],
-)
-def test_every_response_is_drawn_to_every_format_without_a_warning(changes, extension):
-    buffer = io.BytesIO()
-    figure_of(**changes).savefig(buffer, format=extension)
-    assert buffer.tell() > 5000
+def test_every_response_is_drawn_to_every_format_without_a_warning(extension):
+    still = rocking.simulate(BLOCK, rocking.pulses.sine(1.0, 1.0, cycles=2))
+    free = rocking.simulate(BLOCK, None, initial_rotation=0.15)
+    for response in (SHAKEN, FALLEN[1.0], still, free):
+        buffer = io.BytesIO()
+        response.plot(longest_sequence=True).savefig(buffer, format=extension)
+        assert buffer.tell() > 5000

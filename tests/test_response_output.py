@@ -15,8 +15,6 @@ from rocking import Block, InvalidOption, OutputError, simulate
 from rocking.analysis.survey import survey
 from rocking.core.tables import named
 from rocking.explorer.simulated import verdict
-from rocking.kernels import state
-from rocking.response import history, sensitivity, summary
 from rocking.response.summary import known_ratio, time_text
 from rocking.rules import Check
 
@@ -83,27 +81,6 @@ def test_a_time_has_the_digits_that_repeated_simulations_leave(below, above, tex
     assert time_text(time, time - below, time + above) == text
 
 
-@pytest.mark.parametrize("unknown", [math.inf, math.nan])
-def test_an_infinite_change_leaves_no_digit_that_is_shown_as_known(unknown):
-    assert summary.digits_of(0.123, unknown) == 1
-
-
-def test_each_sensitivity_is_one_pass_when_asked_for_and_a_share_of_nothing_is_none(shaken, monkeypatch):
-    passes, vary = [], sensitivity.vary
-    monkeypatch.setattr(sensitivity, "vary", lambda *given: (passes.append(given[3]), vary(*given)))
-    found = simulate(shaken.body, shaken.motion).sensitivity
-    assert found.peak["motion"][0] != 0.0
-    assert passes == [0, 3, 4, 5]
-    assert found.impacts["motion"].any()
-    assert passes == [0, 3, 4, 5]
-    for quantity, name in ((1, "initial_rotation"), (2, "initial_velocity")):
-        changes = np.ones(1), np.ones(len(found.impacts)), np.ones(len(found.events))
-        scratch, work = state.new_scratch(), state.record(state.VARIATION)
-        vary(shaken.solution.trail, scratch, work, quantity, np.array([shaken.peak_time]), *changes)
-        assert not np.any(np.concatenate(changes))
-        assert not np.any(found.events[name]) and not np.any(found.impacts[name]) and not found.peak[name][0]
-
-
 def test_a_motion_changed_by_a_millionth_keeps_the_digits_that_are_shown():
     block, record = Block(width=0.24, height=1.1), rocking.records.load("ridgecrest-clc-090")
     texts = [simulate(block, motion).summary() for motion in (record, record.scaled(1.0 + 1e-6))]
@@ -128,6 +105,8 @@ def test_the_dictionary_is_plain_and_names_its_units(shaken, fallen):
     assert shaken.to_dict()["tipping_time_s"] is None
     assert fallen.to_dict()["tipping_time_s"] == fallen.tipping_time
     assert simulate(Block(half_width=0.2, half_height=1.0), None).to_dict()["motion"] is None
+    for name in ("initial_rotation", "initial_velocity"):  # a share of nothing changes nothing
+        assert not any(np.any(table[name]) for table in (shaken.sensitivity.peak, shaken.sensitivity.events))
 
 
 def test_histories_are_a_data_frame_over_time(shaken):
@@ -177,14 +156,6 @@ def test_every_variable_of_the_dataset_has_a_unit_in_the_file_too(shaken, tmp_pa
         assert units["ground_acceleration"] == "m/s^2"
         assert {"p_rad_s", "alpha_rad", "gravity_m_s2"} <= set(dataset.attrs)
         assert not [name for name in dataset.attrs if "_per_" in name]
-
-
-@pytest.mark.parametrize(("units", "factor"), [("slenderness", 5.0), ("rad", 1.0), ("deg", 180.0 / math.pi)])
-def test_rotations_are_drawn_in_the_unit_that_is_asked_for(shaken, units, factor):
-    axes = shaken.plot(units=units).axes[0]
-    line = max(axes.lines, key=lambda line: len(line.get_xdata()))
-    assert np.max(np.abs(line.get_ydata())) == pytest.approx(shaken.peak_rotation * factor, rel=1e-4)
-    assert units in axes.get_ylabel() or (units == "deg" and "°" in axes.get_ylabel())
 
 
 def test_the_phase_plane_has_the_states_of_the_response_and_its_name(shaken):
@@ -262,7 +233,8 @@ def test_the_time_of_a_peak_is_as_uncertain_as_its_swing():
     motion = rocking.records.load("el-centro-meloland-270").scaled_to(4.0)
     block = Block(width=0.6, height=2.1)
     one, other = (simulate(block, motion.scaled(factor)) for factor in (1.0, 1.0 + 1e-4))
-    decimals = len(summary.peak_time_text(one).partition(".")[2].removesuffix(" s"))
+    (note,) = [row.note for row in one.summary_rows() if row.name == "peak rotation"]
+    decimals = len(re.search(r" at \d+\.?(\d*)", note)[1])
     moved = 0.01 * abs(other.peak_time - one.peak_time)
     assert moved < 10.0**-decimals
 
@@ -287,8 +259,6 @@ def test_the_last_row_is_the_end_whatever_the_multiples_of_the_step_round_to():
         assert frame.index[-1] <= duration and np.isfinite(frame.to_numpy()).all()
         judged += len(frame)
     assert judged > 1000
-    for steps in range(1, 6000, 7):
-        assert history.even_times(round(0.005 * steps, 3), 0.005)[-1] <= round(0.005 * steps, 3)
 
 
 @pytest.mark.parametrize("pga", [0.47, 0.5, 0.53, 0.55, 0.6, 0.65])

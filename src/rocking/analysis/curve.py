@@ -253,7 +253,7 @@ def fragility_line(curve: FragilityCurve, intensity: Floats, measure: Measure) -
     chance = curve.probability(intensity)
     band, scale = curve.band(intensity) if curve.bounded else (chance, chance), measure.scale
     text = f"{curve.limit_state}{limit}: {at_half}"
-    return FragilityLine(text, scale * intensity, chance, *band, scale * at, seen, held)
+    return FragilityLine(text, scale * intensity, chance, *band, scale * at, seen)
 
 
 def whole_numbers(values: ArrayLike, name: str, size: int, least: float, most: ArrayLike) -> Floats:

@@ -206,7 +206,7 @@ class ResponseRose(DatasetResult):
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         from rocking.core.arrays import evenly
-        from rocking.plot.rose import shares_figure
+        from rocking.plot.maps import shares_figure
 
         data = self.data
         chosen = [*evenly(data.sizes["level"], 4)]

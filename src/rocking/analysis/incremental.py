@@ -251,7 +251,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         self, ax: Axes | None = None, *, block: int = 0, title: str = "", figsize: tuple[float, float] | None = None
     ) -> Figure:
         """Draw level against peak rotation and bands for one block, by position; otherwise as `DrawnResult.plot`."""
-        from rocking.plot.ida import ScaledMotion, ida_figure
+        from rocking.plot.curves import ScaledMotion, ida_figure
 
         data, block = self.data, self._position(block, "block")
         levels = data.level.scale * data.level.values

@@ -20,7 +20,7 @@ from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
 from rocking.records.named import Motions, motions_by_name, names_of
 from rocking.response import PRECISION, Response, in_brief, known_ratio, ratio_text, steps_within
-from rocking.response.contact import friction_coefficient
+from rocking.response.mechanics import friction_coefficient
 from rocking.simulation.ensemble import body_coordinates, verticals_of
 from rocking.simulation.simulate import simulate
 

@@ -41,7 +41,7 @@ from rocking.records.named import (
     shipped,
 )
 from rocking.response import PRECISION, Response, steps_within
-from rocking.response.contact import friction_coefficient
+from rocking.response.mechanics import friction_coefficient
 from rocking.rules import check as apply_rules
 from rocking.simulation.simulate import simulate as run
 

@@ -26,7 +26,7 @@ from rocking.inputs.quantities import number
 from rocking.motion.exceedance import lifting_factors
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import FACTOR, Measure
-from rocking.response.contact import friction_coefficient
+from rocking.response.mechanics import friction_coefficient
 from rocking.rules import overturning_velocity, rate
 from rocking.simulation.simulate import simulate
 

@@ -231,7 +231,7 @@ class Motion(Processable):
 
         In `ax` the horizontal acceleration is drawn alone. The title is by default the motion's label.
         """
-        from rocking.plot.response import motion_figure
+        from rocking.plot.curves import motion_figure
 
         times = self.drawing_times(0.0, self.end)
         return motion_figure(

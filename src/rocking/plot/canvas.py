@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import math
-import os
 import re
 import sys
 import textwrap
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.legend import Legend
 
 # Luminances differ, so that the figures read in grey as well.
 INK: Final = "#10243e"
@@ -43,24 +41,17 @@ CURVES: Final[tuple[dict[str, Any], ...]] = (
 _LIGHTEST: Final = 0.85
 
 STYLE: Final[dict[Any, Any]] = {
-    "font.size": 8.5,
-    "axes.titlesize": 8.5,
-    "axes.labelsize": 8.5,
-    "figure.titlesize": 9.0,
-    "axes.linewidth": 0.7,
+    "font.size": 8.0,
+    "axes.titlesize": "medium",
+    "figure.titlesize": "medium",
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.axisbelow": True,
-    "xtick.labelsize": 8.0,
-    "ytick.labelsize": 8.0,
-    "xtick.major.width": 0.7,
-    "ytick.major.width": 0.7,
     "grid.color": REST,
     "grid.linewidth": 0.6,
     "hatch.linewidth": 0.4,
     "legend.fontsize": 7.5,
     "legend.handlelength": 1.5,
-    "legend.handletextpad": 0.5,
     "legend.columnspacing": 1.0,
     "legend.frameon": False,
 }
@@ -68,17 +59,14 @@ STYLE: Final[dict[Any, Any]] = {
 #: A number with more decimals than anybody reads.
 _LONG_NUMBER: Final = re.compile(r"\d+\.\d{6,}(?:e[-+]?\d+)?")
 
-#: The space between a number or a name and its unit: (m/s), s.
-_BEFORE_UNIT: Final = re.compile(r" (?=\(|s\b)")
-
-#: Hinted letters are wider at most resolutions, and in vector graphics, than at that of the moment.
-_FITTING: Final = 0.93
-
-#: Mean width of a letter over the size of its font. Longest line of a label over its axis, of which the layout
-#: will make the upright one shorter for title and legend; and the least number of letters in a line.
+#: Width of a letter over the size of its font: mean, and of a short label; letters that a line of a legend's handle
+#: and gaps take.
 _LETTER: Final = 0.52
-_X_LINE: Final = 1.0
-_Y_LINE: Final = 0.85
+_WIDE_LETTER: Final = 0.53
+_HANDLE: Final = 5
+
+#: Longest line of a label over its axis, of which the layout will make the upright one shorter for title and legend.
+_LINE: Final = (0.9, 0.6)
 _FEWEST_LETTERS: Final = 12
 
 #: What is written of each decade of an axis, where there is less than one, and where there are more.
@@ -97,16 +85,17 @@ def figure_for(
 
     Its size (inches) is `figsize`, or else the default, which suits what is drawn.
 
-    A new figure is made through pyplot, so that `pyplot.show()` and `figure.show()` show it, if pyplot is loaded, in a
-    notebook, or where there is a display and nobody chose a backend without windows. Elsewhere no global state knows of
-    it, and it is forgotten with its last reference. A notebook shows each figure once, as a cell's value or at its end.
+    A new figure is made through pyplot if that is loaded, or in a notebook, so that `pyplot.show()` shows it. Elsewhere
+    no global state knows of it, and it is forgotten with its last reference. A notebook shows each figure once, as a
+    cell's value or at its end.
     """
+    short = _LONG_NUMBER.sub(lambda found: f"{float(found[0]):.4g}", title)
     if ax is not None:
         if not hasattr(ax, "get_figure"):
             raise InvalidOption(f"{{}} must be axes of Matplotlib's to draw in, not {ax!r}", "ax", value=ax)
         figure = ax.get_figure(root=True)
         assert figure is not None
-        _add_title(figure, ax, title)
+        ax.set_title(short, wrap=True)
         yield figure
         _show_once(figure)
         return
@@ -115,7 +104,9 @@ def figure_for(
 
     with mpl.rc_context(STYLE):
         figure = _new_figure(_size(default if figsize is None else figsize))
-        _add_title(figure, None, title)
+        if short:
+            line = textwrap.fill(short, _letters((1.0 - 2.0 * _TITLE_AT) * figure.bbox.width, figure.dpi))
+            figure.suptitle(line, x=_TITLE_AT, ha="left")
         yield figure
         _make_ticks(figure)
         interactive = mpl.is_interactive()
@@ -139,10 +130,9 @@ class Page:
         self.drawn: list[Axes] = []
         self.handles: list[Any] | None = None
 
-    def panels(self, rows: int = 1, columns: int = 1, **options: Any) -> list[Axes]:
-        """Make panels, the main one first, or return the caller's axes alone."""
-        grid: Any = self.ax or self.figure.subplots(rows, columns, **options)
-        self.drawn = np.ravel(grid).tolist()
+    def panels(self, places: Any = "A", **options: Any) -> list[Axes]:
+        """Make panels at the letters of a mosaic, the main one first, or return the caller's axes alone."""
+        self.drawn = [self.ax] if self.ax else [*self.figure.subplot_mosaic(places, **options).values()]
         return self.drawn
 
 
@@ -156,18 +146,9 @@ def page_for(default: tuple[float, float], **place: Unpack[Place]) -> Iterator[P
         add_legend(figure, ax, handles_of(*page.drawn) if page.handles is None else page.handles)
 
 
-def _add_title(figure: Figure, ax: Axes | None, title: str) -> None:
-    """Put a title above a figure of its own, broken into lines where the figure ends, or above the caller's axes."""
-    short = _LONG_NUMBER.sub(lambda found: f"{float(found[0]):.4g}", title)
-    if ax is not None:
-        ax.set_title(short, wrap=True)
-    elif short:
-        # From the figure's edge, not from that of axes: the lines do not depend on how the panels are laid out.
-        line = figure.suptitle("", x=_TITLE_AT, ha="left", wrap=True)
-        letters = int((1.0 - 2.0 * _TITLE_AT) * 72.0 * figure.get_figwidth() / (_LETTER * float(line.get_fontsize())))
-        # Matplotlib breaks lines between words: a word longer than a line, as a path, is broken here.
-        pieces = functools.partial(textwrap.wrap, width=letters, break_on_hyphens=False)
-        line.set_text(re.sub(r"\S+", lambda word: " ".join(pieces(word[0])), short))
+def _letters(width: float, dpi: float, letter: float = _LETTER) -> int:
+    """Return how many letters of the style's font a width, in pixels, has space for."""
+    return max(_FEWEST_LETTERS, int(width / (letter * dpi * float(STYLE["font.size"]) / 72.0)))
 
 
 def magnified(largest: float) -> tuple[float, str]:
@@ -178,10 +159,9 @@ def magnified(largest: float) -> tuple[float, str]:
 
 def add_labels(axes: Axes, x_label: str, y_label: str) -> None:
     """Name both axes, in lines about as long as they are."""
-    lengths = _X_LINE * axes.bbox.width, _Y_LINE * axes.bbox.height
+    lengths = _LINE[0] * axes.bbox.width, _LINE[1] * axes.bbox.height
     for axis, label, length in zip((axes.xaxis, axes.yaxis), (x_label, y_label), lengths, strict=True):
-        letter = _LETTER * axes.figure.dpi * float(axis.label.get_fontsize()) / 72.0
-        axis.set_label_text(_in_lines(label, max(_FEWEST_LETTERS, int(length / letter))))
+        axis.set_label_text(textwrap.fill(label, _letters(length, axes.figure.dpi), break_long_words=False))
 
 
 def styles_of(count: int) -> list[dict[str, Any]]:
@@ -228,18 +208,14 @@ def scale_by_ratio(axes: Axes, x: Floats) -> None:
 
 def add_legend(figure: Figure, ax: Axes | None, handles: Sequence[Artist]) -> None:
     """Put the legend below all panels of a figure of its own, where it covers no data; else into the caller's axes."""
-    if not handles:
-        return
-    if ax is not None:
+    if ax is not None and handles:
         ax.legend(handles=handles)
-        return
-    below: dict[str, Any] = {"handles": handles, "loc": "outside lower center"}
-    for rows in range(1, len(handles) + 1):
-        legend = figure.legend(ncols=math.ceil(len(handles) / rows), **below)
-        if _fits(legend, figure):
-            return
-        legend.remove()
-    _break_lines(figure.legend(**below), figure)
+    elif handles:
+        space = _letters(figure.bbox.width, figure.dpi, _WIDE_LETTER)
+        labels = [textwrap.fill(str(handle.get_label()), space - _HANDLE) for handle in handles]
+        longest = _HANDLE + max(len(line) for label in labels for line in label.splitlines())
+        columns = min(max(1, space // longest), len(handles))
+        figure.legend(handles, labels, ncols=columns, loc="outside lower center")
 
 
 def handles_of(*panels: Axes) -> list[Artist]:
@@ -251,18 +227,10 @@ def handles_of(*panels: Axes) -> list[Artist]:
     return [*named.values()]
 
 
-def _in_lines(text: str, width: int) -> str:
-    """Break a text between words, but not before a unit."""
-    held = _BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", text)
-    return textwrap.fill(held, width, break_long_words=False).replace("\N{NO-BREAK SPACE}", " ")
-
-
 def _size(figsize: tuple[float, float]) -> tuple[float, float]:
     sides = checks.positive_numbers(figsize, "figsize", InvalidOption)
     if sides.size != 2:
-        raise InvalidOption(
-            f"{{}} must be (width, height), in inches, not {sides.size} numbers", "figsize", value=figsize
-        )
+        raise InvalidOption("{} must be (width, height), in inches", "figsize", value=figsize)
     return float(sides[0]), float(sides[1])
 
 
@@ -304,29 +272,10 @@ def _show(figure: Figure) -> None:
 
 def _is_shown() -> bool:
     """Whether there is a pyplot that somebody may ask to show the figure; windows belong to the main thread alone."""
-    if threading.current_thread() is not threading.main_thread():
-        return False
-    return "matplotlib.pyplot" in sys.modules or _in_notebook() or (_has_display() and _may_open_windows())
-
-
-def _in_notebook() -> bool:
     ipython = sys.modules.get("IPython")
-    return ipython is not None and hasattr(ipython.get_ipython(), "kernel")
-
-
-def _has_display() -> bool:
-    return sys.platform in ("darwin", "win32") or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))
-
-
-def _may_open_windows() -> bool:
-    """Whether the backend, if one is chosen already, has windows."""
-    import matplotlib as mpl
-    from matplotlib.backends.registry import BackendFilter, backend_registry
-
-    chosen = mpl.get_backend(auto_select=False)
-    registry: Any = backend_registry
-    without: list[str] = registry.list_builtin(BackendFilter.NON_INTERACTIVE)
-    return chosen is None or chosen.lower() not in without
+    in_notebook = ipython is not None and hasattr(ipython.get_ipython(), "kernel")
+    is_main = threading.current_thread() is threading.main_thread()
+    return is_main and ("matplotlib.pyplot" in sys.modules or in_notebook)
 
 
 def _make_ticks(figure: Figure) -> None:
@@ -335,18 +284,3 @@ def _make_ticks(figure: Figure) -> None:
         for axis in (axes.xaxis, axes.yaxis):
             axis.get_major_ticks(1)
             axis.get_minor_ticks(1)
-
-
-def _fits(legend: Legend, figure: Figure) -> bool:
-    return legend.get_window_extent().width <= _FITTING * figure.bbox.width
-
-
-def _break_lines(legend: Legend, figure: Figure) -> None:
-    """Break the texts of a legend until it fits into its figure, or words would have to be broken."""
-    texts = legend.get_texts()
-    width = max(len(text.get_text()) for text in texts)
-    longest_word = max(len(word) for text in texts for word in text.get_text().split())
-    while width > longest_word and not _fits(legend, figure):
-        width -= 1
-        for text in texts:
-            text.set_text(textwrap.fill(" ".join(text.get_text().split()), width))

@@ -1,8 +1,8 @@
-"""Curves with bands and dots: fragility, risk, spectra, calibrations."""
+"""Curves with bands and dots: fragility, risk, spectra, incremental dynamic analyses, calibrations."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, Unpack
 
 import numpy as np
@@ -14,7 +14,6 @@ from rocking.plot.canvas import ABOVE, CURVES, GROUND, INK, Place, add_labels, p
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
 
 _DOT: Final[dict[str, Any]] = {"markersize": 4.0, "markerfacecolor": "none"}
 
@@ -23,7 +22,6 @@ class FragilityLine(NamedTuple):
     """A fitted curve with its confidence band, and the shares seen among outcomes of about one intensity.
 
     seen_at, seen (groups,) : mean intensity of each group of outcomes, and the share of them that exceeds the limit
-    outcomes (groups,) : how many outcomes a group has
     """
 
     label: str
@@ -33,7 +31,6 @@ class FragilityLine(NamedTuple):
     upper: Floats
     seen_at: Floats
     seen: Floats
-    outcomes: Floats
 
 
 def fragility_figure(
@@ -53,14 +50,9 @@ def fragility_figure(
             axes.plot(line.intensity, line.probability, linewidth=1.5, label=as_written(line.label), **style)
             # Every limit state has a mark of its own.
             axes.plot(line.seen_at, line.seen, "os^D"[k % 4], color=style["color"], clip_on=False, **_DOT)
-        if any(np.any(line.lower < line.upper) for line in lines):
-            axes.fill_between([], [], [], color=GROUND, alpha=0.4, linewidth=0.0, label=band_label)
-        else:
-            axes.plot([], [], linestyle="none", label=band_label)
-        pooled = np.concatenate([line.outcomes for line in lines])
-        fewest, most = round(float(pooled.min())), round(float(pooled.max()))
-        count = f"{most} outcome{'' if most == 1 else 's'}" if fewest == most else f"{fewest} to {most} outcomes"
-        axes.plot([], [], "o", color=GROUND, label=f"dot: share of {count} at about its intensity", **_DOT)
+        is_bounded = any(np.any(line.lower < line.upper) for line in lines)
+        axes.fill_between([], [], color=GROUND, alpha=0.4 * is_bounded, linewidth=0.0, label=band_label)
+        axes.plot([], [], "o", color=GROUND, label="dot: share of outcomes at about its intensity", **_DOT)
         axes.set(xlim=(0.0, float(lines[0].intensity[-1])), ylim=(0.0, 1.0))
         axes.grid(True)
         add_labels(axes, intensity_label, probability_label)
@@ -93,7 +85,7 @@ def risk_figure(
 ) -> Figure:
     """Draw a hazard curve, dotted where it is extended, and below it where each limit state's rate comes from."""
     with page_for((5.6, 5.2), **place) as page:
-        *curves, shares = page.panels(2, sharex=True)
+        *curves, shares = page.panels("A;B", sharex=True)
         for axes in curves:
             _draw_hazard(axes, intensity, hazard)
         for k, line in enumerate(lines):
@@ -128,17 +120,12 @@ def survival_figure(
         scale_by_ratio(axes, intensity)
         if hazard is not None:
             _draw_hazard(axes, intensity, hazard)
-            above = hazard.rate > largest
-            axes.fill_between(
-                intensity, largest, hazard.rate, where=above.tolist(), color=ABOVE, alpha=0.2, linewidth=0.0,
-                label="more often than the block allows" if above.any() else "",
-            )  # fmt: skip
+            above: dict[str, Any] = {"color": ABOVE, "alpha": 0.2, "label": "more often than the block allows"}
+            axes.fill_between(intensity, largest, np.maximum(largest, hazard.rate), linewidth=0.0, **above)
         axes.plot(intensity, largest, label=largest_label, linewidth=1.5, **CURVES[1])
-        axes.set_yscale("log")
-        lowest, highest = float(largest.min()), float(largest[largest < np.inf].max())
-        if hazard is not None:
-            lowest, highest = min(lowest, float(hazard.rate.min())), float(hazard.rate.max())
-        axes.set(xlim=(float(intensity[0]), float(intensity[-1])), ylim=(0.5 * lowest, min(_MARGIN * highest, 10.0)))
+        rate = largest[largest < np.inf] if hazard is None else hazard.rate
+        lowest, highest = 0.5 * min(float(largest.min()), float(rate.min())), _MARGIN * float(rate.max())
+        axes.set(yscale="log", xlim=(intensity[0], intensity[-1]), ylim=(lowest, min(highest, 10.0)))
         axes.grid(True)
         add_labels(axes, intensity_label, "exceeded, times a year")
     return page.figure
@@ -159,20 +146,12 @@ def _draw_hazard(axes: Axes, intensity: Floats, hazard: HazardLine) -> None:
     add_labels(axes, "", "exceeded, times a year")
 
 
-#: Up to so many motions are named; of so few there is nothing to take fractiles of, either.
-_FEW: Final = 2
-
 #: So many curves leave space for all of their fractiles, and so many for every motion.
 _WITH_ALL_FRACTILES: Final = 2
 _WITH_ALL_MOTIONS: Final = 4
 
 #: Most curves that the legend names.
 _NAMED: Final = 8
-
-#: Widths of the lines of up to two motions, of the fractile nearest to the median, and of the others.
-_WIDTHS: Final = (1.6, 0.7)
-_MIDDLE: Final = 1.8
-_OTHER: Final = 0.9
 
 #: What marks an end of a line beyond which blocks overturn.
 _END: Final[dict[str, Any]] = {"marker": "x", "linestyle": "none", "markersize": 4.0, "markeredgewidth": 1.0}
@@ -204,41 +183,42 @@ def spectrum_figure(
 ) -> Figure:
     """Draw peak rotations over the abscissa, and below them the share of motions that overturn the block.
 
-    One curve alone needs no label, and of more than eight some are named. Two motions are named, more are counted, and
-    drawn with up to four curves. Of two motions or fewer no fractile is drawn, and of three curves or more only the
-    middle one. A line of a named motion, and a fractile, ends in a cross where the block of the next point overturns.
-    In `ax`, the peak rotations are drawn without the shares.
+    One curve alone needs no label, and of more than eight some are named. Motions are drawn with up to four curves, and
+    all fractiles with one or two, else the middle one. A fractile, and the line of a single motion, ends in a cross
+    where the block of the next point overturns. In `ax`, the peak rotations are drawn without the shares.
     """
-    from matplotlib.lines import Line2D
-
-    few = len(motions) <= _FEW
-    middle = _middle(fractiles)
-    chosen = {share: k for k, share in enumerate(fractiles) if share == middle or len(curves) <= _WITH_ALL_FRACTILES}
+    middle = min(fractiles, key=lambda share: abs(share - 0.5))
+    chosen = fractiles if len(motions) > 1 and len(curves) <= _WITH_ALL_FRACTILES else [middle]
+    widths = {share: 1.8 if share == middle else 0.9 for share in chosen}
+    named, with_singles = evenly(len(curves), _NAMED), len(curves) <= _WITH_ALL_MOTIONS
     with page_for((5.6, 4.8), **place) as page:
-        peaks, *shares = panels = page.panels(2, sharex=True, height_ratios=(3.2, 1.0))
-        for style, curve in zip(styles_of(len(curves)), curves, strict=True):
-            if few:
-                for width, single in zip(_WIDTHS, curve.singles, strict=False):
-                    _draw(peaks, x, single, width, style)
-            else:
-                for single in curve.singles if len(curves) <= _WITH_ALL_MOTIONS else ():
-                    shown = np.where(np.isfinite(single), single, np.nan)
-                    peaks.plot(x, shown, color=style["color"], linewidth=0.5, alpha=0.35)
-                for share, row in chosen.items():
-                    _draw(peaks, x, curve.fractiles[row], _MIDDLE if share == middle else _OTHER, style)
+        peaks, *shares = panels = page.panels("A;B", sharex=True, height_ratios=(3.2, 1.0))
+        for k, (style, curve) in enumerate(zip(styles_of(len(curves)), curves, strict=True)):
+            peaks.plot([], [], linewidth=1.4, label=as_written(curve.label) if k in named else "", **style)
+            if with_singles:
+                singles = np.where(np.isfinite(curve.singles), curve.singles, np.nan)
+                peaks.plot(x, singles.T, color=style["color"], linewidth=0.5, alpha=0.35)
+            for share, width in widths.items():
+                fractile = curve.fractiles[[*fractiles].index(share)]
+                _draw(peaks, x, curve.singles[0] if len(motions) == 1 else fractile, width, style)
             for panel in shares:
                 panel.step(x, curve.overturned, where="mid", linewidth=1.2, **style)
-        for panel in panels:
-            panel.grid(True, which="both")
+        if len(named) < len(curves):
+            peaks.plot([], [], linestyle="none", label=f"({len(named)} of {len(curves)} named)")
+        if len(motions) > 1:
+            if with_singles:
+                peaks.plot([], [], color=GROUND, linewidth=0.5, label=f"each of {len(motions)} motions")
+            for share, width in widths.items():
+                text = "median" if share == 0.5 else f"{100 * share:g} % of the motions are below"
+                peaks.plot([], [], color=INK, linewidth=width, label=text)
+        peaks.grid(True, which="both")
         scale_by_ratio(panels[-1], x)
         peaks.set_ylim(bottom=0.0)
         add_labels(peaks, "" if shares else x_label, "peak rotation / slenderness")
         for panel in shares:
+            panel.grid(True, which="both")
             panel.set_ylim(-0.03, 1.03)
             add_labels(panel, x_label, "share overturned")
-        page.handles = _handles(curves, motions, chosen)
-        if any(line.get_marker() == _END["marker"] for line in peaks.lines):
-            page.handles.append(Line2D([], [], color=INK, label="beyond: overturns", **_END))
     return page.figure
 
 
@@ -249,36 +229,77 @@ def _draw(axes: Axes, x: Floats, values: Floats, width: float, style: dict[str, 
     axes.plot(x, shown, marker="o" if x.size == 1 else "", markersize=4.0, linewidth=width, **style)
     ends = finite & ~(np.append(True, finite[:-1]) & np.append(finite[1:], True))
     if ends.any():
-        axes.plot(x[ends], values[ends], color=style["color"], **_END)
+        axes.plot(x[ends], values[ends], color=style["color"], label="beyond: overturns", **_END)
 
 
-def _middle(fractiles: Iterable[float]) -> float:
-    return min(fractiles, key=lambda share: abs(share - 0.5))
+#: Shares of the motions that fractiles are of, and their lines.
+_FRACTILES: Final[Mapping[float, Any]] = {0.16: (0, (1, 1)), 0.5: "-", 0.84: (0, (5, 1.5))}
 
 
-def _handles(curves: Sequence[SpectrumCurves], motions: Sequence[str], fractiles: Iterable[float]) -> list[Line2D]:
-    from matplotlib.lines import Line2D
+class ScaledMotion(NamedTuple):
+    """One motion scaled up: levels, peak rotation over slenderness, and the bands (n, 2) of levels that overturn."""
 
-    styles, shown = styles_of(len(curves)), evenly(len(curves), _NAMED)
-    each = [
-        Line2D([], [], linewidth=1.4, label=as_written(curves[k].label), **styles[k]) for k in shown if curves[k].label
-    ]
-    if len(shown) < len(curves):
-        each.append(Line2D([], [], linestyle="none", label=f"({len(shown)} of {len(curves)} curves are named)"))
-    if len(motions) == 1:
-        return each
-    if len(motions) <= _FEW:
-        named = zip(motions, _WIDTHS, strict=False)
-        return each + [Line2D([], [], color=INK, linewidth=width, label=as_written(name)) for name, width in named]
-    if len(curves) <= _WITH_ALL_MOTIONS:
-        each.append(Line2D([], [], color=GROUND, linewidth=0.5, label=f"each of {len(motions)} motions"))
-    middle = _middle(fractiles)
-    others = ", ".join(f"{100 * share:g}" for share in sorted(fractiles) if share != middle)
-    for percent, width in ((f"{100 * middle:g}", _MIDDLE), (others, _OTHER)):
-        if percent:
-            label = "median" if percent == "50" else f"{percent} % of the motions are below"
-            each.append(Line2D([], [], color=INK, linewidth=width, label=label))
-    return each
+    label: str
+    levels: Floats
+    peak: Floats
+    bands: Floats
+
+
+def ida_figure(*, motions: Sequence[ScaledMotion], level_label: str, **place: Unpack[Place]) -> Figure:
+    """Draw the level of scaled motions against the peak rotation, and beside it the levels that overturn.
+
+    More than four motions are drawn alike, with the fractiles of the levels that reach a peak rotation.
+    """
+    few = len(motions) <= len(CURVES)
+    names = [as_written(motion.label) for motion in motions]
+    if few and len(motions) > 1:
+        names = [f"{k}: {name}" for k, name in enumerate(names, start=1)]
+    stands = np.concatenate([motion.levels[np.isfinite(motion.peak)] for motion in motions])
+    last = max(float(motion.levels[-1]) for motion in motions)
+    with page_for((7.0, 4.2), **place) as page:
+        curves, *strips = page.panels("AB", sharey=True, width_ratios=(2.0, 1.0))
+        for k, motion in enumerate(motions):
+            style = CURVES[k] if few else {"color": GROUND, "linewidth": 0.6}
+            peak = np.where(np.isfinite(motion.peak), motion.peak, np.nan)
+            look: dict[str, Any] = {"marker": ".", "markersize": 5.0 if few else 3.0, "markeredgewidth": 0.0, **style}
+            curves.plot(peak, motion.levels, label=names[k] if few else "each motion", **look)
+            for panel in strips:
+                for band in motion.bands:
+                    # The ends are lines, so that the thinnest strip is seen.
+                    color = style["color"] if few else INK
+                    panel.plot([k, k], band, "_-", color=color, linewidth=5.0, markersize=5.0, solid_capstyle="butt")
+        if not few:
+            peaks = np.linspace(0.0, max(float(np.nanmax(line.get_xdata())) for line in curves.lines), 200)[1:]
+            reached = np.sort([levels_reaching(motion, peaks) for motion in motions], axis=0)
+            for share, linestyle in _FRACTILES.items():
+                # The lowest level that is enough for this share of the motions.
+                level = reached[int(np.ceil(share * len(motions))) - 1]
+                look = {"linestyle": linestyle, "label": f"level that suffices for {100 * share:g} % of them"}
+                curves.plot(peaks, np.where(np.isfinite(level), level, np.nan), color=ABOVE, **look)
+        curves.set(xlim=(0.0, None), ylim=(0.0, min(1.5 * float(stands.max(initial=0.0)) or last, last)))
+        curves.grid(True)
+        add_labels(curves, "peak rotation / slenderness", level_label)
+        for panel in strips:
+            panel.set_xticks(range(len(motions)), [str(k + 1) for k in range(len(motions))] if few else names)
+            panel.tick_params("x", labelrotation=0 if few else 90, labelsize="small")
+            panel.set_xlim(-0.7, len(motions) - 0.3)
+            add_labels(panel, "overturns", "")
+    return page.figure
+
+
+def levels_reaching(motion: ScaledMotion, peaks: Floats) -> Floats:
+    """Lowest level at which a motion reaches each of these peak rotations; infinite where it never does."""
+    overturns = float(np.min(motion.bands[:, 0], initial=np.inf))
+    below = motion.levels < overturns
+    level, peak = motion.levels[below], motion.peak[below]
+    if not level.size:
+        return np.full(peaks.shape, overturns)
+    first = np.searchsorted(np.maximum.accumulate(peak), peaks)
+    after = np.minimum(first, level.size - 1)
+    before = np.maximum(after - 1, 0)
+    rise = np.where(peak[after] > peak[before], peak[after] - peak[before], np.inf)
+    between = level[before] + (peaks - peak[before]) / rise * (level[after] - level[before])
+    return np.where(first < level.size, between, overturns)
 
 
 #: Bars of a histogram of blocks.
@@ -310,12 +331,8 @@ def outcomes_figure(
 ) -> Figure:
     """Draw the outcome of every test against its fitted probability, and the blocks behind that by parameters."""
     with page_for((7.0, 4.6), **place) as page:
-        if page.ax is None:
-            grid = page.figure.add_gridspec(2, len(parameters), height_ratios=(1.2, 1.0))
-            page.drawn = [
-                page.figure.add_subplot(at) for at in (grid[0, :], *(grid[1, k] for k in range(len(parameters))))
-            ]
-        tests, *panels = page.drawn or page.panels()
+        below = "ABCDEFGHI"[: len(parameters)]
+        tests, *panels = page.panels(f"{'T' * len(parameters)};{below}", height_ratios=(1.2, 1.0))
         # In increasing order, and each outcome where a sure prediction would put it.
         order = np.argsort(probabilities, kind="stable")
         number, fell = np.arange(1, order.size + 1), overturned[order]
@@ -338,7 +355,7 @@ def measured_figure(
 ) -> Figure:
     """Draw a measured rotation history (rad, over s), that of the fitted block, and what is left between them."""
     with page_for((7.0, 4.0), **place) as page:
-        main, *others = page.panels(2, sharex=True, height_ratios=(2.4, 1.0))
+        main, *others = page.panels("A;B", sharex=True, height_ratios=(2.4, 1.0))
         main.plot(time, measured, ".", color=GROUND, markersize=3.5, markeredgewidth=0.0, label="measured")
         main.plot(fitted_time, fitted, color=ABOVE, linewidth=0.9, label="fitted")
         main.set_xlim(time[0], time[-1])
@@ -364,8 +381,7 @@ def _draw_parameter(axes: Axes, parameter: Parameter, weights: Floats) -> None:
         median, low, high = parameter.estimates[k]
         at = axes.get_xaxis_transform()
         height = 0.97 - 0.07 * k
-        axes.plot([low, high], [height] * 2, color=style["color"], linewidth=1.0, transform=at)
-        axes.plot(median, height, "|", color=style["color"], markersize=7.0, transform=at)
+        axes.plot([low, median, high], [height] * 3, "|-", color=style["color"], linewidth=1.0, transform=at)
     axes.plot([], [], "|-", color=GROUND, linewidth=1.0, markersize=7.0, label="centre: median and 90 %")
     axes.set_ylim(0.0, 1.3 * axes.get_ylim()[1])
     axes.set_yticks([])
@@ -385,4 +401,27 @@ def reliability_figure(
         axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
         axes.grid(True)
         add_labels(axes, "predicted probability of overturning", "share that overturned")
+    return page.figure
+
+
+def draw_ground(axes: Axes, time: Floats, acceleration: Floats, linewidth: float) -> None:
+    """Draw an acceleration over time, about a line at zero."""
+    axes.axhline(0.0, color=INK, linewidth=0.4)
+    axes.plot(time, acceleration, color=GROUND, linewidth=linewidth, label="_ground acceleration")
+
+
+def motion_figure(
+    *, time: Floats, acceleration_g: Floats, vertical_g: Floats | None = None, **place: Unpack[Place]
+) -> Figure:
+    """Draw a ground acceleration (g) over time (s), and a vertical one below it; in `ax`, the horizontal one alone."""
+    traces = {"ground acceleration (g)": acceleration_g}
+    if vertical_g is not None and place.get("ax") is None:
+        traces["vertical acceleration (g)"] = vertical_g
+    with page_for((7.0, 0.6 + 1.8 * len(traces)), **place) as page:
+        panels = page.panels(";".join("AB"[: len(traces)]), sharex=True)
+        for axes, (label, trace) in zip(panels, traces.items(), strict=True):
+            draw_ground(axes, time, trace, 0.8)
+            axes.set_xlim(time[0], time[-1])
+            add_labels(axes, "time (s)" if axes is panels[-1] else "", label)
+        page.handles = []
     return page.figure

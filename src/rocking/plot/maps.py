@@ -1,8 +1,7 @@
-"""Maps over two parameters: outcomes of points, regions between boundaries, basins, a number for each block."""
+"""Maps over two parameters: outcomes, regions, basins, a number for each block; and roses over all directions."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final, Unpack
@@ -13,11 +12,11 @@ from numpy.typing import NDArray
 from rocking.core.arrays import Floats
 from rocking.core.tables import as_written
 from rocking.errors import InvalidOption
-from rocking.plot.boundaries import Stack, runs
-from rocking.plot.canvas import ABOVE, INK, Place, add_labels, cell_edges, page_for
+from rocking.plot.canvas import ABOVE, GROUND, INK, REST, Place, add_labels, cell_edges, page_for, styles_of
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch
 
@@ -41,16 +40,15 @@ _OVERTURNS: Final = (
     ("#fbe7cd", "...."),
 )
 
-#: Share of the frame below which nobody sees a region.
+#: Share of the frame below which nobody sees a region, and share of its height below which lines would hide one.
 _LEAST_SEEN: Final = 1e-3
+_STRIP: Final = 1e-2
+
+#: Share of the frame's height beyond which boundaries of two columns are no longer one.
+_SAME: Final = 0.25
 
 #: The ends of a frame around one value, over it.
 _AROUND: Final = np.array([0.9, 1.1])
-
-#: Shares of the frame's height: a region lower than the first, about half a point, is no more than a speck, and one
-#: lower than the second would vanish between the lines on both sides of it.
-_SPECK: Final = 2e-3
-_STRIP: Final = 1e-2
 
 
 def outcome_figure(
@@ -66,27 +64,33 @@ def outcome_figure(
 ) -> Figure:
     """Draw which of up to six outcomes each point of a grid has: numbers of shape (len(y), len(x))."""
     from matplotlib import rc_context
-    from matplotlib.colors import BoundaryNorm, ListedColormap
+    from matplotlib.colors import ListedColormap
 
-    count = len(meanings)
     with page_for((5.4, 4.2), **place) as page:
         (axes,) = page.panels()
-        colours, norm = ListedColormap(_COLOURS[:count]), BoundaryNorm(np.arange(count + 1) - 0.5, count)
-        axes.pcolormesh(cell_edges(x), cell_edges(y), outcome, cmap=colours, norm=norm, rasterized=True)
-        present = sorted(set(np.unique(outcome).tolist()))
-        handles = [_patch((_COLOURS[k], ""), meanings[k]) for k in present]
+        _colour_cells(axes, x, y, outcome, _COLOURS[: len(meanings)])
+        page.handles = [_patch((_COLOURS[k], ""), meanings[k]) for k in np.unique(outcome)]
         if later.any():
+            cells = np.ma.masked_where(~later, outcome)
             # Two hatches over each other are seen on the lightest colours and on the darkest.
             for ink, width in (("#ffffff", 2.0), (_LATER, 0.9)):
+                look: dict[str, Any] = {"cmap": ListedColormap(["none"]), "edgecolor": ink, "linewidth": 0.0}
                 with rc_context({"hatch.linewidth": width}):
-                    axes.pcolor(
-                        cell_edges(x), cell_edges(y), np.ma.masked_where(~later, outcome), facecolor="none",
-                        cmap=ListedColormap(["none"]), hatch="////", edgecolor=ink, linewidth=0.0,
-                    )  # fmt: skip
-            handles.append(_patch(("#ffffff", "////"), "overturns later"))
+                    axes.pcolor(cell_edges(x), cell_edges(y), cells, hatch="////", **look)
+            page.handles.append(_patch(("#ffffff", "////"), "overturns later"))
         add_labels(axes, x_label, y_label)
-        page.handles = handles
     return page.figure
+
+
+def _colour_cells(
+    axes: Axes, x: Floats, y: Floats, numbers: NDArray[np.integer], colours: Sequence[str], first: int = 0
+) -> None:
+    """Fill the cells about the points of a grid, each with the colour of its number, of which `first` is the first."""
+    from matplotlib.colors import BoundaryNorm, ListedColormap
+
+    norm = BoundaryNorm(np.arange(len(colours) + 1) + first - 0.5, len(colours))
+    look: dict[str, Any] = {"cmap": ListedColormap([*colours]), "norm": norm, "rasterized": True}
+    axes.pcolormesh(cell_edges(x), cell_edges(y), numbers, **look)
 
 
 def regions_figure(
@@ -103,49 +107,70 @@ def regions_figure(
     """Draw regions between boundaries that are known at increasing abscissae x, shape (n,).
 
     At each abscissa, `edges` are the ordinates of the boundaries, increasing, and `regions` those below, between and
-    above them: negative ones, from -3 on, where the block stays, the others where it overturns after so many impacts.
-    Those that can be seen are in the legend by their names. How the regions of neighbours meet says
-    `rocking.plot.boundaries`. A strip has no lines around it, which would hide it, and a region too low to be seen none
-    that would make it seen.
+    above them: negative ones, from -5 on, where the block stays, the others where it overturns after so many impacts.
+    Boundaries between the same regions are joined straight; a region that a neighbour does not have ends half way to
+    it. Regions that can be seen are in the legend by their names.
     """
-    from matplotlib.collections import LineCollection, PolyCollection
-
     low, high = y_range
     # One column, or one level, fills the frame.
     if x.size == 1:
         x, edges, regions = x * _AROUND, [*edges] * 2, [*regions] * 2
     if low == high:
         low, high = low * _AROUND
-    stacks = [Stack(np.array([low, *edge, high]), tuple(at)) for edge, at in zip(edges, regions, strict=True)]
-    polygons, specks = dict[int, list[Floats]](), dict[int, list[Floats]]()
-    tallest: dict[int, float] = {}
-    lines: list[Floats] = []
-    for abscissae, levels, inside in runs(x, stacks):
-        curves = [np.column_stack([abscissae, level]) for level in levels]
-        heights = np.diff(levels, axis=0).max(axis=1) / (high - low)
-        for region, height, below, above in zip(inside, heights, curves, curves[1:], strict=False):
-            among = polygons if height > _SPECK else specks
-            among.setdefault(region, []).append(np.concatenate([below, above[::-1]]))
-            tallest[region] = max(height, tallest.get(region, 0.0))
-        seen = np.flatnonzero(heights > _SPECK)
-        lines += [curves[j + 1] for j, k in pairwise(seen) if min(heights[j], heights[k]) > _STRIP]
+    area: dict[int, float] = {}
+    farthest = _SAME * (high - low)
+    starts = [k for k in range(len(x)) if k == 0 or tuple(regions[k]) != tuple(regions[k - 1])]
     with page_for((5.6, 4.6), **place) as page:
         (axes,) = page.panels()
-        for region, corners in specks.items():
-            axes.add_collection(PolyCollection(corners, facecolors=_look(region)[0], linewidths=0.0))
-        for region, corners in polygons.items():
-            colour, hatch = _look(region)
-            # An edge of the same colour closes the seams between polygons; a hatch takes the colour of its edge.
-            axes.add_collection(PolyCollection(corners, facecolors=colour, edgecolors=colour, linewidths=0.5))
-            if hatch:
-                shape = PolyCollection(corners, facecolors="none", edgecolors=INK, linewidths=0.0, hatch=hatch)
-                axes.add_collection(shape)
-        axes.add_collection(LineCollection(lines, colors=INK, linewidths=0.5, capstyle="round", snap=False))
+        for start, end in pairwise([*starts, len(x)]):
+            rows = [(x[k], edges[k]) for k in range(start, end)]
+            if start > 0:
+                rows.insert(
+                    0, (np.mean(x[start - 1 : start + 1]), _half_way(start, start - 1, edges, regions, farthest))
+                )
+            if end < len(x):
+                rows.append((np.mean(x[end - 1 : end + 1]), _half_way(end - 1, end, edges, regions, farthest)))
+            at = np.array([abscissa for abscissa, _ in rows])
+            levels = np.array([[low, *row, high] for _, row in rows]).T
+            seen = np.diff(levels, axis=0).max(axis=1) > _STRIP * (high - low)
+            for k, region in enumerate(regions[start]):
+                colour, hatch = _look(region)
+                look: dict[str, Any] = {"facecolor": colour, "hatch": hatch, "edgecolor": INK, "antialiased": False}
+                axes.fill_between(at, levels[k], levels[k + 1], linewidth=0.0, **look)
+                area[region] = area.get(region, 0.0) + float(np.trapezoid(levels[k + 1] - levels[k], at))
+                if k > 0 and seen[k - 1] and seen[k]:  # lines would hide a strip
+                    axes.plot(at, levels[k], color=INK, linewidth=0.5, solid_capstyle="round")
         axes.set(xlim=(x[0], x[-1]), ylim=(low, high))
         add_labels(axes, x_label, y_label)
-        strips = {region: f"{name} (a strip)" for region, name in names.items() if tallest.get(region, 1.0) < _STRIP}
-        page.handles = _patches(polygons, {**names, **strips}, (x[-1] - x[0]) * (high - low))
+        looks: dict[tuple[str, str], list[int]] = {}
+        for region in sorted(area):
+            if area[region] > _LEAST_SEEN * (x[-1] - x[0]) * (high - low):
+                looks.setdefault(_look(region), []).append(region)
+        page.handles = [
+            _patch(look, names[alike[0]] if len(alike) == 1 else f"overturns after {alike[0]} or more")
+            for look, alike in looks.items()
+        ]
     return page.figure
+
+
+def _half_way(
+    k: int, beside: int, edges: Sequence[Floats], regions: Sequence[Sequence[int]], farthest: float
+) -> Floats:
+    """Boundaries of a column half way to one beside it: to the nearest between the same regions, or a tip, or as is."""
+    one, other = np.array(edges[k], dtype=float), np.array(edges[beside], dtype=float)
+    pairs = [*pairwise(regions[beside])]
+    alike = np.array([[mine == theirs for theirs in pairs] for mine in pairwise(regions[k])], dtype=bool)
+    distance = np.abs(one[:, None] - other)
+    alike = alike.reshape(distance.shape) & (distance < farthest)
+    distance[~alike] = np.inf
+    nearest = [distance.min(axis=axis, initial=np.inf, keepdims=True) for axis in (0, 1)]
+    mine, theirs = np.nonzero(alike & (distance == nearest[0]) & (distance == nearest[1]))
+    one[mine] = 0.5 * (one[mine] + other[theirs])
+    alone = np.setdiff1d(np.arange(one.size), mine)
+    for i in alone[np.isin(alone + 1, alone)]:
+        if regions[k][i] == regions[k][i + 2]:
+            one[i : i + 2] = np.mean(one[i : i + 2])
+    return np.maximum.accumulate(one)
 
 
 def _look(region: int) -> tuple[str, str]:
@@ -153,22 +178,6 @@ def _look(region: int) -> tuple[str, str]:
     if region < 0:
         return (_UNFINISHED, _OVERTURNS_AFTER_REST, *_STAYS)[region + 5]
     return _OVERTURNS[min(region, len(_OVERTURNS) - 1)]
-
-
-def _patches(polygons: Mapping[int, Sequence[Floats]], names: Mapping[int, str], frame: float) -> list[Patch]:
-    """Make the handles of the legend for what can be seen; regions that look the same share one."""
-
-    def area(x: Floats, y: Floats) -> float:
-        return 0.5 * abs(float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))))
-
-    looks: dict[tuple[str, str], list[int]] = {}
-    for region in sorted(polygons):
-        looks.setdefault(_look(region), []).append(region)
-    return [
-        _patch(look, names[alike[0]] if len(alike) == 1 else f"overturns after {alike[0]} or more")
-        for look, alike in looks.items()
-        if sum(area(*corners.T) for region in alike for corners in polygons[region]) > _LEAST_SEEN * frame
-    ]
 
 
 def _patch(look: tuple[str, str], label: str) -> Patch:
@@ -180,10 +189,6 @@ def _patch(look: tuple[str, str], label: str) -> Patch:
 #: Width and height of one panel, inches, and how many stand side by side.
 _PANEL: Final = (3.5, 2.9)
 _BESIDE: Final = 2
-
-#: Area of a mark, points squared, shared by all of them, between bounds.
-_AREA: Final = 9000.0
-_MARK: Final = (6.0, 60.0)
 
 
 def blocks_figure(
@@ -198,27 +203,22 @@ def blocks_figure(
     """Draw a number for each block as the colour of a mark, in one panel or several with the same colours."""
     if place.get("ax") is not None and len(panels) > 1:
         raise InvalidOption(f"{len(panels)} panels need a figure of their own: leave ax out, or select one of them")
-    columns = min(len(panels), _BESIDE)
-    rows = math.ceil(len(panels) / columns)
-    finite = np.concatenate([values[np.isfinite(values)] for values in panels.values()])
-    low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
-    area = float(np.clip(_AREA / len(p), *_MARK))
-    with page_for((columns * _PANEL[0] + 0.6, rows * _PANEL[1] + 0.4), **place) as page:
-        axes = page.panels(rows, columns)
-        for each, (name, values) in zip(axes, panels.items(), strict=False):
-            there = np.isfinite(values)
-            x, y = p[there], np.degrees(alpha[there])
-            shades: dict[str, Any] = {"cmap": "cividis_r", "vmin": low, "vmax": high}
-            marks = each.scatter(x, y, c=values[there], s=area, marker="s", linewidth=0.0, **shades)
+    names, columns = [*panels], min(len(panels), _BESIDE)
+    rows = [[*names[k : k + columns], *"." * (columns - len(names[k:]))] for k in range(0, len(names), columns)]
+    every = np.concatenate([*panels.values()])
+    finite = every[np.isfinite(every)] if np.isfinite(every).any() else np.array([0.0, 1.0])
+    shades: dict[str, Any] = {"cmap": "cividis_r", "vmin": finite.min(), "vmax": finite.max()}
+    size: dict[str, Any] = {"s": float(np.clip(9000.0 / len(p), 6.0, 60.0))}
+    with page_for((columns * _PANEL[0] + 0.6, len(rows) * _PANEL[1] + 0.4), **place) as page:
+        for each, (name, values) in zip(page.panels(rows), panels.items(), strict=True):
+            there, degrees = np.isfinite(values), np.degrees(alpha)
+            marks = each.scatter(p[there], degrees[there], c=values[there], marker="s", linewidth=0.0, **size, **shades)
             if not there.all():
-                x, y = p[~there], np.degrees(alpha[~there])
-                each.scatter(x, y, s=area, marker="x", color=ABOVE, linewidth=0.7, label=missing_label)
+                look: dict[str, Any] = {"color": ABOVE, "linewidth": 0.7, "label": missing_label}
+                each.scatter(p[~there], degrees[~there], marker="x", **size, **look)
             add_labels(each, "p (rad/s)", "slenderness (degrees)")
             if len(panels) > 1:
                 each.set_title(as_written(name), color=INK)
-        page.drawn = axes[: len(panels)]
-        for spare in axes[len(panels) :]:
-            spare.remove()
         page.figure.colorbar(marks, ax=page.drawn, label=value_label, shrink=0.9)
     return page.figure
 
@@ -228,7 +228,6 @@ _SHADES: Final = {
     "orbit": ("#f4f7fb", "#c3d3e6", "#8fabcd", "#6488b3", "#e8d9a8", "#bda55d"),
     "overturns": ("#8c3410", "#3f1404"),
     "unsettled": ("#7a7f85",),
-    "missing": ("#ffffff",),
 }
 
 #: Marks of the points of orbits, those of one orbit alike.
@@ -248,37 +247,84 @@ def basins_figure(
     **place: Unpack[Place],
 ) -> Figure:
     """Draw which attractor each state of a grid goes to: numbers of shape (len(y), len(x)), -1 where unknown."""
-    from matplotlib.colors import BoundaryNorm, ListedColormap
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
-    shades = [_SHADES["missing"][0]]
-    for k, kind in enumerate(kinds):
-        among = _SHADES[kind]
-        shades.append(among[min(kinds[:k].count(kind), len(among) - 1)])
-    colours, norm = ListedColormap(shades), BoundaryNorm(np.arange(len(shades) + 1) - 1.5, len(shades))
+    seen = [kinds[:k].count(kind) for k, kind in enumerate(kinds)]
+    shades = [_SHADES[kind][min(k, len(_SHADES[kind]) - 1)] for k, kind in zip(seen, kinds, strict=True)]
     with page_for((5.4, 4.6), **place) as page:
         (axes,) = page.panels()
-        axes.pcolormesh(cell_edges(x), cell_edges(y), outcome, cmap=colours, norm=norm, rasterized=True)
-        handles: list[Artist] = []
-        if np.any(outcome < 0):
-            handles.append(Patch(facecolor=shades[0], edgecolor=INK, linewidth=0.5, hatch="....", label="not reached"))
-        marked = 0
-        for k, (name, kind) in enumerate(zip(names, kinds, strict=True)):
-            handles.append(Patch(facecolor=shades[k + 1], edgecolor=INK, linewidth=0.5, label=name))
-            if kind != "orbit":
-                continue
-            look: dict[str, Any] = {
-                "marker": _MARKS[marked % len(_MARKS)],
-                "color": "white",
-                "markeredgecolor": INK,
-                "markersize": 4.5,
-            }
-            inside = (orbits[k] >= [x[0], y[0]]).all(axis=1) & (orbits[k] <= [x[-1], y[-1]]).all(axis=1)
-            if inside.any():
-                axes.plot(*orbits[k][inside].T, linestyle="", markeredgewidth=0.8, **look)
-                handles.append(Line2D([], [], linestyle="", label=f"{name}: its points", **look))
-            marked += 1
+        _colour_cells(axes, x, y, outcome, ["#ffffff", *shades], first=-1)
+        handles: list[Artist] = [_patch(("#ffffff", "...."), "not reached")] if np.any(outcome < 0) else []
+        for name, kind, shade, k, points in zip(names, kinds, shades, seen, orbits, strict=True):
+            handles.append(_patch((shade, ""), name))
+            inside = points[(points >= [x[0], y[0]]).all(axis=1) & (points <= [x[-1], y[-1]]).all(axis=1)]
+            if kind == "orbit" and len(inside):
+                look: dict[str, Any] = {"marker": _MARKS[k % len(_MARKS)], "markersize": 4.5, "markeredgewidth": 0.8}
+                look |= {"linestyle": "", "color": "white", "markeredgecolor": INK, "label": f"{name}: its points"}
+                handles += axes.plot(*inside.T, **look)
         add_labels(axes, x_label, y_label)
         page.handles = handles
     return page.figure
+
+
+def rose_figure(
+    *,
+    azimuth: Floats,
+    acceleration: Floats,
+    slenderness: Floats,
+    p: Floats,
+    support: Floats,
+    weakest: tuple[float, float],
+    **place: Unpack[Place],
+) -> Figure:
+    """Draw the acceleration that lifts a body in each direction, g, around its support; slenderness and p beside it."""
+    from matplotlib.patches import Polygon
+
+    with page_for((6.8, 4.0), **place) as page:
+        main, *beside = page.panels("AB;AC", width_ratios=(1.6, 1.0))
+        for axes, values, label in zip(beside, (slenderness, p), ("slenderness (deg)", "p (rad/s)"), strict=False):
+            axes.plot(*_closed(azimuth, values), color=INK, linewidth=1.2)
+            axes.set(xlim=(0.0, 360.0), xticks=(0.0, 180.0, 360.0))
+            axes.grid(True)
+            add_labels(axes, "azimuth (deg)" if axes is beside[-1] else "", label)
+        _look_down(main, float(max(acceleration.max(), np.abs(support).max())))
+        label = "support over height of centre of mass"
+        main.add_patch(Polygon(support, facecolor=REST, edgecolor=GROUND, linewidth=1.0, label=label))
+        main.plot(*_around(azimuth, acceleration), color=INK, linewidth=1.4, label="ground acceleration that lifts it")
+        label = f"least: {weakest[1]:.3g} g at {weakest[0]:.3g} deg"
+        end = _around(np.array([weakest[0]]), np.array([weakest[1]]))[:, :1]
+        main.plot(*np.insert(end, 0, 0.0, axis=1), color=ABOVE, linewidth=1.6, linestyle=(0, (4, 1.5)), label=label)
+        add_labels(main, "towards west and east (g)", "towards south and north (g)")
+    return page.figure
+
+
+def shares_figure(*, azimuth: Floats, shares: Floats, labels: Sequence[str], **place: Unpack[Place]) -> Figure:
+    """Draw shares, shape (curves, azimuths), over the azimuth: towards the north up, and the full circle is all."""
+    with page_for((4.8, 4.8), **place) as page:
+        (axes,) = page.panels()
+        _look_down(axes, 1.0)
+        for share, label, style in zip(shares, labels, styles_of(len(labels)), strict=True):
+            look = {"linewidth": 1.4, "marker": "o", "markersize": 2.0, "label": as_written(label), **style}
+            axes.plot(*_around(azimuth, share), **look)
+        add_labels(axes, "share towards west and east", "share towards south and north")
+    return page.figure
+
+
+def _closed(azimuth: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Values over the azimuth, with the first once more a turn later."""
+    return np.append(azimuth, azimuth[0] + 360.0), np.append(values, values[0])
+
+
+def _around(azimuth: Floats, values: Floats) -> Floats:
+    """Places at distances towards azimuths, in a closed line; shape (2, n)."""
+    turned, distances = _closed(azimuth, values)
+    angle = np.deg2rad(turned)
+    return np.asarray(distances * np.array([np.sin(angle), np.cos(angle)]))
+
+
+def _look_down(axes: Axes, most: float) -> None:
+    """Show as far as a distance to every side, with the distance from the middle on both axes."""
+    axes.set(aspect="equal", xlim=(-1.1 * most, 1.1 * most), ylim=(-1.1 * most, 1.1 * most))
+    axes.locator_params(nbins=5)
+    axes.grid(True)
+    axes.plot(0.0, 0.0, "+", color=INK)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(lambda value, _: f"{abs(value):g}")

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any, Final, Unpack
 import numpy as np
 
 from rocking.core.arrays import Flags, Floats, Integers
-from rocking.plot.canvas import ABOVE, GROUND, INK, Place, add_labels, page_for
+from rocking.plot.canvas import ABOVE, GROUND, INK, Place, add_labels, add_ticks, page_for
 
 if TYPE_CHECKING:
-    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -46,7 +45,7 @@ def orbit_figure(
 ) -> Figure:
     """Draw a periodic orbit: velocity against coordinate with its impacts, and the coordinate over time."""
     with page_for((7.0, 3.2), **place) as page:
-        plane, *histories = page.panels(1, 2)
+        plane, *histories = page.panels("AB")
         # Arcs end at impacts: a jump of the velocity is no part of the course.
         at = np.searchsorted(time, impact_times, side="right") - 1  # division may have made two times one
         x, v = (np.insert(each, at, np.nan) for each in (coordinate, velocity))
@@ -117,33 +116,22 @@ def bifurcation_figure(
     **place: Unpack[Place],
 ) -> Figure:
     """Draw states, shape (len(value), n), of each direction against a parameter; NaN where there is none."""
-    from matplotlib.lines import Line2D
-
     with page_for((5.6, 3.8), **place) as page:
         (axes,) = page.panels()
-        handles: list[Artist] = []
         looks = _ALONE if len(states) == 1 else _LOOKS
         for (way, kept), (colour, area) in zip(states.items(), looks, strict=True):
-            x = np.broadcast_to(value[:, None], kept.shape).ravel()
-            axes.scatter(x, kept.ravel(), s=area, marker="o", color=colour, linewidths=0.0, rasterized=True)
-            size = area**0.5 + 1.0
-            handles.append(Line2D([], [], linestyle="", marker="o", color=colour, markersize=size, label=_WORDS[way]))
+            look: dict[str, Any] = {"linestyle": "", "marker": "o", "color": colour, "markeredgewidth": 0.0}
+            axes.plot(value, kept, markersize=area**0.5, rasterized=True, **look)
+            axes.plot([], [], markersize=area**0.5 + 1.0, label=_WORDS[way], **look)
         for gone, marker, label in ((overturned, "|", "overturned"), (not_followed, "x", "not followed")):
-            if gone is None or not gone.any():
-                continue
-            look: dict[str, Any] = {"linestyle": "", "marker": marker, "color": GROUND}
-            axes.plot(value[gone], 0.015 + 0.0 * value[gone], transform=axes.get_xaxis_transform(), **look)
-            handles.append(Line2D([], [], label=label, **look))
+            if gone is not None and gone.any():
+                add_ticks(axes, value[gone], 0.015, marker, color=GROUND, label=label)
         axes.set_xlim(value[0], value[-1] if value.size > 1 else None)
         add_labels(axes, x_label, y_label)
-        page.handles = handles
     return page.figure
 
 
 _DOTS: Final[dict[str, Any]] = {"linestyle": "", "marker": "o", "color": INK, "markersize": 3.2, "markeredgewidth": 0.6}
-
-#: Up to so many intervals are joined by a line, which shows how they take turns.
-_JOINED: Final = 100
 
 #: Space beside the first and the last impact, over their number.
 _MARGIN: Final = 0.03
@@ -155,7 +143,7 @@ def intervals_figure(*, intervals: Floats, eta: float, **place: Unpack[Place]) -
 
     with page_for((7.0, 3.2), **place) as page:
         # Panels are beside each other where the figure is wider than high.
-        panels = page.panels(*((1, 2) if page.figure.get_figwidth() > page.figure.get_figheight() else (2, 1)))
+        panels = page.panels("AB" if page.figure.get_figwidth() > page.figure.get_figheight() else "A;B")
         number = np.arange(1, intervals.size + 1)
         margin = max(0.5, _MARGIN * intervals.size)
         _draw(panels[0], number, intervals)
@@ -176,12 +164,8 @@ def intervals_figure(*, intervals: Floats, eta: float, **place: Unpack[Place]) -
 
 def _draw(axes: Axes, number: Integers, values: Floats) -> None:
     """Draw values by the number of the impact; those of the first side filled, those of the second open."""
-    if values.size <= _JOINED:
-        axes.plot(number, values, color=INK, linewidth=0.4, alpha=0.6, label="_in turn")
+    axes.plot(number, values, color=INK, linewidth=0.4, alpha=0.6, label="_in turn")
     for first, face, label in ((1, INK, "impacts 1, 3, ..."), (0, "white", "impacts 2, 4, ...")):
         chosen = number % 2 == first
         if chosen.any():
             axes.plot(number[chosen], values[chosen], markerfacecolor=face, label=label, **_DOTS)
-    if not values.size:
-        axes.annotate("no such impacts", (0.5, 0.7), xycoords="axes fraction", ha="center", color=INK)
-        axes.set_xticks([])

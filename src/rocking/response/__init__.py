@@ -14,14 +14,12 @@ from rocking.response.perturbed import (
     steps_within,
 )
 from rocking.response.response import Response
-from rocking.response.sensitivity import AMBIGUITY, QUANTITIES, Sensitivity
+from rocking.response.sensitivity import Sensitivity
 from rocking.response.summary import in_brief, in_words, known_ratio, ratio_text
 
 __all__ = [
-    "AMBIGUITY",
     "COUNT",
     "PRECISION",
-    "QUANTITIES",
     "RELATIVE",
     "Gradient",
     "Perturbed",

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, Unpack, get_args
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, Unpack, get_args
 
 import numpy as np
 
@@ -15,32 +16,37 @@ from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.tables import as_written
 from rocking.engine.problem import thresholds_of
 from rocking.errors import InvalidOption
-from rocking.plot.canvas import Place
-from rocking.plot.response import DrawnSequence, RotationUnits, energy_figure, phase_figure, response_figure
+from rocking.plot.canvas import ABOVE, GROUND, INK, REST, Page, Place, add_labels, add_ticks, page_for, write
+from rocking.plot.curves import draw_ground
+from rocking.response.simulated import Simulated
+from rocking.response.summary import line, time_text
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from rocking.response.response import Response
+#: What rotations are drawn in.
+RotationUnits = Literal["slenderness", "rad", "deg"]
 
 #: Even times of a drawn line: a history, and a course in the phase plane.
 _EVEN_TIMES: Final = 4001
-_EVEN_TIMES_OF_COURSE: Final = 3001
 
-#: Impacts of a course that are drawn at most, evenly left out; and intervals between impacts that have more points, by
-#: how many even steps they are long: arcs of shorter ones nobody sees.
+#: Impacts of a course that are drawn at most, evenly left out.
 _MOST_IMPACTS: Final = 2000
-_SHORT: Final = (0.5, 12.0)
-_POINTS_OF_SHORT: Final = 12
+
+#: Rotations and velocities beyond this leave the frame: past it a block only falls.
+_FARTHEST: Final = 2.0
+
+_BOUNDARY: Final[dict[str, Any]] = {"color": ABOVE, "linewidth": 0.9, "linestyle": (0, (6, 2, 1, 2))}
 
 
-def titled(response: Response) -> str:
+def titled(response: Simulated) -> str:
     """Return what was simulated, for the title of a figure."""
     shaken = "no motion" if response.motion is None else response.motion.label
     return as_written(f"{title_of(response.body)} under {shaken}")
 
 
-def active_span(response: Response) -> tuple[float, float]:
+def active_span(response: Simulated) -> tuple[float, float]:
     """Stretch worth drawing: from a little before the first event to a little after the last."""
     times = np.concatenate([response.events["time"], response.impacts["time"]])
     if len(times) == 0:
@@ -50,7 +56,7 @@ def active_span(response: Response) -> tuple[float, float]:
     return max(0.0, first - margin), min(response.duration, float(times.max()) + margin)
 
 
-def shown_span(response: Response, window: Sequence[float] | None) -> tuple[float, float]:
+def shown_span(response: Simulated, window: Sequence[float] | None) -> tuple[float, float]:
     """Return a window of a response, s, or else what is worth drawing; refuse what is no stretch of the response."""
     if window is None:
         return active_span(response)
@@ -64,7 +70,7 @@ def shown_span(response: Response, window: Sequence[float] | None) -> tuple[floa
     return float(ends[0]), float(ends[1])
 
 
-def drawing_times(response: Response, start: float, end: float) -> Floats:
+def drawing_times(response: Simulated, start: float, end: float) -> Floats:
     """Return times dense enough for a smooth line: even ones, and those of steps that are long enough to see."""
     even = np.linspace(start, end, _EVEN_TIMES)
     steps = _within(response._history.trail.nodes["time"], start, end)
@@ -76,7 +82,7 @@ def _within(times: Floats, start: float, end: float) -> Floats:
     return times[(times >= start) & (times <= end)]
 
 
-def picture(response: Response) -> str:
+def picture(response: Simulated) -> str:
     """Draw the rotation for a notebook, cut at twice the slenderness: past it a block only falls."""
     times = drawing_times(response, *active_span(response))
     coordinate, (plus, minus) = response.body.coordinate, response.balance
@@ -84,59 +90,185 @@ def picture(response: Response) -> str:
     if coordinate.limit and math.isfinite(min(plus, minus)):
         drawn = drawn / np.where((drawn >= 0.0) & math.isfinite(plus) | (not math.isfinite(minus)), plus, minus)
         drawn, label = np.clip(drawn, -2.0, 2.0), f"{coordinate.name} / {coordinate.limit}"
-    return svg.captioned(f"Response: {response._headline()}", svg.history(times, drawn, label))
+    return svg.captioned(f"Response: {line(response)}", svg.history(times, drawn, label))
 
 
 def histories(
-    response: Response,
+    response: Simulated,
     units: RotationUnits,
     window: Sequence[float] | None,
     *,
     longest_sequence: bool,
     **place: Unpack[Place],
 ) -> Figure:
-    """Draw the rotation over the ground motion in a window."""
+    """Draw the rotation over the ground motion in a window.
+
+    The rotation leaves the frame beyond twice the slenderness (or balance). The longest chattering sequence has a panel
+    of its own, the interval to the next impact against the time to rest, both logarithmic. In `ax`, the rotation is
+    drawn without the other panels.
+    """
     checks.one_of(units, "units", InvalidOption, get_args(RotationUnits))
-    start, end = shown_span(response, window)
-    times, (body, motion) = drawing_times(response, start, end), (response.body, response.motion)
-    corners = np.empty(0) if motion is None else motion.drawing_times(start, end)
-    lift = None if motion is None or motion.vertical is None else motion.vertical.acceleration(corners)
-    weight = 1.0 if lift is None else 1.0 + lift / body.gravity
-    (pair,), (own,) = thresholds_of(body.alone(), response.model)
-    with np.errstate(invalid="ignore"):  # of a body of one side, which nothing lifts to the other
-        plus, minus = ((pair[k] + (weight - 1.0) * own[k]) / STANDARD_GRAVITY for k in range(2))
-    balance = (response.balance[0], response.balance[0 if math.isinf(pair[1]) else 1])
-    return response_figure(
-        time=times,
-        rotation=response.states(times)[:, 0],
-        slenderness=balance,
-        limit=body.coordinate.limit,
-        impact_times=response.impacts["time"],
-        rest_intervals=response.rest_intervals,
-        uplift_times=response.events["time"][response.events["kind"] == "uplift"],
-        overturn_time=response.overturn_time if response.overturned and response.overturn_time <= end else None,
-        motion_time=corners,
-        motion_acceleration_g=corners if motion is None else motion.acceleration(corners) / STANDARD_GRAVITY,
-        thresholds_g=(plus, minus),
-        vertical_acceleration_g=None if lift is None else lift / STANDARD_GRAVITY,
-        duration=response.duration,
-        chattering=_longest_sequence(response, start, end) if longest_sequence else None,
-        units="rad" if units == "slenderness" and any(map(math.isinf, balance)) else units,
-        label="" if body.coordinate.unit == "rad" else f"{body.coordinate.name} ({body.coordinate.unit})",
-        **place,
-    )
+    shown = shown_span(response, window)
+    time, coordinate = drawing_times(response, *shown), response.body.coordinate
+    is_rotation = coordinate.unit == "rad"
+    plus, minus = balances = _balances(response)
+    if not is_rotation or (units == "slenderness" and any(map(math.isinf, balances))):
+        units = "rad"
+    scales = {"slenderness": (1.0 / plus, 1.0 / minus), "deg": (math.degrees(1.0),) * 2, "rad": (1.0, 1.0)}[units]
+    names = {"slenderness": f"rotation / {coordinate.limit}", "deg": "rotation (°)", "rad": "rotation (rad)"}
+
+    def scale(values: Floats) -> Floats:
+        return np.where(values >= 0.0, *scales)
+
+    rotation = response.states(time)[:, 0]
+    drawn = rotation * scale(rotation)
+    sequence = _longest_sequence(response, *shown) if longest_sequence and place.get("ax") is None else None
+    traces = _ground_traces(response, *shown)
+    with page_for((7.0, 4.4 + (len(traces) > 1) + 1.4 * (sequence is not None)), **place) as page:
+        main, *grounds = _panels(page, 1 + len(traces), zoomed=sequence is not None)
+        _shade_rest(main, np.clip(response.rest_intervals, *shown))
+        _draw_rotation(main, time, drawn, np.array([-minus, plus]) * scales[::-1], coordinate.limit)
+        if units != "deg" and is_rotation:
+            to_degrees = (lambda y: np.degrees(y / scale(y)), lambda y: np.radians(y) * scale(y))
+            main.secondary_yaxis("right", functions=to_degrees).set_ylabel("rotation (°)")
+        if plus != minus:
+            _tell_sides(main, scales)
+        _mark_events(main, response, *shown)
+        if response.overturned and response.overturn_time <= shown[1]:
+            _mark_fall(main, time, drawn, f"overturned at {response.overturn_time:.3f} s")
+        main.set_xlim(*shown)
+        for axes, (trace_time, trace) in zip(grounds, traces.values(), strict=False):
+            draw_ground(axes, trace_time, trace, 0.6)
+        for axes in grounds[:1]:
+            _draw_thresholds(axes, response, *traces["ground acceleration (g)"])
+        panels = [main, *grounds]
+        label = names[units] if is_rotation else f"{coordinate.name} ({coordinate.unit})"
+        for axes, name in zip(panels, (label, *traces), strict=False):
+            axes.tick_params(labelbottom=axes is panels[-1])
+            add_labels(axes, _time_label(*shown, response.duration) if axes is panels[-1] else "", name)
+        if sequence is not None:
+            _draw_sequence(main, page.drawn[-1], response, sequence)
+    return page.figure
 
 
-def _longest_sequence(response: Response, start: float, end: float) -> DrawnSequence | None:
-    """Chattering sequence with the most impacts in the stretch."""
+def _balances(response: Simulated) -> tuple[float, float]:
+    """Balance on each side; of a body of one side, that one."""
+    (pair,), _ = thresholds_of(response.body.alone(), response.model)
+    return response.balance[0], response.balance[0 if math.isinf(pair[1]) else 1]
+
+
+def _ground_traces(response: Simulated, start: float, end: float) -> dict[str, tuple[Floats, Floats]]:
+    """Return times, and ground accelerations, g, by their labels."""
+    motion = response.motion
+    if motion is None:
+        return {}
+    times = motion.drawing_times(start, end)
+    parts = {"ground acceleration (g)": motion, "vertical (g)": motion.vertical}
+    return {
+        name: (times, part.acceleration(times) / STANDARD_GRAVITY) for name, part in parts.items() if part is not None
+    }
+
+
+def _longest_sequence(response: Simulated, start: float, end: float) -> np.void | None:
+    """Chattering sequence with the most impacts in the stretch, if its time of rest is bracketed."""
     inside = response.chattering[(response.chattering["start"] >= start) & (response.chattering["end"] <= end)]
-    longest = max(inside, key=lambda row: row["impacts"], default=None)
-    if longest is None:
+    longest: np.void | None = max(inside, key=lambda row: row["impacts"], default=None)
+    if longest is None or not math.isfinite(longest["upper"] - longest["lower"]):
         return None
-    times = _within(response.impacts["time"], longest["start"], longest["end"])
-    near = response.perturbed()
-    off = float(near.event_spreads[response.events["time"] == longest["end"]].max(initial=0.0))
-    return DrawnSequence(times, float(longest["lower"]), float(longest["upper"]), off, near.sample)
+    return longest if _within(response.impacts["time"], longest["start"], longest["end"]).size > 1 else None
+
+
+def _panels(page: Page, histories: int, *, zoomed: bool) -> list[Axes]:
+    """Panels of the rotation and of the motion; below them that of the chattering sequence."""
+    panels = page.panels(
+        ";".join("RGV"[:histories] + "Z" * zoomed), height_ratios=[*(1.3, 1.0, 0.7)[:histories]] + [1.0] * zoomed
+    )
+    for axes in panels[1:histories]:
+        axes.sharex(panels[0])
+    return panels[:histories]
+
+
+def _shade_rest(axes: Axes, rest_intervals: Floats) -> None:
+    for start, end in rest_intervals[rest_intervals[:, 0] < rest_intervals[:, 1]]:
+        axes.axvspan(start, end, color=REST, linewidth=0.0, label="at rest")
+
+
+def _draw_rotation(axes: Axes, time: Floats, drawn: Floats, tipping: Floats, limit: str) -> None:
+    """Draw the rotation, in its units, and the angles, to side - and to side +, at which the block tips over."""
+    axes.axhline(0.0, color=INK, linewidth=0.4)
+    axes.plot(time, drawn, color=INK, linewidth=0.9, label="_rotation")
+    lowest = max(float(np.min(drawn, initial=0.0)), _FARTHEST * float(tipping[0]))
+    highest = min(float(np.max(drawn, initial=0.0)), _FARTHEST * float(tipping[1]))
+    span = (highest - lowest) or 1.0
+    # Space below for the marks of the impacts and uplifts.
+    low, high = axes.set_ylim(lowest - 0.28 * span, highest + 0.1 * span)
+    label = "tipping, θ = ±α" if limit == "slenderness" else "unstable balance without ground motion"
+    for level in tipping[(tipping > low) & (tipping < high)]:
+        axes.axhline(level, label=label, **_BOUNDARY)
+
+
+def _mark_events(axes: Axes, response: Simulated, start: float, end: float) -> None:
+    impacts, uplifts = _within(response.impacts["time"], start, end), marked(response, start, end)["uplift"]
+    if impacts.size:
+        add_ticks(axes, impacts, 0.055, label=f"resolved impacts ({impacts.size})")
+    if uplifts.size:
+        add_ticks(axes, uplifts, 0.13, "^", color=ABOVE, markersize=4.5, markeredgewidth=0.0, label="uplift")
+
+
+def _mark_fall(axes: Axes, time: Floats, drawn: Floats, label: str) -> None:
+    """Put a cross where the curve ends, or where it has left the frame before."""
+    low, high = axes.get_ylim()
+    end = np.flatnonzero((drawn >= low) & (drawn <= high))[-1]
+    axes.plot(time[end], drawn[end], "X", color=ABOVE, markersize=7, clip_on=False, zorder=4, label=label)
+
+
+def _tell_sides(axes: Axes, factors: tuple[float, float]) -> None:
+    """Name the sides where rotations are theirs, with what 1 is on each."""
+    for name, place, off, factor in zip(("side +", "side −"), ("bottom", "top"), (2, -2), factors, strict=True):
+        words = name if factors[0] == factors[1] else f"{name}: 1 is {math.degrees(1.0 / factor):.3g}°"
+        look = {"va": place, "color": INK, "fontsize": "small", "xycoords": axes.get_yaxis_transform()}
+        write(axes, words, (0.0, 0.0), (3, off), **look)
+
+
+def _draw_thresholds(axes: Axes, response: Simulated, time: Floats, acceleration: Floats) -> None:
+    """Draw what lifts the body to each side, which changes with its weight, and the motion beyond it."""
+    (pair,), (own,) = thresholds_of(response.body.alone(), response.model)
+    lift = response.motion.vertical.acceleration(time) if response.motion and response.motion.vertical else 0.0 * time
+    above: dict[str, Any] = {"color": ABOVE, "linewidth": 0.9, "interpolate": True, "zorder": 3}
+    for sign, size, change in ((-1.0, pair[0], own[0]), (1.0, pair[1], own[1])):
+        if math.isinf(size):
+            continue  # nothing lifts it to that side
+        threshold = sign * (size + lift / response.body.gravity * change) / STANDARD_GRAVITY
+        beyond = sign * acceleration > sign * threshold
+        if np.any(beyond):
+            axes.fill_between(time, acceleration, threshold, where=beyond, label="beyond a threshold", **above)
+        axes.plot(time, threshold, color=INK, linewidth=0.8, linestyle=(0, (5, 2)), label="uplift thresholds")
+
+
+def _time_label(start: float, end: float, duration: float) -> str:
+    is_all = start <= 0.0 and end >= duration * (1.0 - 1e-9)
+    return "time (s)" if is_all else f"time (s); shown: {start:.4g}–{end:.4g} s of {duration:.4g} s"
+
+
+def _draw_sequence(main: Axes, axes: Axes, response: Simulated, sequence: np.void) -> None:
+    """Draw a sequence impact by impact, and where it is among the histories."""
+    times = _within(response.impacts["time"], sequence["start"], sequence["end"])
+    low, high = response.perturbed().event_ranges[response.events["time"] == sequence["end"]].T.max(axis=1)
+    first, last, at = float(times[0]), float(sequence["upper"]), main.get_xaxis_transform()
+    main.plot([first, last], [0.95, 0.95], "|-", color=ABOVE, linewidth=1.3, transform=at)
+    look: dict[str, Any] = {"ha": "center", "va": "bottom", "color": ABOVE, "fontweight": "bold", "xycoords": at}
+    write(main, "A", (0.5 * (first + last), 0.955), (0, 2), **look)
+    rest, start, interval = 0.5 * (sequence["lower"] + sequence["upper"]), times[:-1], np.diff(times)
+    # Where impacts lie closer than the spacing of floating point times, neither axis has a logarithm.
+    shown = (interval > 0.0) & (rest > start)
+    look = {"color": INK, "markersize": 2.6, "markerfacecolor": "white", "markeredgewidth": 0.6}
+    axes.loglog(rest - start[shown], interval[shown], "o", **look)
+    axes.invert_xaxis()
+    add_labels(axes, "time to rest (s)", "interval to next impact (s)")
+    axes.grid(True)
+    known = f"about {rest:.0f} s, if at all" if math.isnan(low) else time_text(rest, low, high)
+    words = f"A: at rest at {known}; bracket of the computation {sequence['upper'] - sequence['lower']:.0e} s"
+    axes.set_title(textwrap.fill(words, max(20, int(axes.bbox.width / axes.figure.dpi * 14))), color=ABOVE, loc="left")
 
 
 class Course(NamedTuple):
@@ -167,17 +299,13 @@ class Course(NamedTuple):
         return np.insert(values, self.before + 1, np.nan)
 
 
-def course_of(response: Response, start: float, end: float) -> Course:
+def course_of(response: Simulated, start: float, end: float) -> Course:
     """Follow a response, of a body whose energy is known, from a time to a later one, s."""
     history, energy = response._history, response._energy
-    even, step = np.linspace(start, end, _EVEN_TIMES_OF_COURSE, retstep=True)
     impacts = response.impacts[(response.impacts["time"] >= start) & (response.impacts["time"] <= end)]
     impacts = impacts[:: 1 + len(impacts) // _MOST_IMPACTS]
     at = np.asarray(impacts["time"], dtype=float)
-    gaps = np.diff(at)
-    short = np.flatnonzero((gaps > _SHORT[0] * step) & (gaps < _SHORT[1] * step))
-    inside = at[short, None] + gaps[short, None] * np.linspace(0.0, 1.0, _POINTS_OF_SHORT)[1:-1]
-    times = np.setdiff1d(np.union1d(even, inside.ravel()), at)
+    times = np.setdiff1d(np.linspace(start, end, _EVEN_TIMES), at)
     rows = history.rows(times)
     theta, rate, _ = history.states_in(times, rows).T
     where = np.searchsorted(times, at)
@@ -201,7 +329,7 @@ def course_of(response: Response, start: float, end: float) -> Course:
     )
 
 
-def boundary_of(response: Response) -> tuple[Floats, Floats]:
+def boundary_of(response: Simulated) -> tuple[Floats, Floats]:
     """Rotations and velocities, in units of a `Course`, with as much energy as at the balance."""
     energy, gap = response._energy, np.array([np.nan])
     x: list[Floats] = []
@@ -216,37 +344,54 @@ def boundary_of(response: Response) -> tuple[Floats, Floats]:
     return np.concatenate(x), np.concatenate(y)
 
 
-def marked(response: Response, start: float, end: float) -> dict[str, Floats]:
+def marked(response: Simulated, start: float, end: float) -> dict[str, Floats]:
     """Return the times of uplift and rest within a stretch, s."""
     events = response.events
     inside = (events["time"] >= start) & (events["time"] <= end)
     return {kind: np.asarray(events["time"][inside & (events["kind"] == kind)], float) for kind in ("uplift", "rest")}
 
 
-def phase_plane(response: Response, window: Sequence[float] | None, **place: Unpack[Place]) -> Figure:
-    """Draw velocity against rotation in a window."""
-    start, end = shown_span(response, window)
-    course = course_of(response, start, end)
-    return phase_figure(
-        rotation=course.parted(course.rotation),
-        velocity=course.parted(course.velocity),
-        jumps=np.column_stack([course.velocity[course.before], course.velocity[course.before + 1]]),
-        boundary=boundary_of(response),
-        **{f"{kind}s": bool(len(times)) for kind, times in marked(response, start, end).items()},
-        limit=response.body.coordinate.limit if response._energy.has_balances else "rad",
-        **place,
-    )
+def phase_plane(response: Simulated, window: Sequence[float] | None, **place: Unpack[Place]) -> Figure:
+    """Draw velocity over p times the slenderness (or balance) against the rotation over that, in a window."""
+    span = shown_span(response, window)
+    course = course_of(response, *span)
+    limit = response.body.coordinate.limit if response._energy.has_balances else "rad"
+    with page_for((4.6, 4.2), **place) as page:
+        (axes,) = page.panels()
+        axes.axhline(0.0, color=INK, linewidth=0.4)
+        axes.axvline(0.0, color=INK, linewidth=0.4)
+        axes.plot(*boundary_of(response), label="as much energy as at the balance", **_BOUNDARY)
+        if len(course.before):
+            jumps = np.column_stack([course.velocity[course.before], course.velocity[course.before + 1]])
+            y = np.insert(jumps, 2, np.nan, axis=1).ravel()
+            axes.plot(0.0 * y, y, color=GROUND, linewidth=1.1, linestyle=(0, (1, 1.5)), label="impact")
+        rotation, velocity = course.parted(course.rotation), course.parted(course.velocity)
+        axes.plot(rotation, velocity, color=INK, linewidth=0.8, label="response")
+        if name := " and ".join(kind for kind, times in marked(response, *span).items() if len(times)):
+            axes.plot(0.0, 0.0, "o", label=name, color=INK, markersize=5.0, markerfacecolor=REST, zorder=4)
+        for values, set_limits in ((rotation, axes.set_xlim), (velocity, axes.set_ylim)):
+            reach = 1.1 * min(max(float(np.nanmax(np.abs(values), initial=0.0)), 1e-12), _FARTHEST)
+            set_limits(-reach, reach)
+        add_labels(axes, f"rotation / {limit}", f"velocity / (p × {limit})")
+    return page.figure
 
 
-def energies(response: Response, window: Sequence[float] | None, **place: Unpack[Place]) -> Figure:
-    """Draw kinetic, potential and total energy in a window."""
+def energies(response: Simulated, window: Sequence[float] | None, **place: Unpack[Place]) -> Figure:
+    """Draw kinetic, potential and total energy over the least energy that overturns the body, in a window."""
     course = course_of(response, *shown_span(response, window))
-    return energy_figure(
-        time=course.time,
-        kinetic=course.kinetic,
-        potential=course.potential,
-        needed=response._energy.needed.tolist(),
-        impact_times=course.time[course.before],
-        rest_intervals=response.rest_intervals,
-        **place,
-    )
+    time, total = course.time, course.kinetic + course.potential
+    with page_for((7.0, 3.0), **place) as page:
+        (axes,) = page.panels()
+        _shade_rest(axes, np.clip(response.rest_intervals, time[0], time[-1]))
+        top = float(np.max(total, initial=0.0)) or 1.0
+        axes.plot(time, total, color=INK, linewidth=1.4, label="total, which drops at impacts")
+        axes.plot(time, course.potential, color=GROUND, linewidth=1.0, label="potential")
+        axes.plot(time, course.kinetic, color="#3c6aa0", linewidth=0.8, linestyle=(0, (4, 1.5)), label="kinetic")
+        axes.plot(time[course.before], 0.0 * course.before, "|", color=INK, markersize=6, markeredgewidth=0.5)
+        levels = [level for level in response._energy.needed.tolist() if level < min(1.6 * top, math.inf)]
+        for level in levels:
+            axes.axhline(level, label="as much energy as at the balance", **_BOUNDARY)
+        axes.set_xlim(time[0], time[-1])
+        axes.set_ylim(0.0, 1.08 * max([min(top, 2.0 * max([1.0, *levels])), *levels]))
+        add_labels(axes, "time (s)", "energy / least that overturns")
+    return page.figure

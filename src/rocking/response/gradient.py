@@ -318,10 +318,7 @@ def _by_own_pieces(motion: Motion, starts: Floats, values: Floats) -> Floats:
 def _by_samples(motion: Motion | None, values: Floats) -> Floats:
     """Take derivatives by the coefficients of lines to those by the accelerations at their ends."""
     if motion is None or values.shape[1] != 2 or piecewise.jumps(motion):
-        raise InvalidOption(
-            "the motion is not linear between samples; take the derivatives by its pieces' `coefficients`, or make it "
-            "of samples by `Motion.from_samples`"
-        )
+        raise InvalidOption("the motion is not linear between samples; take the derivatives by its `coefficients`")
     rates = values[:, 1] / np.diff(motion.breakpoints)
     found = np.zeros(len(values) + 1)
     found[:-1] = values[:, 0] - rates

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
@@ -185,21 +185,16 @@ class Perturbed(Result):
         }
 
 
-def repeated(
-    middle: Repeat, again: Callable[[float], Repeat], relative: float, count: int, coordinate: Coordinate, scaled: str
-) -> Perturbed:
-    """Repeat a simulation with factors 1, 1 +- relative, 1 +- 3 relative, and so on; see `Response.perturbed`."""
+def checked_factors(relative: float, count: int) -> list[float]:
+    """Return the factors of `factors_near`, or refuse a step or a number that is out of range."""
     step = checks.within(relative, "relative", InvalidOption, 1e-12, 0.1)
     if checks.whole(count, "count", InvalidOption, 3, 1001) % 2 == 0:
-        raise InvalidOption(
-            f"{{}} must be odd, with as many factors below 1 as above; got {count}", "count", value=count
-        )
+        odd = f"{{}} must be odd, with as many factors below 1 as above; got {count}"
+        raise InvalidOption(odd, "count", value=count)
     if step * (count - 2) >= 1.0:
-        raise InvalidOption(
-            f"{{}} must be below 1/{count - 2} for {count} factors; got {step:g}", "relative", value=step
-        )
-    repeats = (middle if factor == 1.0 else again(factor) for factor in factors_near(step, count))
-    return Perturbed(step, tuple(repeats), coordinate, scaled)
+        below = f"{{}} must be below 1/{count - 2} for {count} factors; got {step:g}"
+        raise InvalidOption(below, "relative", value=step)
+    return factors_near(step, count)
 
 
 def factors_near(relative: float, count: int) -> list[float]:

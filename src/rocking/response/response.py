@@ -2,35 +2,23 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
-from functools import cached_property
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from rocking.block import Block, RestrainedBlock
-from rocking.block.body import Body
+from rocking.block import RestrainedBlock
 from rocking.core import checks
-from rocking.core.arrays import Floats, as_asked
-from rocking.core.constants import Model
-from rocking.core.result import Result, Row, dictionary_of, text_of
-from rocking.core.tables import Column, frame_of, write_csv, write_netcdf
-from rocking.engine.treatment import Treatment
+from rocking.core.result import Row, dictionary_of, text_of
+from rocking.core.tables import Column, frame_of, named, records_of, write_csv, write_netcdf
 from rocking.errors import InvalidOption
-from rocking.kernels import state
-from rocking.motion.motion import Motion
-from rocking.plot.response import RotationUnits
-from rocking.response import figure, history, summary, tables
-from rocking.response.contact import Contact, friction_coefficient, friction_demand, pull
-from rocking.response.energy import Energy, energy_of, linear_balance
-from rocking.response.history import History, with_all_impacts
-from rocking.response.perturbed import COUNT, OVERTURNS, PRECISION, RELATIVE, STANDS, UNMOVED, Perturbed, Repeat
-from rocking.response.perturbed import repeated as repeated_with
-from rocking.response.sensitivity import Sensitivity, ambiguities, carried_errors
+from rocking.response import figure, summary
+from rocking.response.figure import RotationUnits
+from rocking.response.history import even_times
+from rocking.response.perturbed import PRECISION, steps_within
+from rocking.response.simulated import Simulated
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -41,9 +29,13 @@ if TYPE_CHECKING:
 #: Letters of the column of names in a summary.
 _WIDTH = 20
 
+#: Points that a computer's memory holds, and those of a history whose motion has no step of its own.
+_MOST_POINTS = 50_000_000
+_POINTS = 2000
+
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Response(Result):
+class Response(Simulated):
     """Response of one body to one motion, made by `rocking.simulate`.
 
     Attributes
@@ -88,343 +80,6 @@ class Response(Result):
 
     TABLES = ("histories", "events", "impacts", "chattering")
 
-    body: Body
-    motion: Motion | None
-    model: Model
-    treatment: Treatment
-    overturned: bool
-    unfinished: bool
-    leans: bool
-    overturn_time: float
-    peak_rotation: float
-    peak_time: float
-    duration: float
-    events: NDArray[np.void]
-    impacts: NDArray[np.void]
-    stalled: int
-    near_ties: int
-    solution: history.Solution
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return the data alone: answers are found again."""
-        return {entry.name: getattr(self, entry.name) for entry in fields(self)}
-
-    @property
-    def block(self) -> Block:
-        """The body; raises `InvalidOption` if it is no block."""
-        if not isinstance(self.body, Block):
-            raise InvalidOption(f"this is known of blocks alone, not of a {type(self.body).__name__}")
-        return self.body
-
-    @cached_property
-    def _history(self) -> History:
-        """Course in time, with the impacts that follow where a proof has closed a sequence."""
-        trail, sequences = self.solution.trail, self.solution.sequences
-        if int(trail.settings["treatment"]) == state.RestRule.CERTIFIED:
-            closed = bool(len(sequences)) and bool(sequences["end"][-1] >= self.duration)
-            trail = with_all_impacts(trail, cut=closed and self.moves_at_end)
-        return History(trail, self.duration, self.body.stops)
-
-    @cached_property
-    def _energy(self) -> Energy:
-        trail = self.solution.trail
-        return energy_of(self.body, trail.block, nonlinear=bool(trail.settings["nonlinear"]))
-
-    @cached_property
-    def _contact(self) -> Contact:
-        law = self.body.contact
-        if law is None:
-            raise InvalidOption(f"the forces of the ground are not known of this body: {self.body.description}")
-        return Contact(self._history, law, self.duration if math.isnan(self.tipping_time) else self.tipping_time)
-
-    @cached_property
-    def chattering(self) -> NDArray[np.void]:
-        """Sequences of impacts that ended at rest: see `Response`."""
-        found = self.solution.sequences.copy()
-        error = carried_errors(self.solution.trail, np.isfinite(found["lower"]), max(map(abs, self.body.stops)))
-        found["lower"] -= error
-        found["upper"] += error
-        return found
-
-    @cached_property
-    def balance(self) -> tuple[float, float]:
-        """Rotation of the unstable balance on each side in this model, rad; infinite without one.
-
-        Of a free block it is the slenderness in both models.
-        """
-        if isinstance(self.body, RestrainedBlock) and self.model == "linear":
-            plus, minus = linear_balance(self.body).tolist()
-            return plus, minus
-        return self.body.balance
-
-    @cached_property
-    def peak_over_slenderness(self) -> float:
-        """Peak rotation over the slenderness of its side; infinite where the block overturns.
-
-        Of a restrained block over its balance; NaN where there is none.
-        """
-        if self.overturned:
-            return math.inf
-        return self.peak_rotation / self._balance_at_peak if math.isfinite(self._balance_at_peak) else math.nan
-
-    @cached_property
-    def _balance_at_peak(self) -> float:
-        """Balance on the side of the peak, rad; of a block that does not move the nearer one."""
-        if self.peak_rotation == 0.0:
-            return min(self.balance)
-        return self.balance[0 if float(self.rotation(self.peak_time)) > 0.0 else 1]
-
-    @property
-    def _reaches_second_stop(self) -> bool:
-        """Whether the peak is where the second of two stops is."""
-        return bool(self.solution.trail.block["two_stops"]) and self.peak_rotation == self.body.stops[1]
-
-    @cached_property
-    def tendons(self) -> NDArray[np.void]:
-        """Largest elongation and force of each tendon: see `Response`."""
-        rows = []
-        if isinstance(self.body, RestrainedBlock):
-            plus, minus = self._history.largest()
-            if self.overturned:  # the last step ends there
-                side = int(self.solution.trail.nodes["side"][-1])
-                plus, minus = (self.peak_rotation, minus) if side == 0 else (plus, self.peak_rotation)
-            rows = self.body.tendons_at((plus, minus), self.model)
-        return np.array(rows, dtype=[("elongation", "f8"), ("force", "f8"), ("plastic_elongation", "f8")])
-
-    @property
-    def moves_at_end(self) -> bool:
-        """Whether the block is not at rest at the end of the response."""
-        return bool(self.solution.trail.nodes["side"][-1] >= 0)
-
-    @property
-    def moved(self) -> bool:
-        """Whether the body moves at any time."""
-        return bool(np.any(self.solution.trail.nodes["side"] >= 0))
-
-    @property
-    def outcome(self) -> str:
-        """What becomes of the body, as a verb: "overturns", "stands", "leans", "does not move".
-
-        Also "comes to rest" (of a body that cannot overturn), "has not overturned" (`stopped`) and "is given up"
-        (`unfinished`).
-        """
-        if self.overturned:
-            return OVERTURNS
-        if self.unfinished:
-            return "is given up"
-        if self.stopped:
-            return "has not overturned"
-        if self.leans:
-            return "leans"
-        if not self.moved:
-            return UNMOVED
-        return STANDS if self.body.coordinate.limit else "comes to rest"
-
-    @property
-    def residual_rotation(self) -> float:
-        """Rotation at which the block stays, rad: 0 where it rests upright, the equilibrium where it `leans`.
-
-        NaN where it overturns or its end is not known. Of another body its coordinate.
-        """
-        return math.nan if self.overturned or self.unfinished or self.stopped else self.solution.residual
-
-    @property
-    def stopped(self) -> bool:
-        """Whether `duration` ended the simulation before a verdict: the block still moved, or the motion went on."""
-        over = self.motion is None or self.duration >= self.motion.end
-        return not (self.overturned or self.unfinished or self.leans) and (self.moves_at_end or not over)
-
-    @cached_property
-    def tipping_time(self) -> float:
-        """Last time, s, at which the block passes its `balance`; NaN if it ends within it.
-
-        From then on a block that overturns only falls.
-        """
-        return self._history.tipping_time(self.balance)
-
-    @property
-    def rest_intervals(self) -> Floats:
-        """Start and end of each interval at rest, shape (n, 2), s."""
-        return self._history.rests()
-
-    @property
-    def time_at_rest(self) -> float:
-        """Time that the block spends at rest, s."""
-        starts, ends = self.rest_intervals.T
-        return float(np.sum(ends - starts))
-
-    @cached_property
-    def sensitivity(self) -> Sensitivity:
-        """Derivatives of the peak and of the times of events and impacts by the motion, the start and the block."""
-        return Sensitivity(self)
-
-    @property
-    def ambiguous(self) -> bool:
-        """Whether no double-precision program can know this response: one ulp of what was given changes it visibly."""
-        return bool(self.ambiguities)
-
-    @cached_property
-    def ambiguities(self) -> tuple[str, ...]:
-        """What one ulp of the input changes visibly: "peak", "events" (a time of one, or of an impact) and "touch".
-
-        With the last, rounding decides whether the motion passes a threshold of uplift, whether the body touches the
-        ground, or whether it falls from its balance. `perturbed` has the spread of such results.
-        """
-        start, velocity, acceleration = self.states(0.0)
-        balanced = velocity == acceleration == 0.0 and bool(np.any(np.isclose(abs(start), self.balance)))
-        height = abs(self.peak_rotation - self.body.stops[0])
-        return ambiguities(self.sensitivity, self.solution.trail, height, self.near_ties + balanced)
-
-    def perturbed(self, relative: float = RELATIVE, count: int = COUNT) -> Perturbed:
-        """Repeat the simulation with the motion scaled by factors near 1.
-
-        Parameters
-        ----------
-        relative : float
-            Relative step of the factors, from 1e-12 to 0.1.
-        count : int
-            Number of factors, odd and at least 3: 1, 1 +- relative, 1 +- 3 relative, 1 +- 5 relative, and so on.
-
-        Returns
-        -------
-        Perturbed
-            Outcome, peak and times for each factor, and the ranges of these.
-
-        Notes
-        -----
-        An initial rotation (of a body with a stop its distance from the stop) and velocity are scaled with the motion,
-        or alone where there is no motion. An outcome that changes within a few millionths is undecided for every
-        practical purpose; one that is the same in a few simulations may still change between them.
-        """
-        if (relative, count) not in self._repeated:
-            scaled = "initial states" if self.motion is None else "motions"
-            self._repeated[relative, count] = repeated_with(
-                self._as_repeat(1.0), self._repeat, relative, count, self.body.coordinate, scaled
-            )
-        return self._repeated[relative, count]
-
-    @cached_property
-    def _repeated(self) -> dict[tuple[float, int], Perturbed]:
-        return {}
-
-    def _repeat(self, factor: float) -> Repeat:
-        try:
-            again: Response = self.solution.again(factor)
-            return again._as_repeat(factor)
-        except InvalidOption:  # a state of balance: `simulate` requires a duration
-            return Repeat(factor, "balances", math.nan, math.nan, math.nan, math.nan, self.events[:0])
-
-    def _as_repeat(self, factor: float) -> Repeat:
-        rests = self.events["time"][self.events["kind"] == "rest"]
-        last_rest = float(rests[-1]) if len(rests) and not self.moves_at_end else math.nan
-        return Repeat(
-            factor, self.outcome, self.peak_rotation, self.peak_time, self.overturn_time, last_rest, self.events
-        )
-
-    def states(self, time: ArrayLike) -> Floats:
-        """Return coordinate, velocity and acceleration of the body (of a block its rotation) at times, s, of any shape.
-
-        They are the last dimension, of length 3; NaN at times outside [0, duration]. `InvalidOption` if `time` contains
-        anything but numbers.
-        """
-        return self._history.states(time)
-
-    def rotation(self, time: ArrayLike) -> Floats:
-        """Rotation theta, rad, at any time, from the series of the arc in which it lies; NaN outside [0, duration]."""
-        return as_asked(self.states(time)[..., 0])
-
-    def angular_velocity(self, time: ArrayLike) -> Floats:
-        """Angular velocity, rad/s, at any time (just after an impact, at one); NaN outside [0, duration]."""
-        return as_asked(self.states(time)[..., 1])
-
-    def angular_acceleration(self, time: ArrayLike) -> Floats:
-        """Angular acceleration, rad/s^2, at any time; NaN outside [0, duration]."""
-        return as_asked(self.states(time)[..., 2])
-
-    def kinetic_energy(self, time: ArrayLike) -> Floats:
-        """Kinetic energy over the least that overturns the block, at any time (just after an impact, at one).
-
-        Parameters
-        ----------
-        time : array_like
-            Times, s, of any shape.
-
-        Returns
-        -------
-        ndarray
-            Over the energy that takes the block, without ground motion, from rest to the unstable balance of the side
-            where that is less, m g R (1 - cos alpha) of a free block (m g R alpha^2/2 in the linear model); NaN outside
-            [0, duration]. Velocities are relative to the ground.
-
-        Raises
-        ------
-        InvalidOption
-            If `time` contains anything but numbers, the body is no block, one of its tendons yields, or its restraints
-            hold it back at any rotation.
-        """
-        states, sides = self._history.states_and_sides(time)
-        return as_asked(self._energy.kinetic(states[..., 1], sides))
-
-    def potential_energy(self, time: ArrayLike) -> Floats:
-        """Potential energy of weight and restraints, zero upright, in the unit of `kinetic_energy`; NaN outside.
-
-        Between impacts the sum of both stays the same where nothing shakes or damps the block. Arguments and errors are
-        those of `kinetic_energy`.
-        """
-        states, sides = self._history.states_and_sides(time)
-        return as_asked(self._energy.potential(states[..., 0], sides))
-
-    @cached_property
-    def impact_losses(self) -> Floats:
-        """Energy that each of `impacts` takes, over the least that overturns the block, as `kinetic_energy`."""
-        return self._energy.losses(self.impacts)
-
-    def normal_force(self, time: ArrayLike) -> Floats:
-        """Return the normal force over the weight without the impulses of impacts; NaN outside the response."""
-        return as_asked(self._contact.forces(time)[1])
-
-    def friction_demand(self, time: ArrayLike) -> Floats:
-        """Friction coefficient that sticking needs: infinite without normal force, NaN outside the response."""
-        return as_asked(friction_demand(*self._contact.forces(time)))
-
-    @cached_property
-    def _extremes(self) -> tuple[float, float]:
-        return self._contact.extremes()
-
-    @property
-    def required_friction(self) -> float:
-        """Largest friction coefficient that sticking needs, between impacts and until `tipping_time`.
-
-        Infinite if the normal force does not stay positive.
-        """
-        return self._extremes[0]
-
-    @property
-    def minimum_normal_force(self) -> float:
-        """Smallest normal force over the weight, between impacts and until `tipping_time`."""
-        return self._extremes[1]
-
-    def sliding_time(self, friction: float) -> float:
-        """Return the first time, s, at which sticking needs more than a friction coefficient; NaN if it never does.
-
-        The coefficient is positive and at most 3. The time is before the block tips (`tipping_time`), without the
-        impulses at impacts. What happens after a slip is not part of the model.
-        """
-        level = friction_coefficient(friction)
-        if not self.required_friction > level:
-            return math.nan
-        return self._contact.first(lambda push, normal: np.abs(push) - level * normal, lambda excess: excess > 0.0)
-
-    @cached_property
-    def lift_off_time(self) -> float:
-        """First time, s, at which the normal force is not positive, so that the base leaves the ground; NaN if never.
-
-        As for `sliding_time`, until the block tips and between impacts.
-        """
-        if self.minimum_normal_force > 0.0:
-            return math.nan
-        return self._contact.first(pull, lambda pulled: pulled >= 0.0)
-
     def _headline(self) -> str:
         return summary.line(self)
 
@@ -434,7 +89,57 @@ class Response(Result):
 
     def facts(self, friction: float | None = None, *, precision: float = PRECISION) -> Sequence[Row]:
         """Return the entries of `to_dict` as rows of name, value and unit; arguments as of `summary`."""
-        return tables.facts(self, friction, precision)
+        body, motion, limit = self.body, self.motion, self.body.coordinate.limit
+        shaken = motion and {
+            "name": motion.name,
+            named("duration", "s"): motion.duration,
+            named("pga", "m/s^2"): motion.pga,
+            "history": motion.history,
+            "vertical": motion.vertical and {"name": motion.vertical.name, named("pga", "m/s^2"): motion.vertical.pga},
+        }
+        rows = [Row("block", {"description": body.description, **self._parameters()}), Row("motion", shaken)]
+        rows += self._outcome_rows()
+        if limit:
+            rows.append(Row(f"peak_over_{limit}", self.peak_over_slenderness))
+        if isinstance(body, RestrainedBlock):
+            rows.append(Row("balance", list(self.balance), body.coordinate.unit))
+            rows.append(Row("tendons", records_of(self._structured("tendons"))))
+        rows.append(Row("peak_time", self.peak_time, "s"))
+        if body.contact is not None:
+            rows.append(Row("required_friction", self.required_friction))
+            rows.append(Row("minimum_normal_force_over_weight", self.minimum_normal_force))
+            rows.append(Row("lift_off_time", self.lift_off_time, "s"))
+        if friction is not None:
+            rows += [Row("friction", friction), Row("sliding_time", self.sliding_time(friction), "s")]
+        near = [self.perturbed().to_dict(), self.perturbed(*steps_within(precision)).to_dict()]
+        return [
+            *rows,
+            Row("impacts_resolved", len(self.impacts)),
+            Row("duration", self.duration, "s"),
+            Row("time_at_rest", self.time_at_rest, "s"),
+            Row("perturbed", near),
+            Row("ambiguous", self.ambiguous),
+            Row("ambiguities", self.ambiguities),
+            Row("events", records_of(self._structured("events"))),
+            Row("chattering", records_of(self._structured("chattering"))),
+        ]
+
+    def _parameters(self) -> dict[str, Any]:
+        of_body = self.body.alone().parameters().items()
+        gravity = {named("gravity", "m/s^2"): self.body.gravity}
+        return {named(name, unit): values[0].tolist() for name, (values, unit) in of_body} | gravity
+
+    def _outcome_rows(self) -> list[Row]:
+        name, unit = self.body.coordinate.name, self.body.coordinate.unit
+        return [
+            Row("model", self.model),
+            Row("chattering_treatment", repr(self.treatment)),
+            *(Row(flag, getattr(self, flag)) for flag in ("overturned", "unfinished", "stopped", "leans")),
+            Row("overturn_time", self.overturn_time, "s"),
+            Row("tipping_time", self.tipping_time, "s"),
+            Row(f"peak_{name}", self.peak_rotation, unit),
+            Row(f"residual_{name}", self.residual_rotation, unit),
+        ]
 
     def summary(self, friction: float | None = None, *, precision: float = PRECISION) -> str:
         """Return what happened in words, line by line, as ``rocking simulate`` prints it.
@@ -468,10 +173,63 @@ class Response(Result):
         or a two-thousandth of the duration); events, impacts and chattering sequences have a dimension each. The block
         and the verdict are attributes.
         """
-        return tables.dataset(self, dt)
+        import xarray as xr
+
+        time, *histories = self._columns("histories", dt)
+        variables: dict[str, Any] = {each.name: ("time", each.values, {"units": each.unit}) for each in histories}
+        for table, dimension in (("events", "event"), ("impacts", "impact"), ("chattering", "sequence")):
+            for name, values, unit, _ in self._columns(table):
+                column = values.astype(object) if values.dtype.kind == "U" else values
+                variables[f"{dimension}_{name}"] = (dimension, column, {"units": unit})
+        motion = self.motion
+        rows = [row for row in self._outcome_rows() if row.name != "tipping_time"]
+        rows += [Row("peak_time", self.peak_time, "s"), Row("ambiguous", self.ambiguous)]
+        attributes = {
+            "block": self.body.description,
+            **self._parameters(),
+            "motion": "none" if motion is None else motion.name,
+            "vertical_motion": "none" if motion is None or motion.vertical is None else motion.vertical.name,
+            "motion_history": "" if motion is None else "; ".join(motion.history),
+            **{named(row.name, row.unit): int(row.value) if isinstance(row.value, bool) else row.value for row in rows},
+        }
+        return xr.Dataset(variables, {"time": ("time", time.values, {"units": "s"})}, attributes)
 
     def _columns(self, table: str, dt: float | None = None) -> list[Column]:
-        return tables.columns(self, checks.one_of(table, "table", InvalidOption, self.TABLES), dt)
+        checks.one_of(table, "table", InvalidOption, self.TABLES)
+        if table == "histories":
+            return self._histories(dt)
+        if dt is not None:
+            raise InvalidOption(f"{{}} is the step of the histories; the {table} have none", "dt")
+        return self._structured(table)
+
+    def _structured(self, table: str) -> list[Column]:
+        rows, speed = getattr(self, table), f"{self.body.coordinate.unit}/s"
+        units = {"kind": "1", "side": "1", "impacts": "1", "speed_before": speed, "speed_after": speed}
+        units |= {"elongation": "m", "force": "N", "plastic_elongation": "m"}
+        return [Column(name, rows[name], units.get(name, "s")) for name in rows.dtype.names]
+
+    def _histories(self, dt: float | None) -> list[Column]:
+        motion, (name, rate, _, unit, _) = self.motion, self.body.coordinate
+        if dt is None:
+            step = motion and motion.step
+            # A pulse of a few straight lines has a step, too, that shows nothing.
+            dt = step if step and step <= 0.01 * self.duration else max(self.duration, 1e-3) / _POINTS
+        step = checks.positive(dt, "dt", InvalidOption, "s")
+        if self.duration > _MOST_POINTS * step:
+            most = f"more than {_MOST_POINTS:,} points of {self.duration:g} s"
+            raise InvalidOption(f"{{}} = {step:g} s makes {most}; take a longer step", "dt", value=dt)
+        times = even_times(self.duration, step)
+        states = self.states(times)
+        columns = [
+            Column("time", times, "s"),
+            Column(name, states[:, 0], unit),
+            Column(rate, states[:, 1], f"{unit}/s"),
+        ]
+        ground = np.zeros_like(times) if motion is None else motion.acceleration(times)
+        columns.append(Column("ground_acceleration", ground, "m/s^2"))
+        if motion is not None and motion.vertical is not None:
+            columns.append(Column("vertical_ground_acceleration", motion.vertical.acceleration(times), "m/s^2"))
+        return columns
 
     def to_dataframe(self, table: str | None = None, *, dt: float | None = None) -> pd.DataFrame:
         """Return a table as a data frame: "histories", "events", "impacts" or "chattering"; units are in the names.

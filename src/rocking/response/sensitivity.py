@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from functools import cached_property
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,9 +19,6 @@ from rocking.kernels.adjoint import Ends, adjoint, adjoint_of_final_state
 from rocking.kernels.trace import Quantity, Trail, copy_trail, vary
 from rocking.kernels.uplift import next_uplifts
 from rocking.response.history import History
-
-if TYPE_CHECKING:
-    from rocking.response.response import Response
 
 #: A response is ambiguous when changes of the motion, the initial state and the block by one unit in the last place
 #: move its peak by more than this fraction, or one of its events or impacts by more than this many seconds.
@@ -56,16 +53,20 @@ class Sensitivity:
     where the simulation was not finished. Made by `Response.sensitivity`.
     """
 
-    def __init__(self, response: Response) -> None:
-        self._trail = trail = response.solution.trail
-        drawn = int(trail.block["seed"]) >= 0 and bool(trail.block["variable_restitution"])
-        # What is drawn goes by the number of the impact, which those beyond a proof do not count in.
-        self._history = History(trail, response.duration, response.body.stops) if drawn else response._history
-        self._peak_time = np.array([response.peak_time])
+    def __init__(
+        self,
+        trail: Trail,
+        history: History,
+        peak_time: float,
+        sizes: tuple[int, int],
+        *,
+        is_fixed: bool,
+        is_known: bool,
+    ) -> None:
+        self._trail, self._history, self._sizes = trail, history, sizes
+        self._peak_time = np.array([peak_time])
         self._peak_time.flags.writeable = False
-        self._sizes = len(response.impacts), len(response.events)
-        self._is_peak_fixed = response.overturned or response._reaches_second_stop
-        self._unfinished = response.unfinished
+        self._is_peak_fixed, self._is_known = is_fixed, is_known
 
     @cached_property
     def peak(self) -> NDArray[np.void]:
@@ -87,7 +88,7 @@ class Sensitivity:
         values = self._all[which]
         table = np.empty(values.shape[1], dtype=[(name, "f8") for name in QUANTITIES])
         for name, row in zip(QUANTITIES, values, strict=True):
-            table[name] = np.nan if self._unfinished else row
+            table[name] = row if self._is_known else np.nan
         return table
 
     @cached_property
@@ -125,7 +126,7 @@ class Sensitivity:
         documentation).
         """
         found = changes_along(self._history, time, of)
-        return {name: np.full_like(values, np.nan) for name, values in found.items()} if self._unfinished else found
+        return found if self._is_known else {name: np.full_like(values, np.nan) for name, values in found.items()}
 
     def __repr__(self) -> str:
         event = np.max(np.abs(self.events["motion"]), initial=0.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
@@ -14,9 +14,7 @@ from rocking.core.result import Row
 from rocking.core.tables import counted
 from rocking.engine.problem import thresholds_of
 from rocking.response.perturbed import percent, steps_within
-
-if TYPE_CHECKING:
-    from rocking.response.response import Response
+from rocking.response.simulated import Simulated
 
 #: Decimals of a time at most; digits of a peak, at most and where its range is shown.
 _MOST_DECIMALS: Final = 9
@@ -41,7 +39,7 @@ _AFFECTED: Final = {
 }
 
 
-def summary_rows(response: Response, friction: float | None, precision: float) -> list[Row]:
+def summary_rows(response: Simulated, friction: float | None, precision: float) -> list[Row]:
     """Return what happened, line by line; with a coefficient of friction, whether it is enough."""
     body = response.body
     sliding = math.nan if friction is None else response.sliding_time(friction)
@@ -88,7 +86,7 @@ def summary_rows(response: Response, friction: float | None, precision: float) -
     ]
 
 
-def line(response: Response) -> str:
+def line(response: Simulated) -> str:
     """Return what happened, in one line."""
     motion, limit = response.motion, response.body.coordinate.limit
     peak = ""
@@ -102,7 +100,7 @@ def line(response: Response) -> str:
     )
 
 
-def in_words(response: Response, overturn_time: str) -> str:
+def in_words(response: Simulated, overturn_time: str) -> str:
     """Return what became of the body, for its summary; the time at which it overturns is given as text."""
     if response.overturned:
         return f"overturns at {overturn_time}"
@@ -120,7 +118,7 @@ def in_words(response: Response, overturn_time: str) -> str:
     return "rocks and does not overturn" if response.body.coordinate.limit else "moves, and comes to rest"
 
 
-def in_brief(response: Response, precision: float) -> str:
+def in_brief(response: Simulated, precision: float) -> str:
     """Return what became of the body, for a row of a table."""
     near, further = response.perturbed(), response.perturbed(*steps_within(precision))
     if not near.is_decided and near.overturned.any():
@@ -142,17 +140,17 @@ def in_brief(response: Response, precision: float) -> str:
     return f"{text} in {', '.join(parts)}{', AMBIGUOUS' if response.ambiguous else ''}"
 
 
-def _residual_text(response: Response) -> str:
+def _residual_text(response: Simulated) -> str:
     """Rotation about which the block leans; it depends on the peak where a tendon has yielded."""
     return f"{response.residual_rotation:.{_peak_digits(response)}g} {response.body.coordinate.unit}"
 
 
-def ratio_text(response: Response) -> str:
+def ratio_text(response: Simulated) -> str:
     """Peak rotation over slenderness, to the digits that are known."""
     return f"{response.peak_over_slenderness:.{min(_peak_digits(response), 4)}g}"
 
 
-def known_ratio(response: Response) -> float:
+def known_ratio(response: Simulated) -> float:
     """Peak rotation over slenderness, rounded where fewer than four digits are known: to show it in fewer still."""
     return response.peak_over_slenderness if _peak_digits(response) >= _SHORT else float(ratio_text(response))
 
@@ -166,7 +164,7 @@ def time_text(time: float, low: float, high: float) -> str:
     return f"{low:.{decimals}f} to {high:.{decimals}f} s"
 
 
-def tipping_text(response: Response) -> str:
+def tipping_text(response: Simulated) -> str:
     """Time at which the block tips, as far as it is known: it falls as late or as early as it tips."""
     unknown = 0.0
     if response.overturned:
@@ -175,21 +173,7 @@ def tipping_text(response: Response) -> str:
     return f"{about}{response.tipping_time:.{min(_decimals(unknown), _SHORT)}f} s"
 
 
-def peak_time_text(response: Response) -> str:
-    """Time of the peak, as far as it is known."""
-    return _short_text(response.peak_time, *response.perturbed().peak_time_range)
-
-
-def digits_of(value: float, unknown: float) -> int:
-    """Digits that are known of a value of which so much is unknown."""
-    if not math.isfinite(unknown):
-        return 1
-    if not (unknown > 0.0 and value != 0.0):
-        return _MOST_DIGITS
-    return min(max(math.floor(-math.log10(unknown / abs(value))), 1), _MOST_DIGITS)
-
-
-def _motion_text(response: Response) -> str:
+def _motion_text(response: Simulated) -> str:
     """Say what shakes the body; here and below a g is the standard one, as wherever accelerations are given in g."""
     motion = response.motion
     if motion is None:
@@ -200,7 +184,7 @@ def _motion_text(response: Response) -> str:
     return "; ".join(parts)
 
 
-def _thresholds_text(response: Response) -> str:
+def _thresholds_text(response: Simulated) -> str:
     """Return what lifts the body; under a vertical motion it changes with the weight."""
     motion = response.motion
     (pair,), (own,) = thresholds_of(response.body.alone(), response.model)
@@ -216,7 +200,7 @@ def _thresholds_text(response: Response) -> str:
     return f"{text}; from {least:.4f} to {most:.4f} g with the weight{'' if one else ', to side +'}"
 
 
-def _event_rows(response: Response) -> list[Row]:
+def _event_rows(response: Simulated) -> list[Row]:
     sequences = {float(row["end"]): row for row in response.chattering}
     near = response.perturbed()
     rows: list[Row] = []
@@ -248,14 +232,14 @@ def _rest_note(unknown: float, sequence: np.void) -> str:
     return f", complete chattering proven{start}{bracket}"
 
 
-def _peak_rows(response: Response) -> list[Row]:
+def _peak_rows(response: Simulated) -> list[Row]:
     """Peak and its time, each as far as it is known."""
     near, (name, _, _, unit, limit) = response.perturbed(), response.body.coordinate
     (low, high), digits, balance = near.peak_range, _peak_digits(response), response._balance_at_peak
     value = f"{response.peak_rotation:.{digits}g}"
     if spread := digits < _FEWEST_DIGITS and math.isfinite(high):
         value = f"{low:.{_FEWEST_DIGITS}g} to {high:.{_FEWEST_DIGITS}g}"
-    note = f" at {peak_time_text(response)}"
+    note = f" at {_short_text(response.peak_time, *near.peak_time_range)}"
     if response.overturned:
         note += ", where the block has fallen"
     elif response._reaches_second_stop:
@@ -268,7 +252,7 @@ def _peak_rows(response: Response) -> list[Row]:
     return [Row(f"peak {name}", value, unit, note)]
 
 
-def _balance_text(response: Response) -> str:
+def _balance_text(response: Simulated) -> str:
     """Unstable balance of a block that is not free, which its slenderness does not tell."""
     plus, minus = (f"{value:.5g} rad" if math.isfinite(value) else "none" for value in response.balance)
     if plus != minus and not (isinstance(response.body, RestrainedBlock) and response.body.is_one_sided):
@@ -276,7 +260,7 @@ def _balance_text(response: Response) -> str:
     return "none: restraints hold it at any rotation" if plus == "none" else plus
 
 
-def _outcome(response: Response) -> str:
+def _outcome(response: Simulated) -> str:
     text = response.perturbed().sentence()
     if response.overturned:
         text += f", at {time_text(response.overturn_time, *response.perturbed().overturn_range)}"
@@ -290,7 +274,7 @@ def _outcome(response: Response) -> str:
     return text
 
 
-def _when_stopped(response: Response) -> str:
+def _when_stopped(response: Simulated) -> str:
     end = f"{response.duration:.6g} s"
     if not math.isnan(response.tipping_time):
         return f"beyond its balance point since {response.tipping_time:.4f} s and not yet fallen at {end}"
@@ -299,9 +283,15 @@ def _when_stopped(response: Response) -> str:
     return f"at rest at {end}" if response.moved else f"has not moved by {end}"
 
 
-def _peak_digits(response: Response) -> int:
+def _peak_digits(response: Simulated) -> int:
+    """Digits that are known of the peak."""
     unknown = _unknown(response.peak_rotation, *response.perturbed().peak_range)
-    return digits_of(response.peak_rotation - response.body.stops[0], unknown)
+    value = abs(response.peak_rotation - response.body.stops[0])
+    if not math.isfinite(unknown):
+        return 1
+    if not (unknown > 0.0 and value != 0.0):
+        return _MOST_DIGITS
+    return min(max(math.floor(-math.log10(unknown / value)), 1), _MOST_DIGITS)
 
 
 def _unknown(value: float, low: float, high: float) -> float:

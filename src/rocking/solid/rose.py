@@ -96,7 +96,7 @@ class Rose(DatasetResult):
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
-        from rocking.plot.rose import rose_figure
+        from rocking.plot.maps import rose_figure
 
         data = self.data
         return rose_figure(
