@@ -16,7 +16,7 @@ PULSE = "one-sine:amplitude=0.4g,frequency=1Hz"
 
 
 #: What is typed after `rocking`, and words of the one sentence that answers: {R} is a record, {S} sizes, {B} a block by
-#: its parameters, {W} a wall of a mass, {P} and {Q} a pulse and a sine.
+#: its parameters, {W} a wall of a mass, {P} a pulse.
 MISTAKES = """
 simulat | did you mean simulate?
 simulate {R} | a block is needed: give --width and --height, or --half-width and --half-height, or --p and --alpha
@@ -69,19 +69,6 @@ fragility {R} {S} --seed 1.5 | --seed takes a whole number, not '1.5'
 fragility {R} {S} --site 2 | --site is for a curve of --hazard
 chatter one 2 0.9 | A takes a number, not 'one'; see rocking chatter --help
 chatter 1.5 2 | rocking chatter needs ETA; see rocking chatter --help
-basin {B} | rocking basin needs --pulse; see rocking basin --help
-basin --pulse sine:amplitude=1kg,frequency=1 {B} | amplitude of a sine pulse takes an acceleration
-bifurcation {Q} {B} --along amplitude | --along takes a parameter of the pulse with its values
-bifurcation {Q} {B} --along height:1:2:3 | the pulse sine has no height
-bifurcation --pulse sine:frequency=1 {B} --along phase:0:1:3 | the pulse sine needs amplitude
-bifurcation {Q} {B} --along phase:0:1:3 --start 0.1 | --start takes a coordinate and a velocity
-orbits {Q} | a block is needed
-orbits {Q} --ball 0.5 --width 1 | leave --width out
-orbits {Q} --ball 0.5 --oscillator frequency=1 --restitution 0.5 | leave --oscillator and --restitution
-orbits {Q} --oscillator frequency=1 | --oscillator needs restitution
-orbits {Q} --oscillator frequency=1,mass=3 | --oscillator has no mass; there are frequency, restitution
-orbits {Q} --ball 0.5 --along amplitude:16:9 | a lower value to a higher one
-orbits {Q} --ball 0.5 --orbit 1 | --along
 mesh nobody.obj | nobody.obj: there is no such file
 mesh statue --density heavy | --density takes a number, not 'heavy'
 mesh statue --restitution 0.9 | --restitution is for the blocks of --azimuth: give one
@@ -92,7 +79,6 @@ pulses sine x | rocking pulses takes no argument 'sine x'; see rocking pulses --
 TYPED = {
     "R": RECORD, "S": "--width 0.24 --height 1.1", "B": "--p 2 --alpha 0.2 --restitution 0.9",
     "W": "--width 0.5 --height 4 --mass 5000", "P": f"--pulse {PULSE}",
-    "Q": "--pulse sine:amplitude=3.5,frequency=1.2Hz",
 }  # fmt: skip
 
 

@@ -1134,7 +1134,6 @@ def test_a_diagram_is_taken_away_and_computed_again(opened, tmp_path):
             assert np.isnan(states[-1]).all()
         judged += 1
     assert judged >= 200 and {*ran.direction.values} == {row[1] for row in rows[1:]} == {"up", "down"}
-    assert page.text("#command").startswith("rocking bifurcation --pulse sine:frequency=2.0 --along amplitude:")
 
 
 def test_a_record_is_answered_with_the_nearest_sine(opened):

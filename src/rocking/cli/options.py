@@ -138,31 +138,6 @@ class HeldOptions(BlockOptions):
         return body
 
 
-@_with("ball", "oscillator", "pendulum")
-class BodyOptions(HeldOptions):
-    """A block with what holds it back, or another body in its place."""
-
-    def body(self) -> Body:
-        """Return the other body that is given, or where there is none the block."""
-        from rocking.dynamics.bodies import BouncingBall, ImpactOscillator, InvertedPendulum
-
-        kinds: dict[str, Callable[..., Body]] = {
-            "ball": BouncingBall, "oscillator": ImpactOscillator, "pendulum": InvertedPendulum,
-        }  # fmt: skip
-        first = next((name for name in kinds if name in self.given()), None)
-        if first is None:
-            return super().body()
-        given = self.given()
-        if others := [
-            name for name in dict.fromkeys((*kinds, "restitution", *given)) if name in given and name != first
-        ]:
-            raise InvalidBlock(f"{{}} is a body of its own: leave {bodies.all_of(others)} out", first, *others)
-        if first != "ball":
-            return _made(kinds[first], given[first], first)
-        with _about("ball"):
-            return BouncingBall(self.read("ball")["ball"])
-
-
 @dataclass(frozen=True)
 class EnsembleOptions(HeldOptions):
     """A block by its sizes or by its parameters, or the ensemble of a calibration."""

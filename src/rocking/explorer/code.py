@@ -238,27 +238,9 @@ def sweep_as_python(sweep: Sweep) -> str:
     )
 
 
-def sweep_as_command(sweep: Sweep) -> str | None:
-    """Write a sweep as a command; None for what the command line does not take."""
-    texts, sine = sweep.case.texts, sweep.sine
-    if texts.keys() & {"gravity", "chattering"}:
-        return None
-    name = {"a": "amplitude", "omega": "frequency"}[sweep.axis.name]
-    first, last = (float(getattr(sweep.sine_at(float(sweep.axis.values[k])), name)) for k in (0, -1))
-    fixed = {each: value for each, value in sine._asdict().items() if each not in (name, "cycles") and value}
-    options: dict[str, str] = {
-        "pulse": "sine:" + ",".join(f"{each}={value!r}" for each, value in fixed.items()),
-        "along": f"{name}:{first!r}:{last!r}:{len(sweep.axis.values)}",
-        "start": "0,0",
-        "transient": str(PASSED - 1),
-        **block_options(sweep.case),
-    }
-    return command_line(["rocking", "bifurcation"], options)
-
-
 def sweep_as_code(sweep: Sweep) -> dict[str, Any]:
-    """Return the script and the command of a sweep."""
-    return {"python": sweep_as_python(sweep), "command": sweep_as_command(sweep)}
+    """Return the script of a sweep; the command line does not sweep."""
+    return {"python": sweep_as_python(sweep), "command": None}
 
 
 def block_options(case: Case) -> dict[str, str]:
