@@ -24,8 +24,8 @@ from unittest.mock import patch
 import distributed  # noqa: F401 - imported once, and not by every process that is forked
 import numpy as np
 from common import digest, made, units
-
 from rocking.studies.run import scheduler_client
+
 from rocking.studies.units import UnitGrid
 
 HERE = ("--host", "127.0.0.1", "--dashboard-address", "127.0.0.1:0")

@@ -15,11 +15,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rocking.studies.run import scheduler_client
 from studies_seen import after_each_unit, digest, store_of
 
 import rocking
 from rocking.studies import run as clusters
-from rocking.studies.run import scheduler_client
 from rocking.studies.units import compute
 
 distributed = pytest.importorskip("distributed")

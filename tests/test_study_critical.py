@@ -4,10 +4,10 @@ import itertools
 
 import numpy as np
 import pytest
+from rocking.studies.product import OUTCOMES
 
 import rocking
 from rocking.studies import results as critical
-from rocking.studies.product import OUTCOMES
 
 SCALES = np.geomspace(1.6, 20.0, 16)
 MOTIONS = [rocking.pulses.one_sine(1.0, 5.0 / np.pi), rocking.pulses.ricker(1.0, 0.9)]

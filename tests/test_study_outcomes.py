@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from rocking.studies.product import ALWAYS_KEPT, OUTCOMES
 
 import rocking
 from rocking.explorer.studies import StudyView
 from rocking.studies import read_study
-from rocking.studies.product import ALWAYS_KEPT, OUTCOMES
 
 BLOCKS = rocking.Blocks.grid(p=np.linspace(1.0, 6.0, 130), alpha=[0.1, 0.2, 0.25, 0.3], restitution=[0.85])
 FEW = BLOCKS.select(slice(None, None, 27))

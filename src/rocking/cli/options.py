@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -328,8 +329,8 @@ class MotionOptions(_RecordOptions):
 
 
 @dataclass(frozen=True)
-class MeasureOptions:
-    """How the intensity of motions is measured, and its levels."""
+class IntensityOptions:
+    """How the intensity of motions is measured."""
 
     measure: Annotated[
         IntensityName,
@@ -340,6 +341,17 @@ class MeasureOptions:
     ] = "pga"
     period: Annotated[float | None, hint("Period of the spectral acceleration, s.")] = None
     damping: Annotated[float, hint("Its fraction of critical damping.")] = 0.05
+
+    @property
+    def wanted(self) -> Measure:
+        """Measure of intensity."""
+        return Measure(self.measure, self.period, self.damping)
+
+
+@dataclass(frozen=True)
+class MeasureOptions(IntensityOptions):
+    """How the intensity of motions is measured, and its levels."""
+
     levels: Annotated[
         str | None,
         written(
@@ -353,11 +365,6 @@ class MeasureOptions:
         readers: Mapping[str, Quantity] = {"pga": positive_acceleration, "sa": positive_acceleration, "pgv": velocity}
         levels = None if self.levels is None else values(self.levels, "levels", readers.get(self.measure, _ratio))
         return {"measure": self.wanted, "levels": levels}
-
-    @property
-    def wanted(self) -> Measure:
-        """Measure of intensity."""
-        return Measure(self.measure, self.period, self.damping)
 
 
 @dataclass(frozen=True)
@@ -413,3 +420,22 @@ def _ratio(text: str, name: str) -> float:
     except InvalidOption:
         sentence = "{} takes plain numbers with this {}, which counts in the block's own units, not "
         raise InvalidOption(sentence + repr(text.strip()), name, "measure") from None
+
+
+def limits_of(text: str) -> dict[str, float]:
+    """Return limit states by name: overturning, or rotations over slenderness, as half=0.5."""
+    limits = {}
+    for part in text.split(","):
+        name, given, value = part.strip().partition("=")
+        if not given and name != "overturning":
+            raise InvalidOption(
+                f"{{}} takes overturning or NAME=ROTATION over slenderness, not {part.strip()!r}", "limits", value=text
+            )
+        if name in limits or (given and name in ("", "overturning")):
+            why = f"has {name} twice" if name in limits else f"gives a rotation the name {name!r}"
+            raise InvalidOption(f"{{}} {why}; name each limit state once, as half=0.5", "limits")
+        try:
+            limits[name] = number(value, "limits") if given else math.inf
+        except InvalidOption:
+            raise InvalidOption(f"{{}} {name} takes a number, not {value.strip()!r}", "limits", value=text) from None
+    return limits
