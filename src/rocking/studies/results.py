@@ -278,12 +278,12 @@ class BlockTable(DatasetResult):
             np.mean([values for one, values in parameters.items() if one.partition("_")[0] == name], axis=0)
             for name in ("p", "alpha")
         )
-        labels = drawn[over].values
+        labels, unit = drawn[over].values, drawn.attrs["units"]
         return blocks_figure(
             p,
             alpha,
             panels={f"{over.replace('_', ' ')} {labels[k]}": drawn.values[k] for k in evenly(len(labels), 4)},
-            value_label=drawn.attrs["long_name"],
+            value_label=drawn.attrs["long_name"] + ("" if unit == "1" else f" ({unit})"),
             missing_label="none",
             title=title or as_written(self.data.description),
             ax=ax,
@@ -425,7 +425,7 @@ def block_fragilities(
                         values[i, j] = number
                     bar.advance()
     dims, without, left_out = ("limit_state", "block"), np.count_nonzero(faults != ""), missing_text(missing)
-    text = f"fragility of {counted(len(bodies), 'block')}; intensity: {measure.label}"
+    text = f"fragility of {counted(len(bodies), 'block')}; intensity: {measure.quantity}"
     text += f"; {counted(int(without), 'curve')} cannot be fitted (fault says why)" if without else ""
     about = {"confidence": confidence, "model": product.model, "measure": measure.name, **measure.options()}
     return BlockTable(
