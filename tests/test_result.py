@@ -267,9 +267,9 @@ HEADERS = {
     ("MeasureComparison", "measures"): "measure,unit,median_intensity,dispersion,dispersion_low,dispersion_high,"
     "dispersion_of_all",
     ("MeasureComparison", "intensities"): "measure,motion,block,unit,intensity",
-    ("StudySpectrum", "fractiles"): "fractile,pga_m_s2,block,p_rad_s,alpha_rad,restitution,"
+    ("StudySpectrum", "blocks"): "fractile,pga_m_s2,block,p_rad_s,alpha_rad,restitution,"
     "fractile_over_alpha,overturned_share",
-    ("BlockFragilities", "curves"): "limit_state,block,p_rad_s,alpha_rad,restitution,"
+    ("BlockFragilities", "blocks"): "limit_state,block,p_rad_s,alpha_rad,restitution,"
     "median_m_s2,median_lower_m_s2,median_upper_m_s2,dispersion,dispersion_lower,dispersion_upper,exceeded,outcomes,"
     "fault",
     ("ChatteringMap", "outcomes"): "a,omega,outcome,complete,uplift_s,rest_s,lower_s,upper_s,rests,overturned",

@@ -34,7 +34,7 @@ _GROUP: Final = 512
 #: Simulations in one unit at most.
 _LARGEST: Final = 1 << 18
 
-#: Packing saves two thirds of the bytes, and takes 3 % of the time of the simulations.
+#: Packing saves three quarters of the bytes, and takes half a microsecond for each simulation.
 _LEVEL: Final = 1
 
 #: Bytes of the hash at the end of a file.
