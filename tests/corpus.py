@@ -938,7 +938,6 @@ COMMANDS: Final = {
     ],
     "catalogues": ["records", f"records {RECORD}", "pulses", "pulses --json"],
     "chattering": ["chatter 1.03 2 0.92", "chatter 1.03 2 0.92 --table", "critical 2 0.92"],
-    "dynamics": ["orbits --pulse sine:amplitude=3.5,frequency=1.2Hz --p 2 --alpha 0.2 --restitution 0.9"],
     "mesh": ["mesh statue --density 2600 --azimuth 0,90"],
     "mistakes": [
         f"simulate {RECORD}",
@@ -952,7 +951,7 @@ COMMANDS: Final = {
 }
 
 
-@group(digits=6, subject=("simulate", "restrained", "catalogues", "chattering", "dynamics", "mistakes"))
+@group(digits=6, subject=("simulate", "restrained", "catalogues", "chattering", "mistakes"))
 def commands(subject: str) -> Iterator[Item]:
     for command in COMMANDS[subject]:
         yield command, printed(command)
@@ -1007,8 +1006,6 @@ el-centro-meloland-270,1,b,0,1.5
 SHAKEN: Final = "motion,scale,overturned\n" + "".join(
     f"{name},{scale},{int(scale > 1.2)}\n" for name in TWO.split() for scale in (0.4, 0.8, 1.1, 1.3, 2, 3)
 )
-BODY: Final = "--p 2 --alpha 0.2 --restitution 0.9"
-SINE: Final = "--pulse sine:frequency=1.2Hz"
 ON_FILES: Final = {
     "fragility": [
         "fragility --outcomes observed.csv --hazard rates.csv --years 50 --out fitted",
@@ -1019,15 +1016,11 @@ ON_FILES: Final = {
         f"validate tests.csv {SIZES} --peak-error 0.1deg --lapse 0.01 --out judged",
         "calibrate shaken.csv --candidates 128 --p 3 --restitution housner --no-two-sided",
     ],
-    "periods": [
-        f"basin {SINE},amplitude=0.4g {BODY} --positions -0.1:0.1:5 --velocities -0.2:0.2:3 --periods 30",
-        f"bifurcation {SINE} {BODY} --along amplitude:0.2g:0.4g:4 --start 0.02,0.1 --transient 30 --kept 8",
-    ],
     "study": [
         "study new template.toml",
         "study run study.toml kept --quiet",
         "study status kept",
-        "study report kept report --quiet",
+        "study report kept report --quiet --limits overturning,half=0.5",
         "study verify kept --quiet",
     ],
 }

@@ -174,8 +174,7 @@ def results(bars, spectrum, study):
         "Rose": statue.rose(),
         "ResponseRose": rocking.response_rose(statue, [(PULSE, PULSE)], azimuths=[0.0, 90.0], recorded=(0.0, 90.0)),
         "ChatteringMap": chattering_map(families.sine(BLOCK), {"a": [1.01, 1.1], "omega": [2.0, 3.0]}),
-        "StudySpectrum": study.spectrum().select(scale=3.0),
-        "BlockFragilities": study.block_fragilities(),
+        "BlockTable": study.block_fragilities(),
         "Basins": dynamics.basins(BLOCK, ONE_PERIOD, np.linspace(-0.2, 0.2, 5), np.linspace(-0.4, 0.4, 5)),
         "BifurcationDiagram": dynamics.bifurcation_diagram(
             lambda factor: (BLOCK, ONE_PERIOD.scaled(factor)), [0.5, 1.0], [0.01, 0.1], kept=4, direction="both"
@@ -201,9 +200,9 @@ def test_every_bar_comes_to_its_end(results, bars):
     assert [each for each in bars if not each[1] == each[2] > 0] == []
 
 
-@pytest.mark.parametrize("written", [3, pytest.param(11, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("written", [3, pytest.param(10, marks=pytest.mark.thorough)])
 def test_a_result_keeps_its_dataset_and_offers_nothing_of_it_as_its_own(results, tmp_path, written):
-    assert len(results) == 11
+    assert len(results) == 10
     for number, found in enumerate(results.values()):
         for again in (copy.copy(found), pickle.loads(pickle.dumps(found))):
             assert again.data.identical(found.data)
@@ -267,9 +266,7 @@ HEADERS = {
     ("MeasureComparison", "measures"): "measure,unit,median_intensity,dispersion,dispersion_low,dispersion_high,"
     "dispersion_of_all",
     ("MeasureComparison", "intensities"): "measure,motion,block,unit,intensity",
-    ("StudySpectrum", "blocks"): "fractile,pga_m_s2,block,p_rad_s,alpha_rad,restitution,"
-    "fractile_over_alpha,overturned_share",
-    ("BlockFragilities", "blocks"): "limit_state,block,p_rad_s,alpha_rad,restitution,"
+    ("BlockTable", "blocks"): "limit_state,block,p_rad_s,alpha_rad,restitution,"
     "median_m_s2,median_lower_m_s2,median_upper_m_s2,dispersion,dispersion_lower,dispersion_upper,exceeded,outcomes,"
     "fault",
     ("ChatteringMap", "outcomes"): "a,omega,outcome,complete,uplift_s,rest_s,lower_s,upper_s,rests,overturned",
@@ -282,7 +279,7 @@ def test_every_result_is_written_as_tables_whose_columns_have_units(results, tmp
         for table in found.TABLES:
             found.to_csv(tmp_path / "table.csv", table)
             written[name, table] = (tmp_path / "table.csv").read_text().splitlines()
-            rows = found.data[[*found.TABLES[table]]].to_dataframe()
+            rows = found.data[[*(found.TABLES[table] or found.data)]].to_dataframe()
             assert len(found.to_dataframe(table)) == len(rows) == len(written[name, table]) - 1
         assert found.to_dataframe().equals(found.to_dataframe(next(iter(found.TABLES))))
         with pytest.raises(rocking.InvalidOption, match="table must be one of"):
@@ -351,7 +348,6 @@ def test_the_nonlinear_critical_amplitude_is_not_read_off_an_unfinished_simulati
 NOT_POOLED = {
     "RockingSpectrum": {"fractile"},
     "RockingSpectrum of several": {"fractile"},
-    "StudySpectrum": {"fractile"},
     "OverturningMap": {"amplitude", "frequency"},
     "Rose": {"azimuth", "corner"},
     "BifurcationDiagram": {"direction", "value", "iterate"},

@@ -153,7 +153,7 @@ def _bodies(tables: Tables) -> Bodies:
         return _blocks_of_csv(tables, tables.file.parent / given["csv"])
     with tables.located("blocks"):
         shape_of(given)
-    axes: dict[str, list[Any]] = {}
+    axes: dict[str, Any] = {}
     for name in (*(name for name in given if name in BLOCK), "one_sided", "lean", *COUPLES):
         with tables.located("blocks", key=name):
             if name in given:

@@ -80,7 +80,8 @@ class Store:
     def create(path: str | Path, product: Product, unit: Sequence[int], records: Sequence[str]) -> None:
         """Write an empty store where nothing else is."""
         buffer, about = io.BytesIO(), {"format": _FORMAT, "program": program(), "unit": unit, "records": records}
-        np.savez_compressed(buffer, about=np.array(json.dumps(about)), **_arrays(product))
+        arrays: dict[str, Any] = _arrays(product) | {"about": np.array(json.dumps(about))}
+        np.savez_compressed(buffer, **arrays)
         put(folder_of(path) / _INPUTS, sealed(buffer.getvalue()))
 
     def check_program(self) -> None:

@@ -100,10 +100,11 @@ def _selected(store: Store, names: Sequence[str], complete: bool, key: _Selectio
         here = [np.flatnonzero(axis // part == k) for axis, part, k in zip(wanted, grid.unit, unit, strict=True)]
         within = [axis[at] - k * part for axis, at, part, k in zip(wanted, here, grid.unit, unit, strict=True)]
         outcomes = store.outcomes(unit)
-        if outcomes is None and complete:
+        if outcomes is not None:
+            for values, name in zip(found, names, strict=True):
+                values[np.ix_(*here)] = outcomes[name][np.ix_(*within)]
+        elif complete:
             raise StudyError(f"unit {name_of(unit)} is gone since these results were opened: run the study again")
-        for values, name in zip(found, names, strict=True) if outcomes is not None else ():
-            values[np.ix_(*here)] = outcomes[name][np.ix_(*within)]
     single = tuple(position for position, axis in enumerate(axes) if axis.ndim == 0)
     return [values.squeeze(axis=single) for values in found]
 
