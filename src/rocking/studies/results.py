@@ -160,12 +160,13 @@ def critical_scales(store: Store, verdict: StudyVerdict) -> xr.Dataset:
         raise InvalidOption("critical scales lie between two scales or more, in increasing order: give those")
     store.require_complete()
     names = ["unfinished", "stopped", "overturned", "complete_chattering", "rests", "stalled"]
-    unfinished, stopped, overturned, completes, rests, stalled = (
-        values != 0.0 for values in _selected(store, names, True, (_EVERYTHING,) * 4)
-    )
-    holds, known = overturned, ~(unfinished | stopped)
-    if verdict == "complete_chattering":
-        holds, known = completes, (known | rests) & ~stalled
+    holds, known = np.empty(store.grid.shape, bool), np.empty(store.grid.shape, bool)
+    for part in ranges(len(product.motions), store.grid.unit[0]):
+        outcomes = _selected(store, names, True, (part, _EVERYTHING, _EVERYTHING, _EVERYTHING))
+        unfinished, stopped, overturned, completes, rests, stalled = (values != 0.0 for values in outcomes)
+        holds[part], known[part] = overturned, ~(unfinished | stopped)
+        if verdict == "complete_chattering":
+            holds[part], known[part] = completes, (known[part] | rests) & ~stalled
     # An unknown verdict takes the last known one below: else a change with unknown verdicts inside would be lost.
     below = np.zeros(store.grid.shape, np.int64)  # number of that scale; -1 where no verdict is known so far
     for k in range(product.scales.count):
@@ -276,7 +277,7 @@ class BlockTable(DatasetResult):
             drawn = drawn.sel(fractile=0.5, method="nearest")
         over = str(drawn.dims[0])
         p, alpha = (
-            np.mean([values for one, values in parameters.items() if one.partition("_")[0] == name], axis=0)
+            np.mean([parameters[one] for one in (name, f"{name}_plus", f"{name}_minus") if one in parameters], axis=0)
             for name in ("p", "alpha")
         )
         labels, unit = drawn[over].values, drawn.attrs["units"]

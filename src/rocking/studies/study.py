@@ -437,12 +437,12 @@ def study_of(
         with locked(folder):
             if not exists(folder):  # another process may have made it meanwhile
                 Store.create(folder, product, unit, records)
-    store = Store(folder)
-    store.check_inputs(product)
-    width, count = store.grid.unit[3], len(product.bodies)
+    found = Study(folder)
+    found._store.check_inputs(product)
+    width, count = found._store.grid.unit[3], len(product.bodies)
     if unit_blocks is not None and min(unit_of(product, unit_blocks)[3], count) != min(width, count):
         raise InvalidOption(f"the study is there already, in units of {width} blocks: leave {{}} out", "unit_blocks")
-    return Study(folder)
+    return found
 
 
 def _part(part: str) -> tuple[int, int]:
