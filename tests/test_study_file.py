@@ -288,8 +288,8 @@ def test_a_file_that_is_there_is_not_overwritten(run, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["study", "crate", "a"], "no command crate; did you mean create?"),
-        (["study", "run", "m", "--thread", "2"], "rocking study run has no option --thread; did you mean --threads?"),
+        (["study", "crate", "a"], 'Unknown command "crate". Did you mean "create"?'),
+        (["study", "run", "m", "--thread", "2"], "Unknown option: --thread. Did you mean --threads?"),
         (["study", "run", "nowhere"], "nowhere: there is no study here"),
         (["study", "export", "nowhere", "all.doc"], "exported to .nc, .csv, .parquet, not to all.doc"),
     ],

@@ -63,7 +63,7 @@ def written(text: str) -> Parameter:
 
 def _whole(_: Any, tokens: Sequence[Token]) -> int:
     if not re.fullmatch(r"[+-]?\d+", tokens[0].value):
-        raise ValueError(tokens[0].value)
+        raise ValueError(f"{tokens[0].value} is not a whole number")
     return int(tokens[0].value)
 
 
