@@ -45,7 +45,7 @@ simulate ridgecrest-clc-91 {S} | did you mean ridgecrest-clc-090?
 simulate {P} --offset 0.1 | needs more than --offset: give --width and --height, or --half-width and --half-height
 simulate {P} {W} --tendon stiffnes=1 | --tendon has no stiffnes; did you mean stiffness?
 simulate {P} {W} --tendon prestress=1 | --tendon needs stiffness
-simulate {P} {W} --tendon stiffness=1e6,stiffness=2 | --tendon gives stiffness twice, in 'stiffness=1e6,stiffness=2'
+simulate {P} {W} --tendon stiffness=1e6,stiffness=2 | --tendon takes NAME=VALUE with commas between, each name once
 simulate {P} {W} --tendon stiffness=-1 | --tendon: stiffness of a tendon must be at least 0 N/m, not -1
 simulate {P} {W} --load mass=1,height=2,follows=maybe | --load takes follows=yes or follows=no, not 'maybe'
 simulate {P} {W} --lean 40deg | whose --lean is 0.698132 rad falls

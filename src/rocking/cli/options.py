@@ -181,20 +181,16 @@ def _about(option: str) -> Iterator[None]:
 def _made(kind: Callable[..., Made], text: str, option: str) -> Made:
     """Make what an option describes by NAME=VALUE."""
     given: dict[str, Any] = {}
-    known = inspect.signature(kind).parameters
+    flags = {name for name, each in inspect.signature(kind).parameters.items() if isinstance(each.default, bool)}
     for part in text.split(","):
         name, equals, value = (each.strip() for each in part.partition("="))
         name = name.replace("-", "_")
-        if not equals:
-            raise InvalidOption(f"{{}} takes NAME=VALUE with commas between, not {part.strip()!r}", option, value=text)
-        if name in given:
-            raise InvalidOption(f"{{}} gives {name} twice, in {text!r}", option)
-        if name in known and isinstance(known[name].default, bool):
-            if value not in ("yes", "no"):
-                raise InvalidOption(f"{{}} takes {name}=yes or {name}=no, not {value!r}", option, value=text)
-            given[name] = value == "yes"
-        else:
-            given[name] = bodies.quantity_of(name)(value, option)
+        if not equals or name in given:
+            sentence = "{} takes NAME=VALUE with commas between, each name once, not "
+            raise InvalidOption(sentence + literal(repr(text)), option, value=text)
+        if name in flags and value not in ("yes", "no"):
+            raise InvalidOption(f"{{}} takes {name}=yes or {name}=no, not {value!r}", option, value=text)
+        given[name] = value == "yes" if name in flags else bodies.quantity_of(name)(value, option)
     bodies.check_parameters(kind, given, "{}", option)
     with _about(option):
         return kind(**given)
