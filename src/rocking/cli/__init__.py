@@ -126,7 +126,8 @@ def _sentence(error: Exception, given: list[str]) -> str:
     if isinstance(error, RockingError):
         return error.text(spelling_of(command_of(given))).rstrip(".")
     if isinstance(error, CycloptsError):
-        return f"{' '.join(str(error).split()).rstrip('.')}; see {_named(given)} --help"
+        sentence = " ".join(str(error).split()).rstrip(".")
+        return sentence if sentence.endswith("?") else f"{sentence}; see {_named(given)} --help"
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO):
         # Files have their own sentence: this is what is printed, to a disk that is full.
         _close_output()

@@ -31,6 +31,9 @@ from rocking.studies.study import Study, study_of
 
 study = App(name="study")
 
+#: Units that are named where some failed, at most.
+_SHOWN: Final = 5
+
 #: What writes a study, by the end of the file's name.
 FORMATS: Final = {".nc": Study.to_netcdf, ".csv": Study.to_csv, ".parquet": Study.to_parquet}
 
@@ -100,8 +103,8 @@ def run(
     found = _created(Path(folder), into or folder.removesuffix(".toml"), None) if is_file else Study(folder)
     report = found.run(threads=threads, part=part)
     print(f"{report}\n{found.place}: {found.status}")
-    for unit, why in report.failed.items():
-        note(f"unit {unit} failed: {why}")
+    for unit, why in [*report.failed.items()][:_SHOWN]:
+        note(f"{unit} failed: {why}")
     if report.failed:
         raise StudyError(f"{counted(len(report.failed), 'unit')} failed; run the study again to try again")
     if report.stopped:

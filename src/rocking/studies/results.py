@@ -254,7 +254,8 @@ class BlockTable(DatasetResult):
         return {str(name): one.values for name, one in self.data.coords.items() if one.dims == ("block",)}
 
     def summary(self) -> str:
-        rows = records_of(columns := self._columns("blocks"))
+        columns = [one for one in self._columns("blocks") if one.name != "fault"]  # too long for a table
+        rows = records_of(columns)
         table = table_of_some([column.key for column in columns], [[*row.values()] for row in rows])
         return f"{self.data.description}\n\n{table}"
 

@@ -474,7 +474,8 @@ def _run(store: Store, share: Sequence[Key], threads: int, executor: Any, progre
             while True:
                 # Each worker has a unit in hand, and the next.
                 room = 0 if stop.is_set() else max(2 * max(1, count()) - len(pending), 0)
-                pending |= {submit(store.work(key)): key for key in itertools.islice(left, room)}
+                for key in itertools.islice(left, room):
+                    pending[submit(store.work(key))] = key
                 if not pending:
                     break
                 for future in wait(pending, timeout=1.0, return_when=FIRST_COMPLETED).done:
