@@ -10,9 +10,6 @@ from rocking.studies import Study
 
 BLOCKS = rocking.Blocks(p=np.linspace(1.0, 6.0, 1300), alpha=0.2, restitution=0.9)
 
-#: What may differ between two stores of the same study.
-_ITS_OWN = ("lock", "runs.jsonl")
-
 
 def made(folder: Path, scales: int = 8) -> Study:
     """Make a study of six units for each scale, of a hundredth of a second, or open it."""
@@ -24,11 +21,11 @@ def digest(folder: Path) -> str:
     """Hash of every file of a study: its name and its bytes."""
     total = hashlib.sha256()
     for path in sorted(folder.rglob("*")):
-        if path.is_file() and path.name not in _ITS_OWN:
+        if path.is_file() and path.name != "lock":
             total.update(f"{path.relative_to(folder)}".encode() + b"\0" + path.read_bytes())
     return total.hexdigest()
 
 
 def units(folder: Path) -> dict[str, bytes]:
     """Bytes of every unit that is done, by its name."""
-    return {path.name: path.read_bytes() for path in (folder / "result").glob("c.*")}
+    return {path.name: path.read_bytes() for path in (folder / "units").glob("unit.*")}

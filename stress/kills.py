@@ -21,11 +21,10 @@ from collections.abc import Callable
 from pathlib import Path
 from unittest.mock import patch
 
-import distributed  # noqa: F401 - imported once, and not by every process that is forked
+import distributed
 import numpy as np
 from common import digest, made, units
 
-from rocking.studies.run import scheduler_client
 from rocking.studies.units import UnitGrid
 
 HERE = ("--host", "127.0.0.1", "--dashboard-address", "127.0.0.1:0")
@@ -76,7 +75,7 @@ def run(folder: Path, cluster: Cluster, kind: str, count: int, order: str) -> No
     keys = list(study._store.grid)
     ordered = keys[::-1] if order == "reversed" else keys
     address = json.loads(cluster.file.read_text())["address"]
-    client = contextlib.nullcontext() if kind == "threads" else scheduler_client(address)
+    client = contextlib.nullcontext() if kind == "threads" else distributed.Client(address, set_as_default=False)
     with client as executor, patch.object(UnitGrid, "__iter__", lambda grid: iter(ordered)):
         study.run(threads=count if kind == "threads" else None, executor=executor)
 

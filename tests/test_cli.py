@@ -22,8 +22,6 @@ from rocking.errors import INTERRUPTED
 
 BLOCK = ["--half-width", "0.12", "--half-height", "0.55"]
 RECORD = "el-centro-meloland-270"
-STATES = ["--p", "2", "--alpha", "0.2", "--restitution", "0.9"]
-SINE = ["--pulse", "sine:frequency=1.2Hz"]
 
 
 def test_simulate_json_is_the_response(run):
@@ -58,14 +56,6 @@ FILES = {
     ),
     "chatter": (["1.03", "2", "0.92"], "impacts.csv cycles.csv chatter"),
     "chatter without loss": (["1.03", "2", "1"], "impacts.csv chatter"),
-    "basin": (
-        [SINE[0], f"{SINE[1]},amplitude=3.5", *STATES, "--positions", "-0.2:0.2:4", "--velocities", "-0.4:0.4:4"],
-        "attractors.csv outcomes.csv orbits.csv basin.nc basin",
-    ),
-    "bifurcation": (
-        [*SINE, *STATES, "--along", "amplitude:1:3:4", "--kept", "4"],
-        "states.csv orbits.csv bifurcation.nc bifurcation",
-    ),
     "mesh": (["statue", "--azimuth", "0:165:12"], "rose.csv rose.nc support.csv blocks.csv rose"),
 }  # fmt: skip
 

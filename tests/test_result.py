@@ -173,8 +173,7 @@ def results(bars, spectrum, study):
         "Rose": statue.rose(),
         "ResponseRose": rocking.response_rose(statue, [(PULSE, PULSE)], azimuths=[0.0, 90.0], recorded=(0.0, 90.0)),
         "ChatteringMap": chattering_map(families.sine(BLOCK), {"a": [1.01, 1.1], "omega": [2.0, 3.0]}),
-        "StudySpectrum": study.spectrum().select(scale=3.0),
-        "BlockFragilities": study.block_fragilities(),
+        "BlockTable": study.block_fragilities(),
         "Basins": dynamics.basins(BLOCK, ONE_PERIOD, np.linspace(-0.2, 0.2, 5), np.linspace(-0.4, 0.4, 5)),
         "BifurcationDiagram": dynamics.bifurcation_diagram(
             lambda factor: (BLOCK, ONE_PERIOD.scaled(factor)), [0.5, 1.0], [0.01, 0.1], kept=4, direction="both"
@@ -263,9 +262,7 @@ HEADERS = {
     ("IncrementalDynamicAnalysis", "levels"): "motion,level_m_s2,block,p_rad_s,alpha_rad,restitution,"
     "peak_rotation_rad,peak_over_alpha,overturned",
     ("IncrementalDynamicAnalysis", "bands"): "motion,block,band_start_m_s2,band_end_m_s2",
-    ("StudySpectrum", "fractiles"): "fractile,pga_m_s2,block,p_rad_s,alpha_rad,restitution,"
-    "fractile_over_alpha,overturned_share",
-    ("BlockFragilities", "curves"): "limit_state,block,p_rad_s,alpha_rad,restitution,"
+    ("BlockTable", "blocks"): "limit_state,block,p_rad_s,alpha_rad,restitution,"
     "median_m_s2,median_lower_m_s2,median_upper_m_s2,dispersion,dispersion_lower,dispersion_upper,exceeded,outcomes,"
     "fault",
     ("ChatteringMap", "outcomes"): "a,omega,outcome,complete,uplift_s,rest_s,lower_s,upper_s,rests,overturned",
@@ -278,7 +275,7 @@ def test_every_result_is_written_as_tables_whose_columns_have_units(results, tmp
         for table in found.TABLES:
             found.to_csv(tmp_path / "table.csv", table)
             written[name, table] = (tmp_path / "table.csv").read_text().splitlines()
-            rows = found.data[[*found.TABLES[table]]].to_dataframe()
+            rows = found.data[[*(found.TABLES[table] or found.data)]].to_dataframe()
             assert len(found.to_dataframe(table)) == len(rows) == len(written[name, table]) - 1
         assert found.to_dataframe().equals(found.to_dataframe(next(iter(found.TABLES))))
         with pytest.raises(rocking.InvalidOption, match="table must be one of"):
@@ -347,7 +344,6 @@ def test_the_nonlinear_critical_amplitude_is_not_read_off_an_unfinished_simulati
 NOT_POOLED = {
     "RockingSpectrum": {"fractile"},
     "RockingSpectrum of several": {"fractile"},
-    "StudySpectrum": {"fractile"},
     "OverturningMap": {"amplitude", "frequency"},
     "Rose": {"azimuth", "corner"},
     "BifurcationDiagram": {"direction", "value", "iterate"},

@@ -15,11 +15,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from studies_seen import after_each_unit, digest, store_of
+from studies_seen import RUNS, after_each_unit, digest, store_of
 
 import rocking
-from rocking.studies import run as clusters
-from rocking.studies.run import scheduler_client
 from rocking.studies.units import compute
 
 distributed = pytest.importorskip("distributed")
@@ -28,6 +26,10 @@ pytestmark = pytest.mark.skipif(os.name == "nt", reason="processes are killed th
 HERE = ["--host", "127.0.0.1", "--dashboard-address", "127.0.0.1:0"]
 BLOCKS = rocking.Blocks(p=np.linspace(1.0, 6.0, 2048), alpha=0.2, restitution=0.9)
 UNITS = 20
+
+
+def connected(address, timeout=5.0):
+    return distributed.Client(address, timeout=timeout, set_as_default=False)
 
 
 def made(folder):
@@ -102,10 +104,10 @@ def test_a_client_is_run_as_its_executor_is(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_cluster_loses_a_worker_a_unit_and_its_scheduler_but_no_result(complete, tmp_path, cluster, run, monkeypatch):
+def test_a_cluster_loses_a_worker_a_unit_and_its_scheduler_but_no_result(complete, tmp_path, cluster, monkeypatch):
     # One of two workers is killed in the middle: the other one takes over its units.
     study = made(tmp_path / "worker")
-    with scheduler_client(cluster.address) as client:
+    with connected(cluster.address) as client:
         client.wait_for_workers(2)
         with monkeypatch.context() as patched:
             after_each_unit(patched, cluster.workers[0].kill)
@@ -124,28 +126,25 @@ def test_a_cluster_loses_a_worker_a_unit_and_its_scheduler_but_no_result(complet
         return compute(work)
 
     cluster.start_worker()
-    with scheduler_client(cluster.address) as client:
+    with connected(cluster.address) as client:
         client.wait_for_workers(2)
         client.run_on_scheduler(lambda dask_scheduler: setattr(dask_scheduler, "allowed_failures", 0))
-        monkeypatch.setattr("rocking.studies.run.compute", deadly)
+        monkeypatch.setattr(RUNS, "compute", deadly)
         report = study.run(executor=client)
         monkeypatch.undo()
-    assert report.failed == study.status.failed
-    assert "KilledWorker" in report.failed["c.0.0.7.0.0"]
+    assert "KilledWorker" in report.failed["unit.0.7.0.0"]
     assert len(report.failed) <= 2  # with the one that waited behind it
     study.run(threads=1)
     assert digest(tmp_path / "unit") == complete
 
-    # All is well, by the command.
-    made(tmp_path / "well")
-    code, out, _ = run("study", "run", tmp_path / "well", "--scheduler", cluster.address)
-    assert code == 0 and "20 of 20 units done" in out
-    assert digest(tmp_path / "well") == complete
-
     # The scheduler is killed: one sentence, and no waiting for what will never come.
     study = made(tmp_path / "scheduler")
     gone = pytest.raises(rocking.StudyError, match="the workers are gone: ")
-    with gone, scheduler_client(cluster.address) as client, monkeypatch.context() as patched:
+    with (
+        gone,
+        connected(cluster.address) as client,
+        monkeypatch.context() as patched,
+    ):
         after_each_unit(patched, cluster.scheduler.kill)
         study.run(executor=client)
     assert 0 < study.status.done < UNITS
@@ -159,31 +158,8 @@ def test_a_worker_with_another_program_is_told_so(tmp_path):
         compute(replace(work, program="rocking 9.9.9 (kernels 0)"))
 
 
-@pytest.mark.parametrize(
-    ("options", "sentence"),
-    [
-        (["--scheduler", "tcp://127.0.0.1:1"], "there is no scheduler at tcp://127.0.0.1:1"),
-        (["--scheduler", "nonsense://x"], "there is no scheduler at nonsense://x"),
-        (["--scheduler", "tcp://127.0.0.1:1", "--threads", "2"], "--threads and --scheduler both say who computes"),
-    ],
-)
-def test_what_is_wrong_with_a_cluster_is_one_sentence(tmp_path, run, monkeypatch, options, sentence):
-    monkeypatch.setattr(clusters, "_ANSWER", 0.2)
-    made(tmp_path)
-    code, out, err = run("study", "run", tmp_path, *options)
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert sentence in err
-
-
-def test_without_dask_it_says_what_to_install(tmp_path, run, monkeypatch):
-    monkeypatch.setitem(sys.modules, "distributed", None)
-    made(tmp_path)
-    assert "pip install '.[cluster]' in the source folder" in run("study", "run", tmp_path, "--scheduler", "x")[2]
-
-
 # The page
 
-SCHEDULED = "rocking study run museum --sch"
 PAGE = (Path(__file__).parents[1] / "docs" / "howto" / "study-cluster.md").read_text("utf-8")
 
 
@@ -195,16 +171,19 @@ def commands(*beginnings):
 
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="the page makes a certificate with openssl")
-def test_the_commands_of_the_page_run_a_study_over_tls(complete, tmp_path, monkeypatch, run):
+def test_the_commands_of_the_page_run_a_study_over_tls(complete, tmp_path, monkeypatch):
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = str(free.getsockname()[1])
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("PATH", str(Path(sys.executable).parent), prepend=os.pathsep)
-    certificate, settings, scheduler, worker, begin = (
+    certificate, settings, scheduler, worker = (
         line.replace("8786", port)
-        for line in commands("openssl", "export DASK_CONFIG", "dask scheduler", "dask worker", SCHEDULED)
+        for line in commands("openssl", "export DASK_CONFIG", "dask scheduler", "dask worker")
     )
+    driver, jobs = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    assert "SLURM" in jobs
+    (tmp_path / "run.py").write_text(driver.replace("8786", port))
     (tmp_path / "dask.yaml").write_text(re.search(r"```yaml\n(.*?)```", PAGE, re.DOTALL)[1])
     subprocess.run(certificate, shell=True, check=True, stderr=subprocess.DEVNULL)
     made(tmp_path / "museum")
@@ -216,16 +195,13 @@ def test_the_commands_of_the_page_run_a_study_over_tls(complete, tmp_path, monke
             stack.callback(process.wait)
             stack.callback(os.killpg, process.pid, signal.SIGKILL)
         wait_until(lambda: answers(port))
-        done = subprocess.run(
-            f"{settings}; {begin}", shell=True, executable="/bin/bash", capture_output=True, text=True
-        )
+        command = f"{settings}; exec {sys.executable} run.py"
+        done = subprocess.run(command, shell=True, executable="/bin/bash", capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
-        assert "20 of 20 units done" in done.stdout
+        assert "20 units" in done.stdout
         # Who has no certificate is not let in.
-        monkeypatch.setattr(clusters, "_ANSWER", 0.5)
-        code, _, err = run(*begin.replace("tls://$HEAD", "tls://127.0.0.1").split()[1:])
-        assert (code, err.count("\n")) == (2, 1)
-        assert "there is no scheduler at tls://127.0.0.1" in err
+        with pytest.raises(OSError), connected(f"tcp://127.0.0.1:{port}", timeout=0.5):
+            pass
     assert digest(tmp_path / "museum") == complete
 
 
@@ -238,7 +214,7 @@ def answers(port):
 @pytest.mark.thorough
 def test_the_script_of_the_page_submits_what_it_says(tmp_path, monkeypatch):
     pytest.importorskip("dask_jobqueue")
-    script = re.search(r"```python\n(.*?)```", PAGE, re.DOTALL)[1]
+    _, script = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     monkeypatch.chdir(tmp_path)
     scope = {}
     exec(script[: script.index("cluster.scale")], scope)

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking.studies import results as critical
-from rocking.studies.product import OUTCOMES
 
 SCALES = np.geomspace(1.6, 20.0, 16)
 MOTIONS = [rocking.pulses.one_sine(1.0, 5.0 / np.pi), rocking.pulses.ricker(1.0, 0.9)]
@@ -81,22 +79,6 @@ def test_a_change_with_unknown_verdicts_inside_lies_between_the_known_ones(tmp_p
     assert results.overturned.values.ravel().tolist() == [False, False, False, False, True, True]
     assert (found.low.values.tolist(), found.high.values.tolist()) == ([1.0], [6.0])
     assert (found.overturns.values.tolist(), found.known.values.tolist()) == ([True], [False])
-
-
-def test_chattering_that_was_cut_off_or_is_not_proven_is_no_verdict():
-    outcomes = dict.fromkeys(OUTCOMES, np.zeros(6))
-    outcomes |= {
-        "overturned": np.array([0, 0, 0, 1, 0, 0]),
-        "unfinished": np.array([1, 0, 0, 0, 0, 0]),
-        "stopped": np.array([0, 1, 1, 0, 0, 0]),
-        "rests": np.array([0, 0, 2, 0, 1, 1]),
-        "complete_chattering": np.array([0, 0, 1, 0, 1, 1]),
-        "stalled": np.array([0, 0, 0, 0, 0, 1]),
-    }
-    expected = {"overturning": [None, None, None, 1, 0, 0], "complete_chattering": [None, None, 1, 0, 1, None]}
-    for verdict, wanted in expected.items():
-        holds, known = critical._verdicts(verdict, outcomes)
-        assert [int(one) if certain else None for one, certain in zip(holds, known, strict=True)] == wanted
 
 
 def test_what_has_no_critical_scales_is_refused(complete, tmp_path):

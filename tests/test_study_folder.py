@@ -10,7 +10,7 @@ import pytest
 
 import rocking
 from rocking.errors import InvalidOption, StudyError
-from rocking.studies.folder import Folder, Store, exists, require_free, this_process
+from rocking.studies.folder import Store, exists, locked, put, require_free
 
 
 @pytest.mark.skipif(os.name == "nt", reason="folders cannot be flushed there")
@@ -30,9 +30,9 @@ def test_a_file_is_on_the_disk_before_it_has_its_name(tmp_path: Path, monkeypatc
 
     monkeypatch.setattr(os, "fsync", flush)
     monkeypatch.setattr(Path, "replace", name)
-    Folder(tmp_path).put("c.0.1", b"outcomes")
+    put(tmp_path / "unit.1", b"outcomes")
     assert done == [len(b"outcomes"), "name", "folder"]
-    assert (tmp_path / "c.0.1").read_bytes() == b"outcomes"
+    assert (tmp_path / "unit.1").read_bytes() == b"outcomes"
 
 
 @pytest.mark.skipif(os.name == "nt", reason="there the folder decides who may read its files")
@@ -40,89 +40,65 @@ def test_a_file_is_on_the_disk_before_it_has_its_name(tmp_path: Path, monkeypatc
 def test_the_umask_decides_who_may_read_a_study(tmp_path: Path, umask: int, mode: int) -> None:
     before = os.umask(umask)
     try:
-        Folder(tmp_path).put("c.0.1", b"outcomes")
-        with Folder(tmp_path).locked():
+        put(tmp_path / "unit.1", b"outcomes")
+        with locked(tmp_path):
             pass
     finally:
         os.umask(before)
-    assert [stat.S_IMODE((tmp_path / name).stat().st_mode) for name in ("c.0.1", "lock")] == [mode, mode]
+    assert [stat.S_IMODE((tmp_path / name).stat().st_mode) for name in ("unit.1", "lock")] == [mode, mode]
 
 
-@pytest.mark.parametrize(
-    ("one", "other", "together"),
-    [
-        ("lock", "lock", False),
-        ("lock", "lock.1-3", False),
-        ("lock.1-3", "lock", False),
-        ("lock.1-3", "lock.1-3", False),
-        ("lock.1-3", "lock.2-3", True),
-    ],
-)
-def test_one_process_runs_a_study_or_several_run_parts_of_it(
-    tmp_path: Path, one: str, other: str, together: bool
-) -> None:
-    first, second = Folder(tmp_path), Folder(tmp_path)
-    told = rf"run by process {os.getpid()} on .*; wait for it, or end it there"
+@pytest.mark.skipif(os.name == "nt", reason="parts share no lock there")
+@pytest.mark.parametrize("one", [False, True])
+@pytest.mark.parametrize("other", [False, True])
+def test_one_process_runs_a_study_or_several_run_parts_of_it(tmp_path: Path, one: bool, other: bool) -> None:
     for _ in range(2):  # a lock that was given back locks nothing
-        with first.locked(one):
-            assert second.holders() == {one: this_process()}
-            if together:
-                with second.locked(other):
-                    assert first.holders() == dict.fromkeys((one, other), this_process())
-            else:
-                with pytest.raises(StudyError, match=told), second.locked(other):
+        with locked(tmp_path, shared=one):
+            if one and other:
+                with locked(tmp_path, shared=other):
                     pass
-        assert first.holders() == {}
+            else:
+                told = rf"run by process {os.getpid()} on .*; wait for it, or end it there"
+                with pytest.raises(StudyError, match=told), locked(tmp_path, shared=other):
+                    pass
 
 
-def test_a_lock_goes_with_its_process_and_the_next_run_removes_half_written_files(tmp_path: Path) -> None:
+@pytest.mark.skipif(os.name == "nt", reason="parts share no lock there")
+@pytest.mark.parametrize("shared", [False, True])
+def test_a_lock_goes_with_its_process_and_the_next_run_removes_half_written_files(tmp_path: Path, shared: bool) -> None:
     program = (
-        "import sys, time\nfrom rocking.studies.folder import Folder\n"
-        "with Folder(sys.argv[1]).locked(sys.argv[2]):\n    print('locked', flush=True)\n    time.sleep(600)\n"
+        "import sys, time\nfrom rocking.studies.folder import locked\n"
+        f"with locked(sys.argv[1], shared={shared}):\n    print('locked', flush=True)\n    time.sleep(600)\n"
     )
-    (tmp_path / "result").mkdir()
-    part = tmp_path / "result" / ".abc.part"
-    for lock in ("lock", "lock.1-3"):
-        part.write_bytes(b"half")
-        with subprocess.Popen([sys.executable, "-c", program, tmp_path, lock], stdout=subprocess.PIPE) as process:
-            assert process.stdout is not None and process.stdout.readline() == b"locked\n"
-            with pytest.raises(StudyError, match=f"run by process {process.pid} on"), Folder(tmp_path).locked():
-                pass
-            assert part.exists() == (lock != "lock")  # others may be writing beside a part
-            process.kill()
-        with Folder(tmp_path).locked("lock.1-3"):
-            assert part.exists() == (lock != "lock")
-        with Folder(tmp_path).locked():
-            assert not part.exists()
-
-
-def test_a_file_with_the_same_content_is_not_written_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    folder, written = Folder(tmp_path), []
-    put = Folder.put
-    monkeypatch.setattr(Folder, "put", lambda folder, name, data: written.append(data) or put(folder, name, data))
-    for data in (b"one", b"one", b"two"):
-        folder.keep("study.json", data)
-        assert folder.get("study.json") == data
-    assert written == [b"one", b"two"]
+    part = tmp_path / ".abc.part"
+    part.write_bytes(b"half")
+    with subprocess.Popen([sys.executable, "-c", program, tmp_path], stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None and process.stdout.readline() == b"locked\n"
+        with pytest.raises(StudyError, match=f"run by process {process.pid} on"), locked(tmp_path):
+            pass
+        assert part.exists() == shared  # others may be writing beside a part
+        process.kill()
+    with locked(tmp_path):
+        assert not part.exists()
 
 
 def test_where_there_is_no_study_none_is_opened(tmp_path: Path) -> None:
-    assert not exists(Folder(tmp_path))
+    assert not exists(tmp_path)
     with pytest.raises(StudyError, match="there is no study here: create it first"):
-        Store.open(Folder(tmp_path))
+        Store(tmp_path)
     with pytest.raises(StudyError, match="this is a URL, and a study is kept in a folder"):
-        Folder("s3://bucket/museum")
+        rocking.study("s3://bucket/museum")
 
 
 @pytest.mark.parametrize(
     ("names", "listed"), [(("b", "a"), "but a, b: name"), (("d", "c", "b", "a"), "but a, b, c and more: name")]
 )
 def test_a_folder_of_other_files_is_no_place_for_a_study(tmp_path: Path, names: tuple[str, ...], listed: str) -> None:
-    require_free(Folder(tmp_path))
+    require_free(tmp_path)
     for name in names:
         (tmp_path / name).touch()
     with pytest.raises(StudyError, match=listed):
-        require_free(Folder(tmp_path))
+        require_free(tmp_path)
 
 
 @pytest.mark.parametrize("part", ["0/3", "4/3", "1", "1/", "/3", "a/b", "-1/3", "1/0", "1.5/3", 3])

@@ -17,9 +17,6 @@ from rocking.cli import main
 
 _BLOCK: Final = ("--width", "0.24", "--height", "1.1")
 _RECORD: Final = "el-centro-meloland-270"
-_SINE: Final = "sine:amplitude=0.3g,frequency=2Hz"
-_ALONG: Final = ("--pulse", "sine:frequency=2Hz", "--along", "amplitude:0.1g:0.4g:9")
-_GRID: Final = ("--positions=-0.15:0.15:65", "--velocities=-0.5:0.5:65")
 
 _STUDY: Final = """\
 [blocks]
@@ -41,9 +38,6 @@ _TESTS: Final = "motion,overturned,scale\n" + "".join(
     f"el-centro-meloland-270,{int(scale > 1.0)},{scale}\n" for scale in (0.3, 0.6, 0.9, 1.2, 1.5)
 )
 
-#: What a study writes of its own runs; half a line there is passed over.
-_JOURNALS: Final = ("lock", "runs.jsonl")
-
 #: Commands by name; OUT is the folder for their files, and what they read lies beside it. STUDY is one that is done.
 COMMANDS: Final[dict[str, tuple[str, ...]]] = {
     "simulate": ("simulate", _RECORD, *_BLOCK, "--out", "OUT"),
@@ -51,13 +45,10 @@ COMMANDS: Final[dict[str, tuple[str, ...]]] = {
     "spectrum": ("spectrum", _RECORD, "--alpha", "0.15,0.2", "--p", "1:6:20", "--out", "OUT"),
     "fragility": ("fragility", _RECORD, "ridgecrest-clc-090", *_BLOCK, "--levels", "0.1g:1g:19", "--out", "OUT"),
     "study run": ("study", "run", "study.toml", "OUT"),
-    "orbits": ("orbits", *_BLOCK, "--pulse", _SINE, "--out", "OUT"),
     "calibrate": ("calibrate", "tests.csv", "--out", "OUT"),
     "validate": ("validate", "tests.csv", *_BLOCK, "--out", "OUT"),
     "check": ("check", _RECORD, *_BLOCK, "--out", "OUT"),
     "ida": ("ida", _RECORD, *_BLOCK, "--levels", "0.1g:1.5g:30", "--out", "OUT"),
-    "bifurcation": ("bifurcation", *_BLOCK, *_ALONG, "--transient", "20", "--kept", "8", "--out", "OUT"),
-    "basin": ("basin", *_BLOCK, "--pulse", _SINE, *_GRID, "--periods", "50", "--out", "OUT"),
     "chatter": ("chatter", "1.05", "0.7", "0.8", "--out", "OUT"),
     "critical": ("critical", "0.7", "0.8", "--out", "OUT"),
     "mesh": ("mesh", "statue", "--azimuth", "0,90", "--out", "OUT"),
@@ -73,9 +64,6 @@ LONG: Final = tuple(
     for name in COMMANDS
     if name not in ("check", "chatter", "critical", "study new", "study create", "study export")
 )
-
-#: Commands that end with what was computed until Ctrl-C was pressed.
-ENDING_WITH_A_PART: Final = ("basin",)
 
 #: Commands that only print.
 PRINTING: Final[dict[str, tuple[str, ...]]] = {
@@ -139,23 +127,17 @@ def files(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in found}
 
 
-def faults(folder: Path, whole: dict[str, bytes], *, of_a_part: bool = False) -> list[str]:
-    """Say which files of a folder are not whole, or are none that an undisturbed run (`whole`) leaves.
-
-    ``of_a_part``: tables may hold the part that was computed until then.
-    """
-    fault = {name: _fault(folder / name, name, content, whole, of_a_part) for name, content in files(folder).items()}
+def faults(folder: Path, whole: dict[str, bytes]) -> list[str]:
+    """Say which files of a folder are not whole, or are none that an undisturbed run (`whole`) leaves."""
+    fault = {name: _fault(folder / name, name, content, whole) for name, content in files(folder).items()}
     return [each for each in fault.values() if each]
 
 
-def _fault(path: Path, name: str, content: bytes, whole: dict[str, bytes], of_a_part: bool) -> str:
-    if Path(name).name in _JOURNALS:
+def _fault(path: Path, name: str, content: bytes, whole: dict[str, bytes]) -> str:
+    if Path(name).name == "lock":
         return ""
     if name not in whole:
         return f"{name} is left"
-    if of_a_part and path.suffix == ".csv":
-        same_head = content.partition(b"\n")[0] == whole[name].partition(b"\n")[0]
-        return "" if same_head and content.endswith(b"\n") else f"{name} is not whole"
     try:
         return "" if _opens(path, content, whole[name]) else f"{name} is not whole"
     except (OSError, ValueError) as error:

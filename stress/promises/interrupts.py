@@ -17,16 +17,15 @@ from functools import cache
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from promises.commands import ENDING_WITH_A_PART, LONG, arguments, faults, files
+from promises.commands import LONG, arguments, faults, files
 from promises.promise import Found, Promise
 from rocking.errors import INTERRUPTED
 
 #: Interrupts of a part, all of one command, which has two parts.
 INTERRUPTS: Final = 20
 
-#: Processor time after an interrupt at most, s; of a command that draws and writes what it has.
+#: Processor time after an interrupt at most, s.
 LIMIT: Final = 2.0
-_LIMIT_WITH_A_PART: Final = 5.0
 
 #: Longest a command may take in all, s: long enough for a busy machine.
 _PATIENCE: Final = 300.0
@@ -115,16 +114,14 @@ def judge(part: int) -> Found:
 def _judge_end(found: Found, what: str, one: Ended, folder: Path, whole: dict[str, bytes]) -> None:
     found.cases += 1
     found.judged += 1
-    of_a_part = what.startswith(ENDING_WITH_A_PART)
-    limit = _LIMIT_WITH_A_PART if of_a_part else LIMIT
-    found.worst = max(found.worst, one.after / limit)
-    if one.after > limit:
+    found.worst = max(found.worst, one.after / LIMIT)
+    if one.after > LIMIT:
         found.fail(f"{what}: {one.after:.2f} s of processor time after the interrupt, status {one.status}")
-    for fault in faults(folder, whole, of_a_part=of_a_part):
+    for fault in faults(folder, whole):
         found.fail(f"{what}: {fault}")
     lines = [line for line in one.errors.splitlines() if not line.startswith(b"rocking: note:")]
     if one.status == 0 and not lines:
-        found.notes["a part" if b"interrupted" in one.errors else "over before"] += 1
+        found.notes["over before"] += 1
     elif one.status == -signal.SIGINT:
         found.notes["before the program"] += 1  # Python itself was starting, or leaving: what it says is its own
     elif one.status == 130 and len(lines) == 1 and lines[0] == INTERRUPTED.encode():
@@ -140,7 +137,7 @@ def table(found: Found) -> str:
     return (
         f"Of {found.cases} interrupts {counts['interrupted']} met the imports or the work, "
         f"{counts['before the program']} Python itself before the program's first line or after its last, and "
-        f"{counts['over before']} one that was over; {counts['a part']} ended with what was computed until then.\n"
+        f"{counts['over before']} one that was over.\n"
     )
 
 

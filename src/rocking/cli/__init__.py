@@ -10,18 +10,13 @@ import sys
 from collections.abc import Iterable, Sequence
 from inspect import Parameter
 from pathlib import Path
-from typing import Final
 
-from cyclopts import App, Argument, CoercionError, CycloptsError, MissingArgumentError, UnknownCommandError
-from cyclopts.exceptions import UnknownOptionError, UnusedCliTokensError
+from cyclopts import App, CycloptsError
 
 from rocking.core.checks import meant
 from rocking.core.progress import notes_for
 from rocking.errors import INTERRUPTED, DamagedStudy, InvalidOption, RockingError, Spelling
 from rocking.inputs.texts import option_of
-
-#: Names so short are too alike for a guess: a suggestion must not lead to another quantity.
-_SHORT: Final = len("--pga")
 
 app = App(
     name="rocking",
@@ -41,7 +36,6 @@ def _lines_of(module: str) -> dict[str, str]:
 for _module, _commands in {
     "simulate": ("simulate", "check", "records", "pulses"),
     "analysis": ("chatter", "critical", "spectrum", "map", "ida"),
-    "dynamics": ("orbits", "bifurcation", "basin"),
     "fragility": ("fragility",),
     "calibrate": ("calibrate", "validate"),
     "mesh": ("mesh",),
@@ -126,9 +120,14 @@ def _is_of_an_interrupt(error: BaseException | None) -> bool:
 
 
 def _sentence(error: Exception, given: list[str]) -> str:
-    """Say what is wrong; nothing where it is a fault of the program."""
-    if isinstance(error, (RockingError, CycloptsError)):
-        return sentence_of(error, given)
+    """Return an error as one line that names options; nothing where it is a fault of the program."""
+    if isinstance(error, DamagedStudy):
+        return f"{error.text()}: rocking study verify FOLDER --repair computes it again"
+    if isinstance(error, RockingError):
+        return error.text(spelling_of(command_of(given))).rstrip(".")
+    if isinstance(error, CycloptsError):
+        sentence = " ".join(str(error).split()).rstrip(".")
+        return sentence if sentence.endswith("?") else f"{sentence}; see {_named(given)} --help"
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO):
         # Files have their own sentence: this is what is printed, to a disk that is full.
         _close_output()
@@ -176,47 +175,12 @@ def refuse_unknown_options(given: Iterable[object], arguments: Sequence[str]) ->
     typed = arguments[: arguments.index("--")] if "--" in arguments else arguments
     for name in given:
         if isinstance(name, str) and name.startswith("-") and name.lstrip("-")[:1].isalpha() and name in typed:
-            raise InvalidOption(_unknown_option(name, arguments))
-
-
-def sentence_of(error: RockingError | CycloptsError, arguments: Sequence[str]) -> str:
-    """Return an error as one line that names options."""
-    if isinstance(error, DamagedStudy):
-        return f"{error.text()}: rocking study verify FOLDER --repair computes it again"
-    if isinstance(error, RockingError):
-        return error.text(spelling_of(command_of(arguments))).rstrip(".")
-    if isinstance(error, UnknownCommandError):
-        unknown = (error.unused_tokens or arguments)[0]
-        commands = [each for each in command_of(arguments) if not each.startswith("-")]
-        hint = meant(unknown, commands, f"there are {', '.join(commands)}")
-        return f"there is no command {unknown}; {hint}"
-    if isinstance(error, UnknownOptionError):
-        return _unknown_option(error.token.keyword or error.token.value, arguments)
-    sentence = " ".join(str(error).split()).rstrip(".")
-    command = _named(arguments)
-    argument = error.argument
-    if isinstance(error, MissingArgumentError) and argument is not None:
-        is_given = any(each.partition("=")[0] in argument.names for each in arguments)
-        sentence = f"{command} needs {_name(argument)}"
-        if is_given and not _is_positional(argument):
-            sentence = f"{_name(argument)} needs a value"
-    elif isinstance(error, CoercionError) and argument and error.token and error.target_type in (float, int):
-        kind = "a number" if error.target_type is float else "a whole number"
-        sentence = f"{_name(argument)} takes {kind}, not {error.token.value!r}"
-    elif isinstance(error, UnusedCliTokensError):
-        sentence = f"{command} takes no argument {' '.join(error.unused_tokens or ())!r}"
-    return f"{sentence}; see {command} --help"
-
-
-def _unknown_option(typed: str, arguments: Sequence[str]) -> str:
-    name = typed.partition("=")[0]
-    command = command_of(arguments)
-    known = {"--help", *_options(command), *(each for each in command if each.startswith("-"))}
-    words = {each.lstrip("-"): each for each in known if len(each) > _SHORT}
-    hint = meant(
-        name.lstrip("-"), words if len(name) > _SHORT else {}, "see its --help", 0.8
-    )  # a slip: a letter or two of six
-    return f"{_named(arguments)} has no option {name}; {hint}"
+            option = name.partition("=")[0]
+            # Short names are too alike for a guess: a suggestion must not lead to another quantity.
+            known = [each for each in _options(command_of(arguments)) if min(len(each), len(option)) > len("--pga")]
+            words = {each.lstrip("-"): each for each in known}
+            hint = meant(option.lstrip("-"), words, "see its --help", 0.8)  # a slip: a letter or two of six
+            raise InvalidOption(f"{_named(arguments)} has no option {option}; {hint}")
 
 
 def _named(arguments: Sequence[str]) -> str:
@@ -233,12 +197,5 @@ def _options(command: App) -> Iterable[str]:
     if command.default_command is None:
         return ()
     arguments = command.assemble_argument_collection()
-    return [name for each in arguments if not _is_positional(each) for name in each.names if name.startswith("-")]
-
-
-def _name(argument: Argument) -> str:
-    return argument.name.lstrip("-").upper() if _is_positional(argument) else argument.name
-
-
-def _is_positional(argument: Argument) -> bool:
-    return not argument.keys and argument.field_info.kind is not Parameter.KEYWORD_ONLY
+    named = [each for each in arguments if each.keys or each.field_info.kind is Parameter.KEYWORD_ONLY]
+    return [name for each in named for name in each.names if name.startswith("-")]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -112,30 +112,22 @@ def calibrate(
             if len(motions) > 1:
                 raise InvalidOption("a history has one motion of the base: give {}, or one {}", "motion", "pulse")
             shaking = next(iter(motions.values()), None)
-            history = calibrate_history(
-                table.times, table.rotation, shaking, **choices, initial_rotation=start, seed=seed
-            )
-            results = _Results(history, history.to_dict(), history.summary())
+            choices |= {"initial_rotation": start, "seed": seed}
+            found: Calibration | HistoryCalibration = calibrate_history(table.times, table.rotation, shaking, **choices)
+            result, text = found.to_dict(), found.summary()
         else:
-            results = _of_outcomes(table, motions, folds, {"candidates": candidates, "seed": seed, **choices})
+            # Outcomes that cannot be calibrated, and more folds than groups, are refused before the work.
+            fell = checked_outcomes([test.overturned for test in table], len(table)).tolist()
+            if folds:
+                group_labels([test.group for test in table], len(table), folds)
+            choices |= {"candidates": candidates, "seed": seed}
+            found = calibration = calibrated([test.motion for test in table], fell, **choices)
+            result, text = _of_outcomes(calibration, table, motions, folds)
+            if folder is not None:
+                calibration.to_csv(folder / "ensemble.csv")
         if folder is not None:
-            results.write(folder)
-        print_result(results.numbers, results.text, as_json=output.as_json)
-
-
-@dataclass(frozen=True)
-class _Results:
-    """A calibration, its numbers and words."""
-
-    found: Calibration | HistoryCalibration
-    numbers: dict[str, Any]
-    text: str
-
-    def write(self, folder: Path) -> None:
-        """Write numbers, and figure and ensemble of a calibration."""
-        if isinstance(self.found, Calibration):
-            self.found.to_csv(folder / "ensemble.csv")
-        write_results(folder, figures={"calibration": self.found.plot}, result=self.numbers)
+            write_results(folder, figures={"calibration": found.plot}, result=result)
+        print_result(result, text, as_json=output.as_json)
 
 
 def _motions(records: Sequence[str], file: ScaledPulseOptions, option: str) -> dict[str, Motion]:
@@ -147,25 +139,19 @@ def _motions(records: Sequence[str], file: ScaledPulseOptions, option: str) -> d
 
 
 def _of_outcomes(
-    tests: Sequence[ShakeTest], others: Mapping[str, Motion], folds: int, choices: Mapping[str, Any]
-) -> _Results:
-    fell, groups = [test.overturned for test in tests], [test.group for test in tests]
-    # Outcomes that cannot be calibrated, and more folds than groups, are refused before the work.
-    checked_outcomes(fell, len(tests))
-    if folds:
-        group_labels(groups, len(tests), folds)
-    found = calibrated([test.motion for test in tests], fell, **choices)
+    found: Calibration, tests: Sequence[ShakeTest], others: Mapping[str, Motion], folds: int
+) -> tuple[dict[str, Any], str]:
+    """Return numbers and words of a calibration, with predictions and a cross-validation where they are asked for."""
     predicted = dict(zip(others, found.predict([*others.values()]), strict=True))
-    numbers = {**found.to_dict(), "predicted": predicted}
-    parts = [found.summary()]
+    numbers, parts = {**found.to_dict(), "predicted": predicted}, [found.summary()]
     if folds:
-        scores = found.cross_validate(groups=groups, folds=folds).scores
+        scores = found.cross_validate(groups=[test.group for test in tests], folds=folds).scores
         numbers["cross_validated"] = asdict(scores)
         parts.append(f"left-out motions: {scores} ({counted(folds, 'fold')})")
     if predicted:
         rows = [(name, float(chance)) for name, chance in predicted.items()]
         parts.append("\n" + text_table(["motion", "probability"], rows))
-    return _Results(found, numbers, "\n".join(parts))
+    return numbers, "\n".join(parts)
 
 
 def validate(

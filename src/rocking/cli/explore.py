@@ -58,9 +58,9 @@ def explore(
 def _study(folder: Path) -> StudyView:
     """Study in a folder, to be shown as maps."""
     from rocking.explorer.studies import StudyView
-    from rocking.studies.folder import Folder, exists
+    from rocking.studies.folder import exists
 
-    if not exists(Folder(folder)):
+    if not exists(folder):
         sentence = "this folder holds no study; name one record, and drop the other files on the page"
         raise InvalidOption(sentence, path=str(folder))
     return StudyView(folder)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -29,6 +28,7 @@ from rocking.cli.options import (
     Names,
     TreatmentOptions,
     labels_of,
+    limits_of,
 )
 from rocking.cli.output import OUTPUT, OutputOptions, left_out, print_result, write_results
 from rocking.core import checks
@@ -36,7 +36,6 @@ from rocking.core.progress import note
 from rocking.core.tables import write_csv
 from rocking.errors import InvalidOption, Unfitted
 from rocking.inputs.notes import hazard_notes
-from rocking.inputs.quantities import number
 from rocking.motion.scaling import Measure
 from rocking.simulation.ensemble import Polarity
 
@@ -112,7 +111,7 @@ def fragility(
     bodies = {} if outcomes is not None else block.blocks(model)
     checks.positive(years, "years", InvalidOption)
     curve = _hazard(hazard, site, years, measure.period)
-    states = _limits(limits)
+    states = limits_of(limits)
     if output.out is not None:
         check_names([taxonomy], "taxonomy")
         check_names(states, "a limit state")
@@ -210,21 +209,3 @@ def _hazard(file: Path | None, site: int, years: float, period: float | None) ->
     for sentence in hazard_notes(curve.intensity, curve.measure):
         note(f"{file}: {sentence}")
     return curve
-
-
-def _limits(text: str) -> dict[str, float]:
-    limits = {}
-    for part in text.split(","):
-        name, given, value = part.strip().partition("=")
-        if not given and name != "overturning":
-            raise InvalidOption(
-                f"{{}} takes overturning or NAME=ROTATION over slenderness, not {part.strip()!r}", "limits", value=text
-            )
-        if name in limits or (given and name in ("", "overturning")):
-            why = f"has {name} twice" if name in limits else f"gives a rotation the name {name!r}"
-            raise InvalidOption(f"{{}} {why}; name each limit state once, as half=0.5", "limits")
-        try:
-            limits[name] = number(value, "limits") if given else math.inf
-        except InvalidOption:
-            raise InvalidOption(f"{{}} {name} takes a number, not {value.strip()!r}", "limits", value=text) from None
-    return limits

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -62,7 +63,7 @@ def written(text: str) -> Parameter:
 
 def _whole(_: Any, tokens: Sequence[Token]) -> int:
     if not re.fullmatch(r"[+-]?\d+", tokens[0].value):
-        raise ValueError(tokens[0].value)
+        raise ValueError(f"{tokens[0].value} is not a whole number")
     return int(tokens[0].value)
 
 
@@ -138,31 +139,6 @@ class HeldOptions(BlockOptions):
         return body
 
 
-@_with("ball", "oscillator", "pendulum")
-class BodyOptions(HeldOptions):
-    """A block with what holds it back, or another body in its place."""
-
-    def body(self) -> Body:
-        """Return the other body that is given, or where there is none the block."""
-        from rocking.dynamics.bodies import BouncingBall, ImpactOscillator, InvertedPendulum
-
-        kinds: dict[str, Callable[..., Body]] = {
-            "ball": BouncingBall, "oscillator": ImpactOscillator, "pendulum": InvertedPendulum,
-        }  # fmt: skip
-        first = next((name for name in kinds if name in self.given()), None)
-        if first is None:
-            return super().body()
-        given = self.given()
-        if others := [
-            name for name in dict.fromkeys((*kinds, "restitution", *given)) if name in given and name != first
-        ]:
-            raise InvalidBlock(f"{{}} is a body of its own: leave {bodies.all_of(others)} out", first, *others)
-        if first != "ball":
-            return _made(kinds[first], given[first], first)
-        with _about("ball"):
-            return BouncingBall(self.read("ball")["ball"])
-
-
 @dataclass(frozen=True)
 class EnsembleOptions(HeldOptions):
     """A block by its sizes or by its parameters, or the ensemble of a calibration."""
@@ -205,20 +181,16 @@ def _about(option: str) -> Iterator[None]:
 def _made(kind: Callable[..., Made], text: str, option: str) -> Made:
     """Make what an option describes by NAME=VALUE."""
     given: dict[str, Any] = {}
-    known = inspect.signature(kind).parameters
+    flags = {name for name, each in inspect.signature(kind).parameters.items() if isinstance(each.default, bool)}
     for part in text.split(","):
         name, equals, value = (each.strip() for each in part.partition("="))
         name = name.replace("-", "_")
-        if not equals:
-            raise InvalidOption(f"{{}} takes NAME=VALUE with commas between, not {part.strip()!r}", option, value=text)
-        if name in given:
-            raise InvalidOption(f"{{}} gives {name} twice, in {text!r}", option)
-        if name in known and isinstance(known[name].default, bool):
-            if value not in ("yes", "no"):
-                raise InvalidOption(f"{{}} takes {name}=yes or {name}=no, not {value!r}", option, value=text)
-            given[name] = value == "yes"
-        else:
-            given[name] = bodies.quantity_of(name)(value, option)
+        if not equals or name in given:
+            sentence = "{} takes NAME=VALUE with commas between, each name once, not "
+            raise InvalidOption(sentence + literal(repr(text)), option, value=text)
+        if name in flags and value not in ("yes", "no"):
+            raise InvalidOption(f"{{}} takes {name}=yes or {name}=no, not {value!r}", option, value=text)
+        given[name] = value == "yes" if name in flags else bodies.quantity_of(name)(value, option)
     bodies.check_parameters(kind, given, "{}", option)
     with _about(option):
         return kind(**given)
@@ -353,8 +325,8 @@ class MotionOptions(_RecordOptions):
 
 
 @dataclass(frozen=True)
-class MeasureOptions:
-    """How the intensity of motions is measured, and its levels."""
+class IntensityOptions:
+    """How the intensity of motions is measured."""
 
     measure: Annotated[
         IntensityName,
@@ -365,6 +337,17 @@ class MeasureOptions:
     ] = "pga"
     period: Annotated[float | None, hint("Period of the spectral acceleration, s.")] = None
     damping: Annotated[float, hint("Its fraction of critical damping.")] = 0.05
+
+    @property
+    def wanted(self) -> Measure:
+        """Measure of intensity."""
+        return Measure(self.measure, self.period, self.damping)
+
+
+@dataclass(frozen=True)
+class MeasureOptions(IntensityOptions):
+    """How the intensity of motions is measured, and its levels."""
+
     levels: Annotated[
         str | None,
         written(
@@ -378,11 +361,6 @@ class MeasureOptions:
         readers: Mapping[str, Quantity] = {"pga": positive_acceleration, "sa": positive_acceleration, "pgv": velocity}
         levels = None if self.levels is None else values(self.levels, "levels", readers.get(self.measure, _ratio))
         return {"measure": self.wanted, "levels": levels}
-
-    @property
-    def wanted(self) -> Measure:
-        """Measure of intensity."""
-        return Measure(self.measure, self.period, self.damping)
 
 
 @dataclass(frozen=True)
@@ -438,3 +416,22 @@ def _ratio(text: str, name: str) -> float:
     except InvalidOption:
         sentence = "{} takes plain numbers with this {}, which counts in the block's own units, not "
         raise InvalidOption(sentence + repr(text.strip()), name, "measure") from None
+
+
+def limits_of(text: str) -> dict[str, float]:
+    """Return limit states by name: overturning, or rotations over slenderness, as half=0.5."""
+    limits = {}
+    for part in text.split(","):
+        name, given, value = part.strip().partition("=")
+        if not given and name != "overturning":
+            raise InvalidOption(
+                f"{{}} takes overturning or NAME=ROTATION over slenderness, not {part.strip()!r}", "limits", value=text
+            )
+        if name in limits or (given and name in ("", "overturning")):
+            why = f"has {name} twice" if name in limits else f"gives a rotation the name {name!r}"
+            raise InvalidOption(f"{{}} {why}; name each limit state once, as half=0.5", "limits")
+        try:
+            limits[name] = number(value, "limits") if given else math.inf
+        except InvalidOption:
+            raise InvalidOption(f"{{}} {name} takes a number, not {value.strip()!r}", "limits", value=text) from None
+    return limits

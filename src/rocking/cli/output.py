@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
@@ -101,7 +102,7 @@ def print_result(result: Mapping[str, Any], text: str, *, as_json: bool) -> None
 def output_folder(folder: Path, *, listed: bool = False) -> Iterator[Path]:
     """Make a folder for results, and say what was written; on failure, remove what was made and is empty.
 
-    What was replaced, and what is left of an earlier run, is noted; what was written is printed where it is `listed`.
+    What was replaced is noted; what was written is printed where it is `listed`.
 
     Raises
     ------
@@ -110,14 +111,10 @@ def output_folder(folder: Path, *, listed: bool = False) -> Iterator[Path]:
     """
     made = [each for each in (folder, *folder.parents) if not each.exists()]
     before = _written_at(folder)
-    probe = folder / ".rocking-can-write"
     try:
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            try:
-                probe.touch()
-            finally:
-                probe.unlink(missing_ok=True)
+            tempfile.TemporaryFile(dir=folder).close()  # it can be written to
         except OSError as error:
             sentence = f"this folder cannot be written to: {error.strerror}; choose another {{}}"
             raise OutputError(sentence, "out", path=str(folder)) from error
@@ -128,10 +125,6 @@ def output_folder(folder: Path, *, listed: bool = False) -> Iterator[Path]:
             print(f"\nwritten to {folder}: {', '.join(sorted({Path(name).parts[0] for name in written}))}")
         if replaced := [name for name in written if name in before]:
             note(f"replaced in {folder}: {', '.join(replaced)}")
-            new = {Path(name).parts[0] for name in written}
-            suffixes = (".png", ".pdf", ".csv", ".nc", ".json", ".xml")
-            if kept := sorted({name for name in now if name.endswith(suffixes)} - new):
-                note(f"from before in {folder}: {', '.join(kept)}")
     except BaseException:
         with suppress(OSError):
             for each in made:

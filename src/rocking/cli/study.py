@@ -2,29 +2,40 @@
 
 from __future__ import annotations
 
-import contextlib
 import signal
 import sys
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 from cyclopts import App, Parameter
 
-import rocking
-from rocking.cli.options import WHOLE
-from rocking.cli.output import OUTPUT, PrintOptions, QuietOptions, output_folder, print_result, write_results
+from rocking.cli.options import MEASURE, WHOLE, IntensityOptions, limits_of
+from rocking.cli.output import (
+    OUTPUT,
+    PrintOptions,
+    QuietOptions,
+    left_out,
+    output_folder,
+    print_result,
+    write_results,
+)
 from rocking.core.progress import note
-from rocking.core.tables import counted, to_json, write_text
+from rocking.core.result import Result
+from rocking.core.tables import counted, write_text
 from rocking.errors import InvalidOption, OutputError, StudyError
+from rocking.inputs.quantities import values
 from rocking.studies.file import TEMPLATE, read_study
-from rocking.studies.folder import Folder
-from rocking.studies.report import ReportPlan
-from rocking.studies.results import FORMATS, StudyVerdict
-from rocking.studies.run import scheduler_client
+from rocking.studies.results import StudyVerdict
 from rocking.studies.study import Study, study_of
 
 study = App(name="study")
+
+#: Units that are named where some failed, at most.
+_SHOWN: Final = 5
+
+#: What writes a study, by the end of the file's name.
+FORMATS: Final = {".nc": Study.to_netcdf, ".csv": Study.to_csv, ".parquet": Study.to_parquet}
 
 
 @study.command
@@ -70,7 +81,6 @@ def run(
     into: str | None = None,
     *,
     threads: Annotated[int | None, WHOLE] = None,
-    scheduler: str | None = None,
     part: str | None = None,
     output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
 ) -> None:
@@ -84,21 +94,19 @@ def run(
         With a file, the folder where the study is kept; by default one beside the file, of its name without .toml.
     threads
         Number of threads; by default one for every core.
-    scheduler
-        Address of a scheduler of dask.distributed whose workers compute instead, as tcp://127.0.0.1:8786.
     part
         Compute a fixed share of the units only, as 3/10; shares may run at the same time, as an array of jobs.
     """
-    if threads is not None and scheduler is not None:
-        raise InvalidOption("{} and {} both say who computes; give one of them", "threads", "scheduler")
-    found = _opened(folder, into)
-    with contextlib.nullcontext() if scheduler is None else scheduler_client(scheduler) as client:
-        report = found.run(threads=threads, executor=client, part=part)
+    if into is not None and not folder.endswith(".toml"):
+        raise InvalidOption(f"{into} is for a study from a TOML file, which {folder} is not; name one place only")
+    is_file = folder.endswith(".toml")
+    found = _created(Path(folder), into or folder.removesuffix(".toml"), None) if is_file else Study(folder)
+    report = found.run(threads=threads, part=part)
     print(f"{report}\n{found.place}: {found.status}")
+    for unit, why in [*report.failed.items()][:_SHOWN]:
+        note(f"{unit} failed: {why}")
     if report.failed:
-        raise StudyError(
-            f"{counted(len(report.failed), 'unit')} failed, as runs.jsonl says; run the study again to try again"
-        )
+        raise StudyError(f"{counted(len(report.failed), 'unit')} failed; run the study again to try again")
     if report.stopped:
         sys.exit(128 + signal.SIGTERM)
 
@@ -112,10 +120,8 @@ def status(folder: str, *, output: Annotated[PrintOptions, OUTPUT] = PrintOption
     folder
         Folder where the study is kept.
     """
-    state = rocking.study(folder).status
-    running = None if state.running is None else asdict(state.running)
-    about = {name: getattr(state, name) for name in ("done", "units", "simulations", "failed")}
-    print(to_json({"folder": folder, **about, "running": running}) if output.as_json else f"{folder}: {state}")
+    state = Study(folder).status
+    print_result({"folder": folder, **asdict(state)}, f"{folder}: {state}", as_json=output.as_json)
 
 
 @study.command
@@ -126,7 +132,7 @@ def verify(
     repair: Annotated[bool, Parameter(negative="")] = False,
     output: Annotated[QuietOptions, OUTPUT] = QuietOptions(),
 ) -> None:
-    """Read every unit and all that describes the study, and check it; compute some units again and compare all bits.
+    """Read and check every unit; compute some units again and compare all bits.
 
     Parameters
     ----------
@@ -137,17 +143,14 @@ def verify(
     repair
         Compute damaged units again and store them.
     """
-    found = rocking.study(folder)
+    found = Study(folder)
     faults = found.verify(recompute, repair=repair)
     for fault in faults:
         print(fault)
     if faults and not repair:
-        found_faults = f"{counted(len(faults), 'fault')} found"
-        raise StudyError(f"{found_faults}; {{}} computes damaged units again", "repair")
-    left = found.verify() if faults else []
-    print(_sound(found, folder, len(faults) - len(left)))
-    if left:
-        raise StudyError(f"{counted(len(left), 'fault')} cannot be repaired: {'; '.join(left)}")
+        raise StudyError(f"{counted(len(faults), 'fault')} found; {{}} computes damaged units again", "repair")
+    state, repaired = found.status, f"; {counted(len(faults), 'fault')} repaired" if faults else ""
+    print(f"{state.done} of {counted(state.units, 'unit')} done and sound{repaired}")
 
 
 @study.command
@@ -165,23 +168,30 @@ def export(
     folder
         Folder where the study is kept.
     file
-        NetCDF (.nc), or a table with a row for each simulation: CSV (.csv), JSON (.json) or Parquet
-        (.parquet); units are in the names of its columns.
+        NetCDF (.nc), or a table with a row for each simulation: CSV (.csv) or Parquet (.parquet); units are in the
+        names of its columns.
     critical
         Write the scales between which this verdict on a block changes instead.
     """
     if file.suffix not in FORMATS:
         raise InvalidOption(f"a study is exported to {', '.join(FORMATS)}, not to {file.name}", "file", value=file)
-    is_replaced = file.exists()
-    getattr(rocking.study(folder), f"to_{FORMATS[file.suffix]}")(file, critical=critical)
-    if is_replaced:
-        note(f"replaced {file}")
+    FORMATS[file.suffix](Study(folder), file, critical=critical)
     print(f"written to {file}")
 
 
 @study.command
-def report(folder: str, out: Path | None = None, *, output: Annotated[PrintOptions, OUTPUT] = PrintOptions()) -> None:
-    """Make what the study's file asks for under [report]: figures, tables (CSV) and result.json.
+def report(
+    folder: str,
+    out: Path | None = None,
+    *,
+    limits: str = "overturning",
+    together: Annotated[bool, Parameter(negative="")] = False,
+    confidence: float = 0.9,
+    fractiles: str = "0.16,0.5,0.84",
+    measure: Annotated[IntensityOptions, MEASURE] = IntensityOptions(),
+    output: Annotated[PrintOptions, OUTPUT] = PrintOptions(),
+) -> None:
+    """Fit a fragility curve to the outcomes of each block and compute its spectrum: figures, tables, result.json.
 
     Parameters
     ----------
@@ -189,41 +199,30 @@ def report(folder: str, out: Path | None = None, *, output: Annotated[PrintOptio
         Folder where the study is kept.
     out
         Folder for what is made; by default the folder report in that of the study.
+    limits
+        Limit states, with commas between: overturning, or NAME=ROTATION over slenderness, as half=0.5.
+    together
+        Fit one curve to the outcomes of all blocks together.
+    confidence
+        Probability of the intervals.
+    fractiles
+        Shares of the motions that stay below the fractiles of the spectrum.
     """
-    found = rocking.study(folder)
+    found, made = Study(folder), dict[str, Result]()
+    fit = found.fragility if together else found.block_fragilities
     with output_folder(out or Path(folder) / "report", listed=not output.as_json) as target:
-        made = found.report()
+        with left_out("fragility"):
+            made["fragility"] = fit(measure=measure.wanted, limits=limits_of(limits), confidence=confidence)
+        made["spectrum"] = found.spectrum(values(fractiles, "fractiles").tolist())
         for name, one in made.items():
             one.to_csv(target / f"{name}.csv")
         result = {name: one.to_dict() for name, one in made.items()}
         write_results(target, figures={name: one.plot for name, one in made.items()}, result=result)
-        text = "\n\n".join(one.summary() for one in made.values())
-        print_result(result, text, as_json=output.as_json)
-
-
-def _opened(folder: str, into: str | None) -> Study:
-    """Open a study, or create the one of a file."""
-    if folder.endswith(".toml"):
-        return _created(Path(folder), into or folder.removesuffix(".toml"), None)
-    if into is not None:
-        raise InvalidOption(f"{into} is for a study from a TOML file, which {folder} is not; name one place only")
-    return rocking.study(folder)
+        print_result(result, "\n\n".join(one.summary() for one in made.values()), as_json=output.as_json)
 
 
 def _created(file: Path, folder: str, unit_blocks: int | None) -> Study:
     described = read_study(file)
     for sentence in described.skipped:
         note(f"left out: {sentence}")
-    wanted = described.report or ReportPlan(), described.outcomes, described.records
-    return study_of(Folder(folder), described.product, unit_blocks, *wanted)
-
-
-def _sound(found: Study, folder: str, repaired: int) -> str:
-    """Say how much is sound, how much was repaired, and what is not there."""
-    state = found.status
-    missing = state.units - state.done
-    sound = f"{counted(state.done, 'unit')} {'is' if state.done == 1 else 'are'} sound"
-    sound += f"; {counted(repaired, 'fault')} repaired" if repaired else ""
-    if missing:
-        sound += f"; {missing} of {state.units} {'is' if missing == 1 else 'are'} missing: rocking study run {folder}"
-    return sound
+    return study_of(folder, described.product, unit_blocks, described.records)

@@ -47,13 +47,7 @@ class StudyView:
         self.study = rocking.study(folder)
         if not self.study.status.done:
             raise StudyError(f"nothing of the study in {folder} is done yet: rocking study run {folder}")
-        kept = self.study.outcomes
-        self.quantities = [name for name in QUANTITIES if name in kept]
-        if not self.quantities:
-            raise StudyError(
-                f"the study in {folder} keeps only {', '.join(kept)}; a map needs one of {', '.join(QUANTITIES)}. See "
-                f"its numbers: rocking study export {folder} results.csv"
-            )
+        self.quantities = [*QUANTITIES]
         product = self.study.product
         blocks = product.blocks
         self._scales = np.asarray(product.scales.values, dtype=float)

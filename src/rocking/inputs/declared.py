@@ -186,13 +186,6 @@ INPUTS: Final = by_name(
     Input("load", "", "texts",
         "Weight on it, as mass=250,height=3 (kg, m), with offset (m), and follows=no for one that presses and does "
         "not move with it; several times for several."),
-    Input("ball", "", "number",
-        "In place of a block a ball on a table, by its coefficient of restitution; the motion is up."),
-    Input("oscillator", "", "text",
-        "In place of a block an oscillator that hits a stop, as frequency=1,restitution=0.8,stop=0.01 (Hz, m), with "
-        "damping_ratio and second_stop."),
-    Input("pendulum", "", "text",
-        "In place of a block a pendulum between walls, as p=3,gap=0.1,restitution=0.6 (rad/s, m)."),
     Input("gravity", "model", "acceleration", "", "m/s²"),
     Input("motion", "motion", "text", default="ridgecrest-clc-090"),
     Input("channel", "motion", "text", "Channel, by number or name, of files that hold several."),

@@ -111,11 +111,6 @@ def tilt(text: str, name: str) -> float:
     raise InvalidOption(f"{{}} must be below 90deg in size, not {text.strip()}", name, value=text)
 
 
-def of_state(unit: str) -> tuple[Quantity, Quantity]:
-    """Return what reads a coordinate in a unit, rad or m, and what reads its velocity."""
-    return (tilt, rate) if unit == "rad" else (position, velocity)
-
-
 def sides(text: str, name: str, quantity: Quantity = number) -> float | list[float]:
     """Return one number, or a list of two: side + and side -."""
     return _one_or_two(text, name, quantity, "a number, or two with a comma between (side +, side -)")

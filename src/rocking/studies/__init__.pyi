@@ -1,20 +1,14 @@
 from .file import TEMPLATE, StudyFile, read_study
-from .report import BlockFragilities, FragilityPlan, ReportPlan, SpectrumPlan, StudySpectrum
-from .run import Running, RunReport, Status
-from .study import Study, study
+from .results import BlockTable
+from .study import RunReport, Status, Study, study
 
 __all__ = [
     "TEMPLATE",
-    "BlockFragilities",
-    "FragilityPlan",
-    "ReportPlan",
+    "BlockTable",
     "RunReport",
-    "Running",
-    "SpectrumPlan",
     "Status",
     "Study",
     "StudyFile",
-    "StudySpectrum",
     "read_study",
     "study",
 ]

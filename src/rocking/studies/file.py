@@ -2,37 +2,31 @@
 
 from __future__ import annotations
 
-import dataclasses
-import fnmatch
 import glob
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, cast
 
-import numpy as np
-
 from rocking import records
-from rocking.block import Blocks
+from rocking.block import Blocks, Restraint
 from rocking.block.body import Bodies
 from rocking.core import checks
 from rocking.core.progress import note
 from rocking.core.tables import counted, csv_rows
 from rocking.engine.treatment import treatment
-from rocking.errors import InvalidMotion, InvalidOption, RockingError, StudyError, UnreadableRecord
+from rocking.errors import InvalidMotion, InvalidOption, StudyError, UnreadableRecord
 from rocking.inputs import quantities
 from rocking.inputs.bodies import block_of, body_of, check_parameters, note_likely_mistakes, quantity_of, shape_of
 from rocking.inputs.declared import BLOCK, COUPLES, FORCES, HELD, INPUTS, noted_acceleration
 from rocking.inputs.notes import motion_notes
 from rocking.inputs.pulses import pulse_family
-from rocking.inputs.toml import Tables, in_line, moved, nearest
+from rocking.inputs.toml import Tables, in_line, nearest
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import FACTOR, Measure, MeasureName
-from rocking.records.formats.source import Request
 from rocking.records.named import expanded, is_there, named_motion
 from rocking.simulation.ensemble import Product, Scales
-from rocking.studies.product import OUTCOMES, chosen_outcomes
-from rocking.studies.report import PLANS, ReportPlan, check_part
 
 #: A file to start from, with comments.
 TEMPLATE: Final = Path(__file__).with_name("template.toml").read_text("utf-8")
@@ -53,28 +47,24 @@ SCHEMA: Final[Mapping[str, tuple[str, ...]]] = {
     "blocks": ("csv", *BLOCK, *_HELD),
     "motions": ("records", "channel", "vertical", "units", "dt", "skip_unreadable", "pulses"),
     "scales": (*_MEASURES, "period", "damping", "polarity"),
-    "simulation": ("model", "chattering", "duration", "outcomes"),
-    "report": tuple(PLANS),
-    **{f"report.{name}": tuple(each.name for each in dataclasses.fields(plan)) for name, plan in PLANS.items()},
+    "simulation": ("model", "chattering", "duration"),
 }
 
-#: Keys whose values are no numbers, and what these must be.
-_TYPES: Final[Mapping[str, tuple[str, ...]]] = {
-    "text": ("csv", "vertical", "units", "polarity", "model", "chattering"),
-    "text or a whole number": ("channel",),
-    "a list of texts": ("records", "outcomes"),
-    "true or false": ("one_sided", "skip_unreadable"),
-    "a table": tuple(PLANS),
-    "tables, [[blocks.{}]]": tuple(f"{name}s" for name in FORCES),
-    "tables, [[motions.{}]]": ("pulses",),
+#: Keys whose values are no numbers, and what these must be, or must be lists of.
+_TYPES: Final[Mapping[str, tuple[Any, str]]] = {
+    **dict.fromkeys(("csv", "vertical", "units", "polarity", "model", "chattering"), (str, "text")),
+    **dict.fromkeys(("one_sided", "skip_unreadable"), (bool, "true or false")),
+    **{f"{name}s": ([dict], f"tables, [[blocks.{name}s]]") for name in FORCES},
+    "pulses": ([dict], "tables, [[motions.pulses]]"),
+    "channel": (str | int, "text or a whole number"),
+    "records": ([str], "a list of texts"),
 }
 
 #: What both sides of a block may have of their own, in columns of a table that end so.
 _SIDES: Final = ("_plus", "_minus")
-_SIDED: Final = tuple(name for name in BLOCK if INPUTS[name].values != "one")
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclass(frozen=True)
 class StudyFile:
     """Description of a study in a file.
 
@@ -84,16 +74,12 @@ class StudyFile:
         Blocks, motions, scales and rules.
     skipped : tuple of str
         A sentence for each record that could not be read, where the file says to go on.
-    report : ReportPlan or None
-        Results to make.
-    outcomes, records : tuple of str
-        As for `rocking.study`; and the name of the record of each motion, relative to the file; empty of a pulse.
+    records : tuple of str
+        Name of the record of each motion, relative to the file; empty of a pulse.
     """
 
     product: Product
     skipped: tuple[str, ...]
-    report: ReportPlan | None
-    outcomes: tuple[str, ...] = OUTCOMES
     records: tuple[str, ...] = ()
 
 
@@ -108,7 +94,7 @@ def read_study(path: str | Path) -> StudyFile:
     Returns
     -------
     StudyFile
-        Its product, and what is to be kept and made of the results.
+        Its product, and the records that it is of.
 
     Raises
     ------
@@ -127,71 +113,40 @@ def read_study(path: str | Path) -> StudyFile:
     """
     tables = Tables(path)
     _check_tables(tables)
-    rules, given = tables.table("simulation"), tables.table("scales")
     blocks, scales = _bodies(tables), _scales(tables)
     motions, names, skipped = _motions(tables, scales)
+    rules, polarity = tables.table("simulation"), tables.table("scales").get("polarity", "+")
     with tables.located("simulation", key="chattering"):
         chattering = treatment(rules.get("chattering", "certified"))
-    model, polarity = rules.get("model", "nonlinear"), given.get("polarity", "+")
     with tables.located("simulation", "scales", "blocks"):
-        product = Product(blocks, tuple(motions), scales, polarity, model, chattering, rules.get("duration"))
-        kept = chosen_outcomes(rules.get("outcomes"))
-    plans: dict[str, Any] = {}
-    for name, options in tables.table("report").items():
-        with tables.located(f"report.{name}"):
-            plans[name] = PLANS[name](**options)
-            check_part(plans[name], kept)
-    longest = max(motion.end for motion in motions)
-    if plans and product.duration is not None and product.duration < longest:
-        raise tables.wrong(
-            "simulation",
-            "duration",
-            f"{{}} ends before the longest motion, of {longest:g} s, and a report needs whole responses: leave it out",
-            "duration",
-        )
-    report = ReportPlan(**plans) if "report" in tables.tables else None
-    return StudyFile(product, tuple(skipped), report, kept, tuple(names))
+        model, duration = rules.get("model", "nonlinear"), rules.get("duration")
+        product = Product(blocks, tuple(motions), scales, polarity, model, chattering, duration)
+    return StudyFile(product, tuple(skipped), tuple(names))
 
 
 def _check_tables(tables: Tables) -> None:
     """Check names of tables and keys, and that values which are no numbers are what they must be."""
     for table, content in tables.tables.items():
         if table not in SCHEMA:
-            hint = nearest(table, (name for name in SCHEMA if "." not in name))
-            raise tables.wrong(table, None, f"there is no table [{{}}]; {hint}", table)
+            raise tables.wrong(table, None, f"there is no table [{{}}]; {nearest(table, SCHEMA)}", table)
         if not isinstance(content, dict):
             raise tables.wrong(table, None, f"{{}} must be one table, [{table}], once", table)
-        _check_keys(tables, table)
+        for key, value in content.items():
+            if key not in SCHEMA[table]:
+                raise tables.wrong(table, key, f"[{table}] has no {{}}; {nearest(key, SCHEMA[table])}", key)
+            kind, wanted = _TYPES.get(key, (object, ""))
+            is_right = isinstance(value, list if isinstance(kind, list) else kind)
+            if not is_right or (isinstance(kind, list) and not all(isinstance(one, kind[0]) for one in value)):
+                sentence = f"{{}} must be {wanted}, not {checks.shown(value)}"
+                raise tables.wrong(table, key, sentence, key, value=value)
     for needed in ("blocks", "motions"):
         if needed not in tables.tables:
             raise StudyError("the table [{}] is missing", needed, path=str(tables.file))
 
 
-def _check_keys(tables: Tables, table: str) -> None:
-    for key, value in tables.table(table).items():
-        if key not in SCHEMA[table]:
-            raise tables.wrong(table, key, f"[{table}] has no {{}}; {nearest(key, SCHEMA[table])}", key)
-        wanted = next((kind for kind, keys in _TYPES.items() if key in keys and table.count(".") == 0), "")
-        several = dict if wanted.startswith("tables") else str
-        is_list = isinstance(value, list) and all(isinstance(each, several) for each in value)
-        kind = {"text": str, "true or false": bool, "a table": dict}.get(wanted)
-        is_right = is_list if kind is None else isinstance(value, kind)
-        if wanted == "text or a whole number":
-            is_right = isinstance(value, str) or type(value) is int
-        if wanted and not is_right:
-            sentence = f"{{}} must be {wanted.format(key)}, not {checks.shown(value)}"
-            raise tables.wrong(table, key, sentence, key, value=value)
-        if wanted == "a table":
-            _check_keys(tables, f"{table}.{key}")
-
-
 def _bodies(tables: Tables) -> Bodies:
     """Bodies of all combinations of what [blocks] gives, or of the table that it names."""
     given = tables.table("blocks")
-    held = [name for name in given if name in _HELD]
-    if held and not {"width", "half_width", "pivots"} & given.keys():
-        sentence = "{} goes with width, half_width and pivots of a block"
-        raise tables.wrong("blocks", held[0], sentence, held[0])
     if "csv" in given:
         if len(given) > 1:
             raise tables.wrong("blocks", "csv", "{} goes without other keys", "csv")
@@ -199,102 +154,88 @@ def _bodies(tables: Tables) -> Bodies:
     with tables.located("blocks"):
         shape_of(given)
     axes: dict[str, Any] = {}
-    described = [name for name in given if name not in _HELD]
-    for name in (*described, *(name for name in ("one_sided", "lean") if name in given)):
+    for name in (*(name for name in given if name in BLOCK), "one_sided", "lean", *COUPLES):
         with tables.located("blocks", key=name):
-            axes[name] = INPUTS[name].axis(given[name])
-    restraints = [*_restraints(tables)]
+            if name in given:
+                values = INPUTS[name].axis(given[name])
+                axes[name] = [COUPLES[name](value) for value in values] if name in COUPLES else values
+    for name in FORCES:
+        for k in range(len(given.get(f"{name}s", []))):
+            axes[f"{name} {k + 1}"] = _forces(tables, name, k)
     with tables.located("blocks"):
-        if "p" in axes:
+        if "p" in given and axes.keys() <= {*BLOCK}:
             return Blocks.grid(**axes)
-        restraint_counts = {f"restraint {k}": len(each) for k, each in enumerate(restraints, 1)}
-        checks.grid_size({name: len(axis) for name, axis in axes.items()} | restraint_counts, StudyError)
-        rows = [*itertools.product(*axes.values(), *restraints)]
-        values = [dict(zip(axes, row, strict=False)) for row in rows]
-        blocks = [block_of(each) for each in values]
+        checks.grid_size({name: len(axis) for name, axis in axes.items()}, StudyError)
+        rows = [dict(zip(axes, row, strict=True)) for row in itertools.product(*axes.values())]
+        blocks = [block_of(row) for row in rows]
+        pairs = zip(blocks, rows, strict=True)
         bodies: list[Any] = [
-            body_of(block, each, row[len(axes) :]) for block, each, row in zip(blocks, values, rows, strict=True)
+            body_of(block, row, [one for one in row.values() if isinstance(one, Restraint)]) for block, row in pairs
         ]
         note_likely_mistakes(blocks, bodies)
         return Blocks.of(bodies)
 
 
-def _restraints(tables: Tables) -> Iterator[list[Any]]:
-    """Give what each restraint may be: one, or several where its numbers are lists or ranges."""
-    blocks = tables.table("blocks")
-    for name, couple in COUPLES.items():
-        if name in blocks:
-            with tables.located("blocks", key=name):
-                yield [couple(value) for value in INPUTS[name].axis(blocks[name])]
-    for name, force in FORCES.items():
-        for k, given in enumerate(blocks.get(f"{name}s", [])):
-            table, axes = f"blocks.{name}s", dict[str, Any]()
-            with tables.located(table, occurrence=k):
-                check_parameters(force, given, f"[[{table}]]")
-            for key, value in given.items():
-                with tables.located(table, key=key, occurrence=k):
-                    numbers = [value] if isinstance(value, bool) else quantities.axis(value, key, quantity_of(key))
-                    axes[key] = [*numbers]
-            with tables.located(table, occurrence=k):
-                yield [force(**dict(zip(axes, row, strict=True))) for row in itertools.product(*axes.values())]
+def _made(
+    tables: Tables,
+    table: str,
+    k: int,
+    given: Mapping[str, Any],
+    reader: Callable[[str], quantities.Quantity | None],
+    make: Callable[[dict[str, Any]], Any],
+) -> list[Any]:
+    """Make what the k-th table of a name describes: one thing, or several where its numbers are lists or ranges."""
+    axes: dict[str, Any] = {}
+    for key, value in given.items():
+        with tables.located(table, key=key, occurrence=k):
+            quantity = None if isinstance(value, bool) else reader(key)
+            axes[key] = [value] if quantity is None else quantities.axis(value, key, quantity)
+    with tables.located(table, occurrence=k):
+        return [make(dict(zip(axes, row, strict=True))) for row in itertools.product(*axes.values())]
 
 
-def _blocks_of_csv(tables: Tables, table: Path) -> Blocks:
+def _forces(tables: Tables, name: str, k: int) -> list[Any]:
+    table = f"blocks.{name}s"
+
+    def made(values: dict[str, Any]) -> Any:
+        check_parameters(FORCES[name], values, f"[[{table}]]")
+        return FORCES[name](**values)
+
+    return _made(tables, table, k, tables.table(table, k), quantity_of, made)
+
+
+def _pulses(tables: Tables, k: int) -> list[Motion]:
+    given, table = dict(tables.table("motions.pulses", k)), "motions.pulses"
+    with tables.located(table, key="family", occurrence=k):
+        family = pulse_family(str(given.pop("family", "")))
+    return _made(tables, table, k, given, family.quantity, family.motion)
+
+
+def _blocks_of_csv(tables: Tables, file: Path) -> Blocks:
     try:
-        rows = csv_rows(table.read_text("utf-8-sig"))
-    except OSError as error:
-        raise tables.wrong("blocks", "csv", f"{table} cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise tables.wrong("blocks", "csv", f"{table} is no text table in UTF-8; save it as CSV") from None
-    headings, rows = (rows[0][1], rows[1:]) if len(rows) > 1 else (list[str](), [])
-    _check_headings(tables, table, headings)
-    columns = _columns(table, headings, rows)
-    try:
-        shape_of(columns)
-        if "p" in columns:
-            arrays: dict[str, Any] = {name: np.array(column) for name, column in columns.items()}
-            return Blocks(**arrays)
-    except RockingError as error:
-        where = f"{table}, whose block 0 is in line {rows[0][0]}: " if rows else f"{table}: "
-        raise moved(error, StudyError, tables.file, tables.line_of("blocks", "csv"), where) from None
+        rows = csv_rows(file.read_text("utf-8-sig"))
+    except (OSError, UnicodeDecodeError) as error:
+        why = error.strerror if isinstance(error, OSError) else "it is no text table in UTF-8; save it as CSV"
+        raise tables.wrong("blocks", "csv", f"{file} cannot be read: {why}") from None
+    if len(rows) < 2:
+        raise tables.wrong("blocks", "csv", f"{file} holds no blocks: a heading and a row for each are needed")
+    headings, known = rows[0][1], [name + end for name in BLOCK for end in ("", *_SIDES)]
+    for name in headings:
+        meant = "" if name in known else checks.meant(name, known, "")
+        if meant or name in _HELD or (name in known and headings.count(name) > 1):
+            fault = meant or ("it goes under [blocks]" if name in _HELD else "it is there twice")
+            raise tables.wrong("blocks", "csv", f"column {name} of {file} cannot be read; {fault}")
     blocks = []
-    for (line, _), values in zip(rows, zip(*columns.values(), strict=True), strict=True):
-        with in_line(table, line):
-            blocks.append(block_of(dict(zip(columns, values, strict=True))))
-    note_likely_mistakes(blocks)
-    return Blocks.of(blocks)
-
-
-def _columns(table: Path, headings: Sequence[str], rows: Sequence[tuple[int, list[str]]]) -> dict[str, Any]:
-    """Values of each column that describes a block; those of both sides beside each other."""
-    columns: dict[str, Any] = {}
-    for line, row in rows:
-        with in_line(table, line):
+    for line, row in rows[1:]:
+        with in_line(file, line):
             if len(row) != len(headings):
                 raise StudyError(f"{counted(len(row), 'cell')} under {counted(len(headings), 'column')}; correct it")
             cells = dict(zip(headings, row, strict=True))
-            for name in BLOCK:
-                ends = [name + end for end in _SIDES if name in _SIDED]
-                if ends and {*ends} <= cells.keys():
-                    columns.setdefault(name, []).append(tuple(INPUTS[name].one(cells[end]) for end in ends))
-                elif name in cells:
-                    columns.setdefault(name, []).append(INPUTS[name].one(cells[name]))
-    return columns
-
-
-def _check_headings(tables: Tables, table: Path, headings: Sequence[str]) -> None:
-    """Refuse columns that are there twice, or that a block could have and this table cannot say."""
-    known = [*BLOCK, *(name + end for name in _SIDED for end in _SIDES)]
-    for name in dict.fromkeys(headings):
-        fault = ""
-        if name in known and headings.count(name) > 1:
-            fault = "is there twice"
-        elif name in _HELD:
-            fault = "cannot be given in a table: give it under [blocks]"
-        elif name not in known and (meant := checks.meant(name, known, "")):
-            fault = f"is no column of blocks; {meant}"
-        if fault:
-            raise tables.wrong("blocks", "csv", f"column {name} of {table} {fault}")
+            texts = {name: ",".join(cells[name + end] for end in _SIDES if name + end in cells) for name in BLOCK}
+            given = {name: cells.get(name, text) for name, text in texts.items()}
+            blocks.append(block_of({name: INPUTS[name].read(text) for name, text in given.items() if text}))
+    note_likely_mistakes(blocks)
+    return Blocks.of(blocks)
 
 
 def _scales(tables: Tables) -> Scales:
@@ -305,33 +246,26 @@ def _scales(tables: Tables) -> Scales:
         sentence = f"motions can be scaled to one measure only, not to {listed}"
         raise tables.wrong("scales", measures[0], sentence, *measures)
     options = {option: given[option] for option in ("period", "damping") if option in given}
-    for option in options:
-        if "sa" not in given:
-            raise tables.wrong("scales", option, "{} goes with {}, and only with it", option, "sa")
-    if "sa" in given and "period" not in given:
-        raise tables.wrong("scales", "sa", "{} needs {}, in s", "sa", "period")
-    with tables.located("scales"):
-        if not measures:
-            return Scales.of(None, FACTOR)
-        (name,) = measures
-        with tables.located("scales", key=name):
-            values = quantities.axis(given[name], name, _MEASURES[name])
-            checks.positive_numbers(values, name, InvalidOption)
+    for option in () if "sa" in given else options:
+        raise tables.wrong("scales", option, "{} goes with {}, and only with it", option, "sa")
+    if not measures:
+        return Scales.of(None, FACTOR)
+    (name,) = measures
+    with tables.located("scales", key=name):
+        values = quantities.axis(given[name], name, _MEASURES[name])
+        checks.positive_numbers(values, name, InvalidOption)
         return Scales.of(values, Measure(cast(MeasureName, name), **options))
 
 
 def _motions(tables: Tables, scales: Scales) -> tuple[list[Motion], list[str], list[str]]:
     """Motions that can be read and scaled, their records, and a sentence for each that cannot, if it may be so."""
-    given = tables.table("motions")
-    for key in ("dt", "units"):
-        with tables.located("motions", key=key):
-            Request.checked(**{"dt": None, "units": None, key: given.get(key)})
+    given, folder = tables.table("motions"), tables.file.parent
     if "vertical" in given and not given.get("records"):
         raise tables.wrong("motions", "vertical", "{} is that of the records, and there are none", "vertical")
     found: dict[str, str] = {}  # by their paths or names, what stands for each in the file
     for name in given.get("records", []):
         with tables.located_record(name):
-            found |= dict.fromkeys(_records_of(tables.file.parent, name), name)
+            found |= dict.fromkeys(_records_of(folder, name), name)
     motions, names, skipped = [], [], []
     for path, name in found.items():
         try:
@@ -344,8 +278,8 @@ def _motions(tables: Tables, scales: Scales) -> tuple[list[Motion], list[str], l
             skipped.append(str(error))
         else:
             motions.append(motion)
-            beside = Path(path).is_relative_to(tables.file.parent) and is_there(path)
-            names.append(str(Path(path).relative_to(tables.file.parent)) if beside else path)
+            beside = is_there(path) and Path(path).is_relative_to(folder)
+            names.append(str(Path(path).relative_to(folder)) if beside else path)
     for k in range(len(given.get("pulses", []))):
         motions += _pulses(tables, k)
     if not motions:
@@ -367,31 +301,12 @@ def _record(tables: Tables, path: str, *, several: bool) -> Motion:
     return motion
 
 
-def _records_of(parent: Path, name: str) -> list[str]:
-    """Files beside the study's own, or shipped records, that a name, a folder or a pattern stands for."""
-    path = str(parent / name)
+def _records_of(folder: Path, name: str) -> list[str]:
+    """Files beside the study's own that a name, a folder or a pattern stands for, or a shipped record."""
+    path = str(folder / name)
+    if glob.has_magic(name) and not is_there(path):
+        return expanded([str(Path(glob.escape(str(folder))) / name)])
     if is_there(path):
         return expanded([path])
-    if not glob.has_magic(name):
-        # A file of this name in the folder of the call is not meant; without one the name alone tells more.
-        return [path if is_there(name) and name not in records.names() else name]
-    try:
-        return expanded([str(Path(glob.escape(str(parent))) / name)])
-    except UnreadableRecord:
-        shipped = fnmatch.filter(records.names(), name)
-        if not shipped:
-            raise
-        return shipped
-
-
-def _pulses(tables: Tables, k: int) -> list[Motion]:
-    pulse, table = dict(tables.table("motions.pulses", k)), "motions.pulses"
-    with tables.located(table, key="family", occurrence=k):
-        family = pulse_family(str(pulse.pop("family", "")))
-    axes: dict[str, Any] = {}
-    for key, value in pulse.items():
-        with tables.located(table, key=key, occurrence=k):
-            quantity = family.quantity(key)
-            axes[key] = [value] if quantity is None else quantities.axis(value, key, quantity)
-    with tables.located(table, occurrence=k):
-        return [family.motion(dict(zip(axes, values, strict=True))) for values in itertools.product(*axes.values())]
+    # A file of this name in the folder of the call is not meant; without one the name alone tells more.
+    return [path if is_there(name) and name not in records.names() else name]

@@ -1,265 +1,125 @@
-"""The folder of a study: files that are written whole or not at all, and the locks of the processes that run it."""
+"""The folder of a study: its inputs and units, each in a file that is whole or not there, and the lock of its runs."""
 
 from __future__ import annotations
 
 import contextlib
 import functools
-import hashlib
+import io
 import json
 import os
 import socket
 import sys
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
+import rocking.dynamics.bodies  # noqa: F401 -- its kinds are known from then on
+from rocking.block.body import KINDS
 from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.core.constants import VERSION
 from rocking.core.tables import counted, write_bytes
+from rocking.engine.treatment import treatment
 from rocking.errors import DamagedStudy, OutputError, StudyError
-from rocking.kernels.compiled import fingerprint
-from rocking.simulation.ensemble import Product, setup_of
-from rocking.studies import product as inputs
-from rocking.studies.product import outcomes_text
-from rocking.studies.units import DamagedUnit, Key, UnitGrid, Work, decoded, name_of
+from rocking.motion.description import Description
+from rocking.motion.motion import Motion
+from rocking.motion.scaling import Measure
+from rocking.simulation.ensemble import Product, Scales, setup_of
+from rocking.studies.units import OUTCOMES, Key, UnitGrid, Work, decoded, name_of, program, sealed, unsealed
 
 if sys.platform == "win32":
     import msvcrt
 
-    def _lock(file: IO[bytes]) -> None:
-        file.seek(0)
-        msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+    def _lock(file: IO[bytes], shared: bool) -> None:
+        if not shared:  # there is no other kind
+            file.seek(0)
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
 else:
     import fcntl
 
-    def _lock(file: IO[bytes]) -> None:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    def _lock(file: IO[bytes], shared: bool) -> None:
+        fcntl.flock(file, fcntl.LOCK_NB | (fcntl.LOCK_SH if shared else fcntl.LOCK_EX))
 
 
-#: How often a lock is tried, and how long after one another, s: whoever reads its holder has it for a moment.
-_TRIES: Final = 3
+#: File that describes a study; its number grows when other programs cannot read it.
+_INPUTS: Final = "study.npz"
+_FORMAT: Final = 4
 
-
-class Folder:
-    """Files of a study, made where there is no folder yet."""
-
-    def __init__(self, path: str | Path) -> None:
-        self.path = checks.path(path, "the folder of a study", StudyError)
-        if "://" in str(path):
-            raise StudyError("this is a URL, and a study is kept in a folder: name a folder", path=str(path))
-        if self.path.is_file():
-            raise StudyError("this is a file, and a study is kept in a folder: name that", path=str(path))
-
-    def __str__(self) -> str:
-        return str(self.path)
-
-    def put(self, name: str, data: bytes) -> None:
-        """Write a file, whole or not at all, and its name to the disk."""
-        target = self.path / name
-        with _refused("written", target):
-            target.parent.mkdir(parents=True, exist_ok=True)
-            write_bytes(target, data)
-            if os.name != "nt":  # folders cannot be opened there; its file system keeps a journal of names
-                handle = os.open(target.parent, os.O_RDONLY)
-                try:
-                    os.fsync(handle)
-                finally:
-                    os.close(handle)
-
-    def keep(self, name: str, data: bytes) -> None:
-        """Write a file unless it has this content already."""
-        if self.get(name) != data:
-            self.put(name, data)
-
-    def get(self, name: str) -> bytes | None:
-        """Read a file; None where there is none."""
-        target = self.path / name
-        try:
-            return target.read_bytes()
-        except FileNotFoundError:
-            return None
-        except OSError as error:
-            raise StudyError(f"the file cannot be read: {error.strerror or error}", path=str(target)) from error
-
-    def names(self, folder: str = "") -> list[str]:
-        """List the files and folders in this one or in one of its folders, without files that are half-written."""
-        try:
-            with os.scandir(self.path / folder) as entries:
-                return [entry.name for entry in entries if not entry.name.startswith(".")]
-        except FileNotFoundError:
-            return []
-
-    def append(self, name: str, line: str) -> None:
-        """Append a line to a file, on a line of its own where a crash has cut the last one."""
-        with _refused("written", self.path / name), (self.path / name).open("ab+") as file:
-            end = file.seek(0, os.SEEK_END)
-            file.seek(max(0, end - 1))
-            is_cut = file.read(1) not in (b"", b"\n")
-            file.write(b"\n" * is_cut + line.encode() + b"\n")
-
-    @contextlib.contextmanager
-    def locked(self, lock: str = "lock") -> Iterator[None]:
-        """Hold a lock, a file that names its holder, while the process lives; that of a part excludes it and "lock"."""
-        with _refused("locked", self.path / lock):
-            self.path.mkdir(parents=True, exist_ok=True)
-            file = (self.path / lock).open("a+b", buffering=0)
-        with file:
-            with _refused("locked", self.path / lock):
-                own = [] if _acquired(file, _TRIES) else [_holder(file)]
-                # A process takes its own lock before it looks at those of others, so that two never miss each other.
-                others = self.holders(_TRIES).items()
-                holders = own + [who for other, who in others if other != lock and "lock" in (lock, other)]
-                if holders:
-                    who = ", ".join(each or "another process" for each in holders)
-                    raise StudyError(
-                        f"the study is being run by {who}; wait for it, or end it there and run it again",
-                        path=str(self),
-                    )
-                file.truncate(0)
-                # On Windows nobody else can read the byte that is locked: the name begins at the second one.
-                file.write(f" {this_process()}".encode())
-                if lock == "lock":
-                    for left in self.path.rglob(".*.part*"):  # half-written, when a process was killed
-                        left.unlink(missing_ok=True)
-            yield
-
-    def holders(self, tries: int = 1) -> dict[str, str]:
-        """Return the process that holds each lock that is held."""
-        found = {}
-        for lock in self.names():
-            if lock == "lock" or lock.startswith("lock."):
-                # A process that may not write to the folder does not run the study.
-                with contextlib.suppress(OSError), (self.path / lock).open("a+b", buffering=0) as file:
-                    if not _acquired(file, tries):
-                        found[lock] = _holder(file)
-        return found
-
-
-def this_process() -> str:
-    """Name this process and its host."""
-    return f"process {os.getpid()} on {socket.gethostname()}"
-
-
-@contextlib.contextmanager
-def _refused(done: str, target: Path) -> Iterator[None]:
-    """Raise an OutputError where the system refuses to do something to a file."""
-    try:
-        yield
-    except OSError as error:
-        raise OutputError(f"the file cannot be {done}: {error.strerror or error}", path=str(target)) from error
-
-
-def _acquired(file: IO[bytes], tries: int) -> bool:
-    """Lock a file until it is closed, and return whether that succeeded."""
-    for left in reversed(range(tries)):
-        try:
-            _lock(file)
-        except (BlockingIOError, PermissionError):
-            time.sleep(0.02 if left else 0.0)
-        else:
-            return True
-    return False
-
-
-def _holder(file: IO[bytes]) -> str:
-    file.seek(1)
-    return file.read().decode(errors="replace").strip()
-
-
-_ARRAY: Final = "result"
+#: Folder of the units in that of the study.
+_UNITS: Final = "units"
 
 
 class Store:
-    """Outcomes of a product, in units of a grid that are done when their files exist; `about` is from `study.json`."""
+    """Outcomes of a product in a folder, in units of a grid that are done when their files exist."""
 
-    def __init__(self, folder: Folder, about: dict[str, Any], product: Product) -> None:
-        self.folder, self.about, self.product = folder, about, product
-        self.grid = UnitGrid(product.shape, tuple(about["unit"]), tuple(about["outcomes"]))
+    def __init__(self, path: str | Path) -> None:
+        self.folder = folder_of(path)
+        data = read(self.folder / _INPUTS)
+        if data is None:
+            raise StudyError("there is no study here: create it first", path=str(path))
+        archive = unsealed(data)
+        if archive is None:
+            raise StudyError(
+                f"{_INPUTS} is damaged: restore it, or create the study again elsewhere", path=str(self.folder)
+            )
+        with np.load(io.BytesIO(archive), allow_pickle=False) as arrays:
+            self.inputs: dict[str, NDArray[Any]] = dict(arrays)
+        about = json.loads(str(self.inputs.pop("about")))
+        if about["format"] != _FORMAT:
+            raise StudyError(f"the study is of format {about['format']}, this program reads {_FORMAT}", path=str(path))
+        self.program: str = about["program"]
+        #: Name of the record of each motion, empty of a pulse; none at all where they are not known.
+        self.records: tuple[str, ...] = tuple(about["records"])
+        self.product = _product(self.inputs)
+        self.grid = UnitGrid(self.product.shape, tuple(about["unit"]))
         self._factors = functools.lru_cache(1)(self._factors_of)  # neighbouring units share their motions
 
-    @classmethod
-    def create(cls, folder: Folder, product: Product, unit: tuple[int, ...], outcomes: tuple[str, ...]) -> Store:
-        """Write an empty store where nothing else is; `study.json` last, so that half a store is none."""
-        require_free(folder)
-        archive = inputs.to_bytes(product)
-        about: dict[str, Any] = {
-            "format": 3,
-            "version": VERSION,
-            "kernels": fingerprint(),
-            "unit": list(unit),
-            "shape": list(product.shape),
-            "inputs": hashlib.sha256(archive).hexdigest(),
-            "parts": inputs.hashes(product),
-            "outcomes": list(outcomes),
-        }
-        made = cls(folder, about, product)
-        for name, data in {"inputs.npz": archive, **made.metadata, "study.json": sealed(about)}.items():
-            folder.put(name, data)
-        return made
-
-    @classmethod
-    def open(cls, folder: Folder) -> Store:
-        """Open a store; a StudyError if there is none, it is damaged, or of another format."""
-        about = kept(folder, "study.json", "restore it, or create the study again elsewhere")
-        if about is None:
-            raise StudyError("there is no study here: create it first", path=str(folder))
-        if about["format"] != 3:
-            raise StudyError(
-                f"the study is of format {about['format']}, this program reads 3: use its version", path=str(folder)
-            )
-        archive = folder.get("inputs.npz")
-        if archive is None or hashlib.sha256(archive).hexdigest() != about["inputs"]:
-            raise StudyError(
-                "inputs.npz is missing or damaged; restore it, or create the study again elsewhere", path=str(folder)
-            )
-        return cls(folder, about, inputs.from_bytes(archive))
-
-    @property
-    def metadata(self) -> dict[str, bytes]:
-        """Files by which any reader of Zarr knows the array, and the group that it is in."""
-        group = json.dumps({"zarr_format": 3, "node_type": "group", "attributes": {}}, indent=2).encode()
-        return {"zarr.json": group, f"{_ARRAY}/zarr.json": self.grid.metadata()}
+    @staticmethod
+    def create(path: str | Path, product: Product, unit: Sequence[int], records: Sequence[str]) -> None:
+        """Write an empty store where nothing else is."""
+        buffer, about = io.BytesIO(), {"format": _FORMAT, "program": program(), "unit": unit, "records": records}
+        arrays: dict[str, Any] = _arrays(product) | {"about": np.array(json.dumps(about))}
+        np.savez_compressed(buffer, **arrays)
+        put(folder_of(path) / _INPUTS, sealed(buffer.getvalue()))
 
     def check_program(self) -> None:
         """Check that this program computes what the store holds, to the last bit; a StudyError if not."""
-        version, kernels = self.about["version"], self.about["kernels"]
-        if (version, kernels) != (VERSION, fingerprint()):
+        if self.program != program():
             raise StudyError(
-                f"the study was made by rocking {version} (kernels {kernels}), this is {VERSION} "
-                f"(kernels {fingerprint()}): run it with that version, or create it again elsewhere",
+                f"the study was made by {self.program}, this is {program()}: run it with that version, or create it "
+                "again elsewhere",
                 path=str(self.folder),
             )
 
-    def check_inputs(self, product: Product, outcomes: tuple[str, ...]) -> None:
-        """Check that these are the inputs and outcomes of the store; a StudyError says in which parts they differ."""
-        changed = inputs.changes(inputs.hashes(product), self.about["parts"], product.motions)
-        if outcomes != self.grid.outcomes:
-            changed.append(f"the outcomes ({outcomes_text(self.grid.outcomes)} then; {outcomes_text(outcomes)} now)")
+    def check_inputs(self, product: Product) -> None:
+        """Check that these are the inputs of the store; a StudyError says in which parts they differ."""
+        now, then = _arrays(product), self.inputs
+        changed = [
+            "/".join(name.split("/")[:2])
+            for name in (then | now)
+            if name not in then or name not in now or now[name].tobytes() != then[name].tobytes()
+        ]
         if changed:
+            parts = [*dict.fromkeys(changed)]
+            listed = ", ".join(parts[:3]) + (" and more" if len(parts) > 3 else "")
             raise StudyError(
-                f"this holds a study of other inputs ({', '.join(changed)} changed), {len(self.done())} of "
+                f"this holds a study of other inputs ({listed} changed), {len(self.done())} of "
                 f"{counted(len(self.grid), 'unit')} done: create this one elsewhere, or remove that one",
                 path=str(self.folder),
             )
 
-    def name_records(self, records: Sequence[str]) -> None:
-        """Keep the name of the record of each motion, in place of those that were; no number depends on them."""
-        self.folder.keep("records.json", sealed({"records": list(records)}))
-
-    def records(self) -> tuple[str, ...]:
-        """Name of the record of each motion, empty of a pulse; none at all where they are not known."""
-        correction, count = "create the study again from its file, in its place", len(self.product.motions)
-        about = kept(self.folder, "records.json", correction, lambda about: len(about["records"]) == count)
-        return () if about is None else tuple(about["records"])
+    def file_of(self, key: Key) -> Path:
+        """File of a unit."""
+        return self.folder / _UNITS / name_of(key)
 
     def done(self) -> set[Key]:
         """Keys of the units that are done."""
-        names = set(self.folder.names(_ARRAY))
-        return {key for key in self.grid if name_of(key) in names}
+        with contextlib.suppress(FileNotFoundError), os.scandir(self.folder / _UNITS) as entries:
+            names = {entry.name for entry in entries}
+            return {key for key in self.grid if name_of(key) in names}
+        return set()
 
     def require_complete(self) -> None:
         """Raise a StudyError if units are missing."""
@@ -270,36 +130,21 @@ class Store:
                 path=str(self.folder),
             )
 
-    def put(self, key: Key, data: bytes) -> None:
-        """Store a unit."""
-        self.folder.put(f"{_ARRAY}/{name_of(key)}", data)
-
-    def raw(self, key: Key) -> bytes | None:
-        """Return the bytes of a unit; None where it is not done."""
-        return self.folder.get(f"{_ARRAY}/{name_of(key)}")
-
     def outcomes(self, key: Key) -> Mapping[str, Floats] | None:
-        """Outcomes of a unit by name, of its counts each; None where it is not done, a StudyError if it is damaged."""
-        data = self.raw(key)
+        """Outcomes of a full unit by name; None where it is not done, a StudyError if it is damaged."""
+        data = read(self.file_of(key))
         if data is None:
             return None
-        try:
-            return decoded(data, self.grid.outcomes, self.grid.counts(key), self.grid.unit)
-        except DamagedUnit as error:
-            raise DamagedStudy(f"unit {name_of(key)} is damaged, {error}") from None
-
-    def present(self, key: Key) -> Mapping[str, Floats]:
-        """Outcomes of a unit that was done; a StudyError if it is gone or damaged."""
-        outcomes = self.outcomes(key)
-        if outcomes is None:
-            raise StudyError(f"unit {name_of(key)} is gone: run the study again", path=str(self.folder))
-        return outcomes
+        values = decoded(data, self.grid.unit)
+        if values is None:
+            raise DamagedStudy(f"unit {name_of(key)} is damaged")
+        return dict(zip(OUTCOMES, values, strict=True))
 
     def work(self, key: Key) -> Work:
         """Return all that a worker needs for a unit."""
         motions, scales, polarities, blocks = self.grid.ranges(key)
-        setup, factors = setup_of(self.product, blocks), self._factors(key[0])[:, scales, polarities]
-        return Work(setup, self.product.motions[motions], factors, self.grid.unit, self.grid.outcomes)
+        factors = self._factors(key[0])[:, scales, polarities]
+        return Work(setup_of(self.product, blocks), self.product.motions[motions], factors, self.grid.unit)
 
     def _factors_of(self, unit: int) -> Floats:
         """Factors on the motions of a unit, shape (motions, scales, polarities)."""
@@ -308,41 +153,152 @@ class Store:
         return factors[:, :, None] * np.array(self.product.signs, dtype=np.float64)
 
 
-def exists(folder: Folder) -> bool:
+def folder_of(path: str | Path) -> Path:
+    """Return the folder of a study, which may not exist yet."""
+    folder = checks.path(path, "the folder of a study", StudyError)
+    if "://" in str(path) or folder.is_file():
+        kind = "a file" if folder.is_file() else "a URL"
+        raise StudyError(f"this is {kind}, and a study is kept in a folder: name a folder", path=str(path))
+    return folder
+
+
+def exists(path: str | Path) -> bool:
     """Whether there is a study in a folder."""
-    return folder.get("study.json") is not None
+    return (folder_of(path) / _INPUTS).exists()
 
 
-def require_free(folder: Folder) -> None:
-    """Check that there is nothing in a folder that is no study's."""
-    others = {*folder.names()} - {_ARRAY, "inputs.npz", "zarr.json", "lock", "runs.jsonl"}  # a creation was cut off
+def require_free(path: str | Path) -> None:
+    """Check that there is nothing in a folder but what a creation leaves that was cut off."""
+    folder = folder_of(path)
+    others = sorted({each.name for each in folder.glob("[!.]*")} - {"lock"})
     if others:
-        listed = ", ".join(sorted(others)[:3]) + (" and more" if len(others) > 3 else "")
+        listed = ", ".join(others[:3]) + (" and more" if len(others) > 3 else "")
         raise StudyError(f"this holds no study, but {listed}: name a new folder, or an empty one", path=str(folder))
-    # A creation that was cut off has computed nothing: units of a study whose description is gone may be of another.
-    if any(name.startswith("c.") for name in folder.names(_ARRAY)):
-        raise StudyError(
-            "this holds results of a study whose study.json is gone: restore that, or name a new folder",
-            path=str(folder),
-        )
 
 
-def kept(
-    folder: Folder, name: str, correction: str, holds: Callable[[dict[str, Any]], bool] = lambda about: True
-) -> dict[str, Any] | None:
-    """Return the content of a sealed file; None where there is none, a StudyError if it is damaged."""
-    data = folder.get(name)
-    if data is None:
+def read(file: Path) -> bytes | None:
+    """Read a file; None where there is none."""
+    try:
+        return file.read_bytes()
+    except FileNotFoundError:
         return None
-    with contextlib.suppress(ValueError, KeyError, AttributeError, TypeError):
-        about: dict[str, Any] = json.loads(data)
-        del about["seal"]
-        if sealed(about) == data and holds(about):
-            return about
-    raise StudyError(f"{name} is damaged: {correction}", path=str(folder))
+    except OSError as error:
+        raise StudyError(f"the file cannot be read: {error.strerror or error}", path=str(file)) from error
 
 
-def sealed(about: dict[str, Any]) -> bytes:
-    """Return a description with its own hash."""
-    seal = hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()
-    return json.dumps(about | {"seal": seal}, indent=2).encode()
+def put(file: Path, data: bytes) -> None:
+    """Write a file, whole or not at all, and its name to the disk."""
+    with _refused("written", file):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        write_bytes(file, data)
+        if os.name != "nt":  # folders cannot be opened there; its file system keeps a journal of names
+            handle = os.open(file.parent, os.O_RDONLY)
+            try:
+                os.fsync(handle)
+            finally:
+                os.close(handle)
+
+
+@contextlib.contextmanager
+def locked(path: str | Path, *, shared: bool = False) -> Iterator[None]:
+    """Hold the lock of a folder while the process lives: alone, or shared with others that run parts of the study."""
+    folder = folder_of(path)
+    with _refused("locked", folder / "lock"):
+        folder.mkdir(parents=True, exist_ok=True)
+        file = (folder / "lock").open("a+b", buffering=0)
+    with file:
+        with _refused("locked", folder / "lock"):
+            try:
+                _lock(file, shared)
+            except (BlockingIOError, PermissionError):
+                # On Windows nobody else can read the byte that is locked: the name begins at the second one.
+                file.seek(1)
+                holder = file.read().decode(errors="replace") or "another process"
+                raise StudyError(
+                    f"the study is being run by {holder}; wait for it, or end it there and run it again",
+                    path=str(folder),
+                ) from None
+            file.truncate(0)
+            file.write(f" process {os.getpid()} on {socket.gethostname()}".encode())
+            for left in () if shared else folder.rglob(".*.part*"):  # half-written, when a process was killed
+                left.unlink(missing_ok=True)
+        yield
+
+
+@contextlib.contextmanager
+def _refused(done: str, file: Path) -> Iterator[None]:
+    """Raise an OutputError where the system refuses to do something to a file."""
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(f"the file cannot be {done}: {error.strerror or error}", path=str(file)) from error
+
+
+def _arrays(product: Product) -> dict[str, NDArray[Any]]:
+    """Return all inputs as arrays by name, the name of their part first."""
+    bodies, scales = product.bodies, product.scales
+    arrays = {f"{bodies.kind}/{name}": values for name, (values, _) in bodies.parameters().items()}
+    arrays[f"{bodies.kind}/gravity"] = np.array(bodies.gravity)
+    for k, motion in enumerate(product.motions):
+        arrays |= _motion_arrays(motion, f"motions/{k}")
+    measure = None if scales.measure is None else {"name": scales.measure.name, **scales.measure.options()}
+    rules = {
+        "scales/measure": measure,
+        "rules/polarity": product.polarity,
+        "rules/model": product.model,
+        "rules/treatment": str(product.treatment),
+        "rules/duration": product.duration,
+    }
+    words = {name: np.array(json.dumps(value)) for name, value in rules.items()}
+    return arrays | {"scales/values": scales.values} | words
+
+
+def _product(arrays: Mapping[str, NDArray[Any]]) -> Product:
+    """Return inputs from their arrays."""
+    kind = next((folder for folder in (name.partition("/")[0] for name in arrays) if folder in KINDS), "")
+    if not kind:
+        raise StudyError("the bodies of this study are of a kind that is not known here: import its module first")
+    values = {name.partition("/")[2]: each for name, each in arrays.items() if name.startswith(f"{kind}/")}
+    motions = dict.fromkeys(name.split("/")[1] for name in arrays if name.startswith("motions/"))
+    words = {name: json.loads(str(each)) for name, each in arrays.items() if each.dtype.kind == "U"}
+    measure = words["scales/measure"]
+    return Product(
+        KINDS[kind](**{**values, "gravity": float(values["gravity"])}),
+        tuple(_motion(arrays, f"motions/{k}") for k in motions),
+        Scales(None if measure is None else Measure(**measure), arrays["scales/values"]),
+        words["rules/polarity"],
+        words["rules/model"],
+        treatment(words["rules/treatment"]),
+        words["rules/duration"],
+    )
+
+
+def _motion_arrays(motion: Motion, place: str) -> dict[str, NDArray[Any]]:
+    description = motion.description
+    words = {
+        "name": motion.name,
+        "family": description.family,
+        "parameters": dict(description.parameters),
+        "text": description.text,
+        "history": motion.history,
+        "error": motion.error,
+    }
+    arrays: dict[str, NDArray[Any]] = {
+        f"{place}/breakpoints": motion.breakpoints,
+        f"{place}/coefficients": motion.coefficients,
+        f"{place}/words": np.array(json.dumps(words)),
+    }
+    return arrays if motion.vertical is None else arrays | _motion_arrays(motion.vertical, f"{place}/vertical")
+
+
+def _motion(arrays: Mapping[str, NDArray[Any]], place: str) -> Motion:
+    words = json.loads(str(arrays[f"{place}/words"]))
+    return Motion(
+        arrays[f"{place}/breakpoints"],
+        arrays[f"{place}/coefficients"],
+        name=words["name"],
+        description=Description(words["family"], words["parameters"], words["text"]),
+        history=tuple(words["history"]),
+        error=words["error"],
+        vertical=_motion(arrays, f"{place}/vertical") if f"{place}/vertical/words" in arrays else None,
+    )

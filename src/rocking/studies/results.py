@@ -1,99 +1,79 @@
-"""Results of a study: arrays read from its store when they are needed, and tables written a part at a time."""
+"""Results of a study: arrays read from its folder when they are needed, tables, critical scales, fragility, spectra."""
 
 from __future__ import annotations
 
-import functools
 import itertools
-import json
+import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from rocking.analysis.curve import Band, fitted_curve, passed
+from rocking.analysis.fragility import Fragility, fit_fragility, of_polarities, weights_of
+from rocking.analysis.levels import clusters_of, motions_in_words, pooled, ratios_of, single_block, units_of, values_of
+from rocking.analysis.spectrum import fractiles_of, overturned_share
+from rocking.block.body import Bodies
 from rocking.core import checks
-from rocking.core.arrays import Flags, Floats
+from rocking.core.arrays import Flags, Floats, evenly, ranges
 from rocking.core.progress import Progress
-from rocking.core.tables import columns_of, frame_of, plain, whole_file
-from rocking.engine.tasks import OUTCOME
+from rocking.core.result import DatasetResult, table_of_some, variable
+from rocking.core.tables import as_written, columns_of, counted, frame_of, records_of, whole_file
+from rocking.engine.problem import slenderness_of
+from rocking.engine.tasks import OUTCOME, missing_text
 from rocking.errors import InvalidOption, StudyError, install
-from rocking.simulation.ensemble import body_coordinates, dataset_of, verticals_of
+from rocking.motion.scaling import Measure
+from rocking.simulation.ensemble import Product, body_coordinates, dataset_of, verticals_of
 from rocking.studies.folder import Store
-from rocking.studies.product import require
-from rocking.studies.units import name_of
+from rocking.studies.units import OUTCOMES, name_of
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
-#: Methods of a study that write it, by the end of the file's name: `to_csv` and so on.
-FORMATS: Final[Mapping[str, str]] = {
-    ".nc": "netcdf",
-    ".csv": "csv",
-    ".json": "json",
-    ".parquet": "parquet",
-}
+#: Simulations that are held in memory at a time.
+_HELD: Final = 4_000_000
 
+_EVERYTHING: Final = slice(None)
 
-def write_table(kind: str, path: str | Path, dataset: xr.Dataset, along: str, step: int, progress: bool | None) -> None:
-    """Write a row for each simulation or change in one of `FORMATS`, a range of the first dimension at a time."""
-    table, count = _for_tables(dataset), max(1, dataset.sizes[along])
-    with Progress("writing", count, show=progress) as bar:
+#: An integer, a slice or an array of indices along each axis.
+_Selection = tuple[Any, ...]
 
-        def frames() -> Iterator[pd.DataFrame]:
-            for start in range(0, count, step):
-                yield frame_of(columns_of(table.isel({along: slice(start, start + step)}).load()))
-                bar.advance(min(step, count - start))
-
-        with whole_file(path) as beside:
-            {"csv": _write_csv, "json": _write_json, "parquet": _write_parquet}[kind](frames(), table, beside)
+StudyVerdict = Literal["overturning", "complete_chattering"]
 
 
-def _for_tables(dataset: xr.Dataset) -> xr.Dataset:
-    """Name the scales as factors or values of a measure, which is an attribute, and impacts as in other tables."""
-    if "scale" in dataset.dims:
-        dataset = dataset.assign_attrs({name: of for name, of in dataset.scale.attrs.items() if name != "units"})
-        names = {"scale": dataset.scale.attrs["measure"], "impacts": "impacts_resolved"}
-        return dataset.rename({name: other for name, other in names.items() if name in dataset})
-    return dataset.rename({name: f"{dataset.measure}_{name}" for name in ("low", "high") if name in dataset})
+def results_of(store: Store) -> xr.Dataset:
+    """Return the outcomes so far, read when they are needed; of floats, NaN where a unit is not done, if some are."""
+    done, grid = store.done(), store.grid
+    complete = len(done) == len(grid)
+    outcomes: dict[str, Any] = {name: _lazy_outcome(store, name, complete) for name in OUTCOMES}
+    if not complete:
+        outcomes["done"] = np.zeros(grid.shape, dtype=bool)
+        for key in done:
+            outcomes["done"][grid.ranges(key)] = True
+    return _with_records(store, dataset_of(store.product, outcomes))
 
 
-def _write_csv(frames: Iterator[pd.DataFrame], dataset: xr.Dataset, target: Path) -> None:
-    with target.open("w", encoding="utf-8", newline="") as file:
-        for k, frame in enumerate(frames):
-            frame.to_csv(file, header=k == 0, index=False, lineterminator="\n")
+def _with_records(store: Store, data: xr.Dataset) -> xr.Dataset:
+    """Name each motion by its record, too, where the study knows that."""
+    return data.assign_coords(record=("motion", list(store.records))) if store.records else data
 
 
-def _write_json(frames: Iterator[pd.DataFrame], dataset: xr.Dataset, target: Path) -> None:
-    with target.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(f'{{"study": {json.dumps(plain(dataset.attrs))},\n"simulations": [')
-        separator = "\n"
-        for row in itertools.chain.from_iterable(frame.to_dict("records") for frame in frames):
-            file.write(separator + json.dumps(plain(row), allow_nan=False))
-            separator = ",\n"
-        file.write("\n]}\n")
-
-
-def _write_parquet(frames: Iterator[pd.DataFrame], dataset: xr.Dataset, target: Path) -> None:
-    try:
-        import pyarrow
-        from pyarrow import parquet
-    except ImportError:
-        raise InvalidOption(f"Parquet needs pyarrow: {install('parquet')}, or write CSV or NetCDF") from None
-    tables = (pyarrow.Table.from_pandas(frame, preserve_index=False) for frame in frames)
-    first = next(tables)
-    with parquet.ParquetWriter(target, first.schema) as file:
-        file.write_table(first)
-        for table in tables:
-            file.write_table(table)
-
-
-def lazy_outcome(store: Store, name: str, complete: bool) -> xr.Variable:
-    """Outcome of a store, read when it is needed; of floats, NaN where a unit is not done, if some are not."""
+def _lazy_outcome(store: Store, name: str, complete: bool) -> xr.Variable:
     import xarray as xr
     from xarray.backends import BackendArray
     from xarray.core import indexing
+
+    def selected(key: _Selection) -> NDArray[Any]:
+        (values,) = _selected(store, [name], complete, key)
+        return values.astype(OUTCOME[name]) if complete else values
 
     class Outcome(BackendArray):
         """Reads the units that a selection touches."""
@@ -102,49 +82,72 @@ def lazy_outcome(store: Store, name: str, complete: bool) -> xr.Variable:
         dtype = OUTCOME[name] if complete else np.dtype(np.float64)
 
         def __getitem__(self, key: indexing.ExplicitIndexer) -> NDArray[Any]:
-            selected = functools.partial(_selected, store, name, complete)
-            found: NDArray[Any] = indexing.explicit_indexing_adapter(
-                key, self.shape, indexing.IndexingSupport.OUTER, selected
-            )
+            outer = indexing.IndexingSupport.OUTER
+            found: NDArray[Any] = indexing.explicit_indexing_adapter(key, self.shape, outer, selected)
             return found
 
     return xr.Variable(("motion", "scale", "polarity", "block"), indexing.LazilyIndexedArray(Outcome()))
 
 
-def _selected(store: Store, name: str, complete: bool, key: tuple[Any, ...]) -> NDArray[Any]:
-    """Values of an outcome at an integer, a slice or an array of indices along each axis."""
+def _selected(store: Store, names: Sequence[str], complete: bool, key: _Selection) -> list[Floats]:
+    """Read a selection of some outcomes; NaN where a unit is missing, if the study is not complete."""
     grid = store.grid
     axes = [np.arange(size)[part] for size, part in zip(grid.shape, key, strict=True)]
     wanted = [np.atleast_1d(axis) for axis in axes]
-    found = np.full([len(axis) for axis in wanted], np.nan)
+    found = np.full([len(names), *map(len, wanted)], np.nan)
     units = [np.unique(axis // part).tolist() for axis, part in zip(wanted, grid.unit, strict=True)]
     for unit in itertools.product(*units):
         here = [np.flatnonzero(axis // part == k) for axis, part, k in zip(wanted, grid.unit, unit, strict=True)]
         within = [axis[at] - k * part for axis, at, part, k in zip(wanted, here, grid.unit, unit, strict=True)]
         outcomes = store.outcomes(unit)
         if outcomes is not None:
-            found[np.ix_(*here)] = outcomes[name][np.ix_(*within)]
+            for values, name in zip(found, names, strict=True):
+                values[np.ix_(*here)] = outcomes[name][np.ix_(*within)]
         elif complete:
             raise StudyError(f"unit {name_of(unit)} is gone since these results were opened: run the study again")
-    values = found.squeeze(axis=tuple(position for position, axis in enumerate(axes) if axis.ndim == 0))
-    return values.astype(OUTCOME[name]) if complete else values
+    single = tuple(position for position, axis in enumerate(axes) if axis.ndim == 0)
+    return [values.squeeze(axis=single) for values in found]
 
 
-StudyVerdict = Literal["overturning", "complete_chattering"]
+def write_table(kind: str, path: str | Path, dataset: xr.Dataset, step: int, progress: bool | None) -> None:
+    """Write a row for each simulation or change as CSV or Parquet, a range of the first dimension at a time."""
+    along = next(iter(dataset.sizes))
+    table, count = _for_tables(dataset), max(1, dataset.sizes[along])
+    with Progress("writing", count, show=progress) as bar:
 
-#: Of each verdict its name on the higher scale, what that means, and the outcomes that it follows from.
-_VERDICTS: Final[Mapping[str, tuple[str, str, Sequence[str]]]] = {
-    "overturning": (
-        "overturns",
-        "whether the scale above overturns the block, and the one below does not",
-        ("overturned",),
-    ),
-    "complete_chattering": (
-        "completes",
-        "whether chattering is complete at the scale above, and not at the one below",
-        ("rests", "complete_chattering"),
-    ),
-}
+        def frames() -> Iterator[pd.DataFrame]:
+            for part in ranges(count, step):
+                yield frame_of(columns_of(table.isel({along: part}).load()))
+                bar.advance(part.stop - part.start)
+
+        with whole_file(path) as beside:
+            (_write_csv if kind == "csv" else _write_parquet)(frames(), beside)
+
+
+def _for_tables(dataset: xr.Dataset) -> xr.Dataset:
+    """Name the scales as factors or values of a measure, and impacts as in other tables."""
+    measure = dataset.scale.attrs["measure"] if "scale" in dataset.dims else dataset.attrs.get("measure")
+    names = {"scale": measure, "impacts": "impacts_resolved", "low": f"{measure}_low", "high": f"{measure}_high"}
+    return dataset.rename({name: other for name, other in names.items() if name in dataset.variables})
+
+
+def _write_csv(frames: Iterator[pd.DataFrame], target: Path) -> None:
+    with target.open("w", encoding="utf-8", newline="") as file:
+        for k, frame in enumerate(frames):
+            frame.to_csv(file, header=k == 0, index=False, lineterminator="\n")
+
+
+def _write_parquet(frames: Iterator[pd.DataFrame], target: Path) -> None:
+    try:
+        import pyarrow
+        from pyarrow import parquet
+    except ImportError:
+        raise InvalidOption(f"Parquet needs pyarrow: {install('parquet')}, or write CSV or NetCDF") from None
+    tables = (pyarrow.Table.from_pandas(frame, preserve_index=False) for frame in frames)
+    first = next(tables)
+    with parquet.ParquetWriter(target, first.schema) as file:
+        for table in itertools.chain([first], tables):
+            file.write_table(table)
 
 
 def critical_scales(store: Store, verdict: StudyVerdict) -> xr.Dataset:
@@ -152,16 +155,18 @@ def critical_scales(store: Store, verdict: StudyVerdict) -> xr.Dataset:
     import xarray as xr
 
     checks.one_of(verdict, "verdict", InvalidOption, get_args(StudyVerdict))
-    above, meaning, needed = _VERDICTS[verdict]
-    require(store.grid.outcomes, needed, f"a critical scale of {verdict.replace('_', ' ')}")
     product, levels = store.product, store.product.scales.values
     if product.scales.count < 2 or not np.all(np.diff(levels) > 0.0):
         raise InvalidOption("critical scales lie between two scales or more, in increasing order: give those")
     store.require_complete()
-    holds, known = np.zeros(store.grid.shape, bool), np.zeros(store.grid.shape, bool)
-    for key in store.grid:
-        here = store.grid.ranges(key)
-        holds[here], known[here] = _verdicts(verdict, store.present(key))
+    names = ["unfinished", "stopped", "overturned", "complete_chattering", "rests", "stalled"]
+    holds, known = np.empty(store.grid.shape, bool), np.empty(store.grid.shape, bool)
+    for part in ranges(len(product.motions), store.grid.unit[0]):
+        outcomes = _selected(store, names, True, (part, _EVERYTHING, _EVERYTHING, _EVERYTHING))
+        unfinished, stopped, overturned, completes, rests, stalled = (values != 0.0 for values in outcomes)
+        holds[part], known[part] = overturned, ~(unfinished | stopped)
+        if verdict == "complete_chattering":
+            holds[part], known[part] = completes, (known[part] | rests) & ~stalled
     # An unknown verdict takes the last known one below: else a change with unknown verdicts inside would be lost.
     below = np.zeros(store.grid.shape, np.int64)  # number of that scale; -1 where no verdict is known so far
     for k in range(product.scales.count):
@@ -171,36 +176,279 @@ def critical_scales(store: Store, verdict: StudyVerdict) -> xr.Dataset:
     motion, polarity, block, scale = np.nonzero(changed.transpose(0, 2, 3, 1))
     low = below[motion, scale, polarity, block]
     whole, about = dataset_of(product, {}), product.scales.about
-    units = {"units": about["units"]}
-    of_blocks: dict[str, Any] = {
-        name: ("change", np.asarray(values)[block], attributes)
-        for name, (_, values, attributes) in body_coordinates(product.bodies).items()
-    }
+    above, meaning = {
+        "overturning": ("overturns", "whether the scale above overturns the block, and the one below does not"),
+        "complete_chattering": ("completes", "whether chattering is complete at the scale above, and not below"),
+    }[verdict]
+    unit = about["units"]
     return xr.Dataset(
         {
-            "low": ("change", levels[low], units | {"long_name": "scale below the change"}),
-            "high": ("change", levels[scale + 1], units | {"long_name": "scale above the change"}),
-            above: ("change", holds[motion, scale + 1, polarity, block], {"long_name": meaning}),
-            "known": ("change", low == scale, {"long_name": "whether the verdicts of all simulations are known"}),
+            "low": variable("change", levels[low], "scale below the change", unit),
+            "high": variable("change", levels[scale + 1], "scale above the change", unit),
+            above: variable("change", holds[motion, scale + 1, polarity, block], meaning),
+            "known": variable("change", low == scale, "whether the verdicts of all simulations are known"),
         },
         {
-            "motion": ("change", whole.motion.values[motion]),
             **{
-                name: ("change", np.array(verticals)[motion])
-                for name, (_, verticals) in verticals_of(product.motions).items()
+                str(name): ("change", one.values[motion])
+                for name, one in _with_records(store, whole).coords.items()
+                if one.dims == ("motion",)
             },
             "polarity": ("change", np.where(np.array(product.signs)[polarity] > 0, "+", "-")),
             "block": ("change", block),
-            **of_blocks,
+            **{
+                name: ("change", np.asarray(values)[block], attributes)
+                for name, (_, values, attributes) in body_coordinates(product.bodies).items()
+            },
         },
         whole.attrs | {name: value for name, value in about.items() if name != "units"},
     )
 
 
-def _verdicts(verdict: str, outcomes: Mapping[str, Floats]) -> tuple[Flags, Flags]:
-    """Return whether a verdict holds in each simulation, and whether that is known: it was not given up or stopped."""
-    known = (outcomes["unfinished"] == 0.0) & (outcomes["stopped"] == 0.0)
-    if verdict == "overturning":
-        return outcomes["overturned"] != 0.0, known
-    known = (known | (outcomes["rests"] != 0.0)) & (outcomes["stalled"] == 0.0)
-    return outcomes["complete_chattering"] != 0.0, known
+def _peak_ratios(store: Store) -> Iterator[tuple[slice, Floats]]:
+    """Peak rotation over slenderness (motions, scales, polarities, blocks), infinite if overturned, by blocks.
+
+    It is NaN where the simulation was given up.
+    """
+    store.require_complete()
+    *others, count = store.product.shape
+    polarities = slice(0, 1 if store.product.bodies.is_symmetric else None)
+    names = ["peak_rotation", "overturned", "unfinished", "stopped"]
+    for blocks in ranges(count, max(1, _HELD // math.prod(others))):
+        selection = _EVERYTHING, _EVERYTHING, polarities, blocks
+        peak, overturned, unfinished, stopped = _selected(store, names, True, selection)
+        if stopped.any():
+            raise StudyError(
+                f"{np.count_nonzero(stopped)} of {stopped.size} simulations were stopped by the study's duration, "
+                "while the block moved or the motion went on, so that their verdicts are not known: make the study "
+                "without a duration"
+            )
+        alpha = slenderness_of(store.product.bodies.select(blocks))
+        yield blocks, ratios_of(peak, overturned != 0.0, unfinished != 0.0, alpha)
+
+
+def _repeated(bodies: Bodies, polarities: int) -> Flags:
+    """Whether a polarity (polarities, bodies) repeats the first one: a symmetric body does the same in both."""
+    repeated = np.zeros((polarities, len(bodies)), bool)
+    if polarities > 1:
+        repeated[1] = [bodies.select(slice(k, k + 1)).is_symmetric for k in range(len(bodies))]
+    return repeated
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BlockTable(DatasetResult):
+    """Numbers of each block of a study; from `Study.spectrum` and `Study.block_fragilities`.
+
+    Attributes
+    ----------
+    data : xarray.Dataset
+        Variables over ``block`` and other dimensions, the one that is drawn first. Parameters of the blocks are
+        coordinates.
+    """
+
+    TABLES = MappingProxyType({"blocks": ()})
+
+    @property
+    def block_parameters(self) -> dict[str, Floats]:
+        """Parameters of the blocks by name, SI units: those that tables list."""
+        return {str(name): one.values for name, one in self.data.coords.items() if one.dims == ("block",)}
+
+    def summary(self) -> str:
+        columns = [one for one in self._columns("blocks") if one.name != "fault"]  # too long for a table
+        rows = records_of(columns)
+        table = table_of_some([column.key for column in columns], [[*row.values()] for row in rows])
+        return f"{self.data.description}\n\n{table}"
+
+    def to_dict(self) -> dict[str, Any]:
+        data = self.data
+        about = [data.attrs, *(one.attrs for name, one in data.coords.items() if name in data.dims)]
+        return {
+            **{name: value for attributes in about for name, value in attributes.items() if name != "units"},
+            **{str(name): one.values for name, one in data.coords.items() if one.dims != ("block",)},
+            "blocks": self.block_parameters,
+            **{str(name): one.values for name, one in data.data_vars.items()},
+        }
+
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
+        """Draw the first variable of each block over its p and slenderness, in up to four panels; of fractiles one."""
+        from rocking.plot.maps import blocks_figure
+
+        drawn, parameters = next(iter(self.data.data_vars.values())), self.block_parameters
+        if "fractile" in drawn.dims:
+            drawn = drawn.sel(fractile=0.5, method="nearest")
+        over = str(drawn.dims[0])
+        p, alpha = (
+            np.mean([parameters[one] for one in (name, f"{name}_plus", f"{name}_minus") if one in parameters], axis=0)
+            for name in ("p", "alpha")
+        )
+        labels, unit = drawn[over].values, drawn.attrs["units"]
+        return blocks_figure(
+            p,
+            alpha,
+            panels={f"{over.replace('_', ' ')} {labels[k]}": drawn.values[k] for k in evenly(len(labels), 4)},
+            value_label=drawn.attrs["long_name"] + ("" if unit == "1" else f" ({unit})"),
+            missing_label="none",
+            title=title or as_written(self.data.description),
+            ax=ax,
+            figsize=figsize,
+        )
+
+    def _table(self, name: str) -> xr.Dataset:
+        return _for_tables(self.data)
+
+
+def study_spectrum(store: Store, fractiles: Sequence[float], progress: bool | None) -> BlockTable:
+    """Fractiles over motions and polarities of peak rotation over slenderness, for each scale and block."""
+    import xarray as xr
+
+    given = np.atleast_1d(checks.numbers(fractiles, "fractiles", InvalidOption)).ravel()
+    shares = np.array([checks.share(value, "each of fractiles", InvalidOption) for value in given])
+    product, scales, count = store.product, store.product.scales, len(store.product.bodies)
+    values = np.empty((len(shares), scales.count, count))
+    overturned, missing = np.empty((scales.count, count)), 0
+    with Progress("reading", count, show=progress) as bar:
+        for blocks, ratios in _peak_ratios(store):
+            repeated = _repeated(product.bodies.select(blocks), ratios.shape[2])
+            missing += int(np.count_nonzero(np.isnan(ratios) & ~repeated))
+            own = np.where(repeated, np.nan, ratios).swapaxes(1, 2).reshape(-1, scales.count, ratios.shape[3])
+            values[:, :, blocks], overturned[:, blocks] = fractiles_of(own, shares), overturned_share(own)
+            bar.advance(blocks.stop - blocks.start)
+    words = "peak rotation over the slenderness, infinite where that share overturns"
+    left_out = missing_text(missing)
+    text = f"fractiles of peak rotation over slenderness, {counted(len(product.motions), 'motion')}, {product.model} "
+    return BlockTable(
+        xr.Dataset(
+            {
+                "fractile_over_alpha": variable(("fractile", "scale", "block"), values, words, "1"),
+                "overturned_share": variable(("scale", "block"), overturned, unit="1"),
+            },
+            {"fractile": shares, "scale": ("scale", scales.values, scales.about), **body_coordinates(product.bodies)},
+            {"description": f"{text}model" + f"; {left_out}" * bool(left_out), "model": product.model},
+        )
+    )
+
+
+def pooled_fragility(
+    store: Store,
+    measure: Measure,
+    limits: Mapping[str, float],
+    confidence: float,
+    weights: ArrayLike | None,
+    clusters: ArrayLike | None,
+) -> Fragility:
+    """Fit one curve to the outcomes of all blocks, each of which may have a weight."""
+    product, bodies = store.product, store.product.bodies
+    units, which = np.unique(units_of(bodies, measure, product.model), return_inverse=True)
+    shares, band = weights_of(weights, len(bodies)), Band(confidence=confidence)
+    motions, scales, _, _ = product.shape
+    trials, missing = np.zeros((motions, scales, len(units))), 0
+    counts = {name: np.zeros_like(trials) for name in limits}
+    for blocks, ratios in _peak_ratios(store):
+        belongs = np.where(which[blocks][:, None] == np.arange(len(units)), shares[blocks][:, None], 0.0)
+        known = ~np.isnan(ratios)
+        trials += known.sum(axis=2, dtype=float) @ belongs
+        missing += int(np.count_nonzero(~known))
+        for name, limit in limits.items():
+            counts[name] += passed(ratios, limit, name).sum(axis=2) @ belongs
+    found = trials > 0.0
+    together = clusters_of(product.motions, clusters)
+    x, groups = (
+        _intensities(product, measure)[:, :, None] / units,
+        np.broadcast_to(together[:, None, None], found.shape),
+    )
+    curves = [
+        fitted_curve(name, (x[found], count[found], trials[found]), groups[found], band, measure, limits[name])
+        for name, count in counts.items()
+    ]
+    text = f"{pooled(bodies, weights)}, {motions_in_words(together, clusters)}, {counted(scales, 'scale')}"
+    return Fragility(
+        tuple(curves),
+        measure,
+        f"{text}, {product.model} model{of_polarities(product.polarity, is_symmetric=bodies.is_symmetric)}",
+        single_block(bodies),
+        product.model,
+        outcomes=None,
+        one_way=product.polarity != "both" and not bodies.is_symmetric,
+        with_vertical=bool(verticals_of(product.motions)),
+        several_blocks=bool(np.count_nonzero(shares) > 1),
+        source="motion" if clusters is None else "cluster",
+        missing=missing_text(missing),
+    )
+
+
+#: What is kept of the curve of each block.
+_KEPT: Final[Mapping[str, str]] = {
+    "median": "intensity that half of the outcomes exceed the limit at",
+    "median_lower": "lower end of its confidence interval",
+    "median_upper": "upper end of its confidence interval",
+    "dispersion": "standard deviation of the logarithm of the intensity",
+    "dispersion_lower": "lower end of its confidence interval",
+    "dispersion_upper": "upper end of its confidence interval",
+    "exceeded": "outcomes that exceed the limit",
+    "outcomes": "outcomes that the curve is fitted to",
+}
+
+
+def block_fragilities(
+    store: Store,
+    measure: Measure,
+    limits: Mapping[str, float],
+    confidence: float,
+    clusters: ArrayLike | None,
+    progress: bool | None,
+) -> BlockTable:
+    """Fit a curve to the outcomes of each block."""
+    import xarray as xr
+
+    product, bodies, scales = store.product, store.product.bodies, store.product.scales.count
+    kept = {name: np.full((len(limits), len(bodies)), np.nan) for name in _KEPT}
+    faults, missing = np.full((len(limits), len(bodies)), "", dtype=object), 0
+    intensities, units = _intensities(product, measure).ravel(), units_of(bodies, measure, product.model)
+    together = np.repeat(clusters_of(product.motions, clusters), scales)
+    fit = partial(fit_fragility, measure=measure, band=Band(confidence=confidence))
+    with Progress("fitting", len(bodies) * len(limits), show=progress) as bar:
+        for blocks, ratios in _peak_ratios(store):
+            repeated = _repeated(bodies.select(blocks), ratios.shape[2])
+            missing += int(np.count_nonzero(np.isnan(ratios) & ~repeated))
+            own = np.where(repeated, np.nan, ratios)
+            all_trials = np.count_nonzero(~np.isnan(own), axis=2).reshape(-1, own.shape[3])
+            for i, (name, limit) in enumerate(limits.items()):
+                all_exceeded = passed(own, limit, name).sum(axis=2).reshape(-1, own.shape[3])
+                for j, trials, exceeded in zip(range(len(bodies))[blocks], all_trials.T, all_exceeded.T, strict=True):
+                    some = trials > 0
+                    data = intensities[some] / units[j], {name: exceeded[some]}
+                    numbers = [np.nan] * 6
+                    try:
+                        curve = fit(*data, trials=trials[some], clusters=together[some]).curves[0]
+                        numbers = [curve.median, *curve.median_interval, curve.dispersion, *curve.dispersion_interval]
+                    except InvalidOption as error:  # no lognormal fits outcomes that are all alike, or separated
+                        faults[i, j] = str(error)
+                    numbers += [exceeded.sum(), trials.sum()]
+                    for values, number in zip(kept.values(), numbers, strict=True):
+                        values[i, j] = number
+                    bar.advance()
+    dims, without, left_out = ("limit_state", "block"), np.count_nonzero(faults != ""), missing_text(missing)
+    text = f"fragility of {counted(len(bodies), 'block')}; intensity: {measure.quantity}"
+    text += f"; {counted(int(without), 'curve')} cannot be fitted (fault says why)" if without else ""
+    about = {"confidence": confidence, "model": product.model, "measure": measure.name, **measure.options()}
+    return BlockTable(
+        xr.Dataset(
+            {
+                name: variable(dims, values, _KEPT[name], measure.units if name.startswith("median") else "1")
+                for name, values in kept.items()
+            }
+            | {"fault": variable(dims, faults.astype(str), "why there is no curve")},
+            {"limit_state": list(limits), **body_coordinates(bodies)},
+            {"description": text + f"; {left_out}" * bool(left_out), **about},
+        )
+    )
+
+
+def _intensities(product: Product, measure: Measure) -> Floats:
+    """Return what every motion measures at every scale, shape (motions, scales)."""
+    scales = product.scales
+    values = values_of(product.motions, measure)
+    if scales.measure == measure.alone:
+        return np.tile(scales.values, (len(values), 1))  # as they were given, to the last bit
+    factors = np.array([scales.factors(motion) for motion in product.motions])
+    return np.asarray(np.abs(factors) * values[:, None])

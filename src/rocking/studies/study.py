@@ -2,9 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
-from collections.abc import Mapping, Sequence
-from concurrent.futures import Executor
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ThreadPoolExecutor,
+    wait,
+)
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,38 +29,101 @@ from rocking.analysis.levels import OVERTURNING
 from rocking.block.body import Bodies, Body
 from rocking.core import checks
 from rocking.core.constants import Model
+from rocking.core.progress import Progress
 from rocking.core.tables import counted, write_netcdf
+from rocking.core.threads import cores
 from rocking.engine.treatment import Treatment
-from rocking.errors import InvalidOption
+from rocking.errors import InvalidOption, RockingError, StudyError
 from rocking.motion.scaling import IntensityName, Measure, MeasureName
-from rocking.records.named import Motions, names_of
-from rocking.simulation.ensemble import Polarity, Product, dataset_of, product_of
-from rocking.studies.folder import Folder, Store, exists, require_free
-from rocking.studies.product import OUTCOMES, chosen_outcomes
-from rocking.studies.report import (
-    FRACTILES,
-    BlockFragilities,
-    ReportPart,
-    ReportPlan,
-    StudySpectrum,
+from rocking.records.named import Motions
+from rocking.simulation.ensemble import Polarity, Product, product_of
+from rocking.studies.folder import Store, exists, locked, put, read, require_free
+from rocking.studies.results import (
+    BlockTable,
+    StudyVerdict,
     block_fragilities,
-    keep_report,
-    kept_report,
-    made_report,
+    critical_scales,
     pooled_fragility,
+    results_of,
     study_spectrum,
+    write_table,
 )
-from rocking.studies.results import StudyVerdict, critical_scales, lazy_outcome, write_table
-from rocking.studies.run import RunReport, Status, log_run, run, status_of, verified
-from rocking.studies.units import fitting_unit, width_of
+from rocking.studies.units import Key, Work, compute, name_of, unit_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True)
+class Status:
+    """Progress of a study.
+
+    Attributes
+    ----------
+    done, units, simulations : int
+        Units that are done, all units, and simulations in all.
+    """
+
+    done: int
+    units: int
+    simulations: int
+
+    @property
+    def complete(self) -> bool:
+        """Whether every unit is done."""
+        return self.done == self.units
+
+    def __str__(self) -> str:
+        share = int(1000 * self.done / self.units) / 10  # 100 % only where all are
+        done = f"{self.done} of {counted(self.units, 'unit')} done ({share:.1f} %)"
+        return f"{done}, {counted(self.simulations, 'simulation')} in all"
+
+
+@dataclass(frozen=True)
+class RunReport:
+    """Outcome of one run.
+
+    Attributes
+    ----------
+    units, simulations : int
+        Units that were computed, and simulations in them.
+    seconds : float
+        Time it took.
+    failed : mapping
+        Sentence for each unit that could not be computed, by its name.
+    stopped : bool
+        Whether SIGTERM stopped it before all was done.
+    """
+
+    units: int
+    simulations: int
+    seconds: float
+    failed: dict[str, str]
+    stopped: bool
+
+    def __str__(self) -> str:
+        rate = self.simulations / self.seconds if self.seconds > 0.0 else 0.0
+        done = f"{counted(self.units, 'unit')}, {counted(self.simulations, 'simulation')}"
+        text = f"{done} in {self.seconds:.1f} s ({rate:.3g} a second)"
+        if self.failed:
+            text += f"; {counted(len(self.failed), 'unit')} failed, the first: {next(iter(self.failed.values()))}"
+        return text + ("; stopped, go on with another run" if self.stopped else "")
+
+
 class Study:
     """Simulations of blocks, motions, scales and polarities, kept in a folder; from `rocking.study`.
+
+    Parameters
+    ----------
+    folder : path
+        Folder of a study that is there.
+
+    Attributes
+    ----------
+    place : str
+        Folder where the study is kept.
+    product : Product
+        What is simulated.
 
     Examples
     --------
@@ -62,27 +137,15 @@ class Study:
     'one-sine,0.4,0,2.0,0.1,0.9,True,1.570796'
     """
 
-    _store: Store
-
-    @property
-    def place(self) -> str:
-        """Folder where it is kept."""
-        return str(self._store.folder)
-
-    @property
-    def product(self) -> Product:
-        """What is simulated."""
-        return self._store.product
-
-    @property
-    def outcomes(self) -> tuple[str, ...]:
-        """What is kept of each simulation."""
-        return self._store.grid.outcomes
+    def __init__(self, folder: str | Path) -> None:
+        self._store = Store(folder)
+        self.place = str(self._store.folder)
+        self.product: Product = self._store.product
 
     @property
     def status(self) -> Status:
-        """How far it has come; may be asked while another process runs it."""
-        return status_of(self._store)
+        """Number of units that are done; may be asked while another process runs the study."""
+        return Status(len(self._store.done()), len(self._store.grid), int(np.prod(self._store.grid.shape)))
 
     def run(
         self,
@@ -121,55 +184,25 @@ class Study:
         OutputError
             If a unit cannot be written.
         """
-        if threads is not None:
-            threads = checks.whole(threads, "threads", InvalidOption, least=1)
-        number, count = (1, 1) if part is None else _part(part)
-        store, folder, lock = self._store, self._store.folder, "lock" if part is None else f"lock.{number}-{count}"
-        store.check_program()
-        with folder.locked(lock):
-            for name, data in store.metadata.items():
-                folder.keep(name, data)
-            share = [*itertools.islice(store.grid, number - 1, None, count)]
-            log_run(folder, lock, {"event": "start", "done": sum(map(store.grid.simulations, store.done()))})
-
-            def failing(unit: str, why: str) -> None:
-                log_run(folder, lock, {"event": "failed", "unit": unit, "why": why})
-
-            try:
-                report = run(store, share, threads=threads, executor=executor, progress=progress, failing=failing)
-            except BaseException as error:
-                log_run(folder, lock, {"event": "end", "error": str(error) or type(error).__name__})
-                raise
-            about = {"units": report.units, "seconds": report.seconds, "stopped": report.stopped}
-            log_run(folder, lock, {"event": "end", **about})
-        return report
+        number = cores() if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
+        first, step = (1, 1) if part is None else _part(part)
+        self._store.check_program()
+        with locked(self.place, shared=part is not None):
+            share = [*itertools.islice(self._store.grid, first - 1, None, step)]
+            return _run(self._store, share, number, executor, progress)
 
     def results(self) -> xr.Dataset:
-        """Outcomes so far, read from the folder when they are needed, as `simulate_many` returns them.
+        """Return the outcomes so far as `simulate_many` does, read from the folder when they are needed.
 
         While units are missing every variable is of floats, NaN where its unit is not done, and a variable ``done``
         marks the others. A StudyError names a damaged unit when it is read.
         """
-        done, grid = self._store.done(), self._store.grid
-        complete = len(done) == len(grid)
-        outcomes: dict[str, Any] = {name: lazy_outcome(self._store, name, complete) for name in grid.outcomes}
-        if not complete:
-            outcomes["done"] = np.zeros(grid.shape, dtype=bool)
-            for key in done:
-                outcomes["done"][grid.ranges(key)] = True
-        return self._with_records(dataset_of(self.product, outcomes))
-
-    def _with_records(self, found: xr.Dataset) -> xr.Dataset:
-        """Name each motion by its record, too, where the study knows that."""
-        records = dict(zip(names_of(self.product.motions), self._store.records(), strict=False))
-        if not records:
-            return found
-        return found.assign_coords(record=(found.motion.dims, [records[name] for name in found.motion.values.tolist()]))
+        return results_of(self._store)
 
     def verify(
         self, recompute: int = 0, *, repair: bool = False, seed: int = 0, progress: bool | None = None
     ) -> list[str]:
-        """Read every unit and all that describes the study, and check it; compute some units again, to the last bit.
+        """Read and check every unit, and compute some again, to the last bit.
 
         Parameters
         ----------
@@ -185,17 +218,35 @@ class Study:
         Returns
         -------
         list of str
-            A sentence for each unit or file that is damaged or differs; empty if all is well.
+            A sentence for each unit that is damaged or differs; empty if all is well.
 
         Raises
         ------
         StudyError
-            If units are to be computed again and the study was made by another version, or its inputs are damaged.
+            If units are to be computed again and the study was made by another version.
         """
-        return verified(self._store, recompute, repair, seed, progress)
+        store, faults = self._store, dict[Key, str]()
+        if checks.whole(recompute, "recompute", InvalidOption, 0) or repair:
+            store.check_program()
+        done = sorted(store.done())
+        drawn = {*np.random.default_rng(seed).permutation(len(done))[:recompute].tolist()}
+        with Progress("verifying", len(done), show=progress) as bar:
+            for k, key in enumerate(done):
+                try:
+                    store.outcomes(key)
+                    if k in drawn and compute(store.work(key)) != read(store.file_of(key)):
+                        faults[key] = f"unit {name_of(key)} is not what this program computes"
+                except StudyError as error:
+                    faults[key] = error.text()
+                bar.advance()
+        if repair and faults:
+            with locked(self.place):
+                for key in faults:
+                    put(store.file_of(key), compute(store.work(key)))
+        return [*faults.values()]
 
     def critical_scales(self, verdict: StudyVerdict = "overturning") -> xr.Dataset:
-        """Scales between which the verdict on a block changes.
+        """Find the scales between which the verdict on a block changes.
 
         Parameters
         ----------
@@ -216,9 +267,9 @@ class Study:
         StudyError
             If units are missing or damaged.
         InvalidOption
-            If there is no such verdict, the study does not keep its outcomes, or has no two scales in increasing order.
+            If there is no such verdict, or the study has no two scales in increasing order.
         """
-        return self._with_records(critical_scales(self._store, verdict))
+        return critical_scales(self._store, verdict)
 
     def fragility(
         self,
@@ -243,16 +294,17 @@ class Study:
         confidence: float = 0.9,
         clusters: ArrayLike | None = None,
         progress: bool | None = None,
-    ) -> BlockFragilities:
+    ) -> BlockTable:
         """Fit a fragility curve to the outcomes of each block, with arguments and errors as for `Study.fragility`.
 
-        A curve takes some hundredths of a second where motions were scaled to the measure (stripes), and seconds where
-        thousands of outcomes have an intensity each (a cloud). Where no lognormal fits, a sentence is kept instead.
+        The result has, over (limit_state, block), the median and the dispersion with their confidence intervals
+        (median_lower, median_upper, ...; SI units), exceeded and outcomes (counts; a symmetric block has those of one
+        polarity), and fault: why no lognormal fits, empty where one does.
         """
         return block_fragilities(self._store, Measure.of(measure), limits, confidence, clusters, progress)
 
-    def spectrum(self, fractiles: Sequence[float] = FRACTILES, *, progress: bool | None = None) -> StudySpectrum:
-        """Fractiles over the motions of the peak rotation over slenderness, for each scale and block.
+    def spectrum(self, fractiles: Sequence[float] = (0.16, 0.5, 0.84), *, progress: bool | None = None) -> BlockTable:
+        """Compute fractiles over the motions of the peak rotation over slenderness, for each scale and block.
 
         Parameters
         ----------
@@ -263,28 +315,22 @@ class Study:
 
         Returns
         -------
-        StudySpectrum
-            Fractiles of every scale and block, with the share of the motions that overturns the block.
+        BlockTable
+            fractile_over_alpha over (fractile, scale, block), infinite where that share of the motions overturns the
+            block, and overturned_share over (scale, block).
 
         Raises
         ------
         StudyError
             If units are missing or damaged.
         InvalidOption
-            If a fractile is out of its range, or the study does not keep overturned and peak_rotation.
+            If a fractile is out of its range.
         """
         return study_spectrum(self._store, fractiles, progress)
 
-    def report(self, *, progress: bool | None = None) -> dict[str, ReportPart]:
-        """Make the results that the study's file lists under [report], by "fragility" and "spectrum".
-
-        Each has a summary and a figure. A StudyError is raised if the file lists none, or units are missing or damaged.
-        """
-        return made_report(self._store, progress)
-
     def to_netcdf(self, path: str | Path, *, critical: StudyVerdict | None = None) -> None:
         """Write the `results` to a NetCDF file, or the critical scales, as `to_csv` does."""
-        write_netcdf(path, self._results(critical)[0])
+        write_netcdf(path, self.critical_scales(critical) if critical else self.results())
 
     def to_csv(self, path: str | Path, *, critical: StudyVerdict | None = None, progress: bool | None = None) -> None:
         """Write a row for each simulation as text, in columns named with their units.
@@ -305,32 +351,22 @@ class Study:
         StudyError
             If a unit is damaged, or units are missing for critical scales.
         """
-        write_table("csv", path, *self._results(critical), progress)
-
-    def to_json(self, path: str | Path, *, critical: StudyVerdict | None = None, progress: bool | None = None) -> None:
-        """Write an object for each simulation as JSON, with arguments and errors as for `to_csv`.
-
-        The keys are those of the columns of `to_csv`, and NaN is null. The attributes of the study and of its measure
-        are under "study".
-        """
-        write_table("json", path, *self._results(critical), progress)
+        self._write("csv", path, critical, progress)
 
     def to_parquet(
         self, path: str | Path, *, critical: StudyVerdict | None = None, progress: bool | None = None
     ) -> None:
         """Write the table of `to_csv` as Parquet, with its arguments and errors; requires pyarrow."""
-        write_table("parquet", path, *self._results(critical), progress)
+        self._write("parquet", path, critical, progress)
 
-    def _results(self, critical: StudyVerdict | None) -> tuple[xr.Dataset, str, int]:
-        """Return what is written, the dimension along which it is cut, and how much of it is held in memory."""
-        if critical:
-            return self.critical_scales(critical), "change", 1 << 16
-        return self.results(), "motion", self._store.grid.unit[0]
+    def _write(self, kind: str, path: str | Path, critical: StudyVerdict | None, progress: bool | None) -> None:
+        dataset = self.critical_scales(critical) if critical else self.results()
+        write_table(kind, path, dataset, 1 << 16 if critical else self._store.grid.unit[0], progress)
 
     def __repr__(self) -> str:
-        m, s, k, n = self._store.grid.shape
-        sizes = counted(m, "motion"), counted(s, "scale"), counted(k, "polarity"), counted(n, "block")
-        return f"<Study: {' x '.join(sizes)}; {self.status}>"
+        names = ("motion", "scale", "polarity", "block")
+        sizes = " x ".join(map(counted, self._store.grid.shape, names))
+        return f"<Study: {sizes}; {self.status}>"
 
 
 def study(
@@ -344,7 +380,6 @@ def study(
     measure: MeasureName | Measure = "factor",
     polarity: Polarity = "+",
     duration: float | None = None,
-    outcomes: Sequence[str] | None = None,
     unit_blocks: int | None = None,
 ) -> Study:
     """Create a study, or open one that is there and check that its inputs are these.
@@ -357,9 +392,6 @@ def study(
         As for `simulate_many`; without both, the study must be there, and takes no other argument.
     model, chattering, levels, measure, polarity, duration : optional
         As for `simulate_many`.
-    outcomes : sequence of str, optional
-        Variables of `simulate_many` to keep; by default all. stalled, unfinished and stopped are always kept: they say
-        which of the others are answers.
     unit_blocks : int, optional
         Blocks of a unit, a multiple of 512, of one motion, scale and polarity; by default a unit holds as many of all
         as take about five seconds, from a pilot.
@@ -372,7 +404,7 @@ def study(
     Raises
     ------
     StudyError
-        If there is no study and no inputs are given, it holds other inputs or outcomes, or it is damaged.
+        If there is no study and no inputs are given, it holds other inputs, or it is damaged.
     InvalidOption
         If an argument is out of its range.
 
@@ -385,59 +417,33 @@ def study(
     >>> study(folder).results().overturned.sel(scale=0.4).values.tolist()
     [[True, False, True, False]]
     """
-    where = Folder(folder)
     if blocks is not None and motions is not None:
         product = product_of(blocks, motions, levels, measure, polarity, model, chattering, duration)
-        return study_of(where, product, unit_blocks, outcomes=chosen_outcomes(outcomes))
+        return study_of(folder, product, unit_blocks)
     if blocks is not None or motions is not None:
         raise InvalidOption("a new study needs {} and {}; one that is there needs neither", "blocks", "motions")
-    texts = {"model": (model, "nonlinear"), "chattering": (chattering, "certified"), "measure": (measure, "factor")}
-    texts |= {"polarity": (polarity, "+")}
-    others = {"levels": levels, "duration": duration, "outcomes": outcomes, "unit_blocks": unit_blocks}
-    ignored = [name for name, (value, default) in texts.items() if value != default]
-    ignored += [name for name, value in others.items() if value is not None]
-    if ignored:
-        raise InvalidOption(
-            f"{', '.join(['{}'] * len(ignored))} belong{'s' if len(ignored) == 1 else ''} to {{}} and {{}}: give those "
-            "as well, or open the study by its folder alone",
-            *ignored,
-            "blocks",
-            "motions",
-        )
-    return Study(Store.open(where))
+    others = model, chattering, levels, measure, polarity, duration, unit_blocks
+    if str(others) != str(("nonlinear", "certified", None, "factor", "+", None, None)):
+        raise InvalidOption("a study that is opened has rules of its own: give its folder alone, or all its inputs")
+    return Study(folder)
 
 
 def study_of(
-    folder: Folder,
-    product: Product,
-    unit_blocks: int | None = None,
-    plan: ReportPlan | None = None,
-    outcomes: tuple[str, ...] = OUTCOMES,
-    records: Sequence[str] = (),
+    folder: str | Path, product: Product, unit_blocks: int | None = None, records: Sequence[str] = ()
 ) -> Study:
-    """Create the study of a product in a folder, or open the one there, check its inputs, replace plan and records."""
-    found = None if exists(folder) else _created(folder, product, unit_blocks, outcomes)
-    if found is None:
-        found = Store.open(folder)
-        found.check_inputs(product, outcomes)
-        width, count = found.grid.unit[3], len(product.bodies)
-        if unit_blocks is not None and min(width_of(unit_blocks), count) != min(width, count):
-            raise InvalidOption(
-                f"the study is there already, in units of {width} blocks: leave {{}} out", "unit_blocks"
-            )
-    if any(records) or (records and found.records()):
-        found.name_records(records)
-    if plan is not None and (plan != ReportPlan() or kept_report(folder) is not None):
-        keep_report(folder, plan)
-    return Study(found)
-
-
-def _created(folder: Folder, product: Product, unit_blocks: int | None, outcomes: tuple[str, ...]) -> Store | None:
-    """Create the store of a study; None where another process has done so meanwhile."""
-    require_free(folder)  # before the pilot, and before a lock is put beside the files of others
-    unit = fitting_unit(product) if unit_blocks is None else (1, 1, 1, width_of(unit_blocks))
-    with folder.locked():
-        return None if exists(folder) else Store.create(folder, product, unit, outcomes)
+    """Create the study of a product in a folder, or open the one there and check its inputs."""
+    if not exists(folder):
+        require_free(folder)  # before the pilot, and before a lock is put beside the files of others
+        unit = unit_of(product, unit_blocks)
+        with locked(folder):
+            if not exists(folder):  # another process may have made it meanwhile
+                Store.create(folder, product, unit, records)
+    found = Study(folder)
+    found._store.check_inputs(product)
+    width, count = found._store.grid.unit[3], len(product.bodies)
+    if unit_blocks is not None and min(unit_of(product, unit_blocks)[3], count) != min(width, count):
+        raise InvalidOption(f"the study is there already, in units of {width} blocks: leave {{}} out", "unit_blocks")
+    return found
 
 
 def _part(part: str) -> tuple[int, int]:
@@ -450,3 +456,99 @@ def _part(part: str) -> tuple[int, int]:
             value=part,
         )
     return int(number), int(count)
+
+
+def _run(store: Store, share: Sequence[Key], threads: int, executor: Any, progress: bool | None) -> RunReport:
+    """Compute the units of a share that are not done, in threads or by an executor, until SIGTERM."""
+    start, grid, pending = time.monotonic(), store.grid, dict[Future[bytes], Key]()
+    units, simulations, failed = 0, 0, dict[str, str]()
+    done = store.done()
+    missing = [key for key in share if key not in done]
+    left, total = iter(missing), sum(map(grid.simulations, share))
+    before = total - sum(map(grid.simulations, missing))
+    with (
+        Progress("simulations", total, show=progress, done=before) as bar,
+        _workers(executor, threads) as (submit, count),
+        _terminated() as stop,
+    ):
+        try:
+            while True:
+                # Each worker has a unit in hand, and the next.
+                room = 0 if stop.is_set() else max(2 * max(1, count()) - len(pending), 0)
+                for key in itertools.islice(left, room):
+                    pending[submit(store.work(key))] = key
+                if not pending:
+                    break
+                for future in wait(pending, timeout=1.0, return_when=FIRST_COMPLETED).done:
+                    key = pending.pop(future)
+                    try:
+                        data = future.result()
+                    except (BrokenExecutor, CancelledError) as error:
+                        raise _gone(error) from error
+                    except Exception as error:
+                        why, kind = " ".join(str(error).split()), type(error).__name__
+                        failed[name_of(key)] = why if isinstance(error, RockingError) else f"{kind}: {why}".rstrip(": ")
+                        bar.note(f"{counted(len(failed), 'unit')} failed")
+                        continue
+                    put(store.file_of(key), data)
+                    units, simulations = units + 1, simulations + grid.simulations(key)
+                    bar.advance(grid.simulations(key))
+        finally:
+            for future in pending:
+                future.cancel()
+    stopped = stop.is_set() and units + len(failed) < len(missing)
+    return RunReport(units, simulations, time.monotonic() - start, failed, stopped)
+
+
+@contextlib.contextmanager
+def _terminated() -> Iterator[threading.Event]:
+    """Give what SIGTERM sets, where this is the main thread."""
+    stop = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield stop
+        return
+    before = signal.signal(signal.SIGTERM, lambda *_: stop.set())
+    try:
+        yield stop
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+@contextlib.contextmanager
+def _workers(executor: Any, threads: int) -> Iterator[tuple[Callable[[Work], Future[bytes]], Callable[[], int]]]:
+    """Give what hands a unit to a worker, and what counts the workers; threads stop when this is left by an error."""
+    if executor is None:
+        cancelled, pool = threading.Event(), ThreadPoolExecutor(threads)
+        try:
+            yield lambda work: pool.submit(compute, work, cancelled), lambda: threads
+        finally:
+            cancelled.set()
+            pool.shutdown(cancel_futures=True)
+        return
+    client: Any = executor if hasattr(executor, "get_executor") else getattr(executor, "_client", None)
+    foreign = executor.get_executor(pure=False) if client is executor else executor
+    if not isinstance(foreign, Executor):
+        kinds = "a concurrent.futures.Executor or a client of dask.distributed"
+        raise InvalidOption(f"{{}} must be {kinds}; got {checks.shown(executor)}", "executor", value=executor)
+
+    def submit(work: Work) -> Future[bytes]:
+        try:
+            return foreign.submit(compute, work)
+        except RuntimeError as error:  # also BrokenExecutor
+            raise _gone(error) from error
+
+    def count() -> int:
+        if client is None:
+            return getattr(foreign, "_max_workers", None) or cores()
+        if client.status != "running":
+            raise _gone("no connection to the scheduler")
+        try:
+            return sum(client.nthreads().values())
+        except Exception as error:  # a client that loses its scheduler raises what its sockets raise
+            raise _gone(error) from error
+
+    yield submit, count
+
+
+def _gone(why: object) -> StudyError:
+    return StudyError(f"the workers are gone: {why}; what was computed is kept, run the study again")
