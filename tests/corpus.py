@@ -487,8 +487,6 @@ ENSEMBLES: Final = {
     "levels": (GRID, {"levels": [1.0, 2.5, 6.0], "measure": "pga", "polarity": "both"}),
     "linear": (GRID, {"levels": [0.5, 1.0], "model": "linear"}),
     "times": (GRID, {"times": True, "polarity": "-"}),
-    "derivatives": (GRID, {"derivatives": True}),
-    "robust": (GRID.select(slice(0, 6)), {"robust": True}),
     "treatment": (GRID, {"chattering": "velocity=0.001", "duration": 5.0}),
     "two-sided": (UNEVEN, {"levels": [0.4, 1.0], "measure": "pgv"}),
     "restrained": ([*HELD["tendon"], *HELD["damper"], *HELD["yielding"]], {"levels": [1.0, 2.0]}),
@@ -511,9 +509,8 @@ def ensembles(kind: str) -> Iterator[Item]:
 @group()
 def ensembles_between_stops() -> Iterator[Item]:
     for kind, bodies in BETWEEN.items():
-        for options in ({}, {"derivatives": True}) if kind != "oscillator" else ({},):
-            data = dynamics.simulate_many(bodies, shaking()[:6], duration=4.0, progress=False, **options)
-            yield kind, of_dataset(data)
+        data = dynamics.simulate_many(bodies, shaking()[:6], duration=4.0, progress=False)
+        yield kind, of_dataset(data)
 
 
 # Motions
