@@ -166,7 +166,8 @@ def test_a_table_and_a_fragility_count_what_leans_as_standing():
 
 def test_the_peak_of_a_body_that_leans_has_derivatives():
     found = rocking.simulate(BODIES["yields"], PULSES[0])
-    assert found.leans and all(np.isfinite(each).all() for each in found.sensitivity.peak.values())
+    changes = [found.sensitivity.peak[name] for name in ("motion", "p", "alpha", "restitution")]
+    assert found.leans and np.isfinite(changes).all()
     h = 1e-6
     peaks = [rocking.simulate(BODIES["yields"], PULSES[0].scaled(1.0 + d)).peak_rotation for d in (-h, h)]
     assert found.sensitivity.peak["motion"][0] == pytest.approx((peaks[1] - peaks[0]) / (2.0 * h), rel=1e-4)

@@ -6,7 +6,6 @@ from rocking.block.restitution import (
     RandomRestitution,
     Restitution,
     housner_restitution,
-    impact_restitution,
     one_sided_restitution,
 )
 from rocking.block.restrained import RestrainedBlock
@@ -33,7 +32,6 @@ __all__ = [
     "Tendon",
     "Thrust",
     "housner_restitution",
-    "impact_restitution",
     "one_block",
     "one_sided_restitution",
 ]

@@ -8,12 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from rocking.block.limits import checked_length, checked_pair, checked_parameter
+from rocking.block.limits import checked_pair, checked_parameter
 from rocking.core import checks
 from rocking.errors import InvalidBlock
-
-#: Most points at which a base meets the ground in turn: far beyond, rounding is what is left of the loss.
-_MOST_POINTS: Final = 1_000_000
 
 #: Largest seed: whole numbers up to it are floats, too.
 _LARGEST_SEED: Final = 2**53
@@ -50,111 +47,6 @@ def one_sided_restitution(alpha: float) -> float:
     angle = checked_parameter(checks.finite(alpha, "alpha", InvalidBlock), "alpha")
     sine, cosine = math.sin(angle), math.cos(angle)
     return abs((1.0 - 1.5 * sine * sine) ** 2 * (1.0 - 1.5 * cosine * cosine))
-
-
-def impact_restitution(
-    alpha: float | None = None,
-    *,
-    contact: float = 1.0,
-    points: int = 2,
-    distances: Sequence[float] | None = None,
-    height: float | None = None,
-    radius_of_gyration: float | None = None,
-) -> tuple[float, float]:
-    """Restitution by angular momentum where the impulse is not at the new pivot, or there are several.
-
-    Parameters
-    ----------
-    alpha : float, optional
-        Slenderness of a rectangular block, rad. Of another body give the three sizes below in its place.
-    contact : float
-        Where the impulse of the impact acts, as a share of the distance from below the centre of mass to the new pivot:
-        1 at the pivot as Housner has it, less where the contact is narrower or spread over a region.
-    points : int
-        At how many points, evenly from the old pivot to the new one, the base meets the ground, one after the other: 2
-        are the pivots alone.
-    distances : pair of float, optional
-        Horizontal distances from the centre of mass to the pivots (side +, side -), m.
-    height, radius_of_gyration : float, optional
-        Height of the centre of mass above the pivots and sqrt(I/m) about it, m.
-
-    Returns
-    -------
-    pair of float
-        Factor on the angular speed on leaving side + and on leaving side -, for the `restitution` of a block.
-
-    Raises
-    ------
-    InvalidBlock
-        If a number is out of its range, there are both a slenderness and sizes or neither, or both a `contact` and
-        `points`, the body would not rock on, or a `contact` is so narrow that an uneven body would gain energy.
-
-    Notes
-    -----
-    With A = k^2 + h^2 and pivots at d_i and d_j from the centre of mass: e_i = (A - kappa d_i d_j)/(A + kappa d_j^2)
-    for a contact kappa (after Kalliontzis, Sritharan and Schultz 2016, whose formula is mostly quoted with kappa^2 in
-    the place of kappa: give the square of such a share); the product of (A + x y)/(A + y^2) over points x and their
-    successors y, from one pivot to the other (after Ther and Kollar 2017). More points lose less, infinitely many no
-    energy. (Derived in the documentation.)
-
-    References
-    ----------
-    D. Kalliontzis, S. Sritharan and A. Schultz, "Improved coefficient of restitution estimation for free rocking
-    members", Journal of Structural Engineering 142 (2016). T. Ther and L. P. Kollar, "Refinement of Housner's model on
-    rocking blocks", Bulletin of Earthquake Engineering 15 (2017).
-
-    Examples
-    --------
-    >>> [round(impact_restitution(0.3, contact=share)[0], 4) for share in (1.0, 0.8, 0.5)]
-    [0.869, 0.8938, 0.9323]
-    """
-    if alpha is not None and (distances, height, radius_of_gyration) == (None, None, None):
-        angle = checked_parameter(checks.finite(alpha, "alpha", InvalidBlock), "alpha")
-        away, h, k = (math.sin(angle),) * 2, math.cos(angle), math.sqrt(1.0 / 3.0)
-    elif alpha is None and not (distances is None or height is None or radius_of_gyration is None):
-        plus, minus = checked_pair(distances, "distances")
-        away = checked_length(plus, "distances"), checked_length(minus, "distances")
-        h, k = checked_length(height, "height"), checked_length(radius_of_gyration, "radius_of_gyration")
-    else:
-        raise InvalidBlock(
-            "give either {} of a rectangular block, or {}, {} and {} of a body",
-            "alpha", "distances", "height", "radius_of_gyration",
-        )  # fmt: skip
-    share = checks.share(contact, "contact", InvalidBlock, below=math.nextafter(1.0, 2.0))
-    count = checks.whole(points, "points", InvalidBlock, 2, _MOST_POINTS)
-    if share < 1.0 and count > 2:
-        raise InvalidBlock("give either a {} or {}, not both", "contact", "points")
-    inertia = k * k + h * h
-    found = _on_leaving(away, inertia, share, count), _on_leaving(away[::-1], inertia, share, count)
-    if min(found) <= 0.0:
-        raise InvalidBlock(
-            f"angular momentum leaves this body a restitution of {min(found):.3g}: it is too stocky to rock that way"
-        )
-    if share < (least := _narrowest(away, inertia)):
-        raise InvalidBlock(f"{{}} must be at least {least:.4g} for this body, which would gain energy", "contact")
-    return found
-
-
-def _narrowest(away: Sequence[float], inertia: float) -> float:
-    """Least share at which no impact adds energy: a body gains some where it passes to the pivot further away."""
-    near, far = sorted(away)
-    ratio = math.sqrt((inertia + far * far) / (inertia + near * near))
-    return inertia * (ratio - 1.0) / (far * (far + ratio * near))
-
-
-def _on_leaving(away: Sequence[float], inertia: float, share: float, points: int) -> float:
-    """Factor on leaving the first of two pivots, from their distances and k^2 + h^2."""
-    if points == 2:
-        return (inertia - share * away[0] * away[1]) / (inertia + share * away[1] ** 2)
-    step = (away[0] + away[1]) / (points - 1)
-    loss = 0.0
-    for n in range(1, points):
-        x = away[0] - n * step
-        change = step * x / (inertia + x * x)
-        if change <= -1.0:
-            return 1.0 + change
-        loss += math.log1p(change)
-    return math.exp(loss)
 
 
 # ---- Laws by which it varies ----
