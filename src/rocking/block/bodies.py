@@ -14,7 +14,7 @@ from rocking.block.body import KINDS
 from rocking.block.limits import checked_gravity, checked_sides
 from rocking.block.restrained import RestrainedBlock
 from rocking.block.restraints import Terms
-from rocking.block.rigid_body import refusal, rigid_bodies
+from rocking.block.rigid_body import no_body, rigid_bodies
 from rocking.block.single import Block, one_block
 from rocking.core import checks
 from rocking.core.arrays import Floats
@@ -381,11 +381,10 @@ def _conserved(p: Floats, alpha: Floats) -> Floats:
     """Restitutions that conserve angular momentum, of the rigid bodies whose sides have these p and alpha."""
     kept: Floats = 1.0 - 1.5 * np.sin(alpha) ** 2
     sided = np.flatnonzero((p[:, 0] != p[:, 1]) | (alpha[:, 0] != alpha[:, 1]))
-    found = rigid_bodies(p[sided], alpha[sided])
-    if not found.known.all():
-        first = int(np.argmin(found.known))
-        raise InvalidBlock(f"{refusal(found, p[sided], alpha[sided], first)} (block {sided[first]})", "restitution")
-    kept[sided] = found.restitution
+    kept[sided], _ = rigid_bodies(p[sided], alpha[sided])
+    if (unknown := np.isnan(kept).any(axis=1)).any():
+        first = int(np.argmax(unknown))
+        raise InvalidBlock(f"{no_body(p[first], alpha[first])} (block {first})", "restitution")
     stocky = np.flatnonzero(~(kept > 0.0).all(axis=1))
     if len(stocky):
         raise InvalidBlock(

@@ -12,7 +12,7 @@ import numpy as np
 from rocking.block.body import KINDS, Bodies, ContactLaw, Coordinate
 from rocking.block.limits import checked_gravity, checked_length, checked_mass, checked_pair, checked_parameter
 from rocking.block.restitution import housner_restitution
-from rocking.block.rigid_body import contact_forces, gyration_squared, refusal, rigid_bodies
+from rocking.block.rigid_body import contact_forces, gyration_squared, no_body, rigid_bodies
 from rocking.block.sides import Side, even_sides, in_line, restitutions, sides_on_pivots
 from rocking.core import checks, svg
 from rocking.core.arrays import Floats, Integers
@@ -191,13 +191,12 @@ class Block:
         Raises
         ------
         InvalidBlock
-            If a parameter is out of its range, or without a restitution no rigid body has these sides, or p and alpha
-            have too few digits to tell it to 0.05.
+            If a parameter is out of its range, or without a restitution no rigid body has these sides.
 
         Notes
         -----
-        Depth h and radius of gyration k of the body follow from R_i = h/cos(alpha_i), g R_i/p_i^2 = k^2 + R_i^2. Sides
-        that agree to the digits that they are given to (three at least) count as equal. (Derived in the documentation.)
+        Depth h and radius of gyration k of the body follow from R_i = h/cos(alpha_i), g R_i/p_i^2 = k^2 + R_i^2: from
+        differences of the sides, so that p and alpha need many digits. (Derived in the documentation.)
 
         Examples
         --------
@@ -216,14 +215,12 @@ class Block:
         if rates[0] == rates[1] and angles[0] == angles[1]:
             e = restitutions(restitution, (housner_restitution(angles[0]),) * 2)
         else:
-            both = np.array([rates]), np.array([angles])
-            found = rigid_bodies(*both)
-            if restitution is None and (reason := refusal(found, *both)):
-                raise InvalidBlock(reason, "restitution")
-            conserved = found.restitution[0].tolist()
+            kept, depths = rigid_bodies(np.array([rates]), np.array([angles]))
+            conserved, depth = kept[0].tolist(), g * float(depths[0])
+            if restitution is None and math.isnan(conserved[0]):
+                raise InvalidBlock(no_body(np.array(rates), np.array(angles)), "restitution")
             e = restitutions(restitution, conserved)
-            if not found.alike[0] and all(abs(e[i] - conserved[i]) <= _SAME_RESTITUTION for i in range(2)):
-                depth = g * float(found.depth[0])
+            if depth > 0.0 and all(abs(e[i] - conserved[i]) <= _SAME_RESTITUTION for i in range(2)):
                 radii = [depth / math.cos(angle) for angle in angles]
                 k = math.sqrt(max(g * radii[0] / rates[0] ** 2 - radii[0] ** 2, 0.0))
                 text = f"body from its parameters, centre of mass {depth:.4g} m high, radius of gyration {k:.4g} m"
