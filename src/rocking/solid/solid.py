@@ -149,8 +149,7 @@ class Solid(Result):
         Returns
         -------
         Solid
-            With what was repaired: triangles that are turned otherwise than their neighbours, holes, and normals that
-            point inwards; and with notes, as on parts that overlap.
+            With what was repaired: holes, and normals that point inwards; and with notes, as on parts that overlap.
 
         Raises
         ------
