@@ -51,7 +51,9 @@ WRONG = {
     # Restraints
     "restraints in a list": (lambda: held([Spring(1e3), Damper(1.0)]), "", "is no restraint: give them one by one"),
     "restraints twice": (lambda: RestrainedBlock(held(Spring(1e3)), Damper(1.0)), "", "give all of them at once"),
-    "no mass": (lambda: Block.one_sided(Thrust(9.0, 2.0), width=0.4, height=4.0), "mass", "kg, beside its sizes"),
+    "no mass": (
+        lambda: RestrainedBlock(Block(width=0.4, height=4.0), Thrust(9.0, 2.0)), "mass", "kg, beside its sizes"
+    ),
     "a tendon beyond": (
         lambda: held(Tendon(1e5, offset=2.0)), "offset", "beyond the pivot, which is 0.25 m from the centre of mass"
     ),
@@ -62,8 +64,8 @@ WRONG = {
     "a load outside": (
         lambda: held(Load(1e5, 4.0, offset=1.0)), "offset", "0.702 m beyond its pivot, so that it falls: give"
     ),
-    "sizes of a wall without names": (
-        lambda: Block.one_sided(0.4, 4.0),
+    "sizes without names": (
+        lambda: Block(0.4, 4.0),
         "width",
         "the sizes of a block are given by name, not as 0.4, 4: width and height for the full sizes",
     ),

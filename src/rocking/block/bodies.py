@@ -119,10 +119,7 @@ class Blocks:
         held = {name: np.ascontiguousarray(values) for name, values in arrays.items()}
         for values in held.values():
             values.flags.writeable = False
-        for name in _NAMES:
-            object.__setattr__(self, name, held.pop(name))
-        for name, value in (("gravity", gravity), ("terms", held), ("axes", axes)):
-            object.__setattr__(self, name, value)
+        self.__dict__.update({name: held.pop(name) for name in _NAMES}, gravity=gravity, terms=held, axes=axes)
         return self
 
     @classmethod
@@ -321,16 +318,26 @@ class Blocks:
         if not one_way and terms == [Terms(), Terms()]:
             return block
         text = "block with restraints" + ", rocking one way" * one_way
-        return RestrainedBlock.__new__(RestrainedBlock)._fill(block, terms, one_way, (text, text), None, 0.0)
+        made = RestrainedBlock.__new__(RestrainedBlock)
+        made.__dict__.update(block=block, _terms=tuple(terms), is_one_sided=one_way, restraints=None, lean=0.0)
+        made.__dict__.update(description=text, title=text)
+        return made
 
     def __iter__(self) -> Iterator[Block | RestrainedBlock]:
         return (self[index] for index in range(len(self)))
 
     def select(self, index: slice | NDArray[np.int64] | NDArray[np.bool_]) -> Blocks:
         """Return some of the blocks: a slice, indices, or a mask."""
-        if not isinstance(index, slice):
-            index = self._indices(index)
-        chosen = {name: values[index] for name, values in self._arrays().items()}
+        try:
+            rows = np.arange(len(self))[index]
+        except IndexError:
+            rows = np.array(0)
+        if rows.ndim != 1:
+            raise InvalidBlock(
+                f"select takes a slice, a flat array of indices below {len(self)}, or a mask of {len(self)} truth "
+                f"values, not {checks.shown(index)}; for one block alone blocks[0]"
+            )
+        chosen = {name: values[rows] for name, values in self._arrays().items()}
         return Blocks.__new__(Blocks)._fill(self.gravity, chosen)
 
     def resized(self, factors: Floats) -> Blocks:
@@ -342,20 +349,6 @@ class Blocks:
         by = factors[:, None]
         terms = {name: values * by ** _POWERS.get(name, 0) for name, values in self.terms.items()}
         return Blocks(self.p * by, self.alpha, self.restitution, gravity=self.gravity, **terms)
-
-    def _indices(self, index: NDArray[np.int64] | NDArray[np.bool_]) -> NDArray[np.int64]:
-        """Positions of the blocks of a flat array of indices, or of a mask."""
-        given = np.asarray(index)
-        if given.ndim == 1 and given.dtype == np.bool_ and len(given) == len(self):
-            return np.flatnonzero(given)
-        usable = given.ndim == 1 and (given.dtype.kind in "iu" or not given.size)
-        chosen = given.astype(np.int64) if usable else np.array([len(self)])
-        if not np.all((chosen >= -len(self)) & (chosen < len(self))):
-            raise InvalidBlock(
-                f"select takes a slice, a flat array of indices below {len(self)}, or a mask of {len(self)} truth "
-                f"values, not {checks.shown(index)}; for one block alone blocks[0]"
-            )
-        return chosen
 
 
 def rates_of(p: ArrayLike | None, size: ArrayLike | None, gravity: float) -> ArrayLike:

@@ -27,9 +27,6 @@ class Side:
         Distance R from the pivot to the centre of mass, m.
     inertia : float or None
         Moment of inertia about the pivot, m g R/p^2, kg m^2; None while the mass is not known.
-    arm : float or None
-        What the angular speed is multiplied with for the momentum over the mass, m, from which the forces of the ground
-        follow; None where it is the radius, as in all but frames.
     """
 
     p: float
@@ -37,7 +34,6 @@ class Side:
     restitution: float
     radius: float
     inertia: float | None = None
-    arm: float | None = None
 
     def __str__(self) -> str:
         """Return the parameters as people read them."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final, Never
+from typing import Final, Never
 
 import numpy as np
 
@@ -14,14 +14,10 @@ from rocking.block.limits import checked_gravity, checked_length, checked_mass, 
 from rocking.block.restitution import housner_restitution
 from rocking.block.rigid_body import contact_forces, gyration_squared, no_body, rigid_bodies
 from rocking.block.sides import Side, even_sides, in_line, restitutions, sides_on_pivots
-from rocking.core import checks, svg
+from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
 from rocking.core.constants import MODELS, STANDARD_GRAVITY, Model
 from rocking.errors import InvalidBlock, InvalidOption, UnequalSides
-
-if TYPE_CHECKING:
-    from rocking.block.restrained import RestrainedBlock
-    from rocking.block.restraints import Restraint
 
 #: The coordinate of every block.
 ROTATION: Final = Coordinate("rotation", "angular_velocity", "angular_acceleration", "rad", "slenderness")
@@ -30,16 +26,37 @@ ROTATION: Final = Coordinate("rotation", "angular_velocity", "angular_accelerati
 _ROUNDING: Final = 1e-12
 #: Restitutions so near are one: that of a body, from p and alpha or from itself.
 _SAME_RESTITUTION: Final = 1e-9
-_HEAVIEST_BEAM: Final = 1e12
-#: Longer side of a block's picture, pixels.
-_PICTURED: Final = 120.0
 
 
-@dataclass(frozen=True)
-class Block:
+class Rocking:
+    """What free and restrained blocks share: text, the stops, and the arrays of one."""
+
+    sides: Sequence[Side]
+    gravity: float
+    description: str
+
+    def __str__(self) -> str:
+        """Return description and parameters in one line."""
+        return f"{self.description}; {in_line(self.sides)}"
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self}>"
+
+    @property
+    def stops(self) -> tuple[float, float]:
+        """Rotation at which it stands, for each side: zero."""
+        return 0.0, 0.0
+
+    def alone(self) -> Bodies:
+        """Return `Blocks` of which it is the only one."""
+        return KINDS["blocks"].of([self])
+
+
+@dataclass(frozen=True, repr=False)
+class Block(Rocking):
     """A free-standing rigid block that rocks without sliding or bouncing.
 
-    Made from the sizes of a rectangular block here, or by `from_parameters`, `from_pivots` and `from_frame`.
+    Made from the sizes of a rectangular block here, or by `from_parameters` and `from_pivots`.
 
     Parameters
     ----------
@@ -148,9 +165,8 @@ class Block:
             mass = checked_mass(mass)
             first, second = (replace(side, inertia=mass * gravity * side.radius / side.p**2) for side in sides)
             sides = first, second
-        names = ("sides", "gravity", "description", "mass", "half_width", "half_height", "offset")
-        for name, value in zip(names, (sides, gravity, description, mass, *rectangle), strict=True):
-            object.__setattr__(self, name, value)
+        self.__dict__.update(sides=sides, gravity=gravity, description=description, mass=mass)
+        self.__dict__.update(zip(("half_width", "half_height", "offset"), rectangle, strict=True))
         return self
 
     def _rows(self) -> list[tuple[float, ...]]:
@@ -286,125 +302,6 @@ class Block:
         pivots = f"body on pivots {plus:.5g} m and {minus:.5g} m from its centre of mass, which is {h:.5g} m high"
         return cls.__new__(cls)._fill(sides, g, description or pivots, mass)
 
-    @classmethod
-    def from_frame(
-        cls,
-        *,
-        half_width: float,
-        half_height: float,
-        mass_ratio: float,
-        restitution: float | Sequence[float] | None = None,
-        gravity: float = STANDARD_GRAVITY,
-    ) -> Block:
-        """Solitary block that rocks like a frame: equal columns that carry a freely supported rigid beam.
-
-        Parameters
-        ----------
-        half_width, half_height : float
-            Half the width and half the height of one column, m. All are given by name.
-        mass_ratio : float
-            gamma: mass of the beam over the mass of all columns; 0 is a column alone.
-        restitution : float or pair, optional
-            By default from angular momentum: (1 - 1.5 sin(alpha)^2 + 3 gamma cos(2 alpha))/(1 + 3 gamma).
-        gravity : float
-            Acceleration of gravity, m/s^2.
-
-        Returns
-        -------
-        Block
-            Symmetric.
-
-        Raises
-        ------
-        InvalidBlock
-            If a size is not positive, or the mass ratio is negative.
-
-        Notes
-        -----
-        The frame has the column's slenderness, and R' = R (1 + 3 gamma)/(1 + 2 gamma): a heavier beam makes it
-        more stable (Makris and Vassiliou 2013; derived in the documentation).
-
-        Examples
-        --------
-        >>> column = Block(half_width=0.5, half_height=3.0)
-        >>> frame = Block.from_frame(half_width=0.5, half_height=3.0, mass_ratio=2.0)
-        >>> frame.alpha == column.alpha, round(frame.radius / column.radius, 12)
-        (True, 1.4)
-        """
-        b = checked_length(half_width, "half_width")
-        h = checked_length(half_height, "half_height")
-        g = checked_gravity(gravity)
-        gamma = checks.within(mass_ratio, "mass_ratio", InvalidBlock, 0.0, _HEAVIEST_BEAM)
-        alpha = math.atan2(b, h)
-        radius = math.hypot(b, h) * (1.0 + 3.0 * gamma) / (1.0 + 2.0 * gamma)
-        kept = 1.0 - 1.5 * math.sin(alpha) ** 2 + 3.0 * gamma * math.cos(2.0 * alpha)
-        plus, minus = even_sides(g, radius, alpha, restitution, kept / (1.0 + 3.0 * gamma), _perhaps_swapped(b, h))
-        # The beam moves twice as far as the centres of the columns do.
-        arm = math.hypot(b, h) * (1.0 + 2.0 * gamma) / (1.0 + gamma)
-        sides = replace(plus, arm=arm), replace(minus, arm=arm)
-        text = f"frame of columns {2 * b:.5g} m x {2 * h:.5g} m, mass ratio {gamma:.5g}"
-        return cls.__new__(cls)._fill(sides, g, text)
-
-    @classmethod
-    def one_sided(
-        cls,
-        *restraints: Restraint,
-        lean: float = 0.0,
-        restitution: float | None = None,
-        **sizes: Any,
-    ) -> RestrainedBlock:
-        """Rectangular block that rocks to side + only, as a facade that stands against transverse walls.
-
-        Parameters
-        ----------
-        *restraints : Restraint
-            What holds it back or pushes it: `Thrust` of a vault, `Load`, `Tendon`.
-        lean : float
-            Angle by which it stands out of plumb to side +, rad.
-        restitution : float, optional
-            Factor on the angular speed with which it bounces back to the same side. By default
-            `one_sided_restitution`; measured ones are better.
-        **sizes
-            As of `Block`: `width` and `height`, m, or half of them, `mass`, kg, `gravity`.
-
-        Returns
-        -------
-        RestrainedBlock
-            With one side.
-
-        Examples
-        --------
-        >>> wall = Block.one_sided(width=0.4, height=4.0)
-        >>> round(wall.sides[0].restitution, 4)
-        0.4708
-        """
-        from rocking.block.restrained import RestrainedBlock
-
-        numbers: Any = [each for each in restraints if isinstance(each, (int, float))]
-        # What is given takes the place of the block's own restitution, so that angular momentum need not leave it one.
-        own = None if restitution is None else 1.0
-        block = cls(*numbers, restitution=own, **sizes)
-        return RestrainedBlock(block, *restraints, one_sided=True, lean=lean, restitution=restitution)
-
-    def __str__(self) -> str:
-        """Return description and parameters in one line."""
-        return f"{self.description}; {in_line(self.sides)}"
-
-    def __repr__(self) -> str:
-        return f"<Block: {self}>"
-
-    def _repr_html_(self) -> str:
-        if self.half_width is not None and self.half_height is not None:
-            b, top = self.half_width, 2.0 * self.half_height
-            corners, label = [(-b, 0.0), (b, 0.0), (b, top), (-b, top)], f"{2.0 * b:.4g} m x {top:.4g} m"
-        else:
-            (right, left), (up, _) = zip(
-                *((side.radius * math.sin(side.alpha), side.radius * math.cos(side.alpha)) for side in self.sides),
-                strict=True,
-            )
-            corners, label = [(-left, 0.0), (right, 0.0), (0.0, up)], "pivots and centre of mass"
-        return svg.captioned(f"Block: {self}", svg.outline(corners, _PICTURED, label))
-
     @property
     def p(self) -> float:
         """Frequency parameter, rad/s, of a block whose sides are equal; else ask its `sides`."""
@@ -461,11 +358,6 @@ class Block:
         return self.sides[0].alpha, self.sides[1].alpha
 
     @property
-    def stops(self) -> tuple[float, float]:
-        """Rotation at which it stands, for each side: zero."""
-        return 0.0, 0.0
-
-    @property
     def contact(self) -> ContactLaw:
         """Forces of the ground over the weight, from rotation and ground acceleration (see `rocking.block.body`)."""
         return self._contact_forces
@@ -478,16 +370,9 @@ class Block:
         stretch: Floats,
     ) -> tuple[Floats, Floats]:
         leaning = np.maximum(side, 0)
-        alpha, arm = (
-            np.array(each)[leaning]
-            for each in zip(*((s.alpha, s.radius if s.arm is None else s.arm) for s in self.sides), strict=True)
-        )
+        alpha, radius = np.array([(s.alpha, s.radius) for s in self.sides]).T[:, leaning]
         sign = np.where(side < 0, 0.0, 1.0 - 2.0 * leaning)
-        return contact_forces(motion, ground_over_g, sign, alpha, arm / self.gravity)
-
-    def alone(self) -> Bodies:
-        """Return `Blocks` of which this is the only one."""
-        return KINDS["blocks"].of([self])
+        return contact_forces(motion, ground_over_g, sign, alpha, radius / self.gravity)
 
     def uplift_thresholds(self, model: Model = "nonlinear") -> tuple[float, float]:
         """Ground accelerations, m/s^2, that lift the block to side + (when -a passes the first) and to side -."""
