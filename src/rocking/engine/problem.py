@@ -126,7 +126,18 @@ def set_start(
     u, v = np.where(at_other, 0.0, sign * from_plus), np.where(at_other, -speed, sign * speed)
     wrong = one_sided & ((u < 0.0) | (facing & (u > records["overturn_angle"])) | ((u == 0.0) & (v < 0.0)))
     if np.any(wrong):
-        _refuse_behind(bodies, int(np.argmax(wrong)), at, speed, u, name)
+        body = bodies[min(k := int(np.argmax(wrong)), len(bodies) - 1)]
+        called, unit = name or f"initial_{body.coordinate.name}", body.coordinate.unit
+        low, high = body.stops
+        where = f"from {low:g} to {high:g} {unit}" if high > low else f"at least {low:g} {unit}"
+        value, fast = (float(np.broadcast_to(each, u.shape)[k]) for each in (at, speed))
+        raise InvalidOption(
+            f"{{}} must be {where}, in front of the body's stop, and {{}} must not lead into it: they are {value:g} "
+            f"{unit} and {fast:g} {unit}/s",
+            called,
+            "initial_velocity",
+            value=value,
+        )
     side = np.where((sign < 0.0) | at_other, 1, 0)
     at_rest = (u == 0.0) & (v == 0.0)
     states["side"] = np.where(at_rest, np.where(facing, -1 - side, state.AT_REST), side)
@@ -163,25 +174,6 @@ def _check_start(
         raise InvalidOption(
             f"{{}} must be below {limit} {kind.unit} in size, not {u:g}{hint}", called, value=coordinate
         )
-
-
-def _refuse_behind(bodies: Bodies, k: int, at: Floats, speed: Floats, u: Floats, name: str | None) -> None:
-    """Refuse to start where body k cannot be, or into its stop."""
-    body = bodies[min(k, len(bodies) - 1)]
-    called = name or f"initial_{body.coordinate.name}"
-    value, fast = (float(np.broadcast_to(each, u.shape)[k]) for each in (at, speed))
-    if u[k] == 0.0:
-        raise InvalidOption(
-            f"{{}} = {fast:g} leads from the stop into it; change its sign, or {{}}",
-            "initial_velocity",
-            called,
-            value=fast,
-        )
-    low, high = body.stops
-    where = f"from {low:g} to {high:g}" if high > low else f"at least {low:g}"
-    raise InvalidOption(
-        f"{{}} must be {where} {body.coordinate.unit}, in front of the body's stop, not {value:g}", called, value=value
-    )
 
 
 def never_rests(bodies: Bodies) -> bool:

@@ -47,10 +47,17 @@ class Treatment(ABC):
     def __init_subclass__(cls) -> None:
         _BY_NAME[cls.name] = cls
 
+    def __post_init__(self) -> None:
+        """Check that all parameters are positive numbers."""
+        unit = "m/s, or of a block fractions of p alpha" if self.unit == "speed" else self.unit
+        for parameter in fields(self):
+            checks.positive(getattr(self, parameter.name), parameter.name, InvalidOption, unit)
+
     @property
-    @abstractmethod
     def label(self) -> str:
         """Short name with the parameter and its unit, for tables and figures."""
+        values = [f" {getattr(self, parameter.name):g}" for parameter in fields(self)]
+        return f"{self.name}{''.join(values)}{' s' if self.unit == 's' else ''}"
 
     @property
     def bracket(self) -> float:
@@ -177,14 +184,6 @@ class Certified(Treatment):
 
     tolerance: float = 1e-12
 
-    def __post_init__(self) -> None:
-        checks.positive(self.tolerance, "tolerance", InvalidOption, "s")
-
-    @property
-    def label(self) -> str:
-        """Name and tolerance."""
-        return f"certified {self.tolerance:g} s"
-
     @property
     def bracket(self) -> float:
         """The tolerance."""
@@ -210,14 +209,6 @@ class VelocityThreshold(Treatment):
     unit: ClassVar[str] = "speed"
 
     threshold: float = 5e-10
-
-    def __post_init__(self) -> None:
-        checks.positive(self.threshold, "threshold", InvalidOption, "m/s, or of a block fractions of p alpha")
-
-    @property
-    def label(self) -> str:
-        """Name and threshold."""
-        return f"velocity {self.threshold:g}"
 
     def limits(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
         """Threshold of every side, of a block in rad/s."""
@@ -248,11 +239,6 @@ class GeometricBypass(VelocityThreshold):
 
     threshold: float = 1e-3
 
-    @property
-    def label(self) -> str:
-        """Name and threshold."""
-        return f"bypass {self.threshold:g}"
-
 
 @dataclass(frozen=True)
 class IntervalThreshold(Treatment):
@@ -269,14 +255,6 @@ class IntervalThreshold(Treatment):
     unit: ClassVar[str] = "s"
 
     threshold: float = 1e-9
-
-    def __post_init__(self) -> None:
-        checks.positive(self.threshold, "threshold", InvalidOption, "s")
-
-    @property
-    def label(self) -> str:
-        """Name and threshold."""
-        return f"interval {self.threshold:g} s"
 
     def limits(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
         """Threshold of every side, s."""
@@ -314,7 +292,17 @@ def critical_amplitudes_by(method: str, omega: Floats, eta: Floats) -> Floats:
 
     found = np.ones(omega.size)
     if method != "exact":
-        warn_outside_fit(method, omega, eta)
+        low, high = FITTED_FREQUENCIES
+        least, most = FITTED_RESTITUTIONS
+        outside: Flags = (omega < low) | (omega > high) | (eta < least) | (eta > most)
+        if outside.any():
+            k = int(np.argmax(outside))
+            warnings.warn(
+                f"Eq. {method[2:]} was fitted for omega from {low:g} to {high:g} and eta from {least:g} to {most:g}; "
+                f'at omega = {omega.flat[k]:g}, eta = {eta.flat[k]:g} it means nothing: use "exact"',
+                OutsideFit,
+                stacklevel=2,
+            )
         fitted_amplitudes(omega, eta, method == "eq76", found)
         return found
     lossy = np.flatnonzero(eta < 1.0)
@@ -323,18 +311,3 @@ def critical_amplitudes_by(method: str, omega: Floats, eta: Floats) -> Floats:
         critical_amplitudes(omega[lossy[some]], eta[lossy[some]], here)
         found[lossy[some]] = here
     return found
-
-
-def warn_outside_fit(fit: str, omega: Floats, eta: Floats) -> None:
-    """Warn where one of the paper's fits, "eq76" or "eq77", is asked beyond what it was made for."""
-    low, high = FITTED_FREQUENCIES
-    least, most = FITTED_RESTITUTIONS
-    outside: Flags = (omega < low) | (omega > high) | (eta < least) | (eta > most)
-    if outside.any():
-        k = int(np.argmax(outside))
-        warnings.warn(
-            f"Eq. {fit[2:]} was fitted for omega from {low:g} to {high:g} and eta from {least:g} to {most:g}; "
-            f'at omega = {omega.flat[k]:g}, eta = {eta.flat[k]:g} it means nothing: use "exact"',
-            OutsideFit,
-            stacklevel=3,
-        )
