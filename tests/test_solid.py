@@ -592,7 +592,7 @@ def test_azimuths_are_numbers(azimuths):
         ("points.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
          "property float z\nend_header\n0 0 0\n", "holds no faces"),
         ("nothing.obj", "# nothing\n", "holds no faces"),
-        ("empty.obj", "", "this file is empty"),
+        ("empty.obj", "", "holds no faces"),
         ("text.stl", "hello", "holds no faces"),
         ("text.ply", "hello", "cannot be read: "),
         ("text.glb", "hello", "cannot be read: "),

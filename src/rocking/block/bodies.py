@@ -297,11 +297,9 @@ class Blocks:
     def __repr__(self) -> str:
         if not len(self):
             return "<Blocks: none>"
-        ranges = [
-            f"{name} {range_text(values)}{'' if name == 'restitution' else f' {_UNITS[name]}'}"
-            for name, values in (("p", self.p), ("alpha", self.alpha), ("restitution", self.restitution))
-        ]
-        return f"<Blocks: {len(self)}; {', '.join(ranges)}{', restrained' if self.terms else ''}>"
+        p, alpha, e = (range_text(values) for values in (self.p, self.alpha, self.restitution))
+        held = ", restrained" if self.terms else ""
+        return f"<Blocks: {len(self)}; p {p} rad/s, alpha {alpha} rad, restitution {e}{held}>"
 
     def __len__(self) -> int:
         return len(self.p)
@@ -320,7 +318,7 @@ class Blocks:
         text = "block with restraints" + ", rocking one way" * one_way
         made = RestrainedBlock.__new__(RestrainedBlock)
         made.__dict__.update(block=block, _terms=tuple(terms), is_one_sided=one_way, restraints=None, lean=0.0)
-        made.__dict__.update(description=text, title=text)
+        made.__dict__.update(description=text)
         return made
 
     def __iter__(self) -> Iterator[Block | RestrainedBlock]:

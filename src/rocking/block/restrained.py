@@ -25,9 +25,7 @@ from rocking.errors import InvalidBlock, InvalidOption
 #: Rotations at which the balance is looked for, on each side.
 _LOOKS: Final = 512
 
-#: So many restraints are told with their numbers in the title of a figure.
-_FEW: Final = 2
-_SOME: Final = "Tendon, Spring, Damper, Thrust and Load are some"
+_SOME: Final = "Tendon, Spring, Damper, Thrust or Load"
 _ROTATION: Final = Coordinate("rotation", "angular_velocity", "angular_acceleration", "rad", "balance")
 
 
@@ -78,7 +76,6 @@ class RestrainedBlock(Rocking):
     _terms: tuple[Terms, Terms]
     is_one_sided: bool
     description: str
-    title: str
     restraints: tuple[Restraint, ...] | None
     lean: float
 
@@ -123,13 +120,11 @@ class RestrainedBlock(Rocking):
             )
             for side, pivot in enumerate(pivots)
         ]
-        kinds = [type(each).__name__.lower() for each in restraints]
-        text, title = (", ".join([own.description, *_listed(words), *rest]) for words in (restraints, kinds))
-        title = title if len(restraints) > _FEW else text
+        text = ", ".join([own.description, *_listed(restraints), *rest])
         self.__dict__.update(
             block=standing, _terms=tuple(terms), is_one_sided=one_way, restraints=restraints, lean=tilt
         )
-        self.__dict__.update(description=text, title=title)
+        self.__dict__.update(description=text)
         if (least := min(self.uplift_thresholds())) <= 0.0:
             raise InvalidBlock(
                 f"this block does not stand: it would take a ground acceleration of {least:.3g} m/s^2 to lift it; "
@@ -218,8 +213,7 @@ def _check(restraints: Sequence[object], block: Block) -> None:
     """Refuse what is no restraint, and restraints of a block without a mass."""
     for each in restraints:
         if not isinstance(each, Restraint):
-            how = "give them one by one" if isinstance(each, (list, tuple)) else _SOME
-            raise InvalidBlock(f"{checks.shown(each)} is no restraint: {how}")
+            raise InvalidBlock(f"{checks.shown(each)} is no restraint: give {_SOME}, one by one")
     if restraints and block.mass is None:
         raise InvalidBlock("a block with restraints needs its {}, kg, beside its sizes or its pivots", "mass")
 

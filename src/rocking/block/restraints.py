@@ -141,16 +141,9 @@ class Tendon(Restraint):
     def __post_init__(self) -> None:
         self._finite("stiffness", "prestress", "offset")
         stiffness, prestress = self.stiffness, self.prestress
-        if stiffness < 0.0:
-            raise InvalidBlock(
-                f"{{}} of a tendon must be at least 0 N/m, not {stiffness:g}", "stiffness", value=stiffness
-            )
-        if prestress < 0.0:
-            raise InvalidBlock(
-                f"{{}} of a tendon must be at least 0 N, not {prestress:g}: a tendon that hangs slack holds nothing",
-                "prestress",
-                value=prestress,
-            )
+        for name, value, unit in (("stiffness", stiffness, "N/m"), ("prestress", prestress, "N")):
+            if value < 0.0:
+                raise InvalidBlock(f"{{}} of a tendon must be at least 0 {unit}, not {value:g}", name, value=value)
         if stiffness == prestress == 0.0:
             raise InvalidBlock("a tendon needs {} (N/m) or {} (N)", "stiffness", "prestress")
         object.__setattr__(self, "strength", checks.number(self.strength, "strength", InvalidBlock))

@@ -140,17 +140,13 @@ class AsymptoticTime(Treatment):
         """Chattering time of every side, s; infinite where chattering is not complete."""
         from rocking.kernels.sine.series import eq65_time
 
-        if motion is None or motion.description.family != "sine":
+        is_even = isinstance(bodies, Blocks) and not bodies.terms and bodies.is_symmetric
+        if not is_even or motion is None or motion.description.family != "sine" or motion.vertical is not None:
             raise InvalidOption(
-                '{} "time" is the scheme for sinusoidal motions (rocking.pulses.sine), not for '
-                f"{'free rocking' if motion is None else f'a motion of family {motion.description.family}'}; "
-                'use "certified"',
+                '{} "time" is the scheme for symmetric blocks under sinusoidal motions (rocking.pulses.sine) without a '
+                'vertical component; use "certified"',
                 "chattering",
             )
-        if motion.vertical is not None:
-            raise InvalidOption('{} "time" knows no vertical motion; use "certified"', "chattering")
-        if not isinstance(bodies, Blocks) or bodies.terms or not bodies.is_symmetric:
-            raise InvalidOption('{} "time" is for symmetric blocks; use "certified"', "chattering")
         parameters, eta = motion.description.parameters, bodies.restitution
         threshold = bodies.alpha if model == "linear" else np.tan(bodies.alpha)
         amplitude = abs(factor * parameters["amplitude"]) / (bodies.gravity * threshold)

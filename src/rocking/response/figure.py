@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, Unpack, get_args
 
 import numpy as np
 
-from rocking.block.body import title_of
 from rocking.core import checks, svg
 from rocking.core.arrays import Floats, Integers
 from rocking.core.constants import STANDARD_GRAVITY
@@ -37,7 +36,7 @@ _POINTS_OF_SHORT: Final = 12
 def titled(response: Response) -> str:
     """Return what was simulated, for the title of a figure."""
     shaken = "no motion" if response.motion is None else response.motion.label
-    return as_written(f"{title_of(response.body)} under {shaken}")
+    return as_written(f"{response.body.description} under {shaken}")
 
 
 def active_span(response: Response) -> tuple[float, float]:

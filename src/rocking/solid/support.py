@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.errors import InvalidBlock, literal
+from rocking.errors import InvalidBlock
 from rocking.motion.processing import sine_cosine
 from rocking.solid.repair import Surface
 
@@ -65,16 +65,9 @@ def area(polygon: Floats) -> float:
 
 def given_polygon(value: ArrayLike) -> Floats:
     """Return the convex polygon around points that somebody gives, shape (n, 2), or refuse them."""
-    try:
-        points = np.asarray(value, float)
-    except (TypeError, ValueError):
-        points = np.empty(0)
+    points = checks.numbers(value, "support", InvalidBlock)
     if points.ndim != 2 or points.shape[1] != 2 or not np.all(np.isfinite(points)):
-        raise InvalidBlock(
-            f"{{}} must be corners of a polygon, each a finite (east, north) in m, not {literal(checks.shown(value))}",
-            "support",
-            value=value,
-        )
+        raise InvalidBlock("{} must be corners of a polygon, each a finite (east, north) in m", "support", value=value)
     found = hull(points)
     if found is None:
         raise InvalidBlock("{} must have three corners or more that are not on one line", "support")
