@@ -313,10 +313,10 @@ def meshes() -> Iterator[Item]:
 @group(model=MODELS)
 def restitution_laws(model: str) -> Iterator[Item]:
     laws = [
-        rocking.FallingRestitution(0.95, 0.2, 0.7),
-        rocking.FallingRestitution((0.95, 0.9), (0.1, 0.3), (0.6, 0.8)),
-        rocking.RandomRestitution(0.8, 0.95, seed=3),
-        rocking.RandomRestitution((0.7, 0.8), (0.9, 0.99), seed=11),
+        rocking.Restitution(0.95, 0.7, slope=0.2),
+        rocking.Restitution((0.95, 0.9), (0.6, 0.8), slope=(0.1, 0.3)),
+        rocking.Restitution(0.95, 0.8, seed=3),
+        rocking.Restitution((0.9, 0.99), (0.7, 0.8), seed=11),
     ]
     bodies = [rocking.RestrainedBlock(block, restitution=law) for block in (STATUE, UNEVEN[0]) for law in laws]
     yield from under(bodies, shaking(), model=model)
@@ -495,7 +495,7 @@ ENSEMBLES: Final = {
     "two-sided": (UNEVEN, {"levels": [0.4, 1.0], "measure": "pgv"}),
     "restrained": ([*HELD["tendon"], *HELD["damper"], *HELD["yielding"]], {"levels": [1.0, 2.0]}),
     "laws": (
-        [rocking.RestrainedBlock(STATUE, restitution=rocking.RandomRestitution(0.8, 0.95, s)) for s in range(4)], {},
+        [rocking.RestrainedBlock(STATUE, restitution=rocking.Restitution(0.95, 0.8, seed=s)) for s in range(4)], {},
     ),
 }  # fmt: skip
 

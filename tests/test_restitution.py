@@ -9,10 +9,9 @@ from kernel_records import rocking_block
 import rocking
 from rocking import (
     Block,
-    FallingRestitution,
     InvalidBlock,
     InvalidOption,
-    RandomRestitution,
+    Restitution,
     RestrainedBlock,
     dynamics,
     one_sided_restitution,
@@ -56,7 +55,7 @@ def test_draws_are_even_between_their_bounds():
 
 
 def test_a_restitution_that_may_be_one_on_both_sides_proves_nothing():
-    lively = RestrainedBlock(COLUMN, restitution=RandomRestitution(0.9, 1.0, seed=2))
+    lively = RestrainedBlock(COLUMN, restitution=Restitution(1.0, 0.9, seed=2))
     found = rocking.simulate(lively, None, initial_rotation=0.1, duration=9.0)
     assert not len(found.chattering)
     assert len(found.impacts) >= 10
@@ -64,7 +63,7 @@ def test_a_restitution_that_may_be_one_on_both_sides_proves_nothing():
 
 def test_bounds_that_meet_are_a_constant():
     plain = rocking.simulate(RestrainedBlock(COLUMN, restitution=0.9), None, initial_rotation=0.1)
-    for law in (FallingRestitution(0.9, 0.0, 0.5), FallingRestitution(0.9, 3.0, 0.9), RandomRestitution(0.9, 0.9, 3)):
+    for law in (Restitution(0.9, 0.5, slope=0.0), Restitution(0.9, 0.9, slope=3.0), Restitution(0.9, 0.9, seed=3)):
         found = rocking.simulate(RestrainedBlock(COLUMN, restitution=law), None, initial_rotation=0.1)
         count = min(len(found.impacts), len(plain.impacts), 30)
         assert count == 30
@@ -77,7 +76,7 @@ def test_bounds_that_meet_are_a_constant():
 
 
 def test_seeds_make_bodies_that_differ_and_one_seed_the_same():
-    made = [RestrainedBlock(COLUMN, restitution=RandomRestitution(0.8, 0.95, seed)) for seed in (1, 1, 2)]
+    made = [RestrainedBlock(COLUMN, restitution=Restitution(0.95, 0.8, seed=seed)) for seed in (1, 1, 2)]
     rates = []
     for body in made:
         hits = rocking.simulate(body, None, initial_rotation=0.15).impacts[:20]
@@ -90,7 +89,7 @@ def test_seeds_make_bodies_that_differ_and_one_seed_the_same():
 
 
 def test_maps_of_a_restitution_that_falls_have_the_derivatives_of_finite_differences():
-    body = RestrainedBlock(Block.from_parameters(1.0, 0.2), restitution=FallingRestitution(0.9, 1.0, least=0.5))
+    body = RestrainedBlock(Block.from_parameters(1.0, 0.2), restitution=Restitution(0.9, 0.5, slope=1.0))
     strobe = dynamics.stroboscopic_map(body, rocking.pulses.sine(6.0, 0.8, cycles=1), model="linear")
     judged = 0
     for state in ([0.05, 0.0], [0.02, 0.1], [-0.08, 0.05], [0.1, -0.1]):
@@ -113,13 +112,14 @@ def test_maps_of_a_restitution_that_falls_have_the_derivatives_of_finite_differe
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: FallingRestitution(1.2, 0.1, 0.8), "largest must be in"),
-        (lambda: FallingRestitution(0.9, -0.1, 0.8), "slope must be finite and at least 0, in s/rad, not -0.1"),
-        (lambda: FallingRestitution(0.9, 0.1, 0.95), "least must be above 0 and at most largest, 0.9"),
-        (lambda: RandomRestitution(0.95, 0.9, 1), "least must be above 0 and at most largest"),
-        (lambda: RandomRestitution(0.9, 1.1, 1), "largest must be in"),
-        (lambda: RandomRestitution((0.9, 0.5), (0.95, 0.4), 1), "least must be above 0 and at most largest, 0.4"),
-        (lambda: RandomRestitution(0.9, 0.95, 1.5), "seed must be a whole number"),
+        (lambda: Restitution(1.2, 0.8, slope=0.1), "largest must be in"),
+        (lambda: Restitution(0.9, 0.8, slope=-0.1), "slope must be finite and at least 0, in s/rad, not -0.1"),
+        (lambda: Restitution(0.9, 0.95, slope=0.1), "least must be above 0 and at most largest, 0.9"),
+        (lambda: Restitution(0.9, 0.95, seed=1), "least must be above 0 and at most largest"),
+        (lambda: Restitution(1.1, 0.9, seed=1), "largest must be in"),
+        (lambda: Restitution((0.95, 0.4), (0.9, 0.5), seed=1), "least must be above 0 and at most largest, 0.4"),
+        (lambda: Restitution(0.95, 0.9, seed=1.5), "seed must be a whole number"),
+        (lambda: Restitution(0.95, 0.9, slope=0.1, seed=1), "either falls or is drawn: give a slope or a seed"),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_sentence(make, says):
@@ -131,13 +131,13 @@ def test_what_cannot_be_is_refused_in_one_sentence(make, says):
 @pytest.mark.parametrize("given", [(0.95, 0.9), (0.9, 1.1), ((0.9, 0.5), (0.95, 0.4))])
 def test_an_error_keeps_the_bound_that_is_wrong(given):
     with pytest.raises(InvalidBlock) as refused:
-        RandomRestitution(*given, 1)
+        Restitution(*given[::-1], seed=1)
     assert refused.value.value == given[["least", "largest"].index(refused.value.argument)]
 
 
 def test_what_needs_the_same_factor_each_time_refuses_a_law():
     shaking = rocking.pulses.sine(6.0, 0.8, cycles=1)
-    random = RestrainedBlock(COLUMN, restitution=RandomRestitution(0.9, 0.95, 1))
+    random = RestrainedBlock(COLUMN, restitution=Restitution(0.95, 0.9, seed=1))
     with pytest.raises(InvalidOption, match="draws its restitution at each impact"):
         dynamics.stroboscopic_map(random, shaking)
 

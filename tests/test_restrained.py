@@ -197,7 +197,7 @@ def test_what_cannot_be_is_refused_in_one_sentence(make, says):
     assert "\n" not in str(refused.value)
 
 
-@pytest.mark.parametrize("restitution", [0.4, rocking.RandomRestitution(0.3, 0.4, seed=1)])
+@pytest.mark.parametrize("restitution", [0.4, rocking.Restitution(0.4, 0.3, seed=1)])
 def test_a_wall_too_stocky_for_angular_momentum_rocks_one_way_with_a_restitution_that_is_given(restitution):
     with pytest.raises(InvalidBlock, match=r"too stocky to rock that way; .*give restitution a value in \(0, 1\]"):
         RestrainedBlock(Block(width=3.0, height=2.0), one_sided=True)

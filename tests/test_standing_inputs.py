@@ -8,7 +8,7 @@ from rocking import (
     Block,
     Damper,
     Load,
-    RandomRestitution,
+    Restitution,
     RestrainedBlock,
     RockingError,
     Solid,
@@ -33,7 +33,7 @@ def held(*restraints, **options):
 
 
 def drawn(least=0.5, largest=0.9, seed=1):
-    return held(restitution=RandomRestitution(least, largest, seed))
+    return held(restitution=Restitution(largest, least, seed=seed))
 
 
 #: What is done, what it is about (an argument or nothing), and words that say what is wrong and how to correct it.
@@ -49,7 +49,7 @@ WRONG = {
         lambda: rocking.simulate(Solid.from_mesh(box()), PULSE), "", "block(azimuth) of a Solid is what it is"
     ),
     # Restraints
-    "restraints in a list": (lambda: held([Spring(1e3), Damper(1.0)]), "", "is no restraint: give them one by one"),
+    "restraints in a list": (lambda: held([Spring(1e3), Damper(1.0)]), "", "give Tendon, Spring, Damper, Thrust or Load"),
     "restraints twice": (lambda: RestrainedBlock(held(Spring(1e3)), Damper(1.0)), "", "give all of them at once"),
     "no mass": (
         lambda: RestrainedBlock(Block(width=0.4, height=4.0), Thrust(9.0, 2.0)), "mass", "kg, beside its sizes"
@@ -85,7 +85,7 @@ WRONG = {
     "three restitutions": (lambda: held(restitution=[0.9] * 3), "restitution", "a pair (side +, side -), not 3 values"),
     "a law by its name": (lambda: held(restitution="housner"), "restitution", "an array of numbers, not 'housner'"),
     "a law of a free block": (
-        lambda: Block(width=0.4, height=2.0, restitution=RandomRestitution(0.5, 0.9, 1)),
+        lambda: Block(width=0.4, height=2.0, restitution=Restitution(0.9, 0.5, seed=1)),
         "restitution",
         "a law goes to RestrainedBlock(block, restitution=...)",
     ),

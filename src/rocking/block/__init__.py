@@ -2,8 +2,6 @@
 
 from rocking.block.bodies import Blocks
 from rocking.block.restitution import (
-    FallingRestitution,
-    RandomRestitution,
     Restitution,
     housner_restitution,
     one_sided_restitution,
@@ -20,9 +18,7 @@ __all__ = [
     "Block",
     "Blocks",
     "Damper",
-    "FallingRestitution",
     "Load",
-    "RandomRestitution",
     "Restitution",
     "RestrainedBlock",
     "RestrainedBlocks",

@@ -44,8 +44,8 @@ class RestrainedBlock(Rocking):
     lean : float
         Angle by which it stands out of plumb to side +, rad.
     restitution : float, pair or Restitution, optional
-        Factor on the angular speed at an impact, or the law by which it varies: `FallingRestitution`,
-        `RandomRestitution`; that of the `sides` is then the largest. By default that of the block; with a load that
+        Factor on the angular speed at an impact, or the law by which it varies, a `Restitution`; that of
+        the `sides` is then the largest. By default that of the block; with a load that
         follows, the one that conserves angular momentum; of a one-sided block `one_sided_restitution`.
 
     Raises
