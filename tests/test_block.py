@@ -48,7 +48,7 @@ def test_two_sided_body_from_unequal_pivots():
 
 def test_a_block_whose_sides_differ_has_no_one_value_of_them():
     block = Block.from_pivots((0.2, 0.15), 0.6, 0.4, mass=100.0)
-    for name in ("alpha", "p", "radius", "restitution", "inertia"):
+    for name in ("alpha", "p", "radius", "restitution"):
         plus, minus = (getattr(side, name) for side in block.sides)
         with pytest.raises(InvalidBlock, match=rf"{name} is {plus:g} on side .* ask block.sides\[0\].{name}"):
             getattr(block, name)
@@ -64,12 +64,6 @@ def test_thresholds_of_both_models():
     g = block.gravity
     assert block.uplift_thresholds("linear") == (g * 0.1, g * 0.3)
     assert block.uplift_thresholds() == (g * math.tan(0.1), g * math.tan(0.3))
-    assert block.minimum_acceleration == g * math.tan(0.1)
-
-
-def test_inertia_needs_the_mass():
-    assert Block(half_width=0.2, half_height=1.0).inertia is None
-    assert Block(half_width=0.2, half_height=1.0, mass=300.0).inertia == pytest.approx(300.0 * 4.0 / 3.0 * 1.04)
 
 
 def test_parameters_give_the_rectangles_radius():

@@ -45,11 +45,8 @@ WRONG = {
         "its centre of mass lies 0.268 m outside its support, towards 243 deg; correct",
     ),
     "tolerance of all": (lambda: Solid.from_mesh(box(), tolerance=5.0), "tolerance", "below the height of the mesh"),
-    "a solid that rocks": (
-        lambda: rocking.simulate(Solid.from_mesh(box()), PULSE), "", "block(azimuth) of a Solid is what it is"
-    ),
     # Restraints
-    "restraints in a list": (lambda: held([Spring(1e3), Damper(1.0)]), "", "give Tendon, Spring, Damper, Thrust or Load"),
+    "restraints in a list": (lambda: held([Spring(1e3), Damper(1.0)]), "", "is no restraint: give Tendon, Spring"),
     "restraints twice": (lambda: RestrainedBlock(held(Spring(1e3)), Damper(1.0)), "", "give all of them at once"),
     "no mass": (
         lambda: RestrainedBlock(Block(width=0.4, height=4.0), Thrust(9.0, 2.0)), "mass", "kg, beside its sizes"
@@ -63,11 +60,6 @@ WRONG = {
     ),
     "a load outside": (
         lambda: held(Load(1e5, 4.0, offset=1.0)), "offset", "0.702 m beyond its pivot, so that it falls: give"
-    ),
-    "sizes without names": (
-        lambda: Block(0.4, 4.0),
-        "width",
-        "the sizes of a block are given by name, not as 0.4, 4: width and height for the full sizes",
     ),
     "a pair for one side": (
         lambda: held(one_sided=True, restitution=(0.4, 0.5)), "restitution", "rocks one way is one number, not a pair"

@@ -243,11 +243,8 @@ class Blocks:
         made["min_restitution"], made["restitution_slope"] = term["restitution_least"], term["restitution_slope"]
         made["seed"] = term["restitution_seed"][:, 0]
         made["variable_restitution"] = (made["seed"] >= 0) | np.any(made["restitution_slope"] > 0.0, axis=1)
-        made["prestress"], made["spring"], made["damping"] = (
-            p * p * term["prestress"],
-            p * p * term["spring"],
-            term["damping"],
-        )
+        made["prestress"], made["spring"] = p * p * term["prestress"], p * p * term["spring"]
+        made["damping"] = term["damping"]
         at_zero = term["sine"] * sine + term["cosine"] * cosine  # of the moment, and its slope by -u
         slope = term["sine"] * cosine - term["cosine"] * sine
         # A moment that only a tendon without prestress makes is zero there, whatever rounding says.
@@ -260,19 +257,11 @@ class Blocks:
             made["added_weight"], made["added_push"] = term["sine"], term["cosine"]
         made["yielding"] = np.any(term["stiffness"] > 0.0, axis=1)
         if np.any(made["yielding"]):  # elastic as such a tendon is at first
-            for name, field in (
-                ("weight", "added_weight"),
-                ("push", "added_push"),
-                ("prestress", "prestress"),
-                ("restraint_threshold", "restraint_threshold"),
-            ):
-                made[f"base_{name}"] = made[field]
+            for name in ("added_weight", "added_push", "prestress", "restraint_threshold"):
+                made[f"base_{name.removeprefix('added_')}"] = made[name]
             made["tendon"] = p * p * term["stiffness"]
-            made["lever_arm"], made["yields"], made["slack"] = (
-                term["opening"],
-                term["yields"][:, 0],
-                term["slack"][:, 0],
-            )
+            made["lever_arm"] = term["opening"]
+            made["yields"], made["slack"] = term["yields"][:, 0], term["slack"][:, 0]
             stiff, at_rest = term["stiffness"] * term["opening"], -term["stiffness"] * term["slack"]
             made["tendon_weight"] = -stiff * (1.0 if model == "linear" else cosine)
             made["tendon_push"] = stiff * (self.alpha if model == "linear" else sine)

@@ -25,15 +25,12 @@ class Side:
         Factor on the angular speed when the block leaves this side at an impact.
     radius : float
         Distance R from the pivot to the centre of mass, m.
-    inertia : float or None
-        Moment of inertia about the pivot, m g R/p^2, kg m^2; None while the mass is not known.
     """
 
     p: float
     alpha: float
     restitution: float
     radius: float
-    inertia: float | None = None
 
     def __str__(self) -> str:
         """Return the parameters as people read them."""
@@ -50,29 +47,19 @@ def in_line(sides: Sequence[object]) -> str:
     return "; ".join(f"side {sign}: {side}" for sign, side in zip("+-", sides, strict=True))
 
 
-def even_sides(
-    gravity: float, radius: float, alpha: float, restitution: object, conserved: float, advice: str
-) -> tuple[Side, Side]:
-    """Both sides of a body that rocks like a rectangle of this radius, m, and slenderness, rad."""
-    plus, minus = restitutions(restitution, (conserved, conserved), advice)
-    p = math.sqrt(0.75 * gravity / radius)
-    return Side(p, alpha, plus, radius), Side(p, alpha, minus, radius)
-
-
 def sides_on_pivots(
     distances: tuple[float, float],
     height: float,
     gyration_squared: float,
     gravity: float,
     restitution: object,
-    advice: str = "",
 ) -> tuple[Side, Side]:
     """Sides of a body from the distances of its pivots from the centre of mass, its height, m, and k^2, m^2."""
     plus, minus = distances
     radii = math.hypot(plus, height), math.hypot(minus, height)
     inertias = [gyration_squared + radius * radius for radius in radii]
     kept = gyration_squared + height * height - plus * minus
-    e = restitutions(restitution, (kept / inertias[1], kept / inertias[0]), advice)
+    e = restitutions(restitution, (kept / inertias[1], kept / inertias[0]))
     first, second = (
         Side(math.sqrt(gravity * radius / inertia), math.atan2(distance, height), factor, radius)
         for distance, radius, inertia, factor in zip(distances, radii, inertias, e, strict=True)
@@ -80,13 +67,13 @@ def sides_on_pivots(
     return first, second
 
 
-def restitutions(given: object, conserved: Sequence[float], advice: str = "") -> tuple[float, float]:
-    """Return the factors that are given, or those that conserve angular momentum; advice for a block too stocky."""
+def restitutions(given: object, conserved: Sequence[float]) -> tuple[float, float]:
+    """Return the factors that are given, or those that conserve angular momentum."""
     if given is None:
         if min(conserved) <= 0.0:
             raise InvalidBlock(
                 f"conserving angular momentum gives this block a restitution of {min(conserved):.3g}: it is too stocky "
-                f"to rock that way; {advice}give {{}} a value in (0, 1]",
+                "to rock that way; correct its sizes if they are swapped, or give {} a value in (0, 1]",
                 "restitution",
             )
         return conserved[0], conserved[1]

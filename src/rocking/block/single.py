@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Final, Never
+from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from rocking.block.body import KINDS, Bodies, ContactLaw, Coordinate
 from rocking.block.limits import checked_gravity, checked_length, checked_mass, checked_pair, checked_parameter
 from rocking.block.restitution import housner_restitution
 from rocking.block.rigid_body import contact_forces, gyration_squared, no_body, rigid_bodies
-from rocking.block.sides import Side, even_sides, in_line, restitutions, sides_on_pivots
+from rocking.block.sides import Side, in_line, restitutions, sides_on_pivots
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
 from rocking.core.constants import MODELS, STANDARD_GRAVITY, Model
@@ -72,7 +72,7 @@ class Block(Rocking):
         By default the one that conserves angular momentum about the new pivot: without an offset Housner's,
         1 - 1.5 sin(alpha)^2.
     mass : float, optional
-        Mass, kg; it only scales forces and moments of inertia.
+        Mass, kg; it only scales forces.
     gravity : float
         Acceleration of gravity, m/s^2.
 
@@ -109,7 +109,7 @@ class Block(Rocking):
 
     def __init__(
         self,
-        *unnamed: Never,
+        *,
         half_width: float | None = None,
         half_height: float | None = None,
         width: float | None = None,
@@ -119,13 +119,6 @@ class Block(Rocking):
         mass: float | None = None,
         gravity: float = STANDARD_GRAVITY,
     ) -> None:
-        if unnamed:
-            shown = ", ".join(map(checks.shown, unnamed))
-            raise InvalidBlock(
-                f"the sizes of a block are given by name, not as {shown}: {{}} and {{}} "
-                "for the full sizes, {} and {} for half of them, in m",
-                "width", "height", "half_width", "half_height",
-            )  # fmt: skip
         b, h = _half_sizes((half_width, half_height), (width, height))
         g = checked_gravity(gravity)
         text = f"rectangular block, {2 * b:.5g} m x {2 * h:.5g} m"
@@ -139,13 +132,11 @@ class Block(Rocking):
             )
         if s == 0.0:
             alpha = math.atan2(b, h)
-            sides = even_sides(
-                g, math.hypot(b, h), alpha, restitution, housner_restitution(alpha), _perhaps_swapped(b, h)
-            )
+            radius, e = math.hypot(b, h), restitutions(restitution, (housner_restitution(alpha),) * 2)
+            p = math.sqrt(0.75 * g / radius)
+            sides = Side(p, alpha, e[0], radius), Side(p, alpha, e[1], radius)
         else:
-            sides = sides_on_pivots(
-                (b - s, b + s), h, gyration_squared(b, h, s), g, restitution, _perhaps_swapped(b, h)
-            )
+            sides = sides_on_pivots((b - s, b + s), h, gyration_squared(b, h, s), g, restitution)
             text += f", centre of mass {abs(s):.5g} m off its middle to side {'+' if s > 0.0 else '-'}"
         self._fill(sides, g, text, mass, (b, h, s))
 
@@ -161,10 +152,7 @@ class Block(Rocking):
         for side in sides:
             checked_parameter(side.p, "p", origin=" (from the sizes)")
             checked_parameter(side.alpha, "alpha", origin=" (from the sizes)")
-        if mass is not None:
-            mass = checked_mass(mass)
-            first, second = (replace(side, inertia=mass * gravity * side.radius / side.p**2) for side in sides)
-            sides = first, second
+        mass = None if mass is None else checked_mass(mass)
         self.__dict__.update(sides=sides, gravity=gravity, description=description, mass=mass)
         self.__dict__.update(zip(("half_width", "half_height", "offset"), rectangle, strict=True))
         return self
@@ -323,16 +311,6 @@ class Block(Rocking):
         return self._of_both_sides("restitution")
 
     @property
-    def inertia(self) -> float | None:
-        """Moment of inertia about the pivot, kg m^2, of a block whose sides are equal; None while `mass` is None."""
-        return None if self.mass is None else self._of_both_sides("inertia")
-
-    @property
-    def minimum_acceleration(self) -> float:
-        """Least ground acceleration that lifts the block, g tan(alpha), m/s^2 (paper, Eq. 1)."""
-        return min(self.uplift_thresholds())
-
-    @property
     def is_symmetric(self) -> bool:
         """Whether both sides are equal."""
         return self.sides[0] == self.sides[1]
@@ -380,15 +358,12 @@ class Block(Rocking):
         return self.gravity * steepness(self.sides[0].alpha), self.gravity * steepness(self.sides[1].alpha)
 
 
-def one_block(block: object, needed: str = "a Block") -> Block:
+def one_block(block: object, needed: str = "a free Block") -> Block:
     """Return the block, or say that it is none, and what is needed."""
     if not isinstance(block, Block):
-        how = "make one with Block(width=, height=), in m"
-        if hasattr(block, "restraints"):
-            how = "this is known of free blocks alone"
-        elif hasattr(block, "rose"):
-            how = "block(azimuth) of a Solid is what it is in a plane"
-        raise InvalidBlock(f"{needed} is needed, not a {type(block).__name__}: {how}")
+        raise InvalidBlock(
+            f"{needed} is needed, not a {type(block).__name__}: make one with Block(width=, height=), in m"
+        )
     return block
 
 
@@ -405,11 +380,3 @@ def _half_sizes(
         "a block takes either {} and {}, or {} and {} (the full sizes), all in m",
         "half_width", "half_height", "width", "height",
     )  # fmt: skip
-
-
-def _perhaps_swapped(half_width: float, half_height: float) -> str:
-    """Return what to try first where a block is wider than it is high; else nothing."""
-    if half_width <= half_height:
-        return ""
-    width, height = 2.0 * half_width, 2.0 * half_height
-    return f"it is {width:g} m wide and {height:g} m high, so swap its sizes if that is a slip, or "

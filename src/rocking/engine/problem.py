@@ -9,7 +9,7 @@ from typing import cast
 
 import numpy as np
 
-from rocking.block import Block, Blocks, one_block
+from rocking.block import Block, one_block
 from rocking.block.body import KINDS, Bodies, Body
 from rocking.core import checks
 from rocking.core.arrays import Floats
@@ -56,18 +56,13 @@ def step_of(motion: Motion) -> float | None:
 
 def bodies_of(given: Bodies | Body | Iterable[Body]) -> Bodies:
     """Return bodies as they are, and single ones of one kind as `Bodies` of that kind."""
-    if isinstance(given, type):  # has what its objects have, but is none
-        one_block(given, _NEEDED)
-    if isinstance(given, Bodies):
+    if isinstance(given, Bodies) and not isinstance(given, type):
         return given
-    if isinstance(given, Body):
-        return given.alone()
-    several = list(given) if isinstance(given, Iterable) and not isinstance(given, str) else given
-    if isinstance(several, list) and several and isinstance(several[0], Body) and not isinstance(several[0], type):
-        return KINDS[several[0].alone().kind].of(several)
-    for each in several if isinstance(several, list) else [several]:
-        one_block(each, _NEEDED)
-    return Blocks.of(cast("Iterable[Block]", several))
+    several = isinstance(given, Iterable) and not isinstance(given, (str, Body))
+    bodies = [one_body(each) for each in (cast("Iterable[Body]", given) if several else [cast("Body", given)])]
+    if len(bodies) == 1:
+        return bodies[0].alone()
+    return KINDS[bodies[0].alone().kind if bodies else "blocks"].of(bodies)
 
 
 def slenderness_of(bodies: Bodies) -> Floats:
