@@ -79,7 +79,7 @@ WRONG = {
     "a law of a free block": (
         lambda: Block(width=0.4, height=2.0, restitution=Restitution(0.9, 0.5, seed=1)),
         "restitution",
-        "a law goes to RestrainedBlock(block, restitution=...)",
+        "must be a number or an array of numbers, not Restitution(",
     ),
     # Several bodies
     "two gravities": (

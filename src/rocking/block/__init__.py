@@ -1,14 +1,9 @@
 """What rocks: one block, or many as a struct of arrays; free, or held back."""
 
 from rocking.block.bodies import Blocks
-from rocking.block.restitution import (
-    Restitution,
-    housner_restitution,
-    one_sided_restitution,
-)
 from rocking.block.restrained import RestrainedBlock
-from rocking.block.restraints import Damper, Load, Restraint, Spring, Tendon, Thrust
-from rocking.block.sides import Side
+from rocking.block.restraints import Damper, Load, Restitution, Restraint, Spring, Tendon, Thrust
+from rocking.block.sides import Side, housner_restitution, one_sided_restitution
 from rocking.block.single import Block, one_block
 
 #: The same class: arrays of terms say what restrains them.

@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking.block.body import KINDS
-from rocking.block.limits import checked_gravity, checked_sides
 from rocking.block.restrained import RestrainedBlock
 from rocking.block.restraints import Terms
-from rocking.block.rigid_body import no_body, rigid_bodies
+from rocking.block.sides import checked_gravity, checked_sides, no_body, rigid_bodies
 from rocking.block.single import Block, one_block
 from rocking.core import checks
 from rocking.core.arrays import Floats

@@ -11,10 +11,8 @@ from typing import ClassVar, Final
 import numpy as np
 
 from rocking.block.body import ContactLaw, Coordinate
-from rocking.block.limits import checked_pair, checked_parameter
-from rocking.block.restitution import Restitution, one_sided_restitution
-from rocking.block.restraints import Load, Pivot, Restraint, Tendon, Terms
-from rocking.block.sides import Side
+from rocking.block.restraints import Load, Pivot, Restitution, Restraint, Tendon, Terms
+from rocking.block.sides import Side, checked_pair, checked_parameter, one_sided_restitution
 from rocking.block.single import Block, Rocking, one_block
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers

@@ -10,10 +10,22 @@ from typing import Final
 import numpy as np
 
 from rocking.block.body import KINDS, Bodies, ContactLaw, Coordinate
-from rocking.block.limits import checked_gravity, checked_length, checked_mass, checked_pair, checked_parameter
-from rocking.block.restitution import housner_restitution
-from rocking.block.rigid_body import contact_forces, gyration_squared, no_body, rigid_bodies
-from rocking.block.sides import Side, in_line, restitutions, sides_on_pivots
+from rocking.block.sides import (
+    Side,
+    checked_gravity,
+    checked_length,
+    checked_mass,
+    checked_pair,
+    checked_parameter,
+    contact_forces,
+    gyration_squared,
+    housner_restitution,
+    in_line,
+    no_body,
+    restitutions,
+    rigid_bodies,
+    sides_on_pivots,
+)
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
 from rocking.core.constants import MODELS, STANDARD_GRAVITY, Model

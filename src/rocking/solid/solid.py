@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking.block import Block
-from rocking.block.limits import checked_gravity, checked_mass
+from rocking.block.sides import checked_gravity, checked_mass
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
