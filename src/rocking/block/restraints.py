@@ -15,6 +15,9 @@ from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
 from rocking.errors import InvalidBlock
 
+#: Force on a block to side + and up, N.
+Force = tuple[Floats | float, Floats | float]
+
 #: Largest seed: whole numbers up to it are floats, too.
 _LARGEST_SEED: Final = 2**53
 
@@ -83,14 +86,12 @@ class Restraint(ABC):
     def _terms(self, pivot: Pivot) -> Terms:
         """Return what it adds while the block leans to a side."""
 
-    def _acting(
-        self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats
-    ) -> tuple[Floats, Floats]:
+    def _acting(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats) -> Force:
         """Return the force on the block to side + and up, N; a spring and a damper have none.
 
         ``side`` is -1 at rest, ``stretch`` the elongation of a tendon that yields beyond its plastic one, m.
         """
-        return np.zeros_like(rotation), np.zeros_like(rotation)
+        return 0.0, 0.0
 
     def _finite(self, *names: str) -> None:
         """Check numbers and keep them as floats."""
@@ -172,9 +173,7 @@ class Tendon(Restraint):
         stiff = self.stiffness * x * x / pivot.moment
         return Terms(-stiff * math.cos(pivot.alpha), stiff * math.sin(pivot.alpha), self.prestress * x / pivot.moment)
 
-    def _acting(
-        self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats
-    ) -> tuple[Floats, Floats]:
+    def _acting(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats) -> Force:
         """Return its pull, along the chord from its end in the block to that in the ground."""
         if self.strength == math.inf:
             x = np.where(side == 1, self._opening(pivots[1]), self._opening(pivots[0]))
@@ -306,10 +305,8 @@ class Thrust(Restraint):
         force = pivot.sign * self.force / pivot.moment
         return Terms(force * across, -force * along)
 
-    def _acting(
-        self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats
-    ) -> tuple[Floats, Floats]:
-        return np.full_like(rotation, self.force), np.zeros_like(rotation)
+    def _acting(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats) -> Force:
+        return self.force, 0.0
 
     def __str__(self) -> str:
         return f"thrust of {_thousands(self.force, 'N')} at a height of {self.height:.5g} m{_at(self.offset)}"
@@ -360,11 +357,8 @@ class Load(Restraint):
         weight = self.mass * pivot.gravity / pivot.moment
         return Terms(weight * along, weight * across)
 
-    def _acting(
-        self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats
-    ) -> tuple[Floats, Floats]:
-        weight = 0.0 if self.follows else self.mass * pivots[0].gravity
-        return np.zeros_like(rotation), np.full_like(rotation, -weight)
+    def _acting(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats) -> Force:
+        return 0.0, 0.0 if self.follows else -self.mass * pivots[0].gravity
 
     def __str__(self) -> str:
         follows = "that follows" if self.follows else "that only presses"

@@ -240,27 +240,3 @@ def eccentric_rectangles(alpha: Floats) -> tuple[Floats, Floats]:
 def gyration_squared(half_width: Number, half_height: float, offset: Number) -> Number:
     """Square of the radius of gyration, m^2, of a rectangle whose centre of mass is off the middle of its width."""
     return (half_width * half_width + half_height * half_height) / 3.0 - offset * offset
-
-
-def contact_forces(
-    motion: tuple[Floats, Floats, Floats],
-    ground_over_g: tuple[Floats, Floats],
-    side: Floats,
-    slenderness: Floats,
-    radius_over_g: Floats,
-) -> tuple[Floats, Floats]:
-    """Horizontal and vertical force on the block over its weight, all arrays of one shape.
-
-    The motion is theta and its two rates, the ground acceleration in units of g, horizontal and vertical, and the side
-    +1 or -1, 0 at rest; slenderness and R/g (s^2) are those of that side. On side i, with psi = alpha - |theta|, the
-    centre of mass is at x = -i R sin(psi), y = R cos(psi) from the pivot; forces are m (a + x'') and m (g + a_v + y'').
-    At rest they are (a/g, 1 + a_v/g).
-    """
-    rotation, velocity, acceleration = motion
-    psi = slenderness - np.abs(rotation)
-    towards_pivot = side * acceleration
-    speed = np.abs(side) * velocity**2
-    horizontal = side * radius_over_g * (np.cos(psi) * towards_pivot + np.sin(psi) * speed)
-    vertical = radius_over_g * (np.sin(psi) * towards_pivot - np.cos(psi) * speed)
-    push, lift = ground_over_g
-    return push + horizontal, 1.0 + lift + vertical

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from rocking.block.body import KINDS, Bodies, ContactLaw, Coordinate
+from rocking.block.body import KINDS, Bodies, Body, Coordinate
 from rocking.block.sides import (
     Side,
     checked_gravity,
@@ -17,7 +17,6 @@ from rocking.block.sides import (
     checked_mass,
     checked_pair,
     checked_parameter,
-    contact_forces,
     gyration_squared,
     housner_restitution,
     in_line,
@@ -43,11 +42,7 @@ _SAME_RESTITUTION: Final = 1e-9
 class Rocking:
     """What free and restrained blocks share: text, the stops, and the arrays of one."""
 
-    sides: Sequence[Side]
-    gravity: float
-    description: str
-
-    def __str__(self) -> str:
+    def __str__(self: Body) -> str:
         """Return description and parameters in one line."""
         return f"{self.description}; {in_line(self.sides)}"
 
@@ -347,22 +342,25 @@ class Block(Rocking):
         """Rotation of the unstable balance on each side, rad: the slenderness."""
         return self.sides[0].alpha, self.sides[1].alpha
 
-    @property
-    def contact(self) -> ContactLaw:
-        """Forces of the ground over the weight, from rotation and ground acceleration (see `rocking.block.body`)."""
-        return self._contact_forces
-
-    def _contact_forces(
+    def contact(
         self,
         motion: tuple[Floats, Floats, Floats],
         ground_over_g: tuple[Floats, Floats],
         side: Integers,
         stretch: Floats,
     ) -> tuple[Floats, Floats]:
-        leaning = np.maximum(side, 0)
+        """Return the forces of the ground over the weight, horizontal and vertical (see `rocking.block.body`).
+
+        On side i, with psi = alpha - |theta|, the centre of mass is at x = -i R sin(psi), y = R cos(psi) from the
+        pivot; forces are m (a + x'') and m (g + a_v + y''). At rest they are (a/g, 1 + a_v/g).
+        """
+        leaning, (rotation, velocity, acceleration) = np.maximum(side, 0), motion
         alpha, radius = np.array([(s.alpha, s.radius) for s in self.sides]).T[:, leaning]
-        sign = np.where(side < 0, 0.0, 1.0 - 2.0 * leaning)
-        return contact_forces(motion, ground_over_g, sign, alpha, radius / self.gravity)
+        sign, over_g = np.where(side < 0, 0.0, 1.0 - 2.0 * leaning), radius / self.gravity
+        psi, towards_pivot, speed = alpha - np.abs(rotation), sign * acceleration, np.abs(sign) * velocity**2
+        horizontal = sign * over_g * (np.cos(psi) * towards_pivot + np.sin(psi) * speed)
+        vertical = over_g * (np.sin(psi) * towards_pivot - np.cos(psi) * speed)
+        return ground_over_g[0] + horizontal, 1.0 + ground_over_g[1] + vertical
 
     def uplift_thresholds(self, model: Model = "nonlinear") -> tuple[float, float]:
         """Ground accelerations, m/s^2, that lift the block to side + (when -a passes the first) and to side -."""

@@ -140,8 +140,8 @@ class AsymptoticTime(Treatment):
         """Chattering time of every side, s; infinite where chattering is not complete."""
         from rocking.kernels.sine.series import eq65_time
 
-        is_even = isinstance(bodies, Blocks) and not bodies.terms and bodies.is_symmetric
-        if not is_even or motion is None or motion.description.family != "sine" or motion.vertical is not None:
+        is_sine = motion is not None and motion.description.family == "sine" and motion.vertical is None
+        if not (isinstance(bodies, Blocks) and not bodies.terms and bodies.is_symmetric and motion and is_sine):
             raise InvalidOption(
                 '{} "time" is the scheme for symmetric blocks under sinusoidal motions (rocking.pulses.sine) without a '
                 'vertical component; use "certified"',

@@ -104,7 +104,7 @@ class Scales:
     def factors(self, motion: Motion) -> Floats:
         """Return the factors that bring a motion to the levels, one for each."""
         with np.errstate(over="ignore"):
-            factors = self.values / measured(self, motion)
+            factors = self.values / (self.measure or FACTOR).positive(motion, motion.name)
             largest = factors.max() * np.abs(motion.coefficients).max()
         if not largest <= STRONGEST:
             motion.scaled(float(factors.max()))  # refused where it is too strong, and not only steep
@@ -187,11 +187,6 @@ def product_of(
     return Product(bodies, shaking, Scales.of(levels, measure), polarity, model, treatment(chattering), duration)
 
 
-def measured(scales: Scales, motion: Motion) -> float:
-    """Return what a motion measures as it is; 1 where scales are factors."""
-    return (scales.measure or FACTOR).positive(motion, motion.name)
-
-
 def setup_of(product: Product, bodies: slice | None = None) -> Setup:
     """Return how to simulate the bodies of a product, or some of them."""
     chosen = product.bodies if bodies is None else product.bodies.select(bodies)
@@ -213,7 +208,9 @@ def dataset_of(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
 
     dimensions = ("motion", "scale", "polarity", "block")
     gone = {"scale": product.scales.measure is None, "polarity": product.polarity != "both"}
-    described = {name: {"units": units, "long_name": meaning} for name, (units, meaning) in (VARIABLES | TIMES).items()}
+    described = {
+        name: {"units": units, "long_name": meaning} for name, (units, meaning) in {**VARIABLES, **TIMES}.items()
+    }
     coordinate = product.bodies[0].coordinate if len(product.bodies) else ROTATION
     if coordinate.unit != ROTATION.unit:
         described["peak_rotation"] = {"units": coordinate.unit, "long_name": f"largest {coordinate.name} in size"}
