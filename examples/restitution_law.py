@@ -14,7 +14,7 @@ from scipy.optimize import least_squares
 import rocking
 
 block = rocking.Block(width=0.4, height=2.0)
-worn = rocking.RestrainedBlock(block, restitution=rocking.FallingRestitution(0.96, slope=0.15, least=0.7))
+worn = rocking.RestrainedBlock(block, restitution=rocking.Restitution(0.96, 0.7, slope=0.15))
 timing, noise = 1e-3, np.random.default_rng(1)  # standard deviation of the error of a time, s
 speeds, factors, roots = [], [], []
 for rotation in (0.08, 0.12, 0.16):

@@ -256,14 +256,13 @@ def under(bodies: Iterable[Any], motions: Iterable[rocking.Motion], **options: A
 MODELS: Final = ("nonlinear", "linear")
 RECTANGLES: Final = [rocking.Block(width=w, height=h) for w, h in spread(6, (0.15, 0.8), (0.8, 3.0))]
 STATUE: Final = rocking.Block(width=0.24, height=1.1)
-WALL: Final = rocking.Block.one_sided(width=0.5, height=4.0, restitution=0.4)
+WALL: Final = rocking.RestrainedBlock(rocking.Block(width=0.5, height=4.0), one_sided=True, restitution=0.4)
 SLENDER: Final = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.92)
 UNEVEN: Final = [
     rocking.Block.from_pivots((0.2, 0.15), 0.6, 0.4),
     rocking.Block.from_pivots((0.3, 0.12), 0.9, 0.5, restitution=(0.8, 0.9), mass=400.0),
     rocking.Block.from_parameters(p=(2.0, 2.5), alpha=(0.2, 0.14), restitution=(0.85, 0.9)),
     rocking.Block(width=0.4, height=1.5, offset=0.03),
-    rocking.Block.from_frame(half_width=0.2, half_height=1.0, mass_ratio=2.0),
 ]
 
 
@@ -291,8 +290,8 @@ def two_sided(model: str) -> Iterator[Item]:
 def one_sided(model: str) -> Iterator[Item]:
     walls = [
         WALL,
-        rocking.Block.one_sided(width=0.3, height=2.0, lean=0.02),
-        rocking.Block.one_sided(width=0.4, height=2.5, lean=-0.01, restitution=0.6),
+        rocking.RestrainedBlock(rocking.Block(width=0.3, height=2.0), one_sided=True, lean=0.02),
+        rocking.RestrainedBlock(rocking.Block(width=0.4, height=2.5), one_sided=True, lean=-0.01, restitution=0.6),
     ]
     yield from under(walls, [*shaking(), *scaled(-0.6)], model=model)
 
@@ -313,10 +312,10 @@ def meshes() -> Iterator[Item]:
 @group(model=MODELS)
 def restitution_laws(model: str) -> Iterator[Item]:
     laws = [
-        rocking.FallingRestitution(0.95, 0.2, 0.7),
-        rocking.FallingRestitution((0.95, 0.9), (0.1, 0.3), (0.6, 0.8)),
-        rocking.RandomRestitution(0.8, 0.95, seed=3),
-        rocking.RandomRestitution((0.7, 0.8), (0.9, 0.99), seed=11),
+        rocking.Restitution(0.95, 0.7, slope=0.2),
+        rocking.Restitution((0.95, 0.9), (0.6, 0.8), slope=(0.1, 0.3)),
+        rocking.Restitution(0.95, 0.8, seed=3),
+        rocking.Restitution((0.9, 0.99), (0.7, 0.8), seed=11),
     ]
     bodies = [rocking.RestrainedBlock(block, restitution=law) for block in (STATUE, UNEVEN[0]) for law in laws]
     yield from under(bodies, shaking(), model=model)
@@ -443,7 +442,12 @@ def between(kind: str) -> Iterator[Item]:
 @group(digits=6)
 def forces_and_energies() -> Iterator[Item]:
     up = record("el-centro-meloland-up", 350, 1100)
-    for block in (STATUE, UNEVEN[1], HELD["several"][0], rocking.Block.one_sided(width=0.5, height=4.0)):
+    for block in (
+        STATUE,
+        UNEVEN[1],
+        HELD["several"][0],
+        rocking.RestrainedBlock(rocking.Block(width=0.5, height=4.0), one_sided=True),
+    ):
         for motion in (record(), record().with_vertical(up), lobes(4.0, 0.8)):
             response = rocking.simulate(block, motion, duration=12.0)
             times = np.arange(60) * 0.2
@@ -486,13 +490,11 @@ ENSEMBLES: Final = {
     "levels": (GRID, {"levels": [1.0, 2.5, 6.0], "measure": "pga", "polarity": "both"}),
     "linear": (GRID, {"levels": [0.5, 1.0], "model": "linear"}),
     "times": (GRID, {"times": True, "polarity": "-"}),
-    "derivatives": (GRID, {"derivatives": True}),
-    "robust": (GRID.select(slice(0, 6)), {"robust": True}),
     "treatment": (GRID, {"chattering": "velocity=0.001", "duration": 5.0}),
     "two-sided": (UNEVEN, {"levels": [0.4, 1.0], "measure": "pgv"}),
     "restrained": ([*HELD["tendon"], *HELD["damper"], *HELD["yielding"]], {"levels": [1.0, 2.0]}),
     "laws": (
-        [rocking.RestrainedBlock(STATUE, restitution=rocking.RandomRestitution(0.8, 0.95, s)) for s in range(4)], {},
+        [rocking.RestrainedBlock(STATUE, restitution=rocking.Restitution(0.95, 0.8, seed=s)) for s in range(4)], {},
     ),
 }  # fmt: skip
 
@@ -510,9 +512,8 @@ def ensembles(kind: str) -> Iterator[Item]:
 @group()
 def ensembles_between_stops() -> Iterator[Item]:
     for kind, bodies in BETWEEN.items():
-        for options in ({}, {"derivatives": True}) if kind != "oscillator" else ({},):
-            data = dynamics.simulate_many(bodies, shaking()[:6], duration=4.0, progress=False, **options)
-            yield kind, of_dataset(data)
+        data = dynamics.simulate_many(bodies, shaking()[:6], duration=4.0, progress=False)
+        yield kind, of_dataset(data)
 
 
 # Motions

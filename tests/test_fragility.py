@@ -306,7 +306,7 @@ def test_stripes_scale_every_motion_to_every_level():
 
 
 def test_a_blocks_own_measures_are_multiples_of_those_of_the_motion():
-    lifting = BLOCK.minimum_acceleration
+    lifting = min(BLOCK.uplift_thresholds())
     levels = np.array([1.5, 2.0, 3.0, 4.0])
     own = fragility(BLOCK, PULSES, measure="pga_ratio", levels=levels).curves[0]
     plain = fragility(BLOCK, PULSES, measure="pga", levels=levels * lifting).curves[0]

@@ -188,7 +188,7 @@ def test_scales_that_bracket_no_overturning_are_refused() -> None:
 
 def test_a_law_of_restitution_is_carried_back_as_it_is_carried_forwards():
     judged = 0
-    for law in (rocking.FallingRestitution(0.95, 0.3, 0.5), rocking.RandomRestitution(0.6, 0.95, seed=3)):
+    for law in (rocking.Restitution(0.95, 0.5, slope=0.3), rocking.Restitution(0.95, 0.6, seed=3)):
         block = rocking.RestrainedBlock(rocking.Block(width=0.4, height=2.0), restitution=law)
         for amplitude in (2.0, 2.2, 2.4, 2.6, 2.8, 3.0):
             response = rocking.simulate(block, rocking.pulses.ricker(amplitude, 1.0), initial_rotation=0.05)

@@ -249,7 +249,7 @@ def test_behind_a_proof_tendons_are_as_long_as_before_it() -> None:
 def test_impacts_at_any_speed_change_as_those_of_a_proof_do(way: str) -> None:
     """Of lengths of arcs that are all rounding no error stays in what shifts: over 100 impacts follow each other."""
     proven = rocking.simulate(BLOCK, RECORD)
-    body = RestrainedBlock(BLOCK, restitution=rocking.RandomRestitution(RESTITUTION, RESTITUTION, seed=1))
+    body = RestrainedBlock(BLOCK, restitution=rocking.Restitution(RESTITUTION, RESTITUTION, seed=1))
     slow = rocking.simulate(body, RECORD) if way == "drawn" else rocking.simulate(BLOCK, RECORD, chattering=way)
     assert len(slow.impacts) > 100 > len(proven.impacts)
     expected = gradient(proven, "event", 1).samples

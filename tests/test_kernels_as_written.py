@@ -188,7 +188,7 @@ def mapped(model: str) -> Numbers:
     """Maps of bodies that rest, overturn, balance or are held; and from impact to impact."""
     push = pulses.sine(2.5, 2.0, cycles=1)
     held = rocking.RestrainedBlock(STATUE, rocking.Tendon(1e3, 100.0), rocking.Spring(50.0), rocking.Damper(5.0))
-    lean = rocking.RestrainedBlock(TWO_SIDED, restitution=rocking.FallingRestitution(0.9, 0.2, 0.5))
+    lean = rocking.RestrainedBlock(TWO_SIDED, restitution=rocking.Restitution(0.9, 0.5, slope=0.2))
     soft = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.2)
     for body in (STATUE, held, lean, soft):
         for amplitude in (0.01, 1.0, 1.6):

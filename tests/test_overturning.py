@@ -85,7 +85,7 @@ def test_a_second_region_overturns_after_one_impact_with_safety_above_it():
 def test_boundaries_separate_what_simulate_says():
     dataset = overturning_map(BLOCK, "one-sine", amplitudes=[0.5, 2.0, 4.0, 7.0, 10.0], frequencies=[4.5])
     motion = rocking.pulses.one_sine(1.0, 4.5 * 2.0 / (2.0 * math.pi))
-    threshold = BLOCK.minimum_acceleration
+    threshold = min(BLOCK.uplift_thresholds())
     assert dataset.data.sizes["boundary"] >= 4
     judged = set()
     for edge, *modes in zip(
@@ -120,7 +120,7 @@ def test_a_block_that_overturns_after_a_rest_is_told_so():
 
     damped = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.5)
     dataset = overturning_map(damped, pulse, amplitudes=[3.0], frequencies=[1.0])
-    response = rocking.simulate(damped, pulse(3.0 * damped.minimum_acceleration, 1.0 / math.pi))
+    response = rocking.simulate(damped, pulse(3.0 * min(damped.uplift_thresholds()), 1.0 / math.pi))
     assert response.overturned
     assert response.events["kind"].tolist() == ["uplift", "rest", "uplift", "overturn"]
     assert len(response.impacts) > 0

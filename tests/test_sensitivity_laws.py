@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import rocking
-from rocking import Damper, FallingRestitution, Load, RestrainedBlock, Spring, Tendon, Thrust
+from rocking import Damper, Load, Restitution, RestrainedBlock, Spring, Tendon, Thrust
 
 BLOCK = rocking.Block.from_pivots((1.0, 1.2), 3.5, 2.3, mass=2e3, restitution=(0.8, 0.75))
 
@@ -18,11 +18,13 @@ BODIES = {
     "damper": RestrainedBlock(BLOCK, Damper(3e3)),
     "thrust": RestrainedBlock(BLOCK, Thrust(900.0, height=3.0)),
     "lean": RestrainedBlock(BLOCK, lean=0.03),
-    "falling restitution": RestrainedBlock(BLOCK, restitution=FallingRestitution(0.85, 0.4, 0.3)),
+    "falling restitution": RestrainedBlock(BLOCK, restitution=Restitution(0.85, 0.3, slope=0.4)),
     "everything": RestrainedBlock(
         BLOCK, Load(200.0, 3.0, follows=False), Tendon(3e4, prestress=1e3), Spring(1e3), Damper(800.0), lean=0.01
     ),
-    "one side": rocking.Block.one_sided(Spring(1e3), width=1.2, height=4.0, mass=2e3, restitution=0.5),
+    "one side": rocking.RestrainedBlock(
+        rocking.Block(width=1.2, height=4.0, mass=2e3), Spring(1e3), one_sided=True, restitution=0.5
+    ),
 }
 
 BY_SIDE = tuple(f"{name}_{side}" for name in ("p", "alpha", "restitution") for side in ("plus", "minus"))

@@ -12,14 +12,12 @@ import numpy as np
 import pytest
 import trimesh
 from scipy.integrate import quad
-from scipy.optimize import linprog
-from scipy.spatial import ConvexHull, HalfspaceIntersection
 from scipy.spatial.transform import Rotation
 
 import rocking
 from rocking import Block, InvalidBlock, InvalidOption, Solid
 from rocking.solid.mesh import upright
-from rocking.solid.repair import agreeing, closed, is_closed, joined, moments, overlaps, shells_of
+from rocking.solid.repair import shells_of
 
 SCRIPT = runpy.run_path(str(Path(__file__).resolve().parents[1] / "scripts" / "ship_statue.py"))
 SIZES = (0.6, 0.4, 1.8)
@@ -60,7 +58,7 @@ def test_a_box_is_the_rectangular_block_across_its_sides():
     for azimuth, width, deep in ((0.0, 0.4, 0.6), (90.0, 0.6, 0.4), (180.0, 0.4, 0.6), (270.0, 0.6, 0.4)):
         block, rectangle = solid.block(azimuth), Block(width=width, height=1.8, mass=solid.mass)
         for side, exact in zip(block.sides, rectangle.sides, strict=True):
-            for name in ("p", "alpha", "restitution", "radius", "inertia"):
+            for name in ("p", "alpha", "restitution", "radius"):
                 assert getattr(side, name) == pytest.approx(getattr(exact, name), rel=1e-12), name
         assert solid.inertia_over_mass[2, 2] == pytest.approx((width**2 + deep**2) / 12.0, rel=1e-12)
     assert solid.weakest_azimuth in (pytest.approx(0.0), pytest.approx(180.0))
@@ -243,11 +241,11 @@ def test_normals_that_point_inwards_are_turned():
     assert repairs_of(inverted) == ("normals pointed inwards: the surface was turned inside out",)
 
 
-def test_faces_against_their_neighbours_are_turned():
-    mixed = box()
-    mixed.faces[[1, 4, 7]] = mixed.faces[[1, 4, 7], ::-1]
-    assert_same(Solid.from_mesh(mixed), Solid.from_mesh(box()))
-    assert repairs_of(mixed) == ("3 faces turned to agree with the neighbours",)
+def mixed():
+    """A box with some faces turned round."""
+    made = box()
+    made.faces[[1, 4, 7]] = made.faces[[1, 4, 7], ::-1]
+    return made
 
 
 def test_flat_holes_are_filled_exactly_and_said_to_be():
@@ -260,7 +258,6 @@ def test_flat_holes_are_filled_exactly_and_said_to_be():
         assert_same(solid, plain, 1e-11)
         (said,) = solid.repairs
         assert said.startswith(f"{count} filled, ")
-        assert said.endswith("their edges are flat to 0 m") or "e-1" in said
         area = polygon_shares()[0] * 0.3**2 * int(count[0])
         assert f"{area:.3g} m^2" in said
 
@@ -270,7 +267,7 @@ def test_a_hole_round_an_edge_is_filled_with_what_is_missing_known():
     corner = np.flatnonzero(np.all(opened.vertices == [0.5, 0.5, 1.0], axis=1))
     opened.update_faces(~np.any(np.isin(opened.faces, corner), axis=1))
     (said,) = repairs_of(opened)
-    assert "1 hole filled" in said and "flat to 0 m" not in said
+    assert "1 hole filled" in said
     assert 0.5 < Solid.from_mesh(opened).volume < 1.0
 
 
@@ -289,7 +286,7 @@ def test_cavities_are_hollow_and_pieces_are_not():
     core = Solid.from_mesh(trimesh.util.concatenate([outer, inner]))
     assert core.volume == pytest.approx(1.008)
     assert core.repairs == ()
-    assert core.notes[0].startswith("two pieces of mesh overlap in about 0.008 m^3, which is counted twice: ")
+    assert core.notes[0].startswith("parts or pieces overlap in about 0.008 m^3, which is counted twice: ")
     assert core.notes[0].endswith("if one is a cavity, turn its normals inwards")
     apart = box((0.2, 0.2, 0.2), at=(0.0, 2.0))
     apart.invert()
@@ -312,7 +309,7 @@ def test_a_part_inside_another_that_is_turned_the_other_way_is_its_cavity():
         assert solid.notes == ()
     filled = Solid.from_mesh(scene(**parts), density={"outer": 2e3, "far": 2e3, "hollow": 1e3})
     assert filled.volume == pytest.approx(2.008)
-    assert "outer and hollow overlap in" in filled.notes[0] or "hollow and outer overlap in" in filled.notes[0]
+    assert "parts or pieces overlap in about 0.008 m^3" in filled.notes[0]
     # All turned inside out, and a cavity in the smaller piece of one mesh.
     inverted = one_mesh.copy()
     inverted.invert()
@@ -338,14 +335,14 @@ def test_what_two_boxes_have_in_common_is_noted_once(at, sizes, common):
     other = box(sizes, at[:2])
     other.apply_translation([0.0, 0.0, at[2]])
     parts = {"foot": box((1.0, 1.0, 1.0)), "post": other}
-    for mesh, names in ((scene(**parts), "foot and post"), (None, "two pieces of mesh")):
-        solid = Solid.from_mesh(trimesh.util.concatenate([*parts.values()]) if mesh is None else mesh)
+    for mesh in (scene(**parts), trimesh.util.concatenate([*parts.values()])):
+        solid = Solid.from_mesh(mesh)
         if common == 0.0:
             assert solid.notes == ()
             continue
         (note,) = solid.notes
         assert note == (
-            f"{names} overlap in about {common:.2g} m^3, which is counted twice: make one surface of the two, cut "
+            f"parts or pieces overlap in about {common:.2g} m^3, which is counted twice: make one surface of them, cut "
             "one out of the other, or, if one is a cavity, turn its normals inwards"
         )
 
@@ -355,7 +352,7 @@ def test_faces_that_are_none_or_come_twice_are_left_out():
     faces = np.vstack([mesh.faces, [0, 0, 1], [2, 2, 2], mesh.faces[3], np.roll(mesh.faces[5], 1)])
     solid = Solid.from_mesh(mesh_of(mesh.vertices, faces))
     assert_same(solid, Solid.from_mesh(box()))
-    assert solid.repairs == ("2 faces without area left out", "2 faces that came twice left out")
+    assert solid.repairs == ("4 faces without area, or there twice, left out",)
 
 
 def test_a_surface_in_several_open_parts_of_one_density_is_joined():
@@ -369,24 +366,6 @@ def test_a_surface_in_several_open_parts_of_one_density_is_joined():
     assert solid.repairs == ()
     assert [each.name for each in solid.regions] == ["left + right"]
     assert solid.mass == pytest.approx(2000.0 * math.prod(SIZES))
-
-
-def test_random_triangles_that_are_turned_anyhow_close_again():
-    rng = np.random.default_rng(5)
-    sphere = trimesh.creation.icosphere(subdivisions=2)
-    exact = moments(np.asarray(sphere.vertices), np.asarray(sphere.faces))
-    judged = 0
-    for _ in range(20):
-        faces = np.array(sphere.faces)
-        turned = rng.random(len(faces)) < rng.random()
-        faces[turned] = faces[turned, ::-1]
-        surface = closed(agreeing(joined(np.asarray(sphere.vertices), faces[rng.permutation(len(faces))])))
-        assert is_closed(surface.faces)
-        found = moments(surface.vertices, surface.faces)
-        assert found.amount == pytest.approx(exact.amount, rel=1e-12)
-        np.testing.assert_allclose(found.second, exact.second, rtol=1e-12, atol=1e-14)
-        judged += 1
-    assert judged == 20
 
 
 # The support
@@ -541,7 +520,8 @@ def leaning():
 
 REFUSED = {
     "no volume": (lambda: Solid.from_mesh(flat()), "mesh encloses no volume: it is a surface without an inside"),
-    "one side": (lambda: Solid.from_mesh(strip()), "one side only, as a Möbius strip"),
+    "one side": (lambda: Solid.from_mesh(strip()), "point to different sides of the surface: orient them alike"),
+    "mixed": (lambda: Solid.from_mesh(mixed()), "normals of neighbouring triangles point to different sides"),
     "one place": (lambda: Solid.from_mesh(mesh_of(np.ones((3, 3)), [(0, 1, 2)])), "are at one place"),
     "not finite": (
         lambda: Solid.from_mesh(mesh_of([(0, 0, 0), (1, 0, 0), (0, np.nan, 0)], [(0, 1, 2)])),
@@ -554,7 +534,7 @@ REFUSED = {
     "a ball": (lambda: Solid.from_mesh(trimesh.creation.icosphere()), "stands on a point or a line"),
     "support beyond": (
         lambda: Solid.from_mesh(box(), support=[(0.35, 0.2), (-0.3, 0.2), (-0.3, -0.2)]),
-        r"support reaches 0\.05 m beyond the outline of the mesh, from -0\.3 m to 0\.3 m in the east",
+        r"support reaches 0\.05 m beyond the mesh, from -0\.3 m to 0\.3 m in the east",
     ),
     "support on a line": (
         lambda: Solid.from_mesh(box(), support=[(0.1, 0.1), (0.0, 0.0), (-0.1, -0.1)]),
@@ -612,7 +592,7 @@ def test_azimuths_are_numbers(azimuths):
         ("points.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
          "property float z\nend_header\n0 0 0\n", "holds no faces"),
         ("nothing.obj", "# nothing\n", "holds no faces"),
-        ("empty.obj", "", "this file is empty"),
+        ("empty.obj", "", "holds no faces"),
         ("text.stl", "hello", "holds no faces"),
         ("text.ply", "hello", "cannot be read: "),
         ("text.glb", "hello", "cannot be read: "),
@@ -667,7 +647,7 @@ def test_a_stream_names_no_other_file(tmp_path, monkeypatch):
     gltf = {"asset": {"version": "2.0"}, "buffers": [{"uri": "other.bin", "byteLength": 120}]}
     for uri in ("other.bin", "/etc/passwd", "../other.bin", "http://127.0.0.1:9/other.bin", "file:///etc/passwd"):
         gltf["buffers"][0]["uri"] = uri
-        with pytest.raises(InvalidBlock, match=f"a.gltf: names another file, '{uri}', which is not read"):
+        with pytest.raises(InvalidBlock, match=f"a.gltf: cannot be read: it lacks '{uri}'"):
             Solid.from_mesh(named(json.dumps(gltf).encode(), "a.gltf"))
     # Materials of an OBJ file are not looked for.
     scene = b"mtllib /etc/passwd\nusemtl red\n" + trimesh.exchange.obj.export_obj(box()).encode()
@@ -724,29 +704,3 @@ def test_open_pieces_that_share_an_edge_are_one_surface_and_closed_ones_are_not(
     tetrahedron = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
     other = np.array([[0, 5, 1], [0, 1, 6], [1, 5, 6], [0, 6, 5]])
     assert shells_of(np.vstack([tetrahedron, other])).tolist() == [0, 0, 0, 0, 1, 1, 1, 1]
-
-
-@pytest.mark.parametrize("pairs", [1, pytest.param(30, marks=pytest.mark.slow)])
-def test_what_two_boxes_at_any_angle_have_in_common_is_estimated(pairs):
-    rng, shares = np.random.default_rng(3), []
-    for _ in range(pairs):
-        half, middles = rng.uniform(0.2, 0.5, (2, 3)), rng.uniform(-0.2, 0.2, (2, 3))
-        turns = Rotation.random(2, random_state=rng).as_matrix()
-        meshes, planes = [], []
-        for k in range(2):
-            mesh = trimesh.creation.box(2.0 * half[k])
-            mesh.vertices = mesh.vertices @ turns[k].T + middles[k]
-            meshes.append(closed(joined(np.asarray(mesh.vertices), np.asarray(mesh.faces))))
-            normals = np.vstack([turns[k].T, -turns[k].T])
-            planes.append(np.column_stack([normals, -np.tile(half[k], 2) - normals @ middles[k]]))
-        exact = convex_volume(np.vstack(planes))
-        found = overlaps(["one", "other"], meshes)
-        shares.append(float(found[0].partition("about ")[2].partition(" ")[0]) / exact)
-    assert len(shares) == pairs and 0.85 < min(shares) <= max(shares) < 1.15
-
-
-def convex_volume(planes):
-    """Volume between planes, by linear programming for a place inside and the hull of the corners."""
-    normals, off = planes[:, :3], planes[:, 3]
-    place = linprog([0, 0, 0, -1], np.column_stack([normals, np.ones(len(off))]), -off, bounds=[(None, None)] * 4)
-    return ConvexHull(HalfspaceIntersection(planes, place.x[:3]).intersections).volume

@@ -18,7 +18,7 @@ def test_the_amplitudes_of_the_other_program_are_met_within_its_bound():
         block = rocking.Block(half_width=radius * math.sin(0.2), half_height=radius * math.cos(0.2))
         for sign in (-1.0, 1.0):
             level = theirs + sign * validation.OTHERS_ERROR
-            pulse = rocking.pulses.one_sine(level * block.minimum_acceleration, 2.0)
+            pulse = rocking.pulses.one_sine(level * min(block.uplift_thresholds()), 2.0)
             assert rocking.simulate(block, pulse).overturned is (sign > 0.0)
 
 

@@ -19,10 +19,9 @@ from oracles.restrained import Held, integrated
 from rocking import (
     Block,
     Damper,
-    FallingRestitution,
     Load,
     Motion,
-    RandomRestitution,
+    Restitution,
     RestrainedBlock,
     Restraint,
     Solid,
@@ -134,7 +133,7 @@ def _yielding(rng: Drawn, held: Held, weight: float, size: float) -> Made:
 def _falling(rng: Drawn, held: Held, weight: float, size: float) -> Made:
     largest, least = rng.uniform(0.8, 0.99, 2), rng.uniform(0.3, 0.7, 2)
     slope = [between(rng, 0.02, 1.0) for _ in range(2)]
-    law = FallingRestitution(largest.tolist(), slope, least.tolist())
+    law = Restitution(largest.tolist(), least.tolist(), slope=slope)
     held.law = lambda j, speed, number: max(float(least[j]), float(largest[j]) - slope[j] * speed)
     return [], law, 0.0
 
@@ -143,7 +142,7 @@ def _random(rng: Drawn, held: Held, weight: float, size: float) -> Made:
     least, seed = rng.uniform(0.4, 0.7, 2), int(rng.integers(2**53))
     largest = least + rng.uniform(0.05, 0.25, 2)
     held.law = lambda j, speed, number: float(least[j] + (largest[j] - least[j]) * philox(number, seed))
-    return [], RandomRestitution(least.tolist(), largest.tolist(), seed), 0.0
+    return [], Restitution(largest.tolist(), least.tolist(), seed=seed), 0.0
 
 
 def _from_a_mesh(rng: Drawn) -> tuple[RestrainedBlock, Held]:

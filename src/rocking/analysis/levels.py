@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking.block import Blocks
-from rocking.block.body import Bodies, Body, title_of
+from rocking.block.body import Bodies, Body
 from rocking.core import bisection, checks
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.constants import Model
@@ -97,7 +97,7 @@ def described(blocks: Bodies | Body | Sequence[Body]) -> str:
     if only is None:
         return counted(len(bodies_of(blocks)), "block")
     if not isinstance(blocks, Blocks) or blocks.terms:
-        return title_of(only)
+        return only.description
     return f"block with p = {_pair(blocks.p[0])} rad/s, alpha = {_pair(blocks.alpha[0])} rad"
 
 

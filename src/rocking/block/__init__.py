@@ -1,17 +1,9 @@
 """What rocks: one block, or many as a struct of arrays; free, or held back."""
 
 from rocking.block.bodies import Blocks
-from rocking.block.restitution import (
-    FallingRestitution,
-    RandomRestitution,
-    Restitution,
-    housner_restitution,
-    impact_restitution,
-    one_sided_restitution,
-)
 from rocking.block.restrained import RestrainedBlock
-from rocking.block.restraints import Damper, Load, Restraint, Spring, Tendon, Thrust
-from rocking.block.sides import Side
+from rocking.block.restraints import Damper, Load, Restitution, Restraint, Spring, Tendon, Thrust
+from rocking.block.sides import Side, housner_restitution, one_sided_restitution
 from rocking.block.single import Block, one_block
 
 #: The same class: arrays of terms say what restrains them.
@@ -21,9 +13,7 @@ __all__ = [
     "Block",
     "Blocks",
     "Damper",
-    "FallingRestitution",
     "Load",
-    "RandomRestitution",
     "Restitution",
     "RestrainedBlock",
     "RestrainedBlocks",
@@ -33,7 +23,6 @@ __all__ = [
     "Tendon",
     "Thrust",
     "housner_restitution",
-    "impact_restitution",
     "one_block",
     "one_sided_restitution",
 ]

@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking.block.body import KINDS
-from rocking.block.limits import checked_gravity, checked_sides
 from rocking.block.restrained import RestrainedBlock
 from rocking.block.restraints import Terms
-from rocking.block.rigid_body import refusal, rigid_bodies
+from rocking.block.sides import checked_gravity, checked_sides, no_body, rigid_bodies
 from rocking.block.single import Block, one_block
 from rocking.core import checks
 from rocking.core.arrays import Floats
@@ -119,10 +118,7 @@ class Blocks:
         held = {name: np.ascontiguousarray(values) for name, values in arrays.items()}
         for values in held.values():
             values.flags.writeable = False
-        for name in _NAMES:
-            object.__setattr__(self, name, held.pop(name))
-        for name, value in (("gravity", gravity), ("terms", held), ("axes", axes)):
-            object.__setattr__(self, name, value)
+        self.__dict__.update({name: held.pop(name) for name in _NAMES}, gravity=gravity, terms=held, axes=axes)
         return self
 
     @classmethod
@@ -246,11 +242,8 @@ class Blocks:
         made["min_restitution"], made["restitution_slope"] = term["restitution_least"], term["restitution_slope"]
         made["seed"] = term["restitution_seed"][:, 0]
         made["variable_restitution"] = (made["seed"] >= 0) | np.any(made["restitution_slope"] > 0.0, axis=1)
-        made["prestress"], made["spring"], made["damping"] = (
-            p * p * term["prestress"],
-            p * p * term["spring"],
-            term["damping"],
-        )
+        made["prestress"], made["spring"] = p * p * term["prestress"], p * p * term["spring"]
+        made["damping"] = term["damping"]
         at_zero = term["sine"] * sine + term["cosine"] * cosine  # of the moment, and its slope by -u
         slope = term["sine"] * cosine - term["cosine"] * sine
         # A moment that only a tendon without prestress makes is zero there, whatever rounding says.
@@ -263,19 +256,11 @@ class Blocks:
             made["added_weight"], made["added_push"] = term["sine"], term["cosine"]
         made["yielding"] = np.any(term["stiffness"] > 0.0, axis=1)
         if np.any(made["yielding"]):  # elastic as such a tendon is at first
-            for name, field in (
-                ("weight", "added_weight"),
-                ("push", "added_push"),
-                ("prestress", "prestress"),
-                ("restraint_threshold", "restraint_threshold"),
-            ):
-                made[f"base_{name}"] = made[field]
+            for name in ("added_weight", "added_push", "prestress", "restraint_threshold"):
+                made[f"base_{name.removeprefix('added_')}"] = made[name]
             made["tendon"] = p * p * term["stiffness"]
-            made["lever_arm"], made["yields"], made["slack"] = (
-                term["opening"],
-                term["yields"][:, 0],
-                term["slack"][:, 0],
-            )
+            made["lever_arm"] = term["opening"]
+            made["yields"], made["slack"] = term["yields"][:, 0], term["slack"][:, 0]
             stiff, at_rest = term["stiffness"] * term["opening"], -term["stiffness"] * term["slack"]
             made["tendon_weight"] = -stiff * (1.0 if model == "linear" else cosine)
             made["tendon_push"] = stiff * (self.alpha if model == "linear" else sine)
@@ -300,11 +285,9 @@ class Blocks:
     def __repr__(self) -> str:
         if not len(self):
             return "<Blocks: none>"
-        ranges = [
-            f"{name} {range_text(values)}{'' if name == 'restitution' else f' {_UNITS[name]}'}"
-            for name, values in (("p", self.p), ("alpha", self.alpha), ("restitution", self.restitution))
-        ]
-        return f"<Blocks: {len(self)}; {', '.join(ranges)}{', restrained' if self.terms else ''}>"
+        p, alpha, e = (range_text(values) for values in (self.p, self.alpha, self.restitution))
+        held = ", restrained" if self.terms else ""
+        return f"<Blocks: {len(self)}; p {p} rad/s, alpha {alpha} rad, restitution {e}{held}>"
 
     def __len__(self) -> int:
         return len(self.p)
@@ -321,16 +304,26 @@ class Blocks:
         if not one_way and terms == [Terms(), Terms()]:
             return block
         text = "block with restraints" + ", rocking one way" * one_way
-        return RestrainedBlock.__new__(RestrainedBlock)._fill(block, terms, one_way, (text, text), None, 0.0)
+        made = RestrainedBlock.__new__(RestrainedBlock)
+        made.__dict__.update(block=block, _terms=tuple(terms), is_one_sided=one_way, restraints=None, lean=0.0)
+        made.__dict__.update(description=text)
+        return made
 
     def __iter__(self) -> Iterator[Block | RestrainedBlock]:
         return (self[index] for index in range(len(self)))
 
     def select(self, index: slice | NDArray[np.int64] | NDArray[np.bool_]) -> Blocks:
         """Return some of the blocks: a slice, indices, or a mask."""
-        if not isinstance(index, slice):
-            index = self._indices(index)
-        chosen = {name: values[index] for name, values in self._arrays().items()}
+        try:
+            rows = np.arange(len(self))[index]
+        except IndexError:
+            rows = np.array(0)
+        if rows.ndim != 1:
+            raise InvalidBlock(
+                f"select takes a slice, a flat array of indices below {len(self)}, or a mask of {len(self)} truth "
+                f"values, not {checks.shown(index)}; for one block alone blocks[0]"
+            )
+        chosen = {name: values[rows] for name, values in self._arrays().items()}
         return Blocks.__new__(Blocks)._fill(self.gravity, chosen)
 
     def resized(self, factors: Floats) -> Blocks:
@@ -342,20 +335,6 @@ class Blocks:
         by = factors[:, None]
         terms = {name: values * by ** _POWERS.get(name, 0) for name, values in self.terms.items()}
         return Blocks(self.p * by, self.alpha, self.restitution, gravity=self.gravity, **terms)
-
-    def _indices(self, index: NDArray[np.int64] | NDArray[np.bool_]) -> NDArray[np.int64]:
-        """Positions of the blocks of a flat array of indices, or of a mask."""
-        given = np.asarray(index)
-        if given.ndim == 1 and given.dtype == np.bool_ and len(given) == len(self):
-            return np.flatnonzero(given)
-        usable = given.ndim == 1 and (given.dtype.kind in "iu" or not given.size)
-        chosen = given.astype(np.int64) if usable else np.array([len(self)])
-        if not np.all((chosen >= -len(self)) & (chosen < len(self))):
-            raise InvalidBlock(
-                f"select takes a slice, a flat array of indices below {len(self)}, or a mask of {len(self)} truth "
-                f"values, not {checks.shown(index)}; for one block alone blocks[0]"
-            )
-        return chosen
 
 
 def rates_of(p: ArrayLike | None, size: ArrayLike | None, gravity: float) -> ArrayLike:
@@ -381,11 +360,10 @@ def _conserved(p: Floats, alpha: Floats) -> Floats:
     """Restitutions that conserve angular momentum, of the rigid bodies whose sides have these p and alpha."""
     kept: Floats = 1.0 - 1.5 * np.sin(alpha) ** 2
     sided = np.flatnonzero((p[:, 0] != p[:, 1]) | (alpha[:, 0] != alpha[:, 1]))
-    found = rigid_bodies(p[sided], alpha[sided])
-    if not found.known.all():
-        first = int(np.argmin(found.known))
-        raise InvalidBlock(f"{refusal(found, p[sided], alpha[sided], first)} (block {sided[first]})", "restitution")
-    kept[sided] = found.restitution
+    kept[sided], _ = rigid_bodies(p[sided], alpha[sided])
+    if (unknown := np.isnan(kept).any(axis=1)).any():
+        first = int(np.argmax(unknown))
+        raise InvalidBlock(f"{no_body(p[first], alpha[first])} (block {first})", "restitution")
     stocky = np.flatnonzero(~(kept > 0.0).all(axis=1))
     if len(stocky):
         raise InvalidBlock(

@@ -83,11 +83,6 @@ class Body(Protocol):
         """Return bodies of which it is the only one: of a block `rocking.Blocks`."""
 
 
-def title_of(body: Body) -> str:
-    """Return what a body is, for the title of a figure: its description, or its shorter `title` where it has one."""
-    return str(getattr(body, "title", body.description))
-
-
 @runtime_checkable
 class Bodies(Protocol):
     """Any number n of bodies of one kind under one gravity."""

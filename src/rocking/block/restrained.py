@@ -10,12 +10,10 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from rocking.block.body import KINDS, Bodies, ContactLaw, Coordinate
-from rocking.block.limits import checked_pair, checked_parameter
-from rocking.block.restitution import Restitution, one_sided_restitution
-from rocking.block.restraints import Load, Pivot, Restraint, Tendon, Terms
-from rocking.block.sides import Side, in_line
-from rocking.block.single import Block, one_block
+from rocking.block.body import ContactLaw, Coordinate
+from rocking.block.restraints import Load, Pivot, Restitution, Restraint, Tendon, Terms
+from rocking.block.sides import Side, checked_pair, checked_parameter, one_sided_restitution
+from rocking.block.single import Block, Rocking, one_block
 from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
 from rocking.core.bisection import bisected
@@ -25,14 +23,12 @@ from rocking.errors import InvalidBlock, InvalidOption
 #: Rotations at which the balance is looked for, on each side.
 _LOOKS: Final = 512
 
-#: So many restraints are told with their numbers in the title of a figure.
-_FEW: Final = 2
-_SOME: Final = "Tendon, Spring, Damper, Thrust and Load are some"
+_SOME: Final = "Tendon, Spring, Damper, Thrust or Load"
 _ROTATION: Final = Coordinate("rotation", "angular_velocity", "angular_acceleration", "rad", "balance")
 
 
-@dataclass(frozen=True)
-class RestrainedBlock:
+@dataclass(frozen=True, repr=False)
+class RestrainedBlock(Rocking):
     """A block that restraints hold back, that leans, or that rocks one way only, as a facade against its side walls.
 
     Parameters
@@ -46,8 +42,8 @@ class RestrainedBlock:
     lean : float
         Angle by which it stands out of plumb to side +, rad.
     restitution : float, pair or Restitution, optional
-        Factor on the angular speed at an impact, or the law by which it varies: `FallingRestitution`,
-        `RandomRestitution`; that of the `sides` is then the largest. By default that of the block; with a load that
+        Factor on the angular speed at an impact, or the law by which it varies, a `Restitution`; that of
+        the `sides` is then the largest. By default that of the block; with a load that
         follows, the one that conserves angular momentum; of a one-sided block `one_sided_restitution`.
 
     Raises
@@ -78,7 +74,6 @@ class RestrainedBlock:
     _terms: tuple[Terms, Terms]
     is_one_sided: bool
     description: str
-    title: str
     restraints: tuple[Restraint, ...] | None
     lean: float
 
@@ -123,30 +118,16 @@ class RestrainedBlock:
             )
             for side, pivot in enumerate(pivots)
         ]
-        kinds = [type(each).__name__.lower() for each in restraints]
-        text, title = (", ".join([own.description, *_listed(words), *rest]) for words in (restraints, kinds))
-        title = title if len(restraints) > _FEW else text
-        self._fill(standing, terms, one_way, (text, title), restraints, tilt)
+        text = ", ".join([own.description, *_listed(restraints), *rest])
+        self.__dict__.update(
+            block=standing, _terms=tuple(terms), is_one_sided=one_way, restraints=restraints, lean=tilt
+        )
+        self.__dict__.update(description=text)
         if (least := min(self.uplift_thresholds())) <= 0.0:
             raise InvalidBlock(
                 f"this block does not stand: it would take a ground acceleration of {least:.3g} m/s^2 to lift it; "
                 f"a smaller thrust, load or lean lets it{'; forces are in N, masses in kg' * (least < -self.gravity)}"
             )
-
-    def _fill(
-        self,
-        block: Block,
-        terms: Sequence[Terms],
-        one_sided: bool,
-        texts: tuple[str, str],
-        restraints: tuple[Restraint, ...] | None,
-        lean: float,
-    ) -> RestrainedBlock:
-        """Set all attributes; without restraints where they are not known one by one."""
-        names = ("block", "_terms", "is_one_sided", "description", "title", "restraints", "lean")
-        for name, value in zip(names, (block, tuple(terms), one_sided, *texts, restraints, lean), strict=True):
-            object.__setattr__(self, name, value)
-        return self
 
     def _rows(self) -> list[tuple[float, ...]]:
         """Parameters and terms of both sides, as `Blocks` has them; without terms where it is a free block."""
@@ -155,13 +136,6 @@ class RestrainedBlock:
             return rows
         rows = [(*row, *terms, float(self.is_one_sided)) for row, terms in zip(rows, self._terms, strict=True)]
         return rows[:1] * 2 if self.is_one_sided else rows
-
-    def __str__(self) -> str:
-        """Return description and parameters in one line."""
-        return f"{self.description}; {in_line(self.sides)}"
-
-    def __repr__(self) -> str:
-        return f"<RestrainedBlock: {self}>"
 
     @property
     def gravity(self) -> float:
@@ -172,11 +146,6 @@ class RestrainedBlock:
     def sides(self) -> Sequence[Side]:
         """Sides of the block as it stands, with the loads that follow it; one of a block that rocks one way."""
         return self.block.sides[:1] if self.is_one_sided else self.block.sides
-
-    @property
-    def stops(self) -> tuple[float, float]:
-        """Rotation at which it stands, for each side: zero."""
-        return 0.0, 0.0
 
     @property
     def balance(self) -> tuple[float, float]:
@@ -229,10 +198,6 @@ class RestrainedBlock:
         tendons = [each for each in self.restraints or () if isinstance(each, Tendon)]
         return [each._stretched(pivots, (plus, minus)) for each in tendons]
 
-    def alone(self) -> Bodies:
-        """Return `Blocks` of which it is the only one."""
-        return KINDS["blocks"].of([self])
-
 
 def _listed(restraints: Sequence[object]) -> list[str]:
     """Restraints in words, if there are some: with a spring of ..., a load of ... and a tendon of ..."""
@@ -246,8 +211,7 @@ def _check(restraints: Sequence[object], block: Block) -> None:
     """Refuse what is no restraint, and restraints of a block without a mass."""
     for each in restraints:
         if not isinstance(each, Restraint):
-            how = "give them one by one" if isinstance(each, (list, tuple)) else _SOME
-            raise InvalidBlock(f"{checks.shown(each)} is no restraint: {how}")
+            raise InvalidBlock(f"{checks.shown(each)} is no restraint: give {_SOME}, one by one")
     if restraints and block.mass is None:
         raise InvalidBlock("a block with restraints needs its {}, kg, beside its sizes or its pivots", "mass")
 

@@ -1,14 +1,109 @@
-"""The two sides of a block: from a rectangle, from pivots, and with which restitution."""
+"""The two sides of a block: bounds of their numbers, their restitution, and the rigid body behind both."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, Final, TypeVar
 
-from rocking.block.limits import checked_pair, checked_parameter
-from rocking.block.restitution import Restitution
+import numpy as np
+
+from rocking.core import checks
+from rocking.core.arrays import Floats
 from rocking.errors import InvalidBlock
+
+Number = TypeVar("Number", float, Floats)
+
+# Lowest and highest values, both included: far beyond any block, and far enough from the ends of double precision for
+# fourth powers of p, for the quotients of a motion's largest acceleration with gravity and slenderness, and for
+# products of all of them. Below the least restitution one impact is the end of rocking, to double precision.
+_GRAVITY: Final = (1e-6, 1e6)
+_LENGTH: Final = (1e-20, 1e20)
+_MASS: Final = (1e-30, 1e30)
+_LIMITS: Final = {
+    "p": (1e-6, 1e6, "positive, from 1e-06 to 1e+06 rad/s"),
+    "alpha": (1e-9, math.nextafter(0.5 * math.pi, 0.0), "from 1e-09 to below pi/2 rad"),
+    "restitution": (1e-9, 1.0, "in (0, 1], at least 1e-09"),
+}
+
+
+def checked_parameter(value: float, name: str, *, origin: str = "", which: str = "") -> float:
+    """Return p, alpha or restitution of a side, or raise InvalidBlock; the message says where it is from, and whose."""
+    low, high, rule = _LIMITS[name]
+    if not low <= value <= high:
+        hint = checks.hint_of_degrees(value) if name == "alpha" else ""
+        hint = checks.hint_of_percent(value) if name == "restitution" else hint
+        raise InvalidBlock(f"{{}}{origin} must be {rule}, not {value:g}{which}{hint}", name, value=value)
+    return value
+
+
+def checked_sides(values: Floats, name: str) -> Floats:
+    """Return p, alpha or restitution of blocks, shape (n, 2), or raise InvalidBlock for the first out of its range."""
+    low, high, _ = _LIMITS[name]
+    bad = np.argwhere(~((values >= low) & (values <= high)))
+    if len(bad):
+        checked_parameter(float(values[tuple(bad[0])]), name, which=f" (block {bad[0][0]})")
+    return values
+
+
+def checked_gravity(gravity: object) -> float:
+    """Return an acceleration of gravity, m/s^2, or raise InvalidBlock."""
+    return checks.positive(gravity, "gravity", InvalidBlock, "m/s^2", _GRAVITY)
+
+
+def checked_mass(mass: object) -> float:
+    """Return a mass, kg, or raise InvalidBlock."""
+    return checks.positive(mass, "mass", InvalidBlock, "kg", _MASS)
+
+
+def checked_length(value: object, name: str) -> float:
+    """Return a length, m, or raise InvalidBlock."""
+    return checks.positive(value, name, InvalidBlock, "m", _LENGTH)
+
+
+def checked_pair(value: Any, name: str) -> tuple[float, float]:
+    """Return a number, or a pair (side +, side -), as two numbers."""
+    if type(value) is float:
+        return value, value
+    values = checks.numbers(value, name, InvalidBlock)
+    if values.shape not in ((), (2,)):
+        raise InvalidBlock(
+            f"{{}} must be a number or a pair (side +, side -), not {values.size} values", name, value=value
+        )
+    plus, minus = np.broadcast_to(values, 2).tolist()
+    return plus, minus
+
+
+def housner_restitution(alpha: float) -> float:
+    """Restitution of a rectangular block that conserves angular momentum: 1 - 1.5 sin(alpha)^2 (Housner 1963)."""
+    return 1.0 - 1.5 * math.sin(checks.finite(alpha, "alpha", InvalidBlock)) ** 2
+
+
+def one_sided_restitution(alpha: float) -> float:
+    """Restitution of a wall that rocks against transverse walls, by angular momentum at three impacts.
+
+    The wall meets the ground with its inner edge, then the transverse walls with its top, then the ground again
+    (Sorrentino, AlShawa and Decanini 2011). A measured value is better.
+
+    Parameters
+    ----------
+    alpha : float
+        Slenderness, rad.
+
+    Returns
+    -------
+    float
+        The size of (1 - 1.5 sin(alpha)^2)^2 (1 - 1.5 cos(alpha)^2): 0.47 for a slenderness of 0.1.
+
+    Examples
+    --------
+    >>> round(one_sided_restitution(0.1), 4)
+    0.4707
+    """
+    angle = checked_parameter(checks.finite(alpha, "alpha", InvalidBlock), "alpha")
+    sine, cosine = math.sin(angle), math.cos(angle)
+    return abs((1.0 - 1.5 * sine * sine) ** 2 * (1.0 - 1.5 * cosine * cosine))
 
 
 @dataclass(frozen=True)
@@ -25,19 +120,12 @@ class Side:
         Factor on the angular speed when the block leaves this side at an impact.
     radius : float
         Distance R from the pivot to the centre of mass, m.
-    inertia : float or None
-        Moment of inertia about the pivot, m g R/p^2, kg m^2; None while the mass is not known.
-    arm : float or None
-        What the angular speed is multiplied with for the momentum over the mass, m, from which the forces of the ground
-        follow; None where it is the radius, as in all but frames.
     """
 
     p: float
     alpha: float
     restitution: float
     radius: float
-    inertia: float | None = None
-    arm: float | None = None
 
     def __str__(self) -> str:
         """Return the parameters as people read them."""
@@ -54,29 +142,19 @@ def in_line(sides: Sequence[object]) -> str:
     return "; ".join(f"side {sign}: {side}" for sign, side in zip("+-", sides, strict=True))
 
 
-def even_sides(
-    gravity: float, radius: float, alpha: float, restitution: object, conserved: float, advice: str
-) -> tuple[Side, Side]:
-    """Both sides of a body that rocks like a rectangle of this radius, m, and slenderness, rad."""
-    plus, minus = restitutions(restitution, (conserved, conserved), advice)
-    p = math.sqrt(0.75 * gravity / radius)
-    return Side(p, alpha, plus, radius), Side(p, alpha, minus, radius)
-
-
 def sides_on_pivots(
     distances: tuple[float, float],
     height: float,
     gyration_squared: float,
     gravity: float,
     restitution: object,
-    advice: str = "",
 ) -> tuple[Side, Side]:
     """Sides of a body from the distances of its pivots from the centre of mass, its height, m, and k^2, m^2."""
     plus, minus = distances
     radii = math.hypot(plus, height), math.hypot(minus, height)
     inertias = [gyration_squared + radius * radius for radius in radii]
     kept = gyration_squared + height * height - plus * minus
-    e = restitutions(restitution, (kept / inertias[1], kept / inertias[0]), advice)
+    e = restitutions(restitution, (kept / inertias[1], kept / inertias[0]))
     first, second = (
         Side(math.sqrt(gravity * radius / inertia), math.atan2(distance, height), factor, radius)
         for distance, radius, inertia, factor in zip(distances, radii, inertias, e, strict=True)
@@ -84,19 +162,81 @@ def sides_on_pivots(
     return first, second
 
 
-def restitutions(given: object, conserved: Sequence[float], advice: str = "") -> tuple[float, float]:
-    """Return the factors that are given, or those that conserve angular momentum; advice for a block too stocky."""
+def restitutions(given: object, conserved: Sequence[float]) -> tuple[float, float]:
+    """Return the factors that are given, or those that conserve angular momentum."""
     if given is None:
         if min(conserved) <= 0.0:
             raise InvalidBlock(
                 f"conserving angular momentum gives this block a restitution of {min(conserved):.3g}: it is too stocky "
-                f"to rock that way; {advice}give {{}} a value in (0, 1]",
+                "to rock that way; correct its sizes if they are swapped, or give {} a value in (0, 1]",
                 "restitution",
             )
         return conserved[0], conserved[1]
-    if isinstance(given, Restitution):
-        raise InvalidBlock(
-            "{} of a block is a number or a pair; a law goes to RestrainedBlock(block, restitution=...)", "restitution"
-        )
     plus, minus = (checked_parameter(value, "restitution") for value in checked_pair(given, "restitution"))
     return plus, minus
+
+
+#: Sides whose parameters differ by so little, relative, are equal but for rounding.
+_ROUNDING: Final = 1e-12
+
+
+def rigid_bodies(p: Floats, alpha: Floats) -> tuple[Floats, Floats]:
+    """Find the rigid bodies whose sides have these parameters, arrays of shape (n, 2).
+
+    Returned are the restitution on leaving each side by angular momentum, NaN where there is no such body, and the
+    height of the centre of mass above the pivots over gravity, s^2, shape (n,); NaN where the sides are equal, which
+    are those of a rectangle.
+
+    With depth h and radius of gyration k, R_i = h/cos(alpha_i) and g R_i/p_i^2 = k^2 + R_i^2. The difference of both
+    sides gives h, and angular momentum e_i = 1 - (h p_j^2/g) sin(alpha_j) (tan(alpha_+) + tan(alpha_-)), j the other
+    side. A body with positive h and k exists where |ln(p_+/p_-)| < |ln(cos(alpha_+)/cos(alpha_-))|/2 (derived in the
+    documentation).
+    """
+    cosine, tangent = np.cos(alpha), np.tan(alpha)
+    quotient = 1.0 / (cosine * p**2)  # (k^2 + R^2)/(g h)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slope = (quotient[:, 0] - quotient[:, 1]) / (tangent[:, 0] - tangent[:, 1])
+        kept: Floats = 1.0 - np.sin(alpha[:, ::-1]) * p[:, ::-1] ** 2 * slope[:, None]
+        depth = slope / tangent.sum(axis=1)
+    differing, most = _differences(p, cosine)
+    kept[differing >= most] = np.nan
+    equal = np.all([abs(each[:, 0] - each[:, 1]) <= _ROUNDING * each[:, 0] for each in (p, alpha)], axis=0)
+    kept[equal] = 1.0 - 1.5 * np.sin(alpha[equal]) ** 2
+    depth[equal] = np.nan
+    return kept, depth
+
+
+def _differences(p: Floats, cosine: Floats) -> tuple[Floats, Floats]:
+    """By how much the p of both sides differ, and by how much those of a body may: logarithms of ratios."""
+    return np.abs(np.log(p[:, 0] / p[:, 1])), 0.5 * np.abs(np.log(cosine[:, 0] / cosine[:, 1]))
+
+
+def no_body(p: Floats, alpha: Floats) -> str:
+    """Say why there is no rigid body with the p and alpha of two sides."""
+    differ, most = (100.0 * math.expm1(float(each[0])) for each in _differences(p[None], np.cos(alpha)[None]))
+    return (
+        f"no rigid body has p = {p[0]:g} and {p[1]:g} rad/s on sides of alpha = {alpha[0]:g} and {alpha[1]:g} rad: its "
+        f"p would differ by less than {most:.2g} %, not by {differ:.2g} %; correct p, or give {{}} a value or a pair "
+        "in (0, 1]"
+    )
+
+
+def eccentric_rectangles(alpha: Floats) -> tuple[Floats, Floats]:
+    """Rectangles whose centre of mass is so far off the middle that their sides have these slendernesses, shape (n, 2).
+
+    Returned are p of each side over that of the rectangle with its centre of mass in the middle, and the factor on
+    leaving each side, by angular momentum.
+    """
+    distances = np.tan(alpha)  # over the height of the centre of mass
+    half_width, offset = 0.5 * distances.sum(axis=1), 0.5 * (distances[:, 1] - distances[:, 0])
+    squared = gyration_squared(half_width, 1.0, offset)[:, None]
+    radius = np.hypot(distances, 1.0)
+    inertia = squared + radius**2
+    p = np.sqrt(radius / inertia * (4.0 / 3.0) * np.hypot(half_width, 1.0)[:, None])
+    kept = squared + 1.0 - np.prod(distances, axis=1, keepdims=True)
+    return p, kept / inertia[:, ::-1]
+
+
+def gyration_squared(half_width: Number, half_height: float, offset: Number) -> Number:
+    """Square of the radius of gyration, m^2, of a rectangle whose centre of mass is off the middle of its width."""
+    return (half_width * half_width + half_height * half_height) / 3.0 - offset * offset

@@ -4,24 +4,31 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final, Never
+from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
-from rocking.block.body import KINDS, Bodies, ContactLaw, Coordinate
-from rocking.block.limits import checked_gravity, checked_length, checked_mass, checked_pair, checked_parameter
-from rocking.block.restitution import housner_restitution
-from rocking.block.rigid_body import contact_forces, gyration_squared, refusal, rigid_bodies
-from rocking.block.sides import Side, even_sides, in_line, restitutions, sides_on_pivots
-from rocking.core import checks, svg
+from rocking.block.body import KINDS, Bodies, Body, Coordinate
+from rocking.block.sides import (
+    Side,
+    checked_gravity,
+    checked_length,
+    checked_mass,
+    checked_pair,
+    checked_parameter,
+    gyration_squared,
+    housner_restitution,
+    in_line,
+    no_body,
+    restitutions,
+    rigid_bodies,
+    sides_on_pivots,
+)
+from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
 from rocking.core.constants import MODELS, STANDARD_GRAVITY, Model
 from rocking.errors import InvalidBlock, InvalidOption, UnequalSides
-
-if TYPE_CHECKING:
-    from rocking.block.restrained import RestrainedBlock
-    from rocking.block.restraints import Restraint
 
 #: The coordinate of every block.
 ROTATION: Final = Coordinate("rotation", "angular_velocity", "angular_acceleration", "rad", "slenderness")
@@ -30,16 +37,33 @@ ROTATION: Final = Coordinate("rotation", "angular_velocity", "angular_accelerati
 _ROUNDING: Final = 1e-12
 #: Restitutions so near are one: that of a body, from p and alpha or from itself.
 _SAME_RESTITUTION: Final = 1e-9
-_HEAVIEST_BEAM: Final = 1e12
-#: Longer side of a block's picture, pixels.
-_PICTURED: Final = 120.0
 
 
-@dataclass(frozen=True)
-class Block:
+class Rocking:
+    """What free and restrained blocks share: text, the stops, and the arrays of one."""
+
+    def __str__(self: Body) -> str:
+        """Return description and parameters in one line."""
+        return f"{self.description}; {in_line(self.sides)}"
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self}>"
+
+    @property
+    def stops(self) -> tuple[float, float]:
+        """Rotation at which it stands, for each side: zero."""
+        return 0.0, 0.0
+
+    def alone(self) -> Bodies:
+        """Return `Blocks` of which it is the only one."""
+        return KINDS["blocks"].of([self])
+
+
+@dataclass(frozen=True, repr=False)
+class Block(Rocking):
     """A free-standing rigid block that rocks without sliding or bouncing.
 
-    Made from the sizes of a rectangular block here, or by `from_parameters`, `from_pivots` and `from_frame`.
+    Made from the sizes of a rectangular block here, or by `from_parameters` and `from_pivots`.
 
     Parameters
     ----------
@@ -55,7 +79,7 @@ class Block:
         By default the one that conserves angular momentum about the new pivot: without an offset Housner's,
         1 - 1.5 sin(alpha)^2.
     mass : float, optional
-        Mass, kg; it only scales forces and moments of inertia.
+        Mass, kg; it only scales forces.
     gravity : float
         Acceleration of gravity, m/s^2.
 
@@ -92,7 +116,7 @@ class Block:
 
     def __init__(
         self,
-        *unnamed: Never,
+        *,
         half_width: float | None = None,
         half_height: float | None = None,
         width: float | None = None,
@@ -102,13 +126,6 @@ class Block:
         mass: float | None = None,
         gravity: float = STANDARD_GRAVITY,
     ) -> None:
-        if unnamed:
-            shown = ", ".join(map(checks.shown, unnamed))
-            raise InvalidBlock(
-                f"the sizes of a block are given by name, not as {shown}: {{}} and {{}} "
-                "for the full sizes, {} and {} for half of them, in m",
-                "width", "height", "half_width", "half_height",
-            )  # fmt: skip
         b, h = _half_sizes((half_width, half_height), (width, height))
         g = checked_gravity(gravity)
         text = f"rectangular block, {2 * b:.5g} m x {2 * h:.5g} m"
@@ -122,13 +139,11 @@ class Block:
             )
         if s == 0.0:
             alpha = math.atan2(b, h)
-            sides = even_sides(
-                g, math.hypot(b, h), alpha, restitution, housner_restitution(alpha), _perhaps_swapped(b, h)
-            )
+            radius, e = math.hypot(b, h), restitutions(restitution, (housner_restitution(alpha),) * 2)
+            p = math.sqrt(0.75 * g / radius)
+            sides = Side(p, alpha, e[0], radius), Side(p, alpha, e[1], radius)
         else:
-            sides = sides_on_pivots(
-                (b - s, b + s), h, gyration_squared(b, h, s), g, restitution, _perhaps_swapped(b, h)
-            )
+            sides = sides_on_pivots((b - s, b + s), h, gyration_squared(b, h, s), g, restitution)
             text += f", centre of mass {abs(s):.5g} m off its middle to side {'+' if s > 0.0 else '-'}"
         self._fill(sides, g, text, mass, (b, h, s))
 
@@ -144,13 +159,9 @@ class Block:
         for side in sides:
             checked_parameter(side.p, "p", origin=" (from the sizes)")
             checked_parameter(side.alpha, "alpha", origin=" (from the sizes)")
-        if mass is not None:
-            mass = checked_mass(mass)
-            first, second = (replace(side, inertia=mass * gravity * side.radius / side.p**2) for side in sides)
-            sides = first, second
-        names = ("sides", "gravity", "description", "mass", "half_width", "half_height", "offset")
-        for name, value in zip(names, (sides, gravity, description, mass, *rectangle), strict=True):
-            object.__setattr__(self, name, value)
+        mass = None if mass is None else checked_mass(mass)
+        self.__dict__.update(sides=sides, gravity=gravity, description=description, mass=mass)
+        self.__dict__.update(zip(("half_width", "half_height", "offset"), rectangle, strict=True))
         return self
 
     def _rows(self) -> list[tuple[float, ...]]:
@@ -191,13 +202,12 @@ class Block:
         Raises
         ------
         InvalidBlock
-            If a parameter is out of its range, or without a restitution no rigid body has these sides, or p and alpha
-            have too few digits to tell it to 0.05.
+            If a parameter is out of its range, or without a restitution no rigid body has these sides.
 
         Notes
         -----
-        Depth h and radius of gyration k of the body follow from R_i = h/cos(alpha_i), g R_i/p_i^2 = k^2 + R_i^2. Sides
-        that agree to the digits that they are given to (three at least) count as equal. (Derived in the documentation.)
+        Depth h and radius of gyration k of the body follow from R_i = h/cos(alpha_i), g R_i/p_i^2 = k^2 + R_i^2: from
+        differences of the sides, so that p and alpha need many digits. (Derived in the documentation.)
 
         Examples
         --------
@@ -216,14 +226,12 @@ class Block:
         if rates[0] == rates[1] and angles[0] == angles[1]:
             e = restitutions(restitution, (housner_restitution(angles[0]),) * 2)
         else:
-            both = np.array([rates]), np.array([angles])
-            found = rigid_bodies(*both)
-            if restitution is None and (reason := refusal(found, *both)):
-                raise InvalidBlock(reason, "restitution")
-            conserved = found.restitution[0].tolist()
+            kept, depths = rigid_bodies(np.array([rates]), np.array([angles]))
+            conserved, depth = kept[0].tolist(), g * float(depths[0])
+            if restitution is None and math.isnan(conserved[0]):
+                raise InvalidBlock(no_body(np.array(rates), np.array(angles)), "restitution")
             e = restitutions(restitution, conserved)
-            if not found.alike[0] and all(abs(e[i] - conserved[i]) <= _SAME_RESTITUTION for i in range(2)):
-                depth = g * float(found.depth[0])
+            if depth > 0.0 and all(abs(e[i] - conserved[i]) <= _SAME_RESTITUTION for i in range(2)):
                 radii = [depth / math.cos(angle) for angle in angles]
                 k = math.sqrt(max(g * radii[0] / rates[0] ** 2 - radii[0] ** 2, 0.0))
                 text = f"body from its parameters, centre of mass {depth:.4g} m high, radius of gyration {k:.4g} m"
@@ -289,125 +297,6 @@ class Block:
         pivots = f"body on pivots {plus:.5g} m and {minus:.5g} m from its centre of mass, which is {h:.5g} m high"
         return cls.__new__(cls)._fill(sides, g, description or pivots, mass)
 
-    @classmethod
-    def from_frame(
-        cls,
-        *,
-        half_width: float,
-        half_height: float,
-        mass_ratio: float,
-        restitution: float | Sequence[float] | None = None,
-        gravity: float = STANDARD_GRAVITY,
-    ) -> Block:
-        """Solitary block that rocks like a frame: equal columns that carry a freely supported rigid beam.
-
-        Parameters
-        ----------
-        half_width, half_height : float
-            Half the width and half the height of one column, m. All are given by name.
-        mass_ratio : float
-            gamma: mass of the beam over the mass of all columns; 0 is a column alone.
-        restitution : float or pair, optional
-            By default from angular momentum: (1 - 1.5 sin(alpha)^2 + 3 gamma cos(2 alpha))/(1 + 3 gamma).
-        gravity : float
-            Acceleration of gravity, m/s^2.
-
-        Returns
-        -------
-        Block
-            Symmetric.
-
-        Raises
-        ------
-        InvalidBlock
-            If a size is not positive, or the mass ratio is negative.
-
-        Notes
-        -----
-        The frame has the column's slenderness, and R' = R (1 + 3 gamma)/(1 + 2 gamma): a heavier beam makes it
-        more stable (Makris and Vassiliou 2013; derived in the documentation).
-
-        Examples
-        --------
-        >>> column = Block(half_width=0.5, half_height=3.0)
-        >>> frame = Block.from_frame(half_width=0.5, half_height=3.0, mass_ratio=2.0)
-        >>> frame.alpha == column.alpha, round(frame.radius / column.radius, 12)
-        (True, 1.4)
-        """
-        b = checked_length(half_width, "half_width")
-        h = checked_length(half_height, "half_height")
-        g = checked_gravity(gravity)
-        gamma = checks.within(mass_ratio, "mass_ratio", InvalidBlock, 0.0, _HEAVIEST_BEAM)
-        alpha = math.atan2(b, h)
-        radius = math.hypot(b, h) * (1.0 + 3.0 * gamma) / (1.0 + 2.0 * gamma)
-        kept = 1.0 - 1.5 * math.sin(alpha) ** 2 + 3.0 * gamma * math.cos(2.0 * alpha)
-        plus, minus = even_sides(g, radius, alpha, restitution, kept / (1.0 + 3.0 * gamma), _perhaps_swapped(b, h))
-        # The beam moves twice as far as the centres of the columns do.
-        arm = math.hypot(b, h) * (1.0 + 2.0 * gamma) / (1.0 + gamma)
-        sides = replace(plus, arm=arm), replace(minus, arm=arm)
-        text = f"frame of columns {2 * b:.5g} m x {2 * h:.5g} m, mass ratio {gamma:.5g}"
-        return cls.__new__(cls)._fill(sides, g, text)
-
-    @classmethod
-    def one_sided(
-        cls,
-        *restraints: Restraint,
-        lean: float = 0.0,
-        restitution: float | None = None,
-        **sizes: Any,
-    ) -> RestrainedBlock:
-        """Rectangular block that rocks to side + only, as a facade that stands against transverse walls.
-
-        Parameters
-        ----------
-        *restraints : Restraint
-            What holds it back or pushes it: `Thrust` of a vault, `Load`, `Tendon`.
-        lean : float
-            Angle by which it stands out of plumb to side +, rad.
-        restitution : float, optional
-            Factor on the angular speed with which it bounces back to the same side. By default
-            `one_sided_restitution`; measured ones are better.
-        **sizes
-            As of `Block`: `width` and `height`, m, or half of them, `mass`, kg, `gravity`.
-
-        Returns
-        -------
-        RestrainedBlock
-            With one side.
-
-        Examples
-        --------
-        >>> wall = Block.one_sided(width=0.4, height=4.0)
-        >>> round(wall.sides[0].restitution, 4)
-        0.4708
-        """
-        from rocking.block.restrained import RestrainedBlock
-
-        numbers: Any = [each for each in restraints if isinstance(each, (int, float))]
-        # What is given takes the place of the block's own restitution, so that angular momentum need not leave it one.
-        own = None if restitution is None else 1.0
-        block = cls(*numbers, restitution=own, **sizes)
-        return RestrainedBlock(block, *restraints, one_sided=True, lean=lean, restitution=restitution)
-
-    def __str__(self) -> str:
-        """Return description and parameters in one line."""
-        return f"{self.description}; {in_line(self.sides)}"
-
-    def __repr__(self) -> str:
-        return f"<Block: {self}>"
-
-    def _repr_html_(self) -> str:
-        if self.half_width is not None and self.half_height is not None:
-            b, top = self.half_width, 2.0 * self.half_height
-            corners, label = [(-b, 0.0), (b, 0.0), (b, top), (-b, top)], f"{2.0 * b:.4g} m x {top:.4g} m"
-        else:
-            (right, left), (up, _) = zip(
-                *((side.radius * math.sin(side.alpha), side.radius * math.cos(side.alpha)) for side in self.sides),
-                strict=True,
-            )
-            corners, label = [(-left, 0.0), (right, 0.0), (0.0, up)], "pivots and centre of mass"
-        return svg.captioned(f"Block: {self}", svg.outline(corners, _PICTURED, label))
-
     @property
     def p(self) -> float:
         """Frequency parameter, rad/s, of a block whose sides are equal; else ask its `sides`."""
@@ -427,16 +316,6 @@ class Block:
     def restitution(self) -> float:
         """Factor on the angular speed at an impact, of a block whose sides are equal; else ask its `sides`."""
         return self._of_both_sides("restitution")
-
-    @property
-    def inertia(self) -> float | None:
-        """Moment of inertia about the pivot, kg m^2, of a block whose sides are equal; None while `mass` is None."""
-        return None if self.mass is None else self._of_both_sides("inertia")
-
-    @property
-    def minimum_acceleration(self) -> float:
-        """Least ground acceleration that lifts the block, g tan(alpha), m/s^2 (paper, Eq. 1)."""
-        return min(self.uplift_thresholds())
 
     @property
     def is_symmetric(self) -> bool:
@@ -463,34 +342,25 @@ class Block:
         """Rotation of the unstable balance on each side, rad: the slenderness."""
         return self.sides[0].alpha, self.sides[1].alpha
 
-    @property
-    def stops(self) -> tuple[float, float]:
-        """Rotation at which it stands, for each side: zero."""
-        return 0.0, 0.0
-
-    @property
-    def contact(self) -> ContactLaw:
-        """Forces of the ground over the weight, from rotation and ground acceleration (see `rocking.block.body`)."""
-        return self._contact_forces
-
-    def _contact_forces(
+    def contact(
         self,
         motion: tuple[Floats, Floats, Floats],
         ground_over_g: tuple[Floats, Floats],
         side: Integers,
         stretch: Floats,
     ) -> tuple[Floats, Floats]:
-        leaning = np.maximum(side, 0)
-        alpha, arm = (
-            np.array(each)[leaning]
-            for each in zip(*((s.alpha, s.radius if s.arm is None else s.arm) for s in self.sides), strict=True)
-        )
-        sign = np.where(side < 0, 0.0, 1.0 - 2.0 * leaning)
-        return contact_forces(motion, ground_over_g, sign, alpha, arm / self.gravity)
+        """Return the forces of the ground over the weight, horizontal and vertical (see `rocking.block.body`).
 
-    def alone(self) -> Bodies:
-        """Return `Blocks` of which this is the only one."""
-        return KINDS["blocks"].of([self])
+        On side i, with psi = alpha - |theta|, the centre of mass is at x = -i R sin(psi), y = R cos(psi) from the
+        pivot; forces are m (a + x'') and m (g + a_v + y''). At rest they are (a/g, 1 + a_v/g).
+        """
+        leaning, (rotation, velocity, acceleration) = np.maximum(side, 0), motion
+        alpha, radius = np.array([(s.alpha, s.radius) for s in self.sides]).T[:, leaning]
+        sign, over_g = np.where(side < 0, 0.0, 1.0 - 2.0 * leaning), radius / self.gravity
+        psi, towards_pivot, speed = alpha - np.abs(rotation), sign * acceleration, np.abs(sign) * velocity**2
+        horizontal = sign * over_g * (np.cos(psi) * towards_pivot + np.sin(psi) * speed)
+        vertical = over_g * (np.sin(psi) * towards_pivot - np.cos(psi) * speed)
+        return ground_over_g[0] + horizontal, 1.0 + ground_over_g[1] + vertical
 
     def uplift_thresholds(self, model: Model = "nonlinear") -> tuple[float, float]:
         """Ground accelerations, m/s^2, that lift the block to side + (when -a passes the first) and to side -."""
@@ -498,15 +368,12 @@ class Block:
         return self.gravity * steepness(self.sides[0].alpha), self.gravity * steepness(self.sides[1].alpha)
 
 
-def one_block(block: object, needed: str = "a Block") -> Block:
+def one_block(block: object, needed: str = "a free Block") -> Block:
     """Return the block, or say that it is none, and what is needed."""
     if not isinstance(block, Block):
-        how = "make one with Block(width=, height=), in m"
-        if hasattr(block, "restraints"):
-            how = "this is known of free blocks alone"
-        elif hasattr(block, "rose"):
-            how = "block(azimuth) of a Solid is what it is in a plane"
-        raise InvalidBlock(f"{needed} is needed, not a {type(block).__name__}: {how}")
+        raise InvalidBlock(
+            f"{needed} is needed, not a {type(block).__name__}: make one with Block(width=, height=), in m"
+        )
     return block
 
 
@@ -523,11 +390,3 @@ def _half_sizes(
         "a block takes either {} and {}, or {} and {} (the full sizes), all in m",
         "half_width", "half_height", "width", "height",
     )  # fmt: skip
-
-
-def _perhaps_swapped(half_width: float, half_height: float) -> str:
-    """Return what to try first where a block is wider than it is high; else nothing."""
-    if half_width <= half_height:
-        return ""
-    width, height = 2.0 * half_width, 2.0 * half_height
-    return f"it is {width:g} m wide and {height:g} m high, so swap its sizes if that is a slip, or "

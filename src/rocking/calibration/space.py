@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rocking.block import Blocks, housner_restitution
-from rocking.block.rigid_body import eccentric_rectangles
+from rocking.block.sides import eccentric_rectangles
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.errors import InvalidOption

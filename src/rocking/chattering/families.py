@@ -92,7 +92,7 @@ def lobes(block: Block, *, omega: float = 2.0, count: int = 5, model: Model = "n
     >>> import rocking
     >>> block = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
     >>> case = lobes(block, count=3)(1.2, 2.0)
-    >>> round(case.motion.pga / block.minimum_acceleration, 9)
+    >>> round(case.motion.pga / min(block.uplift_thresholds()), 9)
     4.8
     """
     scale = _threshold(block, model)

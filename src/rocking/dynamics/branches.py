@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.block.body import Body, title_of
+from rocking.block.body import Body
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats
 from rocking.core.constants import Model
@@ -220,7 +220,7 @@ class Branch(Result):
                 (each.kind, each.value, float(each.orbit.state[0]) if flat else each.orbit._peak) for each in places
             ],
             labels=(f"{self.name}{unit}", f"{what} ({coordinate.unit})"),
-            title=title or as_written(f"{title_of(body)}, {headline.replace('^2', '²')}"),
+            title=title or as_written(f"{body.description}, {headline.replace('^2', '²')}"),
             ax=ax,
             figsize=figsize,
         )

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rocking.block.body import Body, title_of
+from rocking.block.body import Body
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats
 from rocking.core.constants import Model
@@ -195,7 +195,7 @@ class PeriodicOrbit(Result):
             impact_times=self.response.impacts["time"] / self._map.period,
             states=self.states,
             labels=(f"{coordinate.name} ({coordinate.unit})", f"velocity ({coordinate.unit}/s)"),
-            title=title or as_written(f"{title_of(self.body)}, {self._kind}"),
+            title=title or as_written(f"{self.body.description}, {self._kind}"),
             ax=ax,
             figsize=figsize,
         )

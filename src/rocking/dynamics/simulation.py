@@ -19,7 +19,6 @@ from rocking.errors import InvalidBlock, InvalidOption
 from rocking.motion.motion import Motion
 from rocking.records.named import Motions, one_motion, several_motions
 from rocking.simulation.ensemble import dataset_of, outcomes_of, product_of, setup_of
-from rocking.simulation.peak_changes import BETWEEN_STOPS
 from rocking.simulation.simulate import response_to
 
 if TYPE_CHECKING:
@@ -114,7 +113,6 @@ def simulate_many(
     duration: float | None = None,
     initial_position: float | None = None,
     initial_velocity: float = 0.0,
-    derivatives: bool = False,
     threads: int | None = None,
     progress: bool | None = None,
 ) -> xr.Dataset:
@@ -132,15 +130,13 @@ def simulate_many(
         As for `simulate`; by default of bodies that need not come to rest the end of the longest motion.
     initial_position, initial_velocity : float
         As for `simulate`, for all bodies.
-    derivatives, threads, progress : bool or int, optional
+    threads, progress : int or bool, optional
         As for `rocking.simulate_many`.
 
     Returns
     -------
     xarray.Dataset
-        As `rocking.simulate_many`, with ``peak_position`` (m), the highest. Of derivatives there are peak_by_motion,
-        peak_by_restitution, peak_by_initial_position (per relative change of the distance from the stop) and
-        peak_by_initial_velocity (m); NaN also where the peak is the second stop.
+        As `rocking.simulate_many`, with ``peak_position`` (m), the highest.
 
     Examples
     --------
@@ -163,7 +159,7 @@ def simulate_many(
         kinds = np.flatnonzero(pressed), np.flatnonzero(~pressed)
         options: dict[str, Any] = {
             "chattering": chattering, "initial_position": initial_position, "initial_velocity": initial_velocity,
-            "derivatives": derivatives, "threads": threads, "progress": progress,
+            "threads": threads, "progress": progress,
         }  # fmt: skip
         parts = [simulate_many(gathered.select(kind), motions, **options) for kind in kinds]
         whole = xr.concat(parts, "body", data_vars="all", coords="minimal", compat="override", join="override")
@@ -175,18 +171,15 @@ def simulate_many(
         initial_position = checks.finite(initial_position, "initial_position", InvalidOption)
     product = product_of(gathered, several, None, "factor", "+", "linear", chattering, duration)
     start = initial_position, checks.finite(initial_velocity, "initial_velocity", InvalidOption)
-    by = BETWEEN_STOPS if checks.flag(derivatives, "derivatives", InvalidOption) else None
     setup = replace(setup_of(product), start=start, duration=max(ends) or None)
     names = {"peak_rotation": "peak_position", "residual_rotation": "residual_position", "block": "body"}
-    found = dataset_of(product, outcomes_of(product, setup, threads, progress, by))
+    found = dataset_of(product, outcomes_of(product, setup, threads, progress))
     found = found.drop_vars(["overturned", "leans"]).rename(names)
     found["peak_position"].attrs.update(units="m", long_name="highest position")
     found["residual_position"].attrs.update(units="m", long_name="position at which it stays; NaN where not known")
     found["peak_time"].attrs.update(long_name="time of the highest position")
     for kept in found.values():
         kept.attrs["long_name"] = kept.attrs["long_name"].replace("the block", "the body")
-    for name in by or ():
-        found[name].attrs.update(units="m")
     return found
 
 

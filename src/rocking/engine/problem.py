@@ -9,7 +9,7 @@ from typing import cast
 
 import numpy as np
 
-from rocking.block import Block, Blocks, one_block
+from rocking.block import Block, one_block
 from rocking.block.body import KINDS, Bodies, Body
 from rocking.core import checks
 from rocking.core.arrays import Floats
@@ -56,18 +56,13 @@ def step_of(motion: Motion) -> float | None:
 
 def bodies_of(given: Bodies | Body | Iterable[Body]) -> Bodies:
     """Return bodies as they are, and single ones of one kind as `Bodies` of that kind."""
-    if isinstance(given, type):  # has what its objects have, but is none
-        one_block(given, _NEEDED)
-    if isinstance(given, Bodies):
+    if isinstance(given, Bodies) and not isinstance(given, type):
         return given
-    if isinstance(given, Body):
-        return given.alone()
-    several = list(given) if isinstance(given, Iterable) and not isinstance(given, str) else given
-    if isinstance(several, list) and several and isinstance(several[0], Body) and not isinstance(several[0], type):
-        return KINDS[several[0].alone().kind].of(several)
-    for each in several if isinstance(several, list) else [several]:
-        one_block(each, _NEEDED)
-    return Blocks.of(cast("Iterable[Block]", several))
+    several = isinstance(given, Iterable) and not isinstance(given, (str, Body))
+    bodies = [one_body(each) for each in (cast("Iterable[Body]", given) if several else [cast("Body", given)])]
+    if len(bodies) == 1:
+        return bodies[0].alone()
+    return KINDS[bodies[0].alone().kind if bodies else "blocks"].of(bodies)
 
 
 def slenderness_of(bodies: Bodies) -> Floats:
@@ -126,7 +121,18 @@ def set_start(
     u, v = np.where(at_other, 0.0, sign * from_plus), np.where(at_other, -speed, sign * speed)
     wrong = one_sided & ((u < 0.0) | (facing & (u > records["overturn_angle"])) | ((u == 0.0) & (v < 0.0)))
     if np.any(wrong):
-        _refuse_behind(bodies, int(np.argmax(wrong)), at, speed, u, name)
+        body = bodies[min(k := int(np.argmax(wrong)), len(bodies) - 1)]
+        called, unit = name or f"initial_{body.coordinate.name}", body.coordinate.unit
+        low, high = body.stops
+        where = f"from {low:g} to {high:g} {unit}" if high > low else f"at least {low:g} {unit}"
+        value, fast = (float(np.broadcast_to(each, u.shape)[k]) for each in (at, speed))
+        raise InvalidOption(
+            f"{{}} must be {where}, in front of the body's stop, and {{}} must not lead into it: they are {value:g} "
+            f"{unit} and {fast:g} {unit}/s",
+            called,
+            "initial_velocity",
+            value=value,
+        )
     side = np.where((sign < 0.0) | at_other, 1, 0)
     at_rest = (u == 0.0) & (v == 0.0)
     states["side"] = np.where(at_rest, np.where(facing, -1 - side, state.AT_REST), side)
@@ -163,25 +169,6 @@ def _check_start(
         raise InvalidOption(
             f"{{}} must be below {limit} {kind.unit} in size, not {u:g}{hint}", called, value=coordinate
         )
-
-
-def _refuse_behind(bodies: Bodies, k: int, at: Floats, speed: Floats, u: Floats, name: str | None) -> None:
-    """Refuse to start where body k cannot be, or into its stop."""
-    body = bodies[min(k, len(bodies) - 1)]
-    called = name or f"initial_{body.coordinate.name}"
-    value, fast = (float(np.broadcast_to(each, u.shape)[k]) for each in (at, speed))
-    if u[k] == 0.0:
-        raise InvalidOption(
-            f"{{}} = {fast:g} leads from the stop into it; change its sign, or {{}}",
-            "initial_velocity",
-            called,
-            value=fast,
-        )
-    low, high = body.stops
-    where = f"from {low:g} to {high:g}" if high > low else f"at least {low:g}"
-    raise InvalidOption(
-        f"{{}} must be {where} {body.coordinate.unit}, in front of the body's stop, not {value:g}", called, value=value
-    )
 
 
 def never_rests(bodies: Bodies) -> bool:

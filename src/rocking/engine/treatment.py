@@ -48,10 +48,17 @@ class Treatment(ABC):
     def __init_subclass__(cls) -> None:
         _BY_NAME[cls.name] = cls
 
+    def __post_init__(self) -> None:
+        """Check that all parameters are positive numbers."""
+        unit = "m/s, or of a block fractions of p alpha" if self.unit == "speed" else self.unit
+        for parameter in fields(self):
+            checks.positive(getattr(self, parameter.name), parameter.name, InvalidOption, unit)
+
     @property
-    @abstractmethod
     def label(self) -> str:
         """Short name with the parameter and its unit, for tables and figures."""
+        values = [f" {getattr(self, parameter.name):g}" for parameter in fields(self)]
+        return f"{self.name}{''.join(values)}{' s' if self.unit == 's' else ''}"
 
     @property
     def bracket(self) -> float:
@@ -134,17 +141,13 @@ class AsymptoticTime(Treatment):
         """Chattering time of every side, s; infinite where chattering is not complete."""
         from rocking.kernels.sine.series import eq65_sums
 
-        if motion is None or motion.description.family != "sine":
+        is_sine = motion is not None and motion.description.family == "sine" and motion.vertical is None
+        if not (isinstance(bodies, Blocks) and not bodies.terms and bodies.is_symmetric and motion and is_sine):
             raise InvalidOption(
-                '{} "time" is the scheme for sinusoidal motions (rocking.pulses.sine), not for '
-                f"{'free rocking' if motion is None else f'a motion of family {motion.description.family}'}; "
-                'use "certified"',
+                '{} "time" is the scheme for symmetric blocks under sinusoidal motions (rocking.pulses.sine) without a '
+                'vertical component; use "certified"',
                 "chattering",
             )
-        if motion.vertical is not None:
-            raise InvalidOption('{} "time" knows no vertical motion; use "certified"', "chattering")
-        if not isinstance(bodies, Blocks) or bodies.terms or not bodies.is_symmetric:
-            raise InvalidOption('{} "time" is for symmetric blocks; use "certified"', "chattering")
         parameters, eta = motion.description.parameters, bodies.restitution
         threshold = bodies.alpha if model == "linear" else np.tan(bodies.alpha)
         amplitude = abs(factor * parameters["amplitude"]) / (bodies.gravity * threshold)
@@ -179,14 +182,6 @@ class Certified(Treatment):
 
     tolerance: float = 1e-12
 
-    def __post_init__(self) -> None:
-        checks.positive(self.tolerance, "tolerance", InvalidOption, "s")
-
-    @property
-    def label(self) -> str:
-        """Name and tolerance."""
-        return f"certified {self.tolerance:g} s"
-
     @property
     def bracket(self) -> float:
         """The tolerance."""
@@ -212,14 +207,6 @@ class VelocityThreshold(Treatment):
     unit: ClassVar[str] = "speed"
 
     threshold: float = 5e-10
-
-    def __post_init__(self) -> None:
-        checks.positive(self.threshold, "threshold", InvalidOption, "m/s, or of a block fractions of p alpha")
-
-    @property
-    def label(self) -> str:
-        """Name and threshold."""
-        return f"velocity {self.threshold:g}"
 
     def limits(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
         """Threshold of every side, of a block in rad/s."""
@@ -250,11 +237,6 @@ class GeometricBypass(VelocityThreshold):
 
     threshold: float = 1e-3
 
-    @property
-    def label(self) -> str:
-        """Name and threshold."""
-        return f"bypass {self.threshold:g}"
-
 
 @dataclass(frozen=True)
 class IntervalThreshold(Treatment):
@@ -271,14 +253,6 @@ class IntervalThreshold(Treatment):
     unit: ClassVar[str] = "s"
 
     threshold: float = 1e-9
-
-    def __post_init__(self) -> None:
-        checks.positive(self.threshold, "threshold", InvalidOption, "s")
-
-    @property
-    def label(self) -> str:
-        """Name and threshold."""
-        return f"interval {self.threshold:g} s"
 
     def limits(self, bodies: Bodies, motion: Motion | None, model: Model, factor: float = 1.0) -> Floats:
         """Threshold of every side, s."""
@@ -326,7 +300,17 @@ def critical_amplitudes_by(method: str, omega: Floats, eta: Floats) -> Floats:
     from rocking.kernels.sine.sequence import critical_amplitudes
 
     if method != "exact":
-        warn_outside_fit(method, omega, eta)
+        low, high = FITTED_FREQUENCIES
+        least, most = FITTED_RESTITUTIONS
+        outside: Flags = (omega < low) | (omega > high) | (eta < least) | (eta > most)
+        if outside.any():
+            k = int(np.argmax(outside))
+            warnings.warn(
+                f"Eq. {method[2:]} was fitted for omega from {low:g} to {high:g} and eta from {least:g} to {most:g}; "
+                f'at omega = {omega.flat[k]:g}, eta = {eta.flat[k]:g} it means nothing: use "exact"',
+                OutsideFit,
+                stacklevel=2,
+            )
         fitted: Floats = polynomial.polyval2d(eta, omega, _EQ76 if method == "eq76" else _EQ77)
         return fitted
     found = np.ones(omega.size)
@@ -336,18 +320,3 @@ def critical_amplitudes_by(method: str, omega: Floats, eta: Floats) -> Floats:
         critical_amplitudes(omega[lossy[some]], eta[lossy[some]], here)
         found[lossy[some]] = here
     return found
-
-
-def warn_outside_fit(fit: str, omega: Floats, eta: Floats) -> None:
-    """Warn where one of the paper's fits, "eq76" or "eq77", is asked beyond what it was made for."""
-    low, high = FITTED_FREQUENCIES
-    least, most = FITTED_RESTITUTIONS
-    outside: Flags = (omega < low) | (omega > high) | (eta < least) | (eta > most)
-    if outside.any():
-        k = int(np.argmax(outside))
-        warnings.warn(
-            f"Eq. {fit[2:]} was fitted for omega from {low:g} to {high:g} and eta from {least:g} to {most:g}; "
-            f'at omega = {omega.flat[k]:g}, eta = {eta.flat[k]:g} it means nothing: use "exact"',
-            OutsideFit,
-            stacklevel=3,
-        )

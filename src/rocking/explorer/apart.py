@@ -19,7 +19,7 @@ import numpy as np
 from rocking import errors
 from rocking.errors import InvalidBlock, RockingError
 from rocking.solid.mesh import Region, properties
-from rocking.solid.support import Piece, Sections, sections_of
+from rocking.solid.support import Sections, sections_of
 
 if TYPE_CHECKING:
     from rocking.solid.mesh import Mesh
@@ -70,8 +70,8 @@ def made_of(answer: str | bytes) -> Made:
     made = found["made"]
     arrays = {each: np.array(made[each]) for each in ("support", "centre", "inertia_over_mass")}
     regions = [Region(*each) for each in made["regions"]]
-    pieces = tuple(Piece(section, np.array(corners)) for section, corners in found["pieces"])
-    return {**made, **arrays, "regions": regions}, Sections(np.array(found["heights"]), pieces)
+    hulls = tuple(np.array(corners) for corners in found["hulls"])
+    return {**made, **arrays, "regions": regions}, Sections(np.array(found["heights"]), hulls)
 
 
 def answered(data: bytes) -> dict[str, Any]:
@@ -85,8 +85,8 @@ def answered(data: bytes) -> dict[str, Any]:
     except RockingError as error:
         return {"error": [type(error).__name__, error.message.template, error.message.arguments, error.path]}
     plain = {name: each.tolist() if isinstance(each, np.ndarray) else each for name, each in made.items()}
-    pieces = [(section, np.round(corners, 6).tolist()) for section, corners in sections.pieces]
-    return {"made": plain, "heights": sections.heights.tolist(), "pieces": pieces}
+    hulls = [np.round(corners, 6).tolist() for corners in sections.hulls]
+    return {"made": plain, "heights": sections.heights.tolist(), "hulls": hulls}
 
 
 def _limit_this_process() -> None:

@@ -76,8 +76,8 @@ class Body:
 def described(body: Body, azimuth: float) -> Payload:
     """Return what the page shows of a body: its plan, its rose, and what is said of it; m from its centre of mass."""
     solid, rose = body.solid, body.rose
-    pieces = body.sections.pieces[:: -(-len(body.sections.pieces) // 40)]
-    corners = np.vstack([piece.corners for piece in pieces]) - solid.centre[:2]
+    pieces = body.sections.hulls[:: -(-len(body.sections.hulls) // 40)]
+    corners = np.vstack(pieces) - solid.centre[:2]
     support = solid.support - solid.centre[:2]
     parts = [each.name for each in solid.regions]
     data = solid.rose([azimuth]).data
@@ -100,7 +100,7 @@ def described(body: Body, azimuth: float) -> Payload:
         "acceleration": rose.data.acceleration.values,
         "support": support.ravel(),
         "plan": corners.ravel(),
-        "piece": np.cumsum([len(piece.corners) for piece in pieces], dtype=float),
+        "piece": np.cumsum([len(each) for each in pieces], dtype=float),
     }
     return Payload(header, arrays)
 

@@ -9,7 +9,6 @@ from typing import Final
 import numpy as np
 
 from rocking.block import Block, Load, RestrainedBlock, Thrust
-from rocking.block.rigid_body import rigid_bodies
 from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import Message
@@ -36,9 +35,6 @@ _FEW_GAPS: Final = 0.05
 #: Levels without a unit that look as if they were in g; they are taken for m/s^2.
 _PERHAPS_IN_G: Final = 1.5
 _UNITLESS: Final = re.compile(r"[\d.+-]+(?:e[+-]?\d+)?", re.IGNORECASE)
-
-#: A restitution less certain than this is worth a note.
-_UNCERTAIN: Final = 0.01
 
 #: Largest plausible diagonal of a block, m.
 _LARGEST: Final = 30.0
@@ -188,16 +184,6 @@ def _side_notes(block: Block) -> Iterator[Message | str]:
         yield (
             f"the more slender side has no larger p, {slender.p:g} rad/s, than the other, so that the mass lies as far "
             "from its centre as the pivots do: are the sides of p swapped, or its digits too few?"
-        )
-    p, alpha, restitution = (
-        np.array([[getattr(side, name) for side in block.sides]]) for name in ("p", "alpha", "restitution")
-    )
-    found = rigid_bodies(p, alpha)
-    if np.array_equal(found.restitution, restitution) and found.uncertainty[0] > _UNCERTAIN:
-        yield Message(
-            f"the digits of {{}} and {{}} tell the restitution to +-{found.uncertainty[0]:.1g} only: give more of "
-            "them, or give {}",
-            ("p", "alpha", "restitution"),
         )
 
 

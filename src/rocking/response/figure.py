@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, Unpack, get_a
 
 import numpy as np
 
-from rocking.block.body import title_of
 from rocking.core import checks, svg
 from rocking.core.arrays import Floats, Integers
 from rocking.core.constants import STANDARD_GRAVITY
@@ -43,7 +42,7 @@ _BOUNDARY: Final[dict[str, Any]] = {"color": ABOVE, "linewidth": 0.9, "linestyle
 def titled(response: Simulated) -> str:
     """Return what was simulated, for the title of a figure."""
     shaken = "no motion" if response.motion is None else response.motion.label
-    return as_written(f"{title_of(response.body)} under {shaken}")
+    return as_written(f"{response.body.description} under {shaken}")
 
 
 def active_span(response: Simulated) -> tuple[float, float]:

@@ -1,1 +1,1 @@
-"""One simulation, many simulations, and derivatives of their peaks."""
+"""One simulation, and many."""

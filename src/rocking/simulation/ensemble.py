@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
@@ -26,8 +26,6 @@ from rocking.motion.motion import Motion
 from rocking.motion.piecewise import STRONGEST
 from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
 from rocking.records.named import Motions, names_of, several_motions
-from rocking.response import COUNT, RELATIVE, factors_near
-from rocking.simulation.peak_changes import BETWEEN_STOPS, OF_BLOCKS, By, peak_changes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -65,8 +63,6 @@ TIMES: Final[Mapping[str, tuple[str, str]]] = {
     "first_rest": ("s", "time at which the block first came to rest; 0 if it never did"),
     "last_rest": ("s", "time at which the block last came to rest; 0 if it never did"),
 }
-
-_ROBUST: Final = ("1", "share of the simulation and its repeats within 3e-6 of the motion that overturn")
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +104,7 @@ class Scales:
     def factors(self, motion: Motion) -> Floats:
         """Return the factors that bring a motion to the levels, one for each."""
         with np.errstate(over="ignore"):
-            factors = self.values / measured(self, motion)
+            factors = self.values / (self.measure or FACTOR).positive(motion, motion.name)
             largest = factors.max() * np.abs(motion.coefficients).max()
         if not largest <= STRONGEST:
             motion.scaled(float(factors.max()))  # refused where it is too strong, and not only steep
@@ -191,11 +187,6 @@ def product_of(
     return Product(bodies, shaking, Scales.of(levels, measure), polarity, model, treatment(chattering), duration)
 
 
-def measured(scales: Scales, motion: Motion) -> float:
-    """Return what a motion measures as it is; 1 where scales are factors."""
-    return (scales.measure or FACTOR).positive(motion, motion.name)
-
-
 def setup_of(product: Product, bodies: slice | None = None) -> Setup:
     """Return how to simulate the bodies of a product, or some of them."""
     chosen = product.bodies if bodies is None else product.bodies.select(bodies)
@@ -217,16 +208,15 @@ def dataset_of(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
 
     dimensions = ("motion", "scale", "polarity", "block")
     gone = {"scale": product.scales.measure is None, "polarity": product.polarity != "both"}
-    kept = {**VARIABLES, **TIMES, "overturned_share": _ROBUST}
-    described = {name: {"units": units, "long_name": meaning} for name, (units, meaning) in kept.items()}
+    described = {
+        name: {"units": units, "long_name": meaning} for name, (units, meaning) in {**VARIABLES, **TIMES}.items()
+    }
     coordinate = product.bodies[0].coordinate if len(product.bodies) else ROTATION
     if coordinate.unit != ROTATION.unit:
         described["peak_rotation"] = {"units": coordinate.unit, "long_name": f"largest {coordinate.name} in size"}
         described["residual_rotation"]["units"] = coordinate.unit
         described["overturned"]["long_name"] = f"whether the {coordinate.name} passed its limit, where it has one"
-    for name, (_, what) in {**OF_BLOCKS, **BETWEEN_STOPS}.items():
-        described[name] = {"units": "rad", "long_name": f"change of the peak per relative change of {what}"}
-    variables = {name: (dimensions, values, described.get(name, {})) for name, values in outcomes.items()}
+    variables = {name: (dimensions, values, described[name]) for name, values in outcomes.items()}
     coordinates = {
         "motion": ("motion", names_of(product.motions)),
         **verticals_of(product.motions),
@@ -275,9 +265,7 @@ def simulate_many(
     measure: MeasureName | Measure = "factor",
     polarity: Polarity = "+",
     duration: float | None = None,
-    derivatives: bool = False,
     times: bool = False,
-    robust: bool = False,
     threads: int | None = None,
     progress: bool | None = None,
 ) -> xr.Dataset:
@@ -300,13 +288,8 @@ def simulate_many(
         Motions as they are, reversed, or both (adds the dimension ``polarity``).
     duration : float, optional
         As for `simulate`.
-    derivatives : bool
-        Whether to differentiate the peaks, which takes some twenty times as long.
     times : bool
         Whether to keep the times of the first uplift and of the first and the last rest.
-    robust : bool
-        Whether to repeat every simulation with the motion scaled by 1 +- 1e-6 and 1 +- 3e-6, as
-        `Response.perturbed` does, which takes five times as long.
     threads, progress : int or bool, optional
         Number of threads, by default one for every core; whether to draw a progress bar, by default if stderr is a
         terminal and the work takes long.
@@ -318,13 +301,8 @@ def simulate_many(
         peak_time (s), impacts (resolved ones: those of a sequence after its proof are not among them), uplifts, rests,
         time_at_rest (s), complete_chattering (whether the block came to rest after its first uplift before the motion
         passed a threshold again), stalled (rests that were not proven), unfinished, stopped (by `duration`, so that
-        overturned is open). With `derivatives` also peak_by_motion, peak_by_p, peak_by_alpha and peak_by_restitution:
-        the change of the peak (rad) per relative change of each of these, as `Response.sensitivity` has it; NaN where
-        there is none, since the block overturns, the simulation was not finished, or rounding decides whether a block
-        that nothing weighs down touches the ground. With `times` also first_uplift, first_rest and last_rest (s; 0 for
-        what never happened). With `robust` also overturned_share, the share of the five simulations that overturn:
-        the outcome is undecided where it is neither 0 nor 1. Coordinates name the motions and hold the blocks'
-        parameters.
+        overturned is open). With `times` also first_uplift, first_rest and last_rest (s; 0 for what never happened).
+        Coordinates name the motions and hold the blocks' parameters.
 
     Notes
     -----
@@ -342,25 +320,8 @@ def simulate_many(
     [[True, False, True, False]]
     """
     product = product_of(blocks, motions, levels, measure, polarity, model, chattering, duration)
-    by = OF_BLOCKS if checks.flag(derivatives, "derivatives", InvalidOption) else None
     names = (*VARIABLES, *(TIMES if checks.flag(times, "times", InvalidOption) else ()))
-    found = outcomes_of(product, setup_of(product), threads, progress, by, names)
-    if checks.flag(robust, "robust", InvalidOption):
-        found["overturned_share"] = _overturned_share(product, found["overturned"], threads, progress)
-    return dataset_of(product, found)
-
-
-def _overturned_share(
-    product: Product, overturned: NDArray[np.generic], threads: int | None, progress: bool | None
-) -> Floats:
-    """Share of each simulation and of those repeated with the motion scaled by factors near 1 that overturn."""
-    shares, near = overturned.astype(float), [factor for factor in factors_near(RELATIVE, COUNT) if factor != 1.0]
-    tasks = (replace(task, factor=factor * task.factor) for task in _tasks(product) for factor in near)
-    with Progress("repeating", len(near) * shares.size, show=progress) as bar:
-        for task, outcomes in simulate_tasks(setup_of(product), tasks, threads=threads):
-            shares[(*task.key, task.bodies)] += outcomes["overturned"]
-            bar.advance(len(outcomes))
-    return shares / COUNT
+    return dataset_of(product, outcomes_of(product, setup_of(product), threads, progress, names))
 
 
 def outcomes_of(
@@ -368,22 +329,14 @@ def outcomes_of(
     setup: Setup,
     threads: int | None,
     progress: bool | None,
-    by: By | None = None,
     names: Iterable[str] = tuple(VARIABLES),
 ) -> dict[str, NDArray[np.generic]]:
-    """Simulate a whole product, and return arrays of its shape by names of `OUTCOME`, and of changes of peaks."""
+    """Simulate a whole product, and return arrays of its shape by names of `OUTCOME`."""
     count = cores() if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
     results: dict[str, NDArray[np.generic]] = {name: np.empty(product.shape, dtype=OUTCOME[name]) for name in names}
-    done = []
     with Progress("simulating", math.prod(product.shape), show=progress) as bar:
         for task, outcomes in simulate_tasks(setup, _tasks(product), threads=count):
             for name, values in results.items():
                 values[(*task.key, task.bodies)] = outcomes[name]
-            if by:
-                done.append((task, outcomes["overturned"]))
             bar.advance(len(outcomes))
-    return (
-        results
-        if by is None
-        else results | peak_changes(setup, done, product.shape, by, threads=count, progress=progress)
-    )
+    return results

@@ -18,14 +18,13 @@ from rocking.motion.processing import sine_cosine
 from rocking.solid import support as polygons
 from rocking.solid.repair import (
     Surface,
-    agreeing,
-    closed,
+    filled,
     is_closed,
     joined,
     moments,
+    one_of,
+    oriented,
     overlaps,
-    signed_volumes,
-    surrounds,
     together,
 )
 
@@ -102,34 +101,15 @@ def parts_of(mesh: Mesh, most: int | None = None) -> Parts:
 
 
 def _read(file: Path, named: str) -> Scene:
-    if file.is_dir():
-        raise InvalidBlock("this is a folder, not a file: name the file in it", path=named)
     if not file.is_file():
         known = f"; the mesh that ships is {', '.join(SHIPPED)}" if not file.suffix else ""
         raise InvalidBlock(f"there is no such file{known}", path=named)
-    if not file.stat().st_size:
-        raise InvalidBlock("this file is empty: export the mesh again", path=named)
     return _loaded(file, named)
 
 
-class _NothingElse:
-    """What a stream may read beside itself: nothing, neither files nor addresses that it names."""
-
-    def __init__(self, file_name: str) -> None:
-        self.file_name = file_name
-
-    def __getitem__(self, other: str) -> bytes:
-        if other == "model.gltf":  # what trimesh looks for where a text is no JSON
-            raise ValueError("it is no JSON")
-        raise InvalidBlock(
-            f"names another file, {checks.shown(other[:60])}, which is not read: export the mesh as one file",
-            path=self.file_name,
-        )
-
-
 def _streamed(stream: BinaryIO, name: str) -> Scene:
-    """Read a stream; a mesh that the format gives no name has the stream's, as one that is read from a path."""
-    scene = _loaded(stream, name, resolver=_NothingElse(name))
+    """Read a stream, and no file or address that it names; a mesh without a name has the stream's, as from a path."""
+    scene = _loaded(stream, name, resolver={})
     if PurePath(name).suffix.lower() in (".ply", ".stl") and len(scene.geometry) == 1:
         (mesh,) = scene.geometry.values()
         scene = type(scene)()
@@ -148,8 +128,6 @@ def _loaded(source: Path | BinaryIO, named: str, **how: Any) -> Scene:
     how |= {"split_objects": True, "split_groups": True, "skip_materials": True, "group_material": False}
     try:
         return trimesh.load_scene(source, file_type=suffix, process=False, **how)
-    except InvalidBlock:
-        raise
     except Exception as error:  # what a reader of foreign files raises is of any kind
         formats = sorted(trimesh.available_formats())
         said = f"it lacks {error}" if isinstance(error, KeyError) else " ".join(str(error).split())
@@ -232,7 +210,7 @@ def properties(
     ground = float(every[:, 2].min())
     every[:, 2] -= ground
     height = float(every[:, 2].max())
-    names, surfaces = _surfaces(parts, density)
+    names, surfaces = _surfaces(parts, density, found.name)
     densities = _densities(density, names, [part.name for part in parts])
     inside = [moments(surface.vertices, surface.faces) for surface in surfaces]
     for name, surface, each in zip(names, surfaces, inside, strict=True):
@@ -262,7 +240,7 @@ def properties(
             for name, surface in zip(names, surfaces, strict=True)
             for sentence in surface.repairs
         ),
-        "notes": (*notes, *overlaps(names, surfaces), *height_notes(height), *density_notes(used)),
+        "notes": (*notes, *overlaps(surfaces), *height_notes(height), *density_notes(used)),
     }
     return made, [surface._replace(vertices=surface.vertices - [0.0, 0.0, ground]) for surface in surfaces]
 
@@ -287,71 +265,36 @@ def _densities(
     return {name: checks.positive(given[name], "density", InvalidBlock, "kg/m^3") for name in names}
 
 
-def _surfaces(parts: Sequence[Part], density: float | Mapping[str, float] | None) -> tuple[list[str], list[Surface]]:
+def _surfaces(
+    parts: Sequence[Part], density: float | Mapping[str, float] | None, file: str
+) -> tuple[list[str], list[Surface]]:
     """Close the surfaces of the parts, and name them; open ones of one density are joined before."""
     names = [part.name for part in parts]
-    found = [agreeing(joined(part.vertices, part.faces)) for part in parts]
+    found = [joined(file, part.vertices, part.faces) for part in parts]
     is_open = [not is_closed(surface.faces) for surface in found]
     if not isinstance(density, Mapping) and sum(is_open) > 1:
         some = [part for part, each in zip(parts, is_open, strict=True) if each]
-        rest = _one_of([Surface(part.vertices, part.faces) for part in some])
+        rest = one_of([Surface(part.vertices, part.faces) for part in some])
         kept = [k for k, each in enumerate(is_open) if not each]
         names = [*(names[k] for k in kept), " + ".join(part.name for part in some)]
-        found = [*(found[k] for k in kept), agreeing(joined(rest.vertices, rest.faces))]
+        found = [*(found[k] for k in kept), joined(file, rest.vertices, rest.faces)]
     given = density if isinstance(density, Mapping) else {}
-    cavities = _cavities(found, [name not in given for name in names])
-    whole = [_one_of([surface, *(found[k] for k, n in cavities.items() if n == j)]) for j, surface in enumerate(found)]
-    left = [k for k in range(len(found)) if k not in cavities]
-    return [names[k] for k in left], [closed(whole[k]) for k in left]
-
-
-def _one_of(surfaces: Sequence[Surface]) -> Surface:
-    """Return one surface of several."""
-    starts = np.cumsum([0, *(len(each.vertices) for each in surfaces)])
-    faces = np.vstack([each.faces + start for each, start in zip(surfaces, starts[:-1], strict=True)])
-    repairs = tuple(sentence for each in surfaces for sentence in each.repairs)
-    return Surface(np.vstack([each.vertices for each in surfaces]), faces, repairs)
-
-
-def _cavities(surfaces: Sequence[Surface], may: Sequence[bool]) -> dict[int, int]:
-    """Numbers of closed surfaces that are cavities, if they may be, each with that of the smallest one around it."""
-    if len(surfaces) == 1:
-        return {}
-    volumes = [float(signed_volumes(*each[:2]).sum()) for each in surfaces]
-    if max(volumes) <= 0.0 or min(volumes) >= 0.0:
-        return {}
-    volumes = [volume if is_closed(each.faces) else 0.0 for volume, each in zip(volumes, surfaces, strict=True)]
-    found = {}
-    for k, surface in enumerate(surfaces):
-        around = [
-            n
-            for n, volume in enumerate(volumes)
-            if may[k] and volume * volumes[k] < 0.0 and abs(volume) > abs(volumes[k])
-            and surrounds(*surfaces[n][:2], *surface[:2])
-        ]  # fmt: skip
-        if around:
-            found[k] = min(around, key=lambda n: abs(volumes[n]))
-    for k in sorted(found, key=lambda n: -abs(volumes[n])):
-        if found[k] in found:  # what is in a cavity is a body again
-            del found[k]
-    return found
+    whole = oriented([filled(each) for each in found], [name not in given for name in names])
+    left = [k for k, each in enumerate(whole) if len(each.faces)]
+    return [names[k] for k in left], [whole[k] for k in left]
 
 
 def _support(corners: Floats, given: ArrayLike | None, tolerance: float, path: str) -> tuple[Floats, tuple[str, ...]]:
     """Support polygon, and notes on it, of a mesh whose lowest corner is at height zero."""
-    outline = polygons.hull(corners[:, :2])
     if given is not None:
         polygon = polygons.given_polygon(given)
-        beyond = 0.0
-        if outline is not None:
-            facing, distances = polygons.edges(outline - outline[0])
-            beyond = float(np.max((polygon - outline[0]) @ polygons.directions(facing).T - distances))
-        if outline is None or beyond > 1e-6 * float(np.ptp(corners, axis=0).max()):
-            (west, south, _), (east, north, _) = corners.min(axis=0), corners.max(axis=0)
+        (west, south), (east, north) = corners[:, :2].min(axis=0), corners[:, :2].max(axis=0)
+        beyond = float(max(np.max([west, south] - polygon), np.max(polygon - [east, north])))
+        if beyond > 1e-6 * float(np.ptp(corners, axis=0).max()):
             raise InvalidBlock(
-                f"{{}} reaches {beyond:.3g} m beyond the outline of the mesh, from {west:.4g} m to {east:.4g} m in the "
-                f"east and {south:.4g} m to {north:.4g} m in the north; its corners are (east, north) in m, in the "
-                "mesh's own coordinates",
+                f"{{}} reaches {beyond:.3g} m beyond the mesh, from {west:.4g} m to {east:.4g} m in the east and "
+                f"{south:.4g} m to {north:.4g} m in the north; its corners are (east, north) in m, in the mesh's own "
+                "coordinates",
                 "support",
             )
         return polygon, ()

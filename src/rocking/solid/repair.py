@@ -6,7 +6,7 @@ What is inside a surface is known where its triangles make a cycle: every edge i
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -32,47 +32,82 @@ def is_closed(faces: Integers) -> bool:
     return not len(_open_edges(faces))
 
 
-def joined(vertices: Floats, faces: Integers) -> Surface:
+def joined(name: str, vertices: Floats, faces: Integers) -> Surface:
     """Join corners at one place; leave out triangles that are none then, or are there already."""
-    from scipy.spatial import cKDTree
-
     low = vertices.min(axis=0)
     size = float(np.max(vertices.max(axis=0) - low))
     if not size > 0.0:
         raise InvalidBlock("all corners of the mesh are at one place")
-    places, at, index = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
-    near = components(len(places), cKDTree(places).query_pairs(1e-8 * size, output_type="ndarray"))
-    _, first, of_place = np.unique(near, return_index=True, return_inverse=True)
-    first = at[first]
-    three = of_place.reshape(-1)[index.reshape(-1)][faces]
-    whole = (three[:, 0] != three[:, 1]) & (three[:, 1] != three[:, 2]) & (three[:, 2] != three[:, 0])
-    kept = three[whole]
+    places = np.rint((vertices - low) / (1e-8 * size))
+    _, first, of_place = np.unique(places, axis=0, return_index=True, return_inverse=True)
+    three = of_place.reshape(-1)[faces]
+    kept = three[(three[:, 0] != three[:, 1]) & (three[:, 1] != three[:, 2]) & (three[:, 2] != three[:, 0])]
     # Each begins with its least corner, so that those of one orientation are equal.
     turned = np.take_along_axis(kept, (np.argmin(kept, axis=1)[:, None] + np.arange(3)) % 3, axis=1)
-    unique = np.sort(np.unique(turned, axis=0, return_index=True)[1])
-    repairs = []
-    if not whole.all():
-        repairs.append(f"{counted(int(np.sum(~whole)), 'face')} without area left out")
-    if len(unique) < len(kept):
-        repairs.append(f"{counted(len(kept) - len(unique), 'face')} that came twice left out")
-    return Surface(vertices[first], kept[unique], tuple(repairs))
+    kept = kept[np.sort(np.unique(turned, axis=0, return_index=True)[1])]
+    edges, _, _, pairs = _shared(kept)
+    if np.any(edges[pairs[:, 0], 0] == edges[pairs[:, 1], 0]):
+        raise InvalidBlock(
+            "normals of neighbouring triangles point to different sides of the surface: orient them alike, as MeshLab "
+            "does by re-orienting all faces coherently",
+            path=name,
+        )
+    left_out = len(faces) - len(kept)
+    said = (f"{counted(left_out, 'face')} without area, or there twice, left out",) if left_out else ()
+    return Surface(vertices[first], kept, said)
 
 
-def agreeing(surface: Surface) -> Surface:
-    """Turn triangles to agree with their neighbours."""
-    vertices, faces, repairs = surface
-    turned = _against_neighbours(faces)
-    if not turned.any():
-        return surface
-    said = f"{counted(int(turned.sum()), 'face')} turned to agree with the neighbours"
-    return Surface(vertices, np.where(turned[:, None], faces[:, ::-1], faces), (*repairs, said))
+def one_of(surfaces: Sequence[Surface]) -> Surface:
+    """Return one surface of several."""
+    starts = np.cumsum([0, *(len(each.vertices) for each in surfaces)])
+    faces = np.vstack([each.faces + start for each, start in zip(surfaces, starts[:-1], strict=True)])
+    repairs = tuple(sentence for each in surfaces for sentence in each.repairs)
+    return Surface(np.vstack([each.vertices for each in surfaces]), faces, repairs)
 
 
-def closed(surface: Surface) -> Surface:
-    """Fill the holes of a surface whose triangles agree, and turn its normals outwards."""
-    vertices, faces, filled = _filled(surface.vertices, surface.faces)
-    faces, outward = _outward(vertices, faces)
-    return Surface(vertices, faces, (*surface.repairs, *filled, *outward))
+def oriented(surfaces: Sequence[Surface], hollow: Sequence[bool]) -> list[Surface]:
+    """Turn the normals of closed surfaces outwards; a piece in a larger one whose normals point into it is a cavity.
+
+    It goes to the surface around it, where it is another one only if ``hollow`` says so; what is left may be empty.
+    """
+    labels = [shells_of(each.faces) for each in surfaces]
+    of, shells = _pieces(surfaces, labels)
+    volumes = np.array([float(signed_volumes(*each[:2]).sum()) for each in shells])
+    sizes, owner = np.abs(volumes), of.copy()
+    against = volumes * volumes[np.argmax(sizes)] < 0.0
+    is_cavity = np.zeros(len(shells), bool)
+    for n in np.flatnonzero(against):
+        larger = np.flatnonzero(~against & (sizes > sizes[n]) & ((of == of[n]) | hollow[of[n]]))
+        if around := [m for m in larger if surrounds(*shells[m][:2], *shells[n][:2])]:
+            is_cavity[n], owner[n] = True, of[min(around, key=lambda m: sizes[m])]
+    flipped = np.where(is_cavity, volumes > 0.0, volumes < 0.0)
+    found = []
+    for k, (vertices, faces, repairs) in enumerate(surfaces):
+        own, label = of == k, labels[k]
+        faces = np.where(flipped[own][label][:, None], faces[:, ::-1], faces)[owner[own][label] == k]
+        cavities = np.flatnonzero(is_cavity & (owner == k) & ~own)
+        turned = [Surface(shells[n].vertices, shells[n].faces[:, :: -1 if flipped[n] else 1]) for n in cavities]
+        said = _said(sizes[is_cavity & (owner == k)], flipped[own & ~is_cavity])
+        found.append(one_of([Surface(vertices, faces, (*repairs, *said)), *turned]))
+    return found
+
+
+def _pieces(surfaces: Sequence[Surface], labels: Sequence[Integers]) -> tuple[Integers, list[Surface]]:
+    """Return the closed pieces of surfaces from the labels of their triangles, and of which surface each is."""
+    of = [(k, n) for k, label in enumerate(labels) for n in range(int(label.max(initial=-1)) + 1)]
+    pieces = [Surface(surfaces[k].vertices, surfaces[k].faces[labels[k] == n]) for k, n in of]
+    return np.array([k for k, _ in of]), pieces
+
+
+def _said(cavities: Floats, flipped: Flags) -> Iterator[str]:
+    """Sentences on cavities, m^3, and on the other pieces of a surface that were turned, or not."""
+    if flipped.all() and len(flipped):
+        yield "normals pointed inwards: the surface was turned inside out"
+    if len(cavities):
+        said = "1 cavity" if len(cavities) == 1 else f"{len(cavities)} cavities"
+        yield f"{said} of {cavities.sum():.3g} m^3 taken as hollow"
+    if flipped.any() and not flipped.all():
+        yield f"{counted(int(flipped.sum()), 'separate surface')} turned inside out"
 
 
 def _edges(faces: Integers) -> Integers:
@@ -98,31 +133,6 @@ def components(count: int, pairs: Integers) -> Integers:
     return np.asarray(connected_components(links, directed=False)[1], dtype=np.int64)
 
 
-def _against_neighbours(faces: Integers) -> Flags:
-    """Which triangles to turn, so that neighbours pass their edge in opposite senses; the fewest of each component.
-
-    Every triangle stands in a graph twice, as it is and turned; neighbours are linked as they agree. Where both of one
-    triangle are connected, the surface has one side only.
-    """
-    edges, _, _, pairs = _shared(faces)
-    one, other = pairs.T
-    agree = edges[one, 0] != edges[other, 0]
-    n = len(faces)
-    if agree.all():
-        return np.zeros(n, bool)
-    left, right = one // 3, other // 3
-    crossed = np.where(agree, 0, n)
-    links = np.vstack([np.column_stack([left, right + crossed]), np.column_stack([left + n, right + n - crossed])])
-    label = components(2 * n, links)
-    if np.any(label[:n] == label[n:]):
-        raise InvalidBlock("the surface of the mesh has one side only, as a Möbius strip: it encloses nothing")
-    patch = components(n, np.column_stack([left, right]))
-    root = np.unique(patch, return_index=True)[1][patch]
-    turned = label[:n] != label[root]
-    share = np.bincount(patch, weights=turned) / np.bincount(patch)
-    return np.asarray(np.where(share[patch] > 0.5, ~turned, turned))
-
-
 def _open_edges(faces: Integers) -> Integers:
     """Edges that are passed one way more often than the other, in the sense that closes them; shape (k, 2)."""
     edges = _edges(faces)
@@ -132,30 +142,22 @@ def _open_edges(faces: Integers) -> Integers:
     return np.repeat(closing, np.abs(net), axis=0)
 
 
-def _filled(vertices: Floats, faces: Integers) -> tuple[Floats, Integers, tuple[str, ...]]:
+def filled(surface: Surface) -> Surface:
     """Fill every hole with triangles from its edge to the mean of its corners, which is exact where it is flat."""
+    vertices, faces, repairs = surface
     edges = _open_edges(faces)
     if not len(edges):
-        return vertices, faces, ()
+        return surface
     corners, index = np.unique(edges, return_inverse=True)
     hole = components(len(corners), index.reshape(-1, 2))
     count = int(hole.max()) + 1
-    shares = np.bincount(hole)
-    middle = np.column_stack([np.bincount(hole, weights=column) for column in vertices[corners].T]) / shares[:, None]
-    of_edge = hole[index.reshape(-1, 2)[:, 0]]
-    patches = np.column_stack([edges, len(vertices) + of_edge])
-    everything = np.vstack([vertices, middle])
-    area, before = _areas(everything, patches), float(_areas(vertices, faces).sum())
-    # Least-squares planes of the edges: how far these leave them.
-    off = (vertices[corners] - middle[hole])[np.argsort(hole, kind="stable")]
-    each = np.split(off, np.cumsum(shares)[:-1])
-    rough = max(float(np.max(np.abs(rim @ np.linalg.svd(rim, full_matrices=False)[2][-1]))) for rim in each)
-    total = float(area.sum())
-    said = (
-        f"{counted(count, 'hole')} filled, {total:.3g} m^2 or {100.0 * total / (total + before):.2g} % of the surface; "
-        f"their edges are flat to {rough:.2g} m"
-    )
-    return everything, np.vstack([faces, patches]), (said,)
+    middle = np.column_stack([np.bincount(hole, weights=column) for column in vertices[corners].T])
+    everything = np.vstack([vertices, middle / np.bincount(hole)[:, None]])
+    patches = np.column_stack([edges, len(vertices) + hole[index.reshape(-1, 2)[:, 0]]])
+    area, before = _area(everything, patches), _area(vertices, faces)
+    share = 100.0 * area / (area + before)
+    said = f"{counted(count, 'hole')} filled, {area:.3g} m^2 or {share:.2g} % of the surface"
+    return Surface(everything, np.vstack([faces, patches]), (*repairs, said))
 
 
 def shells_of(faces: Integers) -> Integers:
@@ -172,36 +174,9 @@ def shells_of(faces: Integers) -> Integers:
     return np.asarray(np.unique(label, return_inverse=True)[1].reshape(-1), dtype=np.int64)
 
 
-def _areas(vertices: Floats, faces: Integers) -> Floats:
+def _area(vertices: Floats, faces: Integers) -> float:
     one, two, three = (vertices[faces[:, k]] for k in range(3))
-    return np.asarray(0.5 * np.linalg.norm(np.cross(two - one, three - one), axis=1))
-
-
-def _outward(vertices: Floats, faces: Integers) -> tuple[Integers, tuple[str, ...]]:
-    """Turn normals outwards; a surface inside another, whose normals point into it, is a cavity."""
-    label = shells_of(faces)
-    volume = np.bincount(label, weights=signed_volumes(vertices, faces))
-    largest = int(np.argmax(np.abs(volume)))
-    repairs: list[str] = []
-    sign = np.ones(len(volume))
-    if volume[largest] < 0.0:
-        repairs.append("normals pointed inwards: the surface was turned inside out")
-        sign[:] = -1.0
-    cavities, apart = [], 0
-    outer = np.flatnonzero(sign * volume > 0.0)
-    for k in np.flatnonzero(sign * volume < 0.0):
-        around = outer[np.abs(volume[outer]) > abs(volume[k])]
-        if any(surrounds(vertices, faces[label == n], vertices, faces[label == k]) for n in around):
-            cavities.append(abs(float(volume[k])))
-        else:
-            sign[k] *= -1.0
-            apart += 1
-    if cavities:
-        said = "1 cavity" if len(cavities) == 1 else f"{len(cavities)} cavities"
-        repairs.append(f"{said} of {sum(cavities):.3g} m^3 taken as hollow")
-    if apart:
-        repairs.append(f"{counted(apart, 'separate surface')} turned inside out")
-    return np.where(sign[label][:, None] < 0.0, faces[:, ::-1], faces), tuple(repairs)
+    return float(0.5 * np.linalg.norm(np.cross(two - one, three - one), axis=1).sum())
 
 
 def surrounds(vertices: Floats, faces: Integers, other: Floats, others: Integers) -> bool:
@@ -277,63 +252,28 @@ def _middle(vertices: Floats) -> Floats:
     return np.asarray(0.5 * (vertices.min(axis=0) + vertices.max(axis=0)))
 
 
-def overlaps(names: Sequence[str], surfaces: Sequence[Surface]) -> tuple[str, ...]:
-    """Return a sentence on the pieces of a mesh that overlap, by sampling where the boxes around them do."""
-    pieces = [piece for name, surface in zip(names, surfaces, strict=True) for piece in _pieces(name, surface)]
-    used = [each.vertices[np.unique(each.faces)] for each in pieces]
-    ends = [(corners.min(axis=0), corners.max(axis=0)) for corners in used]
+def overlaps(surfaces: Sequence[Surface]) -> tuple[str, ...]:
+    """Return a sentence on what pieces of a mesh have in common, by sampling where the boxes around them overlap.
+
+    Of several closed surfaces with their cavities all go round a place as often as bodies are there.
+    """
+    _, shells = _pieces(surfaces, [shells_of(each.faces) for each in surfaces])
+    corners = [each.vertices[each.faces] for each in shells]
+    ends = [(each.min(axis=(0, 1)), each.max(axis=(0, 1))) for each in corners]
+    pairs = ((np.maximum(a, c), np.minimum(b, d)) for (a, b), (c, d) in itertools.combinations(ends, 2))
     size = max(float(np.max(high - low)) for low, high in ends)
-    boxes = []
-    for (one, first), (other, second) in itertools.combinations(zip(pieces, ends, strict=True), 2):
-        low, high = np.maximum(first[0], second[0]), np.minimum(first[1], second[1])
-        if np.all(high - low > 2e-9 * size):
-            boxes.append((float(np.prod(high - low)), one, other, low, high))
-    found = []
-    for volume, one, other, low, high in sorted(boxes, key=lambda box: -box[0])[:50]:
-        count = min(max(20_000_000 // (len(boxes) * (len(one.faces) + len(other.faces))), 30), 1000)
-        # An additive recurrence fills the box evenly, with no place on a face of a common shape.
-        shares = (0.5 + np.arange(count)[:, None] * 1.2207440846057596 ** -np.arange(1.0, 4.0)) % 1.0
-        within = sum(
-            all(winding(each.vertices, each.faces, place) > 0.75 for each in (one, other))
-            for place in low + shares * (high - low)
-        )
-        if volume * within / count > 1e-4 * min(one.volume, other.volume):
-            found.append((volume * within / count, one.part, other.part))
-    if not found:
+    boxes = [(low, high) for low, high in pairs if np.all(high - low > 2e-9 * size)]
+    if not boxes:
         return ()
-    found.sort(key=lambda pair: -pair[0])
-    said = [
-        f"{f'{one} and {other}' if one != other else f'two pieces of {one}'} overlap in about {common:.2g} m^3"
-        for common, one, other in found[:3]
-    ]
-    more = f", and so do {len(found) - 3} more pairs" if len(found) > 3 else ""
+    low, high = np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)
+    count = min(max(20_000_000 // sum(len(each.faces) for each in surfaces), 30), 1000)
+    # An additive recurrence fills the box evenly, with no place on a face of a common shape.
+    places = low + (0.5 + np.arange(count)[:, None] * 1.2207440846057596 ** -np.arange(1.0, 4.0)) % 1.0 * (high - low)
+    times = np.array([sum(winding(*each[:2], place) for each in surfaces) for place in places])
+    twice = float(np.prod(high - low) * np.mean(np.maximum(np.rint(times) - 1.0, 0.0)))
+    if not twice > 0.0:
+        return ()
     return (
-        f"{', '.join(said)}{more}, which is counted twice: make one surface of the two, cut one out of the other, or, "
-        "if one is a cavity, turn its normals inwards",
+        f"parts or pieces overlap in about {twice:.2g} m^3, which is counted twice: make one surface of them, cut one "
+        "out of the other, or, if one is a cavity, turn its normals inwards",
     )
-
-
-class _Piece(NamedTuple):
-    """A closed surface with its cavities: the part that it is of, its corners, triangles and volume."""
-
-    part: str
-    vertices: Floats
-    faces: Integers
-    volume: float
-
-
-def _pieces(name: str, surface: Surface) -> list[_Piece]:
-    """Part a surface into closed ones whose normals point outwards, each with its cavities."""
-    vertices, faces, _ = surface
-    label = shells_of(faces)
-    volumes = np.bincount(label, weights=signed_volumes(vertices, faces))
-    outer = np.flatnonzero(volumes > 0.0)
-    if len(outer) == 1:
-        return [_Piece(name, vertices, faces, float(volumes.sum()))]
-    members = {int(k): [faces[label == k]] for k in outer}
-    for k in np.flatnonzero(volumes < 0.0):
-        cavity = faces[label == k]
-        around = [n for n, parts in members.items() if winding(vertices, parts[0], vertices[cavity[0, 0]]) > 0.5]
-        for n in around[:1]:
-            members[n].append(cavity)
-    return [_Piece(name, vertices, np.vstack(parts), float(volumes[n])) for n, parts in members.items()]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rocking.block import Block
-from rocking.block.limits import checked_gravity, checked_mass
+from rocking.block.sides import checked_gravity, checked_mass
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
@@ -149,8 +149,7 @@ class Solid(Result):
         Returns
         -------
         Solid
-            With what was repaired: triangles that are turned otherwise than their neighbours, holes, and normals that
-            point inwards; and with notes, as on parts that overlap.
+            With what was repaired: holes, and normals that point inwards; and with notes, as on parts that overlap.
 
         Raises
         ------

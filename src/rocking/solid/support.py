@@ -1,7 +1,7 @@
 """The convex polygon of a body's support, in any direction; horizontal sections of a body, and its outline from them.
 
-Seen along a horizontal axis, each connected piece of a section covers an interval, which its convex hull has as well.
-So hulls at some heights are all that an outline needs, for every azimuth.
+Seen along a horizontal axis, a section covers what its convex hull does, from one end to the other. So hulls at some
+heights are all that an outline needs, for every azimuth.
 """
 
 from __future__ import annotations
@@ -14,17 +14,15 @@ from numpy.typing import ArrayLike
 
 from rocking.core import checks
 from rocking.core.arrays import Floats
-from rocking.errors import InvalidBlock, literal
+from rocking.errors import InvalidBlock
 from rocking.motion.processing import sine_cosine
-from rocking.solid.repair import Surface, components
+from rocking.solid.repair import Surface
 
 #: Corners of a polygon within this part of its size of the outermost one are on one edge with it.
 _ON_EDGE: Final = 1e-6
 
 #: Most bands between sections; each has a section just above its lower end and one just below its upper end.
 _BANDS: Final = 120
-#: Most pieces of a section that are kept apart.
-_PIECES: Final = 24
 
 
 class Extent(NamedTuple):
@@ -67,16 +65,9 @@ def area(polygon: Floats) -> float:
 
 def given_polygon(value: ArrayLike) -> Floats:
     """Return the convex polygon around points that somebody gives, shape (n, 2), or refuse them."""
-    try:
-        points = np.asarray(value, float)
-    except (TypeError, ValueError):
-        points = np.empty(0)
+    points = checks.numbers(value, "support", InvalidBlock)
     if points.ndim != 2 or points.shape[1] != 2 or not np.all(np.isfinite(points)):
-        raise InvalidBlock(
-            f"{{}} must be corners of a polygon, each a finite (east, north) in m, not {literal(checks.shown(value))}",
-            "support",
-            value=value,
-        )
+        raise InvalidBlock("{} must be corners of a polygon, each a finite (east, north) in m", "support", value=value)
     found = hull(points)
     if found is None:
         raise InvalidBlock("{} must have three corners or more that are not on one line", "support")
@@ -101,36 +92,17 @@ def edges(polygon: Floats) -> tuple[Floats, Floats]:
     return azimuth, np.sum(outward * polygon, axis=1)
 
 
-class Piece(NamedTuple):
-    """Convex hull of a connected piece of a section: the number of the section, and corners, m, shape (n, 2)."""
-
-    section: int
-    corners: Floats
-
-
 class Sections(NamedTuple):
-    """Sections in pairs: band k lies between heights 2k and 2k + 1, m; pieces in the order of their sections."""
+    """Sections in pairs: heights (m), and the corners of the convex hull of each (m, shape (n, 2))."""
 
     heights: Floats
-    pieces: tuple[Piece, ...]
+    hulls: tuple[Floats, ...]
 
     def across(self, azimuth: float) -> Floats:
         """Return the outline across an azimuth as trapezoids: heights, ends below and ends above, m, shape (n, 6)."""
-        towards = directions(azimuth)[0]
-        ends: list[list[tuple[float, float]]] = [[] for _ in self.heights]
-        for section, corners in self.pieces:
-            reach = corners @ towards
-            ends[section].append((float(reach.min()), float(reach.max())))
-        rows = []
-        for k in range(0, len(self.heights), 2):
-            low, high = (float(each) for each in self.heights[k : k + 2])
-            below, above = (_united(each) for each in ends[k : k + 2])
-            if len(below) == len(above):
-                rows += [(low, high, *one, *other) for one, other in zip(below, above, strict=True)]
-            else:
-                middle = 0.5 * (low + high)
-                rows += [(low, middle, *one, *one) for one in below] + [(middle, high, *one, *one) for one in above]
-        return np.array(rows).reshape(-1, 6)
+        reach = [corners @ directions(azimuth)[0] for corners in self.hulls]
+        ends = np.array([(each.min(), each.max()) for each in reach])
+        return np.column_stack([self.heights.reshape(-1, 2), ends.reshape(-1, 4)])
 
 
 def sections_of(surfaces: Sequence[Surface]) -> Sections:
@@ -144,47 +116,26 @@ def sections_of(surfaces: Sequence[Surface]) -> Sections:
     within = 1e-6 * np.diff(kept)  # so that a step in the outline stays one
     heights = np.column_stack([kept[:-1] + within, kept[1:] - within]).ravel()
     reach = [(tall.min(axis=1), tall.max(axis=1)) for tall in (each.vertices[each.faces, 2] for each in surfaces)]
-    found = [Piece(k, hull) for k, height in enumerate(heights) for hull in _hulls(surfaces, reach, float(height))]
-    return Sections(np.column_stack([kept[:-1], kept[1:]]).ravel(), tuple(found))
+    hulls = tuple(_section(surfaces, reach, float(height)) for height in heights)
+    return Sections(np.column_stack([kept[:-1], kept[1:]]).ravel(), hulls)
 
 
-def _hulls(surfaces: Sequence[Surface], reach: Sequence[tuple[Floats, Floats]], height: float) -> list[Floats]:
-    """Convex hulls of the pieces of a section; of very many pieces, one around all."""
-    found: list[Floats] = []
+def _section(surfaces: Sequence[Surface], reach: Sequence[tuple[Floats, Floats]], height: float) -> Floats:
+    """Return the convex hull of a section, or a polygon in it that differs by at most 2e-4 of its size."""
+    places = []
     for (vertices, faces, _), (low, high) in zip(surfaces, reach, strict=True):
         cut = faces[(low < height) & (high > height)]
-        if not len(cut):
-            continue
         edges = cut[:, [[0, 1], [1, 2], [2, 0]]]
         is_above = vertices[edges, 2] > height
-        crossed = np.sort(edges[is_above[..., 0] != is_above[..., 1]], axis=1)  # two of each triangle, side by side
-        unique, index = np.unique(crossed, axis=0, return_inverse=True)
-        one, other = vertices[unique[:, 0]], vertices[unique[:, 1]]
+        crossed = np.sort(edges[is_above[..., 0] != is_above[..., 1]], axis=1)
+        one, other = vertices[crossed[:, 0]], vertices[crossed[:, 1]]
         part = (height - one[:, 2]) / (other[:, 2] - one[:, 2])
-        places = one[:, :2] + part[:, None] * (other[:, :2] - one[:, :2])
-        piece = components(len(unique), index.reshape(-1, 2))
-        count = int(piece.max()) + 1
-        if count > _PIECES:
-            piece, count = np.zeros(len(places), np.int64), 1
-        found += [_hull(places[piece == k]) for k in range(count)]
-    return found if len(found) <= _PIECES else [_hull(np.vstack(found))]
-
-
-def _hull(places: Floats) -> Floats:
-    """Return the corners of a hull, or of a polygon in it that differs by at most 2e-4 of its size."""
-    around = hull(places)
+        places.append(one[:, :2] + part[:, None] * (other[:, :2] - one[:, :2]))
+    every = np.vstack(places)
+    if not len(every):  # between pieces that lie apart: no width
+        return surfaces[0].vertices[:1, :2]
+    around = hull(every)
     if around is None:  # on one line: its ends
-        return places[np.lexsort(places.T)[[0, -1]]]
+        return every[np.lexsort(every.T)[[0, -1]]]
     towards = directions(np.arange(0.0, 360.0, 2.0))
     return around if len(around) <= len(towards) else around[np.unique(np.argmax(around @ towards.T, axis=0))]
-
-
-def _united(intervals: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Return intervals that do not meet, from left to right."""
-    found: list[tuple[float, float]] = []
-    for left, right in sorted(intervals):
-        if found and left <= found[-1][1]:
-            found[-1] = (found[-1][0], max(found[-1][1], right))
-        else:
-            found.append((left, right))
-    return found
