@@ -41,7 +41,7 @@ simulate {R} {S} --pga -0.4g | --pga must be above 0, not -0.4g; --scale -1 reve
 simulate {R} {S} --channel 7 | a shipped record is one channel, with its step and units; leave --channel out
 simulate {R} {S} --energy | --energy writes files
 simulate {R} {S} --each | --out
-simulate ridgecrest-clc-91 {S} | did you mean ridgecrest-clc-090?
+simulate ridgecrest-clc-91 {S} | did you mean the shipped record ridgecrest-clc-090?
 simulate {P} --offset 0.1 | needs more than --offset: give --width and --height, or --half-width and --half-height
 simulate {P} {W} --tendon stiffnes=1 | --tendon has no stiffnes; did you mean stiffness?
 simulate {P} {W} --tendon prestress=1 | --tendon needs stiffness

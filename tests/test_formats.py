@@ -5,7 +5,6 @@ import contextlib
 import io
 import os
 import pickle
-import re
 import sys
 import tempfile
 import time
@@ -24,9 +23,9 @@ from rocking import records
 from rocking.analysis.levels import clusters_of
 from rocking.errors import InvalidMotion, RockingError, UnreadableRecord
 from rocking.records import channels, formats, identify, read
-from rocking.records.formats import source, through_obspy, values
+from rocking.records.formats import engine, source, through_obspy
 from rocking.records.formats.channel import even_step, gap_at
-from rocking.records.formats.source import Request, open_source
+from rocking.records.formats.source import Request
 
 GRAVITY = 9.80665
 SERIES = np.array(written.series(1)) / 100.0
@@ -57,14 +56,14 @@ def complaint(path: Path | str, error: type[RockingError] = UnreadableRecord, **
 # The fixtures
 
 
-#: What the fixtures hold that are no records of acceleration: the place and the words of their refusal.
+#: What the fixtures hold that are no records of acceleration: the words of their refusal.
 REFUSED = {
-    "nga.vt2": "line 3: this PEER file holds velocity",
-    "nga.dt2": "line 3: this PEER file holds displacement",
-    "velocity.smc": "line 1: this SMC file holds 'velocity'",
-    "velocity.asc": "line 24: this ESM file holds 'velocity'",
-    "velocity.v2c": "this file holds 'velocity'",
-    "raw.v0c": "this file holds 'raw accel.'",
+    "nga.vt2": "line 4: this PEER AT2 file holds 'velocity'; give the file of the acceleration",
+    "nga.dt2": "line 4: this PEER AT2 file holds 'displacement'",
+    "velocity.smc": "this USGS SMC file holds 'velocity'",
+    "velocity.asc": "this ESM file holds 'velocity'",
+    "velocity.v2c": "this COSMOS file holds 'velocity'",
+    "raw.v0c": "this COSMOS file holds 'raw accel.'",
 }
 
 #: Those of records with a header.
@@ -79,18 +78,12 @@ def test_fixtures_are_what_their_writer_writes() -> None:
 
 
 def test_every_format_has_a_fixture_and_stands_in_the_reference_the_how_to_and_the_docstring() -> None:
-    names: dict[str, str] = {}
-    for fixture in written.fixtures().keys() - REFUSED.keys():
-        opened = open_source(written.FOLDER / fixture)
-        module, found = next((each.__module__, it) for each in formats._RECOGNISERS if (it := each(opened)) is not None)
-        names[found.format] = module
-    without = {each.__module__ for each in formats._RECOGNISERS} - {*names.values()}
-    assert without == {through_obspy.__name__}
+    names = {identify(written.FOLDER / fixture).format for fixture in written.fixtures().keys() - REFUSED.keys()}
+    assert names == {each.name for each in formats.FORMATS} | {"text table"}
     docs = Path(__file__).parents[1] / "docs"
     reference, how_to = (
         (docs / each).read_text("utf-8") for each in ("reference/records.md", "howto/read-a-record.md")
     )
-    assert len(names) >= 8
     for name in names:
         assert f"`{name}`" in reference, name
         for word in name.split("/")[0].split():
@@ -222,18 +215,15 @@ def test_one_channel_is_chosen_by_number_or_name() -> None:
     assert read(written.FOLDER / "nga.at2", channel=1).pga == read(written.FOLDER / "nga.at2").pga
 
 
-def test_the_vertical_motion_is_any_channel_but_the_horizontal_one() -> None:
+def test_the_vertical_motion_is_a_channel_by_its_name_whatever_the_horizontal_one_is() -> None:
     path, single = written.FOLDER / "two.v1", written.FOLDER / "nga.at2"
-    for horizontal in (1, "90 Deg", None):
-        found = formats.read_vertical(path, "Up", Request.checked(None, None, horizontal))
-        assert found.pga == read(path, channel="Up").pga
-    for file, horizontal, said in (
-        (path, 1, "no channel, file or shipped record 'north'; give one of 2 'Up'"),
-        (path, 2, "no channel, file or shipped record 'north'; give one of 1 '90 Deg'"),
-        (single, None, "'north', and this file holds the horizontal motion alone; give the path"),
-    ):
-        with pytest.raises(UnreadableRecord, match=re.escape(said)):
-            formats.read_vertical(file, "north", Request.checked(None, None, horizontal))
+    for several in (False, True):
+        for horizontal in (1, "90 Deg", None):
+            request = Request.checked(None, None, horizontal, several=several)
+            assert formats.chosen(path, request, vertical="Up").motion().pga == read(path, channel="Up").pga
+        for file in (path, single):
+            with pytest.raises(UnreadableRecord, match="no channel, file or shipped record 'north'; give one of 1 '"):
+                formats.chosen(file, Request.checked(several=several), vertical="north")
 
 
 # PEER
@@ -359,11 +349,11 @@ def test_knet_counts_keep_their_offset() -> None:
 @pytest.mark.parametrize(
     ("samples", "seconds", "says"),
     [
-        (200, 3, "line 12: 3 s at 100 Hz make 300 samples but 200 follow; get the whole file again"),
-        (299, 3, "line 12: 3 s at 100 Hz make 300 samples but 299 follow; get the whole file again"),
+        (200, 3, "line 12: the duration says 300 values but 200 follow; get the whole file again"),
+        (299, 3, "line 12: the duration says 300 values but 299 follow; get the whole file again"),
         (300, 3, ""),
         (399, 3, ""),
-        (400, 3, "line 12: 3 s at 100 Hz make 300 samples but 400 follow; remove what does not belong to it"),
+        (400, 3, "line 12: the duration says 300 values but 400 follow; remove what does not belong to it"),
     ],
 )
 def test_knet_lasts_its_whole_seconds_and_less_than_one_more(
@@ -476,7 +466,7 @@ def test_uneven_times_make_an_uneven_motion(file: Callable[[str], Path]) -> None
         ("1\n2\n", {"dt": 0.1}, "line 1: the file does not say its units; give units as one of g, m/s2"),
         ("0 1\n1 2\n1 3\n", {"units": "g"}, "line 3: the time does not increase from the row before"),
         ("0 1\n\n#\n1 2\n-1 3\n", {"units": "g"}, "line 5: the time does not increase from the row before"),
-        ("0 1\n1 2\n2\n", {"units": "g"}, "line 3: columns in this row: 1, in the first: 2"),
+        ("0 1\n1 2\n2\n", {"units": "g"}, "line 3: columns in this row: 1, in others: 2"),
         ("0.1\n0.2\nEND\n", {"units": "g", "dt": 0.1}, "line 3: 'END' is not a number"),
         ("0 1\n0.1 2\n0.2 3\n", {"units": "g", "dt": 0.2}, "line 1: the sampling step is 0.1 s, not dt 0.2 s"),
         (
@@ -488,7 +478,7 @@ def test_uneven_times_make_an_uneven_motion(file: Callable[[str], Path]) -> None
         ('"1,5E-1"\n"2,5E-1"\n', {"units": "g", "dt": 0.1}, "decimal comma"),
         (",512\n,301\n", {"units": "g", "dt": 0.1}, "',512' may be one number with a decimal comma"),
         ("0\n1,5\n2,0\n", {"units": "g", "dt": 0.1}, "line 2: '1,5' is not a number; write decimal points"),
-        ("0 1\n" + 600 * "1 " + "\n", {"units": "g"}, "line 2: this row is 1199 characters long"),
+        ("0 1\n1 2\n" + 600 * "1 " + "\n", {"units": "g"}, "line 3: this row is 1199 characters long"),
         ("0 1\n", {"units": "g"}, "line 1: 1 values are too few"),
         ("1e308\n1e308\n", {"units": "g", "dt": 0.1}, "too large"),
         ("0 1\n1e200 2\n", {"units": "g"}, "the time does not increase"),
@@ -505,7 +495,6 @@ def test_two_columns_of_whole_numbers_are_read_where_a_blank_tells_the_comma_fro
 ) -> None:
     for text in ("0, 5\n1, 7\n2, 6\n", "0 5\n1 7\n2 6\n", "0;5\n1;7\n2;6\n", "0,5,\n1,7,\n2,6,\n"):
         assert read(file(text), units="m/s2").samples[1].tolist() == [5.0, 7.0, 6.0]
-    assert "decimal comma, or two numbers" in identify(file("0,5\n1,7\n2,6\n")).reason
 
 
 @pytest.mark.parametrize(
@@ -609,7 +598,7 @@ def test_a_missing_sample_is_not_even() -> None:
 
 @pytest.mark.cases(fast=4)
 @pytest.mark.parametrize("step", [0.005, 0.0078125, 1.0 / 3.0])
-@pytest.mark.parametrize("printed", [".2f", ".3f", ".4g", ".5g"])
+@pytest.mark.parametrize("printed", [".2f", ".3f"])
 def test_a_step_that_is_given_holds_where_times_are_its_own_with_few_digits(step: float, printed: str, file) -> None:
     exact = 0.5 + step * np.arange(4000)
 
@@ -662,8 +651,8 @@ def test_touching_columns_are_split_as_written(numbers: list[float], per_line: i
     width = max(map(len, text)) + spare
     block = written.rows([number.rjust(width) for number in text], per_line).encode()
     origin = source.Source("f", block, block)
-    layout = values.Layout(per_line, width)
-    found = values.read_values(origin, 0, len(block), layout, values.Stated(len(numbers), 0))
+    layout = engine.Layout(per_line, width)
+    found = engine.read_values(origin, 0, len(block), layout, engine.Stated(len(numbers), 0))
     assert found.tolist() == numbers
 
 
@@ -671,7 +660,7 @@ def test_large_files_are_read_in_pieces_of_the_same_content(
     monkeypatch: pytest.MonkeyPatch, file: Callable[[str], Path]
 ) -> None:
     expected = {name: [c.acceleration.tolist() for c in channels(written.FOLDER / name)] for name in HEADED}
-    monkeypatch.setattr(values, "_CHUNK", 100)
+    monkeypatch.setattr(engine, "_CHUNK", 100)
     for name, accelerations in expected.items():
         assert [c.acceleration.tolist() for c in channels(written.FOLDER / name)] == accelerations
     lines = (written.FOLDER / "esm.asc").read_text().splitlines(keepends=True)
@@ -709,16 +698,15 @@ def test_a_missing_file_a_folder_and_an_empty_file(tmp_path: Path, file: Callabl
     assert read(path).pga == read(str(path)).pga == read(os.fsencode(path)).pga  # type: ignore[arg-type]
 
 
-def test_a_file_that_may_not_be_read(monkeypatch: pytest.MonkeyPatch, file: Callable[[str], Path]) -> None:
+def test_a_file_that_cannot_be_read(monkeypatch: pytest.MonkeyPatch, file: Callable[[str], Path]) -> None:
     path = file("1\n2\n")
+    for error in (PermissionError(13, "Permission denied"), OSError(5, "Input/output error")):
 
-    def refuse(*_: object) -> None:
-        raise PermissionError(13, "Permission denied")
+        def refuse(*_: object, error: OSError = error) -> None:
+            raise error
 
-    monkeypatch.setattr("builtins.open", refuse)
-    assert "may not be read" in complaint(path)
-    monkeypatch.setattr("builtins.open", lambda *_: (_ for _ in ()).throw(OSError(5, "Input/output error")))
-    assert "could not be read (Input/output error)" in complaint(path)
+        monkeypatch.setattr("builtins.open", refuse)
+        assert f"this file could not be read ({error.strerror})" in complaint(path)
     monkeypatch.undo()
     monkeypatch.setattr(source, "SIZE_LIMIT", 2**20)
     assert "larger than 1 MiB" in complaint(file("1\n" * 2**20))
@@ -726,9 +714,9 @@ def test_a_file_that_may_not_be_read(monkeypatch: pytest.MonkeyPatch, file: Call
 
 def test_foreign_files_are_said_to_be_text_or_binary(file: Callable[[bytes], Path]) -> None:
     for byte in set(range(32)) - set(b"\t\n\f\r"):
-        assert f"this is a binary file (byte {byte} at 2)" in complaint(file(b"ab%ccd\n" % byte))
-    assert "this is text in no format known here" in complaint(file(b"Dear reader,\nthere is no record here.\n"))
-    assert "no line of it holds numbers alone" in complaint(file("time (s), acceleration (g)\n"))
+        assert "this is a binary file in no format known here" in complaint(file(b"ab%ccd\n" % byte))
+    for text in (b"Dear reader,\nthere is no record here.\n", b"time (s), acceleration (g)\n"):
+        assert "in no format known here: none of its first 1000 lines holds numbers alone" in complaint(file(text))
 
 
 # ObsPy
@@ -796,10 +784,10 @@ def test_traces_with_gaps_or_without_numbers_are_refused(
     obspy = pytest.importorskip("obspy")
     path = file(waveform("MSEED"))
     gaps = np.ma.masked_array(np.arange(5.0), [False, True, False, False, False])
-    for data, what in ((gaps, "trace 1 has gaps"), (np.array(["a", "b"]), "does not hold plain numbers")):
+    for data in (gaps, np.array(["a", "b"])):
         stream = obspy.Stream([obspy.Trace(data)])
         monkeypatch.setattr(through_obspy, "_traces", lambda *_, stream=stream: stream)
-        assert what in complaint(path, units="g")
+        assert "trace 1 has gaps, or no numbers" in complaint(path, units="g")
 
 
 @pytest.fixture(params=["UTC0", "XXX-9", "XXX+8", "XXX-5:30"])
@@ -929,73 +917,60 @@ VALUES = SERIES.tolist()
 UP = (1, "Up", VALUES)
 KNET = fixture("knet.ns")
 WRONG_COSMOS = written.cosmos([1.5] * 37).replace("      37 acceleration", "      38 acceleration")
-GEONET = "Uncorrected accelerogram 20990101_000000_ABCD_20 Some Institute\nSite ABCD  42 00 00S  172 00 00E\n"
 FURLONG = "ACCELERATION TIME SERIES IN UNITS OF FURLONG"
-
-
-@pytest.mark.parametrize(
-    ("content", "sentence"),
-    [
-        *((fixture(name), sentence) for name, sentence in REFUSED.items()),
-        (fixture("two.v1"), "holds 2 channels; give channel as one of 1 '90 Deg', 2 'Up'"),
-        (written.at2([0.1, -0.2, 0.1], "NPTS=3, DT=.01", FURLONG), "the units 'FURLONG' are not known; give units as"),
-        *((written.at2(VALUES, f"NPTS= {n}, DT= .005"), f"line 4: NPTS says {n} values but 37") for n in (36, 38)),
-        *((written.at2(VALUES, f"NPTS=37, DT={dt} SEC"), "line 4: the sampling step is") for dt in ("0", "1E999")),
-        (written.at2([], "NPTS= 3, DT= .01"), "NPTS says 3 values but 0 follow"),
-        (written.cosmos(FLAGGED), "which here means 'unknown'"),
-        (WRONG_COSMOS.replace("(8F10.5)", "(2F10.5)"), "38 values but 37 follow"),
-        (written.cosmos(LONG, step_ms=-999.0, raw_step=-999.0), "give no sampling step"),
-        (fixture("even.smc", "        37", "        33", lines=slice(-1)) + "  1.7E+38\n", "which means 'unknown'"),
-        (fixture("esm.asc", "UNITS", "NO_UNITS"), "give units as one of"),
-        (KNET.replace("Scale Factor      3920", "Scale Factor      0"), "which is no positive number"),
-        (KNET.replace("100Hz", "fast"), "which is no positive number"),
-        (fixture("knet.ns", lines=slice(-13)), "line 12: 2 s at 100 Hz make 200 samples but 96 follow"),
-        (fixture("knet.ns", lines=slice(15)), "ends within its header"),
-        ("a (g) or (cm/s2)\n0,0\n0.01,2.5\n", "does not say its units"),
-        ("time (s),acc (g)\n0.00,0.1\n0.01,0.2\n0.01,0.1\n0.02,0.0\n", "with too few digits, give dt"),
-        (b"\x93NUMPY\x01\x00" + bytes(64), "Motion.from_samples"),
-        (b"PK\x03\x04" + bytes(64), "save its table as CSV"),
-        (b"\x1f\x8b" + bytes(64), "unpack it"),
-        (GEONET + "Number of points  60    Duration 0.30 s\n", "layout of GeoNet or USC"),
-        ("Response and Fourier Amplitude Spectra\n1 2 3\n", "V3 file of spectra"),
-    ],
-)  # fmt: skip
-def test_what_is_no_record_is_refused(content: str | bytes, sentence: str, file: Callable[..., Path]) -> None:
-    assert sentence in complaint(file(content))
 
 
 @pytest.mark.parametrize(
     ("content", "channel", "sentence"),
     [
+        *((fixture(name), None, sentence) for name, sentence in REFUSED.items()),
+        (fixture("two.v1"), None, "holds 2 channels; give channel as one of 1 '90 Deg', 2 'Up'"),
         (fixture("two.v1"), 3, "no channel 3; give one of 1 '90 Deg', 2 'Up'"),
         (fixture("two.v1"), "", "no channel ''"),
         (written.csmip_v1([UP, (2, *UP[1:])]), "Up", "2 channels are called 'Up'"),
+        (written.at2([0.1, -0.2, 0.1], "NPTS=3, DT=.01", FURLONG), 1, "the units 'FURLONG' are not known; give units"),
+        *((written.at2(VALUES, f"NPTS= {n}, DT= .005"), 1, f"line 4: NPTS says {n} values but 37") for n in (36, 38)),
+        *((written.at2(VALUES, f"NPTS=37, DT={dt} SEC"), 1, "line 4: the sampling step is") for dt in ("0", "1E999")),
+        (written.at2([], "NPTS= 3, DT= .01"), 1, "NPTS says 3 values but 0 follow"),
+        (written.cosmos(FLAGGED), 1, "seems to stand for a missing value"),
+        (WRONG_COSMOS.replace("(8F10.5)", "(2F10.5)"), 1, "38 values but 37 follow"),
+        (written.cosmos(LONG, step_ms=-999.0, raw_step=-999.0), 1, "real headers 34 and 62 give no step"),
+        (fixture("even.smc", "        37", "        33", lines=slice(-1)) + "  1.7E+38\n", 1, "for a missing value"),
+        (fixture("esm.asc", "UNITS", "NO_UNITS"), 1, "give units as one of"),
+        (KNET.replace("Scale Factor      3920", "Scale Factor      0"), 1, "line 14: 'Scale Factor 0(gal)/6182761' "),
+        (KNET.replace("100Hz", "fast"), 1, "line 11: 'Sampling Freq(Hz) fast' gives no positive number"),
+        (fixture("knet.ns", lines=slice(-13)), 1, "line 12: the duration says 200 values but 96 follow"),
+        (fixture("knet.ns", lines=slice(15)), 1, "ends within its header"),
+        ("a (g) or (cm/s2)\n0,0\n0.01,2.5\n", None, "does not say its units"),
+        ("time (s),acc (g)\n0.00,0.1\n0.01,0.2\n0.01,0.1\n0.02,0.0\n", None, "give dt if it is missing or rounded"),
+        *((mark + bytes(64), None, "binary file in no format") for mark in (b"\x93NUMPY\1", b"PK\3\4", b"\x1f\x8b")),
         (fixture("two.v1", lines=slice(31)), 1, "37 values but"),
-        (fixture("two.v1", lines=slice(20)), 1, "ends this channel's header"),
+        (fixture("two.v1", lines=slice(20)), 1, "ends within its header"),
         (fixture("two.v2", lines=slice(49)), 1, "37 values but"),
         (fixture("two.v2", lines=slice(30)), 1, "ends this channel's header"),
         (fixture("two.v2c", lines=slice(52)), 1, "37 values but"),
-        (fixture("two.v2c", lines=slice(16)), 1, "100 values but 20 follow"),
+        (fixture("two.v2c", lines=slice(16)), 1, "ends within its header"),
         (fixture("even.smc", lines=slice(31)), 1, "37 values but"),
         (fixture("even.smc", lines=slice(20)), 1, "ends within its header"),
         (fixture("esm.asc", lines=slice(50)), 1, "NDATA says 37 values but"),
         (fixture("pairs.v1", lines=slice(30)), 1, "74 values but"),
-        (fixture("two.v2c", "(Format v01.20", "(Formt v01.20"), 1, "line 111: a channel's title with"),
+        (fixture("two.v2c", "(Format v01.20", "(Formt v01.20"), 1, "line 111: the title of another channel"),
         (fixture("two.v2c", "velocity pts", "velocity xxx"), 1, "the line with the number of points should"),
-        (fixture("two.v2c", "100 Integer-header", "100 Integr-header"), 1, "a line '... integer-header values follow'"),
-        (fixture("two.v1", "Uncorrected Accel", "Unocrrected Accel"), 1, "Accelerogram' should begin here"),
-        (fixture("two.v1", "at 200 pts", "at two pts"), 1, "the sampling rate 'two' is not a positive number"),
-        (fixture("pairs.v1", "100.005", "100.000"), 1, "the times of the points that follow do not increase"),
+        (fixture("two.v2c", "100 Integer-header", "100 Integr-header"), 1, "a line '... header values follow' should"),
+        (fixture("two.v1", "Uncorrected Accel", "Unocrrected Accel"), 1, "the title of another channel should stand"),
+        (fixture("two.v2", "points of veloc", "pionts of veloc"), 1, "' 37 pio' is not a number"),
+        (fixture("two.v1", "at 200 pts", "at two pts"), 1, "the sampling step is 0 s, but it must be positive"),
+        (fixture("pairs.v1", "100.005", "100.000"), 1, "the time does not increase from the row before"),
         (fixture("two.v2", "accel data equally spaced at  .005", "accel data equally spaced at  .0x5"), 1,
-          "the sampling step '.0x5' is not a number"),
-        (fixture("esm.asc", "NDATA: 37", "NDATA: many"), 1, "line 13: NDATA is 'many', which is no positive number"),
+          "the sampling step is 0 s, but it must be positive"),
+        (fixture("esm.asc", "NDATA: 37", "NDATA: many"), 1, "line 13: 'NDATA: many' gives no positive number"),
         (fixture("knet.ns", "Mag.   ", "Magn.  "), 1, "line 5: the header line 'Mag.' should stand here"),
-        (fixture("even.smc", "         2\n        37", "     20000\n        37"), 1, "20000 comment lines are"),
-        (fixture("even.smc", "  2.0000000E+02", " -2.0000000E+02"), 1, "the sampling rate is -200 per second"),
-        (fixture("even.smc", "  2.0000000E+02", "  1.7000000E+38"), 1, "nor are the values pairs of increasing time"),
+        (fixture("even.smc", "         2\n        37", "     20000\n        37"), 1, "ends within its header"),
+        (fixture("even.smc", "  2.0000000E+02", " -2.0000000E+02"), 1, "the sampling step is -0.005 s"),
+        (fixture("even.smc", "  2.0000000E+02", "  1.7000000E+38"), 1, "the values are no pairs of time"),
     ],
 )  # fmt: skip
-def test_a_channel_that_is_unknown_cut_short_or_damaged_is_refused(content, channel, sentence, file) -> None:
+def test_what_is_no_record_unknown_cut_short_or_damaged_is_refused(content, channel, sentence, file) -> None:
     assert sentence in complaint(file(content), channel=channel)
 
 
@@ -1010,7 +985,7 @@ def test_cosmos_has_the_step_that_fits_the_duration_to_a_second(step_ms, raw_ste
     text = written.cosmos(LONG, step_ms=step_ms, raw_step=raw_step)
     path = file(text.replace("approx   10 secs", f"approx {seconds:4d} secs"))
     if step is None:
-        assert f"2000 points at 0.005 s do not last {seconds} s; correct the header" in complaint(path)
+        assert "give no step at which 2000 points last as stated; correct the header" in complaint(path)
     else:
         assert read(path).step == step
 
@@ -1026,11 +1001,11 @@ def test_what_obspy_may_not_or_cannot_read_is_refused(
         assert complaint(file(content), units="g")
     pickled, pieces = io.BytesIO(), io.BytesIO()
     obspy.Stream([obspy.Trace(np.zeros(9))]).write(pickled, format="PICKLE")
-    assert "nor to ObsPy" in complaint(file(pickled.getvalue()), units="g")
+    assert "in no format known here" in complaint(file(pickled.getvalue()), units="g")
     header = {"station": "X", "channel": "HNE", "delta": 0.01}
     traces = [obspy.Trace(np.arange(50, dtype=np.int32), header | {"starttime": obspy.UTCDateTime(t)}) for t in (0, 10)]
     obspy.Stream(traces).write(pieces, format="MSEED")
     assert ".X..HNE is in 2 pieces, with gaps or overlaps" in complaint(file(pieces.getvalue()), units="g")
     monkeypatch.setitem(sys.modules, "obspy", None)
     binary = file(bytes(range(256)) * 3 + b"\n5\n6\n7\n")
-    assert "this is a binary file (byte 0 at 0) in no format known here" in complaint(binary)
+    assert "this is a binary file in no format known here" in complaint(binary)

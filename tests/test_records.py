@@ -108,10 +108,10 @@ def test_the_shipped_files_are_small_and_name_their_sources():
 
 
 def test_an_unknown_name_is_answered_with_a_near_one():
-    with pytest.raises(UnreadableRecord, match="did you mean 'ridgecrest-clc-090'"):
-        records.load("ridgecrest-clc-90")
+    with pytest.raises(UnreadableRecord, match="did you mean the shipped record ridgecrest-clc-090"):
+        read("ridgecrest-clc-90")
     with pytest.raises(UnreadableRecord, match="there are ridgecrest-clc-090, "):
-        records.info("zzz")
+        records.load("zzz")
 
 
 @pytest.mark.parametrize("scale", [1.0, 2.5, 0.5])

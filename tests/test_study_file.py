@@ -148,8 +148,8 @@ factor = [0.5, 1.0] -> sa = 2 | 15 | "sa" needs period
 factor = [0.5, 1.0] -> damping = 0.1 | 15 | damping goes with sa
 polarity = "both" -> polarity = "up" | 16 | polarity must be
 chattering = "certified=1e-9" -> chattering = "slow" | 20 | chattering must be
-["el-centro-meloland-270"] -> ["el-centro-melolnd-270"] | 7 | did you mean el-centro-meloland-270
-["el-centro-meloland-270"] -> [\n"el-centro-meloland-270",\n"nowhere/*.AT2",\n] | 9 | matches this pattern
+["el-centro-meloland-270"] -> ["el-centro-melolnd-270"] | 7 | did you mean the shipped record el-centro-meloland-270
+["el-centro-meloland-270"] -> [\n"el-centro-meloland-270",\n"nowhere/*.AT2",\n] | 9 | matches this name
 ["el-centro-meloland-270"] -> "el-centro-meloland-270" | 7 | records must be a list of texts
 records = ["el-centro-meloland-270"] -> vertical = "el-centro-meloland-up" | 7 | of the records, and there
 [motions] -> [motions]\nskip_unreadable = "no" | 7 | must be true or false

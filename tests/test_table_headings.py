@@ -9,8 +9,7 @@ import pytest
 
 from rocking.errors import UnreadableRecord
 from rocking.inputs.notes import reading_notes, vertical_notes
-from rocking.records.formats import channels, chosen, identify, read
-from rocking.records.formats.source import Request
+from rocking.records.formats import channels, identify, read
 from rocking.records.named import named_motion, named_vertical
 
 G = 9.80665
@@ -111,18 +110,18 @@ REFUSED = [
     ("the letter O", "0.00,O.1\n" + rows(start=1), 1, "'O.1' is not a number"),
     ("a number with a letter", "t;a\n0;0,1x\n" + rows(start=1, sign=";", point=","), 2, "'0.1x' is not a number"),
     ("thousands", "time (s);a (g)\n0;1.234,5\n" + rows(start=1, sign=";"), 2, "'1.234.5' is not a number, in"),
-    ("an empty time", "time (s),a (g)\n,0.1\n" + rows(start=1), 2, "row: 1, in those below: 2"),
+    ("an empty time", "time (s),a (g)\n,0.1\n" + rows(start=1), 2, "row: 1, in others: 2"),
     ("a spreadsheet's error", "time (s),a (g)\n0,#N/A\n" + rows(start=1), 2, "'#N/A' is not a number"),
     ("a spreadsheet's error among rows", "a (g)\n0.1\n#DIV/0!\n0.2\n", 3, "'#DIV/0!' is not a number"),
     ("not a number", "time (s),a (g)\n0,NaN\n" + rows(start=1), 2, "'NaN' is not a finite number"),
     ("a dash", "0 -\n0.01 0.1\n0.02 0.3\n", 1, "'-' is not a number"),
     ("a word for a value", "t (s)\ta (g)\n0\tfaulty\n" + rows(start=1, sign="\t"), 2, "'faulty' is not"),
     ("a word for a time, no heading", "x;0,1\n" + rows(start=1, sign=";"), 1, "'x' is not a number"),
-    ("two damaged rows", "t,a\n0,?\n\n0.01,?\n" + rows(start=2), 2, "'?' is not a number"),
+    ("two damaged rows", "t,a\n0,?\n\n0.01,?\n" + rows(start=2), 4, "'?' is not a number"),
+    ("a damaged time below names", "t (s)  a (g)\nx.csv  0.1\n" + rows(start=1, sign="  "), 2, "'x.csv' is not"),
     ("one damaged number", "a (g)\n0.l\n0.2\n0.3\n", 2, "'0.l' is not a number"),
     ("9999", "time (s),a (g)\n0,0.1\n0.01,9999\n0.02,0.2\n", 3, "9999 seems to stand for a missing value"),
     ("many of -999.9", "a (gal)\n1\n-999.9\n-999.9\n-3\n", 3, "-999.9 seems to stand for a missing value"),
-    ("dates", "Time,a (g)\n2024-01-31 10:00:00.00,0.1\n2024-01-31 10:00:00.01,0.2\n", 2, "write times in seconds"),
     ("an unknown unit of time", "Time (fortnights),a (g)\n" + rows(), 1, "not clear from 'fortnights'"),
     ("a unit of time of something", "Recorded (min)\nTime,a (g)\n" + rows(), 2, "not clear from 'min'"),
     ("a peak in brackets", "# PGA (g) = 0.312\n# Time   Acc\n" + rows(), 3, "the file does not say its units"),
@@ -130,13 +129,13 @@ REFUSED = [
     ("-99", "time (s),a (g)\n0,0.1\n0.01,-99\n0.02,0.2\n", 3, "-99 seems to stand for a missing value"),
     ("24 bits", "time (s),a (gal)\n0,1\n0.01,8388607\n0.02,2\n", 3, "8.38861e+06 seems to stand for a missing value"),
     ("metres", "Time (m),a (g)\n" + rows(), 1, "not clear from 'm'"),
-    ("volts", "Time (s),Sensor (mV)\n" + rows(), 1, "the heading says 'mV', which is no unit of acceleration"),
-    ("velocities", "Time (s),v (cm/s)\n" + rows(), 1, "the heading says 'cm/s'"),
-    ("a factor", "Time (s),a (10^-3 g)\n" + rows(), 1, "the heading says '10^-3 g'"),
-    ("two units", "Time (s),a (g or cm/s2)\n" + rows(), 1, "the heading says 'g or cm/s2'"),
+    ("volts", "Time (s),Sensor (mV)\n" + rows(), 1, "the units 'mV' are not known; give units as one of"),
+    ("velocities", "Time (s),v (cm/s)\n" + rows(), 1, "the units 'cm/s' are not known"),
+    ("a factor", "Time (s),a (10^-3 g)\n" + rows(), 1, "the units '10^-3 g' are not known"),
+    ("two units", "Time (s),a (g or cm/s2)\n" + rows(), 1, "the units 'g or cm/s2' are not known"),
     ("numbers of rows and no times", "Sample,a (g)\n" + wide(COUNT, SAMPLES), 2, "give dt in seconds"),
     ("components and no times", "NS (g),EW (g)\n" + wide(OTHER, SAMPLES), 2, "give dt in seconds"),
-    ("a spectrum", "Period (s),Sa (g)\n" + rows(), 1, "the column 'Period' is that of a spectrum"),
+    ("a spectrum", "Period (s),Sa (g)\n" + rows(), 1, "names no column of accelerations at times ('Period',"),
     ("unnamed columns", "0 1 2\n1 2 3\n2 3 4\n", 1, "each line holds 3 numbers"),
 ]  # fmt: skip
 
@@ -170,9 +169,6 @@ def test_channels_without_times_take_the_step_that_is_given(tmp_path: Path) -> N
     assert (first.name, first.dt, second.name) == ("NS", 0.02, "EW")
     path.write_text("Sample,a (g)\n" + wide(COUNT, SAMPLES))
     assert read(path, dt=0.02).step == 0.02
-    path.write_text("Sample,a (g)\n1,0.1\n2,0.3\n4,0.5\n")
-    with pytest.raises(UnreadableRecord, match="line 4: the number of this row does not follow"):
-        read(path, dt=0.02)
 
 
 def test_units_overrule_what_a_heading_says_and_lines_before_the_rows_may_hold_numbers(tmp_path: Path) -> None:
@@ -185,7 +181,7 @@ def test_units_overrule_what_a_heading_says_and_lines_before_the_rows_may_hold_n
     path.write_text("Time (s),v (cm/s)\n" + rows())
     (channel,) = channels(path, units="g")
     assert channel.metadata["heading units"] == "cm/s"
-    assert identify(path).reason == "from line 2 on each line holds two numbers, between them a comma"
+    assert identify(path).reason == "from line 2 on each line holds 2 numbers, between them a comma"
 
 
 def test_the_first_row_of_a_table_is_among_its_first_1000_lines(tmp_path: Path) -> None:
@@ -196,51 +192,6 @@ def test_the_first_row_of_a_table_is_among_its_first_1000_lines(tmp_path: Path) 
     path.write_text("words of a laboratory\n" * 1000 + rows())
     with pytest.raises(UnreadableRecord, match="none of its first 1000 lines holds numbers alone"):
         read(path, units="g")
-
-
-@pytest.mark.parametrize(
-    "stated",
-    """SAMPLING INTERVAL (sec) : 0.01  Sampling rate: 100 Hz  sampling frequency (Hz),100  dt = 0.01 s  DT 0.0100
-Time step (s) = .01  Samples/sec=100  100 samples per second  100 sps  Delta t = 10 ms  time_step: 1.0E-02
-EQUALLY SPACED INTERVALS OF: 0.010 SEC  INTERVALO DE MUESTREO, C1-C6 (s) : /0.01/0.01/0.01
-VEL. DE MUESTREO, C1-C6 (muestras/s) : /100/100/100  Sampling period 1/100 s""".replace("\n", "  ").split("  "),
-)
-@pytest.mark.parametrize("columns", [1, 3])
-def test_a_step_that_a_heading_states_is_not_contradicted(stated: str, columns: int, tmp_path: Path) -> None:
-    path = tmp_path / "table.txt"
-    names = "N-S (gal)  E-W (gal)  U-D (gal)\n" if columns == 3 else ""
-    path.write_text(f"A STATION\n{stated}\n{names}" + wide(*[SAMPLES] * columns, sign="  "))
-    channel = 1 if columns == 3 else None
-    assert read(path, dt=0.01, units="gal", channel=channel).step == 0.01
-    for several in (False, True):
-        with pytest.raises(UnreadableRecord, match=r"line 2: the heading says .*, not dt 0.02 s; correct one of them"):
-            chosen(path, Request.checked(0.02, "gal", channel, several=several))
-    if columns == 1:
-        with pytest.raises(
-            UnreadableRecord, match=r"no column holds times, but the heading says .*; give dt in seconds"
-        ):
-            read(path, units="gal")
-
-
-@pytest.mark.parametrize("dt", [0.0078125, 0.0078, 0.008])
-def test_a_step_that_a_heading_states_may_be_rounded(dt: float, tmp_path: Path) -> None:
-    path = tmp_path / "table.txt"
-    for stated, refused in (("0.0078", dt == 0.008), ("0.008", False), ("0.01", True), ("1e-9999", True)):
-        path.write_text(f"sampling interval: {stated} s\n" + wide(SAMPLES))
-        if refused:
-            with pytest.raises(UnreadableRecord, match="correct one of them"):
-                read(path, dt=dt, units="g")
-        else:
-            assert read(path, dt=dt, units="g").step == dt
-
-
-@pytest.mark.parametrize(
-    "line", ["Sample 3 of test 12", "low-pass filter 25 Hz", "PGA 0.3 g", "dt", "sampling rate {}"]
-)
-def test_a_number_of_something_else_is_no_step(line: str, tmp_path: Path) -> None:
-    path = tmp_path / "table.txt"
-    path.write_text(f"{line}\n" + wide(SAMPLES))
-    assert read(path, dt=0.02, units="g").step == 0.02
 
 
 def test_even_and_uneven_times_are_in_the_unit_of_their_heading(tmp_path: Path) -> None:
@@ -255,21 +206,13 @@ def test_even_and_uneven_times_are_in_the_unit_of_their_heading(tmp_path: Path) 
         read(path, dt=5.0)
 
 
-@pytest.mark.parametrize("unit", ["cm", "cm/s", "m/s", "mm"])
-def test_a_table_of_displacements_or_velocities_is_refused_without_advice_to_rename_them(tmp_path, unit):
-    path = tmp_path / "other.csv"
-    path.write_text(f"time (s),u ({unit})\n0.00,1\n0.01,2\n0.02,3\n0.03,2\n")
-    with pytest.raises(UnreadableRecord, match=r"no unit of an acceleration; give a table of accelerations$"):
-        read(path)
-
-
 @pytest.mark.parametrize(
     "name", ["time (s)", "Time", "t/ms", "Time in s", "# Zeit, s", "time\n(s)", "t [s]", "Period (s)", "PSA (g)"]
 )
 def test_a_column_of_times_alone_is_not_read_as_accelerations(tmp_path, name):
     path = tmp_path / "times.csv"
     path.write_text(f"{name}\n0.000\n0.005\n0.010\n")
-    with pytest.raises(UnreadableRecord, match=r"names no column of accelerations|is that of a spectrum"):
+    with pytest.raises(UnreadableRecord, match=r"names no column of accelerations"):
         read(path, dt=0.005, units="g")
 
 
@@ -320,19 +263,19 @@ def test_ns_beside_times_is_north_south_and_no_nanoseconds(tmp_path, names):
 def test_components_alone_are_read_with_a_step(tmp_path, names):
     path = tmp_path / "table.csv"
     sign = "," if "," in names else ";" if ";" in names else " "
-    path.write_text(names + "\n" + wide(SAMPLES, OTHER, OTHER[::-1], sign=sign))
+    path.write_text(names + "\n" + wide(SAMPLES, OTHER, [-each for each in OTHER], sign=sign))
     found = channels(path, dt=0.01, units="gal")
     assert [channel.name for channel in found] == [name.strip() for name in re.split("[,; ]", names)]
     assert found[0].acceleration == pytest.approx(0.01 * np.array(SAMPLES), rel=1e-15)
-    with pytest.raises(UnreadableRecord, match=r"no column is named as that of times, and .* or give dt of a table"):
+    with pytest.raises(UnreadableRecord, match="the time does not increase from the row before"):
         channels(path, units="gal")
 
 
 def test_of_a_folder_those_that_say_something_else_keep_it_or_are_refused(tmp_path):
     path = tmp_path / "table.csv"
-    for heading, says in (("t (s),v (cm/s)", "no unit of an acceleration"), ("t (s),a (counts)", "no unit of acc")):
-        path.write_text(heading + "\n" + rows())
-        with pytest.raises(UnreadableRecord, match=says):
+    for unit in ("cm/s", "counts"):
+        path.write_text(f"t (s),v ({unit})\n" + rows())
+        with pytest.raises(UnreadableRecord, match=f"the units '{unit}' are not known"):
             named_motion(str(path), units="g", several=True)
     path.write_text("t (s),a (g)\n0,0\n0.01,1\n0.05,0.5\n0.06,0\n")
     assert named_motion(str(path), dt=0.01, several=True).step is None
@@ -399,7 +342,7 @@ def headings(text: str) -> list[str]:
 def test_a_response_spectrum_is_no_accelerogram(heading: str, periods: list[float], tmp_path: Path) -> None:
     path = tmp_path / "record.csv"
     path.write_text(heading + "\n" + wide(periods, [0.9 / (0.3 + period) for period in periods]), encoding="utf-8")
-    with pytest.raises(UnreadableRecord, match=r"that of a spectrum|seems to be a response spectrum"):
+    with pytest.raises(UnreadableRecord, match=r"names no column of acc|seems to be a response spectrum"):
         read(path)
 
 

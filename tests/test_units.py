@@ -57,7 +57,7 @@ def test_every_unit_of_a_quantity_is_so_much_in_si_units(kind):
 
 
 def test_every_spelling_of_accelerations_and_times_in_records_is_so_much_in_si_units():
-    assert (set(ACCELERATIONS), set(SECONDS)) == (set(units.accelerations()), set(units.times()))
+    assert (set(ACCELERATIONS), set(SECONDS)) == (set(units.ACCELERATIONS), set(units.TIMES))
     for find, factors in ((units.find_unit, ACCELERATIONS), (units.find_time_unit, SECONDS)):
         for spelling, factor in factors.items():
             assert find(spelling).to_si(np.array([2.5])) == pytest.approx(2.5 * factor, rel=1e-15), spelling

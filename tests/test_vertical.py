@@ -114,12 +114,12 @@ def test_a_vertical_component_that_is_not_there_is_refused(run, tmp_path: Path, 
     size = ["--width", "0.5", "--height", "2.0"]
     code, _, err = run("simulate", TWO, *size, "--channel", "1", "--vertical", name)
     assert (code, err.count("\n")) == (2, 1)
-    assert f"there is no channel, file or shipped record {name!r}; give one of 2 'Up'" in err
+    assert f"there is no channel, file or shipped record {name!r}; give one of 1 '90 Deg', 2 'Up'" in err
     alone = tmp_path / "single1.csv"
     alone.write_text("".join(f"{0.01 * k},{0.1 * (-1) ** k}\n" for k in range(300)))
     code, _, err = run("simulate", alone, *size, "--units", "g", "--vertical", name)
     assert (code, err.count("\n")) == (2, 1)
-    assert f"record {name!r}, and this file holds the horizontal motion alone; give the path of the file" in err
+    assert f"record {name!r}; give one of 1 'single1'" in err
     code, _, err = run("simulate", "el-centro-meloland-270", *size, "--vertical", name)
     assert (code, err.count("\n")) == (2, 1)
     assert f"there is no file or shipped record {name!r} for the vertical motion" in err and "has no channels" in err

@@ -14,7 +14,7 @@ from rocking.core.arrays import Floats
 from rocking.core.tables import decimal
 from rocking.errors import InvalidOption, literal
 from rocking.motion.scaling import FACTOR, Measure
-from rocking.records.units import Unit, accelerations, plain_spelling, times
+from rocking.records.units import ACCELERATIONS, TIMES, Unit, plain_spelling
 
 #: What reads one number: its text and the name of the argument that it is of, to SI units.
 Quantity = Callable[[str, str], float]
@@ -52,11 +52,11 @@ UNITS: Final[Mapping[str, Mapping[str, Unit]]] = {
     "length": _LENGTHS,
     "position": _LENGTHS,
     "angle": _ANGLES,
-    "acceleration": {"": _SI, **accelerations()},
+    "acceleration": {"": _SI, **ACCELERATIONS},
     "velocity": _VELOCITIES,
     "frequency": _units(_SI._replace(name="Hz"), Unit("rad/s", 0.5 / math.pi, 1.0)),
     "rate": _RATES,
-    "duration": {"": _SI, **{plain_spelling(each): unit for each, unit in times().items()}},
+    "duration": {"": _SI, **{plain_spelling(each): unit for each, unit in TIMES.items()}},
     "number": {"": _SI},
 }
 

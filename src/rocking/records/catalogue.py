@@ -11,8 +11,7 @@ import json
 import re
 from dataclasses import dataclass
 from importlib import resources
-from importlib.resources.abc import Traversable
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -21,6 +20,8 @@ from rocking.errors import UnreadableRecord
 from rocking.motion.description import Description, Origin
 from rocking.motion.motion import Motion
 from rocking.records.units import choose_unit
+
+_FOLDER: Final = resources.files("rocking.records") / "data"
 
 
 @dataclass(frozen=True)
@@ -105,22 +106,8 @@ def info(name: str) -> Record:
     """
     catalogue = _catalogue()
     if checks.text(name, "name of a shipped record", UnreadableRecord) not in catalogue:
-        close = meant(name)
-        hint = f"did you mean {' or '.join(map(repr, close))}?" if close else f"there are {', '.join(catalogue)}"
-        raise UnreadableRecord(f"no shipped record is named {name!r}: {hint}")
+        raise UnreadableRecord(f"no shipped record is named {name!r}: there are {', '.join(catalogue)}")
     return Record(name=name, **catalogue[name])
-
-
-def meant(name: str) -> tuple[str, ...]:
-    """Return the shipped records that may be meant: one that is like `name`, or a station's horizontal ones."""
-    catalogue = _catalogue()
-    horizontal = [each for each in catalogue if catalogue[each]["direction"] != "up"]
-    begun = tuple(each for each in horizontal if each.startswith(str(name)))
-    stations = {each.rpartition("-")[0]: () for each in horizontal}
-    alike = {station: tuple(each for each in horizontal if each.startswith(station)) for station in stations}
-    alike |= {each: (each,) for each in catalogue}
-    close = checks.nearest(str(name), alike)
-    return begun or (alike[close] if close else ())
 
 
 def load(name: str) -> Motion:
@@ -149,32 +136,23 @@ def load(name: str) -> Motion:
     319.31 s, 0.344 g
     """
     record = info(name)
-    with (_folder() / record.archive).open("rb") as file, np.load(file, allow_pickle=False) as archive:
+    with (_FOLDER / record.archive).open("rb") as file, np.load(file, allow_pickle=False) as archive:
         differences = archive[record.direction].astype(np.int64)
     published = np.cumsum(np.cumsum(differences)) / record.denominator
     facts = (record.event, record.station, f"direction {record.direction}", record.state, record.source)
-    return Motion.from_samples(
-        choose_unit(record.units).to_si(published),
-        record.step,
-        name=name,
-        description=Description(
-            "record",
-            text=f"{'; '.join(facts)}; terms: {record.terms}",
-            origin=Origin(
-                event=record.event,
-                station=record.station,
-                channel=record.direction,
-                azimuth=float(record.direction) if record.direction.isdecimal() else None,
-                units=record.units,
-            ),
-        ),
-    )
+    text = f"{'; '.join(facts)}; terms: {record.terms}"
+    known: dict[str, Any] = {
+        "event": record.event,
+        "station": record.station,
+        "units": record.units,
+        "channel": record.direction,
+    }
+    azimuth = float(record.direction) if record.direction.isdecimal() else None
+    description = Description("record", text=text, origin=Origin(azimuth=azimuth, **known))
+    samples = choose_unit(record.units).to_si(published)
+    return Motion.from_samples(samples, record.step, name=name, description=description)
 
 
 def _catalogue() -> dict[str, dict[str, Any]]:
-    catalogue: dict[str, dict[str, Any]] = json.loads((_folder() / "catalogue.json").read_text("utf-8"))
+    catalogue: dict[str, dict[str, Any]] = json.loads((_FOLDER / "catalogue.json").read_text("utf-8"))
     return catalogue
-
-
-def _folder() -> Traversable:
-    return resources.files("rocking.records") / "data"

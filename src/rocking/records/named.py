@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fnmatch
 import glob
+import itertools
 import os
 import sys
 from collections import Counter
@@ -34,19 +35,17 @@ def one_motion(motion: Motion | None) -> Motion | None:
 
 def several_motions(motions: Motions) -> list[Motion]:
     """Return one motion or several as a list; those of a mapping under its names."""
-    if isinstance(motions, Motion):
-        return [motions]
-    if isinstance(motions, (str, Path, np.ndarray)) or not isinstance(motions, Iterable):
-        raise InvalidMotion(_refusal(motions))
-    gathered = list(motions.values() if isinstance(motions, Mapping) else motions)
+    if isinstance(motions, Mapping):
+        several = several_motions([*motions.values()])
+        return [replace(motion, name=name) for name, motion in zip(motions, several, strict=True)]
+    gathered: list[Any] = [motions]
+    if isinstance(motions, Iterable) and not isinstance(motions, (Motion, str, Path, np.ndarray)):
+        gathered = list(motions)
     if not gathered:
         raise InvalidOption("{} must hold at least one motion", "motions")
     for motion in gathered:
         if not isinstance(motion, Motion):
-            whole = isinstance(motion, (int, float, np.number)) and not isinstance(motion, bool)
-            raise InvalidMotion(_refusal(motions if whole else motion))
-    if isinstance(motions, Mapping):
-        return [replace(motion, name=name) for name, motion in motions.items()]
+            raise InvalidMotion(_refusal(motion))
     return gathered
 
 
@@ -64,43 +63,35 @@ def names_of(motions: Sequence[Motion]) -> list[str]:
 
 
 def numbered(given: Sequence[str]) -> list[str]:
-    """Names, numbered where several are the same."""
+    """Names, numbered where several are the same, by numbers that make no other name."""
     shared = {name for name, count in Counter(given).items() if count > 1}
-    taken, seen = {*given}, Counter[str]()
+    taken = {*given}
     names = []
     for name in given:
-        own = name
-        while name in shared and own in taken:
-            seen[name] += 1
-            own = f"{name} #{seen[name]}"
-        taken.add(own)
-        names.append(own)
+        ways = (f"{name} #{k}" for k in itertools.count(1))
+        names.append(next(each for each in ways if each not in taken) if name in shared else name)
+        taken.add(names[-1])
     return names
 
 
 def distinct_motions(motions: Sequence[Motion]) -> tuple[list[Motion], list[int]]:
     """Motions that differ, and which of them each one is: the same command is often given several times."""
-    places: dict[tuple[bytes, ...], int] = {}
-    distinct: list[Motion] = []
-    which: list[int] = []
+    distinct: dict[tuple[bytes, ...], Motion] = {}
+    keys = []
     for motion in motions:
         parts = [part for part in (motion, motion.vertical) if part is not None]
-        key = tuple(values.tobytes() for part in parts for values in (part.breakpoints, part.coefficients))
-        if key not in places:
-            places[key] = len(distinct)
-            distinct.append(motion)
-        which.append(places[key])
-    return distinct, which
+        keys.append(tuple(values.tobytes() for part in parts for values in (part.breakpoints, part.coefficients)))
+        distinct.setdefault(keys[-1], motion)
+    places = {key: place for place, key in enumerate(distinct)}
+    return [*distinct.values()], [places[key] for key in keys]
 
 
 def _refusal(given: Any) -> str:
     if isinstance(given, (str, Path)):
         how = "rocking.records.load" if str(given) in catalogue.names() else "rocking.read"
         return f'a Motion is needed, not {str(given)!r}: load it with {how}("{given}")'
-    made = "make one with Motion.from_samples(array, dt), in m/s^2 and s"
-    if given is None:
-        return f"a Motion is needed, not None: {made}"
-    return f"a Motion is needed, not a {type(given).__name__}: {made}"
+    kind = "None" if given is None else f"a {type(given).__name__}"
+    return f"a Motion is needed, not {kind}: make one with Motion.from_samples(array, dt), in m/s^2 and s"
 
 
 #: The name of a record that is read from standard input.
@@ -108,52 +99,34 @@ STANDARD_INPUT = "-"
 
 
 def named_motion(
-    name: str,
-    *,
-    vertical: str | None = None,
-    channel: str | None = None,
-    dt: float | None = None,
-    units: str | None = None,
-    scale: float = 1.0,
-    several: bool = False,
+    name: str, *, vertical: str | None = None, scale: float = 1.0, several: bool = False, **about: Any
 ) -> Motion:
     """Motion, times a factor, of a record file ("-" is standard input), or of a shipped record where there is no file.
 
-    With `several`, arguments are for several files: those that say their step and units keep them, and those that hold
-    one channel are taken whatever its name.
+    Its channel, dt and units may be given. With `several`, they are for several files: those that say their step and
+    units keep them, and those that hold one channel are taken whatever its name.
     """
     several = several or (vertical is not None and _stands_alone(vertical))
     if is_shipped(name):
-        if not several:
-            refuse_what_is_known(name, channel=channel, dt=dt, units=units)
+        refuse_what_is_known(name, **({} if several else about))
         motion = catalogue.load(name)
     else:
         file = sys.stdin.buffer if name == STANDARD_INPUT else name
-        motion = formats.chosen(file, Request.checked(dt, units, channel, several=several)).motion()
+        motion = formats.chosen(file, Request.checked(**about, several=several)).motion()
     if vertical is not None:
-        up = named_vertical(vertical, name, channel=channel, dt=dt, units=units, several=several)
-        motion = motion.with_vertical(up)
+        motion = motion.with_vertical(named_vertical(vertical, name, several=several, **about))
     return motion if scale == 1.0 else motion.scaled(scale)
 
 
-def named_vertical(
-    name: str,
-    record: str,
-    *,
-    channel: str | None = None,
-    dt: float | None = None,
-    units: str | None = None,
-    several: bool = False,
-) -> Motion:
+def named_vertical(name: str, record: str, *, several: bool = False, **about: Any) -> Motion:
     """Vertical motion by name: a file or a shipped record of its own, or else a channel of the horizontal file."""
+    about = {key: value for key, value in about.items() if key != "channel"}  # that of the horizontal motion
     if _stands_alone(name):
-        return named_motion(name, dt=dt, units=units, several=True)
+        return named_motion(name, several=True, **about)
     if record == STANDARD_INPUT or not is_there(record):
-        raise UnreadableRecord(
-            f"there is no file or shipped record {name!r} for the vertical motion, and {record} has no channels; check "
-            "the name"
-        )
-    return formats.read_vertical(record, name, Request.checked(dt, units, channel, several=several))
+        text = f"there is no file or shipped record {name!r} for the vertical motion, and {record} has no channels"
+        raise UnreadableRecord(f"{text}; check the name")
+    return formats.chosen(record, Request.checked(**about, several=several), vertical=name).motion()
 
 
 def _stands_alone(vertical: str) -> bool:
@@ -163,11 +136,9 @@ def _stands_alone(vertical: str) -> bool:
 
 def refuse_what_is_known(name: str, **said: object) -> None:
     """Check that nothing is said of a shipped record that it knows itself."""
-    for argument, value in said.items():
-        if value is not None:
-            raise UnreadableRecord(
-                "a shipped record is one channel, with its step and units; leave {} out", argument, path=name
-            )
+    text = "a shipped record is one channel, with its step and units; leave {} out"
+    for argument in (each for each, value in said.items() if value is not None):
+        raise UnreadableRecord(text, argument, path=name)
 
 
 def is_there(name: str | Path) -> bool:
@@ -177,41 +148,25 @@ def is_there(name: str | Path) -> bool:
 
 def is_shipped(name: str) -> bool:
     """Whether a name is that of a shipped record, and not of a file."""
-    if name == STANDARD_INPUT or is_there(name):
-        return False
-    if name in catalogue.names():
-        return True
-    meant = catalogue.meant(name)
-    if meant and not Path(name).suffix:
-        raise UnreadableRecord(
-            f"there is no such file or shipped record; did you mean {' or '.join(meant)}?", path=name
-        )
-    return False
+    return name in catalogue.names() and not is_there(name)
 
 
 def expanded(names: Iterable[str]) -> list[str]:
     """Return the names of records that files, folders, patterns and shipped records stand for, each once."""
-    found: dict[str, None] = {}
-    for name in names:
-        found.update(dict.fromkeys(_files(name)))
-    return list(found)
+    return list(dict.fromkeys(itertools.chain.from_iterable(map(_files, names))))
 
 
 def _files(name: str) -> list[str]:
     if os.path.isdir(name):  # noqa: PTH112 - see `is_there`
-        files = sorted(str(path) for path in Path(name).iterdir() if path.is_file() and not path.name.startswith("."))
-        if not files:
-            raise UnreadableRecord("this folder holds no file; name one that holds records", path=name)
-        return files
-    if not glob.has_magic(name) or is_there(name):
+        found = sorted(str(path) for path in Path(name).iterdir() if path.is_file() and not path.name.startswith("."))
+    elif not glob.has_magic(name) or is_there(name):
         return [name]
-    matching = sorted(path for path in glob.glob(name, recursive=True) if Path(path).is_file())  # noqa: PTH207 - any root
-    matching = matching or fnmatch.filter(catalogue.names(), name)
-    if not matching:
-        raise UnreadableRecord(
-            "no file or shipped record matches this pattern; check the folder and the pattern", path=name
-        )
-    return matching
+    else:
+        found = sorted(path for path in glob.glob(name, recursive=True) if Path(path).is_file())  # noqa: PTH207 - any root
+        found = found or fnmatch.filter(catalogue.names(), name)
+    if not found:
+        raise UnreadableRecord("no file or shipped record matches this name; check the folder and the name", path=name)
+    return found
 
 
 @dataclass(frozen=True)
@@ -242,15 +197,13 @@ class Contents:
         """Return the table for people, with its title."""
         columns = list(self.entries[0])
         # What has no value is the step of samples that are not evenly spaced.
-        rows = [["uneven" if entry[column] is None else entry[column] for column in columns] for entry in self.entries]
-        table = text_table(columns, rows)
-        return f"{self.title}\n\n{table}" if self.title else table
+        rows = [["uneven" if value is None else value for value in entry.values()] for entry in self.entries]
+        return "\n\n".join(filter(None, (self.title, text_table(columns, rows))))
 
     def __repr__(self) -> str:
         names = ", ".join(str(entry["name"]) for entry in self.entries)
-        title = f"{self.title}; " if self.title else ""
         kind = self.kind if len(self.entries) > 1 else self.kind.removesuffix("s")
-        return f"<Contents: {title}{len(self.entries)} {kind}: {names}>"
+        return f"<Contents: {'; '.join(filter(None, (self.title, f'{len(self.entries)} {kind}: {names}')))}>"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the table for machines: the facts, and the entries under their kind."""

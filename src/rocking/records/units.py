@@ -35,7 +35,8 @@ def _by_spelling(units: dict[Unit, str]) -> dict[str, Unit]:
     return {spelling: unit for unit, spellings in units.items() for spelling in spellings.split()}
 
 
-_TIMES = _by_spelling(
+#: Units of time by their spellings.
+TIMES = _by_spelling(
     {
         SECOND: "s sec secs second seconds seg segundos sek sekunden secondes secondi",
         Unit("ms", 1.0, 1e3): "ms msec msecs millis millisecond milliseconds",
@@ -47,8 +48,8 @@ _TIMES = _by_spelling(
     }
 )
 
-#: Spelled without signs: "cm/s^2", "cm/sec/sec" and "cm_s2" are "cms2" or "cmss".
-_ACCELERATIONS = _by_spelling(
+#: Units of acceleration by their spellings without signs: "cm/s^2", "cm/sec/sec" and "cm_s2" are "cms2" or "cmss".
+ACCELERATIONS = _by_spelling(
     {
         Unit("g", STANDARD_GRAVITY, 1.0): "g gs",
         Unit("g/10", STANDARD_GRAVITY, 10.0): "g10",
@@ -67,7 +68,7 @@ _ACCELERATIONS = _by_spelling(
 
 def find_unit(spelling: str) -> Unit | None:
     """Return the unit that one spells "CM/SEC/SEC", "cm/sec2", "cm/s^2", "cm/s²", "cm_s2", "gal", "G", ..., or None."""
-    return _ACCELERATIONS.get(plain_spelling(spelling))
+    return ACCELERATIONS.get(plain_spelling(spelling))
 
 
 def plain_spelling(spelling: str) -> str:
@@ -76,26 +77,15 @@ def plain_spelling(spelling: str) -> str:
     return plain.replace("sec", "s").replace("s-2", "s2")
 
 
-def accelerations() -> dict[str, Unit]:
-    """Return the units of acceleration by their plain spellings."""
-    return dict(_ACCELERATIONS)
-
-
-def times() -> dict[str, Unit]:
-    """Return the units of time by their spellings."""
-    return dict(_TIMES)
-
-
 def find_time_unit(spelling: str) -> Unit | None:
     """Return the unit of time that one spells "ms", "Sec.", "minutes", ..., or None."""
-    return _TIMES.get(spelling.strip().rstrip(".").lower())
+    return TIMES.get(spelling.strip().rstrip(".").lower())
 
 
 def choose_unit(units: str) -> Unit:
     """Return the unit that a user names."""
     unit = find_unit(units) if isinstance(units, str) else None
     if unit is None or unit.name not in CHOICES:
-        raise UnreadableRecord(
-            f"the {{}} {units!r} are not known; give one of {', '.join(CHOICES)}", "units", value=units
-        )
+        text = f"the {{}} {units!r} are not known; give one of {', '.join(CHOICES)}"
+        raise UnreadableRecord(text, "units", value=units)
     return unit

@@ -7,40 +7,21 @@ else is done to them: no filter, no baseline, no offset removed.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import BinaryIO, Final
 
-from rocking.core import checks
 from rocking.errors import UnreadableRecord, install
 from rocking.motion.motion import Motion
-from rocking.records.formats import at2, cosmos, csmip, keyed, smc, table, through_obspy
+from rocking.records.formats import csmip, headed, table, through_obspy
 from rocking.records.formats.channel import Channel, Identification, Recognised
 from rocking.records.formats.source import Request, Source, open_source
 
 __all__ = ["Channel", "Identification", "channels", "identify", "read"]
 
 
-#: In the order in which they are tried; the last two accept what no title claims.
-_RECOGNISERS: Final[tuple[Callable[[Source], Recognised | None], ...]] = (
-    at2.recognise,
-    cosmos.recognise,
-    csmip.recognise,
-    smc.recognise,
-    keyed.recognise_esm,
-    keyed.recognise_knet,
-    table.recognise,
-    through_obspy.recognise,
-)
-
-#: How files begin that hold no record as they are, and what becomes of them.
-_FOREIGN = {
-    b"\x93NUMPY": "an array of NumPy's; load it with numpy.load, and make a motion with Motion.from_samples(array, dt)",
-    b"PK\x03\x04": "a ZIP archive, or a workbook; unpack it, or save its table as CSV",
-    b"\x1f\x8b": "a gzip archive; unpack it",
-    b"\x89HDF": "an HDF5 or NetCDF file; write its acceleration as a text table",
-    b"CDF": "a NetCDF file; write its acceleration as a text table",
-}
+#: The formats with a header, in the order in which they are tried; a new one stands here.
+FORMATS: Final = (headed.AT2, csmip.COSMOS, csmip.V1, csmip.V2, headed.SMC, headed.ESM, headed.KNET)
+#: The last two accept what no header claims.
+_RECOGNISERS: Final = (*(each.recognise for each in FORMATS), table.recognise, through_obspy.recognise)
 
 
 def read(
@@ -94,26 +75,13 @@ def read(
     return chosen(path, Request.checked(dt, units, channel)).motion()
 
 
-def chosen(path: str | os.PathLike[str] | BinaryIO, request: Request) -> Channel:
-    """Return the channel of a record file that `read` makes a motion of."""
+def chosen(path: str | os.PathLike[str] | BinaryIO, request: Request, vertical: str | None = None) -> Channel:
+    """Return the channel of a record file that `read` makes a motion of; or the vertical one, by its name."""
     source = open_source(path)
-    return _choose(source, _recognised(source).read(request), request)
-
-
-def read_vertical(path: str | os.PathLike[str], name: str, request: Request) -> Motion:
-    """Read the channel of a record file that is the vertical motion beside the one that is requested."""
-    source, horizontal = open_source(path), request.channel
     found = _recognised(source).read(request)
-    if _matching(found, name):
-        return _choose(source, found, replace(request, channel=name)).motion()
-    taken = {one.number for one in (found if len(found) == 1 or horizontal is None else _matching(found, horizontal))}
-    beside = [one for one in found if one.number not in taken]
-    unknown = f"there is no channel, file or shipped record {name!r}"
-    if not beside:
-        raise source.error(
-            f"{unknown}, and this file holds the horizontal motion alone; give the path of the file of the vertical one"
-        )
-    raise source.error(f"{unknown}; {_hint(beside, name)}give one of {_listed(beside)}")
+    if vertical is not None:
+        return _choose(source, found, vertical, "channel, file or shipped record")
+    return _choose(source, found, None if request.several and len(found) == 1 else request.channel)
 
 
 def content(path: str | os.PathLike[str] | BinaryIO, request: Request) -> tuple[Identification, list[Channel]]:
@@ -121,8 +89,9 @@ def content(path: str | os.PathLike[str] | BinaryIO, request: Request) -> tuple[
     source = open_source(path)
     recognised = _recognised(source)
     found = recognised.read(request)
-    chosen_ones = found if request.channel is None else [_choose(source, found, request)]
-    return Identification(recognised.format, recognised.reason), chosen_ones
+    if request.channel is not None and not (request.several and len(found) == 1):
+        found = [_choose(source, found, request.channel)]
+    return Identification(recognised.format, recognised.reason), found
 
 
 def channels(path: str | os.PathLike[str], *, dt: float | None = None, units: str | None = None) -> tuple[Channel, ...]:
@@ -191,47 +160,28 @@ def _recognised(source: Source) -> Recognised:
 
 
 def _unknown(source: Source) -> UnreadableRecord:
-    line = source.first_line()
-    if line is not None and "RESPONSE AND FOURIER" in line.text.upper():
-        return source.error("this is a V3 file of spectra; give the V1 or V2 file of the acceleration", line.start)
     if refused := table.refusal(source):
         return refused
-    for mark, foreign in _FOREIGN.items():
-        if source.raw.startswith(mark):
-            return source.error(f"this is {foreign}")
-    position, most = source.binary_at(), table.HEADING_LINES
-    if position is None and not table.is_foreign(source):
-        what = "no line of it holds numbers alone: if it is the heading of a record, get the whole file"
-        if source.data.count(b"\n") >= most:
-            what = f"none of its first {most} lines holds numbers alone: shorten a heading that is longer"
-        return source.error(f"this is text in no format known here, and {what}")
-    what = "this is text" if position is None else f"this is a binary file (byte {source.data[position]} at {position})"
-    if through_obspy.installed():
-        return source.error(f"{what} in no format known here, nor to ObsPy; give a strong-motion record")
-    how = f"if it is MiniSEED, SAC or another format that ObsPy reads, {install('formats')}"
-    return source.error(f"{what} in no format known here; {how}")
+    text = f"this is text in no format known here: none of its first {table.HEADING_LINES} lines holds numbers alone"
+    advice = "get the whole file, and write times in seconds"
+    if source.is_binary:
+        text, advice = "this is a binary file in no format known here", "unpack an archive, save a workbook as CSV"
+    if not through_obspy.installed():
+        advice += f", or if it is MiniSEED, SAC or another format that ObsPy reads, {install('formats')}"
+    return source.error(f"{text}; {advice}")
 
 
-def _listed(found: Sequence[Channel]) -> str:
-    more = f" and {len(found) - 30} more" if len(found) > 30 else ""
-    return ", ".join(channel.label for channel in found[:30]) + more
-
-
-def _choose(source: Source, found: list[Channel], request: Request) -> Channel:
-    listed, wanted = _listed(found), None if request.several and len(found) == 1 else request.channel
+def _choose(source: Source, found: list[Channel], wanted: int | str | None, what: str = "channel") -> Channel:
+    listed = ", ".join(channel.label for channel in found[:30])
+    listed += f" and {len(found) - 30} more" if len(found) > 30 else ""
     if wanted is None and len(found) > 1:
         raise source.error(f"the file holds {len(found)} channels; give {{}} as one of {listed}", None, "channel")
     matching = found if wanted is None else _matching(found, wanted)
     if not matching:
-        raise source.error(f"there is no channel {wanted!r}; {_hint(found, wanted)}give one of {listed}")
+        raise source.error(f"there is no {what} {wanted!r}; give one of {listed}")
     if len(matching) > 1:
         raise source.error(f"{len(matching)} channels are called {wanted!r}; give another name or number of {listed}")
     return matching[0]
-
-
-def _hint(found: list[Channel], wanted: int | str | None) -> str:
-    hint = checks.meant(str(wanted).casefold(), {channel.name.casefold(): repr(channel.name) for channel in found})
-    return hint and f"{hint} "
 
 
 def _matching(found: list[Channel], wanted: int | str) -> list[Channel]:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +14,7 @@ from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import UnreadableRecord
 from rocking.motion.description import Description, Origin
 from rocking.motion.motion import Motion
-from rocking.records.formats.source import Line, Request, Source
+from rocking.records.formats.source import Request, Source
 from rocking.records.units import Unit
 
 #: Even times may be off their grid by this share of the step (or by what the printed decimals round away).
@@ -52,23 +52,15 @@ def even_step(times: Floats) -> float | None:
 
 
 def prints_as(times: Floats, step: float) -> bool:
-    """Whether even times with this step may be printed as `times` are: with so many decimals or significant digits."""
+    """Whether even times with this step may be printed as `times` are, with so many decimals."""
     sizes = np.abs(times)
     if not sizes.max() <= _LATEST or not np.all(np.diff(times) >= 0.0):
         return False
-    off = times - times[0] - step * np.arange(len(times))
     rounding = 4.0 * float(np.spacing(sizes.max()))
-    last = np.full(len(times), _resolution(times, rounding))
-    rounded = last[0] and abs(step / last[0] - round(step / last[0])) > _JITTER
-    if not np.ptp(off) <= (last[0] if rounded else _JITTER * step) + rounding:
-        powers = np.floor(np.log10(np.where(sizes > 0.0, sizes, 1.0)))
-        for digits in range(4, 10):
-            last = 10.0 ** (powers - digits + 1)
-            if np.abs(times / last - np.rint(times / last)).max() <= _JITTER:
-                break
-        if not np.all(np.abs(off) <= 0.5 * _SPREAD * (last + last[0]) + rounding):
-            return False
-    return bool(last.max() <= 10.0 * step)
+    last = _resolution(times, rounding)
+    rounded = last and abs(step / last - round(step / last)) > _JITTER
+    spread = float(np.ptp(times - step * np.arange(len(times))))
+    return spread <= (last if rounded else _JITTER * step) + rounding and last <= 10.0 * step
 
 
 def _resolution(times: Floats, rounding: float) -> float:
@@ -88,16 +80,27 @@ def _simplest_fit(times: Floats, step: float, drift: float, allowed: float) -> f
     return simplest if spread <= allowed else None
 
 
-def step_or_times(source: Source, request: Request, times: Floats, at: int) -> tuple[float | None, Floats | None]:
-    """Return the step (s) of increasing times, or the times where they are uneven; refuse another step."""
-    step = even_step(times) if len(times) > 1 else None
+def timing(
+    source: Source, request: Request, written: Floats, unit: Unit, at: int, row_at: Callable[[int], int] | None = None
+) -> tuple[float | None, Floats | None]:
+    """Return the step (s) of times that are written in a unit, or else the times (s); refuse another step."""
+    times, row_at = unit.to_si(written), row_at or (lambda _: at)
+    fault = first_fault(times)
+    step = even_step(written) if fault is None and len(written) > 1 else None
     if step is not None:
-        return request.step(source, step, at), None
-    if request.dt is None or request.several:
-        return None, times
-    if not prints_as(times, request.dt):
-        raise source.error(f"the times are not evenly {request.dt:g} s apart; leave {{}} out", at, "dt")
-    return request.dt, None
+        return request.step(source, step * unit.multiplier / unit.divisor, at), None
+    given = None if request.several else request.dt
+    if given is not None and prints_as(written, given * unit.divisor / unit.multiplier):
+        return given, None
+    if fault is not None:
+        text = "the time does not increase from the row before; correct it, or give {} if it is missing or rounded"
+        raise source.error(text, row_at(fault), "dt")
+    gap = gap_at(written)
+    if gap is not None:
+        raise missing_value(source, written[gap], row_at(gap))
+    if given is not None:
+        raise source.error(f"the times are not evenly {given:g} s apart; leave {{}} out", at, "dt")
+    return None, times
 
 
 class Identification(NamedTuple):
@@ -163,11 +166,9 @@ class Channel:
     def __repr__(self) -> str:
         taken = f"in steps of {self.dt:g} s" if self.dt is not None else "at uneven times"
         peak = float(np.abs(self.acceleration).max(initial=0.0))
+        peaks = f"peak {peak:.5g} m/s^2 ({peak / STANDARD_GRAVITY:.4g} g)"
         in_file = f", {self.units} in the file" if self.units else ""
-        return (
-            f"<Channel: {self.label}, {len(self.acceleration)} samples {taken}, peak {peak:.5g} m/s^2 "
-            f"({peak / STANDARD_GRAVITY:.4g} g){in_file}>"
-        )
+        return f"<Channel: {self.label}, {len(self.acceleration)} samples {taken}, {peaks}{in_file}>"
 
     @property
     def label(self) -> str:
@@ -190,37 +191,13 @@ class Channel:
         facts = {"event": self.event, "station": self.station, "channel": self.label, "units": self.units}
         text = ", ".join(f"{key} {value}" for key, value in {**self.metadata, **facts}.items() if value)
         name = " ".join(part for part in (self.station, self.name) if part)
-        description = Description("record", text=text, origin=self.origin)
+        known = {key: getattr(self, key) for key in ("event", "station", "number", "azimuth", "units", "start")}
+        known |= {key: self.metadata.get(key.replace("_", " "), "") for key in ("format", "file", "heading_units")}
+        description = Description("record", text=text, origin=Origin(channel=self.name, **known))
         if self.dt is None:
             assert self.times is not None
             return Motion.from_points(self.times, self.acceleration, name=name, description=description)
         return Motion.from_samples(self.acceleration, self.dt, name=name, description=description)
-
-    @property
-    def origin(self) -> Origin:
-        """Origin of the motion, for its description."""
-        return Origin(
-            format=self.metadata.get("format", ""),
-            file=self.metadata.get("file", ""),
-            event=self.event,
-            station=self.station,
-            channel=self.name,
-            number=self.number,
-            azimuth=self.azimuth,
-            units=self.units,
-            heading_units=self.metadata.get("heading units", ""),
-            start=self.start,
-        )
-
-
-def first_match(pattern: re.Pattern[str], lines: Iterable[Line]) -> re.Match[str] | None:
-    """Return what a pattern finds in the first of the lines in which it finds anything."""
-    return next((found for line in lines if (found := pattern.search(line.text))), None)
-
-
-def azimuth_of(name: str) -> float | None:
-    """Return the direction, in degrees clockwise from north, of a component whose name is a number; else None."""
-    return float(name) % 360.0 if re.fullmatch(r"\d{1,3}", name, re.ASCII) else None
 
 
 #: Numbers that files have where a value is missing: nines before and after the point, those of well logs and of SAC,
@@ -238,28 +215,27 @@ def channel_of(
     *,
     spelling: str = "",
     facts: Mapping[str, str] | None = None,
-    row_at: Callable[[int], int | None] | None = None,
+    row_at: Callable[[int], int] | None = None,
     **known: Any,
 ) -> Channel:
     """Return the channel of numbers in a unit, which stand at the offset `at` of a file of that format."""
-    row_at = row_at or (lambda _: at)
     if len(values) < 2:
         raise source.error(f"{len(values)} values are too few for a record; get the whole file", at)
-    if np.isnan(values).any():
-        where = int(np.argmax(np.isnan(values)))
-        raise missing_value(source, values[where], row_at(where))
     acceleration = unit.to_si(values)
-    if not np.isfinite(acceleration).all():
+    if np.isinf(acceleration).any():
         raise source.error("some values are too large for an acceleration; check the file and its units", at)
     gap = gap_at(values)
     if gap is not None:
-        raise missing_value(source, values[gap], row_at(gap))
-    metadata = {"format": form, "file": source.file} | {key: fact for key, fact in (facts or {}).items() if fact}
+        raise missing_value(source, values[gap], row_at(gap) if row_at else at)
+    said = {"format": form, "file": Path(source.path).name, **(facts or {})}
+    metadata = {key: fact for key, fact in said.items() if fact}
     return Channel(acceleration=acceleration, units=spelling or unit.name, metadata=metadata, **known)
 
 
 def gap_at(values: Floats) -> int | None:
     """Return the index of the first number that stands for a missing value, or None."""
+    if np.isnan(values).any():
+        return int(np.argmax(np.isnan(values)))
     sizes = np.abs(values)
     marked = np.isin(sizes, _MARKS) | (sizes >= 1e9)
     if not marked.any():
@@ -273,7 +249,5 @@ def gap_at(values: Floats) -> int | None:
 
 def missing_value(source: Source, value: float, at: int | None) -> UnreadableRecord:
     """Return the error for a number at the offset `at` that stands for a missing value."""
-    return source.error(
-        f"{value:g} seems to stand for a missing value; a record needs a value at every instant: get one without gaps",
-        at,
-    )
+    text = f"{value:g} seems to stand for a missing value; get a record that has a value at every instant"
+    return source.error(text, at)

@@ -1,246 +1,186 @@
-"""CSMIP V1, uncorrected accelerograms, and V2, corrected ones; and what COSMOS has in common with them.
+"""Formats of several channels a file: CSMIP V1 (uncorrected) and V2 (corrected), and COSMOS 1.20.
 
-V1 has channel after channel, each with text, integer and real headers. Today's files state count, rate, units and
-columns in a line before the data. Older ones, and those of networks that took the format over, have no such line:
-pairs of time and acceleration follow the headers at once, in columns 10F7.3 that touch, in seconds and g/10.
-
-V2 has three headers for each channel, then acceleration, velocity and displacement. Only the acceleration is read. The
-line before it prints the step with three decimals; real header 53 holds more of them, and is used where both agree.
+The files of CSMIP have text, integer and real headers for each channel, then a line with count, step or rate, units and
+columns. Older V1 files, and those of networks that took the format over, have no such line: pairs of time and
+acceleration follow at once, in columns 10F7.3 that touch, in seconds and g/10. In V2 velocity and displacement follow
+the acceleration. The files of COSMOS state the length and columns of each header.
 """
 
 from __future__ import annotations
 
-import functools
 import itertools
 import re
-from typing import Any, NamedTuple
+from typing import Any, Final
 
 from rocking.core.arrays import Floats
-from rocking.records.formats.channel import (
-    Channel,
-    Recognised,
-    channel_of,
-    first_fault,
-    first_match,
-    step_or_times,
+from rocking.errors import UnreadableRecord
+from rocking.records.formats.engine import (
+    Format,
+    Header,
+    Layout,
+    Said,
+    Stated,
+    direction,
+    number,
+    numeric_end,
+    stated_layout,
+    step_of,
 )
-from rocking.records.formats.source import Line, Request, Source
-from rocking.records.formats.values import Layout, Stated, bad_number, numeric_end, parse, read_values
-from rocking.records.units import Unit
 
-
-class _Volume(NamedTuple):
-    """A kind of file: its titles, the line before its samples, and where its headers contain what."""
-
-    name: str
-    words: str
-    title: re.Pattern[str]
-    data_line: re.Pattern[str]
-    units: re.Pattern[str]
-    columns: Layout | None
-    header_lines: int
-    text_lines: int
-    event_line: int
-
-
-_V1 = _Volume(
-    "CSMIP V1",
-    "Uncorrected",
-    re.compile(r"^\s*uncorrected accelerogram", re.IGNORECASE),
-    re.compile(
-        r"^\s*(\d{1,12})\s+accel\w*\s+points\s+at\s+(\S+)\s*(?:pts|points|samples|sps)", re.IGNORECASE | re.ASCII
-    ),
-    re.compile(r"units\s+of\s+([A-Za-z0-9/^]+)", re.IGNORECASE),
-    columns=None,
-    header_lines=40,
-    text_lines=13,
-    event_line=1,
+_V1_DATA: Final = re.compile(
+    r"(?ia)^\s*(\d{1,12})\s+accel\w*\s+points\s+at\s+(\S+)\s*(?:pts|points|samples|sps)(?:.*?units\s+of\s+([A-Za-z0-9/^]+))?"
 )
-_V2 = _Volume(
-    "CSMIP V2",
-    "Corrected",
-    re.compile(r"^\s*corrected accelerogram", re.IGNORECASE),
-    re.compile(r"^\s*(\d{1,12})\s+points\s+of\s+accel\w*\s+data\b.*?\bat\s+(\S+)\s*sec", re.IGNORECASE | re.ASCII),
-    re.compile(r"(?:units:|\bin)\s*([A-Za-z0-9/^]+)", re.IGNORECASE),
-    columns=Layout(per_line=8, width=10),
-    header_lines=70,
-    text_lines=25,
-    event_line=2,
+_V2_DATA: Final = re.compile(
+    r"(?ia)^\s*(\d{1,12})\s+points\s+of\s+accel\w*\s+data\b.*?\bat\s+(\S+)\s*sec(?:.*?(?:units:|\bin)\s*([A-Za-z0-9/^]+))?"
 )
-#: Titles of GeoNet and of USC, which begin alike; their headers are others.
-_OTHER_LAYOUT = re.compile(
-    r"^\s*(?:un)?corrected accelerogram(?: \d{8}_\d{6}_|.*\bfile\s+\d)|^\s*file\s+\d+ of uncorrected accelerogram",
-    re.IGNORECASE | re.ASCII,
-)
-_CHANNEL = re.compile(r"^\s*chan\S*\s*(\d{1,6})\s*:\s*(.*)$", re.IGNORECASE | re.ASCII)
-_STATION = re.compile(r"^\s*sta\w*\s+(?:no|id)\b\.?\s*(.*)$", re.IGNORECASE)
-_STATION_CHANNEL = re.compile(r"\(sta\S*\s+ch\S*\s*(\d{1,6})\s*\)", re.IGNORECASE | re.ASCII)
-_LOCATION = re.compile(r"location\s*:\s*(.*)$", re.IGNORECASE)
-_AZIMUTH = re.compile(r"^(\d{1,3}(?:\.\d*)?)\s*deg", re.IGNORECASE | re.ASCII)
-_FORMAT = re.compile(r"\(\s*(\d{1,3})\s*[EFGI]\s*(\d{1,3})(?:\.\d+)?\s*\)", re.IGNORECASE | re.ASCII)
-_END_OF_DATA = re.compile(r"^\s*(/&|-*\s*end[ -]of[ -]data)", re.IGNORECASE)
-_PAIR_UNITS = re.compile(r"^\s*units\b.*\bsec\w*\s+and\s+([A-Za-z0-9/^]+)", re.IGNORECASE)
-_PAIR_COUNT = re.compile(r"no\.?\s*of\s*points\s*=\s*(\d{1,12})", re.IGNORECASE | re.ASCII)
-_PAIR_NUMBER_LINES = 14
-_NEXT_QUANTITY = re.compile(r"^\s*\d+\s+points\s+of\s+(?:veloc|displ)", re.IGNORECASE)
-_V2_DATA = re.compile(rb"(?im)^[ \t]*\d{1,12}[ \t]+points[ \t]+of[ \t]+accel")
-_V2_TITLE = re.compile(rb"(?im)^[ \t]*corrected accelerogram")
-_V2_REAL_LINES = 13
-
-_NO_DATA_LINE = "if the file is cut, get it again; if its layout is another one, write it as a text table"
+_V2_OTHER: Final = re.compile(r"(?i)^\s*\d+\s+points\s+of\s+(?:veloc|displ)")
+_CHANNEL: Final = re.compile(r"(?ia)^\s*chan\S*\s*(\d{1,6})\s*:\s*(.*)$")
+_STATION: Final = re.compile(r"(?i)^\s*sta\w*\s+(?:no|id)\b\.?\s*(.*)$")
+_STATION_CHANNEL: Final = re.compile(r"(?ia)\(sta\S*\s+ch\S*\s*(\d{1,6})\s*\)")
+_LOCATION: Final = re.compile(r"(?i)location\s*:\s*(.*)$")
+_DEGREES: Final = re.compile(r"(?ia)(\d{1,3}(?:\.\d*)?)\s*deg")
+_PAIR_UNITS: Final = re.compile(r"(?i)^\s*units\b.*\bsec\w*\s+and\s+([A-Za-z0-9/^]+)")
+_PAIR_COUNT: Final = re.compile(r"(?ia)no\.?\s*of\s*points\s*=\s*(\d{1,12})")
+_TEXT_LINES, _NUMBER_LINES, _REAL_LINES = 13, 14, 13
 
 
-def recognise(source: Source) -> Recognised | None:
-    """Return the format if the first line is its title; refuse other layouts with such a title."""
-    line = source.first_line()
-    if line is None:
-        return None
-    if _OTHER_LAYOUT.search(line.text):
-        text = "this accelerogram has the layout of GeoNet or USC, which is not read here"
-        raise source.error(f"{text}; write it as a text table", line.start)
-    for volume in (_V1, _V2):
-        if volume.title.search(line.text):
-            reason = f"line {source.line_number(line.start)} begins '{volume.words} Accelerogram'"
-            return Recognised(volume.name, reason, functools.partial(_read, source, volume, line.start))
-    return None
+def _v1(header: Header) -> Said:
+    stated = header.take_until(_V1_DATA, 40)
+    if stated is None:
+        return _pairs(header)
+    return _said(header, stated, step_of(number(stated[2])), None, event_line=1)
 
 
-def azimuth(name: str) -> float | None:
-    """Return the direction in a name such as "90 Deg", in degrees clockwise from north, or None."""
-    found = _AZIMUTH.match(name)
-    return float(found[1]) % 360.0 if found else None
+def _v2(header: Header) -> Said:
+    stated = header.take_until(_V2_DATA, 70)
+    if stated is None:
+        raise _without_count(header)
+    step = number(stated[2])
+    if len(header.lines) > _REAL_LINES:
+        # Real header 53, in columns 8F10, of those that end just before the line of the data: it has more decimals.
+        finer = number(header.lines[5 - _REAL_LINES].text[40:50].strip())
+        if abs(finer - step) <= 0.5 * 10.0 ** -len(stated[2].partition(".")[2]):
+            step = finer
+    return _said(header, stated, step, Layout(per_line=8, width=10), event_line=2)
 
 
-def location(text: str) -> str:
-    """Return what follows "Location:" in `text`, or an empty string."""
+def _said(header: Header, stated: re.Match[str], step: float, layout: Layout | None, *, event_line: int) -> Said:
+    line = header.lines[-1]
+    labels, facts = _labels(header, event_line)
+    layout = stated_layout(line.text) or layout
+    return Said(line.start, stated[3] or "", step, Stated(int(stated[1]), line.start), labels, layout, facts=facts)
+
+
+def _pairs(header: Header) -> Said:
+    header.take(_TEXT_LINES)
+    start, at = header.end, header.lines[0].start
+    header.skip(_NUMBER_LINES)
+    points, units = header.text(_PAIR_COUNT), header.text(_PAIR_UNITS)
+    if not (points and units and numeric_end(header.source, start) >= header.end):
+        raise _without_count(header)
+    labels, facts = _labels(header, 1)
+    layout = Layout(per_line=10, width=7)
+    return Said(at, units, None, Stated(2 * int(points), at), labels, layout, facts=facts)
+
+
+def _without_count(header: Header) -> UnreadableRecord:
+    advice = "if the file is cut, get it again; if its layout is another one, write it as a text table"
+    at = header.lines[0].start if header.lines else header.end
+    return header.source.error(f"no line of points and units ends this channel's header; {advice}", at)
+
+
+def _labels(header: Header, event_line: int) -> tuple[dict[str, Any], dict[str, str]]:
+    lines = header.lines
+    labels: dict[str, Any] = {"name": f"channel {header.ordinal}", "station": ""}
+    facts: dict[str, str] = {}
+    for line, following in itertools.pairwise(lines):
+        if found := _STATION.match(line.text):
+            labels["station"] = following.text[:40].strip() or found[1].split("  ")[0]
+            facts["station line"] = " ".join(line.text.split())
+            break
+    if channel := header.find(_CHANNEL):
+        words = channel[2].strip()
+        name = re.split(r"\s{2,}|\(|location\s*:", words, maxsplit=1, flags=re.IGNORECASE)[0].strip()
+        labels |= {"number": int(channel[1]), "azimuth": direction(_DEGREES, name)}
+        labels["name"] = name or f"channel {channel[1]}"
+        place = _STATION_CHANNEL.search(words)
+        facts |= {"station channel": place[1] if place else "", "location": _location(words)}
+    labels["event"] = lines[event_line].text.split("   ")[0].strip() if len(lines) > event_line else ""
+    return labels, facts
+
+
+def _location(text: str) -> str:
     found = _LOCATION.search(text)
     return found[1].strip() if found else ""
 
 
-def layout_in(text: str) -> Layout | None:
-    """Return the Fortran columns that a header such as "... Format: (8f9.6)" states, or None."""
-    found = _FORMAT.search(text)
-    layout = Layout(int(found[1]), int(found[2])) if found else None
-    return layout if layout and all(layout) else None
+_COSMOS_TITLE: Final = re.compile(r"(?ia)\(format\s+v\s*[\d.]{1,8}\s+with\s+(\d{1,3})\s+text(?:\s+lines\))?")
+_NUMBERS: Final = re.compile(r"(?ia)^\s*(\d{1,6})\s+(?:integer|real)-header\s+values\s+follow\s+on\s+(\d{1,4})\s+lines")
+_COMMENTS: Final = re.compile(r"(?ia)^\s*(\d{1,4})\s+comment")
+_DATA: Final = re.compile(r"(?ia)^\s*(\d{1,12})\s+(\S.*?)\s*pts\b")
+_DURATION: Final = re.compile(r"(?ia)approx\s+(\d{1,9})\s+secs")
+_UNITS: Final = re.compile(r"(?i)units\s*=\s*([A-Za-z0-9/^]+)")
+_UNKNOWN: Final = re.compile(r"(?ia)unspecified:.*,\s*(-\d{1,9}(?:\.\d{0,9})?)\s*$")
+_COSMOS_CHANNEL: Final = re.compile(r"(?i)^\s*sta\s+cha\w*\s*:?\s*(\w+|\?)\s*:\s*([^(]*)")
+_COSMOS_STATION: Final = re.compile(r"(?i)^\s*statn\s+no\S*\s+(\S+)\s*(?:code:\s*\S+)?\s*(.*)$")
 
 
-def data_end(source: Source, start: int, *titles: re.Pattern[str]) -> int:
-    """Return where the numbers that begin at `start` end: at a trailer, at one of `titles` or with the file."""
-    end = numeric_end(source, start)
-    if end == len(source.data):
-        return end
-    line = source.line(end)
-    if _END_OF_DATA.match(line.text) or any(title.search(line.text) for title in titles):
-        return end
-    raise bad_number(source, end, line.next)
+def _cosmos(header: Header) -> Said:
+    title = header.expect(_COSMOS_TITLE, "the title")
+    header.take(int(title[1]) - 1)
+    text = [*header.lines]
+    _numbers_of(header)
+    reals = _numbers_of(header)
+    if comments := _COMMENTS.match(header.source.line(header.end).text):
+        header.skip(1 + int(comments[1]))
+    stated = header.expect(_DATA, "the line with the number of points")
+    data = header.lines[-1]
+    unknown, station = header.text(_UNKNOWN), header.find(_COSMOS_STATION)
+    labels: dict[str, Any] = {"name": "", "event": text[1].text.strip() if len(text) > 1 else ""}
+    place = ""
+    if channel := header.find(_COSMOS_CHANNEL):
+        if re.fullmatch(r"\d{1,6}", channel[1], re.ASCII):
+            labels["number"] = int(channel[1])
+        labels["name"] = " ".join(channel[2].split("  ")[0].split())
+        place = _location(channel.string)
+    labels["name"] = labels["name"] or f"channel {labels.get('number', header.ordinal)}"
+    labels["azimuth"] = direction(_DEGREES, labels["name"])
+    labels["station"] = " ".join((station[2] or station[1]).split()) if station else ""
+    return Said(
+        data.start,
+        units[1] if (units := _UNITS.search(data.text)) else "",
+        _step(header, reals, int(stated[1])) if stated[2].lower().startswith("accel") else None,
+        Stated(int(stated[1]), data.start),
+        labels,
+        stated_layout(data.text),
+        quantity=stated[2],
+        facts={"stage": text[0].text.split("(")[0].strip(), "location": place},
+        unknown=float(unknown) if unknown else None,
+    )
 
 
-def after_trailer(source: Source, start: int) -> int:
-    """Return the offset after the "end of data" line at `start`, or `start` where there is none."""
-    line = source.first_line(start)
-    return line.next if line is not None and _END_OF_DATA.match(line.text) else start
+def _numbers_of(header: Header) -> Floats:
+    stated = header.expect(_NUMBERS, "a line '... header values follow'")
+    return header.numbers(int(stated[2]), stated_layout(stated.string), int(stated[1]))
 
 
-def _read(source: Source, volume: _Volume, first: int, request: Request) -> list[Channel]:
-    channels: list[Channel] = []
-    start: int | None = first
-    while start is not None:
-        channel, end = _channel(source, request, volume, start, len(channels) + 1)
-        channels.append(channel)
-        if volume is _V1:
-            title = source.first_line(after_trailer(source, end))
-            if title is not None and not volume.title.search(title.text):
-                raise source.error(
-                    "a channel's 'Uncorrected Accelerogram' should begin here; correct the file", title.start
-                )
-            start = None if title is None else title.start
-        else:  # velocity and displacement follow
-            found = _V2_TITLE.search(source.data, end)
-            start = None if found is None else found.start()
-            lost = _V2_DATA.search(source.data, end, len(source.data) if start is None else start)
-            if lost is not None:
-                raise source.error("this channel's header lacks its title; get the whole file again", lost.start())
-    return channels
+def _step(header: Header, reals: Floats, points: int) -> float:
+    """Return the step (s) that fits the stated duration: real header 62 is in ms, 34, that of the raw data, in s."""
+    data = header.lines[-1]
+    steps = [float(step) for step in (*reals[61:62] / 1000.0, *reals[33:34]) if step > 0.0]
+    stated = _DURATION.search(data.text)
+    duration = int(stated[1]) if stated else 0
+    # The duration is printed in whole seconds, by some without the last interval.
+    fitting = [step for step in steps if not duration or abs(points * step - duration) <= 1.0 + step]
+    if not fitting:
+        text = f"real headers 34 and 62 give no step at which {points} points last as stated"
+        raise header.source.error(f"{text}; correct the header, or get the file again", data.start)
+    return fitting[0]
 
 
-def _channel(source: Source, request: Request, volume: _Volume, start: int, ordinal: int) -> tuple[Channel, int]:
-    header: list[Line] = []
-    for line in source.lines(start, volume.header_lines):
-        if header and volume.title.search(line.text):
-            break  # what follows is the next channel's
-        header.append(line)
-        if stated := volume.data_line.match(line.text):
-            return _samples(source, request, volume, header, stated, ordinal)
-    if volume is _V1:
-        return _pairs(source, request, header[: _V1.text_lines + _PAIR_NUMBER_LINES], ordinal)
-    raise source.error(f"no line 'points of accel data' ends this channel's header; {_NO_DATA_LINE}", start)
-
-
-def _samples(
-    source: Source, request: Request, volume: _Volume, header: list[Line], stated: re.Match[str], ordinal: int
-) -> tuple[Channel, int]:
-    line = header[-1]
-    found = volume.units.search(line.text, stated.end())
-    spelling = found[1] if found else ""
-    unit = request.units(source, spelling, line.start)
-    dt = request.step(source, _step(source, volume, header, stated[2]), line.start)
-    end = data_end(source, line.next, volume.title, *([_NEXT_QUANTITY] if volume is _V2 else []))
-    layout = layout_in(line.text) or volume.columns
-    values = read_values(source, line.next, end, layout, Stated(int(stated[1]), line.start))
-    known = {"dt": dt, "spelling": spelling}
-    return _labelled(source, volume, header, ordinal, values, unit, line.start, **known), end
-
-
-def _step(source: Source, volume: _Volume, header: list[Line], printed: str) -> float:
-    number, at = parse(printed.encode("latin-1")), header[-1].start
-    if volume is _V1:
-        if number is None or not number > 0.0:
-            raise source.error(f"the sampling rate {printed!r} is not a positive number; correct it", at)
-        return 1.0 / number
-    if number is None:
-        raise source.error(f"the sampling step {printed!r} is not a number; correct it", at)
-    if len(header) <= _V2_REAL_LINES:
-        return number
-    # Real header 53, in columns 8F10, of those that end just before the line of the data.
-    finer = parse(header[5 - _V2_REAL_LINES].text[40:50].strip().encode("latin-1"))
-    place = 10.0 ** -len(printed.partition(".")[2])
-    return finer if finer is not None and abs(finer - number) <= 0.5 * place else number
-
-
-def _pairs(source: Source, request: Request, header: list[Line], ordinal: int) -> tuple[Channel, int]:
-    text, numbers, at = header[: _V1.text_lines], header[_V1.text_lines :], header[0].start
-    points, spelling = first_match(_PAIR_COUNT, text), first_match(_PAIR_UNITS, text)
-    complete = len(numbers) == _PAIR_NUMBER_LINES and numeric_end(source, numbers[0].start) >= numbers[-1].next
-    if points is None or spelling is None or not complete:
-        raise source.error(f"no line 'points at ... in units of ...' ends this channel's header; {_NO_DATA_LINE}", at)
-    unit = request.units(source, spelling[1], at)
-    start = header[-1].next
-    end = data_end(source, start, _V1.title)
-    values = read_values(source, start, end, Layout(per_line=10, width=7), Stated(2 * int(points[1]), at))
-    if first_fault(values[0::2]) is not None:
-        raise source.error("the times of the points that follow do not increase throughout; correct the file", start)
-    dt, times = step_or_times(source, request, values[0::2], start)
-    known = {"dt": dt, "times": times, "spelling": spelling[1]}
-    return _labelled(source, _V1, header, ordinal, values[1::2], unit, at, **known), end
-
-
-def _labelled(
-    source: Source, volume: _Volume, header: list[Line], ordinal: int, values: Floats, unit: Unit, at: int, **known: Any
-) -> Channel:
-    text = header[: volume.text_lines]
-    station, facts = "", {}
-    for line, following in itertools.pairwise(text):
-        if found := _STATION.match(line.text):
-            station = following.text[:40].strip() or found[1].split("  ")[0]
-            facts["station line"] = " ".join(line.text.split())
-            break
-    number, name, direction = ordinal, f"channel {ordinal}", None
-    if channel := first_match(_CHANNEL, text):
-        number, words = int(channel[1]), channel[2].strip()
-        name = re.split(r"\s{2,}|\(|location\s*:", words, maxsplit=1, flags=re.IGNORECASE)[0].strip()
-        direction, name = azimuth(name), name or f"channel {number}"
-        place = _STATION_CHANNEL.search(words)
-        facts |= {"station channel": place[1] if place else "", "location": location(words)}
-    event = header[volume.event_line].text.split("   ")[0].strip() if len(header) > volume.event_line else ""
-    known |= {"name": name, "number": number, "azimuth": direction, "station": station, "event": event, "facts": facts}
-    return channel_of(source, volume.name, values, unit, at, **known)
+# The titles of GeoNet and of USC begin alike; their headers are others.
+_TITLE: Final = r" accelerogram(?! \d{8}_\d{6}_|.*\bfile\s+\d)"
+_V1_TITLE, _V2_TITLE = (re.compile(rf"(?ia)^\s*{word}{_TITLE}") for word in ("uncorrected", "corrected"))
+V1: Final = Format("CSMIP V1", (_V1_TITLE,), _v1, several=True)
+V2: Final = Format("CSMIP V2", (_V2_TITLE,), _v2, several=True, other=_V2_OTHER)
+COSMOS: Final = Format("COSMOS", (_COSMOS_TITLE,), _cosmos, several=True)

@@ -10,7 +10,6 @@ import csv
 import functools
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple
 
 from rocking.records.formats.source import Source
@@ -27,26 +26,22 @@ _UP_TO_BRACKET: Final = re.compile(r"[^()\[\]]*[(\[][^()\[\]]*[)\]]")
 _WORD_WITH_BRACKETS: Final = re.compile(r'"[^"]*"|(?:[^\s()\[\]]+\s*)?[(\[][^()\[\]]*[)\]]|[^\s()\[\]]+')
 _WORD: Final = re.compile(r"[^\W\d_]+")
 #: What follows the name of an acceleration, in running text.
-_SUFFIX: Final = re.compile(r"(?:(?<![^\W_])a|(?:acc|acel|beschl)[^\W_]*)_(?=([A-Za-z]\w{0,12})\b)", re.IGNORECASE)
+_SUFFIX: Final = re.compile(r"(?i)(?:(?<![^\W_])a|(?:acc|acel|beschl)[^\W_]*)_(?=([A-Za-z]\w{0,12})\b)")
 _BREAK: Final = re.compile(r"[\s_/,;:.-]+(?:in\s+)?")
 #: A line that holds nothing: it divides, or has delimiters only.
 RULE: Final = re.compile(r"[-=_~+|\s]{3,}|#+|[,;\s]*")
 #: What may be a unit; the number in "channel (3)" is none.
 _UNIT_LIKE: Final = re.compile(r".*(?:[^\W\d_]|[%°])")
 
-_TIMES: Final = frozenset({"t", "time", "times", "timestamp", "zeit", "temps", "tiempo", "tempo", "tid", "tijd"})
-_STEPS: Final = frozenset({"time", "step"})
-_COUNTS: Final = frozenset(
-    {"index", "idx", "i", "no", "nr", "num", "number", "sample", "samples", "point", "points", "pt", "row", "rows"}
-    | {"step", "scan", "count", "id", "record"}
+_TIMES: Final = {"t", "time", "times", "timestamp", "zeit", "temps", "tiempo", "tempo", "tid", "tijd"}
+_COUNTS: Final = {"index", "idx", "i", "no", "nr", "num", "number", "sample", "samples", "point", "points", "pt"}.union(
+    ("row", "rows", "step", "time", "scan", "count", "id", "record")
 )
-_SPECTRA: Final = frozenset({"period", "periods", "frequency", "frequencies", "freq", "sa", "psa"})
+_SPECTRA: Final = {"period", "periods", "frequency", "frequencies", "freq", "sa", "psa"}
 #: What names the ordinates of a response spectrum, unless it is that of an accelerogram which was fitted to one.
-_SPECTRAL: Final = re.compile(
-    r"(?!.*(?:match|[ck]ompat|consist|accelerogr)).*(?:spe[ckt]tr|pseudo|rotd\d|gmrot)", re.IGNORECASE
-)
-_PERIOD: Final = re.compile(r"p[eé]r[ií]od|periyot", re.IGNORECASE)
-_ACCELERATION: Final = re.compile(r"\b(a|acc\w*|acel\w*|beschl\w*)(?![a-z])", re.IGNORECASE)
+_SPECTRAL: Final = re.compile(r"(?i)(?!.*(?:match|[ck]ompat|consist|accelerogr)).*(?:spe[ckt]tr|pseudo|rotd\d|gmrot)")
+_PERIOD: Final = re.compile(r"(?i)p[eé]r[ií]od|periyot")
+_ACCELERATION: Final = re.compile(r"(?i)\b(a|acc\w*|acel\w*|beschl\w*)(?![a-z])")
 
 
 class Column(NamedTuple):
@@ -58,15 +53,14 @@ class Column(NamedTuple):
     strange: str = ""
 
 
-@dataclass(frozen=True)
-class Heading:
+class Heading(NamedTuple):
     """What a heading says of each column, whether it names them and where (the offset of that line)."""
 
     columns: tuple[Column, ...]
     named: bool
     at: int
-    assumed: bool = False
-    doubtful: bool = False
+    assumed: bool
+    doubtful: bool
 
     def places(self, kind: Kind) -> list[int]:
         """Return the places of the columns of one kind."""
@@ -86,133 +80,92 @@ def heading_of(source: Source, end: int, count: int, delimiter: str) -> Heading:
     names = _cells(texts[-1], count, delimiter) if texts else ()
     above = _cells(texts[-2], count, delimiter) if names and len(texts) > 1 else ()
     rest = "\n".join(texts[: len(texts) - bool(names) - bool(above)])
-    named = _Names(names, above, rest)
-    columns = named.columns() if names else _unnamed(rest, count)
-    assumed = count > 1 and not (names and named.names_times())
+    where = lines[-1][1] if lines else end
     spectral = any(map(_SPECTRAL.match, texts))
-    doubtful = not named.names_times(surely=True) if names and count > 1 else spectral
-    return Heading(tuple(columns), bool(names), lines[-1][1] if lines else end, assumed, doubtful)
+    if not names:
+        times = Column("time", "", *_time_unit(("",), rest))
+        channel = Column("channel", "", _acceleration_unit_in(rest) if count <= 2 else None)
+        unnamed = (times,) * (count > 1) + (channel,) * max(count - 1, 1)
+        return Heading(unnamed, False, where, count > 1, spectral)
+    cells = list(zip(names, above, strict=True)) if above else [(name,) for name in names]
+    kinds = [_kind(each) for each in cells] if count > 1 else [_kind_of_only(cells[0])]
+    labels = [_label(cells[place]) for place, kind in enumerate(kinds) if kind == "time"]
+    # "T" is the name of periods as well.
+    surely = any(_TIMES - {"t"} & _words(each) or "T" not in _WORD.findall(each) for each in labels)
+    first_time = kinds.index("time") if labels else 0
+    kinds = ["channel" if kind == "count" and place > first_time else kind for place, kind in enumerate(kinds)]
+    units = [_acceleration_unit(each, rest if place == count - 1 <= 1 else "") for place, each in enumerate(cells)]
+    if not labels and kinds[0] == "channel" and count > 1 and units[0][0] is None:
+        kinds[0] = "time"
+    columns = (
+        Column(kind, _without_brackets(_label(each)), *(_time_unit(each, rest) if kind == "time" else unit))
+        for kind, each, unit in zip(kinds, cells, units, strict=True)
+    )
+    return Heading(tuple(columns), True, where, count > 1 and not labels, not surely if count > 1 else spectral)
 
 
-def names_columns(line: bytes, count: int, delimiter: str) -> bool:
-    """Return whether a line names `count` columns, one of them so that it is understood: times, or a known unit."""
-    return _Names(_cells(_uncommented(line), count, delimiter), (), "").understood()
+def _kind(cell: tuple[str, ...]) -> Kind:
+    """Return the kind of a column from what is written above it, the nearest line first."""
+    name = _without_brackets(_label(cell))
+    words = _words(name)
+    if (words and words <= _SPECTRA) or _SPECTRAL.match(name):
+        return "spectrum"
+    if any(find_unit(text) for line in cell for text in _texts(line)):
+        return "channel"
+    if _PERIOD.search(name) and not _ACCELERATION.search(name):
+        return "spectrum"
+    counts = words <= _COUNTS and words != {"time"} if words else re.search(r"\w", name) is None
+    if counts and not any(map(_time_of, cell)):
+        return "count"
+    alone = find_time_unit(_bare(cell[0]))
+    # "min", "h" and "d" are units of time in brackets only, and "ns" is north and south.
+    unit = _time_of(cell[0]) and alone and (alone.multiplier == 1.0 or cell[0] != _bare(cell[0]))
+    return "time" if words & _TIMES or unit else "channel"
 
 
-@dataclass(frozen=True)
-class _Names:
-    """Names of columns, the line above them where it has as many cells, and the text of the other lines."""
-
-    names: tuple[str, ...]
-    above: tuple[str, ...]
-    rest: str
-
-    def columns(self) -> Iterator[Column]:
-        """Columns as their names tell; where none is named as times, the first of several holds them."""
-        count = len(self.names)
-        kinds = [self._kind(place) for place in range(count)] if count > 1 else [self._kind_of_only()]
-        first_time = kinds.index("time") if "time" in kinds else 0
-        for place, kind in enumerate(kinds):
-            if kind == "count" and place > first_time:
-                kinds[place] = "channel"
-        if "time" not in kinds and kinds[0] == "channel" and count > 1 and self._acceleration_unit(0)[0] is None:
-            kinds[0] = "time"
-        for place, kind in enumerate(kinds):
-            unit, strange = self._time_unit(place) if kind == "time" else self._acceleration_unit(place)
-            yield Column(kind, _without_brackets(self._label(place)), unit, strange)
-
-    def names_times(self, *, surely: bool = False) -> bool:
-        """Whether a name is that of times; surely so if it is more than "T", which is that of periods as well."""
-        places = [place for place in range(len(self.names)) if self._kind(place) == "time"]
-        words = [set(_WORD.findall(self._label(place))) for place in places]
-        return any(not surely or "T" not in each or {word.lower() for word in each} & _TIMES - {"t"} for each in words)
-
-    def understood(self) -> bool:
-        """Whether a name is that of times, row numbers or a spectrum, or has a unit of acceleration."""
-        return any(
-            (_WORD.search(name) if self._kind(place) != "channel" else self._acceleration_unit(place)[0]) is not None
-            for place, name in enumerate(self.names)
-        )
-
-    def _kind(self, place: int) -> Kind:
-        name = _without_brackets(self._label(place))
-        words = {word.lower() for word in _WORD.findall(name)}
-        texts = [text for line in self._lines(place) for text in _texts(line)]
-        if (words and words <= _SPECTRA) or _SPECTRAL.match(name):
-            return "spectrum"
-        if any(map(find_unit, texts)):
-            return "channel"
-        if _PERIOD.search(name) and not _ACCELERATION.search(name):
-            return "spectrum"
-        counts = words <= _COUNTS | _STEPS and words != {"time"} if words else re.search(r"\w", name) is None
-        if counts and not any(map(find_time_unit, texts)):
-            return "count"
-        return "time" if words & _TIMES or self._is_unit_of_time(place) else "channel"
-
-    def _kind_of_only(self) -> Kind:
-        """Return the kind of a single column, above which a title may stand: times only if it says nothing else."""
-        name = self._label(0)
-        units = (find_unit, find_time_unit)
-        words = {word.lower() for word in _WORD.findall(name) if not any(find(word) for find in units)} - {"in"}
-        unclear = words == {"t"} and not any(find_time_unit(text) for line in self._lines(0) for text in _texts(line))
-        sure = words and words <= _TIMES | _SPECTRA and not unclear and not re.search(r"\d", name)
-        return self._kind(0) if sure else "channel"
-
-    def _label(self, place: int) -> str:
-        """Return a column's name, which may stand above a line of units."""
-        name = self.names[place]
-        if self.above and (find_unit(_bare(name)) or find_time_unit(_bare(name)) or not _WORD.search(name)):
-            return self.above[place]
-        return name
-
-    def _is_unit_of_time(self, place: int) -> bool:
-        """Whether a name is a unit of time and nothing else; "min", "h" and "d" only in brackets."""
-        name = self.names[place]
-        if self._is_north_south(place):
-            return False
-        unit = find_time_unit(_bare(name))
-        return unit is not None and (unit.multiplier == 1.0 or name != _bare(name))
-
-    def _is_north_south(self, place: int) -> bool:
-        """Whether a name is "ns" of north and south: beside "ew", or a column that is named as times."""
-        others = [name.lower() for k, name in enumerate(self.names) if k != place]
-        return self.names[place].lower() == "ns" and any(
-            name == "ew" or not _TIMES.isdisjoint(_WORD.findall(name)) for name in others
-        )
-
-    def _lines(self, place: int) -> list[str]:
-        """Return what is written above a column, the nearest line first."""
-        return [line[place] for line in (self.names, self.above) if line]
-
-    def _time_unit(self, place: int) -> tuple[Unit | None, str]:
-        for line in () if self._is_north_south(place) else self._lines(place):
-            unit = next((unit for text in _texts(line) if (unit := find_time_unit(text))), None)
-            if unit is not None:
-                return unit, ""
-        strange = _strange(self.names[place])
-        return (None, strange) if strange else _time_unit_in(self.rest)
-
-    def _acceleration_unit(self, place: int) -> tuple[Unit | None, str]:
-        for line in self._lines(place):
-            units = {unit for text in _BRACKETS.findall(line) if (unit := find_unit(text))}
-            if len(units) > 1:
-                return None, _strange(line)
-            # The longest end first: "acc % g" ends with "% g" and with "g".
-            unit = next(iter(units), None) or next((unit for text in _ends(line) if (unit := find_unit(text))), None)
-            if unit is not None:
-                return unit, ""
-        strange = _strange(self.names[place])
-        if strange or place != len(self.names) - 1 or place > 1:
-            return None, strange
-        return _acceleration_unit_in(self.rest), ""
+def _kind_of_only(cell: tuple[str, ...]) -> Kind:
+    """Return the kind of a single column, above which a title may stand: times only if it says nothing else."""
+    name = _label(cell)
+    words = {word for word in _words(name) if not (find_unit(word) or find_time_unit(word))} - {"in"}
+    unclear = words == {"t"} and not any(map(_time_of, cell))
+    sure = words and words <= _TIMES | _SPECTRA and not unclear and not re.search(r"\d", name)
+    return _kind(cell) if sure else "channel"
 
 
-def _unnamed(text: str, count: int) -> Iterator[Column]:
-    if count > 1:
-        yield Column("time", "", *_time_unit_in(text))
-    unit = _acceleration_unit_in(text) if count <= 2 else None
-    for _ in range(count - 1 if count > 1 else 1):
-        yield Column("channel", "", unit)
+def _label(cell: tuple[str, ...]) -> str:
+    """Return a column's name, which may stand above a line of units."""
+    bare = _bare(cell[0])
+    return cell[-1] if find_unit(bare) or find_time_unit(bare) or not _WORD.search(cell[0]) else cell[0]
+
+
+def _words(name: str) -> set[str]:
+    return {word.lower() for word in _WORD.findall(name)}
+
+
+def _time_of(line: str) -> Unit | None:
+    """Return the unit of time in a name; that of "ns" alone is north and south."""
+    return None if line.lower() == "ns" else next(filter(None, map(find_time_unit, _texts(line))), None)
+
+
+def _time_unit(cell: tuple[str, ...], rest: str) -> tuple[Unit | None, str]:
+    """Return the unit of a column of times: where nothing says it, seconds, unless the rest has another in brackets."""
+    unit = next(filter(None, map(_time_of, cell)), None)
+    strange = "" if unit else _strange(cell[0])
+    if unit or strange:
+        return unit, strange
+    others = [each for each in _BRACKETS.findall(rest) if find_time_unit(each) not in (None, SECOND)]
+    return (None, others[0]) if others else (SECOND, "")
+
+
+def _acceleration_unit(cell: tuple[str, ...], rest: str) -> tuple[Unit | None, str]:
+    for line in cell:
+        if len({unit for text in _BRACKETS.findall(line) if (unit := find_unit(text))}) > 1:
+            return None, _strange(line)
+        # The longest end first: "acc % g" ends with "% g" and with "g".
+        if unit := next(filter(None, map(find_unit, _texts(line))), None):
+            return unit, ""
+    strange = _strange(cell[0])
+    return None if strange else _acceleration_unit_in(rest), strange
 
 
 def _cells(line: str, count: int, delimiter: str) -> tuple[str, ...]:
@@ -271,12 +224,6 @@ def _without_brackets(name: str) -> str:
 def _strange(name: str) -> str:
     """Return what a name has in brackets that may be a unit, or an empty text."""
     return ", ".join(text for text in _BRACKETS.findall(name) if _UNIT_LIKE.match(text))
-
-
-def _time_unit_in(text: str) -> tuple[Unit | None, str]:
-    """Return seconds; or None, and the other unit of time that a text has in brackets, of what it does not say."""
-    others = [each for each in _BRACKETS.findall(text) if find_time_unit(each) not in (None, SECOND)]
-    return (None, others[0]) if others else (SECOND, "")
 
 
 def _acceleration_unit_in(text: str) -> Unit | None:

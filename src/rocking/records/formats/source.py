@@ -11,11 +11,11 @@ import re
 import stat
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 from rocking.core import checks
 from rocking.errors import InvalidMotion, UnreadableRecord, literal
+from rocking.records import catalogue
 from rocking.records.units import CHOICES, Unit, choose_unit, find_unit
 
 #: Largest file that is read, bytes; the longest strong-motion records are a hundred times smaller.
@@ -36,13 +36,6 @@ class Line(NamedTuple):
     next: int
 
 
-class Entry(NamedTuple):
-    """What a header has after a key, and the offset of its line."""
-
-    value: str
-    at: int
-
-
 @dataclass(frozen=True)
 class Source:
     """A file's content.
@@ -60,16 +53,6 @@ class Source:
     path: str
     raw: bytes
     data: bytes
-
-    @property
-    def file(self) -> str:
-        """The file's name without its folder."""
-        return Path(self.path).name
-
-    @property
-    def stem(self) -> str:
-        """The file's name without folder and extension."""
-        return Path(self.path).stem
 
     def line(self, start: int) -> Line:
         """Return the line that starts at the offset `start`."""
@@ -105,11 +88,6 @@ class Source:
         """Whether one byte in a hundred is such as no text file contains; a stray one is none."""
         return len(self.data.translate(None, _CONTROL)) < 0.99 * len(self.data)
 
-    def binary_at(self) -> int | None:
-        """Return the offset of the first byte that no text file holds, or None if this is text."""
-        places = (self.data.find(bytes([control])) for control in _CONTROL)
-        return min((place for place in places if place >= 0), default=None)
-
     def error(self, message: str, at: int | None = None, *arguments: str, value: object = None) -> UnreadableRecord:
         """Return the error that says `message` about this file, at the line that holds the offset `at`."""
         line = None if at is None else self.line_number(at)
@@ -120,24 +98,20 @@ def open_source(path: str | os.PathLike[str] | BinaryIO) -> Source:
     """Read a file whole, or what is left of one that is open."""
     read = getattr(path, "read", None)
     if read is not None:  # Python's own streams have no name but "<stdin>" or a number
-        name = getattr(path, "name", None)
-        name = name if isinstance(name, str) and name and not name.startswith("<") else "standard input"
+        name = str(getattr(path, "name", "<"))
+        name = "standard input" if name.startswith("<") or name.isdecimal() else name
+    elif not isinstance(path, (str, bytes, os.PathLike)):
+        raise UnreadableRecord(f"the path of a record must be a file name, not {path!r}")
     else:
-        try:
-            name = os.fsdecode(path)  # type: ignore[arg-type]
-        except TypeError as error:
-            raise UnreadableRecord(f"the path of a record must be a file name, not {path!r}") from error
+        name = os.fsdecode(path)
     try:
         raw = _content(name) if read is None else read(SIZE_LIMIT + 1)
-    except FileNotFoundError as error:
-        raise UnreadableRecord(f"there is no such file; {_hint(name)}", path=name) from error
-    except PermissionError as error:
-        raise UnreadableRecord("this file may not be read; ask for permission to read it", path=name) from error
     except (OSError, ValueError) as error:
-        why = getattr(error, "strerror", None) or error
-        raise UnreadableRecord(
-            f"this file could not be read ({why}); check the name and the disk", path=name
-        ) from error
+        text = f"this file could not be read ({getattr(error, 'strerror', None) or error}); check the name and the disk"
+        if isinstance(error, FileNotFoundError):
+            shipped = {each: f"the shipped record {each}" for each in catalogue.names()}
+            text = f"there is no such file; {checks.meant(name, shipped, 'check the name and the folder')}"
+        raise UnreadableRecord(text, path=name) from error
     if len(raw) > SIZE_LIMIT:
         limit = SIZE_LIMIT // 2**20
         raise UnreadableRecord(f"this file is larger than {limit} MiB; cut the record into smaller files", path=name)
@@ -147,25 +121,11 @@ def open_source(path: str | os.PathLike[str] | BinaryIO) -> Source:
     return Source(name, raw, data)
 
 
-def _hint(name: str) -> str:
-    """Suggest what may be meant by the name of a file that does not exist."""
-    try:
-        beside = {path.name: str(path) for path in Path(name).parent.iterdir()}
-    except (OSError, ValueError):
-        beside = {}
-    from rocking.records import catalogue  # it loads its records with the units of the formats
-
-    if name in catalogue.names():
-        return f"it is a shipped record: load it with rocking.records.load({name!r})"
-    return checks.meant(Path(name).name, beside, "check the name and the folder", likeness=0.8)
-
-
 def _content(name: str) -> bytes:
     status = os.stat(name)  # noqa: PTH116 - Path() would turn an empty name into the current folder
-    if stat.S_ISDIR(status.st_mode):
-        raise UnreadableRecord("this is a folder; name one record file in it", path=name)
     if not stat.S_ISREG(status.st_mode):
-        raise UnreadableRecord("this is not a regular file; copy the record into one", path=name)
+        text = "this is a folder" if stat.S_ISDIR(status.st_mode) else "this is not a regular file"
+        raise UnreadableRecord(f"{text}; name one record file", path=name)
     with open(name, "rb") as file:  # noqa: PTH123
         # A read sets aside as much memory as it is asked for.
         return file.read(min(status.st_size, SIZE_LIMIT) + 1)
@@ -198,15 +158,16 @@ class Request:
 
     @classmethod
     def checked(
-        cls, dt: float | None, units: str | None, channel: int | str | None = None, *, several: bool = False
+        cls,
+        dt: float | None = None,
+        units: str | None = None,
+        channel: int | str | None = None,
+        *,
+        several: bool = False,
     ) -> Request:
         """Return the request."""
-        return cls(
-            None if dt is None else checks.positive(dt, "dt", InvalidMotion, "s"),
-            None if units is None else choose_unit(units),
-            channel,
-            several,
-        )
+        step = None if dt is None else checks.positive(dt, "dt", InvalidMotion, "s")
+        return cls(step, None if units is None else choose_unit(units), channel, several)
 
     def step(self, source: Source, stated: float, at: int | None) -> float:
         """Return the step (s) that the file states at the offset `at`."""
@@ -214,13 +175,8 @@ class Request:
         if not (stated > 0.0 and math.isfinite(stated * len(source.raw))):
             raise source.error(f"the sampling step is {stated:g} s, but it must be positive; correct it", at)
         if self.dt is not None and not self.several and not math.isclose(self.dt, stated, rel_tol=1e-6):
-            raise source.error(
-                f"the sampling step is {stated:g} s, not {{}} {self.dt:g} s; leave {{}} out",
-                at,
-                "dt",
-                "dt",
-                value=self.dt,
-            )
+            text = f"the sampling step is {stated:g} s, not {{}} {self.dt:g} s; leave {{}} out"
+            raise source.error(text, at, "dt", "dt", value=self.dt)
         return stated
 
     def units(self, source: Source, stated: Unit | str | None, at: int | None) -> Unit:
@@ -229,16 +185,10 @@ class Request:
         unit = find_unit(spelling) if isinstance(stated, str) else stated
         unit = unit or (None if spelling and self.several else self.unit)
         if unit is None:
-            fault = "the file does not say its units"
-            if spelling:
-                fault = f"the units {literal(repr(spelling))} are not known"
+            unknown = f"the units {literal(repr(spelling))} are not known"
+            fault = unknown if spelling else "the file does not say its units"
             raise source.error(f"{fault}; give {{}} as one of {', '.join(CHOICES)}", at, "units")
         if self.unit is not None and not self.several and unit != self.unit:
-            raise source.error(
-                f"the units are {unit.name}, not {{}} {self.unit.name!r}; leave {{}} out",
-                at,
-                "units",
-                "units",
-                value=self.unit.name,
-            )
+            text = f"the units are {unit.name}, not {{}} {self.unit.name!r}; leave {{}} out"
+            raise source.error(text, at, "units", "units", value=self.unit.name)
         return unit

@@ -14,7 +14,6 @@ import numpy as np
 
 from rocking.records.formats.channel import Channel, Recognised, channel_of
 from rocking.records.formats.source import Request, Source
-from rocking.records.formats.values import wrong_count
 from rocking.records.units import Unit
 
 #: PICKLE runs what a file tells it to; the other two open further files that a file names.
@@ -24,23 +23,21 @@ _TITLE = re.compile(rb"(?m)^TIMESERIES [^\n]*?, (\d{1,12}) samples,")
 
 def installed() -> bool:
     """Return whether ObsPy can be imported."""
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), contextlib.suppress(ImportError):
         warnings.simplefilter("ignore")
-        try:
-            import obspy  # noqa: F401
-        except ImportError:
-            return False
-    return True
+        import obspy  # noqa: F401
+
+        return True
+    return False
 
 
 def recognise(source: Source) -> Recognised | None:
     """Return the first format whose reader in ObsPy claims the file (and, of several, can read it)."""
-    claims = _claims(source)
+    claims = _claims(source) if installed() else []
+    able = (name for name in claims if len(claims) == 1 or not isinstance(_traces(source, name), str))
     if not claims:
         return None
-    name = claims[0]
-    if len(claims) > 1:
-        name = next((each for each in claims if not isinstance(_traces(source, each), str)), name)
+    name = next(able, claims[0])
     reason = f"ObsPy's {name} reader recognises it"
     return Recognised(f"{name} (through ObsPy)", reason, functools.partial(_read, source, name))
 
@@ -48,8 +45,12 @@ def recognise(source: Source) -> Recognised | None:
 def _read(source: Source, name: str, request: Request) -> list[Channel]:
     """Return all traces of the file, times their calibration factor."""
     unit = request.units(source, None, None)
-    if request.most is not None:
-        _refuse_long(source, name, request.most)
+    if request.most is not None:  # before they are unpacked, a file says how many samples it holds
+        heads = _traces(source, name, headonly=True)
+        samples = sum(int(trace.stats.npts) for trace in heads if not isinstance(trace, str))
+        if samples > request.most:
+            text = f"{samples} samples, of which at most {request.most} are read here; cut it into smaller files"
+            raise source.error(text)
     traces = _traces(source, name)
     if isinstance(traces, str):
         raise source.error(f"ObsPy's {name} reader cannot read this ({traces}); get the record again")
@@ -57,64 +58,45 @@ def _read(source: Source, name: str, request: Request) -> list[Channel]:
     for each, pieces in Counter(str(trace.id) for trace in traces).most_common(1):
         if pieces > 1:
             raise source.error(f"{each} is in {pieces} pieces, with gaps or overlaps; get a record without gaps")
-    form = f"{name} (through ObsPy)"
-    return [_channel(source, request, unit, trace, form, number) for number, trace in enumerate(traces, 1)]
+    return [_channel(source, request, unit, trace, name, number) for number, trace in enumerate(traces, 1)]
 
 
-def _channel(source: Source, request: Request, unit: Unit, trace: Any, form: str, number: int) -> Channel:
+def _channel(source: Source, request: Request, unit: Unit, trace: Any, name: str, number: int) -> Channel:
     stats = trace.stats
-    if np.ma.is_masked(trace.data):
-        raise source.error(f"trace {number} has gaps; get a record without gaps")
-    try:
-        with np.errstate(all="ignore"):
-            values = np.asarray(trace.data, dtype=np.float64).reshape(len(trace.data)) * float(stats.calib)
-        dt, station = float(stats.delta), f"{stats.network}.{stats.station}".strip(".")
-    except (TypeError, ValueError) as error:
-        raise source.error(f"trace {number} does not hold plain numbers; choose another file") from error
+    if np.ma.is_masked(trace.data) or not np.issubdtype(trace.data.dtype, np.number):
+        raise source.error(f"trace {number} has gaps, or no numbers; get a record without gaps")
+    with np.errstate(all="ignore"):
+        values = np.asarray(trace.data, dtype=np.float64).reshape(len(trace.data)) * float(stats.calib)
     # SAC gives the azimuth of a component, and its angle from above, which is about a right one of horizontal ones.
-    sac = stats.get("sac", {})
-    direction, from_above = (sac.get(key) for key in ("cmpaz", "cmpinc"))
-    horizontal = direction is not None and from_above is not None and abs(from_above - 90.0) <= 5.0
+    sac = {"cmpaz": None, "cmpinc": None, **stats.get("sac", {})}
+    horizontal = None not in (sac["cmpaz"], sac["cmpinc"]) and abs(sac["cmpinc"] - 90.0) <= 5.0
     return channel_of(
         source,
-        form,
+        f"{name} (through ObsPy)",
         values,
         unit,
         None,
         name=str(stats.channel) or f"trace {number}",
         number=number,
-        dt=request.step(source, dt, None),
-        azimuth=float(direction) % 360.0 if horizontal else None,
-        station=station,
+        dt=request.step(source, float(stats.delta), None),
+        azimuth=float(sac["cmpaz"]) % 360.0 if horizontal else None,
+        station=f"{stats.network}.{stats.station}".strip("."),
         start=float(stats.starttime.timestamp),
     )
 
 
-def _refuse_long(source: Source, name: str, most: int) -> None:
-    """Refuse a file that says it holds more samples, before they are unpacked."""
-    traces = _traces(source, name, headonly=True)
-    samples = 0 if isinstance(traces, str) else sum(int(trace.stats.npts) for trace in traces)
-    if samples > most:
-        raise source.error(f"{samples} samples, of which at most {most} are read here; cut it into smaller files")
-
-
 def _refuse_cut(source: Source, traces: Any) -> None:
     """Refuse a file that lacks its end where ObsPy reads what is left without a word."""
-    titles = list(_TITLE.finditer(source.data))
-    for title, trace in zip(titles, traces if len(titles) == len(traces) else (), strict=False):
-        if int(title[1]) != len(trace.data):
-            raise wrong_count(
-                source, title.start(), f"the header says {int(title[1])} samples", len(trace.data), int(title[1])
-            )
+    titles = _TITLE.findall(source.data)
     lengths = {int(trace.stats.mseed.record_length) for trace in traces if "mseed" in trace.stats}
-    if len(lengths) == 1 and len(source.raw) % (length := lengths.pop()):
-        raise source.error(f"the last of its blocks of {length} bytes is not whole; get the whole file again")
+    held = [len(trace.data) for trace in traces]
+    is_other = len(titles) == len(held) and [*map(int, titles)] != held
+    if is_other or (len(lengths) == 1 and len(source.raw) % lengths.pop()):
+        raise source.error("the file does not hold as many values as it says; get the whole file again")
 
 
 def _claims(source: Source) -> list[str]:
     """Return the names of the formats whose readers say that the file is theirs."""
-    if not installed():
-        return []
     from obspy.core.util.base import ENTRY_POINTS
     from obspy.core.util.misc import buffered_load_entry_point
 

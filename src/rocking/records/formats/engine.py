@@ -1,0 +1,359 @@
+"""Numbers in bulk, and one reader of every format whose numbers follow a header.
+
+A format says how it is recognised and, in a function of a channel's header, what stands where: count, step, unit,
+labels, and how the numbers are laid out. The rest is the same for all: which channel comes next, whether the numbers
+are as many as stated and finite, whether step and unit agree with what is asked, and the channel itself.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from rocking.core.arrays import Floats
+from rocking.errors import UnreadableRecord, literal
+from rocking.records.formats.channel import Channel, Recognised, channel_of, missing_value, timing
+from rocking.records.formats.source import Line, Request, Source
+from rocking.records.units import SECOND
+
+#: A number in a header, as a regular expression.
+NUMBER: Final = r"[+-]?(?:\d{1,20}\.?\d{0,20}|\.\d{1,20})(?:[EeDd][+-]?\d{1,4})?"
+
+#: Fortran writes double precision with a D.
+_FORTRAN: Final = bytes.maketrans(b"Dd", b"EE")
+_IS_OTHER: Final = bytes(0 if c in b"0123456789+-.eEdD \t\n\v" else 1 for c in range(256))
+#: Bytes at once: the numbers in them take some fifty times the memory while they are converted.
+_CHUNK: Final = 2**18
+_SPACE: Final = re.compile(rb"\s")
+_LINE_END: Final = re.compile(rb"\n")
+#: No number is written with more characters.
+_LONGEST: Final = 400
+_END_OF_DATA: Final = re.compile(r"(?i)^\s*(/&|-*\s*end[ -]of[ -]data)")
+_LAYOUT: Final = re.compile(r"(?ia)\(\s*(\d{1,3})\s*[EFGI]\s*(\d{1,3})(?:\.\d+)?\s*\)")
+_NUMBER: Final = re.compile(rf"({NUMBER})\s*$")
+
+
+@dataclass
+class Header:
+    """The header of one channel, which a format takes line by line; `end` is where its numbers begin."""
+
+    source: Source
+    form: Format
+    end: int
+    ordinal: int = 1
+    lines: list[Line] = field(default_factory=list)
+
+    def skip(self, count: int) -> list[Line]:
+        """Pass over so many lines."""
+        lines = self.source.lines(self.end, count)
+        if len(lines) < count:
+            last = lines[-1].start if lines else self.end
+            raise self.source.error("the file ends within its header; get the whole file again", last)
+        self.end = lines[-1].next if lines else self.end
+        return lines
+
+    def take(self, count: int) -> None:
+        """Take so many lines of text."""
+        self.lines += self.skip(count)
+
+    def expect(self, pattern: re.Pattern[str], what: str) -> re.Match[str]:
+        """Take the next line, which must match."""
+        self.take(1)
+        found = pattern.search(self.lines[-1].text)
+        if found is None:
+            raise self.source.error(f"{what} should stand here; get the file again", self.lines[-1].start)
+        return found
+
+    def take_until(self, pattern: re.Pattern[str], most: int) -> re.Match[str] | None:
+        """Take the lines up to the first that matches, among so many and before the title of another channel."""
+        for k, line in enumerate(self.source.lines(self.end, most)):
+            if found := pattern.search(line.text):
+                self.take(k + 1)
+                return found
+            if k > 0 and self.form.begins(line):
+                break
+        return None
+
+    def numbers(self, rows: int, layout: Layout | None, count: int) -> Floats:
+        """Take so many numbers in so many lines."""
+        start = self.end
+        self.skip(rows)
+        return read_values(self.source, start, self.end, layout, Stated(count, start))
+
+    def find(self, pattern: re.Pattern[str]) -> re.Match[str] | None:
+        """Return what a pattern finds in the first of the lines in which it finds anything."""
+        return next((found for line in self.lines if (found := pattern.search(line.text))), None)
+
+    def text(self, pattern: re.Pattern[str]) -> str:
+        """Return the first group of what a pattern finds, or an empty text."""
+        found = self.find(pattern)
+        return found[1].strip() if found else ""
+
+    def at(self, pattern: re.Pattern[str]) -> int:
+        """Return the offset of the first line that matches, or of the last line."""
+        return next((line.start for line in self.lines if pattern.search(line.text)), self.end)
+
+    def positive(self, key: re.Pattern[str], form: re.Pattern[str] = _NUMBER) -> list[float]:
+        """Return the numbers that stand, in this form, after a key; each must be positive."""
+        found = form.match(self.text(key))
+        numbers = [parse(group.encode("latin-1")) or 0.0 for group in found.groups()] if found else [0.0]
+        if not all(number > 0.0 for number in numbers):
+            line = self.source.line(self.at(key))
+            text = f"{literal(repr(line.text))} gives no positive number; correct it, or get the record again"
+            raise self.source.error(text, line.start)
+        return numbers
+
+
+@dataclass
+class Said:
+    """What a header says of a channel: its unit, its labels, and the numbers that follow.
+
+    They are pairs of time and value where there is no step (s). A number that means 'unknown' is refused. `scale` turns
+    an instrument's counts into the unit: a factor, and a divisor. `at` is the offset of the line that says all this.
+    """
+
+    at: int
+    units: str
+    step: float | None
+    count: Stated
+    labels: dict[str, Any]
+    layout: Layout | None = None
+    quantity: str = "acceleration"
+    facts: Mapping[str, str] = field(default_factory=dict)
+    padded: bool = False
+    unknown: float | None = None
+    scale: tuple[float, float] | None = None
+
+
+class Format(NamedTuple):
+    """A format: its name, what its first lines have, and what reads a channel's header.
+
+    Each of the marks is found in one of so many first lines; the first one also begins every channel of a file of
+    `several`. Data of other quantities, which begin with a line that has `other`, are passed over.
+    """
+
+    name: str
+    marks: tuple[re.Pattern[str], ...]
+    says: Callable[[Header], Said]
+    within: int = 1
+    several: bool = False
+    other: re.Pattern[str] = re.compile(r"(?!)")
+
+    def recognise(self, source: Source) -> Recognised | None:
+        """Return the format if each of its marks is found."""
+        lines = source.first_lines(self.within)
+        found = [next(filter(None, (mark.search(line.text) for line in lines)), None) for mark in self.marks]
+        if found[0] is None or None in found:
+            return None
+        at = next(line.start for line in lines if self.begins(line))
+        reason = f"line {source.line_number(at)} reads {found[0][0].strip()!r}"
+        return Recognised(self.name, reason, functools.partial(self._read, source, lines[0].start))
+
+    def begins(self, line: Line) -> bool:
+        """Whether a line begins a channel."""
+        return self.marks[0].search(line.text) is not None
+
+    def _read(self, source: Source, start: int | None, request: Request) -> list[Channel]:
+        channels: list[Channel] = []
+        while start is not None:
+            header = Header(source, self, start, len(channels) + 1)
+            said = self.says(header)
+            end = self._end(source, header.end)
+            if said.quantity.lower().startswith("accel"):
+                channels.append(_channel(header, said, end, request))
+            start = self._next(source, end)
+        if not channels:
+            text = f"this {self.name} file holds {said.quantity.lower()!r}; give the file of the acceleration"
+            raise source.error(text, said.at)
+        return channels
+
+    def _end(self, source: Source, start: int) -> int:
+        """Return where the numbers of a channel end: with the file, or where a line begins what follows them."""
+        end = numeric_end(source, start) if self.several else len(source.data)
+        line = source.line(end)
+        ends = _END_OF_DATA.match(line.text) or self.begins(line) or self.other.search(line.text)
+        return end if ends else line.next  # such a line is no end, but has a damaged number
+
+    def _next(self, source: Source, end: int) -> int | None:
+        """Return where the next channel begins."""
+        line = source.first_line(end)
+        while line is not None and not self.begins(line):
+            if not (_END_OF_DATA.match(line.text) or self.other.search(line.text)):
+                raise source.error("the title of another channel should stand here; correct the file", line.start)
+            line = source.first_line(numeric_end(source, line.next))
+        return None if line is None else line.start
+
+
+def _channel(header: Header, said: Said, end: int, request: Request) -> Channel:
+    source = header.source
+    unit = request.units(source, said.units, said.at)
+    dt = None if said.step is None else request.step(source, said.step, said.at)
+    values = read_values(source, header.end, end, said.layout, said.count)
+    if said.padded:
+        values = values[: int(said.count.values)]
+    if said.unknown is not None and (values == said.unknown).any():
+        raise missing_value(source, said.unknown, said.at)
+    times, facts = None, {**said.facts}
+    if said.scale is not None:
+        with np.errstate(over="ignore"):
+            values = values * said.scale[0] / said.scale[1]
+            facts["offset"] = f"kept, the mean is {float(unit.to_si(values).mean()) if len(values) else 0.0:.4g} m/s^2"
+    if dt is None:
+        if len(values) % 2 or len(values) < 4:
+            raise source.error("the values are no pairs of time and acceleration; correct the file", said.at)
+        dt, times = timing(source, request, values[0::2], SECOND, said.at)
+        values = values[1::2]
+    known = {"number": header.ordinal, "dt": dt, "times": times, **said.labels}
+    return channel_of(source, header.form.name, values, unit, said.at, spelling=said.units, facts=facts, **known)
+
+
+def stated_layout(text: str) -> Layout | None:
+    """Return the Fortran columns that a header such as "... Format: (8f9.6)" states, or None."""
+    found = _LAYOUT.search(text)
+    layout = Layout(int(found[1]), int(found[2])) if found else None
+    return layout if layout and all(layout) else None
+
+
+def direction(pattern: re.Pattern[str], name: str) -> float | None:
+    """Return the direction, degrees clockwise from north, with which a name begins as the pattern has it, or None."""
+    found = pattern.match(name)
+    return float(found[1]) % 360.0 if found else None
+
+
+def number(text: str) -> float:
+    """Return the number that a text writes, or 0."""
+    return parse(text.encode("latin-1")) or 0.0
+
+
+def step_of(rate: float) -> float:
+    """Return the step, s, of so many samples per second; 0 of none."""
+    return 1.0 / rate if rate else 0.0
+
+
+class Stated(NamedTuple):
+    """Number of values that a file states, the offset of the line that does, and how that is called.
+
+    So many more may follow that fill the last row, or that a length in whole seconds does not count.
+    """
+
+    values: float
+    at: int
+    by: str = "the header"
+    more: float = 0.0
+
+    def fits(self, count: int) -> bool:
+        """Whether so many values may follow."""
+        return -0.5 < count - self.values < self.more + 0.5
+
+
+class Layout(NamedTuple):
+    """Fortran columns such as 8F10.3: numbers per line and characters per number."""
+
+    per_line: int
+    width: int
+
+    def fields(self, line: bytes) -> list[bytes]:
+        """Return the fields of a line; the line as it is where it does not fit."""
+        if len(line) > self.per_line * self.width or b"\t" in line:
+            return [line.strip()]
+        return [line[i : i + self.width] for i in range(0, len(line), self.width)]
+
+
+def numeric_end(source: Source, start: int) -> int:
+    """Return the offset of the first line from `start` on that holds more than numbers, or the file's end."""
+    data = source.data
+    for begin in range(start, len(data), _CHUNK):
+        position = data[begin : begin + _CHUNK].translate(_IS_OTHER).find(1)
+        if position >= 0:
+            return max(data.rfind(b"\n", start, begin + position) + 1, start)
+    return len(data)
+
+
+def read_values(source: Source, start: int, end: int, layout: Layout | None, stated: Stated) -> Floats:
+    """Return all numbers between the offsets `start` and `end`, which begin lines; as many as are stated."""
+    values, reached = _in_blocks(source, start, end, None)
+    further = reached
+    if layout is not None and not (reached == end and stated.fits(len(values))):
+        columns, further = _in_blocks(source, start, end, layout)
+        if further == end and (reached < end or stated.fits(len(columns))):
+            values, reached = columns, end
+    if reached < end:
+        # The reading that got further is the one that the file was written for: its complaint helps.
+        bad = _first_bad(source, reached, None), _first_bad(source, further, layout)
+        raise not_a_number(source, *max(bad, key=lambda each: each[1]))
+    if not stated.fits(len(values)):
+        advice = "remove what does not belong to it" if len(values) > stated.values else "get the whole file again"
+        said = f"{stated.by} says {stated.values:.15g} values but {len(values)} follow"
+        raise source.error(f"{said}; {advice}, or correct that number", stated.at)
+    return values
+
+
+def not_a_number(source: Source, token: bytes, at: int) -> UnreadableRecord:
+    """Return the error for a piece of text that should be a finite number."""
+    shown, number = repr(token[:40].decode("latin-1")), parse(token)
+    if b"," in token and parse(token.replace(b",", b".")) is not None:
+        return source.error(f"{shown} is not a number; write decimal points in place of commas", at)
+    finite = "" if number is None or np.isfinite(number) else "finite "
+    return source.error(f"{shown} is not a {finite}number; correct it or get the record again", at)
+
+
+def parse(token: bytes) -> float | None:
+    """Return the number that `token` writes (D exponents too; perhaps not finite), or None."""
+    if len(token) > _LONGEST or b"_" in token:
+        return None
+    try:
+        return float(token.translate(_FORTRAN))
+    except ValueError:
+        return None
+
+
+def convert(tokens: list[bytes]) -> Floats | None:
+    """Return the numbers that the tokens write (D exponents too), or None if one is not a finite number."""
+    if not tokens:
+        return np.empty(0)
+    joined = b"\n".join(tokens)
+    if b"_" in joined or max(map(len, tokens)) > _LONGEST:
+        return None
+    if b"D" in joined or b"d" in joined:
+        tokens = joined.translate(_FORTRAN).split(b"\n")
+    try:
+        values = np.array(tokens, dtype=np.float64)
+    except ValueError:
+        return None
+    return values if np.isfinite(values).all() else None
+
+
+def _in_blocks(source: Source, start: int, end: int, layout: Layout | None) -> tuple[Floats, int]:
+    """Numbers of the blocks that hold nothing else, up to the first other one, and where that begins; or the end."""
+    parts = [np.empty(0)]
+    while start < end:
+        found = (_LINE_END if layout else _SPACE).search(source.data, min(start + _CHUNK, end) - 1, end)
+        stop = end if found is None else found.end()
+        values = convert(_tokens(source.data[start:stop], layout))
+        if values is None:
+            break
+        parts.append(values)
+        start = stop
+    return np.concatenate(parts), start
+
+
+def _tokens(text: bytes, layout: Layout | None) -> list[bytes]:
+    """Pieces between blanks; or columns, of which the last of a line may be missing."""
+    if layout is None:
+        return text.split()
+    return [field for line in text.split(b"\n") for field in layout.fields(line.rstrip())]
+
+
+def _first_bad(source: Source, at: int, layout: Layout | None) -> tuple[bytes, int]:
+    """Find the first piece of text from `at` on that is not a finite number, and where its line starts."""
+    for line in source.data[at : at + 2 * _CHUNK].split(b"\n"):
+        for token in _tokens(line, layout):
+            if convert([token]) is None:
+                return token, at
+        at += len(line) + 1
+    raise AssertionError("in a block that does not convert one number is bad")

@@ -1,0 +1,170 @@
+"""Formats of one component a file: PEER AT2, USGS SMC, K-NET and KiK-net, ESM and ITACA."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from datetime import datetime
+from typing import Final
+
+from rocking.records.formats.engine import NUMBER, Format, Header, Layout, Said, Stated, direction, number, step_of
+
+_DEGREES: Final = re.compile(r"(?a)(\d{1,3})$")
+
+# PEER AT2: NPTS and DT stand in the last line of the header in several shapes, ``NPTS=  5372, DT= .0100 SEC,`` (NGA) or
+# ``4096    0.0100    NPTS, DT`` (the older database). VT2 and DT2 files look alike but hold velocities, displacements.
+
+_SIZES: Final = re.compile(
+    rf"(?i)NPTS\s*[=:]?\s*(\d{{1,12}})\b.*?\bDT\s*[=:]?\s*({NUMBER})"
+    rf"|^\s*(\d{{1,12}})[\s,]+({NUMBER})[\s,]+NPTS\s*,\s*DT\b"
+)
+_AT2_UNITS: Final = re.compile(r"(?i)UNITS\s+OF\s+([A-Z0-9/^*]+)")
+_AT2_OTHER: Final = re.compile(r"(?i)\b(VELOCITY|DISPLACEMENT)\s+TIME\b")
+#: Who owns the station, and its number there, at the end of a title.
+_OWNER: Final = re.compile(r"(.*?)[\s,]*\(([^()]*)\)")
+
+
+def _at2(header: Header) -> Said:
+    sizes = header.take_until(_SIZES, 12)
+    assert sizes is not None
+    points, dt = filter(None, sizes.groups())
+    at = header.lines[-1].start
+    # "event, date, station, component (owner)", "event, station, component" or "..., component, (owner)"
+    title = header.lines[1].text.strip() if len(header.lines) > 2 else ""
+    owned = _OWNER.fullmatch(title)
+    text, owner = owned.groups() if owned else (title, "")
+    event, station, name = title, "", "acceleration"
+    if len(parts := [part.strip() for part in text.split(",")]) >= 3:
+        event, station, name = ", ".join(parts[:-2]), parts[-2], parts[-1] or name
+    else:
+        owner = ""
+    return Said(
+        at,
+        header.text(_AT2_UNITS),
+        number(dt),
+        Stated(int(points), at, "NPTS"),
+        {"name": name, "azimuth": direction(_DEGREES, name), "station": station, "event": event},
+        Layout(per_line=5, width=15),
+        quantity=header.text(_AT2_OTHER) or "acceleration",
+        facts={"station line": owner},
+    )
+
+
+# USGS SMC: 11 text lines, 48 integers, 50 reals, comments. Integer 16 counts the comment lines, integer 17 the values,
+# after which a last row may be padded; real 2 is the rate. A digitised film has no rate: its values are pairs.
+
+_SMC_TITLE: Final = re.compile(
+    r"(?i)^\s*([0-6])\s+(unknown|(?:un)?corrected accelerogram|velocity|displacement|response|fourier)"
+)
+_COMPONENT: Final = re.compile(r"(?i)component\s*=\s*(.*)$")
+_SMC_STATION: Final = re.compile(r"(?i)station\s*=\s*(.*?)\s*(?:component\s*=|$)")
+_UNKNOWN: Final = 1.7e38
+
+
+def _smc(header: Header) -> Said:
+    kind = header.expect(_SMC_TITLE, "the title")
+    header.take(10)
+    at = header.end
+    integers = header.numbers(6, Layout(per_line=8, width=10), 48)
+    reals = header.numbers(10, Layout(per_line=5, width=15), 50)
+    header.skip(int(integers[15]))
+    rate = float(reals[1])
+    name = header.text(_COMPONENT).strip(" *") or "acceleration"
+    layout = Layout(per_line=5, width=14) if int(integers[46]) == 8 else Layout(per_line=8, width=10)
+    return Said(
+        at,
+        "cm/s2",
+        None if rate == _UNKNOWN else step_of(rate),
+        Stated(int(integers[16]), at, more=layout.per_line),
+        {
+            "name": name,
+            "azimuth": direction(_DEGREES, name),
+            "station": header.text(_SMC_STATION),
+            "event": " ".join(header.lines[3].text.split()),
+        },
+        layout,
+        quantity="acceleration" if kind[1] in "12" else kind[2],
+        facts={"stage": kind[2].lower()},
+        padded=True,
+        unknown=_UNKNOWN,
+    )
+
+
+# K-NET and KiK-net: 17 lines, then counts that the scale factor turns into gal. The counts hold the instrument's
+# constant offset (some gal), which is kept. "Record Time" is 15 s later than the first sample.
+
+_KNET_KEYS: Final = (
+    "Origin Time", "Lat.", "Lon", "Depth", "Mag.", "Station Code", "Station Lat", "Station Lon", "Station Height",
+    "Record Time", "Sampling Freq", "Duration Time", "Dir.", "Scale Factor", "Max", "Last Correction", "Memo",
+)  # fmt: skip
+_KNET: Final = {key: re.compile(rf"^(?={re.escape(key)}).{{0,18}}(.*)$") for key in _KNET_KEYS}
+_RATE: Final = re.compile(r"(?ia)\s*([\d.]{1,20})\s*Hz")
+_SCALE: Final = re.compile(r"(?ia)\s*([\d.]{1,20})\s*\(\s*gal\s*\)\s*/\s*([\d.]{1,20})")
+_SECONDS: Final = re.compile(r"(?a)\s*([\d.]{1,20})")
+#: KiK-net numbers its six sensors: three in the borehole, three at the surface.
+_SENSORS: Final = {"1": "N-S borehole", "2": "E-W borehole", "3": "U-D borehole", "4": "N-S", "5": "E-W", "6": "U-D"}
+
+
+def _knet(header: Header) -> Said:
+    says = {key: header.expect(pattern, f"the header line {key!r}")[1].strip() for key, pattern in _KNET.items()}
+    (rate,) = header.positive(_KNET["Sampling Freq"], _RATE)
+    (seconds,) = header.positive(_KNET["Duration Time"], _SECONDS)
+    gal, counts = header.positive(_KNET["Scale Factor"], _SCALE)
+    name = _SENSORS.get(says["Dir."], says["Dir."]) or "acceleration"
+    return Said(
+        header.at(_KNET["Scale Factor"]),
+        "gal",
+        1.0 / rate,
+        # The duration is in whole seconds: fewer samples are missing, and a second's more are too many.
+        Stated(seconds * rate, header.at(_KNET["Duration Time"]), "the duration", more=rate - 1.0),
+        {
+            "name": name,
+            "azimuth": {"N-S": 0.0, "E-W": 90.0}.get(name.split(" ")[0]),
+            "station": says["Station Code"],
+            "event": f"{says['Origin Time']}, magnitude {says['Mag.']}",
+        },
+        facts={"record time": says["Record Time"]},
+        scale=(gal, counts),
+    )
+
+
+# ESM and ITACA: "KEY: value" lines, then one value to a line.
+
+_ESM_LINE: Final = re.compile(r"^([A-Z][A-Z0-9_/^]*)\s*:\s*(.*)$")
+_ESM_KEYS: Final = ("DATA_TYPE", "SAMPLING_INTERVAL_S", "NDATA", "UNITS")
+_ESM: Final = {key: re.compile(rf"^{key}\s*:(.*)$") for key in _ESM_KEYS}
+
+
+def _esm(header: Header) -> Said:
+    found = (_ESM_LINE.match(line.text) for line in header.source.lines(header.end, 200))
+    entries = [each.groups() for each in itertools.takewhile(bool, found) if each]
+    header.take(len(entries))
+    says = {key: value.strip() for key, value in entries if value.strip()}
+    (step,), (count,) = (header.positive(_ESM[key]) for key in ("SAMPLING_INTERVAL_S", "NDATA"))
+    name = says.get("STREAM", "acceleration")
+    first_sample = says.get("DATE_TIME_FIRST_SAMPLE_YYYYMMDD_HHMMSS", "")
+    try:
+        start = datetime.strptime(f"{first_sample}+0000", "%Y%m%d_%H%M%S.%f%z").timestamp()
+    except ValueError:
+        start = None
+    return Said(
+        header.at(_ESM["UNITS"]),
+        says.get("UNITS", ""),
+        step,
+        Stated(count, header.at(_ESM["NDATA"]), "NDATA"),
+        {
+            "name": name,
+            "azimuth": {"N": 0.0, "E": 90.0}.get(name[-1]),
+            "station": ".".join(says[key] for key in ("NETWORK", "STATION_CODE") if key in says),
+            "event": says.get("EVENT_ID", says.get("EVENT_NAME", "")),
+            "start": start,
+        },
+        quantity=says.get("DATA_TYPE", ""),
+        facts={"processing": says.get("PROCESSING", "")},
+    )
+
+
+AT2: Final = Format("PEER AT2", (_SIZES,), _at2, within=12)
+SMC: Final = Format("USGS SMC", (_SMC_TITLE,), _smc)
+KNET: Final = Format("K-NET/KiK-net", (_KNET["Origin Time"], _KNET["Scale Factor"]), _knet, within=34)
+ESM: Final = Format("ESM", tuple(_ESM.values())[:3], _esm, within=200)
