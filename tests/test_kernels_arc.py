@@ -8,16 +8,8 @@ from hypothesis import strategies as st
 from kernel_records import in_units_of_g, numbers, one_sided, rocking_block, rules_for, state_of
 from oracles.taylor import System, after, coefficients, mp
 
-from rocking.kernels.arc import (
-    NEGLIGIBLE,
-    converged,
-    evaluate,
-    expand,
-    expand_checked,
-    linear_order,
-    shortened,
-    step_length,
-)
+from rocking.kernels import arc
+from rocking.kernels.arc import converged, evaluate, expand, linear_order, step_length
 from rocking.kernels.series import linear_coefficients
 from rocking.kernels.state import ORDER, Record, new_scratch
 
@@ -81,7 +73,7 @@ def linear_series(
         order = converged(scratch["rotation"], degree, h)
         if order > ORDER:
             scratch["weight"][0] = 1.0
-            order, h = ORDER, shortened(body, rules_for(), 0, scratch, (degree, 0), h)
+            order, h = ORDER, arc.shortened(body, rules_for(), 0, scratch, (degree, 0), h)
     return scratch["rotation"], order, h
 
 
@@ -93,7 +85,7 @@ def nonlinear_series(
     scratch["weight"][0] = 1.0
     block = rocking_block((p, p), (alpha, alpha), nonlinear=True)
     block["stiffness"] = lam
-    order, h = expand_checked(block, rules_for(nonlinear=True), state_of(0, u, v), scratch, (len(A) - 1, 0), h)
+    order, h = arc.expand_checked(block, rules_for(nonlinear=True), state_of(0, u, v), scratch, (len(A) - 1, 0), h)
     return scratch["rotation"], order, h
 
 
@@ -138,7 +130,7 @@ def test_what_a_linear_series_leaves_out_is_negligible(
     _, order, h = linear_series(u, v, sign * p * p, p * p, alpha, motion, share / p)
     full = coefficients(System(sign * p * p, alpha, gain=p * p), u, v, list(motion), order=80)
     sizes = [abs(x) * mp.mpf(h) ** k for k, x in enumerate(full)]
-    assert sum(sizes[order + 1 :]) <= 4.0 * NEGLIGIBLE * max(sizes)
+    assert sum(sizes[order + 1 :]) <= 4.0 * arc.NEGLIGIBLE * max(sizes)
 
 
 @quick
