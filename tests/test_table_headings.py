@@ -66,6 +66,8 @@ READ = [
     ("names in a comment", "% t (ms)  a (mg)\n" + rows(step=10.0, sign="  "), 0.01, 1e-3 * G),
     ("names of variables", "Time_s_,Acc_m_s_2_\n" + rows(), 0.01, 1.0),
     ("percent of g", "Time (s),Acceleration (%g)\n" + rows(), 0.01, 0.01 * G),
+    ("percent of g after a word", "time;acc % g\n" + rows(sign=";"), 0.01, 0.01 * G),
+    ("a duration in a remark", "# duration (min): 2\n# t, acc (g)\n" + rows(), 0.01, G),
     ("feet", "TIME SEC\tACC FT/SEC2\n" + rows(sign="\t"), 0.01, FT),
     ("inches", "Time (s),Acc (in/s^2)\n" + rows(), 0.01, IN),
     ("m s^-2", "Time (s),Acc (m s^-2)\n" + rows(), 0.01, 1.0),
@@ -235,19 +237,6 @@ def test_a_missing_row_among_even_times_is_noted(tmp_path):
     (note,) = written("gap.csv", {17})
     assert note.startswith("the times go on by 0.01 s, but by 0.02 s after 0.16 s: are rows missing?")
     assert written("whole.csv", set()) == ()
-
-
-@pytest.mark.parametrize("name", ["acc % g", "acc_%_g", "a [%g]", "acc, %g"])
-def test_a_name_has_the_longest_of_the_units_that_end_it(tmp_path, name):
-    path = tmp_path / "table.csv"
-    path.write_text(f"time;{name}\n" + rows(sign=";"))
-    assert channels(path)[0].units == "%g"
-
-
-def test_a_duration_among_the_remarks_is_no_unit_of_the_times(tmp_path):
-    path = tmp_path / "table.txt"
-    path.write_text("# duration (min): 2\n# t, acc (g)\n" + rows())
-    assert (channels(path)[0].dt, channels(path)[0].units) == (0.01, "g")
 
 
 @pytest.mark.parametrize("names", ["time (s),ns,up", "t,NS,EW", "t,ns,ud", "Time,ud,ns"])
