@@ -1,10 +1,8 @@
 """The explorer's periodic view: what a case settles on and its sweeps, against long simulations and its own script."""
 
-import json
 import math
 import re
 import runpy
-import shlex
 
 import numpy as np
 import pytest
@@ -12,7 +10,7 @@ from explorer_texts import in_english
 
 import rocking
 from rocking.errors import InvalidOption
-from rocking.explorer.code import sweep_as_command, sweep_as_python
+from rocking.explorer.code import sweep_as_python
 from rocking.explorer.inputs import read_case
 from rocking.explorer.periodic import (
     KEPT,
@@ -209,39 +207,6 @@ def test_a_sweep_is_what_its_script_computes(texts, asked, tmp_path):
         assert np.array_equal(states[KEPT - len(each.states) :], each.states)
     assert periodic >= 15 and periodic + overturned >= 24
     assert overturned >= 3 or "model" in texts or "scale" in texts
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize(
-    ("texts", "asked", "most"),
-    [
-        ({}, {"sweep": "a", "sweep_from": "1.2", "sweep_to": "6"}, 0),
-        (
-            {**ECCENTRIC, "model": "linear", "scale": "-1.1"},
-            {"sweep": "omega", "sweep_from": "2.5", "sweep_to": "5"},
-            1,
-        ),
-    ],
-)
-def test_a_sweep_is_what_its_command_prints(run, texts, asked, most):
-    case = case_of("sine:amplitude=0.9g,frequency=2,cycles=3,phase=20deg", **texts)
-    sweep = sweep_of(case, {**asked, "sweep_points": "12"})
-    program, *arguments = shlex.split(sweep_as_command(sweep))
-    code, out, err = run(*arguments, "--json")
-    assert (program, code, err) == ("rocking", 0, "")
-    result, found = json.loads(out), swept(sweep)
-    name = "amplitude" if sweep.axis.name == "a" else "frequency"
-    values = [getattr(sweep.sine_at(float(value)), name) for value in sweep.axis.values]
-    assert result["value"] == pytest.approx(values, rel=1e-14) and result["kept"] == KEPT
-    periods = {(way, k): period[0] for way, row in zip(result["direction"], result["period"], strict=True)
-               for k, period in enumerate(row)}  # fmt: skip
-    assert len(periods) == 24
-    assert periods == {at: each.period if len(each.states) else -1 for at, each in found.items()}
-
-
-@pytest.mark.parametrize("texts", [{"gravity": "9.81"}, {"chattering": "velocity=0.01"}])
-def test_a_sweep_that_the_command_line_does_not_take_has_no_command(texts):
-    assert sweep_as_command(sweep_of(case_of(sine(3.0), **texts), {})) is None
 
 
 @pytest.mark.parametrize("points", [12, pytest.param(40, marks=pytest.mark.thorough)])
