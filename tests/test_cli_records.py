@@ -175,12 +175,6 @@ def test_a_record_is_read_from_standard_input(run, folder, monkeypatch):
     assert run("records", "-")[1].startswith("standard input: PEER AT2")
 
 
-def test_a_file_is_listed_with_the_channel_that_is_named(run):
-    two = Path(__file__).parent / "data" / "formats" / "two.v1"
-    name = json.loads(run("records", two, "--json")[1])["channels"][0]["name"]
-    assert len(json.loads(run("records", two, "--channel", name, "--json")[1])["channels"]) == 1
-
-
 def test_errors_name_options(run, tmp_path):
     column = tmp_path / "column.txt"
     column.write_text("0.0\n0.1\n0.0\n")

@@ -445,11 +445,7 @@ def test_uneven_times_make_an_uneven_motion(file: Callable[[str], Path]) -> None
         ("0 1\n1 2\n2\n", {"units": "g"}, "line 3: columns in this row: 1, in others: 2"),
         ("0.1\n0.2\nEND\n", {"units": "g", "dt": 0.1}, "line 3: 'END' is not a number"),
         ("0 1\n0.1 2\n0.2 3\n", {"units": "g", "dt": 0.2}, "line 1: the sampling step is 0.1 s, not dt 0.2 s"),
-        (
-            "a\n0,5\n1,5\n2,0\n",
-            {"units": "g", "dt": 0.1},
-            "line 2: '0,5' may be one number with a decimal comma, or two",
-        ),
+        ("a\n0,5\n1,5\n", {"units": "g", "dt": 0.1}, "line 2: '0,5' may be one number with a decimal comma, or"),
         ("0,5\n1,5\n2,0\n", {"units": "g"}, "write decimal points, or blanks between two numbers"),
         ('"1,5E-1"\n"2,5E-1"\n', {"units": "g", "dt": 0.1}, "decimal comma"),
         (",512\n,301\n", {"units": "g", "dt": 0.1}, "',512' may be one number with a decimal comma"),
@@ -513,13 +509,8 @@ def test_a_heading_in_another_encoding_states_the_units(file: Callable[[bytes], 
 
 @pytest.mark.parametrize("delimiter", [",", ";", "\t", "  "])
 def test_columns_that_a_heading_names_are_channels(delimiter: str, file: Callable[[str], Path]) -> None:
-    rows = [
-        ["time (s)", "NS (cm/s2)", "EW (cm/s2)"],
-        ["0.0", "1.5", "4.0"],
-        ["0.1", "2.5", "5.0"],
-        ["0.2", "3.5", "9.0"],
-    ]
-    path = file("".join(delimiter.join(row) + "\n" for row in rows))
+    rows = "time (s)|NS (cm/s2)|EW (cm/s2)\n0.0|1.5|4.0\n0.1|2.5|5.0\n0.2|3.5|9.0\n"
+    path = file(rows.replace("|", delimiter))
     first, second = channels(path)
     assert [(each.number, each.name, each.dt) for each in (first, second)] == [(1, "NS", 0.1), (2, "EW", 0.1)]
     assert second.acceleration.tolist() == [0.04, 0.05, 0.09]
@@ -823,15 +814,12 @@ def test_a_motion_knows_where_it_comes_from(file: Callable[[str], Path]) -> None
     assert (shipped.channel, shipped.station) == ("up", records.info("ridgecrest-clc-up").station)
 
 
-@pytest.mark.parametrize("mark", [-99.0, -999.0, 9999.0, 99.9999, -99999.99, 999.25, -12345.0, -32768.0, 8388607.0])
-def test_a_number_for_a_missing_value_is_found_among_far_smaller_ones(mark: float) -> None:
-    assert gap_at(np.array([0.1, 0.2, mark, mark, 0.2])) == 2
-    assert gap_at(np.array([0.1, 0.9 * abs(mark), mark, 0.2])) is None  # a value among values
-
-
-@pytest.mark.parametrize("value", [9.0, 9.9999, 99.99999, 98.0, 999999999.0, 32766.0])
-def test_a_large_number_that_stands_for_nothing_is_a_value(value: float) -> None:
-    assert gap_at(np.array([0.1, value, 0.2])) is None
+def test_a_number_for_a_missing_value_is_found_among_far_smaller_ones() -> None:
+    for mark in (-99.0, -999.0, 9999.0, 99.9999, -99999.99, 999.25, -12345.0, -32768.0, 8388607.0):
+        assert gap_at(np.array([0.1, 0.2, mark, mark, 0.2])) == 2
+        assert gap_at(np.array([0.1, 0.9 * abs(mark), mark, 0.2])) is None  # a value among values
+    for value in (9.0, 9.9999, 99.99999, 98.0, 999999999.0, 32766.0):
+        assert gap_at(np.array([0.1, value, 0.2])) is None
 
 
 # What is refused

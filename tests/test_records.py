@@ -1,7 +1,6 @@
 """The shipped records: what was published, to the last digit, without a network."""
 
 import json
-import socket
 from pathlib import Path
 
 import numpy as np
@@ -89,14 +88,6 @@ def test_the_conversion_script_makes_the_shipped_files(shared, tmp_path, monkeyp
             assert made.files == shipped.files
             for channel in made.files:
                 assert_array_equal(made[channel], shipped[channel])
-
-
-def test_records_load_without_a_network(monkeypatch):
-    def refuse(*_, **__):
-        raise AssertionError("a shipped record opened a socket")
-
-    monkeypatch.setattr(socket, "socket", refuse)
-    assert records.load("el-centro-meloland-270").pgv == pytest.approx(0.89, abs=0.01)
 
 
 def test_the_shipped_files_are_small_and_name_their_sources():

@@ -272,13 +272,6 @@ def test_of_a_folder_those_that_say_something_else_keep_it_or_are_refused(tmp_pa
         named_motion(str(path), dt=0.01)
 
 
-def test_both_components_of_a_table_have_the_units_that_are_given(tmp_path):
-    path = tmp_path / "table.csv"
-    path.write_text("t (s),x (g),z (g)\n0,0,0\n0.01,3,2\n0.02,-3,-2\n0.03,0,0\n")
-    assert named_motion(str(path), channel="x", units="m/s2").pga == 3.0
-    assert named_vertical("z", str(path), channel="x", units="m/s2").pga == 2.0
-
-
 def test_a_column_is_found_by_its_name_before_its_number(tmp_path):
     path = tmp_path / "table.csv"
     path.write_text("t (s),2 (g),1 (g)\n0,0,0\n0.01,0.1,0.2\n0.02,0,0\n")
