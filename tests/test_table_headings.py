@@ -359,3 +359,36 @@ def test_accelerations_that_are_never_negative_are_read_where_a_column_is_named_
         else:
             with pytest.raises(UnreadableRecord, match="or name their column so"):
                 read(path)
+
+
+@pytest.mark.parametrize(
+    "stated",
+    """SAMPLING INTERVAL (sec) : 0.01  Sampling rate: 100 Hz  sampling frequency (Hz),100  dt = 0.01 s  DT 0.0100
+Time step (s) = .01  Samples/sec=100  100 samples per second  100 sps  Delta t = 10 ms  time_step: 1.0E-02
+EQUALLY SPACED INTERVALS OF: 0.010 SEC  INTERVALO DE MUESTREO, C1-C6 (s) : /0.01/0.01/0.01
+VEL. DE MUESTREO, C1-C6 (muestras/s) : /100/100/100  Sampling period 1/100 s""".replace("\n", "  ").split("  "),
+)
+@pytest.mark.parametrize("columns", [1, 3])
+def test_a_step_that_a_heading_states_is_not_contradicted(stated: str, columns: int, tmp_path: Path) -> None:
+    path = tmp_path / "table.txt"
+    names = "N-S (gal)  E-W (gal)  U-D (gal)\n" if columns == 3 else ""
+    path.write_text(f"A STATION\n{stated}\n{names}" + wide(*[SAMPLES] * columns, sign="  "))
+    channel = 1 if columns == 3 else None
+    assert read(path, dt=0.01, units="gal", channel=channel).step == 0.01
+    with pytest.raises(UnreadableRecord, match=r"line 2: the heading says .*, not dt 0.02 s; correct one of them"):
+        read(path, dt=0.02, units="gal", channel=channel)
+    if columns == 1:
+        with pytest.raises(UnreadableRecord, match=r"no column holds times, but the heading says .*; give dt"):
+            read(path, units="gal")
+
+
+@pytest.mark.parametrize("dt", [0.0078125, 0.0078, 0.008])
+def test_a_step_that_a_heading_states_may_be_rounded(dt: float, tmp_path: Path) -> None:
+    path = tmp_path / "table.txt"
+    for stated, refused in (("0.0078", dt == 0.008), ("0.008", False), ("0.01", True), ("1e-9999", True)):
+        path.write_text(f"sampling interval: {stated} s\n" + wide(SAMPLES))
+        if refused:
+            with pytest.raises(UnreadableRecord, match="correct one of them"):
+                read(path, dt=dt, units="g")
+        else:
+            assert read(path, dt=dt, units="g").step == dt

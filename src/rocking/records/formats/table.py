@@ -12,15 +12,16 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Iterator, Sequence
+from decimal import Decimal
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from rocking.core.arrays import Floats
-from rocking.errors import UnreadableRecord
+from rocking.errors import UnreadableRecord, literal
 from rocking.records.formats.channel import Channel, Recognised, channel_of, first_fault, timing
-from rocking.records.formats.engine import convert, not_a_number, parse
+from rocking.records.formats.engine import NUMBER, convert, not_a_number, parse
 from rocking.records.formats.heading import RULE, Heading, heading_of
 from rocking.records.formats.source import Line, Request, Source
 
@@ -45,6 +46,13 @@ _DECIMAL_COMMA: Final = re.compile(r"[+-]?\d*,\d+(?:[EeDd][+-]?\d+)?")
 
 #: What a unit of another quantity has.
 _OF_OTHER_QUANTITY: Final = re.compile(r"(?i).*[/%].*|m|cm|mm|in|ft|m?v|counts?|rad|deg")
+#: Step or rate in a heading.
+_STATES_STEP: Final = re.compile(
+    rf"({NUMBER})\s*(?:sps\b|samples?\s*(?:/|per)\s*s)|(?:sampl\w*[\s_-]*(?:rate|freq|interval|step|period|/\s*s)"
+    r"|time[\s_-]*(?:step|interval)|\b(?:dt|delta[\s_-]?t)\b|intervals? of|(?:interval|vel|frec)\S* de muestreo)"
+    r"(?:[^:=]*[:=])?(.*)",
+    re.IGNORECASE,
+)
 #: Title of a table that ObsPy reads.
 OTHER_TITLE: Final = "TIMESERIES "
 
@@ -95,8 +103,8 @@ class _Table(NamedTuple):
         if self.heading.doubtful and (self.columns == 1 or times) and np.all(numbers[:, held] >= 0.0):
             text = "this seems to be a response spectrum: no value is negative, and no column is named 'time'"
             raise self.source.error(f"{text}; give accelerations at times, or name their column so", self.heading.at)
-        if not times and request.dt is None:
-            raise self.source.error("the file does not say its sampling step; give {} in seconds", self.start, "dt")
+        if not times:
+            self._check_step(request.dt)
         overruled = request.unit is not None and not request.several
         channels = []
         for number, place in enumerate(held, 1):
@@ -123,6 +131,20 @@ class _Table(NamedTuple):
             raise self.source.error(f"{text} 'time (ms)': s, ms, us, ns, min, h or d", self.heading.at)
         dt, instants = timing(self.source, request, numbers[:, column], unit, self.start, self._row_at)
         return {"dt": dt, "times": instants, "start": float(unit.to_si(numbers[:1, column])[0])}
+
+    def _check_step(self, dt: float | None) -> None:
+        """Refuse a table without times if no step is given, or another one than its heading states."""
+        said = "the file does not say its sampling step"
+        for line in itertools.takewhile(lambda line: line.start < self.start, self.source.lines(0, HEADING_LINES)):
+            match = _STATES_STEP.search(line.text)
+            numbers = re.findall(NUMBER, match[1] or match[2]) if match else []
+            stated = literal(repr(line.text.strip()[:100]))
+            if dt is not None and numbers and not any(_is_step(number, dt) for number in numbers):
+                text = f"the heading says {stated}, not {{}} {dt:g} s; correct one of them"
+                raise self.source.error(text, line.start, "dt", value=dt)
+            said = f"no column holds times, but the heading says {stated}" if numbers else said
+        if dt is None:
+            raise self.source.error(f"{said}; give {{}} in seconds", self.start, "dt")
 
     def _held(self) -> list[int]:
         """Return the places of the accelerations: with a unit of acceleration if any has one, else without any unit."""
@@ -166,6 +188,13 @@ class _Table(NamedTuple):
     def _row_at(self, index: int) -> int:
         """Return the offset of a row."""
         return next(at for k, (_, at) in enumerate(self._rows()) if k == index)
+
+
+def _is_step(number: str, dt: float) -> bool:
+    """Whether a printed number may be a step (s): in s or ms, or as a rate, rounded as it is printed."""
+    printed = Decimal(number.upper().replace("D", "E"))
+    rounded = min(float(f"0.5e{printed.as_tuple().exponent}"), 0.03 * abs(float(printed)))
+    return any(abs(each - float(printed)) <= rounded for each in (dt, 1e3 * dt, 1.0 / dt))
 
 
 def recognise(source: Source) -> Recognised | None:
