@@ -1,8 +1,6 @@
 """Blocks: parameters from sizes, pivots and frames; thresholds; what cannot stand."""
 
 import math
-import re
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -184,22 +182,3 @@ def test_parameters_of_two_sides_tell_the_body_that_has_them(distances):
     said = "body from its parameters, centre of mass 1.2 m high, radius of gyration 0.8 m"
     assert found.description.startswith(said)
     assert [side.radius for side in found.sides] == pytest.approx([math.hypot(b, 1.2) for b in distances], rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("block", "corners"),
-    [
-        (Block(half_width=0.2, half_height=1.0), [(0.0, 0.0), (0.4, 0.0), (0.4, 2.0), (0.0, 2.0)]),
-        (Block.from_pivots((0.2, 0.15), 0.7, 0.4), [(0.0, 0.0), (0.35, 0.0), (0.15, 0.7)]),
-    ],
-)
-def test_a_notebook_shows_the_block_to_scale_on_the_ground_in_the_colour_of_the_text(block, corners):
-    page = block._repr_html_()
-    ElementTree.fromstring(page)
-    assert "currentColor" in page and "#" not in page
-    points, floor = (
-        np.array([[float(number) for number in point.split(",")] for point in re.search(form, page)[1].split()])
-        for form in (r'<polygon points="([^"]*)"', r'<polyline points="([^"]*)"')
-    )
-    drawn = np.column_stack([points[:, 0] - points[0, 0], floor[0, 1] - points[:, 1]])
-    np.testing.assert_allclose(drawn, 120.0 / np.max(corners) * np.array(corners), atol=0.11)

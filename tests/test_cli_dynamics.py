@@ -22,7 +22,6 @@ def test_basin_json_is_the_basins(run):
     found = dynamics.basins(block, shaking, np.linspace(-0.2, 0.2, 12), np.linspace(-0.4, 0.4, 11))
     assert [each["attractor"] for each in result["attractors"]] == found.data.attractor.values.tolist()
     assert [each["share"] for each in result["attractors"]] == found.data.share.values.tolist()
-    assert result["complete"] is True and result["basin_entropy"] == found.entropy[0]
 
 
 @pytest.mark.parametrize(
@@ -67,7 +66,7 @@ def test_every_body_has_a_basin_and_a_diagram(run, options, body):
     pulse = ["--pulse", "sine:amplitude=3,frequency=1.3Hz"]
     code, out, err = run("basin", *pulse, *options, "--periods", "60", "--json")
     assert (code, err) == (0, "")
-    assert body.description in (result := json.loads(out))["body"] and result["complete"] is True
+    assert body.description in (result := json.loads(out))["body"]
     assert sum(each["share"] for each in result["attractors"]) == pytest.approx(1.0)
     grid = ["--positions", "0:1cm:3", "--velocities", "0,0.1"]
     _, out, _ = run("basin", *pulse, *options, *grid, "--json")

@@ -8,7 +8,7 @@ import pytest
 from oracles.standing import drawn
 
 import rocking
-from rocking import Blocks, InvalidOption, Motion, dynamics, simulate, simulate_many
+from rocking import Blocks, InvalidOption, Motion, simulate, simulate_many
 
 NAMES = ("motion", "p", "alpha", "restitution")
 
@@ -56,29 +56,6 @@ def test_derivatives_of_restrained_blocks_are_those_of_their_responses() -> None
     many = rocking.RestrainedBlocks.of(bodies)
     motion = record(6) * (2.0 * min(min(body.uplift_thresholds()) for body in bodies) / 3.0)
     assert judged(many, [motion], [1.0, 2.0])["known"] >= 3
-
-
-def test_derivatives_between_stops_are_those_of_the_responses_by_the_start_too() -> None:
-    balls = [dynamics.BouncingBall(e) for e in (0.0, 0.4, 0.8)]
-    oscillators = [dynamics.ImpactOscillator(f, 0.7, stop=0.02, second_stop=0.05) for f in (0.5, 1.0, 2.0, 4.0)]
-    motion = rocking.pulses.sine(2.0, 1.0, cycles=2)
-    names = {"motion": "motion", "restitution": "restitution"}
-    names |= {"initial_rotation": "initial_position", "initial_velocity": "initial_velocity"}
-    known = beyond = 0
-    for bodies in (balls, oscillators):
-        start = {"initial_position": 0.01, "initial_velocity": 0.05}
-        found = dynamics.simulate_many(bodies, motion, derivatives=True, **start)
-        for k, body in enumerate(bodies):
-            response = dynamics.simulate(body, motion, duration=motion.end if body in oscillators else None, **start)
-            changes = [float(found[f"peak_by_{name}"].values[0, k]) for name in names.values()]
-            if response.peak_position == body.stops[1] != body.stops[0]:
-                assert np.all(np.isnan(changes))
-                beyond += 1
-            else:
-                assert changes == [response.sensitivity.peak[name][0] for name in names]
-                known += 1
-    assert known >= 4
-    assert beyond >= 1
 
 
 def test_where_rounding_decides_on_a_touch_there_is_no_derivative() -> None:

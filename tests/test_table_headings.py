@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rocking.errors import UnreadableRecord
-from rocking.inputs.notes import reading_notes, vertical_notes
+from rocking.inputs.notes import vertical_notes
 from rocking.records.formats import channels, chosen, identify, read
 from rocking.records.formats.source import Request
 from rocking.records.named import named_motion, named_vertical
@@ -280,18 +280,6 @@ def test_a_title_above_a_column_of_accelerations_may_speak_of_time(tmp_path, nam
     path = tmp_path / "column.csv"
     path.write_text(f"# {name}\n0.000\n0.005\n0.010\n")
     assert read(path, dt=0.005, units="g").pga == pytest.approx(0.01 * G)
-
-
-def test_a_missing_row_among_even_times_is_noted(tmp_path):
-    def written(name, left_out):
-        path = tmp_path / name
-        rows = [f"{0.01 * k:.2f},{0.1 * ((7 * k) % 5 - 2):.3f}" for k in range(40) if k not in left_out]
-        path.write_text("\n".join(["time (s),a (g)", *rows]))
-        return reading_notes(read(path))
-
-    (note,) = written("gap.csv", {17})
-    assert note.startswith("the times go on by 0.01 s, but by 0.02 s after 0.16 s: are rows missing?")
-    assert written("whole.csv", set()) == ()
 
 
 @pytest.mark.parametrize("name", ["acc % g", "acc_%_g", "a [%g]", "acc, %g"])

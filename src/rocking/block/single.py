@@ -14,7 +14,7 @@ from rocking.block.limits import checked_gravity, checked_length, checked_mass, 
 from rocking.block.restitution import housner_restitution
 from rocking.block.rigid_body import contact_forces, gyration_squared, refusal, rigid_bodies
 from rocking.block.sides import Side, even_sides, in_line, restitutions, sides_on_pivots
-from rocking.core import checks, svg
+from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
 from rocking.core.constants import MODELS, STANDARD_GRAVITY, Model
 from rocking.errors import InvalidBlock, InvalidOption, UnequalSides
@@ -31,8 +31,6 @@ _ROUNDING: Final = 1e-12
 #: Restitutions so near are one: that of a body, from p and alpha or from itself.
 _SAME_RESTITUTION: Final = 1e-9
 _HEAVIEST_BEAM: Final = 1e12
-#: Longer side of a block's picture, pixels.
-_PICTURED: Final = 120.0
 
 
 @dataclass(frozen=True)
@@ -395,18 +393,6 @@ class Block:
 
     def __repr__(self) -> str:
         return f"<Block: {self}>"
-
-    def _repr_html_(self) -> str:
-        if self.half_width is not None and self.half_height is not None:
-            b, top = self.half_width, 2.0 * self.half_height
-            corners, label = [(-b, 0.0), (b, 0.0), (b, top), (-b, top)], f"{2.0 * b:.4g} m x {top:.4g} m"
-        else:
-            (right, left), (up, _) = zip(
-                *((side.radius * math.sin(side.alpha), side.radius * math.cos(side.alpha)) for side in self.sides),
-                strict=True,
-            )
-            corners, label = [(-left, 0.0), (right, 0.0), (0.0, up)], "pivots and centre of mass"
-        return svg.captioned(f"Block: {self}", svg.outline(corners, _PICTURED, label))
 
     @property
     def p(self) -> float:

@@ -20,8 +20,7 @@ from rocking.dynamics.basin_maps import basins
 from rocking.dynamics.bifurcation import Direction, bifurcation_diagram
 from rocking.dynamics.branches import Branch
 from rocking.dynamics.continuation import continue_orbit
-from rocking.dynamics.forcing import scale_of
-from rocking.dynamics.maps import stroboscopic_map
+from rocking.dynamics.maps import scale_of, stroboscopic_map
 from rocking.dynamics.orbits import PeriodicOrbit, periodic_orbits
 from rocking.errors import InvalidOption
 from rocking.inputs.pulses import PulseFamily, pulse_values
@@ -156,8 +155,8 @@ def basin(
 
     The body is a block (--width, --height, or --p, --alpha), perhaps a wall or with restraints (--one-sided,
     --tendon, ...), or --ball, --oscillator or --pendulum. Lists of numbers
-    are 1,2,5 or START:STOP:COUNT. An interrupt (Ctrl-C) ends it with what was computed so far, coarse to fine. --out
-    holds basin.png, .pdf, .nc, attractors.csv, outcomes.csv, orbits.csv and result.json.
+    are 1,2,5 or START:STOP:COUNT. --out holds basin.png, .pdf, .nc, attractors.csv, outcomes.csv, orbits.csv and
+    result.json.
 
     Parameters
     ----------

@@ -26,8 +26,7 @@ from rocking.explorer.phrases import phrase
 from rocking.explorer.uploads import UploadStore
 from rocking.inputs.quantities import number
 from rocking.inputs.texts import command_line
-from rocking.motion.exceedance import lifting_factors
-from rocking.motion.motion import Motion
+from rocking.motion.motion import Motion, lifting_factors
 from rocking.motion.scaling import FACTOR, Measure
 from rocking.response.contact import friction_coefficient
 from rocking.rules import overturning_velocity, rate

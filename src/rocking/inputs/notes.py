@@ -8,12 +8,10 @@ from typing import Final
 
 import numpy as np
 
-from rocking.block import Block, Load, RestrainedBlock, Thrust
-from rocking.block.rigid_body import rigid_bodies
+from rocking.block import Block, RestrainedBlock
 from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import Message
-from rocking.motion import measures
 from rocking.motion.description import Origin, begins_later
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
@@ -29,16 +27,9 @@ _COARSEST: Final = 0.1
 #: Peak velocities between which a hazard curve has some, m/s.
 _SPEEDS: Final = (1e-3, _FASTEST)
 
-#: Times of a record are even but for this part of a step; more gaps than this part of the steps are none.
-_UNEVEN: Final = 0.02
-_FEW_GAPS: Final = 0.05
-
 #: Levels without a unit that look as if they were in g; they are taken for m/s^2.
 _PERHAPS_IN_G: Final = 1.5
 _UNITLESS: Final = re.compile(r"[\d.+-]+(?:e[+-]?\d+)?", re.IGNORECASE)
-
-#: A restitution less certain than this is worth a note.
-_UNCERTAIN: Final = 0.01
 
 #: Largest plausible diagonal of a block, m.
 _LARGEST: Final = 30.0
@@ -55,8 +46,6 @@ _HORIZONTAL: Final = re.compile(
     r"(\d{2,3}|n|e|s|w|ns|ew|n-s|e-w|[ns] ?\d{1,2} ?[ew]|north|east|south|west|h[12]|[a-z]{2}[ne12])( deg.*)?",
     re.IGNORECASE,
 )
-#: Components that start together last about as long: the shorter one at least this part of the longer one.
-_ALIKE: Final = 0.75
 
 
 def motion_notes(motion: Motion) -> tuple[str, ...]:
@@ -79,11 +68,12 @@ def vertical_notes(motion: Motion) -> tuple[str, ...]:
     direction = _origin(vertical).channel
     if _HORIZONTAL.fullmatch(direction) and not _VERTICAL.fullmatch(direction):
         notes.append(f"the channel {direction!r} looks horizontal, but it is taken for the vertical motion")
-    for what in ("station", "event"):
-        theirs, ours = (getattr(_origin(each), what) for each in (vertical, motion))
-        if theirs and ours and _spelled(theirs) != _spelled(ours):
-            notes.append(f"the vertical motion is of the {what} {theirs!r}, the horizontal one of {ours!r}")
-    return (*notes, *_timing_notes(motion, vertical))
+    if later := begins_later(motion.description, vertical.description, motion.step):
+        notes.append(
+            f"by its file the vertical motion begins {abs(later):.4g} s {'after' if later > 0.0 else 'before'} the "
+            "horizontal one, but both are taken to start together: cut what comes first"
+        )
+    return tuple(notes)
 
 
 def reading_notes(motion: Motion) -> tuple[str, ...]:
@@ -92,27 +82,10 @@ def reading_notes(motion: Motion) -> tuple[str, ...]:
     step = motion.step or motion.duration / len(motion.coefficients)
     if motion.description.family.endswith("record") and step > _COARSEST:
         notes.append(f"the sampling step is {step:.3g} s, too coarse for a record: are the times in seconds?")
-    if motion.step is None and motion.description.family.endswith("record"):
-        notes += _gap_notes(motion)
     origin = _origin(motion)
     if origin.heading_units and origin.heading_units != origin.units:
         notes.append(f"the file's heading says {origin.heading_units}, but the numbers are taken for {origin.units}")
     return tuple(notes)
-
-
-def _gap_notes(motion: Motion) -> list[str]:
-    """Say where times of a record leave one or more of its even steps out."""
-    steps = np.diff(motion.breakpoints)
-    usual = float(np.median(steps))
-    gaps = np.flatnonzero(np.abs(steps - usual) > _UNEVEN * usual)
-    left_out = np.round(steps[gaps] / usual)
-    if not 0 < len(gaps) <= _FEW_GAPS * len(steps) or np.any(np.abs(steps[gaps] - left_out * usual) > _UNEVEN * usual):
-        return []
-    first = float(motion.breakpoints[gaps[0]])
-    return [
-        f"the times go on by {usual:g} s, but by {steps[gaps[0]]:.3g} s after {first:.6g} s"
-        f"{' and elsewhere' if len(gaps) > 1 else ''}: are rows missing? A straight line joins the samples"
-    ]
 
 
 def level_notes(text: str, value: float, name: str) -> tuple[Message, ...]:
@@ -133,8 +106,8 @@ def hazard_notes(intensity: Floats, measure: Measure) -> tuple[str, ...]:
     return ()
 
 
-def block_notes(block: Block) -> tuple[Message | str, ...]:
-    """Return what looks like a mistake in the sizes or the sides of a block; empty if nothing does."""
+def block_notes(block: Block) -> tuple[str, ...]:
+    """Return what looks like a mistake in the sizes of a block; empty if nothing does."""
     notes = []
     largest = max(2.0 * side.radius for side in block.sides)
     if largest > _LARGEST:
@@ -144,7 +117,7 @@ def block_notes(block: Block) -> tuple[Message | str, ...]:
     if block.half_width is not None and block.half_height is not None and block.half_width > block.half_height:
         width, height = 2.0 * block.half_width, 2.0 * block.half_height
         notes.append(f"the block is wider, {width:g} m, than it is high, {height:g} m: are the sizes swapped?")
-    return (*notes, *_side_notes(block))
+    return tuple(notes)
 
 
 def height_notes(height: float) -> tuple[str, ...]:
@@ -162,43 +135,12 @@ def density_notes(densities: Sequence[float | None]) -> tuple[str, ...]:
     )
 
 
-def restraint_notes(body: RestrainedBlock, top: float | None = None) -> tuple[str, ...]:
+def restraint_notes(body: RestrainedBlock) -> tuple[str, ...]:
     """Return what looks like a mistake in the restraints of a block; empty if nothing does."""
-    notes = []
-    for each in body.restraints or ():
-        if isinstance(each, (Thrust, Load)) and top is not None and each.height > top * (1.0 + 1e-9):
-            kind = type(each).__name__.lower()
-            notes.append(
-                f"a {kind} is at a height of {each.height:g} m, above the top of the block, {top:g} m: is it in metres?"
-            )
     strongest = max(max(*map(abs, terms[:4]), terms.stiffness * terms.opening) for terms in body._terms)
-    if strongest > _MOST_HELD:
-        notes.append(
-            f"what a restraint does is {strongest:.2g} times the weight or more: are forces in N, and masses in kg?"
-        )
-    return tuple(notes)
-
-
-def _side_notes(block: Block) -> Iterator[Message | str]:
-    """Sentences on two different sides."""
-    slender, stocky = sorted(block.sides, key=lambda side: side.alpha)
-    if slender.alpha == stocky.alpha:
-        return
-    if slender.p <= stocky.p:
-        yield (
-            f"the more slender side has no larger p, {slender.p:g} rad/s, than the other, so that the mass lies as far "
-            "from its centre as the pivots do: are the sides of p swapped, or its digits too few?"
-        )
-    p, alpha, restitution = (
-        np.array([[getattr(side, name) for side in block.sides]]) for name in ("p", "alpha", "restitution")
-    )
-    found = rigid_bodies(p, alpha)
-    if np.array_equal(found.restitution, restitution) and found.uncertainty[0] > _UNCERTAIN:
-        yield Message(
-            f"the digits of {{}} and {{}} tell the restitution to +-{found.uncertainty[0]:.1g} only: give more of "
-            "them, or give {}",
-            ("p", "alpha", "restitution"),
-        )
+    if strongest <= _MOST_HELD:
+        return ()
+    return (f"what a restraint does is {strongest:.2g} times the weight or more: are forces in N, and masses in kg?",)
 
 
 def _strength_notes(motion: Motion) -> Iterator[str]:
@@ -214,27 +156,6 @@ def _strength_notes(motion: Motion) -> Iterator[str]:
         yield (
             f"the peak velocity is {motion.pgv:.3g} m/s, too much for a ground motion: are units and step right, or is "
             "an offset left?"
-        )
-
-
-def _timing_notes(motion: Motion, vertical: Motion) -> Iterator[str]:
-    """Sentences on components that seem to start at different times."""
-    if later := begins_later(motion.description, vertical.description, motion.step):
-        yield (
-            f"by its file the vertical motion begins {abs(later):.4g} s {'after' if later > 0.0 else 'before'} the "
-            "horizontal one, but both are taken to start together: cut what comes first"
-        )
-        return
-    (start, end), (first, last) = (measures.significant_span(each) for each in (motion, vertical))
-    if last < start or first > end:
-        yield (
-            f"the horizontal motion is strong from {start:.4g} s to {end:.4g} s, the vertical one from {first:.4g} s "
-            f"to {last:.4g} s: do both start at the same time?"
-        )
-    elif min(motion.duration, vertical.duration) < _ALIKE * max(motion.duration, vertical.duration):
-        yield (
-            f"the horizontal motion lasts {motion.duration:.4g} s, the vertical one {vertical.duration:.4g} s: do both "
-            "start at the same time?"
         )
 
 
@@ -255,7 +176,3 @@ def is_multiple(motion: Motion, other: Motion, *, reversed_too: bool = True) -> 
 
 def _origin(motion: Motion) -> Origin:
     return motion.description.origin or Origin()
-
-
-def _spelled(text: str) -> str:
-    return re.sub(r"\W+", " ", text).strip().casefold()

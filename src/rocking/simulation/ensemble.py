@@ -27,7 +27,7 @@ from rocking.motion.piecewise import STRONGEST
 from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
 from rocking.records.named import Motions, names_of, several_motions
 from rocking.response import COUNT, RELATIVE, factors_near
-from rocking.simulation.peak_changes import BETWEEN_STOPS, OF_BLOCKS, By, peak_changes
+from rocking.simulation.peak_changes import OF_BLOCKS, By, peak_changes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -224,7 +224,7 @@ def dataset_of(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
         described["peak_rotation"] = {"units": coordinate.unit, "long_name": f"largest {coordinate.name} in size"}
         described["residual_rotation"]["units"] = coordinate.unit
         described["overturned"]["long_name"] = f"whether the {coordinate.name} passed its limit, where it has one"
-    for name, (_, what) in {**OF_BLOCKS, **BETWEEN_STOPS}.items():
+    for name, (_, what) in OF_BLOCKS.items():
         described[name] = {"units": "rad", "long_name": f"change of the peak per relative change of {what}"}
     variables = {name: (dimensions, values, described.get(name, {})) for name, values in outcomes.items()}
     coordinates = {

@@ -28,12 +28,6 @@ OF_BLOCKS: Final[By] = {
     "peak_by_alpha": (Quantity.SLENDERNESS, "the slenderness of both sides"),
     "peak_by_restitution": (Quantity.RESTITUTION, "the restitution of both sides"),
 }
-BETWEEN_STOPS: Final[By] = {
-    "peak_by_motion": (Quantity.MOTION, "the motion"),
-    "peak_by_restitution": (Quantity.RESTITUTION, "the restitution"),
-    "peak_by_initial_position": (Quantity.ROTATION, "the initial distance from the stop"),
-    "peak_by_initial_velocity": (Quantity.VELOCITY, "the initial velocity"),
-}
 
 #: Bodies whose changes are found together, in one thread.
 _TOGETHER: Final = 64
