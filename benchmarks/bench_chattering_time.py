@@ -33,7 +33,7 @@ def cases():
     """Arrays of parameters to time."""
     rng = np.random.default_rng(1)
     eta, omega, share = rng.uniform(0.5, 0.97, LARGE), rng.uniform(0.5, 8.0, LARGE), rng.uniform(0.0, 1.0, LARGE)
-    critical = chattering.critical_amplitude(omega, eta, method="approximation")
+    critical = chattering.critical_amplitude(omega, eta)
     return {
         "the paper's case (1.03, 2, 0.92)": tuple(value * np.ones(LARGE) for value in CASE),
         "random, all complete": (1.0 + share * (critical - 1.0), omega, eta),

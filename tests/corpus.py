@@ -512,7 +512,7 @@ def ensembles(kind: str) -> Iterator[Item]:
 @group()
 def ensembles_between_stops() -> Iterator[Item]:
     for kind, bodies in BETWEEN.items():
-        data = dynamics.simulate_many(bodies, shaking()[:6], duration=4.0, progress=False)
+        data = rocking.simulate_many(bodies, shaking()[:6], model="linear", duration=4.0, progress=False)
         yield kind, of_dataset(data)
 
 
@@ -775,7 +775,6 @@ def basins() -> Iterator[Item]:
         x, v = np.linspace(positions[0], positions[-1], 7), np.linspace(velocities[0], velocities[-1], 5)
         found = dynamics.basins(body, motion, x, v, 40, **QUIET)
         yield from of_result(found)
-        yield "entropy", list(found.entropy)
 
 
 @group(digits=5)
@@ -801,8 +800,6 @@ def chattering_times() -> Iterator[Item]:
     yield "ratios", chattering.interval_ratios(1.03, 2.0, 0.92, 12)
     yield "coefficients", chattering.series_coefficients(omega, eta, order=4)
     yield "nonlinear", chattering.critical_amplitude_nonlinear([1.0, 3.0], 0.9, 0.1, **QUIET)
-    found = chattering.series_diagnosis(a, omega, eta)
-    yield "diagnosis", [found.time, found.error, found.radius]
 
 
 @group(digits=6)

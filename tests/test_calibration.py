@@ -157,7 +157,7 @@ def test_dispersion_from_test_to_test_is_measured():
         factors = np.exp(deviation * rng.standard_normal(len(motions)))
         fallen = outcomes([motion.scaled(factor) for motion, factor in zip(motions, factors, strict=True)])
         found = rocking.calibrate(motions, fallen, candidates=1024, two_sided=False, model="linear")
-        dispersions.append(found.dispersion["alpha"])
+        dispersions.append(found.estimates["alpha"].dispersion)
     # No dispersion at all cannot be told from one as wide as the candidates are apart.
     assert dispersions[1] > 1.5 * dispersions[0]
 

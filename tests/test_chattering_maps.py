@@ -11,7 +11,7 @@ import rocking
 from rocking.chattering import chattering_time, critical_amplitude, families
 from rocking.chattering.families import SimulationInput
 from rocking.chattering.maps import Outcome, chattering_episodes, chattering_map
-from rocking.motion.exceedance import exceedances
+from rocking.motion.motion import exceedances
 
 BLOCK = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.92)
 THRESHOLD = BLOCK.gravity * 0.2
@@ -128,20 +128,6 @@ def test_what_overturns_after_its_first_rocking_is_counted_and_hatched():
     hatched = [each for each in figure.axes[0].collections if each.get_hatch()]
     assert [len(each.get_paths()) for each in hatched] == [later.sum()] * 2
     assert "overturns later" in [text.get_text() for text in figure.legends[0].get_texts()]
-
-
-@pytest.mark.parametrize(
-    "names", [("omega", "a"), ("omega", "amplitude"), ("frequency", "a"), ("amplitude", "frequency")]
-)
-def test_parameters_that_a_family_has_by_name_may_stand_in_any_order(names):
-    frequencies, amplitudes = [1.0, 2.0, 4.0], [1.02, 1.05]
-    usual = chattering_map(families.sine(BLOCK), {"a": amplitudes, "omega": frequencies})
-    axes = (amplitudes, frequencies) if names[0] == "amplitude" else (frequencies, amplitudes)
-    found = chattering_map(families.sine(BLOCK), dict(zip(names, axes, strict=True)))
-    assert found.data.outcome.dims == names
-    kept = found.data.outcome.values if names[0] == "amplitude" else found.data.outcome.values.T
-    np.testing.assert_array_equal(kept, usual.data.outcome.values)
-    assert len(np.unique(usual.data.outcome)) > 1
 
 
 def test_a_map_is_the_same_in_one_thread_and_in_several():

@@ -14,7 +14,7 @@ def random_parameters(count, seed, spread=1.5):
     rng = np.random.default_rng(seed)
     eta = rng.uniform(0.5, 0.97, count)
     omega = np.exp(rng.uniform(np.log(0.4), np.log(10.0), count))
-    critical = chattering.critical_amplitude(omega, eta, method="approximation")
+    critical = chattering.critical_amplitude(omega, eta)
     far = rng.uniform(0.0, spread, count)
     near = 1.0 + rng.choice([-1.0, 1.0], count) * 10.0 ** rng.uniform(-6.0, -2.0, count)
     return 1.0 + (critical - 1.0) * np.where(rng.random(count) < 0.8, far, near), omega, eta

@@ -220,13 +220,6 @@ def test_levels_of_a_velocity_may_have_their_unit(run):
 ECCENTRIC = ["--p", "2.9858,3.0053", "--alpha", "0.27417,0.155"]
 
 
-def test_sides_that_look_swapped_are_noted(run):
-    free = ["--pulse", "one-sine:amplitude=0.4g,frequency=1Hz"]
-    swapped = run("simulate", *free, "--p", "2.9858,3.0053", "--alpha", "0.155,0.27417")
-    assert swapped[0] == 0 and "are the sides of p swapped" in swapped[2]
-    assert "note" not in run("simulate", *free, *ECCENTRIC)[2]
-
-
 def test_a_map_takes_a_block_as_the_other_commands_do(run):
     grid = ["--amplitudes", "1,3", "--frequencies", "2", "--tolerance", "1e-2", "--json"]
     alone, with_p = (run("map", "one-sine", *p, "--alpha", "0.2", *grid) for p in ([], ["--p", "2.5"]))

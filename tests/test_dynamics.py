@@ -131,48 +131,6 @@ def test_the_ball_on_a_table_that_goes_down_fast_leaves_it():
     assert found.events["time"][0] == pytest.approx(0.5 + math.asin(1.0 / 1.5) / (2.0 * math.pi), abs=1e-12)
 
 
-def test_a_body_that_rests_does_so_beside_one_that_need_not():
-    pressed, free = (dynamics.ImpactOscillator(1.0, 0.8, stop=stop) for stop in (-0.02, 0.05))
-    motion = rocking.pulses.sine(8.0, 1.0, cycles=2)
-    found = dynamics.simulate_many([pressed, free, pressed], motion)
-    alone = [dynamics.simulate(body, motion) for body in (pressed, free, pressed)]
-    assert found.stopped.values[0].tolist() == [False, True, False]
-    assert found.rests.values[0].tolist() == [len(each.chattering) for each in alone] == [1, 0, 1]
-    assert found.peak_position.values[0] == pytest.approx([each.peak_rotation for each in alone], rel=1e-12)
-    assert found.stop.values.tolist() == [-0.02, 0.05, -0.02]
-
-
-def test_bodies_may_be_gathered_and_one_that_balances_has_no_verdict():
-    still = rocking.Motion.from_samples([0.0, 0.0, 0.0], 0.1)
-    pendulums = dynamics.LinearBodies([dynamics.InvertedPendulum(3.0, 0.1, 0.6)])
-    assert dynamics.simulate_many(pendulums, still, initial_position=0.0).stopped.values.tolist() == [[True]]
-    moved = dynamics.simulate_many(pendulums, still, initial_position=0.01)
-    assert moved.stopped.values.tolist() == [[False]] and moved.impacts.values[0, 0] > 0
-
-
-def test_many_bodies_as_one_by_one():
-    bodies = [
-        dynamics.ImpactOscillator(0.7, e, damping_ratio=d, stop=s)
-        for e, d, s in ((0.5, 0.0, 0.1), (0.8, 0.1, 0.1), (0.9, 0.0, 0.1), (0.6, 0.2, 0.1))
-    ]
-    motions = [rocking.pulses.sine(8.0, 1.1, cycles=5), rocking.records.load("ridgecrest-clc-090")]
-    found = dynamics.simulate_many(bodies, motions, duration=6.0)
-    assert found.sizes == {"motion": 2, "body": 4}
-    judged = 0
-    for m, motion in enumerate(motions):
-        for k, body in enumerate(bodies):
-            alone = dynamics.simulate(body, motion, duration=6.0)
-            assert found.peak_position.values[m, k] == pytest.approx(alone.peak_position, rel=1e-9, abs=1e-12)
-            assert found.impacts.values[m, k] == len(alone.impacts)
-            judged += 1
-    assert judged == 8
-    said = [each.attrs["long_name"] for each in found.values()]
-    assert "time of the highest position" in said
-    assert not [each for each in said if "block" in each or "rotation" in each]
-    two = dynamics.simulate_many(dynamics.InvertedPendulum(3.0, 0.1, 0.5), motions[0])
-    assert two.peak_position.values.tolist() == [[0.1]] and two.impacts.values.min() > 0
-
-
 def test_positions_are_right_between_the_proof_and_the_rest():
     # The proof closes the sequence after a few impacts; the ball goes on bouncing until it rests.
     e, height = 0.9, 1.0
@@ -223,8 +181,6 @@ def test_the_entry_points_for_blocks_lead_to_those_for_bodies_between_stops(tmp_
         "simulate_many": lambda **model: rocking.simulate_many(body, pulses.sine(12.0, 5.0, cycles=2), **model),
         "study": lambda **model: rocking.study(tmp_path, body, pulses.sine(12.0, 5.0, cycles=2), levels=[1.0], **model),
     }
-    with pytest.raises(
-        InvalidOption, match=r"call simulate or simulate_many of rocking.dynamics, or give model \"linear\""
-    ):
+    with pytest.raises(InvalidOption, match=r"call rocking.dynamics.simulate, or give model \"linear\""):
         calls[entry]()
     assert calls[entry](model="linear") is not None

@@ -7,7 +7,6 @@ import pytest
 from numpy.random import default_rng
 
 from rocking import Block, dynamics, pulses
-from rocking.dynamics import basin_maps
 from rocking.dynamics.attractors import KnownAttractors
 from rocking.dynamics.bifurcation import period_of, states_after
 
@@ -100,29 +99,6 @@ def test_the_order_of_work_and_threads_do_not_count():
 
 
 @pytest.mark.thorough
-def test_an_interrupt_keeps_what_was_computed(monkeypatch):
-    monkeypatch.setattr(basin_maps, "_COARSEST", 100)  # A small grid, too, then has three passes.
-    x, v = np.linspace(-0.2, 0.2, 44), np.linspace(-0.4, 0.4, 44)
-    whole = dynamics.basins(BLOCK, SHAKING, x, v)
-    follow, calls = basin_maps._Grid._follow, []
-
-    def interrupted(self, cells):
-        calls.append(len(cells))
-        if len(calls) == 3:
-            raise KeyboardInterrupt
-        follow(self, cells)
-
-    monkeypatch.setattr(basin_maps._Grid, "_follow", interrupted)
-    part = dynamics.basins(BLOCK, SHAKING, x, v)
-    reached = part.data.outcome.values >= 0
-    assert 400 < np.count_nonzero(reached) == sum(calls[:2]) < reached.size
-    assert np.all(np.any(reached.reshape(22, 2, 22, 2), axis=(1, 3)))  # coarse to fine: one of each four cells
-    assert "not reached" in part.summary() and part.to_dict()["complete"] is False
-    names = part.data.attractor.values[part.data.outcome.values[reached]]
-    assert np.array_equal(names, whole.data.attractor.values[whole.data.outcome.values[reached]])
-
-
-@pytest.mark.thorough
 def test_a_state_at_any_point_of_a_long_orbit_has_settled_on_it():
     """A few points of a long orbit have a neighbourhood; a cell may end at another one, before or after it is known."""
     strobe = dynamics.stroboscopic_map(dynamics.BouncingBall(0.5, gravity=10.0), pulses.sine(16.92, 5.0, cycles=1))
@@ -187,23 +163,11 @@ def test_a_neighbourhood_holds_what_enters_it():
     assert judged > 500
 
 
-@pytest.mark.thorough
-def test_the_entropy_of_a_straight_boundary_and_of_random_outcomes():
-    half = np.zeros((100, 100), dtype=int)
-    half[:, 52:] = 1  # two of five columns of one box in twenty
-    mixed = -(0.4 * math.log(0.4) + 0.6 * math.log(0.6))
-    assert dynamics.basin_entropy(half) == pytest.approx((mixed / 20.0, mixed), abs=1e-12)
-    assert dynamics.basin_entropy(np.ones((5, 5), dtype=int)) == (0.0, 0.0)
-    noise = default_rng(1).integers(0, 3, (500, 500))
-    whole, boundary = dynamics.basin_entropy(noise, box=20)
-    assert whole == boundary == pytest.approx(math.log(3.0) - 2.0 / (2.0 * 400.0), abs=1e-3)  # bias of 400 draws
-
-
 def test_an_attractor_that_rests_at_the_start_of_a_period_is_known_after_one():
     ball, table = dynamics.BouncingBall(0.3, gravity=10.0), pulses.sine(11.0, 2.0, cycles=1)
     found = dynamics.basins(ball, table, np.linspace(0.0, 0.1, 41), np.linspace(0.01, 0.5, 41), periods=5)
     assert not dynamics.stroboscopic_map(ball, table)([0.05, 0.0]).any()
     taken, counts = np.unique(found.data.periods.values, return_counts=True)
-    # The coarse cells come before the attractor is known, and all others after it.
-    assert (taken.tolist(), counts.tolist()) == ([1, 5], [1240, 441])
+    # The first cells come before the attractor is known, and all others after it.
+    assert (taken.tolist(), counts.tolist()) == ([1, 5], [1281, 400])
     assert len(np.unique(found.data.attractor.values)) == 1

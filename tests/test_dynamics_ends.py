@@ -1,7 +1,6 @@
 """Every way in which a branch of orbits may end, or cross another, where formulas or other computations say."""
 
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,9 +8,6 @@ from oracles import closed_orbits
 from scipy.optimize import brentq
 
 from rocking import Block, VelocityThreshold, dynamics, pulses, simulate
-from rocking.dynamics.continuation import reason_of_end
-from rocking.dynamics.orbit_equations import Kind, kind_of
-from rocking.dynamics.orbits import OrbitTrajectory
 
 G = 10.0
 TABLE = 5.0  # Hz
@@ -123,21 +119,6 @@ def test_no_more_points_than_asked_for():
     start = next(each for each in dynamics.periodic_orbits(*table(1.2), starts=64) if each.is_stable)
     branch = dynamics.continue_orbit(start, table, 1.2, (1.0, 1.6), most=4)
     assert len(branch) == 7 and branch.ends == ("too many points", "too many points")
-
-
-def test_a_branch_beyond_which_nothing_can_be_followed_is_lost_and_does_not_overturn():
-    lively = dynamics.stroboscopic_map(dynamics.BouncingBall(1.0, gravity=G), pulses.sine(0.1, 0.5, cycles=1))
-    block = Block.from_parameters(p=2.0, alpha=0.2, restitution=0.9)
-    falls = dynamics.stroboscopic_map(block, pulses.sine(20.0, 0.5, cycles=1))
-    judged = 0
-    for reason, strobe, state in (("lost", lively, [0.0, 1e-5]), ("overturning", falls, [0.1, 0.2])):
-        kind = kind_of(strobe, np.array(state), 1)
-        before = Kind(rests=False, for_ever=False, impacts=1, overturns=False, unknown=False)
-        equations = SimpleNamespace(kind=before, sizes=np.ones(3), kind_at=lambda z, kind=kind: kind)
-        trajectory = OrbitTrajectory(1.0, 1.0, 1.0, np.empty(0))
-        assert reason_of_end(equations, trajectory, np.zeros(3), np.ones(3)) == reason
-        judged += 1
-    assert judged == 2
 
 
 @pytest.mark.slow

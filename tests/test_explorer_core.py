@@ -28,7 +28,7 @@ from rocking.explorer.periodic import sweep_of
 from rocking.explorer.simulated import extremes
 from rocking.explorer.studies import StudyView
 from rocking.explorer.uploads import LARGEST, MOST, UploadStore, bare_name
-from rocking.motion.exceedance import exceedances
+from rocking.motion.motion import exceedances
 
 STATUE = {"width": "0.24", "height": "1.1", "motion": "ridgecrest-clc-090", "pga": "0.4g"}
 SINE = {

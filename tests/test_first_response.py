@@ -84,10 +84,8 @@ ball, table = dynamics.BouncingBall(0.5), rocking.pulses.sine(15.0, 2.0, cycles=
 rock = dynamics.stroboscopic_map(ball, table)
 rock([0.1, 0.5])
 rock.derivative([0.1, 0.5])
-dynamics.impact_map(ball, table)([0.05, 1.0])
 dynamics.lyapunov_exponents(ball, table, [0.1, 0.5], 20, transient=5)
 dynamics.basins(ball, table, [0.01, 0.05], [0.0, 0.1], periods=10, progress=False)
-# A mirrored block under an antisymmetric motion: only half a period of it is followed.
 mirrored = rocking.Block.from_parameters(p=2.0, alpha=0.6, restitution=0.55)
 def swing(amplitude):
     return mirrored, rocking.pulses.sine(amplitude, 0.8, cycles=1)

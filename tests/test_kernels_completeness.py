@@ -10,7 +10,7 @@ import rocking
 from rocking.engine.problem import ground_of
 from rocking.kernels.state import AT_REST, new_scratch, records
 from rocking.kernels.uplift import note_complete
-from rocking.motion.exceedance import exceedances
+from rocking.motion.motion import exceedances
 
 Pair = tuple[float, float]
 

@@ -1,12 +1,10 @@
 """Laws of the piecewise polynomial ground motion."""
 
 import pickle
-import re
 import subprocess
 import sys
 from dataclasses import replace
 from fractions import Fraction
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -404,22 +402,6 @@ def test_a_reversed_record_points_the_other_way():
     times = np.linspace(0.0, 20.0, 501)
     assert turned.acceleration(times) == pytest.approx(east.acceleration(times), abs=1e-12)
     assert not turned.description.origin.reversed
-
-
-def test_a_notebook_shows_the_motion_with_its_peaks_in_the_colour_of_the_text():
-    samples = np.zeros(20_000)
-    samples[12_345] = -4.9033
-    page = Motion.from_samples(samples, 0.01, name="spike <&>")._repr_html_()
-    ElementTree.fromstring(page)
-    assert "spike &lt;&amp;&gt;" in page
-    assert "currentColor" in page and "#" not in page
-    line = max(re.findall(r'points="([^"]*)"', page), key=len).split()
-    heights = [float(point.split(",")[1]) for point in line]
-    assert len(line) <= 400
-    assert heights.index(max(heights)) == pytest.approx(len(line) * 12_345 / 20_000, abs=3)
-    assert "-0.5" in page
-    assert ">0</text>" in page and ">200 s</text>" in page
-    assert [line[0].split(",")[0], line[-1].split(",")[0]] == ["56.0", "470.0"]
 
 
 LINE = Motion([0.0, 1.0], [[1.0]], name="line")

@@ -36,14 +36,6 @@ def test_every_figure_appears_once(cells):
         assert len(images) == 1, cell.source
 
 
-@pytest.mark.parametrize("name", ["statue", "record", "response"])
-def test_what_is_named_at_the_end_of_a_cell_shows_a_picture(cells, name):
-    (cell,) = (one for one in cells if one.source.splitlines()[-1] == name)
-    (output,) = (one for one in cell.outputs if one.output_type == "execute_result")
-    assert "<svg" in output["data"]["text/html"]
-    assert len(output["data"]["text/plain"]) < 400
-
-
 def test_no_cell_warns_or_prints_to_stderr(cells):
     for cell in cells:
         assert not [output for output in cell.outputs if output.get("name") == "stderr"], cell.source

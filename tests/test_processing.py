@@ -199,11 +199,10 @@ def test_components_are_cut_at_the_same_instants_whatever_their_steps(
     assert part.vertical.duration == pytest.approx(min(part.duration, lift.duration - float(start)), abs=1e-12)
 
 
-def test_a_vertical_component_on_multiples_of_the_step_stays_even_and_can_be_filtered() -> None:
+def test_a_vertical_component_whose_samples_are_at_both_ends_stays_even_and_can_be_filtered() -> None:
     push, lift = wave(3.0, 1, dt=0.01, count=401), wave(2.0, 2, dt=0.04, count=101)
-    for trim, step in {(0.11, 3.53): 0.01, (0.2, 3.6): 0.04}.items():
-        part = push.with_vertical(lift).processed(trim=trim, band_pass=(0.5, 10.0))
-        assert (part.step, part.vertical.step) == (0.01, step)
+    part = push.with_vertical(lift).processed(trim=(0.2, 3.6), band_pass=(0.5, 10.0))
+    assert (part.step, part.vertical.step) == (0.01, 0.04)
     pulse = pulses.ricker(1.0, 1.0)
     both = pulse.with_vertical(lift).processed(trim=(0.5123, 0.5321))
     assert both.vertical.acceleration(0.01) == pytest.approx(lift.acceleration(0.5223), abs=1e-12)

@@ -56,7 +56,6 @@ RESULTS = {
     "gradient": lambda path: rocking.gradient(rocking.simulate(WALL, RECORD)),
     "critical scale": lambda path: rocking.critical_scale(WALL, MOTIONS[0], 0.5, 20.0),
     "map": lambda path: rocking.dynamics.stroboscopic_map(BLOCK, MOTIONS[0]),
-    "impact map": lambda path: rocking.dynamics.impact_map(rocking.dynamics.BouncingBall(0.8), MOTIONS[0]),
     "solid": lambda path: SOLID,
     "rose": lambda path: SOLID.rose(),
     "fragility": lambda path: rocking.fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10),

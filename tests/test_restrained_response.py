@@ -259,7 +259,6 @@ def test_a_block_that_is_held_at_any_rotation_has_no_balance_to_count_by():
     assert "of the balance" not in repr(response)
     figure = response.plot()
     assert figure.axes[0].get_ylabel() == "rotation (rad)"
-    assert "rotation (rad)" in response._repr_html_()
 
 
 def test_a_peak_has_no_ratio_to_a_balance_that_is_not_there():

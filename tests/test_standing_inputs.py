@@ -108,13 +108,8 @@ def test_units_that_may_be_mistaken_are_noted():
     assert "2.7 kg/m^3" in note and note.endswith("is it in kg/m^3?")
     assert density_notes([2700.0, 500.0, None]) == ()
     usual = held(Tendon(2e8, prestress=1e5), Thrust(9.0, 4.0), Load(9.0, 4.0), Spring(1e6))
-    assert restraint_notes(usual, 4.0) == ()
-    for restraint, words in (
-        (Thrust(0.9, 4000.0), "a thrust is at a height of 4000 m, above the top of the block, 4 m"),
-        (Load(9.0, 5.0), "a load is at a height of 5 m, above the top of the block, 4 m"),
-        (Tendon(2e11), "times the weight or more: are forces in N, and masses in kg?"),
-        (Tendon(2e11, strength=2e9), "times the weight or more: are forces in N, and masses in kg?"),
-        (Spring(1e12), "times the weight or more: are forces in N, and masses in kg?"),
-    ):
-        (note,) = restraint_notes(held(restraint), 4.0)
+    assert restraint_notes(usual) == ()
+    words = "times the weight or more: are forces in N, and masses in kg?"
+    for restraint in (Tendon(2e11), Tendon(2e11, strength=2e9), Spring(1e12)):
+        (note,) = restraint_notes(held(restraint))
         assert words in note

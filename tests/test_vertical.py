@@ -14,7 +14,7 @@ import rocking
 from rocking import InvalidMotion, InvalidOption, Motion
 from rocking.inputs.notes import vertical_notes
 from rocking.motion.description import Origin
-from rocking.motion.exceedance import exceedances, lifting_factors
+from rocking.motion.motion import exceedances, lifting_factors
 from rocking.records.named import named_motion
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
@@ -342,7 +342,6 @@ def test_the_figure_of_a_response_moves_the_thresholds_with_the_weight_and_shows
     [
         ("el-centro-meloland-270", ["the vertical motion is the horizontal one itself"]),
         ("el-centro-meloland-360", ["the channel '360' looks horizontal"]),
-        ("ridgecrest-clc-up", ["the vertical motion is of the station 'CI.CLC", "do both start at the same time?"]),
     ],
 )
 def test_a_vertical_component_that_looks_like_a_mistake_is_computed_with_a_note(
@@ -354,13 +353,6 @@ def test_a_vertical_component_that_looks_like_a_mistake_is_computed_with_a_note(
     assert "rocking: note: el-centro-meloland-270: " in err and all(each in err for each in said)
     code, _, err = run("simulate", "el-centro-meloland-270", "--vertical", "el-centro-meloland-up", *statue)
     assert (code, err) == (0, "")
-
-
-def test_components_that_last_very_different_times_are_noted() -> None:
-    part = el_centro().vertical.processed(trim=(0.0, 20.0))
-    assert vertical_notes(el_centro().with_vertical(part)) == (
-        "the horizontal motion lasts 56.93 s, the vertical one 20 s: do both start at the same time?",
-    )
 
 
 def test_a_jump_beyond_one_threshold_lifts_off_though_the_other_is_only_reached() -> None:

@@ -24,8 +24,7 @@ from figure import (
 from histories import Detail, Mark, excitation_figure, history_figure
 from sketches import Box, Flowchart, Way, block_figure, flowchart_figure
 
-from rocking.chattering.amplitude import critical_amplitude
-from rocking.chattering.duration import chattering_time
+from rocking.chattering.duration import chattering_time, critical_amplitude
 from rocking.core.arrays import Floats
 from rocking.engine.treatment import AsymptoticTime, Certified, Treatment, VelocityThreshold
 from rocking.response import Response

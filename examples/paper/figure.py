@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from rocking import pulses
 from rocking.block import Block
-from rocking.chattering.amplitude import critical_amplitude
-from rocking.chattering.duration import chattering_time
+from rocking.chattering.duration import chattering_time, critical_amplitude
 from rocking.chattering.expansions import (
     checked_frequency,
     checked_loss,

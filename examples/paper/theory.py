@@ -24,8 +24,13 @@ from figure import (
 )
 from histories import Ratios, chattering_figure, ratio_figure
 
-from rocking.chattering.amplitude import critical_amplitude
-from rocking.chattering.duration import chattering_time, interval_ratios, resolved_by_default, sequence
+from rocking.chattering.duration import (
+    chattering_time,
+    critical_amplitude,
+    interval_ratios,
+    resolved_by_default,
+    sequence,
+)
 from rocking.chattering.expansions import checked_loss, first_impact_speed, first_interval, single
 from rocking.core.arrays import Floats
 from rocking.core.bisection import bisected

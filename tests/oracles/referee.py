@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 import rocking
 from rocking.core.arrays import Floats
-from rocking.motion.exceedance import exceedances
+from rocking.motion.motion import exceedances
 
 GRAVITY = 9.80665
 ULP = 2.0**-52

@@ -32,8 +32,7 @@ from rocking.engine.problem import bodies_of, never_rests, slenderness_of, thres
 from rocking.engine.tasks import Setup, missing_text, simulate_each
 from rocking.engine.treatment import Certified
 from rocking.errors import InvalidOption
-from rocking.motion.exceedance import lifting_factors
-from rocking.motion.motion import Motion
+from rocking.motion.motion import Motion, lifting_factors
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.records.named import Motions, one_motion, several_motions
 from rocking.response import Gradient, Response, gradient

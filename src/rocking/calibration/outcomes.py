@@ -16,8 +16,16 @@ from rocking.analysis.spectrum import RockingSpectrum, rocking_spectrum
 from rocking.block import Blocks
 from rocking.block.body import Bodies
 from rocking.calibration.diagnostics import Diagnostics, Scores, diagnosed
-from rocking.calibration.search import Evidence as _Evidence
-from rocking.calibration.search import Problem, expected_share, posterior, search, systematic, unpacked, with_outliers
+from rocking.calibration.search import (
+    Evidence,
+    Problem,
+    expected_share,
+    posterior,
+    search,
+    systematic,
+    unpacked,
+    with_outliers,
+)
 from rocking.calibration.space import SIDED, Knowledge, Space, unit_of
 from rocking.core import checks
 from rocking.core.arrays import Flags, Floats
@@ -123,17 +131,12 @@ class Calibration(Result):
     lapse: float
     seed: int
     diagnostics: Diagnostics
-    _evidence: _Evidence = field(repr=False)
+    _evidence: Evidence = field(init=False)
 
     @property
     def scores(self) -> Scores:
         """Scores on the motions of the calibration itself: too good by nature, see `cross_validate`."""
         return Scores.of(self.probabilities, self.observed)
-
-    @property
-    def dispersion(self) -> Mapping[str, float]:
-        """Standard deviation of each parameter's logarithm from test to test."""
-        return {name: estimate.dispersion for name, estimate in self.estimates.items()}
 
     def predict(self, motions: Motions, *, threads: int | None = None, progress: bool | None = None) -> Floats:
         """Probability that each of m motions overturns the specimen, shape (m,).
@@ -389,7 +392,7 @@ def calibrate(
     final = posterior(evidence, 2 * _DRAWS, ROUNDS, rng, progress=progress)
     weights = evidence.mean_weights(final)
     kept, times = np.unique(systematic(weights, ensemble, rng), return_counts=True)
-    return Calibration(
+    calibration = Calibration(
         blocks=space.blocks(evidence.candidates.points[kept]),
         weights=times / ensemble,
         estimates=_estimates(space, final),
@@ -400,8 +403,9 @@ def calibrate(
         lapse=lapse,
         seed=seed,
         diagnostics=diagnosed(found, final),
-        _evidence=evidence,
     )
+    object.__setattr__(calibration, "_evidence", evidence)
+    return calibration
 
 
 def _estimates(space: Space, populations: Floats) -> dict[str, Estimate]:

@@ -91,23 +91,13 @@ class Candidates:
 
     @classmethod
     def pooled(cls, runs: Sequence[Candidates]) -> Candidates:
-        """Put the candidates of several runs together."""
+        """Put candidates together."""
         return cls(
             runs[0].space,
             np.concatenate([run.points for run in runs]),
             np.concatenate([run.overturned for run in runs]),
             sum(run.evenly for run in runs),
             tuple(guide for run in runs for guide in run.guides),
-        )
-
-    def joined(self, guide: tuple[int, Floats], points: Floats, overturned: NDArray[np.float32]) -> Candidates:
-        """Add others that were drawn from populations."""
-        return Candidates(
-            self.space,
-            np.concatenate([self.points, points]),
-            np.concatenate([self.overturned, overturned]),
-            self.evenly,
-            (*self.guides, guide),
         )
 
     def of_tests(self, tests: Flags) -> Candidates:
@@ -259,7 +249,8 @@ class Problem:
         populations = posterior(self.evidence(candidates), *_PROPOSAL, rng, exponent=exponent, progress=False)
         points = drawn(populations, PROPOSAL_WIDTH, count, rng)
         points = points[self.space.contains(points)]
-        return candidates.joined((count, populations), points, self.tried(points))
+        drawn_ones = Candidates(self.space, points, self.tried(points), 0, ((count, populations),))
+        return Candidates.pooled([candidates, drawn_ones])
 
 
 @dataclass(frozen=True, eq=False)

@@ -355,9 +355,9 @@ def validate(
 
 def _left_out(source: Validation, count: int, weights: object, lapse: float | None) -> Floats:
     """Probabilities of the tests of a calibration while they were left out."""
-    for name, given in (("weights", weights), ("lapse", lapse)):
-        if given is not None:
-            raise InvalidOption("predictions of tests that were left out take no {}: leave it out", name)
+    if weights is not None or lapse is not None:
+        name = "lapse" if weights is None else "weights"
+        raise InvalidOption("predictions of tests that were left out take no {}: leave it out", name)
     known = source.probabilities.shape[1]
     if known != count:
         raise InvalidOption(

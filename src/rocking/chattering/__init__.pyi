@@ -1,13 +1,18 @@
 from . import families
-from .amplitude import critical_amplitude, critical_amplitude_nonlinear
-from .duration import ChatteringSequence, chattering_time, interval_ratios, is_complete, sequence
+from .duration import (
+    ChatteringSequence,
+    chattering_time,
+    critical_amplitude,
+    critical_amplitude_nonlinear,
+    interval_ratios,
+    is_complete,
+    sequence,
+)
 from .expansions import (
-    SeriesDiagnosis,
     asymptotic_table,
     first_impact_speed,
     first_interval,
     series_coefficients,
-    series_diagnosis,
 )
 from .maps import ChatteringEpisodes, ChatteringMap, Outcome, chattering_episodes, chattering_map
 from .report import ChatteringReport, CriticalReport, chattering_report, critical_report
@@ -19,7 +24,6 @@ __all__ = [
     "ChatteringSequence",
     "CriticalReport",
     "Outcome",
-    "SeriesDiagnosis",
     "asymptotic_table",
     "chattering_episodes",
     "chattering_map",
@@ -35,5 +39,4 @@ __all__ = [
     "is_complete",
     "sequence",
     "series_coefficients",
-    "series_diagnosis",
 ]

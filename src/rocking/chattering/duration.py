@@ -1,4 +1,4 @@
-"""How long chattering lasts: the exact sequence, its bracket, and the paper's approximations of its duration."""
+"""How long chattering lasts, and up to which amplitude it is complete: exact, and by the paper's approximations."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rocking import pulses
+from rocking.block import Block
 from rocking.chattering.expansions import (
     HIGHEST_ORDER,
     asymptotic_times,
@@ -17,18 +19,24 @@ from rocking.chattering.expansions import (
     checked_amplitude,
     checked_frequency,
     checked_restitution,
+    checked_slenderness,
     lifting_amplitude,
     series_times,
     single,
 )
 from rocking.core import checks
 from rocking.core.arrays import Floats
+from rocking.core.bisection import bisected
+from rocking.core.progress import Progress
 from rocking.core.tables import counted
 from rocking.core.threads import cores, in_threads
-from rocking.errors import InvalidOption
+from rocking.engine.tasks import require_finished
+from rocking.engine.treatment import critical_amplitudes_by
+from rocking.errors import InvalidOption, Unfinished
 from rocking.kernels.sine import Verdict
 from rocking.kernels.sine.sequence import IMPACT as RESOLVED
 from rocking.kernels.sine.sequence import resolve, rest_phases, semianalytical_phases
+from rocking.simulation.simulate import simulate
 
 #: Sequences that one thread computes at a time.
 _PART: Final = 1 << 12
@@ -309,3 +317,112 @@ def resolved_by_default(eta: Floats) -> NDArray[np.int64]:
     """Return how many impacts Eq. 75 resolves by default."""
     count = np.ceil(_PAPER_IMPACTS * math.log(_PAPER_RESTITUTION) / np.log(eta))
     return np.maximum(count, _PAPER_IMPACTS).astype(np.int64)
+
+
+#: Phase before uplift at which the simulated motion starts.
+_LEAD: Final = 0.1
+
+
+def critical_amplitude(omega: ArrayLike, eta: ArrayLike, *, method: str = "exact") -> Floats:
+    """Amplitude of the ground acceleration up to which chattering is complete.
+
+    Parameters
+    ----------
+    omega, eta : array_like
+        Forcing frequency over p, and coefficient of restitution.
+    method : {"exact", "eq76", "eq77"}
+        "exact": by root finding on certified sequences, to 1e-14. "eq76", "eq77": the paper's fits, off by up to 1.1
+        and 5.4 % in eta from 0.5 to 0.97, omega from 0.5 to 8.
+
+    Returns
+    -------
+    array of float
+        a_cr, over g alpha, of the broadcast shape (a number for numbers): the supremum of all amplitudes whose first
+        sequence of impacts accumulates within half a period of uplift.
+
+    Warns
+    -----
+    OutsideFit
+        Where "eq76" or "eq77" is asked for omega or eta beyond those ranges: there they mean nothing.
+
+    Notes
+    -----
+    Source: the paper's section 5.1, Eqs 76 and 77. As a approaches a_cr the time of rest approaches pi/omega like a
+    power of a_cr - a whose exponent depends on eta only: 0.600 at eta = 0.92 and above, 0.612 at 0.5, to 1 towards 0.
+
+    Examples
+    --------
+    >>> round(float(critical_amplitude(2.0, 0.92)), 12)
+    1.03801553873
+    """
+    chosen = checks.one_of(method, "method", InvalidOption, ("exact", "eq76", "eq77"))
+    shape, flat = broadcast(checked_frequency(omega), checked_restitution(eta))
+    return critical_amplitudes_by(chosen, *flat).reshape(shape)[()]
+
+
+def critical_amplitude_nonlinear(
+    omega: ArrayLike, eta: ArrayLike, alpha: ArrayLike, *, threads: int | None = None, progress: bool | None = None
+) -> Floats:
+    """Critical amplitude of the nonlinear block, which `critical_amplitude` gives in the slender limit.
+
+    Parameters
+    ----------
+    omega, eta : array_like
+        As in `critical_amplitude`.
+    alpha : array_like
+        Slenderness angle, rad, between 0 and pi/2.
+    threads, progress : int or bool, optional
+        As for `rocking.simulate_many`.
+
+    Returns
+    -------
+    array of float
+        Ground acceleration over g tan(alpha), the block's own threshold of uplift, of the broadcast shape; NaN where a
+        simulation is given up since eta is too close to 1. Multiply by tan(alpha)/alpha to get it over g alpha, as in
+        the slender theory.
+
+    Notes
+    -----
+    By bisection to 1e-12 on whether `rocking.simulate`, nonlinear and certified, finds the block at rest within half
+    a period of uplift; some 40 simulations for each value. Source: the paper's Eqs 1, 2 and 13 and section 5.1.
+
+    Examples
+    --------
+    >>> nonlinear = critical_amplitude_nonlinear(2.0, 0.92, 0.2)
+    >>> f"{nonlinear - critical_amplitude(2.0, 0.92):.1e}"
+    '-7.3e-06'
+    """
+    parameters = checked_frequency(omega), checked_restitution(eta), checked_slenderness(alpha)
+    count = None if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
+    shape, flat = broadcast(*parameters)
+    cases = list(zip(*(values.tolist() for values in flat), strict=True))
+    found = np.empty(len(cases))
+    with Progress("bisecting", len(cases), show=progress) as bar:
+        for k, amplitude in enumerate(in_threads(lambda case: _critical(*case), cases, threads=count)):
+            found[k] = amplitude
+            bar.advance()
+    return found.reshape(shape)[()]
+
+
+def _critical(omega: float, eta: float, alpha: float) -> float:
+    if eta == 1.0:
+        return 1.0
+    block = Block.from_parameters(p=1.0, alpha=alpha, restitution=eta)
+    # Beyond 1.5 no block's first sequence has been seen to be complete.
+    low, high = 1.0, 1.5
+    try:
+        while _comes_to_rest(block, high, omega):
+            low, high = high, 2.0 * high
+        return bisected(low, high, lambda a: not _comes_to_rest(block, a, omega), width=1e-12)[0]
+    except Unfinished:
+        return math.nan
+
+
+def _comes_to_rest(block: Block, a: float, omega: float) -> bool:
+    """Whether the block rests within half a period of its first uplift under a sine of amplitude a g tan(alpha)."""
+    amplitude = a * block.gravity * math.tan(block.sides[0].alpha)
+    turn = 2.0 * math.pi
+    motion = pulses.sine(amplitude, omega / turn, cycles=(math.pi + _LEAD) / turn, phase=math.asin(1.0 / a) - _LEAD)
+    response = simulate(block, motion, model="nonlinear", duration=motion.duration)
+    require_finished(response.unfinished)
+    return bool((response.events["kind"] == "rest").any())

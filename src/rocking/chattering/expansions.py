@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -27,10 +26,6 @@ HIGHEST_ORDER: Final = 40
 
 #: Powers of an amplitude that no block is shaken with are infinite; so is what is made of them.
 _BEYOND_RANGE: Final = np.errstate(over="ignore", invalid="ignore")
-
-#: Coefficients beyond the order asked for that the diagnosis looks at, and how many it needs at least.
-LOOK_AHEAD: Final = 6
-_FEWEST: Final = 16
 
 CYCLE: Final = np.dtype(
     [("n", np.int64), ("sign", np.int8), ("order", np.int8)]
@@ -288,69 +283,6 @@ def series_coefficients(omega: ArrayLike, eta: ArrayLike, *, order: int = 4) -> 
     return _coefficients(checked_frequency(omega), checked_restitution(eta), order)
 
 
-@dataclass(frozen=True, eq=False)
-class SeriesDiagnosis:
-    """A partial sum of the expansion and what is known of the rest.
-
-    Attributes
-    ----------
-    time : array of float
-        Sum of the first `order` terms.
-    error : array of float
-        Estimate of what the neglected terms add; infinite from the radius of convergence on.
-    radius : array of float
-        Estimated radius of convergence in eps, from the ratios of the coefficients.
-    """
-
-    time: Floats
-    error: Floats
-    radius: Floats
-
-
-@_BEYOND_RANGE
-def series_diagnosis(a: ArrayLike, omega: ArrayLike, eta: ArrayLike, *, order: int = 4) -> SeriesDiagnosis:
-    """Partial sum of the expansion, its error and where it stops converging.
-
-    Parameters
-    ----------
-    a, omega, eta : array_like
-        As in `chattering_time`, eta below 1.
-    order : int
-        Terms of the sum, 1 to 34.
-
-    Returns
-    -------
-    SeriesDiagnosis
-        Arrays of the broadcast shape.
-
-    Notes
-    -----
-    Error: the next terms, and a geometric sum with the limit of their ratio. Radius: the ratios c_{k-1}/c_k are
-    extrapolated linearly in 1/k (Domb and Sykes). Proven: the radius is not larger than a_cr - 1, where the chattering
-    time has its branch point; it is a_cr - 1 if finitely many coefficients are negative, which is observed of the
-    first 40. For eta from 0.5 up and omega from 0.5 to 8 the estimate agrees with a_cr - 1 to 1.2 per cent.
-
-    Examples
-    --------
-    >>> diagnosis = series_diagnosis(1.01, 2.0, 0.92, order=4)
-    >>> round(float(diagnosis.radius), 3), bool(diagnosis.error < 5e-4)
-    (0.038, True)
-    """
-    order = checks.whole(order, "order", InvalidOption, 1, HIGHEST_ORDER - LOOK_AHEAD)
-    amplitude = checked_amplitude(a)
-    longer = _coefficients(checked_frequency(omega), checked_loss(eta), max(order + LOOK_AHEAD, _FEWEST), _FEWEST)
-    eps = _excess(amplitude, longer)
-    # The limit of the ratios of successive coefficients, extrapolated linearly in 1/k; the signs may take turns.
-    k, ratios = longer.shape[-1] - 1, longer[..., :-1] / longer[..., 1:]
-    radius = np.broadcast_to(np.abs(k * ratios[..., -1] - (k - 1) * ratios[..., -2]), eps.shape)
-    time = _summed(longer[..., :order], eps)
-    last = longer[..., -1] * eps ** (longer.shape[-1] - 0.5)
-    inside = eps < radius
-    tail = last * (eps / radius) / np.where(inside, 1.0 - eps / radius, 1.0)
-    error = np.where(inside, np.abs(_summed(longer, eps) - time + tail), math.inf)
-    return SeriesDiagnosis(time[()], error[()], radius.copy()[()])
-
-
 @_BEYOND_RANGE
 def _summed(coefficients: Floats, eps: Floats) -> Floats:
     """Horner's scheme; exactly zero at eps = 0."""
@@ -360,8 +292,8 @@ def _summed(coefficients: Floats, eps: Floats) -> Floats:
     return np.where(eps == 0.0, 0.0, np.sqrt(eps) * total)
 
 
-def _coefficients(omega: Floats, eta: Floats, order: int, fewest: int = 1) -> Floats:
-    """Coefficients of the broadcast parameters, ``fewest`` at least, formed once for each pair of different values."""
+def _coefficients(omega: Floats, eta: Floats, order: int) -> Floats:
+    """Coefficients of the broadcast parameters, formed once for each pair of different values."""
     shape, parameters = broadcast(omega, eta)
     pairs, where = np.unique(np.stack(parameters), axis=1, return_inverse=True)
     coefficients = np.full((pairs.shape[1], order), math.inf)
@@ -369,9 +301,8 @@ def _coefficients(omega: Floats, eta: Floats, order: int, fewest: int = 1) -> Fl
         w, restitution = pairs[:, i].tolist()
         coefficients[i] = phase_coefficients(1.0 / (w * w), restitution, order) / w
         if not np.isfinite(coefficients[i]).all():
-            lower = "lower the order, or " if order > fewest else ""
             raise InvalidOption(
                 f"the expansion at omega = {w:g}, eta = {restitution:g} is not resolved to order {order} "
-                f"in double precision: {lower}take a higher omega, or eta further from 1"
+                f"in double precision: lower the order, take a higher omega, or eta further from 1"
             )
     return coefficients[where.ravel()].reshape((*shape, order))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -24,8 +23,7 @@ from rocking.core.threads import in_threads
 from rocking.engine.tasks import OUTCOME, complete_chattering
 from rocking.errors import InvalidOption
 from rocking.kernels import state
-from rocking.motion.exceedance import exceedances
-from rocking.motion.motion import Motion
+from rocking.motion.motion import Motion, exceedances
 from rocking.response import Response
 from rocking.simulation.simulate import simulate
 
@@ -112,8 +110,7 @@ def chattering_map(
         Makes a `SimulationInput` (block, motion, model) from two numbers: one of `rocking.chattering.families`, or your
         own.
     parameters : mapping
-        Names and values of the two parameters, the first of them upwards in the figure. A family whose first two
-        parameters have these names the other way round gets them so; else they are given to it in this order.
+        Names and values of the two parameters, given to the family in this order; the first is upwards in the figure.
     threads, progress : int or bool, optional
         As for `rocking.simulate_many`.
 
@@ -156,8 +153,7 @@ def chattering_map(
             value=family,
         )
     (first, x), (second, y) = ((k, checks.axis(values, k, InvalidOption)) for k, values in parameters.items())
-    swapped = _is_swapped(family, str(first), str(second))
-    inputs = [family(*map(float, (other, one) if swapped else (one, other))) for one in x for other in y]
+    inputs = [family(float(one), float(other)) for one in x for other in y]
     for each in inputs:
         if not (isinstance(each, SimulationInput) and isinstance(each.motion, Motion)):
             raise InvalidOption(
@@ -308,15 +304,6 @@ def _simulated(given: SimulationInput) -> _Point:
             states["rests"], states["first_uplift"], states["first_rest"] = rests, uplift, times["upper"]
             ends["complete_chattering"] = complete_chattering(trail.ground, np.array([trail.block]), states)
     return _Point(int(outcomes_of(ends, last)[0]), uplift, **times, rests=rests, overturned=response.overturned)
-
-
-def _is_swapped(family: Family, first: str, second: str) -> bool:
-    """Whether a family has two parameters, by the names of which they stand the other way round."""
-    try:
-        taken = [*inspect.signature(family).parameters]
-    except (TypeError, ValueError):  # a callable that does not tell its parameters
-        return False
-    return len(taken) > 1 and (first == taken[1] or second == taken[0])
 
 
 @dataclass(frozen=True, eq=False, repr=False)

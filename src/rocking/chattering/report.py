@@ -11,29 +11,23 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rocking.chattering.amplitude import critical_amplitude
-from rocking.chattering.duration import chattering_time, sequence
+from rocking.chattering.duration import chattering_time, critical_amplitude, sequence
 from rocking.chattering.expansions import (
     HIGHEST_ORDER,
-    LOOK_AHEAD,
     asymptotic_table,
     first_impact_speed,
     first_interval,
-    series_diagnosis,
 )
 from rocking.core import checks
-from rocking.core.result import Result
-from rocking.core.tables import Column, counted, text_table
+from rocking.core.result import Result, table_of_some
+from rocking.core.tables import Column, counted
 from rocking.errors import InvalidOption, OutsideFit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Rows of a table for people, of which the last is the last.
-_SHOWN: Final = 12
-
-_AMPLITUDES: Final = {"exact": "exact", "eq76": "Eq. 76", "eq77": "Eq. 77", "approximation": "Chebyshev expansion"}
+_AMPLITUDES: Final = {"exact": "exact", "eq76": "Eq. 76", "eq77": "Eq. 77"}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -72,7 +66,7 @@ class ChatteringReport(Result):
 
     def summary(self) -> str:
         result = self.values
-        times, series, resolved = result["chattering_time"], result["series"], result["resolved"]
+        times, resolved = result["chattering_time"], result["resolved"]
         impacts = "" if resolved is None else f", {counted(resolved, 'impact')}"
         worth = "" if result["complete"] else ", worthless: it takes chattering for complete"
         lines = [
@@ -82,7 +76,7 @@ class ChatteringReport(Result):
             ("  proven bracket", self._bracket(result["bracket"])),
             (f"  by Eq. 75{impacts}", self._time(times["semianalytical"])),
             ("  by Eq. 65", f"{self._time(times['asymptotic'])}{worth}"),
-            (f"  by a series, {series['order']} terms", _trust(self._time(times["series"]), series)),
+            (f"  by a series, {result['order']} terms", f"{self._time(times['series'])}{worth}"),
             ("first interval", self._pair(result["first_interval"], "eq32", time=True)),
             ("speed at first impact", self._pair(result["first_impact_speed"], "eq34", time=False)),
         ]
@@ -90,24 +84,19 @@ class ChatteringReport(Result):
         return "\n".join(f"{name:<30}{text}" for name, text in lines) + f"\n\n{units}"
 
     def table(self) -> str:
-        """Return the first cycles of the paper's iterative procedure, and its last, a row for each.
+        """Return cycles of the paper's iterative procedure, a row for each of at most a dozen.
 
         `InvalidOption` without loss at impacts, when there is no such procedure.
         """
-        cycles = self.to_dataframe("cycles").to_dict("records")
-        shown = [*cycles[: _SHOWN - 1], cycles[-1]] if len(cycles) > _SHOWN else cycles
         header = ["n", "sign", "term", "interval, p t", "time, p t", "phase, rad", "speed before", "speed after"]
-        rows: list[list[Any]] = [
+        rows = [
             [
                 c["n"], f"{c['sign']:+d}", f"T_{c['n']};{c['order']} = {c['term']:.6g}", f"{c['interval']:.6e}",
                 f"{c['time']:.9f}", f"{c['phase']:.6f}", f"{c['speed_before']:.6e}", f"{c['speed_after']:.6e}",
             ]
-            for c in shown
+            for c in self.to_dataframe("cycles").to_dict("records")
         ]  # fmt: skip
-        left_out = len(cycles) - len(shown)
-        if left_out:
-            rows.insert(-1, ["...", "", f"({left_out} more)", "", "", "", "", ""])
-        return text_table(header, rows)
+        return table_of_some(header, rows)
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         from rocking.plot.orbits import intervals_figure
@@ -165,7 +154,7 @@ def chattering_report(
     a, omega, eta : float
         As in `chattering_time`, each one number.
     order, resolved : int
-        As in `chattering_time`, but the order up to 34: six coefficients more say what the terms left out add.
+        As in `chattering_time`.
     p : float, optional
         The block's frequency parameter, rad/s: times are then given in seconds as well.
 
@@ -185,7 +174,10 @@ def chattering_report(
     exact = sequence(a, omega, eta)
     no_arc = 0.0 if exact.complete else math.nan
     interval, speed = exact.impacts[["interval", "speed_before"]][0] if exact.impacts.size else (no_arc, no_arc)
-    series = _series(a, omega, eta, order)
+    checks.whole(order, "order", InvalidOption, 1, HIGHEST_ORDER)
+    series = math.nan
+    with suppress(InvalidOption):  # double precision does not resolve so many terms
+        series = float(chattering_time(a, omega, eta, method="series", order=order))
     times = {
         method: float(chattering_time(a, omega, eta, method=method, resolved=resolved))
         for method in ("exact", "asymptotic", "semianalytical")
@@ -196,8 +188,8 @@ def chattering_report(
         "eta": eta,
         "complete": exact.complete,
         "half_period": math.pi / omega,
-        "chattering_time": {**times, "series": series.pop("time")},
-        "series": series,
+        "chattering_time": {**times, "series": series},
+        "order": order,
         "resolved": resolved,
         "bracket": {"lower": exact.lower, "upper": exact.upper, "impacts": int(exact.impacts.size)},
         "critical_amplitude": float(critical_amplitude(omega, eta)),
@@ -271,25 +263,3 @@ def critical_report(omega: float, eta: float) -> CriticalReport:
             with suppress(InvalidOption, OutsideFit):
                 amplitudes[method] = float(critical_amplitude(omega, eta, method=method))
     return CriticalReport(omega, eta, amplitudes)
-
-
-def _series(a: float, omega: float, eta: float, order: int) -> dict[str, float]:
-    """Time by the expansion, and what is known of its error; NaN for what double precision does not resolve."""
-    order = checks.whole(order, "order", InvalidOption, 1, HIGHEST_ORDER - LOOK_AHEAD)
-    if eta == 1.0:
-        return {"order": order, "time": math.inf if a > 1.0 else 0.0, "error": math.inf, "radius": 0.0}
-    found = {"order": order, "time": math.nan, "error": math.nan, "radius": math.nan}
-    with suppress(InvalidOption):
-        found["time"] = float(chattering_time(a, omega, eta, method="series", order=order))
-        diagnosis = series_diagnosis(a, omega, eta, order=order)
-        found |= {"error": float(diagnosis.error), "radius": float(diagnosis.radius)}
-    return found
-
-
-def _trust(time: str, series: dict[str, float]) -> str:
-    if math.isfinite(series["error"]):
-        return f"{time}, the terms left out add about {series['error']:.1e}"
-    if math.isnan(series["error"]):
-        known = "not known" if time == "none" else f"{time}, whose error is not known"
-        return f"{known}: double precision does not resolve enough terms"
-    return f"{time}, worthless: it converges for a - 1 up to {series['radius']:.3g} only"

@@ -246,11 +246,11 @@ def chatter(
     p
         The block's frequency parameter, rad/s.
     order
-        Terms of the expansion in a - 1, 1 to 34.
+        Terms of the expansion in a - 1, 1 to 40.
     resolved
         Impacts that the semi-analytical method resolves; by default as many as the restitution asks for.
     table
-        Show the paper's iterative procedure (Eqs 62 and 64): its first cycles and the last; all are in cycles.csv.
+        Show the paper's iterative procedure (Eqs 62 and 64): some of its cycles; all are in cycles.csv.
     """
     with output.folder() as folder:
         report = chattering_report(a, omega, eta, order=order, resolved=resolved, p=p)

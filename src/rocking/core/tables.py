@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import csv
-import errno
 import io
 import json
 import math
@@ -29,9 +28,6 @@ if TYPE_CHECKING:
 
 #: Wider than any table, so that none is wrapped or cut.
 _WIDTH: Final = 100_000
-
-#: Bytes of a dataset that may be held in memory once more.
-_IN_MEMORY: Final = 1 << 28
 
 #: Rounding of a number that some operations made.
 _ROUNDING: Final = 2.0**-50
@@ -307,18 +303,9 @@ def write_excel(path: str | Path, sheets: Mapping[str, pd.DataFrame]) -> None:
 
 def write_netcdf(path: str | Path, dataset: xr.Dataset) -> None:
     """Write a dataset to a NetCDF file, whole or not at all."""
-    # HDF5 ends the process where it meets a full disk; so it writes to memory as long as that is no burden.
-    if dataset.nbytes <= _IN_MEMORY:
-        content: Any = dataset.to_netcdf(engine="h5netcdf")
-        write_bytes(path, content)
-        return
-    with whole_file(path) as beside:
-        if shutil.disk_usage(beside.parent).free < dataset.nbytes + _IN_MEMORY:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        try:
-            dataset.to_netcdf(beside, engine="h5netcdf")
-        except (OSError, RuntimeError) as error:  # the library's text is for its authors
-            raise OSError(getattr(error, "errno", None) or errno.EIO, "") from error
+    # In memory first: HDF5 ends the process where it meets a full disk.
+    content: Any = dataset.to_netcdf(engine="h5netcdf")
+    write_bytes(path, content)
 
 
 def write_figure(path: str | Path, figure: Figure, **options: Any) -> None:

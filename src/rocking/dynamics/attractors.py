@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from rocking.core.arrays import Flags, Floats, Integers, evenly
 from rocking.core.tables import counted
 from rocking.core.threads import in_threads
-from rocking.dynamics.forcing import parts_of
-from rocking.dynamics.maps import StroboscopicMap
+from rocking.dynamics.maps import StroboscopicMap, parts_of
 from rocking.dynamics.orbits import multipliers_at, sizes_of
 from rocking.errors import InvalidOption
 from rocking.kernels.periodic import TRAP, iterate

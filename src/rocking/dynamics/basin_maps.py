@@ -11,15 +11,14 @@ from numpy.typing import ArrayLike
 
 from rocking.block.body import Body
 from rocking.core import checks
-from rocking.core.arrays import Floats, Integers, ranges
+from rocking.core.arrays import Floats, Integers
 from rocking.core.constants import VERSION, Model
-from rocking.core.progress import Progress, note
+from rocking.core.progress import Progress
 from rocking.core.result import DatasetResult, variable
 from rocking.core.tables import as_written, counted, text_table
 from rocking.core.threads import cores
 from rocking.dynamics.attractors import KnownAttractors
-from rocking.dynamics.forcing import described, scale_of, sensible
-from rocking.dynamics.maps import StroboscopicMap
+from rocking.dynamics.maps import StroboscopicMap, described, scale_of, sensible
 from rocking.engine.treatment import Treatment
 from rocking.errors import InvalidOption
 from rocking.kernels.periodic import Fate
@@ -30,15 +29,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Cells along each side of a box for the basin entropy.
-_BOX: Final = 5
-
 #: What a cell is, before attractors are sorted: 3 + k belongs to attractor k.
-_NOT_REACHED, _TO_PLUS, _TO_MINUS, _UNSETTLED, _FIRST = -1, 0, 1, 2, 3
+_TO_PLUS, _TO_MINUS, _UNSETTLED, _FIRST = 0, 1, 2, 3
 _NAMES: Final = ("overturns to side +", "overturns to side -", "not settled")
 
-#: Cells of the coarsest pass, at least, and cells between two looks for attractors.
-_COARSEST: Final = 400
+#: Cells before the first look for attractors, and between two later ones.
+_BEFORE, _BETWEEN = 400, 16_384
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -50,8 +46,8 @@ class Basins(DatasetResult):
     Attributes
     ----------
     data : xarray.Dataset
-        Over (velocity, coordinate): outcome, the number of the attractor, -1 where an interrupt came first; periods,
-        how many it took until that was known. Over (attractor): share of the cells (the basin's stability) with its
+        Over (velocity, coordinate): outcome, the number of the attractor; periods, how many it took until that was
+        known. Over (attractor): share of the cells (the basin's stability) with its
         standard_error as that of as many random states, period and impacts of its orbit (0 and -1 of what is none),
         rests, and multiplier, the largest in size. Over (attractor, phase): orbit_coordinate and orbit_velocity. What
         overturns and what has not settled on a periodic orbit count among the attractors.
@@ -66,12 +62,6 @@ class Basins(DatasetResult):
     )
     POOLED = ("velocity", "position", "angular_velocity", "rotation", "attractor", "phase")
 
-    @property
-    def entropy(self) -> tuple[float, float]:
-        """Basin entropy and boundary basin entropy of boxes of 5 by 5 cells; see `basin_entropy`. NaN without one."""
-        grid = self.data.outcome.values
-        return basin_entropy(grid, _BOX) if min(grid.shape) >= _BOX else (np.nan, np.nan)
-
     def summary(self) -> str:
         data = self.data
         rows = [
@@ -85,27 +75,16 @@ class Basins(DatasetResult):
         ]
         cells = data.outcome.size
         head = f"basins of {data.body} under {data.motion}: {cells} cells, {counted(data.most_periods, 'period')}"
-        text = [head, "", text_table(["attractor", "share", "standard error", "multiplier"], rows)]
-        missing = int(np.count_nonzero(data.outcome.values == _NOT_REACHED))
-        if missing:
-            return "\n".join([*text, f"not reached before an interrupt: {missing} cells"])
-        whole, boundary = self.entropy
-        if np.isfinite(whole):
-            said = "above ln 2: fractal, if the grid is fine enough" if boundary > np.log(2.0) else "not above ln 2"
-            text.append(f"basin entropy {whole:.4f}, of the boundary {boundary:.4f} ({said})")
-        return "\n".join(text)
+        return f"{head}\n\n{text_table(['attractor', 'share', 'standard error', 'multiplier'], rows)}"
 
     def to_dict(self) -> dict[str, Any]:
         data = self.data
-        complete = not np.any(data.outcome.values == _NOT_REACHED)
-        whole, boundary = self.entropy if complete else (np.nan, np.nan)
         names = self.TABLES["attractors"]
         return {
             "body": data.body,
             "motion": data.motion,
             "model": data.model,
             "periods": data.most_periods,
-            "complete": complete,
             "attractors": [
                 {
                     "attractor": str(data.attractor.values[k]),
@@ -118,8 +97,6 @@ class Basins(DatasetResult):
                 }
                 for k in range(data.sizes["attractor"])
             ],
-            "basin_entropy": whole,
-            "boundary_basin_entropy": boundary,
         }
 
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
@@ -175,8 +152,7 @@ def basins(
     Returns
     -------
     Basins
-        Attractors, basins and their measures; after an interrupt, of the cells that were reached. They come coarse to
-        fine.
+        Attractors, basins and their measures.
 
     Notes
     -----
@@ -210,67 +186,12 @@ def basins(
     most = checks.whole(periods, "periods", InvalidOption, least=1)
     count = None if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
     work = _Grid(strobe, x, v, most, cores() if count is None else count)
-    try:
-        work.run(progress)
-    except KeyboardInterrupt:
-        if np.all(work.outcome == _NOT_REACHED):
-            raise
-        note("interrupted: the basins hold the cells that were reached")
+    work.run(progress)
     return Basins(work.dataset())
 
 
-def basin_entropy(outcomes: ArrayLike, box: int = 5) -> tuple[float, float]:
-    """Basin entropy and boundary basin entropy of a grid of outcomes.
-
-    Parameters
-    ----------
-    outcomes : array_like of int, shape (m, n)
-        What becomes of each state.
-    box : int
-        Cells along each side of a box; rows and columns that fill no box are left out.
-
-    Returns
-    -------
-    entropy : float
-        Mean over the boxes of the entropy of the outcomes in one, natural logarithms.
-    boundary : float
-        Mean over those boxes that hold several outcomes: above ln 2 a boundary is fractal, but not every fractal one
-        is; 0 where there are none.
-
-    Raises
-    ------
-    InvalidOption
-        If the outcomes are no grid of at least one box.
-
-    References
-    ----------
-    A. Daza and others, "Basin entropy: a new tool to analyze uncertainty in dynamical systems", Scientific Reports 6
-    (2016).
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from rocking import dynamics
-    >>> outcomes = np.arange(8) // 2 % 2 * np.ones((8, 1), dtype=int)
-    >>> [round(value, 12) for value in dynamics.basin_entropy(outcomes, box=4)]
-    [0.69314718056, 0.69314718056]
-    """
-    grid = np.asarray(outcomes)
-    if grid.ndim != 2 or grid.size == 0 or grid.dtype.kind not in "iub":
-        raise InvalidOption("{} must be a grid of whole numbers", "outcomes")
-    side = checks.whole(box, "box", InvalidOption, least=2)
-    rows, columns = (length // side for length in grid.shape)
-    if rows * columns == 0:
-        raise InvalidOption(f"{{}} must hold at least one box of {side} by {side} cells", "outcomes")
-    cut = grid[: rows * side, : columns * side].reshape(rows, side, columns, side)
-    shares = np.stack([np.mean(cut == value, axis=(1, 3)) for value in np.unique(grid)])
-    entropies = -np.sum(shares * np.log(np.where(shares > 0.0, shares, 1.0)), axis=0)
-    mixed = np.count_nonzero(shares > 0.0, axis=0) > 1
-    return float(entropies.mean()), float(entropies[mixed].mean()) if mixed.any() else 0.0
-
-
 class _Grid:
-    """Cells of a grid, coarse to fine, with the attractors that are known so far."""
+    """Cells of a grid, with the attractors that are known so far."""
 
     def __init__(self, strobe: StroboscopicMap, x: Floats, v: Floats, periods: int, threads: int) -> None:
         self.strobe, self.x, self.v, self.periods, self.threads = strobe, x, v, periods, threads
@@ -278,31 +199,21 @@ class _Grid:
         # rounding would find no attractor.
         size = np.maximum([float(np.ptp(each) or abs(each[0]) or 1.0) for each in (x, v)], scale_of(strobe))
         self.states = np.stack(np.meshgrid(x, v), axis=-1).reshape(-1, 2)
-        self.outcome = np.full(len(self.states), _NOT_REACHED, dtype=np.int16)
+        self.outcome = np.full(len(self.states), _UNSETTLED, dtype=np.int16)
         self.taken = np.zeros(len(self.states), dtype=np.int32)
         self.known = KnownAttractors(strobe, size)
         # A start behind a stop, or into one, is refused at once.
         strobe._states(self.states[[0, -1]], "positions", "velocities")
 
     def run(self, progress: bool | None) -> None:
-        """Follow all cells, coarse to fine."""
-        stride = 1
-        while self.outcome.size // (4 * stride * stride) >= _COARSEST:
-            stride *= 2
-        row, column = (each.ravel() for each in np.indices((len(self.v), len(self.x))))
-        level = np.zeros(self.outcome.size, dtype=np.int64)
-        passes = int(np.log2(stride)) + 1
-        while stride > 1:
-            stride //= 2
-            level[(row % (2 * stride) != 0) | (column % (2 * stride) != 0)] += 1
-        with Progress("basins", self.outcome.size, show=progress) as bar:
-            for number in range(passes):
-                # Those of a pass in a mixed order: what an interrupt leaves out is then left out all over the grid.
-                cells = np.random.default_rng(number).permutation(np.flatnonzero(level == number))
-                # Attractors are looked for after so many cells.
-                for some in ranges(len(cells), 16_384):
-                    self._follow(cells[some])
-                    bar.advance(len(cells[some]))
+        """Follow all cells, in a mixed order."""
+        count = len(self.outcome)
+        cells = np.random.default_rng(0).permutation(count)
+        later = range(_BEFORE, count, _BETWEEN)
+        with Progress("basins", count, show=progress) as bar:
+            for first, last in zip((0, *later), (*later, count), strict=True):
+                self._follow(cells[first:last])
+                bar.advance(last - first)
 
     def _follow(self, cells: Integers) -> None:
         strobe = self.strobe
@@ -320,7 +231,7 @@ class _Grid:
         """Everything that was found, attractors in the order of their shares, then what is none."""
         import xarray as xr
 
-        found, counts = np.unique(self.outcome[self.outcome != _NOT_REACHED], return_counts=True)
+        found, counts = np.unique(self.outcome, return_counts=True)
         total = counts.sum()
         order = sorted(zip(found.tolist(), counts.tolist(), strict=True), key=lambda each: (each[0] < _FIRST, -each[1]))
         numbers, share = [number for number, _ in order], np.array([count for _, count in order]) / total
@@ -343,7 +254,7 @@ class _Grid:
         cells, shape = (rate, at), (len(self.v), len(self.x))
         return xr.Dataset(
             {
-                "outcome": variable(cells, place[self.outcome].reshape(shape), "number of the attractor, or -1"),
+                "outcome": variable(cells, place[self.outcome].reshape(shape), "number of the attractor"),
                 "periods": variable(cells, self.taken.reshape(shape), "periods until the outcome was known"),
                 "share": variable("attractor", share, "share of the cells", "1"),
                 "standard_error": variable("attractor", error, "of the share, as of random states", "1"),

@@ -13,13 +13,20 @@ from dataclasses import dataclass, fields
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+import rocking.response
 from rocking.block.body import KINDS, Coordinate
 from rocking.core import checks
-from rocking.core.arrays import Floats, Integers
+from rocking.core.arrays import Floats, Integers, as_asked
 from rocking.core.constants import STANDARD_GRAVITY, Model
+from rocking.engine.problem import never_rests
+from rocking.engine.treatment import Treatment
 from rocking.errors import InvalidBlock, InvalidOption
 from rocking.kernels import state
+from rocking.motion.motion import Motion
+from rocking.records.named import one_motion
+from rocking.simulation.simulate import response_to
 
 
 class Law(NamedTuple):
@@ -189,7 +196,7 @@ class LinearBodies:
 
 def _check_model(model: Model) -> None:
     if model != "linear":
-        advice = 'call simulate or simulate_many of rocking.dynamics, or give {} "linear"'
+        advice = 'call rocking.dynamics.simulate, or give {} "linear"'
         raise InvalidOption(f"a body of rocking.dynamics moves by linear equations: {advice}", "model", value=model)
 
 
@@ -365,3 +372,116 @@ class _MakerOfKind(NamedTuple):
 
 
 KINDS.update({made.kind: _MakerOfKind(made) for made in (BouncingBall, ImpactOscillator, InvertedPendulum)})
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Response(rocking.response.Response):
+    """Response of a body between stops, made by `rocking.dynamics.simulate`: a `rocking.Response` in positions.
+
+    Positions are relative to the table or the support. Of events and impacts ``side`` is +1 at the lower stop and -1 at
+    the upper one.
+    """
+
+    @property
+    def peak_position(self) -> float:
+        """Highest position, m: that of the second stop, exactly, once the body has been there."""
+        return self.peak_rotation
+
+    def position(self, time: ArrayLike) -> Floats:
+        """Return the position relative to the table or the support at any time, m; NaN outside the response."""
+        return as_asked(self.states(time)[..., 0])
+
+    def velocity(self, time: ArrayLike) -> Floats:
+        """Return the rate of `position`, m/s; just after an impact at one."""
+        return as_asked(self.states(time)[..., 1])
+
+
+def in_positions(response: rocking.response.Response) -> Response:
+    """Return the response of a body between stops as one in positions."""
+    return Response(**{entry.name: getattr(response, entry.name) for entry in fields(response)})
+
+
+def simulate(
+    body: LinearBody,
+    motion: Motion | None,
+    *,
+    chattering: str | Treatment = "certified",
+    duration: float | None = None,
+    initial_position: float | None = None,
+    initial_velocity: float = 0.0,
+) -> Response:
+    """Response of a body between stops to a motion of its table or support, with chattering resolved by proof.
+
+    Parameters
+    ----------
+    body : BouncingBall, ImpactOscillator or InvertedPendulum
+        What moves.
+    motion : Motion or None
+        Acceleration of the table (positive up) or the support; None for free motion.
+    chattering : str or treatment
+        As for `rocking.simulate`; thresholds on velocities are in m/s.
+    duration : float, optional
+        Time to stop at, s. By default to the end of the motion, and on until rest; a body that need not come to rest
+        stops with the motion.
+    initial_position : float, optional
+        Position at time 0, m; by default 0, or the stop where that is behind it.
+    initial_velocity : float
+        Velocity at time 0, m/s.
+
+    Returns
+    -------
+    Response
+        Events, impacts, chattering sequences, and the position at any time.
+
+    Raises
+    ------
+    InvalidBlock, InvalidMotion
+        If the body is none of these, or the motion none, or one with a vertical component beside it.
+    InvalidOption
+        If an argument is out of its range, the body starts behind a stop, or it never comes to rest and there is
+        neither motion nor duration.
+
+    Examples
+    --------
+    >>> from rocking import dynamics
+    >>> response = dynamics.simulate(dynamics.BouncingBall(0.8, gravity=10.0), None, initial_position=0.2)
+    >>> f"{response.events['time'][0]:.12f}"
+    '1.800000000000'
+    """
+    body, motion = _one_body(body), one_motion(motion)
+    until = _duration(body, motion, duration)
+    at = min(max(0.0, body.law.low), body.law.high) if initial_position is None else initial_position
+    return in_positions(response_to(body, motion, "linear", chattering, until, (at, initial_velocity)))
+
+
+def _one_body(body: object) -> LinearBody:
+    if not isinstance(body, LinearBody):
+        raise InvalidBlock(
+            "a BouncingBall, ImpactOscillator or InvertedPendulum of rocking.dynamics is needed, not "
+            f"{type(body).__name__}; blocks go to rocking.simulate"
+        )
+    return body
+
+
+def _is_pressed(body: LinearBody) -> bool:
+    """Whether something presses the body against one of its stops where nothing moves."""
+    low, high = body.uplift_thresholds()
+    return low > 0.0 or 0.0 < high < np.inf
+
+
+def _duration(body: LinearBody, motion: Motion | None, duration: float | None) -> float | None:
+    """Return the duration: as it is given, else until rest, or of a body that need not rest that of the motion."""
+    if duration is not None:
+        return duration
+    if not _is_pressed(body):
+        if motion is None:
+            raise InvalidOption(
+                "nothing presses this body against a stop, so that it need not rest; give {}", "duration"
+            )
+        return motion.end
+    if never_rests(body.alone()):
+        raise InvalidOption(
+            f"a body with {{}} 1, as this {body.description}, never comes to rest; give {{}} to say when to stop",
+            *("restitution", "duration"),
+        )
+    return None

@@ -17,7 +17,7 @@ from rocking.core.constants import Model
 from rocking.core.result import Result
 from rocking.core.tables import Column, as_written, cell, counted, named, text_table
 from rocking.dynamics.maps import StroboscopicMap
-from rocking.dynamics.orbits import PeriodicOrbit, orbit_at, sizes_of
+from rocking.dynamics.orbits import PeriodicOrbit, orbit_at, peak_of, sizes_of
 from rocking.engine.treatment import Treatment
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
@@ -217,7 +217,8 @@ class Branch(Result):
             heights=_apart([each.states[:, 0] if flat else each.peaks for each in branches]),
             stable=_apart([each.is_stable for each in branches]) == 1.0,
             marks=[
-                (each.kind, each.value, float(each.orbit.state[0]) if flat else each.orbit._peak) for each in places
+                (each.kind, each.value, float(each.orbit.state[0]) if flat else peak_of(each.orbit.response))
+                for each in places
             ],
             labels=(f"{self.name}{unit}", f"{what} ({coordinate.unit})"),
             title=title or as_written(f"{body.description}, {headline.replace('^2', '²')}"),

@@ -1,31 +1,215 @@
-"""Maps of a body under periodic motion, with their derivatives: from period to period, and from impact to impact."""
+"""A body under a motion that repeats for ever, and its map from period to period, with its derivative."""
 
 from __future__ import annotations
 
-from typing import Final
+import math
+from collections.abc import Sequence
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rocking.block.body import Body
+from rocking.block.sides import in_line
 from rocking.core import checks
-from rocking.core.arrays import Flags, Floats
-from rocking.core.constants import Model
+from rocking.core.arrays import Floats, Integers, ranges
+from rocking.core.constants import MODELS, Model
 from rocking.core.threads import cores, in_threads
-from rocking.dynamics.forcing import PeriodicForcing, parts_of, repeated
-from rocking.engine.treatment import Treatment, VelocityThreshold
-from rocking.errors import InvalidOption
+from rocking.dynamics.bodies import LinearBody
+from rocking.engine.problem import FASTEST, one_body, set_start
+from rocking.engine.tasks import Setup
+from rocking.engine.treatment import Treatment, treatment
+from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
 from rocking.kernels import state
-from rocking.kernels.periodic import TRAP, differentiate, iterate, to_next_impact
-from rocking.kernels.periodic import Fate as Fate
+from rocking.kernels.ground import Ground, ground_of
+from rocking.kernels.periodic import TRAP, Fate, Setting, differentiate, iterate, step_rows
+from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
+from rocking.records.named import one_motion
 
-#: Fields of a body's record that are a side's own.
-_OF_SIDES: Final = (
-    "stiffness", "threshold_slope", "threshold", "slenderness", "restitution", "min_restitution", "restitution_slope",
-    "restraint_threshold", "added_weight",
-    "added_push", "prestress", "spring", "damping",
-)  # fmt: skip
+#: Ground acceleration, g, that lifts any body: it stands behind the second period.
+_BEYOND_ALL: Final = 1e12
+
+#: States that a thread takes at once, so that an interrupt is seen soon.
+TOGETHER: Final = 256
+
+#: A share of one that is less by no more than rounding.
+_ALMOST: Final = 1.0 - 2.0**-40
+
+
+class PeriodicForcing:
+    """A body under a motion that repeats for ever, as kernels take both."""
+
+    def __init__(self, body: Body, motion: Motion, model: Model | None, chattering: str | Treatment) -> None:
+        given = one_motion(motion)
+        if given is None:
+            raise InvalidMotion("one period of the motion is needed, as rocking.pulses.sine(a, f, cycles=1), not None")
+        if given.vertical is not None:
+            raise InvalidMotion("maps are made for one component; give a motion without a vertical one")
+        self.body, self.motion = one_body(body), given
+        self.bodies = self.body.alone()
+        self.model: Model = "linear" if isinstance(self.body, LinearBody) else "nonlinear"
+        if model is not None:
+            checks.one_of(model, "model", InvalidOption, MODELS)
+            self.model = model
+        self.treatment = treatment(chattering)
+        self.period = float(self.motion.breakpoints[-1] - self.motion.breakpoints[0])
+        if not np.max(np.abs(self.motion.coefficients[:, 0])) < _BEYOND_ALL * self.body.gravity:
+            raise InvalidMotion(f"the motion is beyond all sense; maps take accelerations below {_BEYOND_ALL:g} g")
+        self._ground = repeated(self.motion, self.body.gravity)
+        run = Setup(self.bodies, self.model, self.treatment, self.period).run(self.motion, ground=self._ground)
+        self._records, self._settings = run.records, run.settings
+        self._settings["stop"], self._settings["no_end_time"] = np.inf, True
+        if np.any(self._records["yielding"]):
+            raise InvalidBlock("a tendon that yields remembers; maps know what position and velocity tell")
+        if np.any(self._records["variable_restitution"] & (self._records["seed"] >= 0)):
+            raise InvalidOption(
+                "a map takes a state to the same one each time, but this body draws its restitution at each impact: "
+                "give it a number, or one that falls with the speed"
+            )
+        rows = step_rows(self._ground, self._records[0])
+        self._steps = rows if self.model == "linear" else rows[:, :0]
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {described(self.body)} under {described(self.motion)}; {self.model} model>"
+
+    def _rules(self, *, record: bool) -> state.Record:
+        settings = self._settings.copy()
+        settings["record"] = record
+        return settings
+
+    def _setting(self) -> Setting:
+        return Setting(self._ground, self._records[0], self._rules(record=False), state.new_table(0), self._steps)
+
+    def _marching(self) -> tuple[Trail, state.Record, state.Record, state.Records]:
+        """Return what kernels of derivatives need beside the states: the problem, and space to work in."""
+        trail = Trail(self._ground, self._records[0], self._rules(record=True), NO_NODES)
+        return trail, state.new_scratch(), state.record(state.VARIATION), state.new_table(512)
+
+    def checked_starts(self, given: ArrayLike, name: str) -> Floats:
+        """Return states to start from, shape (n, 2): finite numbers, in front of the stops."""
+        states = checks.numbers(given, name, InvalidOption)
+        self._states(states, name)
+        sensible(states, name)
+        return states.reshape(-1, 2)
+
+    def _states(self, states: ArrayLike, name: str = "states", velocities: str = "") -> tuple[Floats, state.Records]:
+        """States as given, flat, and as records; ``name`` is what a caller calls them, or their positions."""
+        given = self._pairs(states, name, self.body.coordinate.name)
+        flat = given.reshape(-1, 2)
+        (at, speed), record, (low, high) = flat.T, self._records[0], self.body.stops
+        if record["next_side"][0] == 0:  # a stop, no ground on its other side
+            into = (at == low) & (speed < 0.0) | (bool(record["two_stops"]) & (at == high) & (speed > 0.0))
+            if np.any(into):
+                x, v = float(at[into][0]), float(speed[into][0])
+                raise InvalidOption(
+                    f"{{}} must not lead into a stop, as {v:g} m/s at {x:g} m does; change its sign, or begin in front "
+                    "of the stop", velocities or name, value=v,
+                )  # fmt: skip
+        made = state.new_states(len(flat), 0)
+        set_start(made, self._records, self.bodies, at, speed, name)
+        made["peak"] = self._no_peak
+        return given, made
+
+    @property
+    def _no_peak(self) -> float:
+        """A highest rotation that asks for none: below the one at which a body has fallen by no more than rounding."""
+        fallen = float(self._records["overturn_angle"][0])
+        return fallen if np.isinf(fallen) else fallen * _ALMOST
+
+    def _pairs(self, values: ArrayLike, name: str, first: str) -> Floats:
+        """Pairs of numbers, shape (..., 2)."""
+        given = checks.numbers(values, name, InvalidOption)
+        if given.ndim == 0 or given.shape[-1] != 2:
+            raise InvalidOption(
+                f"{{}} must hold pairs ({first}, velocity) along the last axis, not have the shape {given.shape}", name
+            )
+        return given
+
+    def _coordinates(self, u: Floats, v: Floats, side: Integers) -> Floats:
+        """Coordinates and velocities of states given in the frames of their sides."""
+        at = np.where(side < 0, -1 - side, side)
+        sign = 1.0 - 2.0 * at
+        stops = np.array(self.body.stops)[at]
+        found = np.stack([stops + sign * u, sign * v], axis=-1)
+        found[side < 0] = np.stack([stops, np.zeros_like(stops)], axis=-1)[side < 0]
+        return found + 0.0
+
+    def _known(self, made: state.Records) -> Floats:
+        """Coordinates and velocities of states; NaN of those that are not known."""
+        found = self._coordinates(made["u"], made["v"], made["side"])
+        found[np.isin(made["ending"], (Fate.OVERTURNED, Fate.UNFINISHED))] = np.nan
+        return found
+
+    @property
+    def _is_two_sided(self) -> bool:
+        """Whether the coordinate passes zero, or there is a second stop."""
+        record = self._records[0]
+        return bool(record["two_stops"] or record["next_side"][0] == 1)
+
+    @property
+    def _loses_nothing(self) -> bool:
+        """Whether no speed is lost from one impact to the next but one, so that nothing near a rest comes to rest."""
+        return bool(np.prod(self._records[0]["restitution"]) >= 1.0)
+
+
+class Scale(NamedTuple):
+    """Sizes of a coordinate and a velocity by which states are compared."""
+
+    coordinate: float
+    velocity: float
+
+
+def scale_of(strobe: PeriodicForcing) -> Scale:
+    """Sizes of coordinate and velocity that are natural to a body under a motion."""
+    record, period = strobe._records[0], strobe.period
+    if not isinstance(strobe.body, LinearBody):
+        alpha = float(np.max(record["slenderness"]))
+        return Scale(alpha, alpha * math.sqrt(float(np.max(np.abs(record["stiffness"])))))
+    pull = float(np.max(np.abs(record["threshold_slope"] * record["threshold"])[: 2 if record["two_stops"] else 1]))
+    speed = period * max(mean_size(strobe.motion), pull, 1e-300)
+    rate = math.sqrt(abs(float(record["stiffness"][0])))
+    if record["two_stops"]:
+        width = float(record["overturn_angle"])
+        return Scale(width, max(width * rate, width / period))
+    return Scale(speed / max(rate, 1.0 / period), speed)
+
+
+def mean_size(motion: Motion) -> float:
+    """Mean size of an acceleration, roughly."""
+    times = np.linspace(motion.breakpoints[0], motion.breakpoints[-1], 257)
+    return float(np.mean(np.abs(motion.acceleration(times))))
+
+
+def repeated(motion: Motion, gravity: float, sign: float = 1.0) -> Ground:
+    """Ground of a motion that repeats for ever, with this sign: twice, and behind that what lifts any body."""
+    breaks = motion.breakpoints - motion.breakpoints[0]
+    period, columns = breaks[-1], motion.coefficients.shape[1]
+    beyond = np.zeros((2, columns))
+    beyond[:, 0] = _BEYOND_ALL * gravity, -_BEYOND_ALL * gravity
+    breakpoints = np.concatenate([breaks, period + breaks[1:], [3.0 * period, 4.0 * period]])
+    coefficients = np.concatenate([motion.coefficients, sign * motion.coefficients, beyond])
+    breakpoints.flags.writeable = coefficients.flags.writeable = False  # as a motion's: a kernel is compiled for these
+    return ground_of(breakpoints, coefficients, 1.0 / gravity, motion.error)
+
+
+def parts_of(count: int, periods: int) -> Sequence[slice]:
+    """Ranges of states for one call of a kernel each, over so many periods."""
+    # Half a second of periods.
+    return [*ranges(count, min(TOGETHER, max(1, 100_000 // periods)))]
+
+
+def sensible(values: Floats, name: str) -> None:
+    """Refuse coordinates or velocities that are not finite, or beyond all sense."""
+    if not values.size or not np.all(np.abs(values) <= FASTEST):
+        raise InvalidOption(f"{{}} must be finite numbers of at most {FASTEST:g} in size", name)
+
+
+def described(what: Body | Motion) -> str:
+    """Return what moves, or what shakes it, with its parameters in one line."""
+    if isinstance(what, Motion):
+        return ", ".join(part for part in (what.label, what.description.numbers) if part)
+    return f"{what.description}, {in_line(what.sides)}"
 
 
 class StroboscopicMap(PeriodicForcing):
@@ -102,13 +286,24 @@ class StroboscopicMap(PeriodicForcing):
         return found.reshape(given.shape), total.reshape(*given.shape, 2)
 
     def from_impacts(self, impacts: ArrayLike) -> Floats:
-        """Return the states at the end of the period in which bodies leave impacts, given as for an `ImpactMap`.
+        """Return the states at the end of the period in which bodies leave impacts, shape (..., 2).
 
-        NaN where the body overturns before. `InvalidOption` if the impacts have another shape, or a velocity does not
-        lead away from its stop.
+        An impact is its time since the start of the period, s, and the velocity after it: of a block its sign is the
+        side that is entered; between two stops it leads away from the stop that was hit. NaN where the body overturns
+        before. `InvalidOption` if the impacts have another shape, or a velocity does not lead away from its stop.
         """
         given = self._pairs(impacts, "impacts", "phase in s")
-        made = self._after_impacts(given.reshape(-1, 2))
+        flat = given.reshape(-1, 2)
+        made = state.new_states(len(flat), 0)
+        phase = np.mod(np.where(np.isfinite(flat[:, 0]), flat[:, 0], np.nan), self.period)
+        starts = self._ground.pieces[: (len(self._ground.pieces) - 3) // 2, 0]
+        made["piece"] = np.searchsorted(starts, phase, side="right") - 1
+        made["offset"] = phase - starts[made["piece"]]
+        made["side"] = np.where(flat[:, 1] < 0.0, 1, 0)
+        made["v"] = np.where(np.isnan(phase), np.nan, np.abs(flat[:, 1]))
+        if np.any(flat[:, 1] == 0.0) or (not self._is_two_sided and np.any(flat[:, 1] < 0.0)):
+            raise InvalidOption("every velocity in {} must lead away from the stop that was hit", "impacts")
+        made["peak"] = self._no_peak
         self._iterate(made)
         return self._known(made).reshape(given.shape)
 
@@ -125,111 +320,8 @@ class StroboscopicMap(PeriodicForcing):
             pass
 
 
-class HalfMap(StroboscopicMap):
-    """Map of a mirrored body under an antisymmetric motion to the mirror image of its state half a period later."""
-
-    def __init__(self, strobe: StroboscopicMap) -> None:
-        super().__init__(strobe.body, strobe.motion, strobe.model, strobe.treatment)
-        motion = strobe.motion
-        middle = int(np.argmin(np.abs(motion.breakpoints - 0.5 * motion.duration)))
-        half = Motion(motion.breakpoints[: middle + 1], motion.coefficients[:middle], error=motion.error)
-        self.period *= 0.5
-        self._ground = repeated(half, self.body.gravity, -1.0)
-        self._steps = np.ascontiguousarray(self._steps[:, :middle])  # as kernels take arrays
-
-    def mirrored(self, state: Floats, halves: int) -> tuple[Floats, Floats]:
-        """Mirror image of a state after an odd number of half periods, and its derivative; NaN where it overturns."""
-        total, at = np.eye(2), state
-        for _ in range(halves):
-            if not np.all(np.isfinite(at)):  # a march from there would take all its turns
-                break
-            after, change = self.derivative(at)
-            at, total = 0.0 - after, -change @ total
-        return at, total
-
-
-class ImpactMap(PeriodicForcing):
-    """Map of an impact (phase, velocity after it) to the next one, made by `impact_map`."""
-
-    def __call__(self, impacts: ArrayLike) -> Floats:
-        """Return the next impacts.
-
-        Parameters
-        ----------
-        impacts : array_like, shape (..., 2)
-            Time of an impact since the start of the period, s, and velocity after it: of a block its sign is the side
-            that is entered; between two stops it leads away from the stop that was hit.
-
-        Returns
-        -------
-        ndarray, shape (..., 2)
-            The next ones, with times within the period; NaN where the body rests or overturns first.
-        """
-        return self.derivative(impacts)[0]
-
-    def derivative(self, impacts: ArrayLike) -> tuple[Floats, Floats]:
-        """Return the next impacts as the map does, and their derivatives by the impacts before, shape (..., 2, 2)."""
-        given = self._pairs(impacts, "impacts", "phase in s")
-        made = self._after_impacts(given.reshape(-1, 2))
-        start, signs, change = self._rates(made), _signs(made["side"]), np.empty((len(made), 2, 2))
-        to_next_impact(*self._marching(), made, change)
-        end = self._rates(made)
-        times = self._ground.pieces[made["piece"], 0] + made["offset"]
-        found = np.stack([times, _signs(made["side"]) * made["v"]], axis=-1)
-        # At fixed times a later impact is (-v, -v') off; the shift of the next one is read off in the same way.
-        zeros, ones = np.zeros(len(made)), np.ones(len(made))
-        before = np.array([[-start[:, 0], zeros], [-start[:, 1], ones]]).transpose(2, 0, 1)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            after = np.array([[-1.0 / end[:, 0], zeros], [-end[:, 1] / end[:, 0], ones]])
-            total = after.transpose(2, 0, 1) @ change @ before
-        total *= np.stack([ones, _signs(made["side"])], axis=-1)[:, :, None] * np.stack([ones, signs], axis=-1)[:, None]
-        lost = made["ending"] != Fate.MOVES
-        found[lost] = total[lost] = np.nan
-        return found.reshape(given.shape), total.reshape(*given.shape, 2)
-
-    def _rates(self, made: state.Records) -> Floats:
-        """Velocity and acceleration just after impacts, in the frames of their sides, shape (n, 2)."""
-        record = self._records[0]
-        side = np.maximum(made["side"], 0)
-        push = np.zeros(len(made))
-        for column in self._ground.pieces[made["piece"]][:, :1:-1].T:
-            push = push * made["offset"] + column
-        restoring = record["threshold_slope"][side] * (
-            record["threshold"][side] + record["restraint_threshold"][side] + _signs(side) * push
-        )
-        with np.errstate(invalid="ignore"):  # a velocity may be infinite
-            return np.stack([made["v"], -restoring - record["damping"][side] * made["v"]], axis=-1)
-
-
 def _signs(side: NDArray[np.int64]) -> Floats:
     return np.where(side > 0, -1.0, 1.0)
-
-
-def is_mirrored(strobe: StroboscopicMap) -> bool:
-    """Whether the mirror image of every course of a body is one half a period later."""
-    record, (low, high), motion = strobe._records[0], strobe.body.stops, strobe.motion
-    if not strobe._is_two_sided or low != -high or any(record[name][0] != record[name][1] for name in _OF_SIDES):
-        return False
-    half = 0.5 * motion.duration
-    if not are_halved(motion)[0]:
-        return False
-    times = half * (np.arange(200) + 0.5) / 200.0
-    sums = motion.acceleration(times) + motion.acceleration(times + half)
-    return bool(np.max(np.abs(sums)) <= 1e-12 * motion.pga)
-
-
-def distances(times: Floats, marks: Floats, period: float) -> Floats:
-    """Distance in time of each of some times to the nearest of some marks, all of them within a period that repeats."""
-    marks = np.sort(marks)
-    after = np.searchsorted(marks, times)
-    away = np.abs(times - marks[[after - 1, after % len(marks)]])
-    return np.asarray(np.min(np.minimum(away, period - away), axis=0))
-
-
-def are_halved(motion: Motion) -> Flags:
-    """Of each breakpoint but the last: whether there is another one half a period later."""
-    starts, period = motion.breakpoints[:-1] - motion.breakpoints[0], motion.duration
-    return distances(np.mod(starts + 0.5 * period, period), starts, period) <= 1e-14 * period
 
 
 def stroboscopic_map(
@@ -270,27 +362,3 @@ def stroboscopic_map(
     [-0.085002, 0.087054]
     """
     return StroboscopicMap(body, motion, model, chattering)
-
-
-def impact_map(body: Body, motion: Motion, *, model: Model | None = None) -> ImpactMap:
-    """Map of a body under periodic motion from just after one impact to just after the next.
-
-    Parameters
-    ----------
-    body, motion, model : Body, Motion, str
-        As for `stroboscopic_map`.
-
-    Returns
-    -------
-    ImpactMap
-        A function of impacts (phase in s, velocity after).
-
-    Examples
-    --------
-    >>> from rocking import dynamics, pulses
-    >>> ball, table = dynamics.BouncingBall(0.5, gravity=10.0), pulses.sine(15.0, 5.0, cycles=1)
-    >>> dynamics.impact_map(ball, table)([[0.05, 1.0], [0.1, 0.8]]).shape
-    (2, 2)
-    """
-    # No speed is below this threshold: an impact map closes no chattering.
-    return ImpactMap(body, motion, model, VelocityThreshold(1e-300))

@@ -1,14 +1,14 @@
 """Equations that a family of periodic orbits solves, and Newton's method on them.
 
-Numbers z are coordinate, velocity and parameter over their sizes. A period may start later than that of the motion as
-it was given, by a shift of some pieces: where an impact falls on the start, the equations are not smooth.
+Numbers z are coordinate, velocity and parameter over their sizes.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final, NamedTuple
 
@@ -18,33 +18,26 @@ from numpy.typing import NDArray
 from rocking.block.body import Body
 from rocking.core.arrays import Floats
 from rocking.core.constants import Model
-from rocking.dynamics.forcing import scale_of
-from rocking.dynamics.maps import Fate, HalfMap, StroboscopicMap, are_halved, distances, is_mirrored
-from rocking.dynamics.orbits import (
-    SAME,
-    OrbitTrajectory,
-    PeriodicOrbit,
-    multipliers_at,
-    orbit_at,
-    response_of,
-    trajectory_of,
-)
+from rocking.dynamics.branches import SYMMETRY, Bifurcation
+from rocking.dynamics.maps import Fate, StroboscopicMap, scale_of
+from rocking.dynamics.orbits import SAME, PeriodicOrbit, multipliers_at, orbit_at, peak_of, response_of
 from rocking.engine.treatment import Treatment
 from rocking.errors import InvalidOption, RockingError
 from rocking.motion.motion import Motion
+from rocking.response import Response
 
-#: Makes body and motion of a parameter.
-Family = Callable[[float], tuple[Body, Motion]]
-
-#: The plane of one parameter, by its normal.
-AT_VALUE: Final = np.array([0.0, 0.0, 1.0])
+#: Points from which the crossing of two branches is interpolated.
+_CROSSING: Final = 4
 
 #: Residual of a point of a branch, over the scale and the size of the derivative; and the largest one.
 _RESIDUAL: Final = 1e-12
 _LARGEST_RESIDUAL: Final = 1e-6
 
 #: Greatest step of differences by the parameter, over its range.
-_DIFFERENCE: Final = 1e-6
+DIFFERENCE: Final = 1e-6
+
+#: The plane of one parameter, by its normal.
+AT_VALUE: Final = np.array([0.0, 0.0, 1.0])
 
 
 class Kind(NamedTuple):
@@ -86,25 +79,25 @@ class Solved(NamedTuple):
 class OrbitEquations:
     """Equations of the orbits of a family that are of the kind of a given one."""
 
-    family: Family
+    family: Callable[[float], tuple[Body, Motion]]
     model: Model
     treatment: Treatment
     period: int
-    #: Whether they are those of the map to the mirror image half a period later.
-    by_half: bool
     sizes: Floats
     kind: Kind
     #: Range of the parameter: the family need not be made beyond.
     limits: tuple[float, float]
+    #: Breakpoint of the motion at which a period starts: where an impact falls on it, the equations are not smooth.
     shift: int = 0
-    difference: float = _DIFFERENCE
+    difference: float = DIFFERENCE
 
     def __post_init__(self) -> None:
         self.strobe = lru_cache(maxsize=64)(self._strobe)
-        self.half = lru_cache(maxsize=64)(self._half)
 
     @classmethod
-    def of(cls, orbit: PeriodicOrbit, family: Family, value: float, limits: tuple[float, float]) -> OrbitEquations:
+    def of(
+        cls, orbit: PeriodicOrbit, family: Callable[[float], object], value: float, limits: tuple[float, float]
+    ) -> OrbitEquations:
         """Return the equations that an orbit solves at a value of the parameter."""
         pair = family(value) if callable(family) else None
         if not isinstance(pair, tuple) or len(pair) != 2:
@@ -117,13 +110,10 @@ class OrbitEquations:
             raise InvalidOption(
                 f"the orbit is none of what {{}} makes at {{}} = {value:g}", "family", "value", value=value
             )
-        by_half = orbit.symmetric and not orbit.rests and _stays_mirrored(family, strobe, limits)
-        sizes = np.array([*scale, limits[1] - limits[0]])
-        kind = kind_of(strobe, orbit.state, orbit.period)
-        return cls(family, orbit.model, orbit.treatment, orbit.period, by_half, sizes, kind, limits)
+        sizes, kind = np.array([*scale, limits[1] - limits[0]]), kind_of(strobe, orbit.state, orbit.period)
+        return cls(family, orbit.model, orbit.treatment, orbit.period, sizes, kind, limits)  # type: ignore[arg-type]
 
     def _strobe(self, value: float) -> StroboscopicMap:
-        """Map of the body and the motion at a value, with the start of the period shifted."""
         body, motion = self.family(value)
         if k := self.shift:
             breaks, rows = motion.breakpoints, np.roll(motion.coefficients, -k, axis=0)
@@ -131,34 +121,21 @@ class OrbitEquations:
             motion = Motion(later, rows, motion.name, motion.description, error=motion.error)
         return StroboscopicMap(body, motion, self.model, self.treatment)
 
-    def _half(self, value: float) -> HalfMap:
-        strobe = self.strobe(value)
-        if not is_mirrored(strobe):
-            raise InvalidOption(f"the family has no mirror images at {{}} = {value:g}", "value", value=value)
-        return HalfMap(strobe)
-
     def physical(self, z: Floats) -> tuple[Floats, float]:
         """State and parameter of numbers z; exactly a limit where it differs from that by rounding."""
         value = float(z[2] * self.sizes[2])
         at_limit = (each for each in self.limits if math.isclose(value, each, rel_tol=2.0**-50))
         return z[:2] * self.sizes[:2], next(at_limit, value)
 
-    def for_step(self, step: float) -> None:
-        """Choose the differences by the parameter for steps of some length along the branch."""
-        # Near the end of a branch few of the differences by the parameter reach across it.
-        self.difference = min(max(1e-3 * step, 1e-13), _DIFFERENCE)
-
     def returned(self, state: Floats, value: float) -> tuple[Floats, Floats]:
-        """State, or its mirror image, after the period or half of it, and the derivative; NaN where there is none."""
+        """State after the period, and the derivative; NaN where there is none."""
         try:
-            if self.by_half:
-                return self.half(value).mirrored(state, self.period)
             return self.strobe(value).derivative(state, self.period)
         except RockingError:  # behind a stop, or a parameter that makes no body or motion
             return np.full(2, np.nan), np.full((2, 2), np.nan)
 
-    def at(self, z: Floats) -> tuple[Floats, Floats, Floats]:
-        """Residual, its derivative by z, and the derivative of the map."""
+    def at(self, z: Floats) -> tuple[Floats, Floats]:
+        """Residual, and its derivative by z."""
         state, value = self.physical(z)
         after, change = self.returned(state, value)
         h, (low, high) = self.difference * self.sizes[2], self.limits
@@ -167,13 +144,13 @@ class OrbitEquations:
         by_value = (self.returned(state, more)[0] - self.returned(state, less)[0]) / (more - less)
         scaled = change / self.sizes[:2, None] * self.sizes[:2]
         by_value = by_value * self.sizes[2] / self.sizes[:2]
-        return (after - state) / self.sizes[:2], np.column_stack([scaled - np.eye(2), by_value]), change
+        return (after - state) / self.sizes[:2], np.column_stack([scaled - np.eye(2), by_value])
 
     def solved(self, guess: Floats, normal: Floats) -> Solved | None:
         """Return the point of the branch in the plane through a guess; None where Newton's method finds none."""
         z = guess.copy()
         for count in range(10):
-            residual, jacobian, _ = self.at(z)
+            residual, jacobian = self.at(z)
             if not np.all(np.isfinite(jacobian)):
                 return None
             allowed = _RESIDUAL * max(1.0, float(np.max(np.abs(jacobian[:, :2]))))
@@ -187,86 +164,84 @@ class OrbitEquations:
                 return Solved(z, jacobian, self.returned(*self.physical(z))[1], count)
         return None
 
-    def tangent(self, z: Floats, like: Floats) -> Floats:
-        """Tangent at a point, in the direction of another; that one where there is none."""
-        _, jacobian, _ = self.at(z)
-        return tangent_of(jacobian, like) if np.all(np.isfinite(jacobian)) else like
-
     def kind_at(self, z: Floats) -> Kind:
         """Kind of the course from a state."""
         state, value = self.physical(z)
         return kind_of(self.strobe(value), state, self.period)
 
-    def trajectory(self, z: Floats) -> OrbitTrajectory:
-        """Extremes of the orbit at a point."""
+    def response(self, z: Floats) -> Response:
+        """Course over a period from the start that is used here."""
         state, value = self.physical(z)
-        return trajectory_of(self.strobe(value), state, self.period)
-
-    def is_parent(self, z: Floats) -> bool:
-        """Whether a point is of orbits from which this branch bifurcates: of half the period, or symmetric."""
-        state, value = self.physical(z)
-        if self.kind.rests or self.by_half:
-            return False
-        if self.period % 2 == 0:
-            after = self.strobe(value)(state, self.period // 2)
-        elif is_mirrored(self.strobe(value)):
-            after, _ = self.half(value).mirrored(state, self.period)
-        else:
-            return False
-        return bool(np.max(np.abs(after - state) / self.sizes[:2]) < SAME)
-
-    def multipliers(self, z: Floats) -> NDArray[np.complex128]:
-        """Floquet multipliers at a point."""
-        state, value = self.physical(z)
-        strobe = self.strobe(value)
-        return multipliers_at(strobe, strobe.derivative(state, self.period)[1])
+        return response_of(self.strobe(value), state, self.period)
 
     def state(self, z: Floats, shift: int = 0) -> Floats:
-        """State of the same course where a period starts at another breakpoint of the motion as it was given."""
+        """State of the same course at another breakpoint of the motion as it was given."""
         state, value = self.physical(z)
         if shift == self.shift:
             return state
         _, motion = self.family(value)
         time = float(np.mod(motion.breakpoints[shift] - motion.breakpoints[self.shift], motion.duration))
-        return response_of(self.strobe(value), state, self.period).states(time)[:2]
+        return self.response(z).states(time)[:2]
 
-    def orbit(self, z: Floats) -> PeriodicOrbit:
-        """Orbit at a point."""
-        strobe = StroboscopicMap(*self.family(self.physical(z)[1]), self.model, self.treatment)
-        return orbit_at(strobe, self.state(z), self.period)
+    def point(self, z: Floats, response: Response) -> tuple[float, Floats, NDArray[np.complex128], float]:
+        """Parameter, state, multipliers and greatest size of the coordinate at a point."""
+        state, value = self.physical(z)
+        strobe = self.strobe(value)
+        multipliers = multipliers_at(strobe, strobe.derivative(state, self.period)[1])
+        return value, self.state(z), multipliers, peak_of(response)
 
-    def moved(self, z: Floats, trajectory: OrbitTrajectory) -> tuple[OrbitEquations, Floats]:
-        """Equations with a start of the period that no impact is near, and the same orbit in these."""
-        _, motion = self.family(self.physical(z)[1])
-        starts, period = motion.breakpoints[:-1] - motion.breakpoints[0], motion.duration
-        phases = np.mod(trajectory.phases + starts[self.shift], period)
-        if not len(phases):
-            return self, z
-        nearest = distances(starts, phases, period)
-        if self.by_half:  # the map of half a period ends at a breakpoint, too
-            nearest[~are_halved(motion)] = -1.0
-        best = int(np.argmax(nearest))
-        # An impact within 3 % of a period moves its start.
-        if nearest[self.shift] > 0.03 * period or nearest[best] <= nearest[self.shift]:
-            return self, z
-        return replace(self, shift=best), self.later(z, best)
+    def is_shorter(self, z: Floats) -> bool:
+        """Whether a point is of orbits of half the period, from which this branch bifurcates."""
+        if self.period % 2 or self.kind.rests:
+            return False
+        state, value = self.physical(z)
+        after = self.strobe(value)(state, self.period // 2)
+        return bool(np.max(np.abs(after - state) / self.sizes[:2]) < SAME)
 
-    def later(self, z: Floats, shift: int) -> Floats:
-        """Numbers of the same course where a period starts at another breakpoint."""
-        return np.append(self.state(z, shift), self.physical(z)[1]) / self.sizes
+    def bifurcation(self, kind: str, z: Floats, values: Sequence[float]) -> Bifurcation:
+        """Bifurcation near a point, between values of the parameter over its size."""
+        bracket = sorted(float(each * self.sizes[2]) for each in values)
+        value = self.physical(z)[1]
+        strobe = StroboscopicMap(*self.family(value), self.model, self.treatment)
+        return Bifurcation(kind, value, (bracket[0], bracket[-1]), orbit_at(strobe, self.state(z), self.period))
 
+    def located(self, kind: str, z: Floats, tangent: Floats, length: float, number: int) -> Bifurcation | None:
+        """Root of one of the test functions along a line from a point; None where there is none."""
+        from scipy.optimize import brentq
 
-def _stays_mirrored(family: Family, strobe: StroboscopicMap, limits: tuple[float, float]) -> bool:
-    """Whether the mirror image of every course is one half a period later, at a value and over the whole range."""
-    if not is_mirrored(strobe):
-        return False
-    for value in np.linspace(*limits, 5):
+        found: dict[float, tuple[Solved, float]] = {}
+
+        def tested(at: float) -> float:
+            solved = self.solved(z + at * tangent, tangent)
+            if solved is None:
+                raise _Missed
+            found[at] = solved, solved.tests(tangent_of(solved.jacobian, tangent))[number]
+            return found[at][1]
+
         try:
-            if not is_mirrored(StroboscopicMap(*family(float(value)), strobe.model, strobe.treatment)):
-                return False
-        except RockingError:  # no body or motion there: the branch ends before
-            continue
-    return True
+            root = brentq(tested, 0.0, length, xtol=1e-16, rtol=1e-15)
+        except ValueError:
+            return None
+        except _Missed:
+            if len({test > 0.0 for _, test in found.values()}) < 2:
+                return None
+            # Where branches cross the equations are singular; where symmetry breaks, nearer points tell more.
+            for aside in length * np.array([0.1, 0.01, 1e-3] if kind == SYMMETRY else []):
+                near = sorted((abs(test), test, at) for at, (_, test) in found.items())[:_CROSSING]
+                middle = at_zero([test for _, test, _ in near], [at for *_, at in near])
+                for at in (middle - aside, middle + aside):
+                    with suppress(_Missed):
+                        tested(at)
+            points = sorted(found.values(), key=lambda each: abs(each[1]))[:_CROSSING]
+            value = at_zero([test for _, test in points], [each.z[2] for each, _ in points])
+            crossing = self.bifurcation(kind, points[0][0].z, [z[2], (z + length * tangent)[2]])
+            return crossing._replace(value=float(value * self.sizes[2]))
+        first, second = (found[at][0].z for at in sorted(found, key=lambda at: abs(at - root))[:2])
+        return self.bifurcation(kind, first, [first[2], second[2]])
+
+
+class _Missed(Exception):
+    """There is no point of the branch where one was looked for."""
 
 
 def tangent_of(jacobian: Floats, like: Floats) -> Floats:
@@ -286,3 +261,9 @@ def kind_of(strobe: StroboscopicMap, state: Floats, period: int) -> Kind:
     rests, for_ever = not np.any(change), bool(fate == Fate.RESTS_FOR_EVER and not impacts)
     number = 0 if rests else int(impacts)
     return Kind(rests, for_ever, number, bool(fate == Fate.OVERTURNED), bool(fate == Fate.UNFINISHED))
+
+
+def at_zero(x: Sequence[float], y: Sequence[float]) -> float:
+    """Value at zero of the polynomial through points."""
+    weights = [math.prod(b / (b - a) for b in x if b != a) for a in x]
+    return float(np.dot(weights, y))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,10 +16,8 @@ from rocking.core.arrays import Flags, Floats
 from rocking.core.constants import Model
 from rocking.core.result import Result, Row, text_of
 from rocking.core.tables import Column, as_written, counted, named, plain
-from rocking.dynamics.bodies import LinearBody
-from rocking.dynamics.forcing import mean_size, scale_of
-from rocking.dynamics.maps import StroboscopicMap, is_mirrored
-from rocking.dynamics.simulation import in_positions
+from rocking.dynamics.bodies import LinearBody, in_positions
+from rocking.dynamics.maps import StroboscopicMap, mean_size, scale_of
 from rocking.engine.treatment import Treatment
 from rocking.errors import InvalidOption
 from rocking.motion.motion import Motion
@@ -99,11 +97,6 @@ class PeriodicOrbit(Result):
     def response(self) -> Response:
         """One period of the orbit as a simulation, with its impacts, rests, and the state at any time."""
         return response_of(self._map, self.state, self.period)
-
-    @property
-    def _peak(self) -> float:
-        """Greatest size of the coordinate."""
-        return trajectory_of(self._map, self.state, self.period).peak
 
     @cached_property
     def _map(self) -> StroboscopicMap:
@@ -201,15 +194,6 @@ class PeriodicOrbit(Result):
         )
 
 
-class OrbitTrajectory(NamedTuple):
-    """What a period of an orbit shows: greatest coordinate, slowest impact, least gap, and the phases of impacts."""
-
-    peak: float
-    slowest: float
-    gap: float
-    phases: Floats
-
-
 def response_of(strobe: StroboscopicMap, state: Floats, periods: int) -> Response:
     """Course of a body from a state on, over so many periods."""
     motion, duration = strobe.motion, periods * strobe.period
@@ -224,41 +208,21 @@ def response_of(strobe: StroboscopicMap, state: Floats, periods: int) -> Respons
     return in_positions(found) if isinstance(strobe.body, LinearBody) else found
 
 
-def trajectory_of(strobe: StroboscopicMap, state: Floats, periods: int) -> OrbitTrajectory:
-    """Extremes of the course of a body over so many periods."""
-    response = response_of(strobe, state, periods)
-    duration, impacts = response.duration, response.impacts
-    times = np.linspace(0.0, duration, 64 * periods + 1)
-    states = response.states(times)
-    # A gap is least where the velocity passes zero between impacts.
-    ends = np.concatenate([[0.0], impacts["time"], [duration]])
-    inner = np.searchsorted(ends, times, side="right")
-    v = states[:, 1]
-    crossing = np.flatnonzero((v[1:] * v[:-1] < 0.0) & (inner[1:] == inner[:-1]))
-    low, high = times[crossing], times[crossing + 1]
-    rising = v[crossing] < 0.0
-    for _ in range(40 if len(crossing) else 0):
-        middle = 0.5 * (low + high)
-        before = (response.states(middle)[:, 1] < 0.0) == rising
-        low, high = np.where(before, middle, low), np.where(before, high, middle)
-    at = response.states(0.5 * (low + high))[:, 0]
-    # What a body nearly hits: the stop below where its coordinate is lowest, one above where it is highest.
-    low_stop, high_stop = strobe.body.stops
-    gaps = np.where(rising, at - low_stop, high_stop - at if strobe._is_two_sided else math.inf)
-    hits = response.states(impacts["time"])[:, 0]  # at a second stop the coordinate may be greatest
-    peak = float(np.max(np.abs(np.concatenate([states[:, 0], at, hits]))))
-    slowest = float(np.min(impacts["speed_before"], initial=math.inf))
-    gap = float(np.min(gaps, initial=math.inf, where=gaps > 0.0))
-    return OrbitTrajectory(peak, slowest, gap, np.mod(impacts["time"], strobe.period))
+def peak_of(response: Response) -> float:
+    """Greatest size of the coordinate of a response, on 64 points of a period of the motion at least."""
+    times = np.linspace(0.0, response.duration, 64 * max(1, len(response.impacts)) + 1)
+    at = np.concatenate([times, response.impacts["time"]])
+    return max(response.peak_rotation, float(np.max(np.abs(response.states(at)[:, 0]))))
 
 
 def orbit_at(strobe: StroboscopicMap, state: Floats, period: int) -> PeriodicOrbit:
     """Periodic orbit of a state that comes back after so many periods."""
     _, change = strobe.derivative(state, period)
     symmetric = False
-    if period % 2 and is_mirrored(strobe):  # its own mirror image half a period later
-        after = response_of(strobe, state, period).states(0.5 * period * strobe.period)[:2]
-        symmetric = bool(np.all(np.abs(after + state) < 1e-9 * np.array(scale_of(strobe))))
+    if period % 2 and strobe.bodies.is_symmetric:  # its own mirror image half a period later
+        half = 0.5 * period * strobe.period
+        states = response_of(strobe, state, period).states(half * np.linspace(0.0, 1.0, 9)[:-1, None] + [0.0, half])
+        symmetric = bool(np.all(np.abs(states.sum(axis=1)[:, :2]) < 1e-9 * np.array(scale_of(strobe))))
     return PeriodicOrbit(
         strobe.body, strobe.motion, strobe.model, strobe.treatment, state, period,
         impacts_of(strobe, state, period, change), multipliers_at(strobe, change), symmetric, not np.any(change),

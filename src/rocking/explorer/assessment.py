@@ -23,8 +23,7 @@ from rocking.explorer.parameters import ASSESSMENT, Texts
 from rocking.explorer.payload import Payload, phrase
 from rocking.explorer.uploads import UploadStore
 from rocking.inputs.quantities import number
-from rocking.motion.exceedance import lifting_factors
-from rocking.motion.motion import Motion
+from rocking.motion.motion import Motion, lifting_factors
 from rocking.motion.scaling import FACTOR, Measure
 from rocking.response.mechanics import friction_coefficient
 from rocking.rules import overturning_velocity, rate

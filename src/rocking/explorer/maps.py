@@ -14,7 +14,7 @@ from rocking.analysis.levels import ratios_of
 from rocking.analysis.overturning import modes_of
 from rocking.block import Blocks
 from rocking.block.sides import housner_restitution
-from rocking.chattering.amplitude import critical_amplitude
+from rocking.chattering.duration import critical_amplitude
 from rocking.chattering.maps import Outcome, last_exceedance, outcomes_of
 from rocking.core.arrays import Flags, Floats, Integers
 from rocking.core.constants import STANDARD_GRAVITY

@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike
 from rocking import pulses
 from rocking.core.arrays import Floats
 from rocking.dynamics.bifurcation import period_of, states_after
-from rocking.dynamics.forcing import scale_of
-from rocking.dynamics.maps import Fate, StroboscopicMap, stroboscopic_map
+from rocking.dynamics.maps import Fate, StroboscopicMap, scale_of, stroboscopic_map
 from rocking.dynamics.orbits import multipliers_at
 from rocking.errors import InvalidOption
 from rocking.explorer.inputs import Case, require_possible

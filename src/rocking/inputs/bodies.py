@@ -11,7 +11,7 @@ from rocking.block import Block, RestrainedBlock, Restraint
 from rocking.block.body import Body
 from rocking.core import checks
 from rocking.core.progress import note
-from rocking.errors import InvalidBlock, InvalidOption, Message, literal
+from rocking.errors import InvalidBlock, InvalidOption, literal
 from rocking.inputs import texts
 from rocking.inputs.declared import BLOCK, INPUTS, READERS, SHAPES, Shape
 from rocking.inputs.notes import block_notes, restraint_notes
@@ -75,13 +75,10 @@ def body_of(block: Block, values: Mapping[str, Any], restraints: Sequence[Restra
 
 def note_likely_mistakes(blocks: Sequence[Block], bodies: Sequence[Body] = ()) -> None:
     """Note what looks like a mistake in the first of some blocks, or in their restraints, each sentence once."""
-    sentences: dict[str, Message | str] = {}
-    for block, body in itertools.zip_longest(blocks[:_NOTED], bodies[:_NOTED]):
-        notes: list[Message | str] = [*block_notes(block)]
-        if isinstance(body, RestrainedBlock):
-            notes += restraint_notes(body, None if block.half_height is None else 2.0 * block.half_height)
-        sentences |= {str(sentence): sentence for sentence in notes}
-    for sentence in sentences.values():
+    notes = [sentence for block in blocks[:_NOTED] for sentence in block_notes(block)]
+    for body in bodies[:_NOTED]:
+        notes += restraint_notes(body) if isinstance(body, RestrainedBlock) else ()
+    for sentence in dict.fromkeys(notes):
         note(sentence)
 
 

@@ -8,11 +8,10 @@ from typing import Final
 
 import numpy as np
 
-from rocking.block import Block, Load, RestrainedBlock, Thrust
+from rocking.block import Block, RestrainedBlock
 from rocking.core.arrays import Floats
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.errors import Message
-from rocking.motion import measures
 from rocking.motion.description import Origin, begins_later
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
@@ -51,8 +50,6 @@ _HORIZONTAL: Final = re.compile(
     r"(\d{2,3}|n|e|s|w|ns|ew|n-s|e-w|[ns] ?\d{1,2} ?[ew]|north|east|south|west|h[12]|[a-z]{2}[ne12])( deg.*)?",
     re.IGNORECASE,
 )
-#: Components that start together last about as long: the shorter one at least this part of the longer one.
-_ALIKE: Final = 0.75
 
 
 def motion_notes(motion: Motion) -> tuple[str, ...]:
@@ -79,7 +76,12 @@ def vertical_notes(motion: Motion) -> tuple[str, ...]:
         theirs, ours = (getattr(_origin(each), what) for each in (vertical, motion))
         if theirs and ours and _spelled(theirs) != _spelled(ours):
             notes.append(f"the vertical motion is of the {what} {theirs!r}, the horizontal one of {ours!r}")
-    return (*notes, *_timing_notes(motion, vertical))
+    if later := begins_later(motion.description, vertical.description, motion.step):
+        notes.append(
+            f"by its file the vertical motion begins {abs(later):.4g} s {'after' if later > 0.0 else 'before'} the "
+            "horizontal one, but both are taken to start together: cut what comes first"
+        )
+    return tuple(notes)
 
 
 def reading_notes(motion: Motion) -> tuple[str, ...]:
@@ -129,8 +131,8 @@ def hazard_notes(intensity: Floats, measure: Measure) -> tuple[str, ...]:
     return ()
 
 
-def block_notes(block: Block) -> tuple[Message | str, ...]:
-    """Return what looks like a mistake in the sizes or the sides of a block; empty if nothing does."""
+def block_notes(block: Block) -> tuple[str, ...]:
+    """Return what looks like a mistake in the sizes of a block; empty if nothing does."""
     notes = []
     largest = max(2.0 * side.radius for side in block.sides)
     if largest > _LARGEST:
@@ -140,7 +142,7 @@ def block_notes(block: Block) -> tuple[Message | str, ...]:
     if block.half_width is not None and block.half_height is not None and block.half_width > block.half_height:
         width, height = 2.0 * block.half_width, 2.0 * block.half_height
         notes.append(f"the block is wider, {width:g} m, than it is high, {height:g} m: are the sizes swapped?")
-    return (*notes, *_side_notes(block))
+    return tuple(notes)
 
 
 def height_notes(height: float) -> tuple[str, ...]:
@@ -158,33 +160,12 @@ def density_notes(densities: Sequence[float | None]) -> tuple[str, ...]:
     )
 
 
-def restraint_notes(body: RestrainedBlock, top: float | None = None) -> tuple[str, ...]:
+def restraint_notes(body: RestrainedBlock) -> tuple[str, ...]:
     """Return what looks like a mistake in the restraints of a block; empty if nothing does."""
-    notes = []
-    for each in body.restraints or ():
-        if isinstance(each, (Thrust, Load)) and top is not None and each.height > top * (1.0 + 1e-9):
-            kind = type(each).__name__.lower()
-            notes.append(
-                f"a {kind} is at a height of {each.height:g} m, above the top of the block, {top:g} m: is it in metres?"
-            )
     strongest = max(max(*map(abs, terms[:4]), terms.stiffness * terms.opening) for terms in body._terms)
-    if strongest > _MOST_HELD:
-        notes.append(
-            f"what a restraint does is {strongest:.2g} times the weight or more: are forces in N, and masses in kg?"
-        )
-    return tuple(notes)
-
-
-def _side_notes(block: Block) -> Iterator[Message | str]:
-    """Sentences on two different sides."""
-    slender, stocky = sorted(block.sides, key=lambda side: side.alpha)
-    if slender.alpha == stocky.alpha:
-        return
-    if slender.p <= stocky.p:
-        yield (
-            f"the more slender side has no larger p, {slender.p:g} rad/s, than the other, so that the mass lies as far "
-            "from its centre as the pivots do: are the sides of p swapped, or its digits too few?"
-        )
+    if strongest <= _MOST_HELD:
+        return ()
+    return (f"what a restraint does is {strongest:.2g} times the weight or more: are forces in N, and masses in kg?",)
 
 
 def _strength_notes(motion: Motion) -> Iterator[str]:
@@ -203,29 +184,8 @@ def _strength_notes(motion: Motion) -> Iterator[str]:
         )
 
 
-def _timing_notes(motion: Motion, vertical: Motion) -> Iterator[str]:
-    """Sentences on components that seem to start at different times."""
-    if later := begins_later(motion.description, vertical.description, motion.step):
-        yield (
-            f"by its file the vertical motion begins {abs(later):.4g} s {'after' if later > 0.0 else 'before'} the "
-            "horizontal one, but both are taken to start together: cut what comes first"
-        )
-        return
-    (start, end), (first, last) = (measures.significant_span(each) for each in (motion, vertical))
-    if last < start or first > end:
-        yield (
-            f"the horizontal motion is strong from {start:.4g} s to {end:.4g} s, the vertical one from {first:.4g} s "
-            f"to {last:.4g} s: do both start at the same time?"
-        )
-    elif min(motion.duration, vertical.duration) < _ALIKE * max(motion.duration, vertical.duration):
-        yield (
-            f"the horizontal motion lasts {motion.duration:.4g} s, the vertical one {vertical.duration:.4g} s: do both "
-            "start at the same time?"
-        )
-
-
-def is_multiple(motion: Motion, other: Motion) -> bool:
-    """Whether scaling makes one motion of the other, but for rounding, by a negative factor, too."""
+def is_multiple(motion: Motion, other: Motion, *, reversed_too: bool = True) -> bool:
+    """Whether scaling makes one motion of the other, but for rounding; `reversed_too`: also by a negative factor."""
     parts = [[part for part in (one, one.vertical) if part is not None] for one in (motion, other)]
     if [part.coefficients.shape for part in parts[0]] != [part.coefficients.shape for part in parts[1]]:
         return False

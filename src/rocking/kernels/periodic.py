@@ -397,35 +397,3 @@ def apply_saltation(ground: Ground, block: Record, left: int, following: Record,
         M[0, column], M[1, column] = -e * du, coupling * du - rate * dv
     shrunk = abs(e * rate)
     return math.log(shrunk) if shrunk > 0.0 else -np.inf
-
-
-# ---- From one impact to the next ----
-
-
-@kernel
-def to_next_impact(trail: Trail, scratch: Record, work: Record, table: Records, states: Records, out: Floats) -> None:
-    """Take states just after an impact to just after the next one, as `differentiate` takes them through a period.
-
-    Where there is none, because the body rests or overturns first, ``ending`` says so and the derivative is NaN.
-    """
-    ground, block, settings, _ = trail
-    for k in range(states.shape[0]):
-        state = states[k]
-        out[k, 0, 0], out[k, 0, 1], out[k, 1, 0], out[k, 1, 1] = 1.0, 0.0, 0.0, 1.0
-        fate = Fate.UNFINISHED.value
-        for _ in range(turns_from(state)):
-            state.stop_piece = pieces_of(ground)
-            state.budget = 1
-            state.nodes = state.impacts = state.events = state.sequences = 0
-            ending = march(ground, block, settings, table, scratch, state)
-            carry_on(trail, scratch, work, table[0].node, state, out[k])
-            if ending != Ending.PAUSED:
-                fate = put_back(ground, block, state, ending)
-            else:
-                fate = Fate.RESTS.value if state.side < 0 else Fate.MOVES.value
-            if fate != Fate.MOVES or state.impacts > 0:
-                break
-            fate = Fate.UNFINISHED.value
-        state.ending = fate
-        if fate != Fate.MOVES:
-            out[k, 0, 0] = out[k, 0, 1] = out[k, 1, 0] = out[k, 1, 1] = np.nan

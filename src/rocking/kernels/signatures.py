@@ -50,7 +50,6 @@ def signatures() -> dict[str, tuple[Any, ...]]:
         "periodic.iterate": (setting, scratch, states, 1, reals(1, 1, 3), reals(1, TRAP), count, count),
         "periodic.differentiate": (trail, scratch, state.record(state.VARIATION), table, states, reals(1, 2, 2)),
         "periodic.stretch": (trail, scratch, state.record(state.VARIATION), table, states[0], reals(3, 2), reals(1, 2)),
-        "periodic.to_next_impact": (trail, scratch, state.record(state.VARIATION), table, states, reals(1, 2, 2)),
         "uplift.note_complete": (seen, blocks, states, scratch, flags),
         "uplift.next_uplifts": (trail, scratch, reals()),
         "ground.fill": (given(3), given(2, 2), 1.0, seen, reals()),

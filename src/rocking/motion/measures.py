@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, Final, overload
+from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
 from rocking.core import checks
 from rocking.core.arrays import Floats
@@ -61,32 +61,20 @@ class Measured:
         """Coefficients of the ground displacement on each piece."""
         return piecewise.antiderivative(self._widths(), self._velocity())
 
-    @overload
-    def acceleration(self, time: float) -> float: ...
-    @overload
-    def acceleration(self, time: Sequence[float] | NDArray[Any]) -> Floats: ...
-    def acceleration(self, time: float | Sequence[float] | NDArray[Any]) -> float | Floats:
+    def acceleration(self, time: ArrayLike) -> Any:
         """Return the ground acceleration at times (s), m/s^2, shaped like `time`; zero outside the motion."""
         at = checks.numbers(time, "time", InvalidMotion)
         result = piecewise.at(self.breakpoints, self.coefficients, at)
         result = np.where((at < 0.0) | (at > self.duration), 0.0, result)
         return result if result.ndim else float(result)
 
-    @overload
-    def velocity(self, time: float) -> float: ...
-    @overload
-    def velocity(self, time: Sequence[float] | NDArray[Any]) -> Floats: ...
-    def velocity(self, time: float | Sequence[float] | NDArray[Any]) -> float | Floats:
+    def velocity(self, time: ArrayLike) -> Any:
         """Return the ground velocity from rest, m/s, as `acceleration`; constant after the end of the motion."""
         at = checks.numbers(time, "time", InvalidMotion)
         result = piecewise.at(self.breakpoints, self._velocity(), at)
         return result if result.ndim else float(result)
 
-    @overload
-    def displacement(self, time: float) -> float: ...
-    @overload
-    def displacement(self, time: Sequence[float] | NDArray[Any]) -> Floats: ...
-    def displacement(self, time: float | Sequence[float] | NDArray[Any]) -> float | Floats:
+    def displacement(self, time: ArrayLike) -> Any:
         """Return the ground displacement from rest, m, as `acceleration`; after the end at the last velocity."""
         at = checks.numbers(time, "time", InvalidMotion)
         result = piecewise.at(self.breakpoints, self._displacement(), at)
@@ -143,13 +131,7 @@ class Measured:
         first, last = significant_span(self, start, end)
         return last - first
 
-    @overload
-    def spectral_acceleration(self, period: float, damping: float = ...) -> float: ...
-    @overload
-    def spectral_acceleration(self, period: Sequence[float] | NDArray[Any], damping: float = ...) -> Floats: ...
-    def spectral_acceleration(
-        self, period: float | Sequence[float] | NDArray[Any], damping: float = DAMPING
-    ) -> float | Floats:
+    def spectral_acceleration(self, period: ArrayLike, damping: float = DAMPING) -> Any:
         """Pseudo-spectral acceleration: ``(2 pi/period)**2`` times an oscillator's peak displacement, m/s^2.
 
         The linear oscillator starts from rest and is followed through the motion and the first extremum after it, by

@@ -193,9 +193,8 @@ def _numerical_roots(widths: Floats, coefficients: Floats) -> Floats:
     rounding = 1e-14 * np.sum(np.abs(scaled), axis=1)
     may_vanish = (np.min(control, axis=1) <= rounding) & (np.max(control, axis=1) >= -rounding)
     degrees = np.where(may_vanish, _significant_degrees(scaled), 0)
-    for degree in np.unique(degrees[degrees > 0]):
-        pieces = degrees == degree
-        roots[pieces, :degree] = _polynomial_roots(scaled[pieces, : degree + 1])
+    for k in np.flatnonzero(degrees):
+        roots[k, : degrees[k]] = np.polynomial.polynomial.polyroots(scaled[k, : degrees[k] + 1]).real
     return roots * widths[:, np.newaxis]
 
 
@@ -205,17 +204,6 @@ def _significant_degrees(pieces: Floats) -> Integers:
     significant = sizes > 1e-18 * np.max(sizes, axis=1, keepdims=True)
     last = pieces.shape[1] - 1 - np.argmax(significant[:, ::-1], axis=1)
     return np.where(significant.any(axis=1), last, 0)
-
-
-def _polynomial_roots(pieces: Floats) -> Floats:
-    """Real parts of all roots of polynomials of one degree, as eigenvalues of their companion matrices."""
-    degree = pieces.shape[1] - 1
-    companions = np.zeros((len(pieces), degree, degree))
-    companions[:, np.arange(1, degree), np.arange(degree - 1)] = 1.0
-    companions[:, :, -1] = -pieces[:, :-1] / pieces[:, -1:]
-    # Turned by half a turn, which loses fewer digits.
-    found: Floats = np.linalg.eigvals(companions[:, ::-1, ::-1]).real
-    return found
 
 
 def _control_points(widths: Floats, coefficients: Floats) -> Floats:

@@ -210,18 +210,18 @@ class Processable(Measured):
         if vertical is not None and kept is not None and kept[0] > vertical.duration - piecewise.SHORTEST:
             vertical = None  # it is over by then
         if vertical is not None:
-            vertical = vertical._processed(kept, steps, self.step)
+            vertical = vertical._processed(kept, steps)
         return replace(self._processed(kept, steps), vertical=vertical)  # type: ignore[type-var]
 
-    def _processed(self, kept: tuple[float, float] | None, steps: list[_Step], grid: float | None = None) -> Self:
-        """Return the part between two times (s; even samples stay even on a finer `grid`), after these steps."""
+    def _processed(self, kept: tuple[float, float] | None, steps: list[_Step]) -> Self:
+        """Return the part between two times (s), after these steps."""
         motion: Piecewise = self
         history = self.history
         # What is made of samples is the motion from then on: the lines between them are exact.
         error = 0.0 if steps else self.error
         if kept is not None:
             start, end = kept[0], min(kept[1], self.duration)
-            steps = [lambda motion: _cut(motion, start, end, grid), *steps]
+            steps = [lambda motion: _cut(motion, start, end), *steps]
         for step in steps:
             motion = done = step(motion)
             history = (*history, done.done)
@@ -257,27 +257,19 @@ def _ends(motion: Piecewise, start: float, end: float) -> tuple[float, float]:
     return round(first / step) * step, round(last / step) * step
 
 
-def _cut(motion: Piecewise, start: float, end: float, grid: float | None = None) -> Processed:
-    """Keep the part from `start` to `end` (s); even samples stay even, where needed with a step `grid` (s)."""
+def _cut(motion: Piecewise, start: float, end: float) -> Processed:
+    """Keep the part from `start` to `end` (s)."""
     done = f"trimmed to {start:.6g}-{end:.6g} s"
     step = piecewise.even_step(motion)
     if step is not None:
-        for finer in (step, grid or step):
-            first, last, parts = (_whole(value / finer) for value in (start, end, step))
-            if first is not None and last is not None and parts:
-                sample, part = np.divmod(np.arange(first, last), parts)
-                coefficients = piecewise.moved(motion.coefficients[sample], part * finer)
-                return Processed(piecewise.even_times(last - first + 1, finer), coefficients, done)
+        first, last = round(start / step), round(end / step)
+        if max(abs(first * step - start), abs(last * step - end)) <= 1e-8 * step:
+            return Processed(piecewise.even_times(last - first + 1, step), motion.coefficients[first:last], done)
     breakpoints = motion.breakpoints
     inside = breakpoints[(breakpoints > start) & (breakpoints < end)]
     kept = np.concatenate([[start], inside, [end]])
     coefficients = piecewise.refined(breakpoints, motion.coefficients, kept, motion.coefficients.shape[1])
     return Processed(kept - start, coefficients, done)
-
-
-def _whole(ratio: float) -> int | None:
-    """Return the whole number that a ratio is up to rounding, or None."""
-    return round(ratio) if abs(ratio - round(ratio)) <= 1e-8 else None
 
 
 def _baseline(motion: Piecewise, degree: int) -> Processed:
@@ -353,29 +345,20 @@ def _floor_pieces(
     solution about its start, from the series of the solutions of the states (1, 0), (0, 1), and of the one at rest.
     """
     end = float(motion.breakpoints[-1])
-    time, stiff = checks.positive(period, "period", InvalidMotion, "s"), 1e-4 * end
-    if time < stiff:
-        raise InvalidMotion(
-            f"{{}} of a floor must be at least a ten-thousandth of the motion, {stiff:.4g} s, not {time:g} s: a floor "
-            "that is so stiff moves as the ground does",
-            "period",
-            value=period,
-        )
+    time = checks.positive(period, "period", InvalidMotion, "s")
     rate, ratio = 2.0 * math.pi / time, checked_damping(damping, InvalidMotion)
     if ringing is None and ratio == 0.0:
         raise InvalidMotion("a floor without {} moves for ever: give {}, s", "damping", "ringing")
     # Without a time, a free oscillation is followed until it has faded to a thousandth of itself.
-    after = -math.log(1e-3) / (ratio * rate) if ringing is None else checks.finite(ringing, "ringing", InvalidMotion)
-    if after < 0.0:
-        raise InvalidMotion(f"{{}} must be a time of at least 0 s, not {after:g}", "ringing", value=ringing)
+    ring = -math.log(1e-3) / (ratio * rate) if ringing is None else ringing
+    after = checks.within(ring, "ringing", InvalidMotion, 0.0, 1e15, "s")
     step = _RADIANS / rate
     if not (end + after) / step <= 1e6:
         raise InvalidMotion(
-            f"the floor moves for {end + after:.4g} s, which is too long for a {{}} of {period:g} s; give a shorter "
-            "time for it after the motion, {}",
-            "period",
-            "ringing",
-            value=ringing,
+            f"{{}} = {time:g} s is too short for a floor that is followed for {end + after:.4g} s: give a longer one, "
+            "or a shorter time after the motion, {}",
+            *("period", "ringing"),
+            value=period,
         )
     whole = np.append(motion.breakpoints, end + after) if after > 0.0 else motion.breakpoints
     shares = np.maximum(1, np.ceil(np.diff(whole) / step)).astype(np.int64)
@@ -433,22 +416,19 @@ def sine_cosine(degrees: ArrayLike) -> tuple[Floats, Floats]:
 def _recorded_azimuths(one: Processable, other: Processable, recorded: Any) -> tuple[float, float]:
     """Return the azimuths of two components, as they are given, or else as their records say; or refuse them."""
     if recorded is None:
-        known = [(each, each.description.origin) for each in (one, other)]
-        missing = [each.name for each, origin in known if origin is None or origin.azimuth is None]
-        if missing:
+        recorded = [(each.description.origin or Origin()).azimuth for each in (one, other)]
+        if None in recorded:
             raise InvalidMotion(
-                f"the azimuth of {checks.shown(missing[0])} is not known: give {{}}=(first, second), the directions of "
-                "both components in degrees clockwise from north",
+                f"the azimuth of {checks.shown((one, other)[recorded.index(None)].name)} is not known: give "
+                "{}=(first, second), the directions of both components in degrees clockwise from north",
                 "recorded",
             )
-        first, second = (origin.azimuth for _, origin in known if origin is not None and origin.azimuth is not None)
-    else:
-        given = checks.numbers(recorded, "recorded", InvalidMotion)
-        if given.shape != (2,) or not np.all(np.isfinite(given)):
-            raise InvalidMotion(
-                "{} must be the azimuths of both components, two numbers in degrees", "recorded", value=recorded
-            )
-        first, second = given.tolist()
+    given = checks.numbers(recorded, "recorded", InvalidMotion)
+    if given.shape != (2,) or not np.all(np.isfinite(given)):
+        raise InvalidMotion(
+            "{} must be the azimuths of both components, two numbers in degrees", "recorded", value=recorded
+        )
+    first, second = given.tolist()
     between = abs((second - first + 90.0) % 180.0 - 90.0)
     if between < 15.0:
         raise InvalidMotion(

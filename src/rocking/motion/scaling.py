@@ -149,7 +149,7 @@ class Measure:
     def value(self, motion: Measured) -> float:
         """Return the measure of a motion alone, in SI units; 1 where levels are factors."""
         if self.period is not None:
-            return motion.spectral_acceleration(self.period, self.damping)
+            return float(motion.spectral_acceleration(self.period, self.damping))
         if self.of_motion == "factor":
             return 1.0
         return motion.pga if self.of_motion == "pga" else motion.pgv

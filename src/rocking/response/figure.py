@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, Unpack, get_a
 
 import numpy as np
 
-from rocking.core import checks, svg
+from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
 from rocking.core.constants import STANDARD_GRAVITY
 from rocking.core.tables import as_written
@@ -79,17 +79,6 @@ def drawing_times(response: Simulated, start: float, end: float) -> Floats:
 
 def _within(times: Floats, start: float, end: float) -> Floats:
     return times[(times >= start) & (times <= end)]
-
-
-def picture(response: Simulated) -> str:
-    """Draw the rotation for a notebook, cut at twice the slenderness: past it a block only falls."""
-    times = drawing_times(response, *active_span(response))
-    coordinate, (plus, minus) = response.body.coordinate, response.balance
-    drawn, label = response.states(times)[:, 0], f"{coordinate.name} ({coordinate.unit})"
-    if coordinate.limit and math.isfinite(min(plus, minus)):
-        drawn = drawn / np.where((drawn >= 0.0) & math.isfinite(plus) | (not math.isfinite(minus)), plus, minus)
-        drawn, label = np.clip(drawn, -2.0, 2.0), f"{coordinate.name} / {coordinate.limit}"
-    return svg.captioned(f"Response: {line(response)}", svg.history(times, drawn, label))
 
 
 def histories(

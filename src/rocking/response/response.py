@@ -248,9 +248,6 @@ class Response(Simulated):
         """Write a table of `to_dataframe` as text columns with a header, as `Result.to_csv`."""
         write_csv(path, frame_of(self._columns(table or "histories", dt)))
 
-    def _repr_html_(self) -> str:
-        return figure.picture(self)
-
     def plot(
         self,
         ax: Axes | None = None,
