@@ -22,7 +22,8 @@ from rocking.engine.treatment import Treatment, treatment
 from rocking.errors import InvalidBlock, InvalidMotion, InvalidOption
 from rocking.kernels import state
 from rocking.kernels.ground import Ground, ground_of
-from rocking.kernels.periodic import TRAP, Fate, Setting, differentiate, iterate, step_rows
+from rocking.kernels.periodic import TRAP, Setting, differentiate, iterate, step_rows
+from rocking.kernels.periodic import Fate as Fate
 from rocking.kernels.trace import NO_NODES, Trail
 from rocking.motion.motion import Motion
 from rocking.records.named import one_motion

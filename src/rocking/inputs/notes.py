@@ -184,8 +184,8 @@ def _strength_notes(motion: Motion) -> Iterator[str]:
         )
 
 
-def is_multiple(motion: Motion, other: Motion, *, reversed_too: bool = True) -> bool:
-    """Whether scaling makes one motion of the other, but for rounding; `reversed_too`: also by a negative factor."""
+def is_multiple(motion: Motion, other: Motion) -> bool:
+    """Whether scaling makes one motion of the other, but for rounding, by a negative factor, too."""
     parts = [[part for part in (one, one.vertical) if part is not None] for one in (motion, other)]
     if [part.coefficients.shape for part in parts[0]] != [part.coefficients.shape for part in parts[1]]:
         return False

@@ -18,7 +18,7 @@ from rocking.errors import InvalidOption
 from rocking.plot.canvas import ABOVE, GROUND, INK, REST, Page, Place, add_labels, add_ticks, page_for, write
 from rocking.plot.curves import draw_ground
 from rocking.response.simulated import Simulated
-from rocking.response.summary import line, time_text
+from rocking.response.summary import time_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

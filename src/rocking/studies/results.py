@@ -14,9 +14,20 @@ from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rocking.analysis.curve import Band, fitted_curve, passed
-from rocking.analysis.fragility import Fragility, fit_fragility, of_polarities, weights_of
-from rocking.analysis.levels import clusters_of, motions_in_words, pooled, ratios_of, single_block, units_of, values_of
+from rocking.analysis.curve import fitted_curve
+from rocking.analysis.fragility import Fragility, fit_fragility
+from rocking.analysis.levels import (
+    clusters_of,
+    motions_in_words,
+    of_polarities,
+    passed,
+    pooled,
+    ratios_of,
+    single_block,
+    units_of,
+    values_of,
+    weights_of,
+)
 from rocking.analysis.spectrum import fractiles_of, overturned_share
 from rocking.block.body import Bodies
 from rocking.core import checks
@@ -339,7 +350,7 @@ def pooled_fragility(
     """Fit one curve to the outcomes of all blocks, each of which may have a weight."""
     product, bodies = store.product, store.product.bodies
     units, which = np.unique(units_of(bodies, measure, product.model), return_inverse=True)
-    shares, band = weights_of(weights, len(bodies)), Band(confidence=confidence)
+    shares = weights_of(weights, len(bodies))
     motions, scales, _, _ = product.shape
     trials, missing = np.zeros((motions, scales, len(units))), 0
     counts = {name: np.zeros_like(trials) for name in limits}
@@ -357,7 +368,7 @@ def pooled_fragility(
         np.broadcast_to(together[:, None, None], found.shape),
     )
     curves = [
-        fitted_curve(name, (x[found], count[found], trials[found]), groups[found], band, measure, limits[name])
+        fitted_curve(name, (x[found], count[found], trials[found]), groups[found], confidence, measure, limits[name])
         for name, count in counts.items()
     ]
     text = f"{pooled(bodies, weights)}, {motions_in_words(together, clusters)}, {counted(scales, 'scale')}"
@@ -405,7 +416,7 @@ def block_fragilities(
     faults, missing = np.full((len(limits), len(bodies)), "", dtype=object), 0
     intensities, units = _intensities(product, measure).ravel(), units_of(bodies, measure, product.model)
     together = np.repeat(clusters_of(product.motions, clusters), scales)
-    fit = partial(fit_fragility, measure=measure, band=Band(confidence=confidence))
+    fit = partial(fit_fragility, measure=measure, confidence=confidence)
     with Progress("fitting", len(bodies) * len(limits), show=progress) as bar:
         for blocks, ratios in _peak_ratios(store):
             repeated = _repeated(bodies.select(blocks), ratios.shape[2])
