@@ -74,7 +74,9 @@ TAKES_A_BLOCK = {
 @pytest.mark.parametrize("take", TAKES_A_BLOCK)
 @pytest.mark.parametrize("block", [(0.2, 1.0), 0.2, "statue", None, MOTION, [BLOCK, 0.2]])
 def test_what_is_no_block_is_refused_and_told_how_to_become_one(take, block):
-    with pytest.raises(InvalidBlock, match=r"a Block( or another body)? is needed, not a .*: make one with Block"):
+    with pytest.raises(
+        InvalidBlock, match=r"a (free )?Block( or another body)? is needed, not a .*: make one with Block"
+    ):
         TAKES_A_BLOCK[take](block)
 
 

@@ -144,7 +144,7 @@ def test_levels_go_from_where_a_record_lifts_the_block_to_where_most_overturn_it
         ({"records": PLAIN, "levels": "61"}, "from 2 to 60"),
         ({"records": PLAIN, "levels": "nan"}, "from 2 to 60"),
         ({"records": PLAIN, "level_from": "2g", "level_to": "1g"}, "below the last"),
-        ({"records": PLAIN, "friction": "7"}, "coefficient"),
+        ({"records": PLAIN, "friction": "7"}, "at most 3"),
         ({"records": "motion=none"}, "shakes nothing"),
         ({"records": "0"}, "names no motion"),
         ({"records": "key=x"}, "names no motion"),

@@ -100,6 +100,6 @@ def test_advice_to_install_a_part_names_one_that_the_source_has() -> None:
     """The project is on no package index: parts are installed from its source."""
     sources = {path: path.read_text("utf-8") for path in sorted((ROOT / "src").rglob("*.py"))}
     parts = {part for text in sources.values() for part in re.findall(r"install\('(\w+)'\)", text)}
-    assert parts == {"explorer", "mesh", "parquet", "excel", "cluster", "formats"}
+    assert parts == {"explorer", "mesh", "parquet", "excel", "formats"}
     assert parts <= {*PROJECT["optional-dependencies"]}
     assert [path.name for path, text in sources.items() if re.search(r"install '?\"?rocking\[", text)] == []

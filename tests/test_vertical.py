@@ -213,7 +213,7 @@ def test_a_motion_that_lifts_no_block_at_any_level_is_told() -> None:
 
 def test_the_asymptotic_time_is_for_horizontal_motions() -> None:
     motion = rocking.pulses.sine(2.2, 1.0, cycles=3).with_vertical(wave(1.0, 1))
-    with pytest.raises(InvalidOption, match="no vertical motion"):
+    with pytest.raises(InvalidOption, match="without a vertical component"):
         rocking.simulate(block_for(2.0, 0.2), motion, chattering="time")
 
 

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from rocking.cli.options import WHOLE
 from rocking.cli.output import OUTPUT, QuietOptions
-from rocking.errors import InvalidOption, UnreadableRecord
+from rocking.errors import InvalidOption
 from rocking.records.named import is_shipped
 
 if TYPE_CHECKING:
@@ -69,6 +69,7 @@ def _study(folder: Path) -> StudyView:
 def _opening(explorer: Explorer, motion: str) -> dict[str, str]:
     """Texts of the motion that the page opens with."""
     from rocking.explorer.motions import is_pulse, pulse_of
+    from rocking.records.formats.source import unreadable
 
     if is_pulse(motion):
         pulse_of(motion)
@@ -79,7 +80,6 @@ def _opening(explorer: Explorer, motion: str) -> dict[str, str]:
     try:
         key = explorer.uploads.add_file(file.name, file.read_bytes())
     except OSError as error:
-        sentence = f"this file could not be read ({error.strerror}); check the name"
-        raise UnreadableRecord(sentence, path=motion) from None
+        raise unreadable(motion, error) from None
     explorer.uploads.contents(key)
     return {"motion": f"file:{key}"}

@@ -262,7 +262,9 @@ def axis_of(name: str, texts: Texts, keys: tuple[str, str, str], ends: tuple[flo
         number(texts.get(key) or repr(usual), key) for key, usual in zip(keys, (*ends, 200), strict=True)
     )
     if not (_FEWEST <= count <= _MOST and count == int(count)):
-        raise InvalidOption(f"{{}} must be a whole number from {_FEWEST} to {_MOST}, not {count:g}", keys[2])
+        raise InvalidOption(
+            f"{{}} must be a whole number from {_FEWEST} to {_MOST}, not {count:g}", keys[2], value=count
+        )
     if not 0.0 < low < high < math.inf:
         raise InvalidOption(f"{{}} must be positive and below {{}}; got {low:g} and {high:g}", *keys[:2], value=low)
     return Axis(name, np.linspace(low, high, int(count)))

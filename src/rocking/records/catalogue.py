@@ -106,7 +106,8 @@ def info(name: str) -> Record:
     """
     catalogue = _catalogue()
     if checks.text(name, "name of a shipped record", UnreadableRecord) not in catalogue:
-        raise UnreadableRecord(f"no shipped record is named {name!r}: there are {', '.join(catalogue)}")
+        meant = checks.meant(name, list(catalogue), f"there are {', '.join(catalogue)}")
+        raise UnreadableRecord(f"no shipped record is named {name!r}; {meant}")
     return Record(name=name, **catalogue[name])
 
 

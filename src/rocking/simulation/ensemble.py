@@ -216,7 +216,7 @@ def dataset_of(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
         described["peak_rotation"] = {"units": coordinate.unit, "long_name": f"largest {coordinate.name} in size"}
         described["residual_rotation"]["units"] = coordinate.unit
         described["overturned"]["long_name"] = f"whether the {coordinate.name} passed its limit, where it has one"
-    variables = {name: (dimensions, values, described[name]) for name, values in outcomes.items()}
+    variables = {name: (dimensions, values, described.get(name, {})) for name, values in outcomes.items()}
     coordinates = {
         "motion": ("motion", names_of(product.motions)),
         **verticals_of(product.motions),

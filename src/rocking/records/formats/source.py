@@ -94,6 +94,15 @@ class Source:
         return UnreadableRecord(message, *arguments, path=self.path, line=line, value=value)
 
 
+def unreadable(name: str, error: Exception) -> UnreadableRecord:
+    """Return why a file could not be opened, with the shipped record that may be meant."""
+    text = f"this file could not be read ({getattr(error, 'strerror', None) or error}); check the name and the disk"
+    if isinstance(error, FileNotFoundError):
+        shipped = {each: f"the shipped record {each}" for each in catalogue.names()}
+        text = f"there is no such file; {checks.meant(name, shipped, 'check the name and the folder')}"
+    return UnreadableRecord(text, path=name)
+
+
 def open_source(path: str | os.PathLike[str] | BinaryIO) -> Source:
     """Read a file whole, or what is left of one that is open."""
     read = getattr(path, "read", None)
@@ -107,11 +116,7 @@ def open_source(path: str | os.PathLike[str] | BinaryIO) -> Source:
     try:
         raw = _content(name) if read is None else read(SIZE_LIMIT + 1)
     except (OSError, ValueError) as error:
-        text = f"this file could not be read ({getattr(error, 'strerror', None) or error}); check the name and the disk"
-        if isinstance(error, FileNotFoundError):
-            shipped = {each: f"the shipped record {each}" for each in catalogue.names()}
-            text = f"there is no such file; {checks.meant(name, shipped, 'check the name and the folder')}"
-        raise UnreadableRecord(text, path=name) from error
+        raise unreadable(name, error) from error
     if len(raw) > SIZE_LIMIT:
         limit = SIZE_LIMIT // 2**20
         raise UnreadableRecord(f"this file is larger than {limit} MiB; cut the record into smaller files", path=name)
