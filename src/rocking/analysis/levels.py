@@ -164,8 +164,8 @@ def motions_in_words(clusters: Integers, labels: object) -> str:
     return text if labels is None else f"{text} in {counted(len(np.unique(clusters)), 'cluster')}"
 
 
-def families_of(motions: Sequence[Motion]) -> Integers:
-    """Whole numbers, the same for motions that are multiples of one another, by negative factors, too."""
+def families_of(motions: Sequence[Motion], *, reversed_too: bool = True) -> Integers:
+    """Whole numbers, the same for motions that are multiples of one another, ``reversed_too`` by negative factors."""
     # None of these changes with the scale or the sign: only motions that are alike in all are compared in full.
     alike = np.empty((len(motions), 2))
     for k, motion in enumerate(motions):
@@ -175,7 +175,7 @@ def families_of(motions: Sequence[Motion]) -> Integers:
     families = np.empty(len(motions), dtype=np.int64)
     for k, motion in enumerate(motions):
         near = np.flatnonzero(np.all(np.abs(alike[firsts] - alike[k]) <= 1e-9, axis=1))
-        same = (int(j) for j in near if is_multiple(motions[firsts[j]], motion))
+        same = (int(j) for j in near if is_multiple(motions[firsts[j]], motion, reversed_too=reversed_too))
         families[k] = next(same, len(firsts))
         if families[k] == len(firsts):
             firsts.append(k)
