@@ -18,12 +18,13 @@ from rocking.core.constants import Model
 from rocking.core.progress import Progress, note
 from rocking.core.tables import counted
 from rocking.engine.problem import bodies_of
-from rocking.engine.tasks import missing_text
+from rocking.engine.tasks import Setup, Task, missing_text, simulate_tasks
 from rocking.errors import InvalidOption, Message
 from rocking.inputs.notes import is_multiple
 from rocking.motion.description import Origin, labelled
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
+from rocking.response import COUNT, RELATIVE, factors_near, percent
 from rocking.simulation.ensemble import Polarity, body_coordinates, simulate_many
 
 if TYPE_CHECKING:
@@ -283,6 +284,28 @@ def note_missing(unfinished: Flags) -> None:
     """Report simulations that were given up, where each counts as half overturned."""
     if text := missing_text(unfinished):
         note(f"{text}, and each counts as half overturned")
+
+
+def undecided_text(
+    setup: Setup, motions: Sequence[Motion], factors: ArrayLike, overturned: Flags, threads: int | None
+) -> str:
+    """Repeat a sample of simulations with motions scaled by 1 +- 3e-6, and return in words how many outcomes change.
+
+    Factors of the motions and outcomes are those of (level, motion, block, polarity).
+    """
+    drawn = np.sort(np.random.default_rng(0).permutation(overturned.size)[:30])
+    _, motion, block, _ = np.unravel_index(drawn, overturned.shape)
+    factor, was = np.broadcast_to(factors, overturned.shape).ravel()[drawn], overturned.ravel()[drawn]
+    near = factors_near(RELATIVE, COUNT)
+    tasks = (
+        Task(slice(b, b + 1), motions[m], float(factor[k] * scale), (k,))
+        for k, (m, b) in enumerate(zip(motion, block, strict=True))
+        for scale in (near[0], near[-1])
+    )
+    found = simulate_tasks(setup, tasks, threads=threads)
+    changed = {task.key for task, outcomes in found if outcomes["overturned"][0] != was[task.key[0]]}
+    sample = counted(len(drawn), "outcome")
+    return f"undecided within {percent(near[-1] - 1.0)} of the motion: {len(changed)} of a sample of {sample}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,7 @@ from rocking.response.perturbed import (
     Perturbed,
     Repeat,
     factors_near,
+    percent,
     steps_within,
 )
 from rocking.response.response import Response
@@ -35,6 +36,7 @@ __all__ = [
     "in_brief",
     "in_words",
     "known_ratio",
+    "percent",
     "ratio_text",
     "steps_within",
 ]
