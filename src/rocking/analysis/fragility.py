@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, get_args
 
@@ -42,7 +42,7 @@ from rocking.analysis.levels import (
     values_of,
     weights_of,
 )
-from rocking.analysis.risk import Risk, Survival, risk_of
+from rocking.analysis.risk import Risk, Survival, mean_of_blocks, risk_of
 from rocking.block.body import Bodies, Body
 from rocking.core import checks
 from rocking.core.constants import STANDARD_GRAVITY, Model
@@ -229,7 +229,11 @@ class Fragility(Result):
         """
         curve = self.curve(limit_state)
         rate = None if hazard is None else self.annual_rate(hazard).rate(limit_state)
-        return Survival(curve, self.measure, self.description, years, confidence, hazard, rate, self.several_blocks)
+        found = Survival(curve, self.measure, self.description, years, confidence, hazard, rate, self.several_blocks)
+        if hazard is None or not self.several_blocks or self.outcomes is None:
+            return found
+        mean = mean_of_blocks(self.outcomes, self.measure.column, limit_state, hazard, found.years)
+        return replace(found, mean_probability=mean)
 
     @property
     def range(self) -> tuple[float, float]:
