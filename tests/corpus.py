@@ -647,6 +647,11 @@ def risks() -> Iterator[Item]:
     yield from of_result(fitted.survival(500.0))
 
 
+@group(digits=6, fast=False)
+def efficiencies() -> Iterator[Item]:
+    yield from of_result(rocking.compare_measures(STATUE, suite(), periods=[0.5, 1.0], **QUIET))
+
+
 @group(digits=6)
 def rules_of_thumb() -> Iterator[Item]:
     blocks = [STATUE, *RECTANGLES]
@@ -922,6 +927,7 @@ COMMANDS: Final = {
         f"ida {TWO} {SIZES} --levels 1:6:6",
         "map one-sine --p 2 --alpha 0.2 --amplitudes 1:6:6 --frequencies 1,2",
         f"check {TWO} {SIZES}",
+        f"measures {TWO} el-centro-meloland-up {SIZES}",
     ],
     "catalogues": ["records", f"records {RECORD}", "pulses", "pulses --json"],
     "chattering": ["chatter 1.03 2 0.92", "chatter 1.03 2 0.92 --table", "critical 2 0.92"],

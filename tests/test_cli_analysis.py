@@ -119,6 +119,7 @@ LEVELS = ["--levels", "0.1g:1.2g:12"]
         (["fragility", RECORD, *SIZES, *LEVELS, "--limits", "a half=0.5", "--out", "out"], "limit state of NRML"),
         (["fragility", RECORD, OTHER, *SIZES, *STRIPES, "--hazard", "site.csv"], "fit the one against the other's"),
         (["fragility", RECORD, OTHER, *SIZES, "--levels", "0.5g"], "--levels that differ"),
+        (["measures", RECORD, OTHER, *SIZES, "--damping", "1.5"], "--damping must be a fraction"),
         (["check", RECORD, OTHER, *SIZES, "--rules", "west,east"], "--rules must be one of"),
     ],
 )
@@ -157,6 +158,7 @@ COMMANDS = {
     "spectrum": [RECORD, "--alpha", "0.2", "--p", "2,3"],
     "map": ["half-sine", *SIZES, "--amplitudes", "0.5:4:5", "--frequencies", "2,3"],
     "ida": [RECORD, *SIZES],
+    "measures": [RECORD, OTHER, *SIZES],
     "fragility": [RECORD, OTHER, "ridgecrest-clc-090", *SIZES, *STRIPES],
     "calibrate": [*CALIBRATED],
     "simulate": [RECORD, *SIZES],
@@ -235,16 +237,23 @@ def test_calibrate_refuses_a_mistake_in_one_line(run, outcomes_table, change, wo
     assert words in err and len(err.splitlines()) == 1
 
 
-def test_a_vertical_motion_is_scaled_along_by_the_command_that_scales(run):
-    command = ["ida", RECORD, OTHER, *SIZES, "--levels", "1:4:4", "--json"]
-    code, out, err = run(*command, "--vertical", "el-centro-meloland-up")
+@pytest.mark.cases(fast=1)
+@pytest.mark.parametrize("command", ["ida", "measures"])
+def test_a_vertical_motion_is_scaled_along_by_the_commands_that_scale(run, command):
+    records = [RECORD, OTHER]
+    few = {"ida": ["--levels", "1:4:4"], "measures": []}[command]
+    code, out, err = run(command, *records, *SIZES, *few, "--vertical", "el-centro-meloland-up", "--json")
     assert code == 0, err
     up = rocking.records.load("el-centro-meloland-up")
-    motions = [rocking.records.load(name).with_vertical(up) for name in (RECORD, OTHER)]
-    expected = incremental_dynamic_analysis(rocking.Block(width=0.24, height=1.1), motions, levels=[1.0, 2.0, 3.0, 4.0])
-    found = json.loads(out)["motions"]
-    assert found == json.loads(to_json(expected.to_dict()))["motions"]
-    assert found != json.loads(run(*command)[1])["motions"]
+    motions = [rocking.records.load(name).with_vertical(up) for name in records]
+    analysis = incremental_dynamic_analysis if command == "ida" else rocking.compare_measures
+    options = {"levels": [1.0, 2.0, 3.0, 4.0]} if few else {}
+    expected = json.loads(to_json(analysis(rocking.Block(width=0.24, height=1.1), motions, **options).to_dict()))
+    found = json.loads(out)
+    part = "motions" if command == "ida" else "measures"
+    assert found[part] == expected[part]
+    alone = json.loads(run(command, *records, *SIZES, *few, "--json")[1])
+    assert found[part] != alone[part]
 
 
 def test_what_was_simulated_is_kept_where_no_curve_can_be_fitted(run, tmp_path):

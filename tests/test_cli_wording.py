@@ -62,7 +62,7 @@ map half-sine --cycles 3 --alpha 0.2 | the pulse half-sine has no cycles; it tak
 ida {R} {S} --measure pgv --levels 0.2g:1g:5 | --levels takes a velocity as 40cm/s or 0.4 (m/s), not '0.2g'
 ida {R} {S} --measure pga_ratio --levels 0.2g,1g | which counts in the block's own units, not '0.2g'
 fragility {R} --ensemble none.csv --restitution 0.5 | --ensemble has blocks of its own: leave --restitution out
-fragility {R} --ensemble none.csv --one-sided --spring 2 | leave --one-sided and --spring out
+measures {R} --ensemble none.csv --one-sided --spring 2 | leave --one-sided and --spring out
 fragility {R} {S} --limits half=0.5,half=0.7 | has half twice
 fragility {R} {S} --limits overturning=0.5 | gives a rotation the name 'overturning'
 fragility {R} {S} --site 2 | --site is for a curve of --hazard

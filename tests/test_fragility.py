@@ -577,6 +577,7 @@ def test_motions_of_one_shape_and_another_length_or_vertical_component_are_not_o
     longer = rocking.pulses.one_sine(1.0, 1.5)
     given = [pulse, longer, up, pulse.scaled(-3.0), up.scaled(-0.3), down, longer.scaled(1e-6), up.scaled(0.3)]
     assert families_of(given).tolist() == [0, 1, 2, 0, 2, 3, 1, 2]
+    assert families_of(given, reversed_too=False).tolist() == [0, 1, 2, 3, 4, 5, 1, 2]
 
 
 @pytest.mark.parametrize("missing", [None, "", math.nan, np.nan])

@@ -42,7 +42,7 @@ def table(path, **options):
 
 @pytest.mark.slow
 def test_the_tables_of_all_commands_join_by_record_and_by_motion(run, folder, tmp_path):
-    out = {name: tmp_path / name for name in ("simulate", "check", "ida", "spectrum", "fragility")}
+    out = {name: tmp_path / name for name in ("simulate", "check", "ida", "spectrum", "measures", "fragility")}
     common = [folder, "--keep-going", "--quiet"]
     extra = {
         "check": [*SIZES, "--rules", "west"],
@@ -61,6 +61,7 @@ def test_the_tables_of_all_commands_join_by_record_and_by_motion(run, folder, tm
         out["check"] / "check.csv",
         out["ida"] / "levels.csv",
         out["spectrum"] / "peaks.csv",
+        out["measures"] / "intensities.csv",
         out["fragility"] / "outcomes.csv",
     ):
         found = table(path).dropna(subset="motion")

@@ -165,3 +165,29 @@ def test_factors_that_are_none_are_refused(given, message):
         simulate(FREE, RECORD).perturbed(**given)
     with pytest.raises(InvalidOption, match=r"precision must be a number from 1e-06 to 0\.1, not 1"):
         simulate(FREE, RECORD).summary(precision=1)
+
+
+@pytest.mark.parametrize("measure", ["pga", "pga_ratio"])
+@pytest.mark.parametrize(("body", "polarity"), [(FREE, "+"), (LEANING, "both"), (LEANING, "-")])
+def test_fragilities_count_the_undecided_outcomes_of_a_sample(body, polarity, measure):
+    """So few outcomes are all in the sample: their number is that of single simulations at both ends."""
+    motions = [UNDECIDED, RECORD]
+    unit = min(body.uplift_thresholds()) if measure == "pga_ratio" else 1.0
+    levels = np.array([2.0, 0.53 * 9.80665, 0.55 * 9.80665, 6.5, 9.0, 14.0, 20.0]) / unit
+    found = rocking.fragility(body, motions, measure=measure, levels=levels, polarity=polarity)
+    signs = {"+": (1.0,), "-": (-1.0,), "both": (1.0, -1.0)}[polarity]
+    changed = 0
+    for motion, level, sign in itertools.product(motions, levels, signs):
+        scale = level * unit / motion.pga * sign  # one rounding more would be another motion
+        near = [simulate(body, motion.scaled(scale * factor)).overturned for factor in (1 - 3e-6, 1.0, 1 + 3e-6)]
+        changed += len(set(near)) > 1
+    text = f"undecided within 3e-6 of the motion: {changed} of a sample of {14 * len(signs)} outcomes"
+    assert found.notes[0] == text and text in found.summary()
+    assert changed >= 2 or body is LEANING
+
+
+def test_an_incremental_analysis_counts_the_undecided_outcomes_of_a_sample():
+    levels = np.array([0.53, 0.54, 0.55, 0.6]) * 9.80665
+    found = rocking.incremental_dynamic_analysis(FREE, UNDECIDED, levels=levels, tolerance=0.01)
+    text = "undecided within 3e-6 of the motion: 2 of a sample of 4 outcomes"
+    assert f"note: {text}" in found.summary() and found.to_dict()["undecided"] == text

@@ -158,6 +158,7 @@ def test_what_needs_a_free_block_or_any_block_says_so_in_one_sentence():
     for analysis in (
         lambda: rocking.fragility(ball, PULSES, model="linear"),
         lambda: rocking.incremental_dynamic_analysis(ball, pulse, model="linear"),
+        lambda: rocking.compare_measures(ball, PULSES, model="linear"),
         lambda: rocking.rocking_spectrum(ball, pulse, model="linear"),
         lambda: rocking.survey(ball, pulse, model="linear"),
     ):

@@ -170,6 +170,7 @@ def results(bars, spectrum, study):
         "RockingSpectrum": spectrum,
         "OverturningMap": rocking.overturning_map(BLOCK, "one-sine", amplitudes=[1.0, 4.0], frequencies=[2.0, 3.0]),
         "IncrementalDynamicAnalysis": rocking.incremental_dynamic_analysis(BLOCK, PULSE),
+        "MeasureComparison": rocking.compare_measures(BLOCK, [PULSE, rocking.pulses.one_sine(6.0, 2.0)]),
         "Rose": statue.rose(),
         "ResponseRose": rocking.response_rose(statue, [(PULSE, PULSE)], azimuths=[0.0, 90.0], recorded=(0.0, 90.0)),
         "ChatteringMap": chattering_map(families.sine(BLOCK), {"a": [1.01, 1.1], "omega": [2.0, 3.0]}),
@@ -199,9 +200,9 @@ def test_every_bar_comes_to_its_end(results, bars):
     assert [each for each in bars if not each[1] == each[2] > 0] == []
 
 
-@pytest.mark.parametrize("written", [3, pytest.param(10, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("written", [3, pytest.param(11, marks=pytest.mark.thorough)])
 def test_a_result_keeps_its_dataset_and_offers_nothing_of_it_as_its_own(results, tmp_path, written):
-    assert len(results) == 10
+    assert len(results) == 11
     for number, found in enumerate(results.values()):
         for again in (copy.copy(found), pickle.loads(pickle.dumps(found))):
             assert again.data.identical(found.data)
@@ -262,6 +263,9 @@ HEADERS = {
     ("IncrementalDynamicAnalysis", "levels"): "motion,level_m_s2,block,p_rad_s,alpha_rad,restitution,"
     "peak_rotation_rad,peak_over_alpha,overturned",
     ("IncrementalDynamicAnalysis", "bands"): "motion,block,band_start_m_s2,band_end_m_s2",
+    ("MeasureComparison", "measures"): "measure,unit,median_intensity,dispersion,dispersion_low,dispersion_high,"
+    "dispersion_of_all",
+    ("MeasureComparison", "intensities"): "measure,motion,block,unit,intensity",
     ("BlockTable", "blocks"): "limit_state,block,p_rad_s,alpha_rad,restitution,"
     "median_m_s2,median_lower_m_s2,median_upper_m_s2,dispersion,dispersion_lower,dispersion_upper,exceeded,outcomes,"
     "fault",
@@ -359,8 +363,8 @@ def test_a_dimension_that_some_numbers_lack_is_said_to_be_pooled_or_is_known_not
 def test_a_part_has_no_numbers_of_the_whole(results, of_several):
     results = results | of_several
     for name, dimension in (
-        ("RockingSpectrum", "motion"), ("IncrementalDynamicAnalysis", "motion"),
-        ("RockingSpectrum of several", "block"),
+        ("RockingSpectrum", "motion"), ("IncrementalDynamicAnalysis", "motion"), ("MeasureComparison", "motion"),
+        ("RockingSpectrum of several", "block"), ("MeasureComparison", "block"),
         ("IncrementalDynamicAnalysis", "level"),
         ("ResponseRose", "pair"), ("ResponseRose", "azimuth"), ("Basins", "attractor"), ("Basins", "rotation"),
         ("Basins", "angular_velocity"),

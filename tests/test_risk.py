@@ -1,21 +1,25 @@
 """Annual rates from fragility and hazard, against closed forms and quadrature."""
 
+import itertools
 import json
 import math
 from pathlib import Path
 
 import mpmath
 import numpy as np
+import pandas as pd
 import pytest
 import scipy.integrate
+import scipy.optimize
 import scipy.stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rocking
 from rocking import HazardCurve, InvalidOption
-from rocking.analysis.hazard import log_parts, powers
+from rocking.analysis.hazard import log_parts, log_rate_within, log_standing, powers
 from rocking.analysis.probit import Probit
+from rocking.analysis.risk import mean_of_blocks
 from rocking.calibration.tables import read_observed
 from rocking.motion.scaling import Measure
 
@@ -322,20 +326,69 @@ def test_survival_is_what_the_rate_and_the_curve_say() -> None:
         fitted.survival(0.0)
 
 
-def test_the_survival_of_several_blocks_is_what_it_is_if_each_motion_met_another_of_them() -> None:
-    """Of weak and strong blocks the strong ones stand: their survivals have a higher mean, and contradict nothing."""
-    shapes = [(1.5, 0.35), (2.0, 0.2), (2.5, 0.15)]
+def test_a_survival_of_one_block_of_several_is_the_mean_of_their_own() -> None:
+    """Of weak and strong blocks the strong ones stand: what each does alone, by another optimiser and by quadrature."""
+    shapes = [(3.0, 0.08), (1.5, 0.35), (2.0, 0.2), (2.5, 0.15)]
     blocks = [rocking.Block.from_parameters(p=p, alpha=alpha, restitution=0.6) for p, alpha in shapes]
     pulses = [rocking.pulses.one_sine(1.0, f) for f in np.linspace(0.5, 2.0, 10)]
-    hazard, levels = HazardCurve([0.1, 1.0, 10.0, 100.0], [1e-1, 1e-2, 1e-4, 1e-8]), np.geomspace(0.4, 40.0, 16)
-    every, *alone = (
-        rocking.fragility(some, pulses, levels=levels).survival(20_000.0, hazard) for some in (blocks, *blocks)
+    points = np.array([0.01, 0.1, 1.0, 10.0, 100.0])
+    hazard = HazardCurve(points, [9e-1, 1e-1, 1e-2, 1e-4, 1e-8])
+    levels, weights, years = np.geomspace(0.4, 40.0, 16), [1.0, 3.0, 0.0, 2.0], 2000.0
+
+    def own(block: rocking.Block) -> float:
+        z, exceeded = [], []
+        for pulse in pulses:
+            for level in levels:
+                z.append(math.log(level))
+                exceeded.append(rocking.simulate(block, pulse.scaled_to(level)).overturned)
+        at, sign = np.array(z), np.where(exceeded, 1.0, -1.0)
+
+        def loss(parameters: np.ndarray) -> float:
+            return -float(scipy.stats.norm.logcdf(sign * (parameters[0] + parameters[1] * at)).sum())
+
+        a, b = scipy.optimize.minimize(
+            loss, [-1.0, 1.0], method="Nelder-Mead", options={"xatol": 1e-10, "fatol": 1e-12}
+        ).x
+        middle, width = -a / b, 12.0 / b
+
+        def density(x: float) -> float:
+            return float(hazard.rate_of(math.exp(x)) * scipy.stats.norm.pdf(a + b * x) * b)
+
+        corners = sorted({middle - width, middle + width, *(x for x in np.log(points) if abs(x - middle) < width)})
+        rate = sum(
+            scipy.integrate.quad(density, *ends, epsabs=0.0, epsrel=1e-9)[0] for ends in itertools.pairwise(corners)
+        )
+        return math.exp(-years * rate)
+
+    both = rocking.fragility(blocks, pulses, levels=levels, weights=weights).survival(years, hazard)
+    expected = np.average([own(block) for block in blocks], weights=weights)
+    assert 0.05 < expected < 0.95
+    assert both.mean_probability == pytest.approx(expected, rel=1e-5)
+    assert both.probability < 0.05 < both.mean_probability < both.most_probable
+    assert both.to_dict()["mean_probability"] == both.mean_probability
+    assert not both.contradicts
+    said = f"is {expected:.2g} in the mean and at most {both.most_probable:.2g} if one of the blocks has stood all the"
+    assert said in both.summary()
+    alone = rocking.fragility(blocks[0], pulses, levels=levels).survival(years, hazard)
+    assert alone.contradicts
+    assert math.isnan(alone.mean_probability)
+    assert "if one of the blocks" not in alone.summary()
+
+
+def test_blocks_that_always_or_never_fall_or_at_once_have_their_part_in_the_mean() -> None:
+    """Limits of fits: a probability of 0 or 1, or a step, whose rate is that of the hazard curve there."""
+    site = HazardCurve([1.0, 2.0, 4.0], [1e-2, 2e-3, 2e-4])
+    kinds = {"never": [0, 0, 0], "always": [1, 1, 1], "step": [0, 1, 1], "one unfinished": [0, None, 1]}
+    table = pd.DataFrame(
+        [
+            {"block": k, "pga_m_s2": level, "exceeded_overturning": bool(one), "unfinished": one is None}
+            for level, *fell in zip([1.0, 2.25, 4.0], *kinds.values(), strict=True)
+            for k, one in enumerate(fell)
+        ]
     )
-    assert every.most_probable < 0.05
-    assert every.probability < np.mean([one.probability for one in alone])
-    assert every.several_blocks and not every.contradicts and alone[-1].contradicts
-    assert "if each motion met another of the blocks" in every.summary()
-    assert not any("of the blocks" in one.summary() for one in alone)
+    rates = [0.0, 1e-2 - 2e-4, float(site.rate_of(1.5)), float(site.rate_of(2.0))]
+    found = mean_of_blocks(table, "pga_m_s2", "overturning", site, 100.0)
+    assert found == pytest.approx(np.mean(np.exp(-100.0 * np.array(rates))), rel=1e-4)
 
 
 def test_a_rate_from_above_the_hazard_curve_has_a_bound_and_no_estimate() -> None:
@@ -347,6 +400,31 @@ def test_a_rate_from_above_the_hazard_curve_has_a_bound_and_no_estimate() -> Non
     assert "once in > 6700 years" in rate.in_words()
     # Were every motion above the last point to exceed the limit, the rate would be this.
     assert rate.bounds[0] == pytest.approx((1.0 - rate.above) * rate.annual_rate + 1.5e-4)
+
+
+@pytest.mark.parametrize(("a", "b"), [(-1.0, 1.5), (2.0, 0.7), (-6.0, 9.0), (20.0, 2.0), (-20.0, 1.0)])
+def test_a_block_of_which_the_intensity_alone_decides_stands_as_quadrature_says(a: float, b: float) -> None:
+    hazard = HazardCurve([0.5, 1.0, 2.0, 4.0, 8.0], [5e-2, 2e-2, 6e-3, 1.2e-3, 1.5e-4])
+    low, high = (a + b * math.log(x) for x in hazard.intensity[[0, -1]])
+
+    def integrand(z: mpmath.mpf) -> mpmath.mpf:
+        return mpmath.npdf(z) * mpmath.exp(-100.0 * float(hazard.rate_of(math.exp((float(z) - a) / b))))
+
+    corners = [a + b * math.log(x) for x in hazard.intensity]
+    expected = mpmath.ncdf(low) * mpmath.exp(-5.0) + mpmath.ncdf(-high) + mpmath.quad(integrand, corners)
+    found = log_standing(Probit(np.array([a]), np.array([b])), hazard, 100.0)
+    assert found[0, 0] == pytest.approx(float(mpmath.log(expected)), abs=1e-5)
+
+
+@pytest.mark.parametrize("a", [-np.inf, -3.0, 0.0, 1.5, np.inf])
+def test_a_curve_that_does_not_rise_is_the_limit_of_flat_ones(a: float) -> None:
+    """Motions within the hazard curve exceed it with one probability, as often as they come."""
+    hazard = rocking.HazardCurve([4.0, 12.0, 40.0], [1e-3, 1e-4, 1e-5])
+    chance, flat = scipy.stats.norm.cdf(a), Probit(np.array([a, np.clip(a, -9.0, 9.0)]), np.array([0.0, 1e-9]))
+    with np.errstate(all="raise"):
+        rates, standing = log_rate_within(flat, hazard)[:, 0], log_standing(flat, hazard, 1000.0)[:, 0]
+    assert np.exp(rates) == pytest.approx(chance * (1e-3 - 1e-5), rel=1e-6, abs=1e-21)
+    assert np.exp(standing) == pytest.approx(1.0 - chance + chance * math.exp(-1.0), rel=1e-6)
 
 
 @pytest.mark.parametrize("drawn", [False, pytest.param(True, marks=pytest.mark.thorough)])

@@ -1,5 +1,6 @@
 from . import analysis, calibration, chattering, dynamics, pulses, records, rules, solid, studies
 from .analysis.directions import response_rose
+from .analysis.efficiency import compare_measures
 from .analysis.fragility import Fragility, fit_fragility, fragility
 from .analysis.hazard import HazardCurve
 from .analysis.incremental import CriticalScale, critical_scale, incremental_dynamic_analysis
@@ -125,6 +126,7 @@ __all__ = [
     "calibrate_history",
     "calibration",
     "chattering",
+    "compare_measures",
     "critical_scale",
     "dynamics",
     "explore",

@@ -49,6 +49,7 @@ COMMANDS: Final[dict[str, tuple[str, ...]]] = {
     "validate": ("validate", "tests.csv", *_BLOCK, "--out", "OUT"),
     "check": ("check", _RECORD, *_BLOCK, "--out", "OUT"),
     "ida": ("ida", _RECORD, *_BLOCK, "--levels", "0.1g:1.5g:30", "--out", "OUT"),
+    "measures": ("measures", _RECORD, "ridgecrest-clc-090", *_BLOCK, "--periods", "0.5,1", "--out", "OUT"),
     "chatter": ("chatter", "1.05", "0.7", "0.8", "--out", "OUT"),
     "critical": ("critical", "0.7", "0.8", "--out", "OUT"),
     "mesh": ("mesh", "statue", "--azimuth", "0,90", "--out", "OUT"),

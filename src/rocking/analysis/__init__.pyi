@@ -1,5 +1,6 @@
 from .curve import FragilityCurve
 from .directions import ResponseRose
+from .efficiency import MeasureComparison
 from .incremental import IncrementalDynamicAnalysis
 from .overturning import Mode, OverturningMap, mode_name
 from .probit import Goodness, Probit
@@ -11,6 +12,7 @@ __all__ = [
     "FragilityCurve",
     "Goodness",
     "IncrementalDynamicAnalysis",
+    "MeasureComparison",
     "Mode",
     "OverturningMap",
     "Probit",

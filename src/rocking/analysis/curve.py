@@ -104,22 +104,14 @@ class FragilityCurve:
         )
 
     @property
-    def _intercept(self) -> float:
-        return float(self.fitted.intercept[0])
-
-    @property
-    def _slope(self) -> float:
-        return float(self.fitted.slope[0])
-
-    @property
     def median(self) -> float:
         """Intensity of probability one half, in SI units or a block's own."""
-        return math.exp(-self._intercept / self._slope)
+        return math.exp(-float(self.fitted.intercept[0] / self.fitted.slope[0]))
 
     @property
     def dispersion(self) -> float:
         """Standard deviation of the logarithm of the intensity."""
-        return 1.0 / self._slope
+        return 1.0 / float(self.fitted.slope[0])
 
     @property
     def bounded(self) -> bool:
@@ -153,7 +145,7 @@ class FragilityCurve:
         share = checks.share(probability, "probability", InvalidOption)
         score = float(ndtri(share))
         with np.errstate(over="ignore", under="ignore"):
-            return float(np.exp((score - self._intercept) / self._slope))
+            return float(np.exp((score - self.fitted.intercept[0]) / self.fitted.slope[0]))
 
     def largest_rate(self, intensity: ArrayLike, years: float, confidence: float = 0.95) -> Floats:
         """Annual rates of motions of an intensity or more above which a block that stood would have fallen.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, get_args
 
@@ -37,11 +37,12 @@ from rocking.analysis.levels import (
     ratios_of,
     simulate_levels,
     single_block,
+    undecided_text,
     units_of,
     values_of,
     weights_of,
 )
-from rocking.analysis.risk import Risk, Survival, risk_of
+from rocking.analysis.risk import Risk, Survival, mean_of_blocks, risk_of
 from rocking.block.body import Bodies, Body
 from rocking.core import checks
 from rocking.core.constants import STANDARD_GRAVITY, Model
@@ -49,12 +50,12 @@ from rocking.core.progress import spelled
 from rocking.core.result import Result
 from rocking.core.tables import Column, as_written, counted, text_table, write_text
 from rocking.engine.problem import bodies_of, slenderness_of
-from rocking.engine.tasks import missing_text
-from rocking.engine.treatment import Treatment
+from rocking.engine.tasks import Setup, missing_text
+from rocking.engine.treatment import Treatment, treatment
 from rocking.errors import InvalidOption, Message, Unfitted
 from rocking.motion.scaling import IntensityName, Measure
 from rocking.records.named import Motions, several_motions
-from rocking.simulation.ensemble import Polarity, simulate_many
+from rocking.simulation.ensemble import SIGNS, Polarity, simulate_many
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -88,8 +89,11 @@ class Fragility(Result):
     one_way, with_vertical, several_blocks : bool
         Whether sides that differ met motions in one polarity only, a vertical motion was simulated, and outcomes of
         several blocks count together.
-    source, missing : str
-        Origin of a cluster of outcomes ("motion" or "cluster"); how many simulations were given up, if any.
+    source : str
+        Origin of a cluster of outcomes: "motion" or "cluster".
+    undecided, missing : str
+        How many outcomes of a sample change within 3e-6 of the motion, and how many simulations were given up, which
+        the curves leave out; empty where there are none.
 
     Examples
     --------
@@ -112,6 +116,7 @@ class Fragility(Result):
     with_vertical: bool = False
     several_blocks: bool = False
     source: str = "motion"
+    undecided: str = ""
     missing: str = ""
 
     def summary(self) -> str:
@@ -135,8 +140,8 @@ class Fragility(Result):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Limits of the curves: small samples, poor fits; one sentence each."""
-        notes = [self.missing] if self.missing else []
+        """Limits of the curves: small samples, poor fits, undecided outcomes; one sentence each."""
+        notes = [text for text in (self.missing, self.undecided) if text]
         if self.one_way:
             notes.append(
                 "the sides differ, and motions came in one polarity only: reversed ones give another curve; "
@@ -224,7 +229,11 @@ class Fragility(Result):
         """
         curve = self.curve(limit_state)
         rate = None if hazard is None else self.annual_rate(hazard).rate(limit_state)
-        return Survival(curve, self.measure, self.description, years, confidence, hazard, rate, self.several_blocks)
+        found = Survival(curve, self.measure, self.description, years, confidence, hazard, rate, self.several_blocks)
+        if hazard is None or not self.several_blocks or self.outcomes is None:
+            return found
+        mean = mean_of_blocks(self.outcomes, self.measure.column, limit_state, hazard, found.years)
+        return replace(found, mean_probability=mean)
 
     @property
     def range(self) -> tuple[float, float]:
@@ -409,6 +418,9 @@ def fragility(
     except Unfitted as refused:
         refused.outcomes = outcomes
         raise
+    scales = 1.0 if stripes is None else stripes[:, None, None] * units / values[:, None]
+    factors = np.asarray(scales)[..., None] * np.array(SIGNS[options["polarity"]])
+    setup = Setup(many, model, treatment(chattering))
     kind = "cloud" if levels is None else counted(len(intensity), "stripe")
     text = f"{pooled(blocks, weights)}, {motions_in_words(together, clusters)}, {kind}, {model} model"
     return Fragility(
@@ -422,6 +434,7 @@ def fragility(
         with_vertical="vertical" in table.coords,
         several_blocks=bool(np.count_nonzero(shares) > 1),
         source="motion" if clusters is None else "cluster",
+        undecided=undecided_text(setup, shaken, factors, table.overturned.values, threads),
         missing=missing_text(missing),
     )
 

@@ -308,6 +308,35 @@ def log_parts(fits: Probit, hazard: HazardCurve) -> Floats:
     return np.where(b > 0.0, np.where(near > 0.0, tail, middle), level)
 
 
+def log_rate_within(fits: Probit, hazard: HazardCurve) -> Floats:
+    """Logarithms of the integrals of P(x) |d rate(x)| between the ends of the hazard curve, shape (fits, 1)."""
+    from scipy.special import ndtr
+
+    a, b = (values[:, None] for values in fits)
+    first, last = ndtr(a + b * np.log(hazard.intensity[[0, -1]])).T
+    # Of a curve that does not rise, dP is 0 on every segment.
+    between = np.where(fits.slope > 0.0, np.exp(log_parts(fits, hazard)[:, 1:-1]).sum(axis=1), 0.0)
+    rate = first * hazard.rate[0] - last * hazard.rate[-1] + between
+    return np.asarray(np.log(np.maximum(rate, np.finfo(float).tiny)))[:, None]
+
+
+def log_standing(fits: Probit, hazard: HazardCurve, years: float) -> Floats:
+    """Logarithms of the integral of exp(-rate(x) years) dP(x) over the hazard curve, shape (fits, 1)."""
+    from scipy.special import log_ndtr
+
+    a, b = (values[:, None] for values in fits)
+    log_x, log_rate = np.log(hazard.intensity), np.log(hazard.rate)
+    with np.errstate(all="ignore"):
+        first, last = (np.clip(a + b * end, -38.0, 38.0) for end in log_x[[0, -1]])
+        z = first + (last - first) * np.linspace(0.0, 1.0, 4001)
+        density = -0.5 * z * z - years * np.exp(np.interp((z - a) / b, log_x, log_rate))
+        between = np.logaddexp(density[:, 1:], density[:, :-1]) + np.log(np.diff(z) * math.sqrt(0.125 / math.pi))
+        # Under a curve that does not rise, what falls at all falls under the weakest motions.
+        between = np.where(b > 0.0, between, -np.inf)
+        parts = np.column_stack([log_ndtr(first) - years * hazard.rate[0], between, log_ndtr(-last)])
+        return np.asarray(np.logaddexp.reduce(parts, axis=1)[:, None])
+
+
 def _extended(values: Floats) -> Floats:
     """One value for each segment of a hazard curve, with those of the first and the last also beyond them."""
     return np.concatenate([values[:1], values, values[-1:]])

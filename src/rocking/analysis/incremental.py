@@ -18,6 +18,7 @@ from rocking.analysis.levels import (
     described,
     labels_of,
     simulate_levels,
+    undecided_text,
     units_of,
     values_of,
 )
@@ -145,6 +146,8 @@ def incremental_dynamic_analysis(
     edges = boundaries(table.level.values, flat, overturned, tolerance=width, progress=progress)
     found = _dataset(table, flat, edges, slenderness, how)
     about = {"blocks": described(blocks), "lowest_uplift": first, "sides_differ": int(not many.is_symmetric)}
+    scales = (table.level.values[:, None, None] * factors)[..., None]
+    about["undecided"] = undecided_text(Setup(many, model, Certified()), shaken, scales, grid[..., None], threads)
     return IncrementalDynamicAnalysis(found.assign_attrs(about))
 
 
@@ -160,7 +163,8 @@ class IncrementalDynamicAnalysis(DatasetResult):
         one that does not overturn) and overturned. Over (motion, block): overturning_level, the lowest; NaN where no
         level overturns, or the first one already does. Over (band): band_motion and band_block (positions along these
         dimensions), band_start and band_end; NaN where the band goes on below or above the
-        levels. Its attribute lowest_uplift is the level from which on a motion lifts a block.
+        levels. Its attribute lowest_uplift is the level from which on a motion lifts a block; its attribute undecided,
+        how many outcomes of a sample change within 3e-6 of the motion.
     """
 
     TABLES = MappingProxyType(
@@ -215,6 +219,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         table = text_table([what, *(["block"] if many else []), "overturns"], rows)
         head = f"{blocks}, {data.model} model; {data.level.label} that overturns"
         notes = [f"note: {MIRROR_NOTE}"] if data.sides_differ else []
+        notes.append(f"note: {data.undecided}")
         notes += [f"note: {text}"] if (text := missing_text(np.isnan(data.peak_over_alpha.values))) else []
         return "\n".join([head, looked_at.summary(data.lowest_uplift), "", table, *notes])
 
@@ -229,6 +234,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
             **{name: data.level.attrs[name] for name in ("period", "damping") if name in data.level.attrs},
             named("level", units): data.level.values,
             named("lowest_uplift", units): data.lowest_uplift,
+            "undecided": data.undecided,
             "motions": [
                 {
                     "name": str(data.motion.values[m]),

@@ -18,12 +18,13 @@ from rocking.core.constants import Model
 from rocking.core.progress import Progress, note
 from rocking.core.tables import counted
 from rocking.engine.problem import bodies_of
-from rocking.engine.tasks import missing_text
+from rocking.engine.tasks import Setup, Task, missing_text, simulate_tasks
 from rocking.errors import InvalidOption, Message
 from rocking.inputs.notes import is_multiple
 from rocking.motion.description import Origin, labelled
 from rocking.motion.motion import Motion
 from rocking.motion.scaling import Measure
+from rocking.response import COUNT, RELATIVE, factors_near, percent
 from rocking.simulation.ensemble import Polarity, body_coordinates, simulate_many
 
 if TYPE_CHECKING:
@@ -164,8 +165,8 @@ def motions_in_words(clusters: Integers, labels: object) -> str:
     return text if labels is None else f"{text} in {counted(len(np.unique(clusters)), 'cluster')}"
 
 
-def families_of(motions: Sequence[Motion]) -> Integers:
-    """Whole numbers, the same for motions that are multiples of one another, by negative factors, too."""
+def families_of(motions: Sequence[Motion], *, reversed_too: bool = True) -> Integers:
+    """Whole numbers, the same for motions that are multiples of one another, ``reversed_too`` by negative factors."""
     # None of these changes with the scale or the sign: only motions that are alike in all are compared in full.
     alike = np.empty((len(motions), 2))
     for k, motion in enumerate(motions):
@@ -175,7 +176,7 @@ def families_of(motions: Sequence[Motion]) -> Integers:
     families = np.empty(len(motions), dtype=np.int64)
     for k, motion in enumerate(motions):
         near = np.flatnonzero(np.all(np.abs(alike[firsts] - alike[k]) <= 1e-9, axis=1))
-        same = (int(j) for j in near if is_multiple(motions[firsts[j]], motion))
+        same = (int(j) for j in near if is_multiple(motions[firsts[j]], motion, reversed_too=reversed_too))
         families[k] = next(same, len(firsts))
         if families[k] == len(firsts):
             firsts.append(k)
@@ -283,6 +284,28 @@ def note_missing(unfinished: Flags) -> None:
     """Report simulations that were given up, where each counts as half overturned."""
     if text := missing_text(unfinished):
         note(f"{text}, and each counts as half overturned")
+
+
+def undecided_text(
+    setup: Setup, motions: Sequence[Motion], factors: ArrayLike, overturned: Flags, threads: int | None
+) -> str:
+    """Repeat a sample of simulations with motions scaled by 1 +- 3e-6, and return in words how many outcomes change.
+
+    Factors of the motions and outcomes are those of (level, motion, block, polarity).
+    """
+    drawn = np.sort(np.random.default_rng(0).permutation(overturned.size)[:30])
+    _, motion, block, _ = np.unravel_index(drawn, overturned.shape)
+    factor, was = np.broadcast_to(factors, overturned.shape).ravel()[drawn], overturned.ravel()[drawn]
+    near = factors_near(RELATIVE, COUNT)
+    tasks = (
+        Task(slice(b, b + 1), motions[m], float(factor[k] * scale), (k,))
+        for k, (m, b) in enumerate(zip(motion, block, strict=True))
+        for scale in (near[0], near[-1])
+    )
+    found = simulate_tasks(setup, tasks, threads=threads)
+    changed = {task.key for task, outcomes in found if outcomes["overturned"][0] != was[task.key[0]]}
+    sample = counted(len(drawn), "outcome")
+    return f"undecided within {percent(near[-1] - 1.0)} of the motion: {len(changed)} of a sample of {sample}"
 
 
 @dataclass(frozen=True, eq=False)

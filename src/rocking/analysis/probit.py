@@ -173,6 +173,22 @@ def fit(data: Outcomes) -> Probit:
     return Probit(beta[:, 0] - slope * centre, slope)
 
 
+def fit_or_limits(data: Outcomes) -> Probit:
+    """Fit several data sets; where the likelihood of rising curves has no maximum, by the limit that it tends to."""
+    from scipy.special import ndtri
+
+    z, exceeded, trials = data
+    lowest_yes = np.where(exceeded > 0, z, np.inf).min(axis=1)
+    highest_no = np.where(exceeded < trials, z, -np.inf).max(axis=1)
+    step = np.isfinite(highest_no - lowest_yes) & (highest_no <= lowest_yes + _overlap(z))
+    # A curve that would fall is level at best: one probability, 0 or 1 without either kind of outcome.
+    fits = Probit(ndtri(exceeded.sum(axis=1) / trials.sum(axis=1)), np.where(step, STEEP, 0.0))
+    fits.intercept[step] = -0.5 * STEEP * (highest_no + lowest_yes)[step]
+    if (regular := ~step & _rises(data)).any():
+        fits.intercept[regular], fits.slope[regular] = fit(data.of(regular))
+    return fits
+
+
 def likelihood(data: Outcomes, beta: Floats) -> Floats:
     """Logarithm of the likelihood of parameters (fits, 2), without binomial coefficients."""
     from scipy.special import log_ndtr

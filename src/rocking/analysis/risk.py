@@ -14,10 +14,12 @@ from rocking.analysis.hazard import (
     HazardCurve,
     hazard_line,
     log_parts,
+    log_rate_within,
+    log_standing,
     share_density,
     shares_beyond,
 )
-from rocking.analysis.probit import Probit
+from rocking.analysis.probit import Outcomes, Probit, fit_or_limits
 from rocking.core import checks
 from rocking.core.arrays import Floats
 from rocking.core.result import Result
@@ -26,6 +28,7 @@ from rocking.errors import InvalidOption
 from rocking.motion.scaling import Measure
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -263,8 +266,8 @@ class Survival(Result):
 
     A curve of several blocks (for example an ensemble that stands for one block which is not quite known) does not
     separate their dispersion from that of the motions: rates and `probability` are those of motions that each meet
-    another of the blocks. If one of them has stood all the time, the probability is the mean of those of the blocks,
-    each by a curve of its own.
+    another of the blocks. If one of them has stood all the time, the probability is `mean_probability`, and
+    `most_probable` bounds it.
 
     Attributes
     ----------
@@ -278,6 +281,9 @@ class Survival(Result):
         Annual rates of intensities at the site.
     rate : Rate or None
         Annual rate of the limit state under that hazard curve.
+    mean_probability : float
+        Mean, by the weights of several blocks, of the probabilities of survival under the hazard curve, each by a
+        curve of its own. NaN of one block, without a hazard curve, and where outcomes are not kept.
     """
 
     curve: FragilityCurve
@@ -288,6 +294,7 @@ class Survival(Result):
     hazard: HazardCurve | None
     rate: Rate | None
     several_blocks: bool = False
+    mean_probability: float = math.nan
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "years", checks.positive(self.years, "years", InvalidOption))
@@ -329,24 +336,25 @@ class Survival(Result):
 
     @property
     def most_probable(self) -> float:
-        """The largest `probability` that fits with the interval and the hazard curve.
+        """The largest `probability` that fits with all that is known: with the interval, the hazard curve, the blocks.
 
         It is at the upper end of the interval, and without motions below the hazard curve's first point or above its
-        last, where its lines are only extended.
+        last, where its lines are only extended. Of several blocks it is that of one which has stood all the time, and
+        of which the intensity alone decides whether it falls: the integral of exp(-rate(x) years) dP(x).
         """
         if self.hazard is None:
             return math.nan
-        hazard = self.hazard
-        low, _ = extremes(self.curve.region, lambda fits: _log_rate_within(fits, hazard))
-        return math.exp(-math.exp(float(low[0])) * self.years)
+        hazard, years = self.hazard, self.years
+        if self.several_blocks:
+            _, high = extremes(self.curve.region, lambda fits: log_standing(fits, hazard, years))
+            return math.exp(min(float(high[0]), 0.0))
+        low, _ = extremes(self.curve.region, lambda fits: log_rate_within(fits, hazard))
+        return math.exp(-math.exp(float(low[0])) * years)
 
     @property
     def contradicts(self) -> bool:
-        """Whether the survival, at its `most_probable`, is less probable than 1 - confidence; never of several blocks.
-
-        One of several blocks may be much stronger than their curve says.
-        """
-        return not self.several_blocks and self.most_probable < 1.0 - self.confidence
+        """Whether the survival, at its `most_probable`, is less probable than 1 - confidence."""
+        return self.most_probable < 1.0 - self.confidence
 
     def summary(self) -> str:
         measure, share = self.measure, f"{100.0 * self.confidence:g} %"
@@ -394,15 +402,19 @@ class Survival(Result):
         low, high = rate.bounds
         bounds = math.exp(-high * self.years), math.exp(-low * self.years)
         chance, between = known_digits(self.probability, self.interval, bounds)
-        name = "" if self.hazard is None else self.hazard.name
-        text = (
-            f"under the hazard curve {name!r} the probability of {counted(self.years, 'year')} without it is "
-            f"{chance} ({100.0 * self.curve.confidence:g} % interval {between})"
-        )
-        least = f"{1.0 - self.confidence:.3g}"
+        said, likely = f"{chance} ({100.0 * self.curve.confidence:g} % interval {between})", self.probability
         if self.several_blocks:
-            return f"{text} if each motion met another of the blocks; of one block that stood all the time it is higher"
-        if self.probability >= 1.0 - self.confidence:
+            said = (
+                f"at most {self.most_probable:.2g} if one of the blocks has stood all the time, and {said} if each "
+                "motion met another of them"
+            )
+        if not math.isnan(self.mean_probability):
+            likely = self.mean_probability
+            said = f"{likely:.2g} in the mean and {said}"
+        name = "" if self.hazard is None else self.hazard.name
+        text = f"under the hazard curve {name!r} the probability of {counted(self.years, 'year')} without it is {said}"
+        least = f"{1.0 - self.confidence:.3g}"
+        if likely >= 1.0 - self.confidence:
             return f"{text}, so they do not contradict each other"
         if not self.contradicts:
             return f"{text}; below {least} they would contradict each other, which is not settled"
@@ -429,6 +441,7 @@ class Survival(Result):
             "probability": self.probability,
             "probability_interval": [*self.interval],
             "most_probable": self.most_probable,
+            "mean_probability": self.mean_probability,
             "share_below_hazard_curve": math.nan if self.rate is None else self.rate.below,
             "share_above_hazard_curve": math.nan if self.rate is None else self.rate.above,
             "contradicts": self.contradicts,
@@ -460,13 +473,16 @@ class Survival(Result):
         return f"{self.curve.limit_state}: not in {counted(self.years, 'year')}; most likely never {self._never}"
 
 
-def _log_rate_within(fits: Probit, hazard: HazardCurve) -> Floats:
-    """Logarithms of the integrals of P(x) |d rate(x)| between the ends of the hazard curve, shape (fits, 1)."""
-    from scipy.special import ndtr
-
-    a, b = (values[:, None] for values in fits)
-    first, last = ndtr(a + b * np.log(hazard.intensity[[0, -1]])).T
-    # Of a curve that does not rise, dP is 0 on every segment.
-    between = np.where(fits.slope > 0.0, np.exp(log_parts(fits, hazard)[:, 1:-1]).sum(axis=1), 0.0)
-    rate = first * hazard.rate[0] - last * hazard.rate[-1] + between
-    return np.asarray(np.log(np.maximum(rate, np.finfo(float).tiny)))[:, None]
+def mean_of_blocks(outcomes: pd.DataFrame, column: str, limit_state: str, hazard: HazardCurve, years: float) -> float:
+    """Mean of the probabilities that blocks survive, each by a curve fitted to its own outcomes."""
+    table = outcomes.sort_values("block", kind="stable")
+    blocks = table.drop_duplicates("block")
+    intensity, exceeded, missing = (
+        table[name].to_numpy(np.float64).reshape(len(blocks), -1)
+        for name in (column, f"exceeded_{limit_state}", "unfinished")
+    )
+    fits = fit_or_limits(Outcomes(np.log(intensity[0]), exceeded, 1.0 - missing))
+    # Of a curve that does not rise, motions below the hazard curve would exceed the limit as often as they come.
+    rising = np.logaddexp.reduce(log_parts(fits, hazard), axis=1)
+    rates = np.exp(np.where(fits.slope > 0.0, rising, log_rate_within(fits, hazard)[:, 0]))
+    return float(np.average(np.exp(-years * rates), weights=blocks.get("weight")))

@@ -35,7 +35,7 @@ def _lines_of(module: str) -> dict[str, str]:
 
 for _module, _commands in {
     "simulate": ("simulate", "check", "records", "pulses"),
-    "analysis": ("chatter", "critical", "spectrum", "map", "ida"),
+    "analysis": ("chatter", "critical", "spectrum", "map", "ida", "measures"),
     "fragility": ("fragility",),
     "calibrate": ("calibrate", "validate"),
     "mesh": ("mesh",),

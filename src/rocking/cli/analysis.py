@@ -1,4 +1,4 @@
-"""`rocking spectrum`, `map`, `ida`: many simulations, one answer; `chatter`, `critical`: theory."""
+"""`rocking spectrum`, `map`, `ida`, `measures`: many simulations, one answer; `chatter`, `critical`: theory."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Annotated, Any, Final
 
 from cyclopts import Parameter
 
+from rocking.analysis.efficiency import compare_measures
 from rocking.analysis.incremental import incremental_dynamic_analysis
 from rocking.analysis.overturning import overturning_map
 from rocking.analysis.spectrum import Abscissa, rocking_spectrum
@@ -20,6 +21,7 @@ from rocking.cli.options import (
     RECORDS,
     WHOLE,
     BlockOptions,
+    EnsembleOptions,
     HeldOptions,
     MeasureOptions,
     ModelOptions,
@@ -29,6 +31,7 @@ from rocking.cli.options import (
     TreatmentOptions,
     UnscaledOptions,
     ensemble_of,
+    labels_of,
 )
 from rocking.cli.output import OUTPUT, OutputOptions, deliver, print_result, write_results
 from rocking.core.result import DatasetResult
@@ -194,6 +197,46 @@ def ida(
         motions = [*read.motions.values()]
         found = incremental_dynamic_analysis(body, motions, **measure.chosen(), model=model.model, tolerance=tolerance)
         _deliver(found, "ida", read, folder=folder, as_json=output.as_json)
+
+
+def measures(
+    *names: Names,
+    periods: str = "0.5,1,2",
+    damping: float = 0.05,
+    clusters: str | None = None,
+    block: Annotated[EnsembleOptions, BLOCK] = EnsembleOptions(),
+    motion: Annotated[UnscaledOptions, RECORDS] = UnscaledOptions(),
+    model: Annotated[ModelOptions, MODEL] = ModelOptions(),
+    output: Annotated[OutputOptions, OUTPUT] = OutputOptions(),
+) -> None:
+    """Compare intensity measures: how widely motions scatter, by each, at which they first overturn a block.
+
+    The block is a rectangle (--width, --height, or half of each) or given by its parameters (--p, --alpha), or the
+    ensemble of a calibration stands for it (--ensemble). Every motion is scaled up until it overturns the block. --out
+    holds measures.png, .pdf, .nc, measures.csv, intensities.csv (at which each motion overturns) and result.json.
+
+    Parameters
+    ----------
+    periods
+        Periods of spectral accelerations, s: 0.5,1,2 or 0.2:4:10:log.
+    damping
+        Their fraction of critical damping.
+    clusters
+        Which records belong together, and count as one in the intervals: station joins components of one station in
+        one earthquake, as files name them; or a label for each record, with commas between. By default each is on its
+        own.
+    """
+    bodies = block.blocks(model)
+    with output.folder() as folder:
+        read = motion.read_all(names)
+        found = compare_measures(
+            motions=[*read.motions.values()],
+            periods=values(periods, "periods"),
+            damping=damping,
+            clusters=labels_of(clusters),
+            **bodies,
+        )
+        _deliver(found, "measures", read, folder=folder, as_json=output.as_json)
 
 
 def _deliver(

@@ -184,8 +184,8 @@ def _strength_notes(motion: Motion) -> Iterator[str]:
         )
 
 
-def is_multiple(motion: Motion, other: Motion) -> bool:
-    """Whether scaling makes one motion of the other, but for rounding, by a negative factor, too."""
+def is_multiple(motion: Motion, other: Motion, *, reversed_too: bool = True) -> bool:
+    """Whether scaling makes one motion of the other, but for rounding; `reversed_too`: also by a negative factor."""
     parts = [[part for part in (one, one.vertical) if part is not None] for one in (motion, other)]
     if [part.coefficients.shape for part in parts[0]] != [part.coefficients.shape for part in parts[1]]:
         return False
@@ -195,7 +195,7 @@ def is_multiple(motion: Motion, other: Motion) -> bool:
     if not largest > 0.0 < others_largest or not np.allclose(times, others_times, rtol=1e-9, atol=0.0):
         return False
     signs = np.where(np.arange(values.size) < motion.coefficients.size, -1.0, 1.0)
-    apart = [others / others_largest - way * values / largest for way in (1.0, signs)]
+    apart = [others / others_largest - way * values / largest for way in ([1.0, signs] if reversed_too else [1.0])]
     return any(bool(np.abs(each).max() <= 1e-9) for each in apart)
 
 

@@ -59,6 +59,24 @@ def fragility_figure(
     return page.figure
 
 
+def dispersions_figure(
+    *, names: Sequence[str], dispersion: Floats, low: Floats, high: Floats, **place: Unpack[Place]
+) -> Figure:
+    """Draw the dispersion of the intensity at overturning, with its interval, for each measure by name."""
+    with page_for((5.6, 0.8 + 0.32 * len(names)), **place) as page:
+        (axes,) = page.panels()
+        row = np.arange(len(names))
+        axes.hlines(row, low, high, color=INK, linewidth=1.0)
+        axes.plot(dispersion, row, color=INK, linestyle="none", marker="o", markersize=4.5)
+        axes.set_yticks(row, list(names))
+        axes.set_ylim(len(names) - 0.5, -0.5)
+        axes.set_xlim(left=0.0)
+        axes.grid(axis="x", linewidth=0.4, color="0.85")
+        add_labels(axes, "dispersion of the intensity at overturning (90 % interval)", "")
+        page.handles = []
+    return page.figure
+
+
 #: Shares of a rate are shown from this part of the highest one on.
 _LEAST = 1e-3
 

@@ -1,0 +1,251 @@
+"""Efficiency of intensity measures: which one predicts best when motions overturn a block."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rocking.analysis.incremental import incremental_dynamic_analysis
+from rocking.analysis.levels import (
+    MIRROR_NOTE,
+    clusters_of,
+    families_of,
+    motions_in_words,
+    normalised_weights,
+    pooled,
+    units_of,
+    values_of,
+)
+from rocking.block.body import Bodies, Body
+from rocking.core import checks
+from rocking.core.arrays import Flags, Floats
+from rocking.core.constants import Model
+from rocking.core.result import DatasetResult, variable
+from rocking.core.tables import as_written, counted, text_table
+from rocking.engine.problem import bodies_of, slenderness_of
+from rocking.errors import InvalidOption
+from rocking.motion.scaling import Measure
+from rocking.records.named import Motions, several_motions
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+def compare_measures(
+    blocks: Bodies | Body | Sequence[Body],
+    motions: Motions,
+    *,
+    periods: ArrayLike = (0.5, 1.0, 2.0),
+    damping: float = 0.05,
+    model: Model = "nonlinear",
+    weights: ArrayLike | None = None,
+    clusters: object = None,
+    tolerance: float = 1e-4,
+    threads: int | None = None,
+    progress: bool | None = None,
+) -> MeasureComparison:
+    """Compare how widely motions scatter, by several intensity measures, at which they first overturn blocks.
+
+    Parameters
+    ----------
+    blocks, motions : optional
+        As for `simulate_many`: n blocks, and m motions, two at least.
+    periods : array_like
+        Periods of spectral accelerations, s.
+    damping : float
+        Their fraction of critical damping.
+    model : {"nonlinear", "linear"}
+        Equation of motion.
+    weights, clusters : optional
+        As for `fragility`; a cluster counts as one motion in the intervals.
+    tolerance : float
+        Width of the intensities at overturning, relative to them.
+    threads, progress : optional
+        As for `simulate_many`.
+
+    Returns
+    -------
+    MeasureComparison
+        For PGA, PGV, each spectral acceleration, and PGA and PGV in a block's own units.
+
+    Raises
+    ------
+    InvalidOption
+        If an argument is out of its range, fewer than two motions, or motions of fewer than two clusters, are given or
+        overturn a block, or a block never comes to rest.
+    InvalidMotion
+        If a motion is zero throughout.
+
+    Notes
+    -----
+    Every motion is scaled up, in steps of 5 %, until it overturns the block (`incremental_dynamic_analysis`). The
+    logarithm of its intensity there has the standard deviation beta over the motions, the dispersion of the fragility:
+    the smaller, the more efficient the measure. The interval of beta is that of a normal sample. Over several blocks
+    beta is pooled from the deviations from each block's own mean, with the degrees of freedom of the motions or
+    clusters. Of motions that are multiples of one another only the first counts; where the sides of a block differ,
+    reversed ones count as well.
+
+    Examples
+    --------
+    Rectangular pulses overturn a small block by their velocity, whatever their length:
+
+    >>> import rocking
+    >>> block = rocking.Block.from_parameters(p=0.5, alpha=0.1, restitution=0.5)
+    >>> pulses = [rocking.pulses.rectangular(1.0, length) for length in (0.05, 0.1, 0.2)]
+    >>> found = compare_measures(block, pulses, periods=[1.0])
+    >>> [f"{name} {beta:.2f}" for name, beta in zip(found.data.measure.values, found.data.dispersion.values)]
+    ['PGA 0.67', 'PGV 0.02', 'SA(1 s) 0.01', 'PGA / uplift acceleration 0.67', 'p PGV / uplift acceleration 0.02']
+    """
+    many, shaken = bodies_of(blocks), several_motions(motions)
+    slenderness_of(many)  # refused before the work
+    shares = normalised_weights(weights, len(many))
+    if len(shaken) < 2:
+        raise InvalidOption("measures are compared by how {} scatter: give two or more, not one", "motions")
+    times = checks.positive_numbers(periods, "periods", InvalidOption)
+    of_periods = [Measure("sa", float(time), damping) for time in times]
+    measures = [Measure("pga"), Measure("pgv"), *of_periods, Measure("pga_ratio"), Measure("pgv_ratio")]
+    together = clusters_of(shaken, clusters)
+    _check_enough(len(np.unique(together)), clusters)
+    scaled = incremental_dynamic_analysis(
+        many, shaken, measure="pga_ratio", model=model, tolerance=tolerance, threads=threads, progress=progress
+    )
+    level = scaled.data.overturning_level.transpose("motion", "block").values
+    factors = level * units_of(many, measures[-2], model) / values_of(shaken, measures[0])[:, None]
+    intensity = [factors * values_of(shaken, each)[:, None] / units_of(many, each, model) for each in measures]
+    families = families_of(shaken, reversed_too=many.is_symmetric)
+    is_first = np.isin(np.arange(len(shaken)), np.unique(families, return_index=True)[1])
+    counts = is_first[:, None] & np.isfinite(level)
+    sizes = [len(np.unique(together[overturns])) for overturns in counts[:, shares > 0.0].T]
+    _check_enough(min(sizes), clusters)
+    found = _dataset(measures, np.array(intensity), counts, shares, freedom=min(sizes) - 1)
+    about = {"blocks": pooled(blocks, weights), "model": model, "damping": damping}
+    about["sample"] = motions_in_words(together, clusters)
+    named = {name: scaled.data[name] for name in ("motion", "vertical") if name in scaled.data.coords}
+    return MeasureComparison(found.assign_coords(named).assign_attrs(about, sides_differ=scaled.data.sides_differ))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MeasureComparison(DatasetResult):
+    """Intensity measures side by side; from `compare_measures`.
+
+    Its figure has the dispersion of each measure with its interval, the most efficient first, as the summary.
+
+    Attributes
+    ----------
+    data : xarray.Dataset
+        Over (measure, motion, block): intensity, the lowest that overturns, in the measure's unit; NaN where none does.
+        Over (measure): median_intensity; dispersion (standard deviation of the logarithm about each block's own mean),
+        with dispersion_low and dispersion_high, its 90 % interval; dispersion_of_all, about one mean of all blocks;
+        unit. Its attribute damping is that of the spectral accelerations, sample how many motions there are.
+    """
+
+    TABLES = MappingProxyType(
+        {
+            "measures": ("median_intensity", "dispersion", "dispersion_low", "dispersion_high", "dispersion_of_all"),
+            "intensities": ("intensity",),
+        }
+    )
+    POOLED = ("motion", "block")
+
+    @property
+    def _ranked(self) -> pd.DataFrame:
+        """The table of measures, the most efficient first."""
+        table = self.data[list(self.TABLES["measures"])].to_dataframe()
+        return table.sort_values("dispersion_of_all", kind="stable")
+
+    def summary(self) -> str:
+        data, table = self.data, self._ranked
+        several, best = data.sizes["block"] > 1, table.dispersion_of_all.min()
+        rows = [
+            [
+                one.Index,
+                f"{one.median_intensity:.3g} {one.unit}".removesuffix(" 1"),
+                f"{one.dispersion:.3f}",
+                f"{one.dispersion_low:.3f} to {one.dispersion_high:.3f}",
+                *([f"{one.dispersion_of_all:.3f}"] if several else []),
+                f"{one.dispersion_of_all / best:.2f}" if best > 0.0 else "-",
+            ]
+            for one in table.itertuples()
+        ]
+        head = f"{data.blocks}, {data.model} model: intensities at which {data.sample} overturn"
+        columns = ["measure", "median", "dispersion", "90 % between", *(["of all blocks"] if several else [])]
+        text = [head, "", text_table([*columns, "over the best"], rows)]
+        if missing := int(np.sum(np.isnan(data.intensity.values[0]))):
+            pairs = counted(missing, "pair")
+            text.append(f"left out: {pairs} of block and motion without overturning at any level looked at")
+        return "\n".join(text + ([f"note: {MIRROR_NOTE}"] if data.sides_differ else []))
+
+    def to_dict(self) -> dict[str, Any]:
+        data, names = self.data, self.TABLES["measures"]
+        rows = data[list(names)].to_dataframe()[["unit", *names]].reset_index().to_dict("records")
+        return {
+            "blocks": data.blocks,
+            "model": data.model,
+            "damping": data.damping,
+            "motions": [str(name) for name in data.motion.values],
+            **({"verticals": [str(name) for name in data.vertical.values]} if "vertical" in data.coords else {}),
+            "measures": [{**row, "intensity": each} for row, each in zip(rows, data.intensity.values, strict=True)],
+        }
+
+    def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
+        from rocking.plot.curves import dispersions_figure
+
+        data, table = self.data, self._ranked
+        return dispersions_figure(
+            names=[str(name) for name in table.index],
+            dispersion=table.dispersion.to_numpy(),
+            low=table.dispersion_low.to_numpy(),
+            high=table.dispersion_high.to_numpy(),
+            title=title or as_written(f"{data.blocks}, {data.model} model, {data.sample}"),
+            ax=ax,
+            figsize=figsize,
+        )
+
+
+def _dataset(
+    measures: Sequence[Measure], intensity: Floats, counts: Flags, shares: Floats, *, freedom: int
+) -> xr.Dataset:
+    """Intensities at overturning of (measure, motion, block), and the dispersions of those that count."""
+    import xarray as xr
+    from scipy.special import chdtri
+
+    logarithm = np.where(counts, np.log(intensity), np.nan)
+    weight, count = np.where(counts, shares, 0.0), counts.sum(axis=0)
+    # Motions are what is drawn: those of several blocks are the same.
+    others = np.sum(shares * (count - 1))
+    within = logarithm - np.nansum(logarithm, axis=1, keepdims=True) / np.maximum(count, 1)
+    own = np.sqrt(np.nansum(weight * within**2, axis=(1, 2)) / others)
+    mean = np.nansum(weight * logarithm, axis=(1, 2)) / weight.sum()
+    of_all = np.sqrt(np.nansum(weight * (logarithm - mean[:, None, None]) ** 2, axis=(1, 2)) / others)
+    # Ends of a standard deviation's interval over its estimate, for a normal sample.
+    low, high = (float(np.sqrt(freedom / chdtri(freedom, tail))) * own for tail in (0.05, 0.95))
+    spread = "standard deviation of the logarithm of the intensity at overturning"
+    median = "median of the intensities at overturning, in the measure's unit"
+    return xr.Dataset(
+        {
+            "intensity": variable(("measure", "motion", "block"), intensity, "lowest intensity that overturns"),
+            "median_intensity": variable("measure", np.exp(mean), median),
+            "dispersion": variable("measure", own, f"{spread} about each block's own mean", "1"),
+            "dispersion_low": variable("measure", low, "lower end of its interval", "1"),
+            "dispersion_high": variable("measure", high, "upper end of its interval", "1"),
+            "dispersion_of_all": variable("measure", of_all, f"{spread} about one mean of all blocks", "1"),
+        },
+        {"measure": [each.short_name for each in measures], "unit": ("measure", [each.units for each in measures])},
+    )
+
+
+def _check_enough(count: int, clusters: object) -> None:
+    """Refuse a sample of one: so many clusters, or motions if no clusters were given."""
+    if count < 2:
+        kind, which = ("motions", " that are not multiples of one another") if clusters is None else ("clusters", "")
+        raise InvalidOption(
+            f"fewer than two {{}}{which} overturn a block, however strong; a dispersion needs more", kind
+        )
