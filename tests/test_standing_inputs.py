@@ -79,7 +79,7 @@ WRONG = {
     "a law of a free block": (
         lambda: Block(width=0.4, height=2.0, restitution=Restitution(0.9, 0.5, seed=1)),
         "restitution",
-        "must be a number or an array of numbers, not Restitution(",
+        "must be a number, not Restitution(",
     ),
     # Several bodies
     "two gravities": (
