@@ -264,6 +264,7 @@ UNEVEN: Final = [
     rocking.Block.from_pivots((0.3, 0.12), 0.9, 0.5, restitution=(0.8, 0.9), mass=400.0),
     rocking.Block.from_parameters(p=(2.0, 2.5), alpha=(0.2, 0.14), restitution=(0.85, 0.9)),
     rocking.Block(width=0.4, height=1.5, offset=0.03),
+    rocking.Block.from_frame(half_width=0.2, half_height=1.0, mass_ratio=2.0),
 ]
 
 

@@ -120,12 +120,16 @@ class Side:
         Factor on the angular speed when the block leaves this side at an impact.
     radius : float
         Distance R from the pivot to the centre of mass, m.
+    arm : float or None
+        Momentum over mass and angular speed, m, from which the forces of the ground follow; None where it is the
+        radius, as in all but frames.
     """
 
     p: float
     alpha: float
     restitution: float
     radius: float
+    arm: float | None = None
 
     def __str__(self) -> str:
         """Return the parameters as people read them."""
@@ -140,6 +144,15 @@ def in_line(sides: Sequence[object]) -> str:
     if len(sides) == 1 or sides[0] == sides[1]:
         return str(sides[0])
     return "; ".join(f"side {sign}: {side}" for sign, side in zip("+-", sides, strict=True))
+
+
+def even_sides(
+    gravity: float, radius: float, alpha: float, restitution: object, conserved: float, arm: float | None = None
+) -> tuple[Side, Side]:
+    """Both sides of a body that rocks like a rectangle of this radius, m, and slenderness, rad."""
+    plus, minus = restitutions(restitution, (conserved, conserved))
+    p = math.sqrt(0.75 * gravity / radius)
+    return Side(p, alpha, plus, radius, arm), Side(p, alpha, minus, radius, arm)
 
 
 def sides_on_pivots(
