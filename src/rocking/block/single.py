@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -30,6 +30,10 @@ from rocking.core import checks
 from rocking.core.arrays import Floats, Integers
 from rocking.core.constants import MODELS, STANDARD_GRAVITY, Model
 from rocking.errors import InvalidBlock, InvalidOption, UnequalSides
+
+if TYPE_CHECKING:
+    from rocking.block.restrained import RestrainedBlock
+    from rocking.block.restraints import Restitution, Restraint
 
 #: The coordinate of every block.
 ROTATION: Final = Coordinate("rotation", "angular_velocity", "angular_acceleration", "rad", "slenderness")
@@ -353,6 +357,44 @@ class Block(Rocking):
         sides = even_sides(g, radius, alpha, restitution, kept / (1.0 + 3.0 * gamma), arm)
         text = f"frame of columns {2 * b:.5g} m x {2 * h:.5g} m, mass ratio {gamma:.5g}"
         return cls.__new__(cls)._fill(sides, g, text)
+
+    @classmethod
+    def one_sided(
+        cls,
+        *restraints: Restraint,
+        lean: float = 0.0,
+        restitution: float | Restitution | None = None,
+        **sizes: Any,
+    ) -> RestrainedBlock:
+        """Rectangular block that rocks to side + only, as a facade that stands against transverse walls.
+
+        Parameters
+        ----------
+        *restraints : Restraint
+            `Thrust` of a vault, `Load`, `Tendon` and others.
+        lean : float
+            Angle by which it stands out of plumb to side +, rad.
+        restitution : float or Restitution, optional
+            Factor with which it bounces back to the same side. By default `one_sided_restitution`.
+        **sizes
+            As of `Block`: `width` and `height`, m, or half of them, `mass`, kg, `gravity`.
+
+        Returns
+        -------
+        RestrainedBlock
+            With one side.
+
+        Examples
+        --------
+        >>> wall = Block.one_sided(width=0.4, height=4.0)
+        >>> round(wall.sides[0].restitution, 4)
+        0.4708
+        """
+        from rocking.block.restrained import RestrainedBlock
+
+        # Of a wall too stocky for angular momentum, what is given takes the place of the block's own.
+        block = cls(restitution=None if restitution is None else 1.0, **sizes)
+        return RestrainedBlock(block, *restraints, one_sided=True, lean=lean, restitution=restitution)
 
     @property
     def p(self) -> float:
