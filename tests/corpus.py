@@ -487,6 +487,7 @@ ENSEMBLES: Final = {
     "levels": (GRID, {"levels": [1.0, 2.5, 6.0], "measure": "pga", "polarity": "both"}),
     "linear": (GRID, {"levels": [0.5, 1.0], "model": "linear"}),
     "times": (GRID, {"times": True, "polarity": "-"}),
+    "robust": (GRID.select(slice(0, 6)), {"robust": True}),
     "treatment": (GRID, {"chattering": "velocity=0.001", "duration": 5.0}),
     "two-sided": (UNEVEN, {"levels": [0.4, 1.0], "measure": "pgv"}),
     "restrained": ([*HELD["tendon"], *HELD["damper"], *HELD["yielding"]], {"levels": [1.0, 2.0]}),
