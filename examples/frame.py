@@ -18,14 +18,8 @@ import numpy as np
 import rocking
 
 ratios = (0.0, 1.0, 4.0)
-column = rocking.Block(half_width=0.5, half_height=3.0)
-larger = [(1.0 + 3.0 * gamma) / (1.0 + 2.0 * gamma) for gamma in ratios]
-frames = []
-for gamma, growth in zip(ratios, larger, strict=True):
-    # By angular momentum, where each column passes to its other corner.
-    kept = 1.0 - 1.5 * np.sin(column.alpha) ** 2 + 3.0 * gamma * np.cos(2.0 * column.alpha)
-    frame = rocking.Block.from_parameters(column.p / growth**0.5, column.alpha, kept / (1.0 + 3.0 * gamma))
-    frames.append(frame)
+frames = [rocking.Block.from_frame(half_width=0.5, half_height=3.0, mass_ratio=gamma) for gamma in ratios]
+larger = [frame.radius / frames[0].radius for frame in frames]
 for gamma, frame, growth in zip(ratios, frames, larger, strict=True):
     print(f"gamma = {gamma:g}: R'/R = {growth:.4f}, restitution {frame.restitution:.4f}")
 

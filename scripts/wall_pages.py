@@ -32,7 +32,7 @@ FREQUENCIES = np.geomspace(0.2, 1.6, 25)
 
 def facade(thrust):
     """Return the strip of the facade, which rocks one way, under a thrust at 6 m."""
-    return RestrainedBlock(Block(**WALL), *([Thrust(thrust, height=6.0)] if thrust else []), one_sided=True)
+    return Block.one_sided(*([Thrust(thrust, height=6.0)] if thrust else []), **WALL)
 
 
 def motions():

@@ -256,13 +256,14 @@ def under(bodies: Iterable[Any], motions: Iterable[rocking.Motion], **options: A
 MODELS: Final = ("nonlinear", "linear")
 RECTANGLES: Final = [rocking.Block(width=w, height=h) for w, h in spread(6, (0.15, 0.8), (0.8, 3.0))]
 STATUE: Final = rocking.Block(width=0.24, height=1.1)
-WALL: Final = rocking.RestrainedBlock(rocking.Block(width=0.5, height=4.0), one_sided=True, restitution=0.4)
+WALL: Final = rocking.Block.one_sided(width=0.5, height=4.0, restitution=0.4)
 SLENDER: Final = rocking.Block.from_parameters(p=2.0, alpha=0.2, restitution=0.92)
 UNEVEN: Final = [
     rocking.Block.from_pivots((0.2, 0.15), 0.6, 0.4),
     rocking.Block.from_pivots((0.3, 0.12), 0.9, 0.5, restitution=(0.8, 0.9), mass=400.0),
     rocking.Block.from_parameters(p=(2.0, 2.5), alpha=(0.2, 0.14), restitution=(0.85, 0.9)),
     rocking.Block(width=0.4, height=1.5, offset=0.03),
+    rocking.Block.from_frame(half_width=0.2, half_height=1.0, mass_ratio=2.0),
 ]
 
 
@@ -290,8 +291,8 @@ def two_sided(model: str) -> Iterator[Item]:
 def one_sided(model: str) -> Iterator[Item]:
     walls = [
         WALL,
-        rocking.RestrainedBlock(rocking.Block(width=0.3, height=2.0), one_sided=True, lean=0.02),
-        rocking.RestrainedBlock(rocking.Block(width=0.4, height=2.5), one_sided=True, lean=-0.01, restitution=0.6),
+        rocking.Block.one_sided(width=0.3, height=2.0, lean=0.02),
+        rocking.Block.one_sided(width=0.4, height=2.5, lean=-0.01, restitution=0.6),
     ]
     yield from under(walls, [*shaking(), *scaled(-0.6)], model=model)
 
@@ -442,12 +443,7 @@ def between(kind: str) -> Iterator[Item]:
 @group(digits=6)
 def forces_and_energies() -> Iterator[Item]:
     up = record("el-centro-meloland-up", 350, 1100)
-    for block in (
-        STATUE,
-        UNEVEN[1],
-        HELD["several"][0],
-        rocking.RestrainedBlock(rocking.Block(width=0.5, height=4.0), one_sided=True),
-    ):
+    for block in (STATUE, UNEVEN[1], HELD["several"][0], rocking.Block.one_sided(width=0.5, height=4.0)):
         for motion in (record(), record().with_vertical(up), lobes(4.0, 0.8)):
             response = rocking.simulate(block, motion, duration=12.0)
             times = np.arange(60) * 0.2
@@ -490,6 +486,7 @@ ENSEMBLES: Final = {
     "levels": (GRID, {"levels": [1.0, 2.5, 6.0], "measure": "pga", "polarity": "both"}),
     "linear": (GRID, {"levels": [0.5, 1.0], "model": "linear"}),
     "times": (GRID, {"times": True, "polarity": "-"}),
+    "robust": (GRID.select(slice(0, 6)), {"robust": True}),
     "treatment": (GRID, {"chattering": "velocity=0.001", "duration": 5.0}),
     "two-sided": (UNEVEN, {"levels": [0.4, 1.0], "measure": "pgv"}),
     "restrained": ([*HELD["tendon"], *HELD["damper"], *HELD["yielding"]], {"levels": [1.0, 2.0]}),

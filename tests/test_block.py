@@ -1,4 +1,4 @@
-"""Blocks: parameters from sizes and pivots; thresholds; what cannot stand."""
+"""Blocks: parameters from sizes, pivots and frames; thresholds; what cannot stand."""
 
 import math
 
@@ -59,6 +59,43 @@ def test_a_block_whose_sides_differ_has_no_one_value_of_them():
     assert not hasattr(half, "restitution")
 
 
+@given(st.floats(0.0, 50.0))
+def test_frame_is_the_lagrangian_of_columns_and_beam(gamma):
+    b, h = 0.5, 3.0
+    frame, radius = Block.from_frame(half_width=b, half_height=h, mass_ratio=gamma), math.hypot(b, h)
+    # Kinetic energy of one column about its corner, plus its share of a beam that moves with its top (2R away).
+    inertia = 4.0 / 3.0 * radius**2 + 4.0 * gamma * radius**2
+    stiffness = 9.80665 * radius * (1.0 + 2.0 * gamma)
+    assert frame.p == pytest.approx(math.sqrt(stiffness / inertia), rel=1e-13)
+    assert frame.alpha == Block(half_width=b, half_height=h).alpha
+
+
+@given(st.floats(0.0, 50.0))
+def test_a_frames_restitution_conserves_angular_momentum_at_the_impact(gamma):
+    # Every column turns from one lower corner to the other while the beam moves with their tops, without turning.
+    b, h = 0.5, 3.0
+    left, right = np.array([b, h]), np.array([-b, h])  # from the old and the new lower corner to a column's centre
+    square = b * b + h * h
+
+    def velocity(arm):
+        return np.array([arm[1], -arm[0]])
+
+    def moment(arm, momentum):
+        return arm[1] * momentum[0] - arm[0] * momentum[1]
+
+    # Momentum of a column about its new corner, and the beam's share through the new contact at the top (Makris and
+    # Vassiliou 2013): the top's contact jumps to the opposite corner, 2 (b, h) from the lower one that is left.
+    def about_the_new_corner(arm):
+        spin = square / 3.0
+        beam = gamma * moment(2.0 * right, velocity(2.0 * arm))
+        return spin + moment(right, velocity(arm)) + beam
+
+    expected = about_the_new_corner(left) / about_the_new_corner(right)
+    assert Block.from_frame(half_width=b, half_height=h, mass_ratio=gamma).restitution == pytest.approx(
+        expected, rel=1e-12
+    )
+
+
 def test_thresholds_of_both_models():
     block = Block.from_parameters(p=(2.0, 2.5), alpha=(0.1, 0.3), restitution=0.9)
     g = block.gravity
@@ -86,6 +123,7 @@ def test_parameters_give_the_rectangles_radius():
         (lambda: Block.from_parameters(1.0, 0.97), "give restitution"),
         (lambda: Block.from_pivots((0.2, 0.0), 1.0, 0.3), "distances"),
         (lambda: Block.from_pivots((2.0, 2.0), 0.1, 0.3), "give restitution"),
+        (lambda: Block.from_frame(half_width=0.2, half_height=1.0, mass_ratio=-0.1), "mass_ratio"),
         (lambda: Block(half_width=1e-300, half_height=1.0), "half_width"),
         (lambda: Block(half_width=1e-12, half_height=1.0), "alpha"),
         (lambda: Block(half_width=0.2e14, half_height=1e14), "p (from the sizes) must be positive"),

@@ -247,3 +247,22 @@ def test_the_impacts_that_a_proof_sums_push_and_pull_as_those_that_are_followed(
     assert np.all(followed.normal_force(between) < 0.98)  # 1 at rest
     np.testing.assert_allclose(summed.normal_force(between), followed.normal_force(between), rtol=1e-12)
     np.testing.assert_allclose(summed.friction_demand(between), followed.friction_demand(between), rtol=1e-12)
+
+
+@pytest.mark.parametrize("ratio", [0.0, 0.5, 2.0, 20.0])
+def test_forces_under_a_frame_are_those_of_its_columns_and_its_beam(ratio: float) -> None:
+    """By Newton's law mass by mass: columns move with their centres, the beam twice as far."""
+    frame = Block.from_frame(half_width=0.5, half_height=3.0, mass_ratio=ratio)
+    motion = rocking.pulses.one_sine(3.0, 1.0)
+    response = simulate(frame, motion)
+    radius, g = float(np.hypot(0.5, 3.0)), frame.gravity
+    times = np.linspace(0.55, 0.95, 41)
+    theta, rate, acceleration = response.states(times).T
+    assert np.all(theta != 0.0)
+    side, angle = np.sign(theta), frame.alpha - np.abs(theta)
+    across = side * (np.cos(angle) * side * acceleration + np.sin(angle) * rate**2)
+    up = np.sin(angle) * side * acceleration - np.cos(angle) * rate**2
+    horizontal = (1.0 + ratio) * motion.acceleration(times) + (1.0 + 2.0 * ratio) * radius * across
+    vertical = (1.0 + ratio) * g + (1.0 + 2.0 * ratio) * radius * up
+    np.testing.assert_allclose(response.friction_demand(times), np.abs(horizontal) / vertical, rtol=1e-11)
+    np.testing.assert_allclose(response.normal_force(times), vertical / ((1.0 + ratio) * g), rtol=1e-11)

@@ -18,7 +18,7 @@ BODIES = {
     "parameters": Block.from_parameters(p=(2.9858, 3.0053), alpha=(0.27417, 0.155)),
     "tendon": RestrainedBlock(COLUMN, Tendon(2e5, prestress=2e3)),
     "spring": RestrainedBlock(COLUMN, Spring(2e3)),
-    "wall": RestrainedBlock(Block(width=0.4, height=4.0), one_sided=True, restitution=0.7),
+    "wall": Block.one_sided(width=0.4, height=4.0, restitution=0.7),
     "leaning": RestrainedBlock(COLUMN, lean=0.05),
 }
 

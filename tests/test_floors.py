@@ -73,7 +73,7 @@ def test_a_stiff_floor_moves_as_the_ground_and_one_that_rings_fades_to_a_thousan
 
 def test_a_wall_on_a_floor_that_resonates_falls_under_what_it_stands_on_the_ground():
     ground = rocking.pulses.sine(1.0, 1.5, cycles=6)
-    wall = rocking.RestrainedBlock(rocking.Block(width=0.3, height=3.0), one_sided=True)
+    wall = rocking.Block.one_sided(width=0.3, height=3.0)
     assert not rocking.simulate(wall, ground).overturned
     assert rocking.simulate(wall, ground.floor(1.0 / 1.5)).overturned
 

@@ -23,7 +23,7 @@ BODIES = {
     "offset": RestrainedBlock(COLUMN, Tendon(2e6, strength=4e4, offset=0.02), Damper(5e4)),
     "pushed": RestrainedBlock(COLUMN, Tendon(2e6, strength=4e4), Thrust(100.0, height=4.0), Damper(5e4)),
     "with-spring": RestrainedBlock(COLUMN, Tendon(2e6, strength=4e4), Spring(2e4), Damper(5e4)),
-    "one-sided": RestrainedBlock(Block(**SIZE), Tendon(2e6, strength=4e4), Damper(5e4), one_sided=True),
+    "one-sided": Block.one_sided(Tendon(2e6, strength=4e4), Damper(5e4), **SIZE),
 }
 
 

@@ -109,6 +109,19 @@ def test_an_outcome_that_changes_within_three_millionths_is_undecided(level):
     assert rows == json.loads(json.dumps(rows))
 
 
+@pytest.mark.parametrize("polarity", ["+", "both"])
+def test_a_robust_ensemble_counts_every_body_motion_level_and_polarity(polarity):
+    blocks, motions = rocking.Blocks.of([FREE, LEANING]), {"a": RECORD, "b": SHAKEN}
+    options = {"levels": [1.0, 1.4], "polarity": polarity}
+    found = rocking.simulate_many(blocks, motions, robust=True, **options)
+    near = [rocking.simulate_many(blocks, motions, **options | {"levels": [f, 1.4 * f]}) for f in factors_near(1e-6, 5)]
+    shares = np.mean([each.overturned.values for each in near], axis=0)
+    assert found.overturned_share.dims == found.overturned.dims and np.array_equal(
+        found.overturned_share.values, shares
+    )
+    assert "overturned_share" not in near[0]
+
+
 def test_a_summary_counts_outcomes_in_both_ranges_and_takes_the_precision_that_is_given():
     response = simulate(FREE, UNDECIDED.scaled(0.9))
     assert re.search(r"^outcome +(undecided: )?\w+ in \d of 5 motions within 3e-6", response.summary(), re.MULTILINE)

@@ -20,7 +20,7 @@ from rocking.kernels.trace import Trail
 BLOCK = rocking.Block(width=0.24, height=1.1)
 RECORD = rocking.records.load("el-centro-meloland-270")
 MOTIONS = [rocking.pulses.one_sine(a, f) for a in np.linspace(2.0, 9.0, 5) for f in (0.6, 1.0, 1.6)]
-WALL = rocking.RestrainedBlock(rocking.Block(width=0.5, height=4.0), one_sided=True, restitution=0.4)
+WALL = rocking.Block.one_sided(width=0.5, height=4.0, restitution=0.4)
 COLUMN = rocking.RestrainedBlock(
     rocking.Block(width=0.4, height=2.0, mass=2000.0), rocking.Tendon(2e5, prestress=2e3, strength=2e4)
 )

@@ -1,5 +1,6 @@
 """Restitution: closed forms, laws by which it varies, and what they leave of proofs, derivatives and ensembles."""
 
+import itertools
 import math
 
 import numpy as np
@@ -14,13 +15,92 @@ from rocking import (
     Restitution,
     RestrainedBlock,
     dynamics,
+    impact_restitution,
     one_sided_restitution,
 )
+from rocking.block import housner_restitution
 from rocking.kernels.events import factor, uniform
 
 pytestmark = pytest.mark.usefixtures("parts_run_by_python")
 
 COLUMN = Block(width=0.4, height=2.0, mass=2000.0)
+
+
+# ---- Numbers ----
+
+
+def by_momentum(away, height, gyration, points, contact):
+    """Factor from velocities of the centre of mass and their angular momentum, one impact after the other."""
+    omega, pivots = 1.0, np.linspace(away[0], -away[1], points)
+    for old, new in itertools.pairwise(pivots):
+        velocity = omega * np.array([-height, -old])  # of the centre of mass at (0, height), about (old, 0)
+        at = contact * new
+        momentum = gyration**2 * omega + (-at * velocity[1] - height * velocity[0])
+        omega = momentum / (gyration**2 + height**2 + at * new)  # turning about the new pivot
+    return omega
+
+
+@pytest.mark.parametrize(("contact", "points"), [(1.0, 2), (0.7, 2), (0.2, 2), (1.0, 3), (1.0, 8)])
+def test_angular_momentum_about_every_point_gives_the_restitution(contact, points):
+    judged = 0
+    sizes = np.random.default_rng(points).uniform((0.05, 0.05, 1.0, 0.05), (1.0, 1.0, 2.0, 1.0), (20, 4))
+    for plus, minus, height, gyration in sizes:
+        body = {"distances": (plus, minus), "height": height, "radius_of_gyration": gyration}
+        ways = [(plus, minus), (minus, plus)]
+        expected = [by_momentum(away, height, gyration, points, contact) for away in ways]
+        if any(gained(e, away, height, gyration) > 1.0 for e, away in zip(expected, ways, strict=True)):
+            with pytest.raises(InvalidBlock, match="gain energy"):
+                impact_restitution(**body, contact=contact, points=points)
+            continue
+        assert impact_restitution(**body, contact=contact, points=points) == pytest.approx(expected, rel=1e-12)
+        judged += 1
+    assert judged == 20 if contact > 0.5 else 3 < judged < 17
+
+
+def gained(e, away, height, gyration):
+    """Energy after an impact over that before it, about the old pivot and the new one."""
+    before, after = (gyration**2 + height**2 + distance**2 for distance in away)
+    return e * e * after / before
+
+
+def test_the_narrowest_contact_keeps_all_energy():
+    height, gyration, away = 0.5, 0.3, (0.2, 0.1)
+    body = {"distances": away, "height": height, "radius_of_gyration": gyration}
+    mostly = [
+        max(gained(by_momentum(way, height, gyration, 2, share), way, height, gyration) for way in (away, away[::-1]))
+        for share in (0.2345, 0.2346)
+    ]
+    assert mostly[0] > 1.0 > mostly[1]
+    with pytest.raises(InvalidBlock, match=r"contact must be at least 0\.2346"):
+        impact_restitution(**body, contact=0.2345)
+    assert len(impact_restitution(**body, contact=0.2346)) == 2
+
+
+def test_the_quoted_formula_has_the_square_of_the_share():
+    for alpha, share in ((0.1, 0.7), (0.3, 0.5), (0.45, 0.9)):
+        sine = np.sin(alpha) ** 2
+        quoted = (4 - 3 * (1 + share**2) * sine) / (4 - 3 * (1 - share**2) * sine)
+        assert impact_restitution(alpha, contact=share**2) == pytest.approx([quoted, quoted], rel=1e-14)
+
+
+def test_one_impact_at_the_pivot_is_the_one_of_blocks():
+    for alpha in (0.05, 0.2, 0.5):
+        assert impact_restitution(alpha) == pytest.approx((housner_restitution(alpha),) * 2, rel=1e-14)
+    body = Block.from_pivots((0.3, 0.2), 1.0, 0.6)
+    found = impact_restitution(distances=(0.3, 0.2), height=1.0, radius_of_gyration=0.6)
+    assert found == pytest.approx([side.restitution for side in body.sides], rel=1e-14)
+
+
+def test_more_points_lose_less_as_the_documented_limit_says():
+    alpha = 0.25
+    found = [impact_restitution(alpha, points=n)[0] for n in (2, 3, 4, 8, 100, 10_000)]
+    assert all(a < b for a, b in itertools.pairwise(found))
+    sine, root = math.sin(alpha), math.sqrt(1.0 / 3.0 + math.cos(alpha) ** 2)
+    loss = 0.75 * sine**2 + sine / root * math.atan(sine / root)
+    assert -math.log(found[-1]) * 9_999 == pytest.approx(loss, rel=1e-3)
+    many = impact_restitution(distances=(0.3, 0.2), height=1.0, radius_of_gyration=0.6, points=200_000)
+    kept = math.sqrt((1.36 + 0.3**2) / (1.36 + 0.2**2))  # no energy is lost
+    assert many == pytest.approx((kept, 1.0 / kept), rel=1e-5)
 
 
 # ---- Draws ----
@@ -120,6 +200,11 @@ def test_maps_of_a_restitution_that_falls_have_the_derivatives_of_finite_differe
         (lambda: Restitution((0.95, 0.4), (0.9, 0.5), seed=1), "least must be above 0 and at most largest, 0.4"),
         (lambda: Restitution(0.95, 0.9, seed=1.5), "seed must be a whole number"),
         (lambda: Restitution(0.95, 0.9, slope=0.1, seed=1), "either falls or is drawn: give a slope or a seed"),
+        (lambda: impact_restitution(), "either alpha of a rectangular block, or"),
+        (lambda: impact_restitution(0.2, height=1.0), "either alpha of a rectangular block, or"),
+        (lambda: impact_restitution(0.2, contact=1.5), "contact must be"),
+        (lambda: impact_restitution(0.2, contact=0.5, points=3), "either a contact or points"),
+        (lambda: impact_restitution(1.2), "too stocky"),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_sentence(make, says):
@@ -146,3 +231,8 @@ def test_what_needs_the_same_factor_each_time_refuses_a_law():
 def test_a_wall_has_a_slenderness(alpha):
     with pytest.raises(InvalidBlock, match="alpha"):
         one_sided_restitution(alpha)
+
+
+def test_several_points_below_a_flat_body_leave_nothing():
+    with pytest.raises(InvalidBlock, match="too stocky"):
+        impact_restitution(distances=(1.0, 5.0), height=0.1, radius_of_gyration=0.1, points=3)

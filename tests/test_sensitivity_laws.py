@@ -22,9 +22,7 @@ BODIES = {
     "everything": RestrainedBlock(
         BLOCK, Load(200.0, 3.0, follows=False), Tendon(3e4, prestress=1e3), Spring(1e3), Damper(800.0), lean=0.01
     ),
-    "one side": rocking.RestrainedBlock(
-        rocking.Block(width=1.2, height=4.0, mass=2e3), Spring(1e3), one_sided=True, restitution=0.5
-    ),
+    "one side": rocking.Block.one_sided(Spring(1e3), width=1.2, height=4.0, mass=2e3, restitution=0.5),
 }
 
 BY_SIDE = tuple(f"{name}_{side}" for name in ("p", "alpha", "restitution") for side in ("plus", "minus"))

@@ -48,8 +48,9 @@ WRONG = {
     # Restraints
     "restraints in a list": (lambda: held([Spring(1e3), Damper(1.0)]), "", "is no restraint: give Tendon, Spring"),
     "restraints twice": (lambda: RestrainedBlock(held(Spring(1e3)), Damper(1.0)), "", "give all of them at once"),
-    "no mass": (
-        lambda: RestrainedBlock(Block(width=0.4, height=4.0), Thrust(9.0, 2.0)), "mass", "kg, beside its sizes"
+    "no mass": (lambda: Block.one_sided(Thrust(9.0, 2.0), width=0.4, height=4.0), "mass", "kg, beside its sizes"),
+    "sizes of a wall without names": (
+        lambda: Block.one_sided(0.4, 4.0), "width", "a block takes either half_width and half_height, or"
     ),
     "a tendon beyond": (
         lambda: held(Tendon(1e5, offset=2.0)), "offset", "beyond the pivot, which is 0.25 m from the centre of mass"
@@ -79,7 +80,7 @@ WRONG = {
     "a law of a free block": (
         lambda: Block(width=0.4, height=2.0, restitution=Restitution(0.9, 0.5, seed=1)),
         "restitution",
-        "restitution must be a number, not Restitution(",
+        "must be a number, not Restitution(",
     ),
     # Several bodies
     "two gravities": (

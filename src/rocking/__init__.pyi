@@ -20,6 +20,7 @@ from .block import (
     Spring,
     Tendon,
     Thrust,
+    impact_restitution,
     one_sided_restitution,
 )
 from .block.body import Bodies, Body, Coordinate
@@ -133,6 +134,7 @@ __all__ = [
     "fit_fragility",
     "fragility",
     "gradient",
+    "impact_restitution",
     "incremental_dynamic_analysis",
     "one_sided_restitution",
     "overturning_map",

@@ -3,7 +3,7 @@
 from rocking.block.bodies import Blocks
 from rocking.block.restrained import RestrainedBlock
 from rocking.block.restraints import Damper, Load, Restitution, Restraint, Spring, Tendon, Thrust
-from rocking.block.sides import Side, housner_restitution, one_sided_restitution
+from rocking.block.sides import Side, housner_restitution, impact_restitution, one_sided_restitution
 from rocking.block.single import Block, one_block
 
 #: The same class: arrays of terms say what restrains them.
@@ -23,6 +23,7 @@ __all__ = [
     "Tendon",
     "Thrust",
     "housner_restitution",
+    "impact_restitution",
     "one_block",
     "one_sided_restitution",
 ]

@@ -138,3 +138,6 @@ class Kind(Protocol):
 
 #: Classes of many bodies by name: a registry, so that a body need not import the class that imports it.
 KINDS: Final[dict[str, Kind]] = {}
+
+#: Classes of single bodies by name, for the same reason.
+SINGLE: Final[dict[str, Callable[..., Any]]] = {}

@@ -10,7 +10,7 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from rocking.block.body import ContactLaw, Coordinate
+from rocking.block.body import SINGLE, ContactLaw, Coordinate
 from rocking.block.restraints import Load, Pivot, Restitution, Restraint, Tendon, Terms
 from rocking.block.sides import Side, checked_pair, checked_parameter, one_sided_restitution
 from rocking.block.single import Block, Rocking, one_block
@@ -303,3 +303,6 @@ def _balance_of(side: Side, terms: Terms) -> float:
         return math.inf
     k = int(negative[0])
     return bisected(float(looks[k]), float(looks[k + 1]), lambda u: moment(u) <= 0.0)[1]
+
+
+SINGLE["restrained"] = RestrainedBlock

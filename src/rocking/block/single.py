@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
-from rocking.block.body import KINDS, Bodies, Body, Coordinate
+from rocking.block.body import KINDS, SINGLE, Bodies, Body, Coordinate
 from rocking.block.sides import (
     Side,
     checked_gravity,
@@ -17,6 +17,7 @@ from rocking.block.sides import (
     checked_mass,
     checked_pair,
     checked_parameter,
+    even_sides,
     gyration_squared,
     housner_restitution,
     in_line,
@@ -37,6 +38,7 @@ ROTATION: Final = Coordinate("rotation", "angular_velocity", "angular_accelerati
 _ROUNDING: Final = 1e-12
 #: Restitutions so near are one: that of a body, from p and alpha or from itself.
 _SAME_RESTITUTION: Final = 1e-9
+_HEAVIEST_BEAM: Final = 1e12
 
 
 class Rocking:
@@ -63,7 +65,7 @@ class Rocking:
 class Block(Rocking):
     """A free-standing rigid block that rocks without sliding or bouncing.
 
-    Made from the sizes of a rectangular block here, or by `from_parameters` and `from_pivots`.
+    Made from the sizes of a rectangular block here, or by `from_parameters`, `from_pivots` and `from_frame`.
 
     Parameters
     ----------
@@ -139,9 +141,7 @@ class Block(Rocking):
             )
         if s == 0.0:
             alpha = math.atan2(b, h)
-            radius, e = math.hypot(b, h), restitutions(restitution, (housner_restitution(alpha),) * 2)
-            p = math.sqrt(0.75 * g / radius)
-            sides = Side(p, alpha, e[0], radius), Side(p, alpha, e[1], radius)
+            sides = even_sides(g, math.hypot(b, h), alpha, restitution, housner_restitution(alpha))
         else:
             sides = sides_on_pivots((b - s, b + s), h, gyration_squared(b, h, s), g, restitution)
             text += f", centre of mass {abs(s):.5g} m off its middle to side {'+' if s > 0.0 else '-'}"
@@ -297,6 +297,99 @@ class Block(Rocking):
         pivots = f"body on pivots {plus:.5g} m and {minus:.5g} m from its centre of mass, which is {h:.5g} m high"
         return cls.__new__(cls)._fill(sides, g, description or pivots, mass)
 
+    @classmethod
+    def from_frame(
+        cls,
+        *,
+        half_width: float,
+        half_height: float,
+        mass_ratio: float,
+        restitution: float | Sequence[float] | None = None,
+        gravity: float = STANDARD_GRAVITY,
+    ) -> Block:
+        """Solitary block that rocks like a frame: equal columns that carry a freely supported rigid beam.
+
+        Parameters
+        ----------
+        half_width, half_height : float
+            Half the width and half the height of one column, m.
+        mass_ratio : float
+            gamma: mass of the beam over the mass of all columns; 0 is a column alone.
+        restitution : float or pair, optional
+            By default from angular momentum: (1 - 1.5 sin(alpha)^2 + 3 gamma cos(2 alpha))/(1 + 3 gamma).
+        gravity : float
+            Acceleration of gravity, m/s^2.
+
+        Returns
+        -------
+        Block
+            Symmetric.
+
+        Raises
+        ------
+        InvalidBlock
+            If a size is not positive, or the mass ratio is negative.
+
+        Notes
+        -----
+        The frame has the column's slenderness, and R' = R (1 + 3 gamma)/(1 + 2 gamma): a heavier beam makes it
+        more stable (Makris and Vassiliou 2013; derived in the documentation).
+
+        Examples
+        --------
+        >>> column = Block(half_width=0.5, half_height=3.0)
+        >>> frame = Block.from_frame(half_width=0.5, half_height=3.0, mass_ratio=2.0)
+        >>> frame.alpha == column.alpha, round(frame.radius / column.radius, 12)
+        (True, 1.4)
+        """
+        b, h = checked_length(half_width, "half_width"), checked_length(half_height, "half_height")
+        g = checked_gravity(gravity)
+        gamma = checks.within(mass_ratio, "mass_ratio", InvalidBlock, 0.0, _HEAVIEST_BEAM)
+        alpha = math.atan2(b, h)
+        radius = math.hypot(b, h) * (1.0 + 3.0 * gamma) / (1.0 + 2.0 * gamma)
+        kept = 1.0 - 1.5 * math.sin(alpha) ** 2 + 3.0 * gamma * math.cos(2.0 * alpha)
+        # The beam moves twice as far as the centres of the columns do.
+        arm = math.hypot(b, h) * (1.0 + 2.0 * gamma) / (1.0 + gamma)
+        sides = even_sides(g, radius, alpha, restitution, kept / (1.0 + 3.0 * gamma), arm)
+        text = f"frame of columns {2 * b:.5g} m x {2 * h:.5g} m, mass ratio {gamma:.5g}"
+        return cls.__new__(cls)._fill(sides, g, text)
+
+    @classmethod
+    def one_sided(
+        cls,
+        *restraints: Any,
+        lean: float = 0.0,
+        restitution: Any = None,
+        **sizes: Any,
+    ) -> Any:
+        """Rectangular block that rocks to side + only, as a facade that stands against transverse walls.
+
+        Parameters
+        ----------
+        *restraints : Restraint
+            `Thrust` of a vault, `Load`, `Tendon` and others.
+        lean : float
+            Angle by which it stands out of plumb to side +, rad.
+        restitution : float or Restitution, optional
+            Factor with which it bounces back to the same side. By default `one_sided_restitution`.
+        **sizes
+            As of `Block`: `width` and `height`, m, or half of them, `mass`, kg, `gravity`.
+
+        Returns
+        -------
+        RestrainedBlock
+            With one side.
+
+        Examples
+        --------
+        >>> wall = Block.one_sided(width=0.4, height=4.0)
+        >>> round(wall.sides[0].restitution, 4)
+        0.4708
+        """
+        # Of a wall too stocky for angular momentum, what is given takes the place of the block's own.
+        block = cls(restitution=None if restitution is None else 1.0, **sizes)
+        return SINGLE["restrained"](block, *restraints, one_sided=True, lean=lean, restitution=restitution)
+
     @property
     def p(self) -> float:
         """Frequency parameter, rad/s, of a block whose sides are equal; else ask its `sides`."""
@@ -352,11 +445,13 @@ class Block(Rocking):
         """Return the forces of the ground over the weight, horizontal and vertical (see `rocking.block.body`).
 
         On side i, with psi = alpha - |theta|, the centre of mass is at x = -i R sin(psi), y = R cos(psi) from the
-        pivot; forces are m (a + x'') and m (g + a_v + y''). At rest they are (a/g, 1 + a_v/g).
+        pivot, R being the arm where there is one; forces are m (a + x'') and m (g + a_v + y''). At rest they are
+        (a/g, 1 + a_v/g).
         """
         leaning, (rotation, velocity, acceleration) = np.maximum(side, 0), motion
-        alpha, radius = np.array([(s.alpha, s.radius) for s in self.sides]).T[:, leaning]
-        sign, over_g = np.where(side < 0, 0.0, 1.0 - 2.0 * leaning), radius / self.gravity
+        sides = [(each.alpha, each.radius if each.arm is None else each.arm) for each in self.sides]
+        alpha, arm = np.array(sides).T[:, leaning]
+        sign, over_g = np.where(side < 0, 0.0, 1.0 - 2.0 * leaning), arm / self.gravity
         psi, towards_pivot, speed = alpha - np.abs(rotation), sign * acceleration, np.abs(sign) * velocity**2
         horizontal = sign * over_g * (np.cos(psi) * towards_pivot + np.sin(psi) * speed)
         vertical = over_g * (np.sin(psi) * towards_pivot - np.cos(psi) * speed)

@@ -26,6 +26,7 @@ from rocking.motion.motion import Motion
 from rocking.motion.piecewise import STRONGEST
 from rocking.motion.scaling import FACTOR, SCALES, Measure, MeasureName
 from rocking.records.named import Motions, names_of, several_motions
+from rocking.response import COUNT, RELATIVE, factors_near
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -63,6 +64,7 @@ TIMES: Final[Mapping[str, tuple[str, str]]] = {
     "first_rest": ("s", "time at which the block first came to rest; 0 if it never did"),
     "last_rest": ("s", "time at which the block last came to rest; 0 if it never did"),
 }
+_SHARE: Final = "share of the simulation and its repeats within 3e-6 of the motion that overturn"
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,13 +195,13 @@ def setup_of(product: Product, bodies: slice | None = None) -> Setup:
     return Setup(chosen, product.model, product.treatment, product.duration)
 
 
-def _tasks(product: Product) -> Iterator[Task]:
+def _tasks(product: Product, near: float) -> Iterator[Task]:
     """Cut a product into tasks for the engine; their keys are (motion, scale, polarity)."""
     for m, motion in enumerate(product.motions):
         for s, factor in enumerate(product.scales.factors(motion).tolist()):
             for k, sign in enumerate(product.signs):
                 for part in parts_of(len(product.bodies), motion):
-                    yield Task(part, motion, sign * factor, (m, s, k))
+                    yield Task(part, motion, near * (sign * factor), (m, s, k))
 
 
 def dataset_of(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
@@ -208,9 +210,8 @@ def dataset_of(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
 
     dimensions = ("motion", "scale", "polarity", "block")
     gone = {"scale": product.scales.measure is None, "polarity": product.polarity != "both"}
-    described = {
-        name: {"units": units, "long_name": meaning} for name, (units, meaning) in {**VARIABLES, **TIMES}.items()
-    }
+    kept = {**VARIABLES, **TIMES, "overturned_share": ("1", _SHARE)}
+    described = {name: {"units": units, "long_name": meaning} for name, (units, meaning) in kept.items()}
     coordinate = product.bodies[0].coordinate if len(product.bodies) else ROTATION
     if coordinate.unit != ROTATION.unit:
         described["peak_rotation"] = {"units": coordinate.unit, "long_name": f"largest {coordinate.name} in size"}
@@ -266,6 +267,7 @@ def simulate_many(
     polarity: Polarity = "+",
     duration: float | None = None,
     times: bool = False,
+    robust: bool = False,
     threads: int | None = None,
     progress: bool | None = None,
 ) -> xr.Dataset:
@@ -290,6 +292,9 @@ def simulate_many(
         As for `simulate`.
     times : bool
         Whether to keep the times of the first uplift and of the first and the last rest.
+    robust : bool
+        Whether to repeat every simulation with the motion scaled by 1 +- 1e-6 and 1 +- 3e-6, as
+        `Response.perturbed` does, which takes five times as long.
     threads, progress : int or bool, optional
         Number of threads, by default one for every core; whether to draw a progress bar, by default if stderr is a
         terminal and the work takes long.
@@ -302,7 +307,8 @@ def simulate_many(
         time_at_rest (s), complete_chattering (whether the block came to rest after its first uplift before the motion
         passed a threshold again), stalled (rests that were not proven), unfinished, stopped (by `duration`, so that
         overturned is open). With `times` also first_uplift, first_rest and last_rest (s; 0 for what never happened).
-        Coordinates name the motions and hold the blocks' parameters.
+        With `robust` also overturned_share, the share of the five simulations that overturn: the outcome is undecided
+        unless it is 0 or 1. Coordinates name the motions and hold the blocks' parameters.
 
     Notes
     -----
@@ -321,7 +327,13 @@ def simulate_many(
     """
     product = product_of(blocks, motions, levels, measure, polarity, model, chattering, duration)
     names = (*VARIABLES, *(TIMES if checks.flag(times, "times", InvalidOption) else ()))
-    return dataset_of(product, outcomes_of(product, setup_of(product), threads, progress, names))
+    setup = setup_of(product)
+    found = outcomes_of(product, setup, threads, progress, names)
+    if checks.flag(robust, "robust", InvalidOption):
+        near = [factor for factor in factors_near(RELATIVE, COUNT) if factor != 1.0]
+        again = [outcomes_of(product, setup, threads, progress, ["overturned"], factor) for factor in near]
+        found["overturned_share"] = np.mean([each["overturned"].astype(bool) for each in (found, *again)], axis=0)
+    return dataset_of(product, found)
 
 
 def outcomes_of(
@@ -330,12 +342,13 @@ def outcomes_of(
     threads: int | None,
     progress: bool | None,
     names: Iterable[str] = tuple(VARIABLES),
+    near: float = 1.0,
 ) -> dict[str, NDArray[np.generic]]:
-    """Simulate a whole product, and return arrays of its shape by names of `OUTCOME`."""
+    """Simulate a whole product, its motions times a factor near 1, and return arrays by names of `OUTCOME`."""
     count = cores() if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
     results: dict[str, NDArray[np.generic]] = {name: np.empty(product.shape, dtype=OUTCOME[name]) for name in names}
     with Progress("simulating", math.prod(product.shape), show=progress) as bar:
-        for task, outcomes in simulate_tasks(setup, _tasks(product), threads=count):
+        for task, outcomes in simulate_tasks(setup, _tasks(product, near), threads=count):
             for name, values in results.items():
                 values[(*task.key, task.bodies)] = outcomes[name]
             bar.advance(len(outcomes))
