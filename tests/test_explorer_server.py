@@ -568,8 +568,8 @@ def test_the_command_prints_one_line_and_listens_here_alone():
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("nowhere.txt",), "could not be read"),
-        (("ridgecrest-cls-090",), "did you mean ridgecrest-clc-090"),
+        (("nowhere.txt",), "there is no such file"),
+        (("ridgecrest-cls-090",), "did you mean the shipped record ridgecrest-clc-090"),
         (("--port", "70000"), "from 0 to 65535"),
         (("--address", "0.0.0.0"), "every address"),
         (("--address", "0x0"), "every address"),

@@ -200,9 +200,9 @@ def test_every_bar_comes_to_its_end(results, bars):
     assert [each for each in bars if not each[1] == each[2] > 0] == []
 
 
-@pytest.mark.parametrize("written", [3, pytest.param(11, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("written", [3, pytest.param(10, marks=pytest.mark.thorough)])
 def test_a_result_keeps_its_dataset_and_offers_nothing_of_it_as_its_own(results, tmp_path, written):
-    assert len(results) == 11
+    assert len(results) == 10
     for number, found in enumerate(results.values()):
         for again in (copy.copy(found), pickle.loads(pickle.dumps(found))):
             assert again.data.identical(found.data)
