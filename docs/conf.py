@@ -23,6 +23,8 @@ extensions = [
     "sphinx-mathjax-offline",
     "sphinx_design",
     "numpydoc",
+    "sphinxcontrib.bibtex",
+    "sphinx_copybutton",
     "commands",
     "sphinx_gallery.gen_gallery",
 ]
@@ -33,6 +35,11 @@ myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence", "deflist"]
 myst_heading_anchors = 3
 # MathJax's menu could fetch its speech engine from a content network.
 mathjax3_config = {"options": {"enableMenu": False}}
+
+bibtex_bibfiles = ["references.bib"]
+bibtex_default_style = "unsrtalpha"
+bibtex_reference_style = "author_year"
+copybutton_exclude = ".linenos, .gp, .go"
 
 autosummary_generate = True
 autosummary_ignore_module_all = False
