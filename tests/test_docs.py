@@ -183,6 +183,7 @@ def test_pages_load_nothing_from_the_network(tmp_path):
     source = tmp_path / "docs"
     source.mkdir()
     shutil.copy(ROOT / "docs" / "conf.py", source)
+    shutil.copy(ROOT / "docs" / "references.bib", source)
     shutil.copytree(ROOT / "docs" / "_extensions", source / "_extensions")
     (source / "_static").mkdir()
     shutil.copy(ROOT / "docs" / "_static" / "pages.css", source / "_static")
