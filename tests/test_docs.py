@@ -64,7 +64,7 @@ def known(chain: str) -> bool:
 
 
 def test_code_that_needs_a_readers_own_files_compiles_and_calls_names_that_exist():
-    # The cells of notebook.md, and the script of study-cluster.md, are run by tests of their own.
+    # The cells of command-line.md, and the script of study-cluster.md, are run by tests of their own.
     blocks = [
         (page, code)
         for page in PAGES

@@ -9,7 +9,7 @@ import pytest
 # tests/test_canvas.py, and what a result shows of itself by tests/test_reprs.py.
 pytestmark = pytest.mark.slow
 
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "howto" / "notebook.md"
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "howto" / "command-line.md"
 CELL = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
 
 

@@ -67,7 +67,7 @@ def list_of_commands() -> Iterator[str]:
         "# Command line",
         "",
         "These pages are written from the commands themselves; `rocking COMMAND --help` says the same in a terminal.",
-        "How numbers, angles, lists and records are written, and twenty tasks, are in {doc}`/howto/command-line`.",
+        "How numbers, angles, lists and records are written, and examples, are in {doc}`/howto/command-line`.",
         "A command ends with exit code 0, with 2 and one line on stderr where something given is wrong, and with 130",
         "when it is interrupted.",
         "",
