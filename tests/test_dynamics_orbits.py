@@ -356,5 +356,5 @@ def test_the_peak_of_an_orbit_between_walls_is_where_they_are():
     branch = dynamics.continue_orbit(start, family, 3.0, (2.8, 3.2))
     assert len(branch) >= 5 and branch.peaks == pytest.approx(0.1, rel=1e-14)
     axes = branch.plot().axes[0]  # which would be a flat line
-    assert axes.get_ylabel() == "position at the start of a period (m)"
+    assert " ".join(axes.get_ylabel().split()) == "position at the start of a period (m)"
     assert np.nanmax(axes.lines[0].get_ydata()) == pytest.approx(branch.states[:, 0].max())

@@ -285,7 +285,7 @@ def test_a_figure_of_a_wall_counts_by_its_balance(vertical):
         wall, rocking.pulses.one_sine(1.2, 0.8).with_vertical(PUSH.vertical if vertical else None)
     )
     figure = response.plot()
-    assert figure.axes[0].get_ylabel() == "rotation / balance"
+    assert figure.axes[0].get_ylabel().split() == ["rotation", "/", "balance"]
     drawn = figure.axes[0].lines[1].get_ydata()
     assert np.max(drawn) == pytest.approx(response.peak_over_slenderness, rel=1e-3)
 

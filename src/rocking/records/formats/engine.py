@@ -109,7 +109,7 @@ class Header:
         return numbers
 
 
-@dataclass
+@dataclass(frozen=True)
 class Said:
     """What a header says of a channel: its unit, its labels, and the numbers that follow.
 
