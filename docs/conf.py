@@ -44,19 +44,42 @@ copybutton_exclude = ".linenos, .gp, .go"
 autosummary_generate = True
 autosummary_ignore_module_all = False
 # So that a summary does not end at the citation of an equation.
-sphinx.ext.autosummary.WELL_KNOWN_ABBREVIATIONS += ("Eq.", "Eqs.", "Fig.", "Figs.")
+sphinx.ext.autosummary.WELL_KNOWN_ABBREVIATIONS += (
+    "Eq.",
+    "Eqs.",
+    "Fig.",
+    "Figs.",
+)
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 numpydoc_show_class_members = False
 
-GALLERY = ["paper", "museum", "threshold", "bouncing_ball", "chaos", "pulse_map", "frame", "sizes", "ten_thousand"]
-GALLERY += ["precarious_rock", "median_gradient", "statue", "calibration", "restitution_law"]
+GALLERY = [
+    "paper",
+    "museum",
+    "threshold",
+    "bouncing_ball",
+    "chaos",
+    "pulse_map",
+    "frame",
+    "sizes",
+    "ten_thousand",
+]
+GALLERY += [
+    "precarious_rock",
+    "median_gradient",
+    "statue",
+    "calibration",
+    "restitution_law",
+]
 sphinx_gallery_conf = {
     "examples_dirs": "../examples",
     "gallery_dirs": "gallery",
     "filename_pattern": "",
     "ignore_pattern": "__main__",
-    "within_subsection_order": ExplicitOrder([f"{name}.py" for name in GALLERY]),
+    "within_subsection_order": ExplicitOrder(
+        [f"{name}.py" for name in GALLERY]
+    ),
     "abort_on_example_error": True,
     "capture_repr": (),
     "image_srcset": ["2x"],
@@ -109,7 +132,9 @@ def escape_bars(_app, _what, _name, _object, _options, lines):
 def lead_within(_app, _path, _page, content):
     """Let links of an included page of the repository lead to its page here."""
     for file, page in INCLUDED.items():
-        content[0] = content[0].replace(f"]({file})", f"](/development/{page}.md)")
+        content[0] = content[0].replace(
+            f"]({file})", f"](/development/{page}.md)"
+        )
     content[0] = content[0].replace("](docs/", "](/")
 
 

@@ -43,7 +43,14 @@ def write_pages(source: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     used = pages_by_command(source)
     pages = {
-        name: "\n".join([f"# rocking {name}", "", *page_of(app, name), *used_in(used.get(name, []))])
+        name: "\n".join(
+            [
+                f"# rocking {name}",
+                "",
+                *page_of(app, name),
+                *used_in(used.get(name, [])),
+            ]
+        )
         for name, app in commands_of(commands).items()
     }
     pages["index"] = "\n".join(list_of_commands())
@@ -78,7 +85,14 @@ def list_of_commands() -> Iterator[str]:
     for name, app in names.items():
         yield f"| [`rocking {name}`]({name}.md) | {markdown(app.help)} |"
     yield from ("| `rocking --version` | Display the version. |", "")
-    yield from ("```{toctree}", ":hidden:", "", *(f"rocking {name} <{name}>" for name in names), "```", "")
+    yield from (
+        "```{toctree}",
+        ":hidden:",
+        "",
+        *(f"rocking {name} <{name}>" for name in names),
+        "```",
+        "",
+    )
 
 
 def page_of(app: App, name: str, heading: str = "##") -> Iterator[str]:
@@ -91,11 +105,32 @@ def page_of(app: App, name: str, heading: str = "##") -> Iterator[str]:
         return
     arguments = app.assemble_argument_collection(parse_docstring=True)
     # First what a command takes by itself, then the options that several commands share.
-    groups = sorted(arguments.groups, key=lambda group: (group.name not in OWN, group.name in OWN or group.sort_key))
-    panels = [create_parameter_help_panel(group, arguments.filter_by(group=group), "plaintext") for group in groups]
-    paragraphs = inspect.getdoc(app.default_command).split("\nParameters\n---")[0].strip().split("\n\n")
+    groups = sorted(
+        arguments.groups,
+        key=lambda group: (
+            group.name not in OWN,
+            group.name in OWN or group.sort_key,
+        ),
+    )
+    panels = [
+        create_parameter_help_panel(
+            group, arguments.filter_by(group=group), "plaintext"
+        )
+        for group in groups
+    ]
+    paragraphs = (
+        inspect.getdoc(app.default_command)
+        .split("\nParameters\n---")[0]
+        .strip()
+        .split("\n\n")
+    )
     yield from (markdown(paragraphs[0]), "")
-    yield from ("```text", usage(name, [entry for panel in panels for entry in panel.entries]), "```", "")
+    yield from (
+        "```text",
+        usage(name, [entry for panel in panels for entry in panel.entries]),
+        "```",
+        "",
+    )
     for paragraph in paragraphs[1:]:
         yield from (markdown(paragraph), "")
     for panel in panels:
@@ -107,32 +142,66 @@ def page_of(app: App, name: str, heading: str = "##") -> Iterator[str]:
 
 def usage(name: str, entries: list[Any]) -> str:
     """Return how a command is called."""
-    given = [entry.positional_label for entry in entries if entry.positional_label and entry.required]
-    others = [entry.positional_label for entry in entries if entry.positional_label and not entry.required]
-    optional = any(not entry.required and entry.positive_names for entry in entries)
-    return " ".join(["rocking", name, *given, *(f"[{each}]" for each in others), *(["[OPTIONS]"] if optional else [])])
+    given = [
+        entry.positional_label
+        for entry in entries
+        if entry.positional_label and entry.required
+    ]
+    others = [
+        entry.positional_label
+        for entry in entries
+        if entry.positional_label and not entry.required
+    ]
+    optional = any(
+        not entry.required and entry.positive_names for entry in entries
+    )
+    return " ".join(
+        [
+            "rocking",
+            name,
+            *given,
+            *(f"[{each}]" for each in others),
+            *(["[OPTIONS]"] if optional else []),
+        ]
+    )
 
 
 def option(entry: Any) -> Iterator[str]:
     """Give the lines of an option: a term and its definition."""
-    names = [*([entry.positional_label] if entry.positional_label else []), *entry.positive_names]
+    names = [
+        *([entry.positional_label] if entry.positional_label else []),
+        *entry.positive_names,
+    ]
     names += [*entry.positive_shorts, *entry.negative_names]
-    kind = f" {entry.metavar}" if entry.metavar and not entry.positional_label else ""
+    kind = (
+        f" {entry.metavar}"
+        if entry.metavar and not entry.positional_label
+        else ""
+    )
     said = [markdown(str(entry.description.primary_renderable))]
     if entry.required:
         said.append("*Required.*")
     if entry.choices:
-        said.append(f"*One of* {', '.join(f'`{choice}`' for choice in entry.choices)}.")
+        said.append(
+            f"*One of* {', '.join(f'`{choice}`' for choice in entry.choices)}."
+        )
     if entry.default not in (None, "", "()", "False"):
         said.append(f"*Default:* `{entry.default}`.")
-    yield from (", ".join(f"`{name}`" for name in names) + kind, f": {' '.join(said)}", "")
+    yield from (
+        ", ".join(f"`{name}`" for name in names) + kind,
+        f": {' '.join(said)}",
+        "",
+    )
 
 
 def markdown(text: str) -> str:
     """Return a text of the help as Markdown, with options and names of files as code."""
     text, said, end = " ".join(text.split()), "", 0
     for match in CODE.finditer(text):
-        said += MARKUP.sub(r"\\\1", text[end : match.start()]) + f"`{match[1] or match[2]}`"
+        said += (
+            MARKUP.sub(r"\\\1", text[end : match.start()])
+            + f"`{match[1] or match[2]}`"
+        )
         end = match.end()
     return said + MARKUP.sub(r"\\\1", text[end:])
 
@@ -142,13 +211,23 @@ def pages_by_command(source: Path) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
     for path in sorted(source.rglob("*.md")):
         page = path.relative_to(source)
-        if page.parts[0] in ("howto", "tutorials", "reference") and page.parent != FOLDER:
+        if (
+            page.parts[0] in ("howto", "tutorials", "reference")
+            and page.parent != FOLDER
+        ):
             for name in sorted(set(USED.findall(path.read_text("utf-8")))):
-                found.setdefault(name, []).append(f"/{page.with_suffix('').as_posix()}")
+                found.setdefault(name, []).append(
+                    f"/{page.with_suffix('').as_posix()}"
+                )
     return found
 
 
 def used_in(pages: list[str]) -> Iterator[str]:
     """Give the lines that lead to the pages on which a command is used."""
     if pages:
-        yield from ("## Used in", "", *(f"- {{doc}}`{page}`" for page in pages), "")
+        yield from (
+            "## Used in",
+            "",
+            *(f"- {{doc}}`{page}`" for page in pages),
+            "",
+        )

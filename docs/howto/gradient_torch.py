@@ -18,9 +18,16 @@ class Peak(torch.autograd.Function):
     @staticmethod
     def forward(context, samples):
         """Simulate; keep the derivatives for the way back."""
-        response = rocking.simulate(BLOCK, rocking.Motion.from_samples(samples.detach().cpu().numpy(), STEP))
+        response = rocking.simulate(
+            BLOCK,
+            rocking.Motion.from_samples(samples.detach().cpu().numpy(), STEP),
+        )
         found = rocking.gradient(response)
-        context.save_for_backward(torch.as_tensor(found.samples, dtype=samples.dtype, device=samples.device))
+        context.save_for_backward(
+            torch.as_tensor(
+                found.samples, dtype=samples.dtype, device=samples.device
+            )
+        )
         return samples.new_tensor(found.value)
 
     @staticmethod
@@ -40,17 +47,25 @@ def record(parts):
 
 def main():
     """Print derivatives beside differences, and a descent; return them, and the peaks along it."""
-    parts = torch.tensor([0.5, 1.4, 2.4, -1.0], dtype=torch.float64, requires_grad=True)
+    parts = torch.tensor(
+        [0.5, 1.4, 2.4, -1.0], dtype=torch.float64, requires_grad=True
+    )
     height = Peak.apply(record(parts))
     (found,) = torch.autograd.grad(height, parts)
     h = 1e-5
     differences = [
-        (Peak.apply(record(parts.detach() + h * e)) - Peak.apply(record(parts.detach() - h * e))).item() / (2.0 * h)
+        (
+            Peak.apply(record(parts.detach() + h * e))
+            - Peak.apply(record(parts.detach() - h * e))
+        ).item()
+        / (2.0 * h)
         for e in torch.eye(4, dtype=torch.float64)
     ]
     print(f"peak rotation {height.item():.6f} rad")
     for slope, difference in zip(found, differences, strict=True):
-        print(f"by an amplitude: {slope:+.8f} rad per m/s^2, by differences {difference:+.8f}")
+        print(
+            f"by an amplitude: {slope:+.8f} rad per m/s^2, by differences {difference:+.8f}"
+        )
 
     optimiser = torch.optim.SGD([parts], lr=1.0)
     peaks = []
@@ -60,7 +75,10 @@ def main():
         height.backward()
         optimiser.step()
         peaks.append(height.item())
-    print("a descent along the gradient, peaks in rad:", ", ".join(f"{each:.5f}" for each in peaks))
+    print(
+        "a descent along the gradient, peaks in rad:",
+        ", ".join(f"{each:.5f}" for each in peaks),
+    )
     return found.numpy(), np.array(differences), peaks
 
 
