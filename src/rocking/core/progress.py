@@ -84,10 +84,10 @@ class Progress:
     """
 
     def __init__(self, what: str, total: int, *, show: bool | None = None, done: int = 0) -> None:
-        self._what, self._total = what, total
+        self.what, self.total = what, total
         self._show = (_listener.audience != "nobody" and sys.stderr.isatty()) if show is None else show
         self._start = time.monotonic()
-        self._before = self._done = done
+        self._before = self.done = done
         self._bar: rich.progress.Progress | None = None
 
     def __enter__(self) -> Progress:
@@ -101,20 +101,20 @@ class Progress:
 
     def note(self, text: str) -> None:
         """Show a few words behind what is being done."""
-        self._what = f"{self._what.partition(',')[0]}, {text}"
+        self.what = f"{self.what.partition(',')[0]}, {text}"
         if self._bar is not None:
-            self._bar.update(self._bar.task_ids[0], description=self._what)
+            self._bar.update(self._bar.task_ids[0], description=self.what)
 
     def advance(self, steps: int = 1) -> None:
         """Count steps that are done."""
-        self._done += steps
+        self.done += steps
         if not self._show or time.monotonic() - self._start < _PATIENCE:
             return
         if self._bar is None:
-            self._bar = _started(self._what, self._total)
-        rate = (self._done - self._before) / (time.monotonic() - self._start)
-        left = f"{timedelta(seconds=round(max(self._total - self._done, 0) / rate))} left" if rate else ""
-        self._bar.update(self._bar.task_ids[0], completed=self._done, rate=f"{rate:.3g}/s", left=left)
+            self._bar = _started(self.what, self.total)
+        rate = (self.done - self._before) / (time.monotonic() - self._start)
+        left = f"{timedelta(seconds=round(max(self.total - self.done, 0) / rate))} left" if rate else ""
+        self._bar.update(self._bar.task_ids[0], completed=self.done, rate=f"{rate:.3g}/s", left=left)
 
 
 def _started(what: str, total: int) -> rich.progress.Progress:
