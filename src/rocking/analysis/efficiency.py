@@ -110,7 +110,7 @@ def compare_measures(
     ['PGA 0.67', 'PGV 0.02', 'SA(1 s) 0.01', 'PGA / uplift acceleration 0.67', 'p PGV / uplift acceleration 0.02']
     """
     many, shaken = bodies_of(blocks), several_motions(motions)
-    slenderness_of(many)  # Raise errors before the simulations.
+    slenderness_of(many)  # raise errors before the simulations
     shares = normalised_weights(weights, len(many))
     if len(shaken) < 2:
         raise InvalidOption("measures are compared by how {} scatter: give two or more, not one", "motions")

@@ -506,10 +506,12 @@ def fit_fragility(
     Notes
     -----
     The likelihood of P = Phi(ln(x/median)/dispersion) is that of independent binomial counts (Baker 2015).
+
     References
     ----------
     Baker, J. W. (2015). Efficient analytical fragility function fitting using dynamic structural analysis. Earthquake
     Spectra 31(1), 579-599.
+
     Examples
     --------
     >>> curve = fit_fragility([2.0, 3.0, 4.0, 5.0], [1, 4, 7, 10], trials=10).curves[0]

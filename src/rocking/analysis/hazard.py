@@ -245,7 +245,7 @@ def _from_table(lines: list[str], period: float | None) -> tuple[Floats, Floats,
     if (kind == "sa") != (period is not None):
         raise InvalidOption(f"{{}} (s) is for a spectral acceleration, and needed there; it is {kind}", "period")
     measure = Measure("sa", period) if kind == "sa" else Measure(kind)
-    with np.errstate(over="ignore"):  # Infinite values are rejected later.
+    with np.errstate(over="ignore"):  # infinite values are rejected later
         return factor * intensity, rate, measure
 
 
@@ -295,7 +295,7 @@ def log_parts(fits: Probit, hazard: HazardCurve) -> Floats:
     from scipy.special import erfcx, ndtr
 
     k, log_c = (_extended(values) for values in powers(hazard))
-    corners = np.concatenate([[-np.inf], np.log(hazard.intensity), [np.inf]])  # Ends of the segments and of the extrapolations.
+    corners = np.concatenate([[-np.inf], np.log(hazard.intensity), [np.inf]])  # ends of segments
     ends = corners[:-1], corners[1:]
     a, b = (values[:, None] for values in fits)
     with np.errstate(all="ignore"):

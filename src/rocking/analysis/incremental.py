@@ -110,6 +110,7 @@ def incremental_dynamic_analysis(
     ----------
     Vamvatsikos, D. and Cornell, C. A. (2002). Incremental dynamic analysis. Earthquake Engineering and Structural
     Dynamics 31(3), 491-514.
+
     Examples
     --------
     A one-sine pulse overturns this block in two bands:
@@ -189,7 +190,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         part = super()._table(name)
         if name == "levels":
             return part
-        at = self.data.band_motion.values  # The names of the other table permit a join.
+        at = self.data.band_motion.values  # the names of the other table permit a join
         labels = {
             name: ("band", self.data[name].values[at])
             for name in ("motion", "vertical", "record")

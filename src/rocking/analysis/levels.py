@@ -116,7 +116,7 @@ def normalised_weights(weights: ArrayLike | None, count: int) -> Floats:
     given = checks.numbers(weights, "weights", InvalidOption)
     if given.shape != (count,) or not (np.all(np.isfinite(given) & (given >= 0.0)) and np.any(given > 0.0)):
         raise InvalidOption(f"{{}} must be {count} numbers of 0 or more, not all 0, one for each block", "weights")
-    given = given / given.max()  # Otherwise sums of very large or very small weights overflow.
+    given = given / given.max()  # otherwise sums of very large or very small weights overflow
     return np.asarray(given * (count / given.sum()))
 
 
@@ -203,7 +203,7 @@ def simulate_levels(
     for group in groups:
         scaled = {"levels": levels * units[group[0]], "measure": measure.alone}
         part = simulate_many(blocks.select(group), motions, model=model, **scaled, **options)
-        part = part.drop_vars(body_coordinates(blocks.select(group)))  # Coordinates of blocks are added to the complete dataset.
+        part = part.drop_vars(body_coordinates(blocks.select(group)))  # added to the whole
         parts.append(part.assign_coords(scale=("scale", levels, {"measure": measure.name, "units": measure.units})))
     whole = xr.concat(parts, "block", data_vars="all", coords="minimal", compat="override", join="override")
     ordered = whole.isel(block=np.argsort(np.concatenate(groups))).rename(scale="level")
@@ -248,7 +248,7 @@ def outcomes_of(
     import pandas as pd
 
     def along(values: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-        return np.broadcast_to(values, ratio.shape).ravel()  # Order: level, motion, block, polarity.
+        return np.broadcast_to(values, ratio.shape).ravel()  # order: level, motion, block, polarity
 
     signs = table.polarity.values if "polarity" in table.coords else np.array(["+"])
     motions = [name for name in ("motion", "vertical") if name in table.coords]

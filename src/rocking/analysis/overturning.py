@@ -143,6 +143,7 @@ def overturning_map(
     ----------
     Zhang, J. and Makris, N. (2001). Rocking response of free-standing blocks under cycloidal pulses. Journal of
     Engineering Mechanics 127(5), 473-483.
+
     Examples
     --------
     The half sine of frequency 2 p that just overturns a slender block:

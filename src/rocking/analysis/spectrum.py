@@ -106,6 +106,7 @@ def rocking_spectrum(
     ----------
     Makris, N. and Konstantinidis, D. (2003). The rocking spectrum and the limitations of practical design
     methodologies. Earthquake Engineering and Structural Dynamics 32(2), 265-289.
+
     Examples
     --------
     >>> import rocking
@@ -151,7 +152,7 @@ def rocking_spectrum(
 
 def fractiles_of(peaks: Floats, shares: Floats) -> Floats:
     """Interpolate fractiles (k, ...) of peaks (n, ...) without NaN; infinite if either neighbour is."""
-    ordered = np.sort(peaks, axis=0)  # NaN are last.
+    ordered = np.sort(peaks, axis=0)  # NaN are last
     known = np.maximum(np.count_nonzero(~np.isnan(peaks), axis=0), 1)
     place = shares.reshape(-1, *[1] * known.ndim) * (known - 1)
     # Rounding must not select the next higher value, which may be infinite: 0.28 * 25 > 7.

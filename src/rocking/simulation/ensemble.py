@@ -114,7 +114,7 @@ class Scales:
             factors = self.values / (self.measure or FACTOR).positive(motion, motion.name)
             largest = factors.max() * np.abs(motion.coefficients).max()
         if not largest <= STRONGEST:
-            motion.scaled(float(factors.max()))  # Raises an error if the scaled motion is too strong, not only if it is too steep.
+            motion.scaled(float(factors.max()))  # raises for too strong motions, not only steep ones
         return factors
 
 
@@ -156,7 +156,7 @@ class Product:
 
     def __post_init__(self) -> None:
         checks.one_of(self.polarity, "polarity", InvalidOption, list(SIGNS))
-        settings_of(self.bodies, self.model, self.treatment, self.duration, record=False)  # Check the options before the simulations.
+        settings_of(self.bodies, self.model, self.treatment, self.duration, record=False)  # raises before the work
         for motion in self.motions:
             check_components(self.bodies, motion)
 

@@ -113,7 +113,7 @@ def response_to(
     """Compute a response like `simulate`; `name` denotes the initial coordinate in messages."""
     how, alone, motion = treatment(chattering), one_body(block).alone(), one_motion(motion)
     setup, ground = Setup(alone, model, how, duration, initial), None
-    if factor != 1.0:  # Repeated simulations leave the cache unchanged.
+    if factor != 1.0:  # repeated simulations leave the cache unchanged
         ground = ground_of.__wrapped__(motion, block.gravity, factor)
     run = setup.run(motion, factor, record=True, ground=ground, name=name)
     if factor != 1.0:
