@@ -1,7 +1,7 @@
 """Exceptions of the package: a base class, and a subclass for each kind of invalid input.
 
-Every message is one sentence that names the fault, its location, and the remedy. This information is also available as
-data, so that no code needs to parse a message.
+Every message is one sentence that names the fault, its location, and the remedy. The same information is available as
+attributes.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Message:
     Attributes
     ----------
     template : str
-        Sentence, in which each "{}" represents the name of an argument, as long as there are names.
+        Sentence with a "{}" for each argument. Surplus ones remain.
     arguments : tuple of str
         Names in their order.
     """
@@ -79,7 +79,7 @@ class RockingError(Exception):
     Parameters
     ----------
     message : str
-        One sentence; each "{}" represents one of `arguments`.
+        Sentence with a "{}" for each of `arguments`.
     *arguments : str
         Names of the arguments in the sentence, the invalid one first.
     path, line : str, int, optional
@@ -119,7 +119,7 @@ class RockingError(Exception):
         return self.message.arguments[0] if self.message.arguments else None
 
     def text(self, spelling: Spelling = as_argument) -> str:
-        """Return file, line and sentence in one line; `spelling` formats the names of arguments."""
+        """Return file, line and sentence in one line, with names as written by ``spelling``."""
         if self.path is None:
             return self.message.text(spelling)
         path = _shortened(self.path)
@@ -135,7 +135,7 @@ class InvalidBlock(RockingError):
 
 
 class UnequalSides(InvalidBlock, AttributeError):
-    """A property of one value was requested for a block with unequal sides; use `Block.sides`."""
+    """A property of one value was requested for a block with unequal sides (see `Block.sides`)."""
 
 
 class InvalidMotion(RockingError):
@@ -156,7 +156,7 @@ class Unfitted(InvalidOption):
     Attributes
     ----------
     outcomes : pandas.DataFrame or None
-        All simulations, as in `Fragility.outcomes`; None without simulations.
+        All simulations, as in `Fragility.outcomes`, or None.
     """
 
     outcomes: pd.DataFrame | None = None

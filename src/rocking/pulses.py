@@ -1,11 +1,11 @@
 """Analytic ground motions: rectangles and triangles, sines, lobes, Ricker and Mavroeidis-Papageorgiou pulses.
 
-The pieces of each `Motion` approximate the formula to 1e-15 of the largest acceleration (`Motion.error`); straight
+The pieces of each `Motion` approximate the formula to 1e-15 of the largest acceleration (`Motion.error`). Straight
 lines are exact. Pulses start at time 0, are zero after their end, and can be added with ``+``.
 
 A piece is a Taylor series about its midpoint, moved to its start, and so short that the first neglected term is below
-1e-16 of the amplitude. Large angles are computed without rounding: products and quotients include their errors, and
-whole turns are subtracted exactly. Numbers that are not finite or out of range raise `InvalidMotion`.
+1e-16 of the amplitude. Large angles are not rounded, because products and quotients include their errors and whole
+turns are subtracted exactly. Numbers that are not finite or out of range raise `InvalidMotion`.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ _GAUSSIAN_DEGREE: Final = 15
 
 
 def rectangular(amplitude: float, duration: float) -> Motion:
-    """Return a constant acceleration; exact.
+    """Return a constant acceleration (exact).
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def rectangular(amplitude: float, duration: float) -> Motion:
 
 
 def triangular(amplitude: float, duration: float) -> Motion:
-    """Return an acceleration that rises linearly to its amplitude and falls to zero in equal times; exact.
+    """Return an acceleration that rises linearly to its amplitude and falls to zero in equal times (exact).
 
     Parameters
     ----------
@@ -314,7 +314,7 @@ def ricker(
 
     With t measured from the middle of the motion and f the frequency, the symmetric pulse is ``amplitude (1 - x^2)
     exp(-x^2 / 2)``, ``x = sqrt(2) pi f t``, and the antisymmetric one ``(amplitude / beta) (x^2 - 3) x exp(-x^2 / 2)``,
-    ``x = 2 pi f t / sqrt(3)``, where beta = 1.3801... scales its peak (before the middle) to `amplitude`.
+    ``x = 2 pi f t / sqrt(3)``, in which beta = 1.3801... scales its peak (before the middle) to `amplitude`.
 
     Parameters
     ----------
@@ -323,7 +323,7 @@ def ricker(
     kind : {"symmetric", "antisymmetric"}
         Second or third derivative of a Gaussian.
     duration : float, optional
-        Length of the motion, s. By default the pulse is cut on both sides where it falls below 1e-16 of its peak.
+        Length of the motion, s. By default the pulse ends on both sides at 1e-16 of its peak.
 
     Returns
     -------
@@ -371,14 +371,14 @@ def ricker(
 def mavroeidis_papageorgiou(amplitude: float, frequency: float, *, phase: float, gamma: float) -> Motion:
     """Return the near-fault pulse of Mavroeidis and Papageorgiou (2003).
 
-    Its ground velocity is ``v(t) = (amplitude / 2) [1 + cos(2 pi f s / gamma)] cos(2 pi f s + phase)``, with f the
+    The ground velocity is ``v(t) = (amplitude / 2) [1 + cos(2 pi f s / gamma)] cos(2 pi f s + phase)``, with f the
     frequency and ``s = t - gamma / (2 f)`` measured from the middle. The motion is its derivative::
 
         -(amplitude pi f / gamma) [ sin(2 pi f s / gamma) cos(2 pi f s + phase)
                                     + gamma sin(2 pi f s + phase) (1 + cos(2 pi f s / gamma)) ].
 
-    Note that `amplitude` is a velocity. Use ``.scaled_to(level)`` for a given acceleration. The motion starts from
-    rest, so that its velocity equals v(t), which is zero at both ends.
+    The `amplitude` is a velocity. Use ``.scaled_to(level)`` for a given acceleration. The velocity v(t) is zero at both
+    ends.
 
     Parameters
     ----------

@@ -54,7 +54,7 @@ class Rating:
     demand, capacity : ndarray, shape (n,)
         Demand and capacity of the weaker side of each block.
     unit : str
-        Unit of demand and capacity; "1" if dimensionless.
+        Unit of demand and capacity, "1" if dimensionless.
 
     See Also
     --------
@@ -136,7 +136,7 @@ def _rule(unit: str, example: str) -> Callable[[Comparison], Rule]:
 
 
 def _free(blocks: Blocks | Block | Iterable[Block]) -> Blocks:
-    """Combine blocks; raise an error if they have restraints."""
+    """Combine blocks, or raise an error if they have restraints."""
     many = Blocks.of(blocks)
     for each in many if many.terms else ():
         one_block(each)
@@ -184,7 +184,7 @@ def ishiyama(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     Notes
     -----
     V = 2 g sin(alpha/2)/(p cos(alpha)) is the sudden velocity of the ground after which a block at rest just reaches
-    its balance point. For a rectangle this is Ishiyama's V^2 = 8 g R (1 - cos(alpha))/(3 cos(alpha)^2), and 0.4 V is
+    its balance point. For a rectangle it equals Ishiyama's V^2 = 8 g R (1 - cos(alpha))/(3 cos(alpha)^2), and 0.4 V is
     close to 10 B/sqrt(H) cm/s, with width B and height H in cm. The factor 0.4 comes from his simulations. Both
     criteria are lower limits.
 
@@ -258,11 +258,11 @@ def asce_43_05(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     -----
     For a rotation theta_0, with a = tan(alpha), f_1 = cos(theta_0) + a sin(theta_0) - 1 and C_I = I/(m h^2):
 
-    - capacity 2 g f_1/theta_0: a steady acceleration raises the block up to theta_0 with the work m g h f_1, which is
-      equated to the work of a spring;
+    - capacity 2 g f_1/theta_0, from the work m g h f_1 that raises the block to theta_0, equated to the work of a
+      spring;
     - frequency (1/2 pi) sqrt(2 f_1 g/(C_I theta_0^2 h)) = (p/2 pi) sqrt(2 f_1 cos(alpha))/theta_0;
     - damping gamma/sqrt(4 pi^2 + gamma^2), gamma = -2 ln C_R: the oscillator loses in one cycle as much as the block in
-      two impacts. C_R is the block's restitution; the standard's 1 - 2 a^2/C_I is Housner's.
+      two impacts. C_R is the block's restitution. The standard's 1 - 2 a^2/C_I is Housner's.
 
     The rocking angle is the largest at which the spectrum equals the capacity. If the spectrum exceeds the capacity at
     the balance point, theta_0 = alpha, the block overturns by this method. The standard's correction for vertical
@@ -284,7 +284,7 @@ def priestley(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     -------
     Rating
         Spectral displacement and displacement of the block's centre of mass, m, at the rotation below the balance point
-        with the smallest ratio. For a ratio below 1 the method yields a rocking angle; otherwise the block overturns.
+        with the smallest ratio. The block rocks below a ratio of 1 and otherwise overturns.
 
     Raises
     ------
@@ -358,7 +358,7 @@ def rate(
 
 
 class _Oscillator(NamedTuple):
-    """Equivalent oscillators for one side of a block at several rotations; demands are for a spectrum of 1 m/s^2."""
+    """Equivalent oscillators for one side of a block at several rotations, with demands for a spectrum of 1 m/s^2."""
 
     periods: Floats
     damping: float

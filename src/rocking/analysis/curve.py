@@ -47,13 +47,12 @@ class FragilityCurve:
     limit_state : str
         Name of the limit state.
     limit : float or None
-        Limit of the ratio of peak rotation to slenderness, infinite for overturning; None for outcomes from other
-        sources.
+        Limit of the ratio of peak rotation to slenderness, infinite for overturning, or None for given outcomes.
     intensity, exceeded, trials : ndarray, shape (n,)
         Data: number of outcomes that exceeded, and of trials, at each intensity. Weights of blocks lead to fractional
         numbers.
     clusters : int
-        Number of clusters of dependent outcomes: of motions for simulations, otherwise of outcomes if independent.
+        Number of clusters of dependent outcomes (of motions for simulations).
     independent : bool
         Whether all outcomes are independent, as required by tests without clusters.
     fitted : Probit
@@ -70,7 +69,7 @@ class FragilityCurve:
     goodness : Goodness
         Pearson's test of groups of outcomes against the fit: one group for each intensity if each has five outcomes or
         more (stripes), otherwise up to ten of equal size along the intensity (cloud; Hosmer and Lemeshow). The test
-        assumes independent outcomes; with clusters of several outcomes there is no p-value.
+        assumes independence, and has no p-value for clusters of several outcomes.
 
     See Also
     --------
@@ -120,19 +119,19 @@ class FragilityCurve:
 
     @property
     def bounded(self) -> bool:
-        """Whether the intervals are finite in principle; false for fewer than three clusters of several outcomes."""
+        """Whether intervals can be finite, which requires three clusters if they contain several outcomes."""
         return bool(np.all(np.isfinite(self.region.intercept)))
 
     @property
     def median_interval(self) -> tuple[float, float]:
-        """Confidence interval of the median; 0 or infinite if the data allow a curve that does not rise."""
+        """Confidence interval of the median, 0 or infinite if the data allow a curve that does not rise."""
         low, high = extremes(self.region, _log_medians)
         with np.errstate(over="ignore"):
             return float(np.exp(low[0])), float(np.exp(high[0]))
 
     @property
     def dispersion_interval(self) -> tuple[float, float]:
-        """Confidence interval of the dispersion; infinite if the data allow a curve that does not rise."""
+        """Confidence interval of the dispersion, infinite if the data allow a curve that does not rise."""
         return _dispersion(float(self.region.slope.max())), _dispersion(float(self.region.slope.min()))
 
     def probability(self, intensity: ArrayLike) -> Floats:
@@ -153,10 +152,10 @@ class FragilityCurve:
             return float(np.exp((score - self.fitted.intercept[0]) / self.fitted.slope[0]))
 
     def largest_rate(self, intensity: ArrayLike, years: float, confidence: float = 0.95) -> Floats:
-        """Compute the largest annual rates of motions of an intensity or more that a standing block permits.
+        """Compute the largest annual rates of exceeding an intensity that are consistent with survival.
 
         The rates are -ln(1 - confidence)/(years P(intensity)), with the shape of the intensities (SI units, 0 or more),
-        and infinite at 0. They contradict any hazard curve above them if a precarious rock has stood for so many years.
+        and infinite at 0. A precarious rock that has stood for so long contradicts hazard curves above them.
         """
         time = checks.positive(years, "years", InvalidOption)
         share = checks.share(confidence, "confidence", InvalidOption)
@@ -174,7 +173,7 @@ class FragilityCurve:
         return low, high
 
     def to_dict(self) -> dict[str, Any]:
-        """Return parameters, intervals and tests by name; intensities are in SI units or a block's own."""
+        """Return parameters, intervals and tests by name, with intensities in SI units or a block's own."""
         return {
             "limit_state": self.limit_state,
             "median": self.median,
@@ -200,7 +199,7 @@ def fitted_curve(
     measure: Measure,
     limit: float | None = None,
 ) -> FragilityCurve:
-    """Fit the curve of a limit state; without clusters all trials are independent."""
+    """Fit the curve of a limit state. Without clusters all trials are independent."""
     intensity, exceeded, trials = data
     intensity = probit.merge_equal_intensities(intensity)
     # Both are sums of the same weights, but perhaps in a different order.
@@ -278,7 +277,7 @@ def in_units(intensity: float, measure: Measure) -> str:
 
 
 def interval_text(ends: Sequence[float], digits: int, bounds: tuple[float, float] = (0.0, math.inf)) -> str:
-    """Format an interval; finite ends outside the bounds are replaced by the bounds."""
+    """Format an interval, with bounds in place of finite ends beyond them."""
     text = f"{{:.{digits}g}}".format
     return " to ".join("infinity" if math.isinf(end) else within(end, bounds if end else (0, 0), text) for end in ends)
 
@@ -290,7 +289,7 @@ def median_text(curve: FragilityCurve, scale: float) -> str:
 
 
 def _log_medians(fits: Probit) -> Floats:
-    """Logarithms of medians, shape (fits, 1); -inf or inf for level curves above or below one half."""
+    """Logarithms of medians, shape (fits, 1), -inf or inf for level curves above or below one half."""
     with np.errstate(divide="ignore", invalid="ignore"):
         sloping = -fits.intercept / fits.slope
     return np.where(fits.slope > 0.0, sloping, np.where(fits.intercept > 0.0, -np.inf, np.inf))[:, None]
@@ -365,7 +364,7 @@ def check_names(names: Iterable[str], what: str) -> None:
 
 
 def openquake_measure(measure: Measure, block: Body | None, model: Model) -> tuple[str, float]:
-    """Return OpenQuake's measure, and the factor from SI units or the block's own (PGA, SA: g; PGV: cm/s).
+    """Return OpenQuake's measure, and the factor from SI units or the block's own (g, or cm/s for PGV).
 
     SA(T) does not state its damping, which is the damping of ground-motion models.
     """

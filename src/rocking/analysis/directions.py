@@ -53,7 +53,7 @@ def response_rose(
 ) -> ResponseRose:
     """Simulate a body in the plane of every azimuth under the ground motion along it.
 
-    Each azimuth is a separate simulation in one vertical plane; motion across the plane is neglected.
+    Each azimuth is a separate simulation in one vertical plane, without the motion across it.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def response_rose(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ResponseRose(DatasetResult):
-    """Responses of a body in the plane of each azimuth; from `response_rose`.
+    """Responses of a body in the plane of each azimuth, computed by `response_rose`.
 
     The figure shows the share of pairs that overturn the body over the full circle, for up to four levels.
 
@@ -239,7 +239,7 @@ class ResponseRose(DatasetResult):
 
 
 def _named_pairs(pairs: Pairs) -> dict[str, Pair]:
-    """Return pairs by name; raise an error for anything that is not a pair of motions."""
+    """Return pairs by name, or raise an error if one is not a pair of motions."""
     given = [*pairs.values()] if isinstance(pairs, Mapping) else checks.several(pairs, "pairs", InvalidOption)
     found = [several_motions(pair) for pair in given if not isinstance(pair, Motion)]
     if not found or len(found) < len(given) or any(len(components) != 2 for components in found):

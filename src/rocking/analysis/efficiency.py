@@ -79,8 +79,8 @@ def compare_measures(
     Raises
     ------
     InvalidOption
-        If an argument is out of range, fewer than two motions (or motions of two clusters) are available or overturn a
-        block, or a block never comes to rest.
+        If an argument is out of range, fewer than two motions or clusters are available or overturn a block, or a block
+        never comes to rest.
     InvalidMotion
         If a motion is zero throughout.
 
@@ -92,11 +92,10 @@ def compare_measures(
     Notes
     -----
     Every motion is scaled up in steps of 5 % until it overturns the block (`incremental_dynamic_analysis`). The
-    standard deviation beta of the logarithm of its intensity at this level over the motions is the dispersion of the
-    fragility. A smaller beta means a more efficient measure. The interval of beta assumes a normal sample. For several
-    blocks, beta is pooled from the deviations from each block's mean, with the degrees of freedom of the motions or
-    clusters. Only the first of several motions that are multiples of one another counts. If the sides of a block
-    differ, reversed motions count as well.
+    standard deviation beta of the logarithm of this intensity over the motions is the dispersion of the fragility.
+    Efficient measures have a small beta. The interval of beta assumes a normal sample. For several blocks, beta is
+    pooled from the deviations from each block's mean, with the degrees of freedom of the motions or clusters. Only the
+    first of motions that are multiples of one another counts, and reversed ones as well if the sides of a block differ.
 
     Examples
     --------
@@ -139,17 +138,17 @@ def compare_measures(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MeasureComparison(DatasetResult):
-    """Comparison of intensity measures; from `compare_measures`.
+    """Comparison of intensity measures, computed by `compare_measures`.
 
     Figure and summary list the dispersion of each measure with its interval, the most efficient first.
 
     Attributes
     ----------
     data : xarray.Dataset
-        Over (measure, motion, block): intensity, the lowest that overturns, in the measure's unit; NaN if none does.
-        Over (measure): median_intensity; dispersion (standard deviation of the logarithm about each block's mean) with
-        its 90 % interval, dispersion_low and dispersion_high; dispersion_of_all, about a common mean of all blocks;
-        unit. Attributes: damping of the spectral accelerations, and sample, the number of motions.
+        Over (measure, motion, block): intensity, the lowest that overturns, in the measure's unit, or NaN. Over
+        (measure): median_intensity, unit, dispersion (standard deviation of the logarithm about each block's mean) with
+        its 90 % interval dispersion_low and dispersion_high, and dispersion_of_all (about a common mean). Attributes:
+        damping of the spectral accelerations, and sample, the number of motions.
 
     See Also
     --------

@@ -68,7 +68,7 @@ _POINTS: Final = 201
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Fragility(Result):
-    """Fragility curves of one or more limit states for one intensity measure; from `fragility`.
+    """Fragility curves of one or more limit states for one intensity measure, computed by `fragility`.
 
     Tables: "curves" and, for simulated blocks, "outcomes". The figure contains curves, bands and observed shares.
 
@@ -79,21 +79,21 @@ class Fragility(Result):
     measure : Measure
         Intensity measure. Intensities are in its SI units.
     description, model : str
-        Description of the simulations or observations; equation of motion, on which a block's own unit depends.
+        Description of the data, and equation of motion, which affects a block's own unit.
     block : Block or None
         Block, if there is only one.
     outcomes : pandas.DataFrame or None
-        Row for each simulation: motion, block (position), polarity, the measure (SI, for example pga_m_s2),
-        peak_rotation_rad, peak_over_alpha (infinite: overturned, NaN: unfinished), overturned, unfinished, whether each
-        limit state was exceeded, and the weight of the block if any. None for outcomes from other sources.
+        All simulations: motion, block (position), polarity, the measure (SI, for example pga_m_s2), peak_rotation_rad,
+        peak_over_alpha (infinite: overturned, NaN: unfinished), overturned, unfinished, whether each limit state was
+        exceeded, and the weight of the block if any. None for outcomes from other sources.
     one_way, with_vertical, several_blocks : bool
-        Whether blocks with unequal sides were simulated in one polarity only, vertical motions were included, and
-        outcomes of several blocks are pooled.
+        Whether unequal sides were simulated in one polarity only, vertical motions were included, and several blocks
+        are pooled.
     source : str
         Meaning of a cluster of outcomes: "motion" or "cluster".
     undecided, missing : str
-        Number of outcomes in a sample that change within 3e-6 of the motion, and number of abandoned simulations, which
-        the curves exclude; empty if zero.
+        Number of outcomes in a sample that change within 3e-6 of the motion, and of abandoned (excluded) simulations,
+        or empty.
 
     See Also
     --------
@@ -273,9 +273,9 @@ class Fragility(Result):
     ) -> None:
         """Write the curves as an OpenQuake fragility model (NRML 0.5).
 
-        Lognormals are written by mean and standard deviation of the intensity (PGA and SA in g, PGV in cm/s, measures
-        in a block's own unit as PGA or PGV of that block). For PGA the no-damage limit is the uplift acceleration,
-        unless a vertical motion, which lowers it, was simulated.
+        Lognormals are written by mean and standard deviation of the intensity (PGA and SA in g, PGV in cm/s, a block's
+        own units as its PGA or PGV). For PGA the no-damage limit is the uplift acceleration, unless it is lowered by a
+        simulated vertical motion.
 
         Parameters
         ----------
@@ -284,7 +284,7 @@ class Fragility(Result):
         taxonomy : str
             Identifier of the function in the exposure model.
         block : Block, optional
-            Block that defines the unit of a dimensionless measure, for curves of several blocks.
+            Block for the unit of a dimensionless measure, for curves of several blocks.
         model_id, loss_category, asset_category : str
             Attributes of the model. The category is structural, nonstructural, contents or business_interruption.
 
@@ -346,8 +346,8 @@ def fragility(
     Parameters
     ----------
     blocks : Blocks, Block, RestrainedBlock or sequence of one kind
-        One block, or several with pooled outcomes, for example an ensemble with `weights` that represents one block (as
-        in `Calibration.fragility`).
+        One block, or several with pooled outcomes, for example a weighted ensemble for one block
+        (`Calibration.fragility`).
     motions : optional
         As for `simulate_many`: m motions.
     measure : {"pga", "pgv", "pga_ratio", "pgv_ratio"} or Measure
@@ -365,8 +365,8 @@ def fragility(
     weights : array_like, optional
         Weights of the blocks' outcomes, equal by default. Blocks of weight 0 are simulated but not used in the fit.
     clusters : "station" or array_like of labels, shape (m,), optional
-        Labels of dependent motions, for intervals. By default motions are independent except for multiples of one
-        another. "station" combines components of one station in one earthquake according to their file names.
+        Labels of dependent motions, for intervals. By default only multiples of one another are dependent. "station"
+        combines components of one station and earthquake by their file names.
     confidence : float
         Probability of the intervals and bands, between 0 and 1.
     threads, progress : optional
@@ -474,13 +474,13 @@ def fit_fragility(
     intensity : array_like, shape (n,)
         Positive intensities, in SI units.
     exceeded : array_like, shape (n,), or mapping of str to array_like
-        Whether the limit ("overturning" by default) was exceeded at each intensity, or number of trials that exceeded
-        it; or a mapping from names of limit states to such arrays.
+        Whether the limit (default: "overturning") was exceeded, or in how many trials. A mapping contains several limit
+        states.
     trials : array_like
         Number of trials at each intensity.
     clusters : array_like of labels, shape (n,), optional
-        Labels of dependent outcomes (for example of the same motion), for the bands. By default, and for labels NaN,
-        None or empty, outcomes are independent. Fewer than three clusters of several outcomes yield no finite bounds.
+        Labels of dependent outcomes (for example of one motion), for the bands. By default, and for labels NaN, None or
+        empty, outcomes are independent. Fewer than three clusters of several outcomes have no finite bounds.
     measure, confidence : optional
         As for `fragility`.
     block : Block, optional
@@ -496,8 +496,8 @@ def fit_fragility(
     Raises
     ------
     InvalidOption
-        If an argument is out of range, or no rising lognormal fits best: the outcomes are all equal, separated, at one
-        intensity, or not more frequent at higher intensities, or the median is above 1000 times every intensity.
+        If an argument is out of range, or no rising lognormal fits best: all outcomes are equal, separated, at one
+        intensity, or not more frequent at higher ones, or the median is above 1000 times every intensity.
 
     See Also
     --------
@@ -505,7 +505,7 @@ def fit_fragility(
 
     Notes
     -----
-    The likelihood of P = Phi(ln(x/median)/dispersion) is that of independent binomial counts (Baker 2015).
+    The likelihood of P = Phi(ln(x/median)/dispersion) assumes independent binomial counts (Baker 2015).
 
     References
     ----------

@@ -115,9 +115,9 @@ class HazardCurve(Result):
         path : str or Path
             CSV file. The heading of a table names the intensity with its units (pga_g, pga_percent_g, pga_m_s2,
             pgv_m_s, pgv_cm_s, sa_g, sa_percent_g or sa_m_s2; "PGA (g)" is equivalent to pga_g) and the rate
-            (annual_rate). The separator is a comma, or a semicolon if numbers have decimal commas. The first line of
-            OpenQuake's ``hazard_curve-...csv`` describes the file; its probabilities of exceedance in T years are
-            converted to rates by -ln(1 - probability)/T.
+            (annual_rate). The separator is a comma, or a semicolon if numbers have decimal commas. OpenQuake's
+            ``hazard_curve-...csv`` is self-describing. Its probabilities of exceedance in T years become rates by -ln(1
+            - probability)/T.
         site : int
             Row of OpenQuake's file. A table has only one site.
         period : float, optional
@@ -153,7 +153,7 @@ class HazardCurve(Result):
             raise
 
     def rate_of(self, intensity: ArrayLike) -> Floats:
-        """Compute annual rates of exceeding intensities (SI units, 0 or more), with their shape; infinite at 0.
+        """Compute annual rates of exceeding intensities >= 0 (SI units), with their shape, infinite at 0.
 
         The curve is extrapolated below its first and above its last point.
         """

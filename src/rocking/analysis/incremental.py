@@ -59,23 +59,22 @@ def incremental_dynamic_analysis(
     threads: int | None = None,
     progress: bool | None = None,
 ) -> IncrementalDynamicAnalysis:
-    """Scale motions until every block overturns and beyond; find the bands of levels that overturn.
+    """Scale motions beyond overturning of every block, and find the bands of levels that overturn.
 
-    A rocking block may survive a motion that is stronger than one that overturns it. Therefore, bands of levels that
-    overturn alternate with bands that do not.
+    A rocking block may survive a motion stronger than one that overturns it. Therefore bands of levels that overturn
+    alternate with others.
 
     Parameters
     ----------
     blocks, motions : optional
         As for `simulate_many`: n blocks, m motions.
     measure : {"pga", "pgv", "pga_ratio", "pgv_ratio"} or Measure
-        Intensity measure to which motions are scaled: peak acceleration (m/s^2); peak velocity (m/s); PGA or p PGV
-        normalised by each block's uplift acceleration; or spectral acceleration (m/s^2), for example
+        Intensity measure to which motions are scaled: peak acceleration (m/s^2), peak velocity (m/s), PGA or p PGV
+        normalised by each block's uplift acceleration, or spectral acceleration (m/s^2), for example
         ``rocking.Measure("sa", period=1.0)``.
     levels : array_like, optional
-        Increasing levels of the measure. By default, levels increase in steps of 5 % from the lowest level that lifts a
-        block to three times the level at which every motion has overturned every block, and at most to 490 times the
-        first level.
+        Increasing levels of the measure. By default from the lowest that lifts a block, in steps of 5 %, to three times
+        the level by which every motion has overturned every block, at most 490 times the first.
     model : {"nonlinear", "linear"}
         Equation of motion.
     tolerance : float
@@ -160,18 +159,17 @@ def incremental_dynamic_analysis(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class IncrementalDynamicAnalysis(DatasetResult):
-    """Blocks under scaled motions; from `incremental_dynamic_analysis`.
+    """Blocks under scaled motions, computed by `incremental_dynamic_analysis`.
 
     Attributes
     ----------
     data : xarray.Dataset
-        Over (motion, level, block): peak_rotation (rad; pi/2 where the block overturns), peak_over_alpha (normalised by
-        the smaller slenderness; infinite where the block overturns, NaN for abandoned simulations, which bands count as
-        not overturning) and overturned. Over (motion, block): overturning_level, the lowest level that overturns; NaN
-        if no level overturns, or if the first already does. Over (band): band_motion and band_block (positions),
-        band_start and band_end; NaN where the band extends beyond the levels. The attribute lowest_uplift is the lowest
-        level at which a motion lifts a block. The attribute undecided is the number of outcomes in a sample that change
-        within 3e-6 of the motion.
+        Over (motion, level, block): peak_rotation (rad, pi/2 for overturning), peak_over_alpha (normalised by the
+        smaller slenderness, infinite for overturning, NaN for abandoned simulations, which bands count as not
+        overturning) and overturned. Over (motion, block): overturning_level, the lowest that overturns, or NaN if none
+        or already the first does. Over (band): band_motion and band_block (positions), band_start and band_end, NaN
+        beyond the levels. Attributes: lowest_uplift, the lowest level that lifts a block, and undecided, the number of
+        outcomes in a sample that change within 3e-6 of the motion.
 
     See Also
     --------
@@ -202,7 +200,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
     def bands(self, *, block: int = 0, motion: int = 0) -> list[tuple[float, float]]:
         """Return start and end of the bands of levels that overturn a block under a motion, both by position.
 
-        Ends are in SI units or the block's own, and NaN where the band extends beyond the levels.
+        Ends are in SI units or the block's own, NaN beyond the levels.
         """
         m, b = self._position(motion, "motion"), self._position(block, "block")
         mine = (self.data.band_motion.values == m) & (self.data.band_block.values == b)
@@ -266,7 +264,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
     def plot(
         self, ax: Axes | None = None, *, block: int = 0, title: str = "", figsize: tuple[float, float] | None = None
     ) -> Figure:
-        """Plot level against peak rotation and bands of one block, by position; see `DrawnResult.plot`."""
+        """Plot level against peak rotation and bands of one block, by position, like `DrawnResult.plot`."""
         from rocking.plot.curves import ScaledMotion, ida_figure
 
         data, block = self.data, self._position(block, "block")
@@ -318,7 +316,7 @@ def _until_overturned(
 
 
 def _dataset(table: xr.Dataset, flat: Integers, edges: Boundaries, alpha: Floats, measure: Measure) -> xr.Dataset:
-    """Pair the levels of outcome changes in a (level, column) grid; NaN where it starts or ends in a band."""
+    """Pair the levels of outcome changes in a (level, column) grid, NaN for bands beyond it."""
     import xarray as xr
 
     columns, starts, ends = list[int](), list[float](), list[float]()
@@ -395,19 +393,19 @@ _NO_BALANCE: Final = (
 
 @dataclass(frozen=True)
 class CriticalScale:
-    """Critical scale of a motion with its derivatives; from `critical_scale`.
+    """Critical scale of a motion with its derivatives, computed by `critical_scale`.
 
     Attributes
     ----------
     scale : float
         Smallest floating-point scale that overturns the block, next to a scale that does not.
     gradient : Gradient
-        Derivatives with respect to the unscaled motion and the initial state; `Gradient.value` is the scale. If the
-        outcome changes although the block does not reach the balance point, all derivatives are NaN, and
-        `Gradient.reason` contains the explanation.
+        Derivatives with respect to the unscaled motion and the initial state, with the scale in `Gradient.value`. If
+        the outcome changes although the block does not reach the balance point, all derivatives are NaN, and
+        `Gradient.reason` explains this.
     p, alpha, restitution : float
-        Derivatives with respect to relative changes of these parameters on both sides; multiplied by 1e-3, the change
-        of the scale for 0.1 %.
+        Derivatives with respect to relative changes of these parameters on both sides. Times 1e-3, they are changes of
+        the scale for 0.1 %.
 
     See Also
     --------
@@ -466,7 +464,7 @@ def critical_scale(
     Notes
     -----
     At the critical scale the response approaches the balance point and stays there. The derivatives follow from the
-    implicit function theorem; see "Impacts: restitution and sensitivity" in the documentation.
+    implicit function theorem (see "Impacts: restitution and sensitivity" in the documentation).
 
     Examples
     --------

@@ -39,7 +39,7 @@ def numbered(labels: Sequence[object]) -> Integers:
 
 
 def groups_of(labels: object, name: str, count: int, each: str = "outcome") -> Integers:
-    """Replace `count` labels by integers; labels None, NaN or "" are distinct."""
+    """Replace `count` labels by integers. Labels None, NaN or "" are distinct."""
     given = checks.several(labels, name, InvalidOption)
     if len(given) != count or not all(isinstance(label, Hashable) for label in given):
         raise InvalidOption(f"{{}} must hold {count} labels, numbers or texts, one for each {each}", name, value=labels)
@@ -74,7 +74,7 @@ def motions_text(data: xr.Dataset) -> str:
 
 
 def curves_of(data: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
-    """Return names and selections of all slenderness-restitution combinations; an ensemble is one curve."""
+    """Return names and selections of all slenderness-restitution combinations, or one curve for an ensemble."""
     if "block" in data.dims:
         return [(data.blocks, data)]
     stacked = data.stack(curve=[name for name in ("alpha", "restitution") if name in data.dims])
@@ -110,7 +110,7 @@ def pooled(blocks: Bodies | Body | Sequence[Body], weights: ArrayLike | None) ->
 
 
 def normalised_weights(weights: ArrayLike | None, count: int) -> Floats:
-    """Weights of blocks with mean 1; all 1 by default."""
+    """Weights of blocks with mean 1, equal by default."""
     if weights is None:
         return np.ones(count)
     given = checks.numbers(weights, "weights", InvalidOption)
@@ -194,7 +194,7 @@ def units_of(blocks: Bodies, measure: Measure, model: Model) -> Floats:
 def simulate_levels(
     blocks: Bodies, motions: Sequence[Motion], measure: Measure, levels: Floats, *, model: Model, **options: Any
 ) -> xr.Dataset:
-    """Simulate every block under every motion at every level; `simulate_many` with the dimension ``level``."""
+    """Simulate every block under every motion at every level, with the dimension ``level``."""
     import xarray as xr
 
     units = units_of(blocks, measure, model)
@@ -230,7 +230,7 @@ def checked_limit(limit: float, name: str) -> float:
     return least
 
 
-#: Limit states: limits of the ratio of peak rotation to slenderness; infinity is overturning.
+#: Limit states: limits of the ratio of peak rotation to slenderness (infinite: overturning).
 OVERTURNING: Final[Mapping[str, float]] = {"overturning": math.inf}
 
 
@@ -334,8 +334,8 @@ def boundaries(
 ) -> Boundaries:
     """Find all changes of the outcome (m, columns) between neighbouring levels (m,) of a grid.
 
-    A bracket with a third outcome is split into both halves unless its interval has 64 changes or more; then only one
-    half is followed. Changes between two levels of equal outcome are not detected.
+    A bracket with a third outcome is split, but in an interval with 64 changes or more only one half is followed.
+    Changes between two levels of equal outcome are not detected.
     """
     row, column = np.nonzero(outcome[1:] != outcome[:-1])
     here = Boundaries(column, levels[row], levels[row + 1], outcome[row, column], outcome[row + 1, column])
@@ -346,7 +346,7 @@ def boundaries(
             found = here.below.copy()
             found[wide] = outcome_of(here.column[wide], here.level[wide])
             here, origin = _halved(here, wide, found, origin)
-            # A third outcome adds brackets; the bar waits until they are refined.
+            # A third outcome adds brackets, which the bar waits for.
             before, left = left, min(left, _halvings(here, tolerance))
             bar.advance(before - left)
     order = np.lexsort((here.low, here.column))
@@ -359,7 +359,7 @@ def _halvings(here: Boundaries, tolerance: float) -> int:
 
 
 def _halved(here: Boundaries, wide: Flags, found: Integers, origin: Integers) -> tuple[Boundaries, Integers]:
-    """Bisect wide brackets; those with a third outcome become two."""
+    """Bisect wide brackets, and split those with a third outcome."""
     few = np.bincount(origin)[origin] < 64
     third = wide & few & (found != here.below) & (found != here.above)
     up = wide & (found == here.below)

@@ -95,10 +95,10 @@ def overturning_map(
     Parameters
     ----------
     block : Block
-        Block. Only its slenderness and restitution matter, because frequencies are normalised by p.
+        Block, of which only slenderness and restitution matter.
     pulse : str or callable
         "sine" (with `cycles`), "half-sine", "one-sine", "one-cosine", "ricker" (`kind`) or "mavroeidis-papageorgiou"
-        (`phase`, `gamma`); or a function of amplitude (m/s^2) and frequency (Hz) that returns a motion proportional to
+        (`phase`, `gamma`), or a function of amplitude (m/s^2) and frequency (Hz) that returns a motion proportional to
         the amplitude and of constant shape: the motion and its vertical component last half as long at twice the
         frequency.
     amplitudes : array_like, shape (m,)
@@ -135,9 +135,9 @@ def overturning_map(
 
     Notes
     -----
-    By dimensional analysis a pulse of a single frequency is sufficient, because blocks of different p represent the
-    frequencies. Changes of mode between neighbouring amplitudes of the grid are located by bisection. Changes between
-    two amplitudes of equal mode are not detected.
+    By dimensional analysis, one pulse is simulated with blocks of different p for the frequencies. Changes of mode
+    between neighbouring amplitudes of the grid are located by bisection. Changes between amplitudes of equal mode are
+    not detected.
 
     References
     ----------
@@ -252,7 +252,7 @@ def _overturns(modes: Integers) -> Flags:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class OverturningMap(DatasetResult):
-    """Outcomes of a block under a pulse, over amplitude and frequency; from `overturning_map`.
+    """Outcomes of a block under a pulse, over amplitude and frequency, computed by `overturning_map`.
 
     The figure shows the modes as regions between the refined boundaries.
 
@@ -260,9 +260,9 @@ class OverturningMap(DatasetResult):
     ----------
     data : xarray.Dataset
         Over (amplitude, frequency): mode (a `Mode`, or the number of impacts before overturning), and peak_rotation
-        (rad; pi/2 where the block overturns). Over (frequency): overturning_amplitude, the lowest that overturns the
-        block; NaN if none of the grid does, or if its first already does. Over (boundary): boundary_frequency,
-        boundary_amplitude, and the modes below and above the boundary.
+        (rad, pi/2 for overturning). Over (frequency): overturning_amplitude, the lowest that overturns, or NaN if none
+        or already the first does. Over (boundary): boundary_frequency, boundary_amplitude, and the modes below and
+        above the boundary.
 
     See Also
     --------
@@ -355,7 +355,7 @@ class OverturningMap(DatasetResult):
 def _pulse_function(
     pulse: str | Callable[[float, float], Motion], parameters: dict[str, Any]
 ) -> Callable[[float, float], Motion]:
-    """Return a function of amplitude (m/s^2; the peak for named pulses) and frequency (Hz) that creates a pulse."""
+    """Return a function of amplitude (m/s^2, peak for named pulses) and frequency (Hz) that creates a pulse."""
     if callable(pulse):
         if parameters:
             raise InvalidOption(

@@ -58,7 +58,7 @@ class Probit(NamedTuple):
     Attributes
     ----------
     intercept, slope : ndarray, shape (fits,)
-        Parameters of the fits; one entry for a single fit.
+        Parameters, with one entry for a single fit.
     """
 
     intercept: Floats
@@ -76,7 +76,7 @@ _WHOLE_PLANE: Final = Probit(np.array([-np.inf, np.inf, _STEPS_AT, -_STEPS_AT]),
 
 
 def normal_scores(fits: Probit, z: Floats) -> Floats:
-    """Return normal scores of the probability at logarithms of the intensity, shape (fits, len(z)); -inf at 0."""
+    """Return normal scores of the probability at logarithms of the intensity, shape (fits, len(z)), -inf at 0."""
     finite = np.isfinite(z)
     at = fits.intercept[:, None] + fits.slope[:, None] * np.where(finite, z, 0.0)
     return np.where(finite, at, z)
@@ -101,7 +101,7 @@ class Goodness:
     freedom : int
         Degrees of freedom: number of groups minus two.
     p_value : float
-        Probability of a larger statistic if the lognormal is right; NaN for fewer than three groups or dependent
+        Probability of a larger statistic if the lognormal is right, or NaN for fewer than three groups or dependent
         outcomes.
     """
 
@@ -176,7 +176,7 @@ def fit(data: Outcomes) -> Probit:
 
 
 def fit_or_limits(data: Outcomes) -> Probit:
-    """Fit several data sets; if the likelihood of rising curves has no maximum, return its limit."""
+    """Fit several data sets, with the limit of rising curves if their likelihood has no maximum."""
     from scipy.special import ndtri
 
     z, exceeded, trials = data
@@ -214,7 +214,7 @@ def covariance(data: Outcomes, fitted: Probit) -> Floats:
 
 
 def _standardised(data: Outcomes, fitted: Probit) -> tuple[Outcomes, Probit, float, float]:
-    """Standardise z in data and fits for accuracy; return both, and mean and deviation of z."""
+    """Standardise z in data and fits for accuracy, and return mean and deviation of z as well."""
     centre, spread = float(data.z.mean()), float(data.z.std())
     scaled = data._replace(z=(data.z - centre) / spread)
     return scaled, Probit(fitted.intercept + fitted.slope * centre, fitted.slope * spread), centre, spread
@@ -290,7 +290,7 @@ def _logarithms(at: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _uphill(data: Outcomes, beta: Floats, step: Floats, now: Floats) -> tuple[Floats, Floats]:
-    """Halve steps until the likelihood does not decrease; return steps and likelihoods."""
+    """Halve steps until the likelihood does not decrease, and return steps and likelihoods."""
     then = likelihood(data, beta + step)
     for _ in range(_ITERATIONS):
         falling = ~(then >= now - 1e-12 * np.abs(now))

@@ -50,10 +50,9 @@ class Rate:
     interval : (float, float)
         Confidence interval due to the fragility, for the given hazard curve.
     below, above : float
-        Shares of the rate from motions below the first and above the last point of the hazard curve, where the curve is
-        extrapolated.
+        Shares of the rate from the extrapolated parts of the hazard curve, below its first and above its last point.
     bounds : (float, float)
-        Smallest and largest rate that the hazard curve can resolve. Texts replace rates beyond by the bound.
+        Smallest and largest rate that the hazard curve can resolve, printed for rates beyond.
 
     See Also
     --------
@@ -112,7 +111,7 @@ def _period(rate: float) -> float:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Risk(Result):
-    """Annual rates of the limit states of a fragility; from `Fragility.annual_rate`.
+    """Annual rates of the limit states of a fragility, computed by `Fragility.annual_rate`.
 
     The figure shows the hazard curve and, for each limit state, the contributions of the intensities to its rate.
 
@@ -175,7 +174,7 @@ class Risk(Result):
         return "\n".join([text_table(header, rows), *notes])
 
     def to_dict(self, years: float = 50.0) -> dict[str, Any]:
-        """Return rates, probabilities in a time (years) and the hazard curve by name; units are in the names, or SI."""
+        """Return rates, probabilities in a time (years) and the hazard curve by name, in named or SI units."""
         return {
             "description": self.description,
             "hazard": self.hazard.to_dict(),
@@ -269,7 +268,7 @@ def _rate(curve: FragilityCurve, hazard: HazardCurve) -> Rate:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Survival(Result):
-    """Limit state that was not exceeded, and its constraints on ground motion; from `Fragility.survival`.
+    """Limit state that was not exceeded, and its constraints on ground motion, computed by `Fragility.survival`.
 
     The figure shows the largest rates consistent with the survival, and the hazard curve.
 
@@ -291,8 +290,8 @@ class Survival(Result):
     rate : Rate or None
         Annual rate of the limit state for this hazard curve.
     mean_probability : float
-        Weighted mean of the survival probabilities of several blocks under the hazard curve, each with its own curve.
-        NaN for one block, without a hazard curve, and without outcomes.
+        Weighted mean of the survival probabilities of several blocks, each with its own curve, under the hazard curve.
+        NaN for one block, or without hazard curve or outcomes.
 
     See Also
     --------
@@ -334,7 +333,7 @@ class Survival(Result):
 
     @property
     def probability(self) -> float:
-        """Probability under the hazard curve that the limit is not exceeded in the time; NaN without a curve.
+        """Probability under the hazard curve that the limit is not exceeded in the time, or NaN without a curve.
 
         For several blocks this is the lower bound, with parameters resampled for every motion.
         """

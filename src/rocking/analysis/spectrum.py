@@ -61,10 +61,9 @@ def rocking_spectrum(
     Parameters
     ----------
     blocks : Blocks, Block, RestrainedBlock or sequence of one kind
-        Grid of frequency parameters, slendernesses and restitutions (`Blocks.grid`), which become the dimensions of the
-        spectrum; or an ensemble, for example from a calibration: any other blocks, or a grid with `p`, `size` or
-        `weights`. The blocks of an ensemble are resized together (`Blocks.resized`) so that their median p equals each
-        of `p`.
+        Grid of frequency parameters, slendernesses and restitutions (`Blocks.grid`), the dimensions of the spectrum.
+        Other blocks, for example from a calibration, and a grid with `p`, `size` or `weights` are an ensemble, resized
+        together (`Blocks.resized`) so that its median p equals each of `p`.
     motions : optional
         As for `simulate_many`.
     p : array_like, optional
@@ -151,8 +150,8 @@ def rocking_spectrum(
 
 
 def fractiles_of(peaks: Floats, shares: Floats) -> Floats:
-    """Interpolate fractiles (k, ...) of peaks (n, ...) without NaN; infinite if either neighbour is."""
-    ordered = np.sort(peaks, axis=0)  # NaN are last
+    """Interpolate fractiles (k, ...) of peaks (n, ...) without NaN, infinite if either neighbour is."""
+    ordered = np.sort(peaks, axis=0)  # NaN last
     known = np.maximum(np.count_nonzero(~np.isnan(peaks), axis=0), 1)
     place = shares.reshape(-1, *[1] * known.ndim) * (known - 1)
     # Rounding must not select the next higher value, which may be infinite: 0.28 * 25 > 7.
@@ -188,17 +187,17 @@ def overturned_share(peaks: Floats, weights: Floats | None = None) -> Floats:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RockingSpectrum(DatasetResult):
-    """Peak rotation against the frequency parameter or the size; from `rocking_spectrum`.
+    """Peak rotation against the frequency parameter or the size, computed by `rocking_spectrum`.
 
     Attributes
     ----------
     data : xarray.Dataset
-        Over (motion, alpha, restitution if given, p): peak_rotation (rad; pi/2 where the block overturns),
-        peak_over_alpha (infinite where the block overturns, NaN for abandoned simulations, which fractiles and shares
-        exclude) and overturned. Over (fractile, alpha, ..., p): fractile_over_alpha. Over (alpha, ..., p):
-        overturned_share. Additional coordinates: period 2 pi/p (s), and size R (m) of the rectangular block. For an
-        ensemble, peaks are over (motion, block, p), fractiles and shares over p alone, p is the median, and the blocks'
-        weights (mean 1) are a coordinate.
+        Over (motion, alpha, restitution if given, p): peak_rotation (rad, pi/2 for overturning), peak_over_alpha
+        (infinite for overturning, NaN for abandoned simulations, which fractiles and shares exclude) and overturned.
+        Over (fractile, alpha, ..., p): fractile_over_alpha. Over (alpha, ..., p): overturned_share. Additional
+        coordinates: period 2 pi/p (s), and size R (m) of the rectangular block. For an ensemble, peaks are over
+        (motion, block, p), fractiles and shares over p alone, p is the median, and the blocks' weights (mean 1) are a
+        coordinate.
 
     See Also
     --------
@@ -292,7 +291,7 @@ class RockingSpectrum(DatasetResult):
         return "block" in self.data.dims
 
     def _peaks_of_motions(self, one: xr.Dataset) -> Floats:
-        """Peaks under each motion, shape (motions, p); medians for an ensemble."""
+        """Peaks under each motion, shape (motions, p), or their medians for an ensemble."""
         if not self._of_ensemble:
             return np.asarray(one.peak_over_alpha.transpose("motion", "p").values)
         peaks = one.peak_over_alpha.transpose("block", "motion", "p").values

@@ -39,7 +39,7 @@ _SLIDING: Final = named("sliding_time", "s")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BlockUnderRecords(Result):
-    """Responses of one block to several motions, named `records`; `skipped` maps unread records to reasons."""
+    """Responses of one block to several motions, named `records`, with reasons for `skipped` ones."""
 
     TABLES = ("records",)
 
@@ -73,7 +73,7 @@ class BlockUnderRecords(Result):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Survey(BlockUnderRecords):
-    """Responses of a block to several motions; from `survey`.
+    """Responses of a block to several motions, computed by `survey`.
 
     Attributes
     ----------
@@ -130,14 +130,14 @@ class Survey(BlockUnderRecords):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Check(BlockUnderRecords):
-    """Comparison of rules of thumb with simulations for a block under several motions; from `check`.
+    """Comparison of rules of thumb with simulations for a block under several motions, computed by `check`.
 
     Attributes
     ----------
     ratios : tuple of mapping of str to float
         Ratio of demand to capacity by rule, for each motion.
     margins : tuple of float
-        Reciprocal of the lowest factor on each motion that overturns the block; NaN if none does.
+        Reciprocal of the lowest factor on each motion that overturns the block, or NaN.
     block, records, responses, skipped
         Block, names of the motions, their simulated responses, and reasons why records could not be read.
 

@@ -35,7 +35,7 @@ Polarity = Literal["+", "-", "both"]
 
 SIGNS: Final[Mapping[str, tuple[int, ...]]] = {"+": (1,), "-": (-1,), "both": (1, -1)}
 
-#: Outcomes of a simulation by name: units and meaning. The names are fields of the engine's result.
+#: Units and meanings of outcomes by their names in the engine's result.
 VARIABLES: Final[Mapping[str, tuple[str, str]]] = {
     "overturned": ("1", "whether the rotation reached pi/2"),
     "peak_rotation": ("rad", "largest rotation in size"),
@@ -138,7 +138,7 @@ class Product:
     Raises
     ------
     InvalidOption, InvalidMotion
-        If an option is out of range, or a motion of bodies on a line has a vertical component.
+        If an option is out of range, or bodies on a line have vertical motion.
 
     See Also
     --------
@@ -303,8 +303,8 @@ def simulate_many(
     times : bool
         Whether to include the times of the first uplift and of the first and the last rest.
     robust : bool
-        Whether to repeat every simulation with the motion scaled by 1 +- 1e-6 and 1 +- 3e-6 like `Response.perturbed`,
-        which increases the computing time fivefold.
+        Whether to repeat every simulation with the motion scaled by 1 +- 1e-6 and 1 +- 3e-6 (`Response.perturbed`), in
+        five times the computing time.
     threads, progress : int or bool, optional
         Number of threads (default: one per core), and whether to draw a progress bar (default: if stderr is a terminal
         and the computation is long).
@@ -313,13 +313,12 @@ def simulate_many(
     -------
     xarray.Dataset
         Dimensions (motion, scale, polarity, block), as far as they apply. Variables: overturned, peak_rotation (rad),
-        peak_time (s), impacts (resolved impacts only, without the impacts of a sequence after its certificate),
-        uplifts, rests, time_at_rest (s), complete_chattering (whether the block came to rest after its first uplift
-        before the motion passed a threshold again), stalled (rests without a certificate), unfinished, and stopped (by
-        `duration`, which leaves overturned undetermined). `times` adds first_uplift, first_rest and last_rest (s; 0 for
-        events that did not occur). `robust` adds overturned_share, the share of the five simulations that overturn; the
-        outcome is undecided unless the share is 0 or 1. Coordinates contain the names of the motions and the parameters
-        of the blocks.
+        peak_time (s), impacts (without those after a certificate), uplifts, rests, time_at_rest (s),
+        complete_chattering (whether the block came to rest after its first uplift before the motion passed a threshold
+        again), stalled (rests without a certificate), unfinished, and stopped (by `duration`, which leaves overturned
+        undetermined). `times` adds first_uplift, first_rest and last_rest (s, or 0 without such an event). `robust`
+        adds overturned_share, the share of the five simulations that overturn. Shares other than 0 and 1 are undecided.
+        Coordinates contain the names of the motions and the parameters of the blocks.
 
     See Also
     --------
@@ -330,8 +329,8 @@ def simulate_many(
     Notes
     -----
     The engine is the same as for `simulate`: every impact is located and chattering is proven. Under evenly sampled
-    records, rocking blocks are advanced together through each sample, except for blocks with an event in it, which are
-    integrated individually. Each result depends bit for bit on its block and motion only, not on the others.
+    records, rocking blocks advance together through samples without events. Each result depends, bit for bit, only on
+    its own block and motion.
 
     Examples
     --------
@@ -361,7 +360,7 @@ def outcomes_of(
     names: Iterable[str] = tuple(VARIABLES),
     near: float = 1.0,
 ) -> dict[str, NDArray[np.generic]]:
-    """Simulate a product with its motions scaled by a factor near 1; return arrays by names of `OUTCOME`."""
+    """Simulate a product with motions scaled by a factor near 1, and return arrays by names of `OUTCOME`."""
     count = cores() if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
     results: dict[str, NDArray[np.generic]] = {name: np.empty(product.shape, dtype=OUTCOME[name]) for name in names}
     with Progress("simulating", math.prod(product.shape), show=progress) as bar:

@@ -56,27 +56,25 @@ def simulate(
     model : {"nonlinear", "linear"}
         Equation of motion, for finite rotations or linearised for slender blocks (paper, Eqs 2 and 3).
     chattering : str or treatment
-        Method that ends a sequence of impacts: "certified" (default), "velocity", "bypass", "interval" or "time", or an
-        object with its parameter (`Certified`, `VelocityThreshold`, `GeometricBypass`, `IntervalThreshold`,
+        Method for the end of a sequence of impacts: "certified" (default), "velocity", "bypass", "interval" or "time",
+        or an object with its parameter (`Certified`, `VelocityThreshold`, `GeometricBypass`, `IntervalThreshold`,
         `AsymptoticTime`).
     duration : float, optional
-        End of the simulation, s. By default the simulation continues after the motion until rest or overturning, or
-        until it is proven that restraints hold the block leaning for ever. A response that ends while the block moves
-        or the motion continues is `stopped`, and its outcome is undetermined.
+        End of the simulation, s. By default the simulation continues beyond the motion until rest, overturning, or
+        proof that restraints hold the block leaning for ever. A response cut during the motion of ground or block is
+        `stopped`, with undetermined outcome.
     initial_rotation, initial_velocity : float
-        Initial rotation (rad, positive to side +) and angular velocity (rad/s), or the initial coordinate and its rate
-        for another body.
+        Initial rotation (rad, positive to side +) and angular velocity (rad/s), or coordinate and rate of another body.
 
     Returns
     -------
     Response
-        Events, impacts, chattering sequences, and the rotation as a function of time.
+        Events, impacts, chattering sequences, and rotation history.
 
     Raises
     ------
     InvalidBlock, InvalidMotion
-        If `block` is not a body, `motion` is not a `Motion`, or the motion of a body on a line has a vertical
-        component.
+        If `block` is not a body, `motion` is not a `Motion`, or a body on a line has vertical motion.
 
     See Also
     --------
@@ -86,8 +84,8 @@ def simulate(
 
     Notes
     -----
-    The block does not slide. `Response.sliding_time` and ``summary(friction)`` report whether and when a block with a
-    given coefficient of friction would slide.
+    The block does not slide. `Response.sliding_time` and ``summary(friction)`` report sliding for a given coefficient
+    of friction.
 
     Examples
     --------
@@ -110,7 +108,7 @@ def response_to(
     name: str | None = None,
     factor: float = 1.0,
 ) -> Response:
-    """Compute a response like `simulate`; `name` denotes the initial coordinate in messages."""
+    """Compute a response like `simulate`, with `name` for the initial coordinate in messages."""
     how, alone, motion = treatment(chattering), one_body(block).alone(), one_motion(motion)
     setup, ground = Setup(alone, model, how, duration, initial), None
     if factor != 1.0:  # repeated simulations leave the cache unchanged
@@ -160,7 +158,7 @@ def _scaled(initial: tuple[float, float], factor: float, records: state.Records,
 
 
 def marched(trail: Trail, start: state.Record) -> tuple[int, state.Records]:
-    """Integrate in slices, which permits interrupts; return the end and the table, which grows as necessary."""
+    """Integrate in interruptible slices, and return the end and the growing table."""
     ground, block, settings, _ = trail
     table = state.new_table(128 + int(_FIRST_ROWS * len(ground.pieces)))
     scratch = state.new_scratch()
