@@ -1,7 +1,7 @@
-"""Exceptions of the package: one base class, one subclass per kind of bad input.
+"""Exceptions of the package: a base class, and a subclass for each kind of invalid input.
 
-Every message is one sentence that says what is wrong, where, and how to correct it. What it is about is also kept as
-data, so that no code needs to read a sentence.
+Every message is one sentence that names the fault, its location, and the remedy. The same information is available as
+attributes.
 """
 
 from __future__ import annotations
@@ -14,57 +14,57 @@ from typing import TYPE_CHECKING, Final
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Where a name of an argument stands in a template; or "{}" itself, as `literal` writes it.
+#: Placeholder of an argument's name in a template, or an escaped "{}" from `literal`.
 _PLACE: Final = re.compile(r"\{\{\}\}|\{\}")
 
-#: What a command says that Ctrl-C has ended.
+#: Message of a command after Ctrl-C.
 INTERRUPTED: Final = "rocking: this was interrupted; every file that it wrote is whole"
 
-#: Longest path or word that a sentence shows whole, in characters.
+#: Longest path or word that a message shows completely, in characters.
 _LONGEST_WORD: Final = 400
 
-#: How a name of an argument is written: the command line writes its option, a page the label of its field.
+#: Spelling of an argument's name, for example as a command-line option or the label of a field.
 Spelling = Callable[[str], str]
 
 
 def as_argument(name: str) -> str:
-    """Write the name of an argument as Python does."""
+    """Return the name of an argument as in Python."""
     return name
 
 
 def _shortened(text: str) -> str:
-    """Show both ends of a long word: nobody reads thousands of digits."""
+    """Shorten a long word to its ends."""
     half = _LONGEST_WORD // 2
     return text if len(text) <= _LONGEST_WORD else f"{text[:half]}...{text[-half:]}"
 
 
 def literal(text: str) -> str:
-    """Write a text so that a template has it as it is: a "{}" in it is no place of a name."""
+    """Escape each "{}" in a text for use in a template."""
     return text.replace("{}", "{{}}")
 
 
 def install(part: str) -> str:
-    """Return the advice that installs the optional packages of a part."""
+    """Return instructions to install the optional packages of a part."""
     return f"run pip install '.[{part}]' in the source folder of rocking"
 
 
 @dataclass(frozen=True)
 class Message:
-    """A sentence that may name arguments.
+    """Sentence that may name arguments.
 
     Attributes
     ----------
     template : str
-        The sentence; each "{}" in it stands for a name of an argument, as long as there are names.
+        Sentence with a "{}" for each argument. Surplus ones remain.
     arguments : tuple of str
-        Those names, in their order.
+        Names in their order.
     """
 
     template: str
     arguments: tuple[str, ...] = ()
 
     def text(self, spelling: Spelling = as_argument) -> str:
-        """Return the sentence in one line, with names as ``spelling`` writes them."""
+        """Return the sentence in one line, with names as written by ``spelling``."""
         names = map(spelling, self.arguments)
         sentence = _PLACE.sub(lambda place: "{}" if place[0] == "{{}}" else next(names, "{}"), self.template)
         return " ".join(map(_shortened, sentence.split()))
@@ -74,23 +74,23 @@ class Message:
 
 
 class RockingError(Exception):
-    """Base of every error that the package raises on purpose.
+    """Base class of all errors that the package raises on purpose.
 
     Parameters
     ----------
     message : str
-        One sentence; each "{}" in it stands for one of `arguments`.
+        Sentence with a "{}" for each of `arguments`.
     *arguments : str
-        Names of the arguments that the sentence names, the one that is wrong first.
+        Names of the arguments in the sentence, the invalid one first.
     path, line : str, int, optional
-        The file that is wrong, which the sentence itself does not name, and its line, from 1.
+        Invalid file, which the sentence does not name, and its line, from 1.
     value : object, optional
-        What was given.
+        Invalid value.
 
     Attributes
     ----------
     message : Message
-        The sentence without the file's name.
+        Sentence without the file's name.
     path, line, value
         As above.
 
@@ -115,11 +115,11 @@ class RockingError(Exception):
 
     @property
     def argument(self) -> str | None:
-        """Name of the argument that is wrong, where the message names one."""
+        """Name of the invalid argument, if the message contains one."""
         return self.message.arguments[0] if self.message.arguments else None
 
     def text(self, spelling: Spelling = as_argument) -> str:
-        """Return file, line and sentence in one line; `spelling` writes the names of arguments."""
+        """Return file, line and sentence in one line, with names as written by ``spelling``."""
         if self.path is None:
             return self.message.text(spelling)
         path = _shortened(self.path)
@@ -131,59 +131,59 @@ class RockingError(Exception):
 
 
 class InvalidBlock(RockingError):
-    """The block's sizes or parameters cannot describe a block that stands and rocks."""
+    """Sizes or parameters do not describe a block that stands and rocks."""
 
 
 class UnequalSides(InvalidBlock, AttributeError):
-    """One value was asked of a block whose sides have two: `Block.sides` has them."""
+    """A property of one value was requested for a block with unequal sides (see `Block.sides`)."""
 
 
 class InvalidMotion(RockingError):
-    """The ground motion's samples, step or parameters are not usable."""
+    """Samples, step or parameters of a ground motion are invalid."""
 
 
 class UnreadableRecord(RockingError):
-    """A record file could not be read; the message names the file and, where there is one, the line."""
+    """A record file could not be read. The message names the file and, if known, the line."""
 
 
 class InvalidOption(RockingError):
-    """An argument of an analysis (model, chattering treatment, duration, ...) is not usable."""
+    """An argument of an analysis (model, chattering treatment, duration, ...) is invalid."""
 
 
 class Unfitted(InvalidOption):
-    """Outcomes determine no curve. What was simulated is kept.
+    """Outcomes do not determine a curve. The simulations are retained.
 
     Attributes
     ----------
     outcomes : pandas.DataFrame or None
-        Every simulation, as in `Fragility.outcomes`; None where nothing was simulated.
+        All simulations, as in `Fragility.outcomes`, or None.
     """
 
     outcomes: pd.DataFrame | None = None
 
 
 class Unfinished(RockingError):
-    """A simulation was given up after too many steps, without which an analysis has no answer."""
+    """An analysis has no result because a simulation was abandoned after too many steps."""
 
 
 class StudyError(RockingError):
-    """A study is damaged, held by another process, or not the one that is meant."""
+    """A study is damaged, locked by another process, or not the intended one."""
 
 
 class DamagedStudy(StudyError):
-    """A unit of a study is damaged, and can be computed again: the message says which, and what is wrong with it."""
+    """A unit of a study is damaged and can be recomputed. The message names the unit and the fault."""
 
     def __str__(self) -> str:
         return f"{self.text()}: the study's verify(repair=True) computes it again"
 
 
 class KernelsError(RockingError):
-    """The compiled kernels are missing or damaged, or were built from other sources."""
+    """The compiled kernels are missing, damaged, or built from other sources."""
 
 
 class OutsideFit(UserWarning):
-    """A fitted formula was asked for values beyond those it was fitted to."""
+    """A fitted formula was evaluated beyond the range of its data."""
 
 
 class OutputError(RockingError):
-    """Results could not be written where they were asked for."""
+    """Results could not be written to the requested location."""

@@ -1,11 +1,11 @@
 """Analytic ground motions: rectangles and triangles, sines, lobes, Ricker and Mavroeidis-Papageorgiou pulses.
 
-Each is a `Motion` whose pieces approximate the formula to 1e-15 of the largest acceleration (`Motion.error`); those of
-straight lines are exact. Pulses start at time 0, are zero after their end, and are added with ``+``.
+The pieces of each `Motion` approximate the formula to 1e-15 of the largest acceleration (`Motion.error`). Straight
+lines are exact. Pulses start at time 0, are zero after their end, and can be added with ``+``.
 
-A piece is the Taylor series about its middle, moved to its start, and so short that the first term left out is below
-1e-16 of the amplitude. Large angles are computed without their rounding: products and quotients with their errors,
-whole turns subtracted exactly. A number that is not finite or out of its range raises `InvalidMotion`.
+A piece is a Taylor series about its midpoint, moved to its start, and so short that the first neglected term is below
+1e-16 of the amplitude. Large angles are not rounded, because products and quotients include their errors and whole
+turns are subtracted exactly. Numbers that are not finite or out of range raise `InvalidMotion`.
 """
 
 from __future__ import annotations
@@ -38,33 +38,37 @@ __all__ = [
     "triangular",
 ]
 
-#: Relative to the amplitude of the acceleration, which a pulse that is cut need not reach; covers the terms left out
-#: and the rounding of the coefficients, which are multiples of it.
+#: Error relative to the amplitude, which a cut pulse need not reach. It covers the neglected terms and the rounding of
+#: the coefficients, which are multiples of the amplitude.
 _ERROR: Final = 1e-15
 
-#: Of a sine: half a piece is pi/8 = 0.39 rad, and 0.39**14 / 14! = 2.4e-17.
+#: Pieces per cycle of a sine: half a piece is pi/8 = 0.39 rad, and 0.39**14 / 14! = 2.4e-17.
 _PIECES_PER_CYCLE: Final = 8
 _SINE_DEGREE: Final = 13
 _MOST_CYCLES: Final = 100_000
 
-#: Of a derivative of a Gaussian, in its standard deviations: by Cramer's inequality (|He_n(x)| exp(-x^2/4) is at most
-#: 1.09 sqrt(n!)) the first term left out is below 6 e-17 of the peak.
+#: Piece of a derivative of a Gaussian in standard deviations: by Cramer's inequality (|He_n(x)| exp(-x^2/4) is at most
+#: 1.09 sqrt(n!)) the first neglected term is below 6 e-17 of the peak.
 _GAUSSIAN_PIECE: Final = 0.4
 _GAUSSIAN_DEGREE: Final = 15
 
 
 def rectangular(amplitude: float, duration: float) -> Motion:
-    """Return a constant acceleration; exact.
+    """Return a constant acceleration (exact).
 
     Parameters
     ----------
     amplitude, duration : float
-        m/s^2; s.
+        Acceleration, m/s^2, and duration, s.
 
     Returns
     -------
     Motion
-        One piece.
+        Motion of one piece.
+
+    See Also
+    --------
+    rocking.pulses.triangular : Triangular pulse.
 
     Examples
     --------
@@ -78,17 +82,21 @@ def rectangular(amplitude: float, duration: float) -> Motion:
 
 
 def triangular(amplitude: float, duration: float) -> Motion:
-    """Return an acceleration that rises linearly to its amplitude and falls to zero in equal times; exact.
+    """Return an acceleration that rises linearly to its amplitude and falls to zero in equal times (exact).
 
     Parameters
     ----------
     amplitude, duration : float
-        m/s^2; s.
+        Peak acceleration, m/s^2, and duration, s.
 
     Returns
     -------
     Motion
-        Two pieces.
+        Motion of two pieces.
+
+    See Also
+    --------
+    rocking.pulses.rectangular : Constant acceleration.
 
     Examples
     --------
@@ -107,16 +115,20 @@ def sine(amplitude: float, frequency: float, *, cycles: float, phase: float = 0.
     Parameters
     ----------
     amplitude, frequency : float
-        m/s^2; Hz.
+        Amplitude, m/s^2, and frequency, Hz.
     cycles : float
-        Duration times frequency, at most 100,000; need not be whole.
+        Number of cycles (duration times frequency), at most 100,000 and not necessarily whole.
     phase : float
-        rad.
+        Phase, rad.
 
     Returns
     -------
     Motion
-        Of family "sine", which `rocking.AsymptoticTime` asks for.
+        Motion of family "sine", as `rocking.AsymptoticTime` requires.
+
+    See Also
+    --------
+    rocking.pulses.n_lobe : Half cycles with different amplitudes.
 
     Examples
     --------
@@ -133,12 +145,16 @@ def half_sine(amplitude: float, frequency: float) -> Motion:
     Parameters
     ----------
     amplitude, frequency : float
-        m/s^2; Hz, of the whole sine.
+        Amplitude, m/s^2, and frequency of the whole sine, Hz.
 
     Returns
     -------
     Motion
-        It lasts ``1 / (2 frequency)``.
+        Motion of duration ``1 / (2 frequency)``.
+
+    See Also
+    --------
+    rocking.pulses.one_sine : One cycle.
 
     Examples
     --------
@@ -154,12 +170,16 @@ def one_sine(amplitude: float, frequency: float) -> Motion:
     Parameters
     ----------
     amplitude, frequency : float
-        m/s^2; Hz.
+        Amplitude, m/s^2, and frequency, Hz.
 
     Returns
     -------
     Motion
-        It ends at rest.
+        Motion with zero final velocity.
+
+    See Also
+    --------
+    rocking.pulses.one_cosine : One cycle of a cosine.
 
     Examples
     --------
@@ -175,12 +195,16 @@ def one_cosine(amplitude: float, frequency: float) -> Motion:
     Parameters
     ----------
     amplitude, frequency : float
-        m/s^2; Hz.
+        Amplitude, m/s^2, and frequency, Hz.
 
     Returns
     -------
     Motion
-        It jumps at both ends.
+        Motion with a jump at both ends.
+
+    See Also
+    --------
+    rocking.pulses.one_sine : One cycle of a sine.
 
     Examples
     --------
@@ -191,24 +215,28 @@ def one_cosine(amplitude: float, frequency: float) -> Motion:
 
 
 def n_lobe(amplitude: float | Sequence[float], frequency: float, *, lobes: int | None = None) -> Motion:
-    """Return half cycles of a sine, each with its own amplitude.
+    """Return half cycles of a sine with individual amplitudes.
 
-    Lobe k (k = 0, 1, ...) is ``amplitude[k] * sin(2 pi frequency t)`` for ``k <= 2 frequency t <= k + 1``, so equal
-    amplitudes make a sine.
+    Lobe k (k = 0, 1, ...) is ``amplitude[k] * sin(2 pi frequency t)`` for ``k <= 2 frequency t <= k + 1``, so that
+    equal amplitudes yield a sine.
 
     Parameters
     ----------
     amplitude : float or sequence of float
-        m/s^2; one for all lobes (then give `lobes`), or one for each.
+        Amplitude of each lobe, or of all `lobes`, m/s^2.
     frequency : float
-        Hz, of the sine: a lobe lasts ``1 / (2 frequency)``.
+        Frequency of the sine, Hz. A lobe lasts ``1 / (2 frequency)``.
     lobes : int, optional
-        Number of lobes, if `amplitude` is one number.
+        Number of lobes, for a single `amplitude`.
 
     Returns
     -------
     Motion
-        It starts and ends without a jump.
+        Motion without a jump at its ends.
+
+    See Also
+    --------
+    rocking.pulses.sine : Sine of constant amplitude.
 
     Examples
     --------
@@ -230,7 +258,7 @@ def n_lobe(amplitude: float | Sequence[float], frequency: float, *, lobes: int |
 
 
 def _checked(**numbers: float) -> dict[str, float]:
-    """Return numbers of a pulse: an amplitude and a phase may be any, a duration is positive, a frequency a pulse's."""
+    """Validate parameters: any amplitude and phase, positive duration, frequency in the range of a pulse."""
     found = {}
     for name, value in numbers.items():
         if name in ("amplitude", "phase"):
@@ -244,7 +272,7 @@ def _checked(**numbers: float) -> dict[str, float]:
 
 
 def _made(breakpoints: Floats, series: Floats, peak: float, about: Description, name: str = "") -> Motion:
-    """Return the motion of pieces (about their starts), whose error is in proportion to a peak acceleration."""
+    """Create a motion from pieces (about their starts) with an error proportional to a peak acceleration."""
     return Motion(breakpoints, series, name=name or about.family, description=about, error=_ERROR * abs(peak))
 
 
@@ -284,23 +312,27 @@ def ricker(
 ) -> Motion:
     """Return a symmetric or antisymmetric Ricker pulse (Vassiliou and Makris 2011).
 
-    With t counted from the middle of the motion and f the frequency, the symmetric pulse is ``amplitude (1 - x^2)
+    With t measured from the middle of the motion and f the frequency, the symmetric pulse is ``amplitude (1 - x^2)
     exp(-x^2 / 2)``, ``x = sqrt(2) pi f t``, and the antisymmetric one ``(amplitude / beta) (x^2 - 3) x exp(-x^2 / 2)``,
-    ``x = 2 pi f t / sqrt(3)``, where beta = 1.3801... makes its peak (before the middle) equal to `amplitude`.
+    ``x = 2 pi f t / sqrt(3)``, in which beta = 1.3801... scales its peak (before the middle) to `amplitude`.
 
     Parameters
     ----------
     amplitude, frequency : float
-        Peak acceleration, m/s^2; dominant frequency 1/T_p, Hz.
+        Peak acceleration, m/s^2, and dominant frequency 1/T_p, Hz.
     kind : {"symmetric", "antisymmetric"}
         Second or third derivative of a Gaussian.
     duration : float, optional
-        Length of the motion, s, if the pulse is to be cut on both sides before it falls below 1e-16 of its peak.
+        Length of the motion, s. By default the pulse ends on both sides at 1e-16 of its peak.
 
     Returns
     -------
     Motion
-        The peak is in its middle, or on both sides of it.
+        Motion with one peak in its middle, or a peak on each side of the middle.
+
+    See Also
+    --------
+    rocking.pulses.mavroeidis_papageorgiou : Near-fault velocity pulse.
 
     References
     ----------
@@ -317,13 +349,13 @@ def ricker(
     kinds = ("symmetric", "antisymmetric")
     symmetric = checks.one_of(kind, "kind of a Ricker pulse", InvalidMotion, kinds) == "symmetric"
     rate = math.sqrt(2.0) * math.pi * frequency if symmetric else 2.0 * math.pi * frequency / math.sqrt(3.0)
-    longest = 2.0 * (9.1 if symmetric else 9.3) / rate  # to 1e-16 of the peak
+    longest = 2.0 * (9.1 if symmetric else 9.3) / rate  # limit at 1e-16 of the peak
     length = longest if duration is None else checks.positive(duration, "duration", InvalidMotion, "s")
     if length > longest:
         raise InvalidMotion(f"a Ricker pulse of {frequency:.6g} Hz lasts only {longest:.6g} s: give no longer duration")
     breakpoints = np.linspace(0.0, length, _whole_pieces(rate * length / _GAUSSIAN_PIECE))
     series = -_gaussian_derivative(2 if symmetric else 3, _middles(breakpoints) - 0.5 * length, rate)
-    # (x^2 - 3) x exp(-x^2 / 2) is stationary where x^4 - 6 x^2 + 3 = 0.
+    # (x^2 - 3) x exp(-x^2 / 2) is stationary at x^4 - 6 x^2 + 3 = 0.
     squared = 3.0 - math.sqrt(6.0)
     peak = 1.0 if symmetric else (3.0 - squared) * math.sqrt(squared) * math.exp(-0.5 * squared)
     formula = (
@@ -339,28 +371,32 @@ def ricker(
 def mavroeidis_papageorgiou(amplitude: float, frequency: float, *, phase: float, gamma: float) -> Motion:
     """Return the near-fault pulse of Mavroeidis and Papageorgiou (2003).
 
-    Its ground velocity is ``v(t) = (amplitude / 2) [1 + cos(2 pi f s / gamma)] cos(2 pi f s + phase)``, with f the
-    frequency and ``s = t - gamma / (2 f)`` counted from the middle; the motion is its derivative::
+    The ground velocity is ``v(t) = (amplitude / 2) [1 + cos(2 pi f s / gamma)] cos(2 pi f s + phase)``, with f the
+    frequency and ``s = t - gamma / (2 f)`` measured from the middle. The motion is its derivative::
 
         -(amplitude pi f / gamma) [ sin(2 pi f s / gamma) cos(2 pi f s + phase)
                                     + gamma sin(2 pi f s + phase) (1 + cos(2 pi f s / gamma)) ].
 
-    Note that `amplitude` is a velocity; use ``.scaled_to(level)`` for a given acceleration. The motion starts from
-    rest, so its velocity equals v(t), which is zero at both ends.
+    The `amplitude` is a velocity. Use ``.scaled_to(level)`` for a given acceleration. The velocity v(t) is zero at both
+    ends.
 
     Parameters
     ----------
     amplitude, frequency : float
-        Amplitude A of the velocity pulse, m/s; prevailing frequency f_p, Hz.
+        Amplitude A of the velocity pulse, m/s, and prevailing frequency f_p, Hz.
     phase : float
-        Phase nu, rad: 0 gives a symmetric and pi/2 an antisymmetric velocity pulse.
+        Phase nu, rad: 0 yields a symmetric and pi/2 an antisymmetric velocity pulse.
     gamma : float
         Oscillatory character, at least 1.
 
     Returns
     -------
     Motion
-        It lasts ``gamma / frequency``.
+        Motion of duration ``gamma / frequency``.
+
+    See Also
+    --------
+    rocking.pulses.ricker : Ricker pulse.
 
     References
     ----------
@@ -384,7 +420,7 @@ def mavroeidis_papageorgiou(amplitude: float, frequency: float, *, phase: float,
     carrier = _sine_and_cosine(turns, rest - 0.5 * math.fmod(gamma, 2.0), phase)
     quotient, quotient_rest = exact_quotient(turns, rest, gamma)
     envelope = _sine_and_cosine(quotient, quotient_rest - 0.5, 0.0)
-    # The product of cosines is a sum of three; they have a half, a quarter and a quarter of the amplitude.
+    # The product of cosines is the sum of three with a half, a quarter and a quarter of the amplitude.
     rate, shift = 2.0 * math.pi * frequency, 1.0 / gamma
     series = (
         0.5 * _sine_series(carrier, rate)
@@ -402,7 +438,7 @@ def mavroeidis_papageorgiou(amplitude: float, frequency: float, *, phase: float,
 
 
 class _Angle(NamedTuple):
-    """Angles by their sines and cosines."""
+    """Sines and cosines of angles."""
 
     sine: Floats
     cosine: Floats
@@ -417,7 +453,7 @@ def _sine_and_cosine(turns: Floats, rest: Floats, phase: float) -> _Angle:
 
 
 def _sum_of_angles(one: _Angle, other: _Angle, sign: float) -> _Angle:
-    """Sum of two angles, or their difference where the sign is -1."""
+    """Sum of two angles, or their difference for sign -1."""
     return _Angle(
         one.sine * other.cosine + sign * one.cosine * other.sine,
         one.cosine * other.cosine - sign * one.sine * other.sine,
@@ -425,17 +461,17 @@ def _sum_of_angles(one: _Angle, other: _Angle, sign: float) -> _Angle:
 
 
 def _whole_pieces(pieces: float) -> int:
-    """Return the number of breakpoints of at least so many equal pieces."""
+    """Return the number of breakpoints of at least `pieces` equal pieces."""
     return math.ceil(pieces - 1e-9) + 1
 
 
 def _middles(breakpoints: Floats) -> Floats:
-    """Middle of each piece, s."""
+    """Midpoint of each piece, s."""
     return breakpoints[:-1] + 0.5 * np.diff(breakpoints)
 
 
 def _about_starts(breakpoints: Floats, about_middles: Floats) -> Floats:
-    """Coefficients about the start of each piece, from those about its middle."""
+    """Convert coefficients about the middle of each piece to coefficients about its start."""
     return piecewise.moved(about_middles, breakpoints[:-1] - _middles(breakpoints))
 
 

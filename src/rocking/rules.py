@@ -1,6 +1,6 @@
-"""Rules of thumb for the rocking and overturning of blocks, as demand over capacity, and a check by simulations.
+"""Rules of thumb for rocking and overturning, as demand and capacity, and their check by simulations.
 
-Every demand grows in proportion with the motion: at a ratio of 0.5 the rule permits twice the motion.
+Every demand is proportional to the motion: at a ratio of 0.5 the rule permits twice the motion.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ from rocking.simulation.simulate import simulate
 
 __all__ = ["RULES", "Check", "Rating", "asce_43_05", "check", "housner", "ishiyama", "priestley", "rate", "west"]
 
-#: Rotations over slenderness at which a spectrum is compared with the block: at the first the oscillators are stiff, at
-#: the last a rocking period is 30/p.
+#: Ratios of rotation to slenderness for the comparison with a spectrum, from stiff oscillators to a rocking period of
+#: 30/p.
 _SHARES: Final = np.append(np.geomspace(1e-3, 0.5, 30, endpoint=False), np.linspace(0.5, 0.999, 26))
 
-#: Damping over -ln e^2 (Makris and Konstantinidis 2003).
+#: Ratio of damping to -ln e^2 (Makris and Konstantinidis 2003).
 _DAMPING: Final = 0.34
 
-#: Relative width of the bracket of the level that overturns first.
+#: Relative width of the bracket of the lowest level that overturns.
 _TOLERANCE: Final = 1e-4
 
 
@@ -52,9 +52,13 @@ class Rating:
     rule : str
         Name of the rule.
     demand, capacity : ndarray, shape (n,)
-        Those of the weaker side of each block.
+        Demand and capacity of the weaker side of each block.
     unit : str
-        Their unit; "1" if they have none.
+        Unit of demand and capacity, "1" if dimensionless.
+
+    See Also
+    --------
+    rocking.rules.rate : Apply several rules.
     """
 
     rule: str
@@ -70,12 +74,12 @@ class Rating:
 
     @property
     def ratio(self) -> Floats:
-        """Demand over capacity, shape (n,)."""
+        """Ratio of demand to capacity, shape (n,)."""
         return np.asarray(self.demand / self.capacity)
 
     @property
     def overturns(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-        """Whether the rule says that the block may overturn: a ratio of 1 or more, shape (n,)."""
+        """Whether the block may overturn by the rule (a ratio of 1 or more), shape (n,)."""
         return np.asarray(self.ratio >= 1.0)
 
 
@@ -89,7 +93,7 @@ _rules: dict[str, Rule] = {}
 #: Rules by name.
 RULES: Final[Mapping[str, Rule]] = MappingProxyType(_rules)
 
-#: Sections that the documentation of every rule shares.
+#: Common sections of the docstrings of all rules.
 _DOCUMENTATION: Final = """{}
 
     Parameters
@@ -112,7 +116,7 @@ _DOCUMENTATION: Final = """{}
 
 
 def _rule(unit: str, example: str) -> Callable[[Comparison], Rule]:
-    """Make a rule of a comparison, with the unit of its numbers and the ratio that its example shows."""
+    """Create a rule from a comparison, the unit of its results, and the ratio in its example."""
 
     def rule_of(comparison: Comparison) -> Rule:
         @wraps(comparison, assigned=("__module__", "__name__", "__qualname__"))
@@ -124,7 +128,7 @@ def _rule(unit: str, example: str) -> Callable[[Comparison], Rule]:
         name = comparison.__name__
         first, _, rest = (comparison.__doc__ or "").partition("\n\n")
         rule.__doc__ = _DOCUMENTATION.format(first, rest.rstrip(), name, example)
-        del rule.__wrapped__  # its arguments are not those of the rule
+        del rule.__wrapped__  # the comparison has other arguments than the rule
         _rules[name] = rule
         return rule
 
@@ -132,7 +136,7 @@ def _rule(unit: str, example: str) -> Callable[[Comparison], Rule]:
 
 
 def _free(blocks: Blocks | Block | Iterable[Block]) -> Blocks:
-    """Gather blocks, and refuse those with restraints."""
+    """Combine blocks, or raise an error if they have restraints."""
     many = Blocks.of(blocks)
     for each in many if many.terms else ():
         one_block(each)
@@ -146,11 +150,15 @@ def west(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     Returns
     -------
     Rating
-        PGA, m/s^2, over g tan(alpha).
+        Demand PGA and capacity g tan(alpha), m/s^2.
+
+    See Also
+    --------
+    rocking.rules.ishiyama : Criteria with the peak velocity.
 
     Notes
     -----
-    It is the acceleration that lifts the block, which is necessary for overturning but not sufficient.
+    The threshold is the uplift acceleration, which is necessary for overturning but not sufficient.
 
     References
     ----------
@@ -162,18 +170,22 @@ def west(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
 
 @_rule("1", "0.895")
 def ishiyama(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
-    """Ask for a peak acceleration as well as a peak velocity: Ishiyama's criteria.
+    """Compare peak acceleration and peak velocity with their limits: Ishiyama's criteria.
 
     Returns
     -------
     Rating
-        The lesser of PGA/(g tan(alpha)) and PGV/(0.4 V), over 1.
+        Demand min(PGA/(g tan(alpha)), PGV/(0.4 V)) and capacity 1.
+
+    See Also
+    --------
+    rocking.rules.west : Criterion without the peak velocity.
 
     Notes
     -----
     V = 2 g sin(alpha/2)/(p cos(alpha)) is the sudden velocity of the ground after which a block at rest just reaches
-    its balance point. For a rectangle that is Ishiyama's V^2 = 8 g R (1 - cos(alpha))/(3 cos(alpha)^2), and 0.4 V is
-    close to 10 B/sqrt(H) cm/s, with width B and height H in cm. The factor 0.4 comes from his simulations; both
+    its balance point. For a rectangle it equals Ishiyama's V^2 = 8 g R (1 - cos(alpha))/(3 cos(alpha)^2), and 0.4 V is
+    close to 10 B/sqrt(H) cm/s, with width B and height H in cm. The factor 0.4 comes from his simulations. Both
     criteria are lower limits.
 
     References
@@ -198,13 +210,17 @@ def housner(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     Returns
     -------
     Rating
-        p S_v/g, rad, over alpha.
+        Demand p S_v/g and capacity alpha, rad.
+
+    See Also
+    --------
+    rocking.rules.check : Compare rules of thumb with simulations.
 
     Notes
     -----
-    The mean energy of a block under white noise is set equal to that at its balance point, m g R alpha^2/2. Housner
-    concluded that one block in two overturns there. White noise itself contradicts this: of 300 noises (p = 2 rad/s,
-    alpha = 0.2, restitution 0.925) 1 % overturn the block at a ratio of 1, 28 % at 1.5 and 80 % at 2. S_v is the mean
+    The mean energy of a block under white noise is equated to m g R alpha^2/2, its energy at the balance point. Housner
+    concluded that half of such blocks overturn. Simulated white noise contradicts this: among 300 noises (p = 2 rad/s,
+    alpha = 0.2, restitution 0.925), 1 % overturn the block at a ratio of 1, 28 % at 1.5 and 80 % at 2. S_v is the mean
     of 2 pi S_d/T over periods T of 0.1 to 2.5 s, Housner's spectrum intensity divided by its range.
 
     References
@@ -219,7 +235,7 @@ def housner(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
 
 
 def mean_spectral_velocity(motion: Motion) -> float:
-    """Mean of the undamped pseudo-velocity over periods of 0.1 to 2.5 s, m/s (Housner 1952)."""
+    """Mean undamped pseudo-velocity over periods of 0.1 to 2.5 s, m/s (Housner 1952)."""
     periods = np.linspace(0.1, 2.5, 97)
     velocities = motion.spectral_acceleration(periods, 0.0) * periods / (2.0 * np.pi)
     return float(np.trapezoid(velocities, periods) / (periods[-1] - periods[0]))
@@ -232,20 +248,24 @@ def asce_43_05(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     Returns
     -------
     Rating
-        Spectral acceleration over the block's capacity, both m/s^2, at the balance point.
+        Spectral acceleration and the block's capacity at the balance point, m/s^2.
+
+    See Also
+    --------
+    rocking.rules.priestley : Equivalent oscillator with the period of free rocking.
 
     Notes
     -----
     For a rotation theta_0, with a = tan(alpha), f_1 = cos(theta_0) + a sin(theta_0) - 1 and C_I = I/(m h^2):
 
-    - capacity 2 g f_1/theta_0: the work of a steady acceleration up to theta_0 that raises the block, m g h f_1, taken
-      as that of a spring;
+    - capacity 2 g f_1/theta_0, from the work m g h f_1 that raises the block to theta_0, equated to the work of a
+      spring;
     - frequency (1/2 pi) sqrt(2 f_1 g/(C_I theta_0^2 h)) = (p/2 pi) sqrt(2 f_1 cos(alpha))/theta_0;
-    - damping gamma/sqrt(4 pi^2 + gamma^2), gamma = -2 ln C_R: an oscillator that loses in one cycle what two impacts
-      take. C_R is the block's restitution; the standard's 1 - 2 a^2/C_I is Housner's.
+    - damping gamma/sqrt(4 pi^2 + gamma^2), gamma = -2 ln C_R: the oscillator loses in one cycle as much as the block in
+      two impacts. C_R is the block's restitution. The standard's 1 - 2 a^2/C_I is Housner's.
 
-    The rocking angle is the largest at which the spectrum meets the capacity. Where the spectrum is above the capacity
-    at the balance point, theta_0 = alpha, the block overturns by the method. The standard's correction for vertical
+    The rocking angle is the largest at which the spectrum equals the capacity. If the spectrum exceeds the capacity at
+    the balance point, theta_0 = alpha, the block overturns by this method. The standard's correction for vertical
     motion and its ratio of masses are 1. No factor of safety is applied.
 
     References
@@ -263,22 +283,26 @@ def priestley(blocks: Blocks, motion: Motion) -> tuple[Any, Floats]:
     Returns
     -------
     Rating
-        Spectral displacement over that of the block's centre of mass, both m, at the rotation below the balance point
-        where their ratio is least. Below 1 the method finds a rocking angle, from 1 on none: by it the block overturns.
+        Spectral displacement and displacement of the block's centre of mass, m, at the rotation below the balance point
+        with the smallest ratio. The block rocks below a ratio of 1 and otherwise overturns.
 
     Raises
     ------
     InvalidBlock
         If a restitution is so low (below 0.23) that the damping would be critical.
 
+    See Also
+    --------
+    rocking.rules.asce_43_05 : Equivalent oscillator with the energy of the block.
+
     Notes
     -----
     For a rotation theta_0:
 
-    - period (4/p) acosh(1/(1 - theta_0/alpha)), Housner's of free rocking of a slender block;
-    - damping -0.34 ln r, r = e^2, the line that Makris and Konstantinidis put through the decay of free rocking;
-    - displacement R (sin(alpha) - sin(alpha - theta_0)), half the width at the balance point; R = 3 g/(4 p^2), so the
-      block counts as rectangular.
+    - period (4/p) acosh(1/(1 - theta_0/alpha)), Housner's period of free rocking of a slender block;
+    - damping -0.34 ln r, r = e^2, the line that Makris and Konstantinidis fitted to the decay of free rocking;
+    - displacement R (sin(alpha) - sin(alpha - theta_0)), half the width at the balance point, with R = 3 g/(4 p^2) as
+      for a rectangular block.
 
     References
     ----------
@@ -309,12 +333,16 @@ def rate(
     motion : Motion
         Ground motion.
     rules : iterable of str, optional
-        Names in `RULES`; by default all.
+        Names in `RULES`, by default all.
 
     Returns
     -------
     dict of str to Rating
-        By the rule's name.
+        Ratings by the names of the rules.
+
+    See Also
+    --------
+    rocking.rules.check : Compare rules of thumb with simulations.
 
     Examples
     --------
@@ -330,7 +358,7 @@ def rate(
 
 
 class _Oscillator(NamedTuple):
-    """Oscillators that stand for one side of a block at some rotations; demands are for a spectrum of 1 m/s^2."""
+    """Equivalent oscillators for one side of a block at several rotations, with demands for a spectrum of 1 m/s^2."""
 
     periods: Floats
     damping: float
@@ -339,9 +367,9 @@ class _Oscillator(NamedTuple):
 
 
 def _reserve_energy(p: float, alpha: float, restitution: float, gravity: float, share: float = 1.0) -> _Oscillator:
-    """ASCE/SEI 43-05, Appendix A.2, at one rotation over slenderness: by default at the balance point."""
+    """ASCE/SEI 43-05, Appendix A.2, at one ratio of rotation to slenderness, by default the balance point."""
     rotation = np.array([share * alpha])
-    # cos(t) + a sin(t) - 1 without the difference of numbers next to 1.
+    # cos(t) + a sin(t) - 1 without cancellation near 1.
     raised = 2.0 * np.sin(0.5 * rotation) * (math.tan(alpha) * np.cos(0.5 * rotation) - np.sin(0.5 * rotation))
     periods = 2.0 * np.pi * rotation / (p * np.sqrt(2.0 * raised * math.cos(alpha)))
     decay = -2.0 * math.log(restitution)
@@ -360,7 +388,7 @@ def _free_rocking(p: float, alpha: float, restitution: float, gravity: float) ->
 def _least_ratio(
     blocks: Blocks, motion: Motion, oscillator_of: Callable[[float, float, float, float], _Oscillator]
 ) -> tuple[Floats, Floats]:
-    """Demand and capacity of the sides of blocks at the rotation where their ratio is least."""
+    """Demand and capacity of the sides of blocks at the rotation with the smallest ratio."""
     sides = np.stack([blocks.p, blocks.alpha, blocks.restitution], axis=-1).reshape(-1, 3)
     distinct, place = np.unique(sides, axis=0, return_inverse=True)
     found = np.empty((len(distinct), 2))
@@ -382,16 +410,16 @@ def check(
     threads: int | None = None,
     progress: bool | None = None,
 ) -> Check:
-    """Apply rules of thumb to a block under motions, and simulate the block.
+    """Apply rules of thumb to a block under motions, and compare with simulations.
 
     Parameters
     ----------
     block : Block
-        What rocks.
+        Block.
     motions : Motion, sequence of Motion, or mapping of str to Motion
-        m motions; the table shows the names of a mapping, or else the motions' own.
+        m motions. The table shows the keys of a mapping, or otherwise the names of the motions.
     rules : iterable of str, optional
-        Names in `RULES`; by default all.
+        Names in `RULES`, by default all.
     model : {"nonlinear", "linear"}
         Equation of motion of the simulations.
     threads, progress : int or bool, optional
@@ -400,17 +428,22 @@ def check(
     Returns
     -------
     Check
-        Demand over capacity by each rule, and the simulated margin.
+        Ratio of demand to capacity by each rule, and the simulated margin.
 
     Raises
     ------
     InvalidOption
-        If there is no motion, or no rule of a name, or the block never comes to rest (restitution 1).
+        If there is no motion, a rule does not exist, or the block never comes to rest (restitution 1).
+
+    See Also
+    --------
+    rocking.rules.rate : Apply several rules without simulations.
+    rocking.incremental_dynamic_analysis : Find the levels that overturn each block.
 
     Notes
     -----
-    The simulated margin comes from `incremental_dynamic_analysis`, whose levels are 5 % apart: a thinner band of levels
-    that overturn may lie below it.
+    The simulated margin comes from `incremental_dynamic_analysis` with levels 5 % apart. A thinner band of levels that
+    overturn may therefore lie below it.
 
     Examples
     --------
@@ -425,7 +458,7 @@ def check(
     """
     named_motions = motions_by_name(motions)
     names = None if rules is None else checks.several(rules, "rules", InvalidOption)
-    # What is refused is refused before the work.
+    # Raise errors before the simulations.
     values_of([*named_motions.values()], Measure("pga"))
     ratios = [
         {name: float(rating.ratio[0]) for name, rating in rate(block, motion, names).items()}
@@ -441,13 +474,13 @@ def check(
 
 
 def _margin(response: Response, block: Block, motion: Motion, model: Model, threads: int | None) -> float:
-    """One over the lowest factor on the motion that overturns the block, on the side of 1 that the response tells."""
+    """Reciprocal of the lowest factor on the motion that overturns the block, consistent with the response."""
     scaled = incremental_dynamic_analysis(
         block, motion, model=model, tolerance=_TOLERANCE, threads=threads, progress=False
     )
     margin = motion.pga / float(scaled.data.overturning_level[0, 0])
     if response.overturned:
-        return float(np.fmax(margin, 1.0))  # it may be beyond all levels that were looked at
-    # The level is the middle of a bracket: where that holds the motion itself, which stands, the change lies above it.
+        return float(np.fmax(margin, 1.0))  # the factor may be beyond all simulated levels
+    # The level is the midpoint of a bracket. If this contains the motion itself, which stands, the change is above.
     is_near = 1.0 <= margin <= 1.0 + _TOLERANCE and not response.unfinished
     return float(np.nextafter(1.0, 0.0)) if is_near else margin

@@ -1,4 +1,4 @@
-"""A fragility curve: a lognormal fitted to outcomes of one limit state, with its confidence band, and as NRML."""
+"""Fragility curves: lognormals fitted to outcomes, with confidence bands and NRML export."""
 
 from __future__ import annotations
 
@@ -31,30 +31,30 @@ NAMESPACE: Final = "http://openquake.org/xmlns/nrml/0.5"
 
 LossCategory = Literal["structural", "nonstructural", "contents", "business_interruption"]
 
-#: Square of the widest dispersion whose lognormal has a standard deviation that is a number.
+#: Square of the largest dispersion whose lognormal has a finite standard deviation.
 _WIDEST: Final = 700.0
 
-#: How many times beyond the data a median is still believed.
+#: Largest plausible ratio of the median to the data.
 _FARTHEST: Final = 1000.0
 
 
 @dataclass(frozen=True, eq=False)
 class FragilityCurve:
-    """A lognormal fitted to outcomes: P(x) = Phi(ln(x/median)/dispersion).
+    """Lognormal fragility curve P(x) = Phi(ln(x/median)/dispersion) fitted to outcomes.
 
     Attributes
     ----------
     limit_state : str
-        Name of what is exceeded.
+        Name of the limit state.
     limit : float or None
-        Peak rotation over slenderness that is exceeded, infinite for overturning; None where outcomes were given.
+        Limit of the ratio of peak rotation to slenderness, infinite for overturning, or None for given outcomes.
     intensity, exceeded, trials : ndarray, shape (n,)
-        The data: outcomes that exceeded, of how many, at each intensity. Those of blocks with weights count in parts.
+        Data: number of outcomes that exceeded, and of trials, at each intensity. Weights of blocks lead to fractional
+        numbers.
     clusters : int
-        Number of clusters of outcomes that belong together: of motions, where outcomes were simulated; of outcomes,
-        where each is on its own.
+        Number of clusters of dependent outcomes (of motions for simulations).
     independent : bool
-        Whether every outcome is on its own, so that tests which know of no clusters may be asked.
+        Whether all outcomes are independent, as required by tests without clusters.
     fitted : Probit
         Intercept and slope of P = Phi(intercept + slope ln x).
     covariance : ndarray, shape (2, 2)
@@ -62,15 +62,19 @@ class FragilityCurve:
     confidence : float
         Probability of the intervals and bands.
     log_likelihood : float
-        Its logarithm at the maximum, without binomial coefficients.
+        Maximum of the log-likelihood, without binomial coefficients.
     region : Probit
-        Fits that are about as likely, on the boundary of their region: intervals are extremes in it. From the profile
-        likelihood, adjusted to the differences between clusters where these hold several outcomes (Chandler and Bate
-        2007).
+        Fits on the boundary of the confidence region, whose extremes are the intervals. The region follows from the
+        profile likelihood, adjusted to the differences between clusters with several outcomes (Chandler and Bate 2007).
     goodness : Goodness
-        Pearson's test between groups of outcomes and the fit: one group for each intensity where each has five outcomes
-        or more (stripes), else up to ten of equal size along the intensity (cloud; Hosmer and Lemeshow). It takes all
-        outcomes for independent: where several belong to one cluster there is no p-value.
+        Pearson's test of groups of outcomes against the fit: one group for each intensity if each has five outcomes or
+        more (stripes), otherwise up to ten of equal size along the intensity (cloud; Hosmer and Lemeshow). The test
+        assumes independence, and has no p-value for clusters of several outcomes.
+
+    See Also
+    --------
+    rocking.fit_fragility : Fit curves to given outcomes.
+    rocking.fragility : Simulate the outcomes and fit the curves.
 
     Examples
     --------
@@ -115,30 +119,30 @@ class FragilityCurve:
 
     @property
     def bounded(self) -> bool:
-        """Whether intervals and bands bound anything: fewer than three clusters of several outcomes do not."""
+        """Whether intervals can be finite, which requires three clusters if they contain several outcomes."""
         return bool(np.all(np.isfinite(self.region.intercept)))
 
     @property
     def median_interval(self) -> tuple[float, float]:
-        """Confidence interval of the median; 0 or infinite where the data allow a curve that does not rise."""
+        """Confidence interval of the median, 0 or infinite if the data allow a curve that does not rise."""
         low, high = extremes(self.region, _log_medians)
         with np.errstate(over="ignore"):
             return float(np.exp(low[0])), float(np.exp(high[0]))
 
     @property
     def dispersion_interval(self) -> tuple[float, float]:
-        """Confidence interval of the dispersion; infinite where the data allow a curve that does not rise."""
+        """Confidence interval of the dispersion, infinite if the data allow a curve that does not rise."""
         return _dispersion(float(self.region.slope.max())), _dispersion(float(self.region.slope.min()))
 
     def probability(self, intensity: ArrayLike) -> Floats:
-        """Fitted probability at intensities of 0 or more (SI units, or a block's own), shaped like them."""
+        """Compute the fitted probability at intensities >= 0 (SI units or a block's own), with their shape."""
         at = intensities(intensity)
         return as_asked(probabilities(self.fitted, _logarithm(at).ravel())[0].reshape(at.shape))
 
     def intensity_of(self, probability: float) -> float:
-        """Intensity (SI units, or a block's own) at which the fitted probability is that given, between 0 and 1.
+        """Compute the intensity (SI units or a block's own) for a fitted probability between 0 and 1.
 
-        ``intensity_of(0.95)`` is the amplitude that a rock which still stands has most likely never met.
+        ``intensity_of(0.95)`` is the amplitude that a rock which still stands has most likely never experienced.
         """
         from scipy.special import ndtri
 
@@ -148,10 +152,10 @@ class FragilityCurve:
             return float(np.exp((score - self.fitted.intercept[0]) / self.fitted.slope[0]))
 
     def largest_rate(self, intensity: ArrayLike, years: float, confidence: float = 0.95) -> Floats:
-        """Annual rates of motions of an intensity or more above which a block that stood would have fallen.
+        """Compute the largest annual rates of exceeding an intensity that are consistent with survival.
 
-        They are -ln(1 - confidence)/(years P(intensity)), shaped like the intensities (SI units, 0 or more), and
-        infinite at 0. A precarious rock of that age contradicts a hazard curve above them.
+        The rates are -ln(1 - confidence)/(years P(intensity)), with the shape of the intensities (SI units, 0 or more),
+        and infinite at 0. A precarious rock that has stood for so long contradicts hazard curves above them.
         """
         time = checks.positive(years, "years", InvalidOption)
         share = checks.share(confidence, "confidence", InvalidOption)
@@ -159,7 +163,7 @@ class FragilityCurve:
             return -math.log1p(-share) / (time * self.probability(intensity))
 
     def band(self, intensity: ArrayLike) -> tuple[Floats, Floats]:
-        """Lower and upper end of the pointwise confidence band of the `probability` at intensities."""
+        """Compute the lower and upper end of the pointwise confidence band of `probability`."""
         from scipy.special import ndtr
 
         at = intensities(intensity)
@@ -169,7 +173,7 @@ class FragilityCurve:
         return low, high
 
     def to_dict(self) -> dict[str, Any]:
-        """Return parameters, intervals and tests by name; intensities are in SI units, or a block's own."""
+        """Return parameters, intervals and tests by name, with intensities in SI units or a block's own."""
         return {
             "limit_state": self.limit_state,
             "median": self.median,
@@ -195,10 +199,10 @@ def fitted_curve(
     measure: Measure,
     limit: float | None = None,
 ) -> FragilityCurve:
-    """Curve of a limit state from intensities, exceedances and trials; without clusters every trial is on its own."""
+    """Fit the curve of a limit state. Without clusters all trials are independent."""
     intensity, exceeded, trials = data
     intensity = probit.merge_equal_intensities(intensity)
-    # Both are sums of the same weights, perhaps in another order.
+    # Both are sums of the same weights, but perhaps in a different order.
     exceeded = np.where(np.abs(trials - exceeded) <= 1e-12 * trials, trials, exceeded)
     z = np.log(intensity)
     outcomes = Outcomes(z, exceeded, trials)
@@ -233,7 +237,7 @@ def fitted_curve(
 
 
 def fragility_line(curve: FragilityCurve, intensity: Floats, measure: Measure) -> FragilityLine:
-    """Curve at intensities with its band, and the shares seen in the groups that the fit is tested in, as drawn."""
+    """Return curve, band, and observed shares of the groups of the test for a figure."""
     from rocking.plot.curves import FragilityLine
 
     group = probit.groups(np.log(curve.intensity), curve.trials)
@@ -249,7 +253,7 @@ def fragility_line(curve: FragilityCurve, intensity: Floats, measure: Measure) -
 
 
 def whole_numbers(values: ArrayLike, name: str, size: int, least: float, most: ArrayLike) -> Floats:
-    """Whole numbers, one for each intensity, between two bounds."""
+    """Return integers between two bounds, one for each intensity."""
     given = checks.answers_or_numbers(values, name, InvalidOption)
     try:
         numbers = np.broadcast_to(given, size)
@@ -262,37 +266,37 @@ def whole_numbers(values: ArrayLike, name: str, size: int, least: float, most: A
 
 
 def extremes(region: Probit, quantity: Callable[[Probit], Floats]) -> tuple[Floats, Floats]:
-    """Lowest and highest of quantities (fits, n) in a region of fits."""
+    """Return lowest and highest quantities (fits, n) in a region of fits."""
     values = quantity(region)
     return values.min(axis=0), values.max(axis=0)
 
 
 def in_units(intensity: float, measure: Measure) -> str:
-    """Return an intensity, in SI units, as people write it, with its unit."""
+    """Format an intensity (SI) with its unit."""
     return f"{measure.scale * intensity:.4g} {measure.shown_in}".rstrip()
 
 
 def interval_text(ends: Sequence[float], digits: int, bounds: tuple[float, float] = (0.0, math.inf)) -> str:
-    """Write the ends of an interval, to some digits; in place of finite ones outside of bounds the bounds."""
+    """Format an interval, with bounds in place of finite ends beyond them."""
     text = f"{{:.{digits}g}}".format
     return " to ".join("infinity" if math.isinf(end) else within(end, bounds if end else (0, 0), text) for end in ends)
 
 
 def median_text(curve: FragilityCurve, scale: float) -> str:
-    """Write the interval of the median, times a factor, without numbers that are too far from the data."""
+    """Format the interval of the median, times a factor, without numbers too far from the data."""
     bounds = scale * curve.intensity.min() / _FARTHEST, scale * curve.intensity.max() * _FARTHEST
     return interval_text([scale * end for end in curve.median_interval], 4, bounds)
 
 
 def _log_medians(fits: Probit) -> Floats:
-    """Logarithms of medians, shape (fits, 1): infinite of a level curve, above one half or below."""
+    """Logarithms of medians, shape (fits, 1), -inf or inf for level curves above or below one half."""
     with np.errstate(divide="ignore", invalid="ignore"):
         sloping = -fits.intercept / fits.slope
     return np.where(fits.slope > 0.0, sloping, np.where(fits.intercept > 0.0, -np.inf, np.inf))[:, None]
 
 
 def _dispersion(slope: float) -> float:
-    """Dispersion of a slope: 0 of a step, infinite of a level curve."""
+    """Dispersion for a slope: 0 for a step, infinite for a level curve."""
     if slope >= probit.STEEP:
         return 0.0
     return 1.0 / slope if slope > 0.0 else math.inf
@@ -312,10 +316,10 @@ def fragility_model(
     description: str,
     **about: str,
 ) -> str:
-    """Fragility model of OpenQuake, NRML 0.5, of one function: lognormals by the moments of the intensity itself.
+    """Create an OpenQuake fragility model (NRML 0.5) of one function from moments of the intensity.
 
-    `imt` is OpenQuake's measure and its unit's factor; `valid` the range (SI) of the data; up to `no_damage`
-    (OpenQuake's unit) nothing moves; `about` has the model's id, assetCategory and lossCategory.
+    `imt` contains OpenQuake's measure and the factor of its unit, `valid` the range (SI) of the data, `no_damage` the
+    lowest damaging intensity in OpenQuake's unit, and `about` the model's id, assetCategory and lossCategory.
     """
     checks.one_of(about["lossCategory"], "loss_category", InvalidOption, get_args(LossCategory))
     for what, name in (("taxonomy", taxonomy), ("model_id", about["id"]), ("asset_category", about["assetCategory"])):
@@ -330,7 +334,7 @@ def fragility_model(
         )
     root = ET.Element("nrml", {"xmlns": NAMESPACE})
     model = ET.SubElement(root, "fragilityModel", about)
-    # The manual asks for a brief string in ASCII.
+    # The manual requires a brief string in ASCII.
     ET.SubElement(model, "description").text = description.encode("ascii", "replace").decode("ascii")
     ET.SubElement(model, "limitStates").text = " ".join(curve.limit_state for curve in curves)
     kind = {"id": taxonomy, "format": "continuous", "shape": "logncdf"}
@@ -349,7 +353,7 @@ def fragility_model(
 
 
 def check_names(names: Iterable[str], what: str) -> None:
-    """Raise an InvalidOption unless NRML allows all these names of something."""
+    """Raise an InvalidOption unless NRML allows all names."""
     for name in names:
         if not re.fullmatch(r"[A-Za-z0-9_-]{1,100}", checks.text(name, what, InvalidOption)):
             raise InvalidOption(
@@ -360,9 +364,9 @@ def check_names(names: Iterable[str], what: str) -> None:
 
 
 def openquake_measure(measure: Measure, block: Body | None, model: Model) -> tuple[str, float]:
-    """OpenQuake's type for a measure, and the factor from SI units or the block's own: PGA and SA in g, PGV in cm/s.
+    """Return OpenQuake's measure, and the factor from SI units or the block's own (g, or cm/s for PGV).
 
-    SA(T) does not say its damping: it is that of ground-motion models.
+    SA(T) does not state its damping, which is the damping of ground-motion models.
     """
     if measure.in_block_units and block is None:
         raise InvalidOption(

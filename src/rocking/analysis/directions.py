@@ -1,4 +1,4 @@
-"""A body under pairs of horizontal components: what becomes of it in the plane of each azimuth."""
+"""Responses of a body to pairs of horizontal components in the vertical plane of each azimuth."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-#: Two horizontal components of one place, and maybe several such pairs by their names.
+#: Pair of horizontal components from one location.
 Pair = tuple[Motion, Motion]
 Pairs = Sequence[Pair] | Mapping[str, Pair]
 
@@ -51,25 +51,26 @@ def response_rose(
     threads: int | None = None,
     progress: bool | None = None,
 ) -> ResponseRose:
-    """Simulate a body in the plane of every azimuth, under the component of the ground motion along it.
+    """Simulate a body in the plane of every azimuth under the ground motion along it.
 
-    Each azimuth is a simulation of its own, in one vertical plane; motion across it is left out.
+    Each azimuth is a separate simulation in one vertical plane, without the motion across it.
 
     Parameters
     ----------
     solid : Solid
-        Body; across each azimuth it is the block of `Solid.block`.
+        Body. Each azimuth uses the block of `Solid.block`.
     pairs : sequence of (Motion, Motion), or mapping of str to (Motion, Motion)
-        m pairs of horizontal components, which start together.
+        m pairs of simultaneous horizontal components.
     azimuths : array_like, optional
-        Degrees clockwise from north; by default every 15 from 0 to 165, since at 180 more all is mirrored.
+        Azimuths, degrees clockwise from north. By default 0 to 165 in steps of 15, because results at 180 more are
+        mirrored.
     levels : array_like, optional
-        Levels that every pair is scaled to; by default pairs as they are.
+        Levels to which every pair is scaled. By default pairs are not scaled.
     measure : {"factor", "pga", "pgv"} or Measure
-        Measure of the levels, SI units: the geometric mean of both components as they were recorded. Both are scaled by
-        one factor.
+        Measure of the levels, in SI units: geometric mean of both components as recorded. Both are scaled by one
+        factor.
     recorded : pair of float, optional
-        Azimuths of the first and the second component of every pair; by default as their records say.
+        Azimuths of the first and the second component of every pair. The default is read from the records.
     restitution : float or pair, optional
         As for `Solid.block`.
     model, chattering, threads, progress : optional
@@ -78,16 +79,21 @@ def response_rose(
     Returns
     -------
     ResponseRose
-        Peaks and verdicts for each pair, level and azimuth.
+        Peaks and outcomes for each pair, level and azimuth.
 
     Raises
     ------
     InvalidBlock
-        If `solid` is none, or too stocky to rock across an azimuth.
+        If `solid` is not a Solid, or is too stocky to rock across an azimuth.
     InvalidMotion
-        If a component is no motion, or its azimuth is not known.
+        If a component is not a motion, or its azimuth is unknown.
     InvalidOption
-        If there is no pair, or an argument is out of its range.
+        If there is no pair, or an argument is out of range.
+
+    See Also
+    --------
+    rocking.Solid : Three-dimensional rigid body.
+    rocking.simulate_many : Simulate many blocks under many motions.
 
     Examples
     --------
@@ -147,15 +153,19 @@ def response_rose(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ResponseRose(DatasetResult):
-    """What becomes of a body in the plane of each azimuth; from `response_rose`.
+    """Responses of a body in the plane of each azimuth, computed by `response_rose`.
 
-    Its figure has the share of the pairs that overturn the body, over the full circle, for up to four levels.
+    The figure shows the share of pairs that overturn the body over the full circle, for up to four levels.
 
     Attributes
     ----------
     data : xarray.Dataset
         Over (pair, level, azimuth): overturned, peak_over_slenderness. Over (level, azimuth): overturned_share. Over
-        (level): anywhere, the share of the pairs that overturn the body at one azimuth or more.
+        (level): anywhere, the share of pairs that overturn the body at one azimuth or more.
+
+    See Also
+    --------
+    rocking.response_rose : Run the simulations.
     """
 
     TABLES = MappingProxyType(
@@ -173,7 +183,7 @@ class ResponseRose(DatasetResult):
         return f"{data.description}, {data.model} model: share overturned, {over}"
 
     def _levels(self) -> list[str]:
-        """Return levels as people read them."""
+        """Format the levels."""
         data = self.data
         unit = data.level.attrs.get("units", "1")
         return [
@@ -211,7 +221,7 @@ class ResponseRose(DatasetResult):
         data = self.data
         chosen = [*evenly(data.sizes["level"], 4)]
         azimuth = data.azimuth.values
-        # Where no opposite azimuth was asked for, it does what this one does.
+        # An opposite azimuth that was not requested has the same outcome.
         opposite = np.mod(azimuth + 180.0, 360.0)
         new = ~np.isin(opposite, azimuth)
         around = np.concatenate([azimuth, opposite[new]])
@@ -229,7 +239,7 @@ class ResponseRose(DatasetResult):
 
 
 def _named_pairs(pairs: Pairs) -> dict[str, Pair]:
-    """Pairs of motions by name, or refuse what is none."""
+    """Return pairs by name, or raise an error if one is not a pair of motions."""
     given = [*pairs.values()] if isinstance(pairs, Mapping) else checks.several(pairs, "pairs", InvalidOption)
     found = [several_motions(pair) for pair in given if not isinstance(pair, Motion)]
     if not found or len(found) < len(given) or any(len(components) != 2 for components in found):
@@ -243,7 +253,7 @@ def _named_pairs(pairs: Pairs) -> dict[str, Pair]:
 
 
 def _factors(scales: Scales, pair: Pair) -> Any:
-    """Return the factors on both components that bring the geometric mean of what they measure to the levels."""
+    """Return factors that scale the geometric mean of the measures of both components to the levels."""
     if scales.measure is None:
         return scales.values
     one, other = (scales.measure.positive(motion, motion.name) for motion in pair)

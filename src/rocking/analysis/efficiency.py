@@ -1,4 +1,4 @@
-"""Efficiency of intensity measures: which one predicts best when motions overturn a block."""
+"""Efficiency of intensity measures as predictors of overturning."""
 
 from __future__ import annotations
 
@@ -52,46 +52,50 @@ def compare_measures(
     threads: int | None = None,
     progress: bool | None = None,
 ) -> MeasureComparison:
-    """Compare how widely motions scatter, by several intensity measures, at which they first overturn blocks.
+    """Compare the dispersion of overturning motions for several intensity measures.
 
     Parameters
     ----------
     blocks, motions : optional
-        As for `simulate_many`: n blocks, and m motions, two at least.
+        As for `simulate_many`: n blocks, and m >= 2 motions.
     periods : array_like
         Periods of spectral accelerations, s.
     damping : float
-        Their fraction of critical damping.
+        Fraction of critical damping of the spectral accelerations.
     model : {"nonlinear", "linear"}
         Equation of motion.
     weights, clusters : optional
-        As for `fragility`; a cluster counts as one motion in the intervals.
+        As for `fragility`. A cluster counts as one motion in the intervals.
     tolerance : float
-        Width of the intensities at overturning, relative to them.
+        Relative width of the brackets of the overturning intensities.
     threads, progress : optional
         As for `simulate_many`.
 
     Returns
     -------
     MeasureComparison
-        For PGA, PGV, each spectral acceleration, and PGA and PGV in a block's own units.
+        Comparison of PGA, PGV, each spectral acceleration, and PGA and PGV in a block's own units.
 
     Raises
     ------
     InvalidOption
-        If an argument is out of its range, fewer than two motions, or motions of fewer than two clusters, are given or
-        overturn a block, or a block never comes to rest.
+        If an argument is out of range, fewer than two motions or clusters are available or overturn a block, or a block
+        never comes to rest.
     InvalidMotion
         If a motion is zero throughout.
 
+    See Also
+    --------
+    rocking.incremental_dynamic_analysis : Find the levels that overturn each block.
+    rocking.fragility : Fit fragility curves for one measure.
+
     Notes
     -----
-    Every motion is scaled up, in steps of 5 %, until it overturns the block (`incremental_dynamic_analysis`). The
-    logarithm of its intensity there has the standard deviation beta over the motions, the dispersion of the fragility:
-    the smaller, the more efficient the measure. The interval of beta is that of a normal sample. Over several blocks
-    beta is pooled from the deviations from each block's own mean, with the degrees of freedom of the motions or
-    clusters. Of motions that are multiples of one another only the first counts; where the sides of a block differ,
-    reversed ones count as well.
+    Every motion is scaled up in steps of 5 % until it overturns the block (`incremental_dynamic_analysis`). The
+    standard deviation beta of the logarithm of this intensity over the motions is the dispersion of the fragility.
+    Efficient measures have a small beta. The interval of beta assumes a normal sample. For several blocks, beta is
+    pooled from the deviations from each block's mean, with the degrees of freedom of the motions or clusters. Only the
+    first of motions that are multiples of one another counts, and reversed ones as well if the sides of a block differ.
 
     Examples
     --------
@@ -105,7 +109,7 @@ def compare_measures(
     ['PGA 0.67', 'PGV 0.02', 'SA(1 s) 0.01', 'PGA / uplift acceleration 0.67', 'p PGV / uplift acceleration 0.02']
     """
     many, shaken = bodies_of(blocks), several_motions(motions)
-    slenderness_of(many)  # refused before the work
+    slenderness_of(many)  # raise errors before the simulations
     shares = normalised_weights(weights, len(many))
     if len(shaken) < 2:
         raise InvalidOption("measures are compared by how {} scatter: give two or more, not one", "motions")
@@ -134,17 +138,21 @@ def compare_measures(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MeasureComparison(DatasetResult):
-    """Intensity measures side by side; from `compare_measures`.
+    """Comparison of intensity measures, computed by `compare_measures`.
 
-    Its figure has the dispersion of each measure with its interval, the most efficient first, as the summary.
+    Figure and summary list the dispersion of each measure with its interval, the most efficient first.
 
     Attributes
     ----------
     data : xarray.Dataset
-        Over (measure, motion, block): intensity, the lowest that overturns, in the measure's unit; NaN where none does.
-        Over (measure): median_intensity; dispersion (standard deviation of the logarithm about each block's own mean),
-        with dispersion_low and dispersion_high, its 90 % interval; dispersion_of_all, about one mean of all blocks;
-        unit. Its attribute damping is that of the spectral accelerations, sample how many motions there are.
+        Over (measure, motion, block): intensity, the lowest that overturns, in the measure's unit, or NaN. Over
+        (measure): median_intensity, unit, dispersion (standard deviation of the logarithm about each block's mean) with
+        its 90 % interval dispersion_low and dispersion_high, and dispersion_of_all (about a common mean). Attributes:
+        damping of the spectral accelerations, and sample, the number of motions.
+
+    See Also
+    --------
+    rocking.compare_measures : Run the comparison.
     """
 
     TABLES = MappingProxyType(
@@ -157,7 +165,7 @@ class MeasureComparison(DatasetResult):
 
     @property
     def _ranked(self) -> pd.DataFrame:
-        """The table of measures, the most efficient first."""
+        """Table of measures, the most efficient first."""
         table = self.data[list(self.TABLES["measures"])].to_dataframe()
         return table.sort_values("dispersion_of_all", kind="stable")
 
@@ -213,19 +221,19 @@ class MeasureComparison(DatasetResult):
 def _dataset(
     measures: Sequence[Measure], intensity: Floats, counts: Flags, shares: Floats, *, freedom: int
 ) -> xr.Dataset:
-    """Intensities at overturning of (measure, motion, block), and the dispersions of those that count."""
+    """Combine intensities at overturning (measure, motion, block) with the dispersions of valid ones."""
     import xarray as xr
     from scipy.special import chdtri
 
     logarithm = np.where(counts, np.log(intensity), np.nan)
     weight, count = np.where(counts, shares, 0.0), counts.sum(axis=0)
-    # Motions are what is drawn: those of several blocks are the same.
+    # The sample consists of motions, which are the same for several blocks.
     others = np.sum(shares * (count - 1))
     within = logarithm - np.nansum(logarithm, axis=1, keepdims=True) / np.maximum(count, 1)
     own = np.sqrt(np.nansum(weight * within**2, axis=(1, 2)) / others)
     mean = np.nansum(weight * logarithm, axis=(1, 2)) / weight.sum()
     of_all = np.sqrt(np.nansum(weight * (logarithm - mean[:, None, None]) ** 2, axis=(1, 2)) / others)
-    # Ends of a standard deviation's interval over its estimate, for a normal sample.
+    # Ratios of the ends of the interval to the standard deviation, for a normal sample.
     low, high = (float(np.sqrt(freedom / chdtri(freedom, tail))) * own for tail in (0.05, 0.95))
     spread = "standard deviation of the logarithm of the intensity at overturning"
     median = "median of the intensities at overturning, in the measure's unit"
@@ -243,7 +251,7 @@ def _dataset(
 
 
 def _check_enough(count: int, clusters: object) -> None:
-    """Refuse a sample of one: so many clusters, or motions if no clusters were given."""
+    """Raise an error for a sample of one cluster, or of one motion without clusters."""
     if count < 2:
         kind, which = ("motions", " that are not multiples of one another") if clusters is None else ("clusters", "")
         raise InvalidOption(

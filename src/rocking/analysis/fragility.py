@@ -1,4 +1,4 @@
-"""Fragility curves against one intensity measure, and all that is made of them."""
+"""Fragility curves for one intensity measure, and results derived from them."""
 
 from __future__ import annotations
 
@@ -68,32 +68,37 @@ _POINTS: Final = 201
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Fragility(Result):
-    """Fragility curves of one or several limit states against one intensity measure; from `fragility`.
+    """Fragility curves of one or more limit states for one intensity measure, computed by `fragility`.
 
-    Its tables are "curves" and, of simulated blocks, "outcomes"; its figure has curves, bands and observed shares.
+    Tables: "curves" and, for simulated blocks, "outcomes". The figure contains curves, bands and observed shares.
 
     Attributes
     ----------
     curves : tuple of FragilityCurve
-        One for each limit state.
+        Curve of each limit state.
     measure : Measure
-        Intensity measure; intensities are in its SI units.
+        Intensity measure. Intensities are in its SI units.
     description, model : str
-        Description of the simulations or observations; equation of motion, on which a block's own unit depends.
+        Description of the data, and equation of motion, which affects a block's own unit.
     block : Block or None
-        The block, where there is one.
+        Block, if there is only one.
     outcomes : pandas.DataFrame or None
-        Every simulation: motion, block (position), polarity, the measure (SI, as pga_m_s2), peak_rotation_rad,
+        All simulations: motion, block (position), polarity, the measure (SI, for example pga_m_s2), peak_rotation_rad,
         peak_over_alpha (infinite: overturned, NaN: unfinished), overturned, unfinished, whether each limit state was
-        exceeded, and the weight of the block if any; None where outcomes were given.
+        exceeded, and the weight of the block if any. None for outcomes from other sources.
     one_way, with_vertical, several_blocks : bool
-        Whether sides that differ met motions in one polarity only, a vertical motion was simulated, and outcomes of
-        several blocks count together.
+        Whether unequal sides were simulated in one polarity only, vertical motions were included, and several blocks
+        are pooled.
     source : str
-        Origin of a cluster of outcomes: "motion" or "cluster".
+        Meaning of a cluster of outcomes: "motion" or "cluster".
     undecided, missing : str
-        How many outcomes of a sample change within 3e-6 of the motion, and how many simulations were given up, which
-        the curves leave out; empty where there are none.
+        Number of outcomes in a sample that change within 3e-6 of the motion, and of abandoned (excluded) simulations,
+        or empty.
+
+    See Also
+    --------
+    rocking.fit_fragility : Fit curves to given outcomes.
+    rocking.HazardCurve : Rates of exceeding an intensity at a site.
 
     Examples
     --------
@@ -140,7 +145,7 @@ class Fragility(Result):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Limits of the curves: small samples, poor fits, undecided outcomes; one sentence each."""
+        """Limitations of the curves (small samples, poor fits, undecided outcomes), one sentence each."""
         notes = [text for text in (self.missing, self.undecided) if text]
         if self.one_way:
             notes.append(
@@ -189,14 +194,14 @@ class Fragility(Result):
         return f"{self.description}; {self.measure.label}; {curves}"
 
     def curve(self, limit_state: str) -> FragilityCurve:
-        """Return the curve of a limit state, by its name."""
+        """Return the curve of a limit state."""
         curves = {curve.limit_state: curve for curve in self.curves}
         return curves[checks.one_of(limit_state, "limit_state", InvalidOption, list(curves))]
 
     def annual_rate(self, hazard: HazardCurve) -> Risk:
-        """Annual rates of exceeding the limit states at a site, from its hazard curve of this measure.
+        """Compute annual rates of exceeding the limit states from the hazard curve of a site.
 
-        The integral of rate(x) dP(x) over all intensities x is in closed form, of one power k all along
+        The integral of rate(x) dP(x) over all intensities x is evaluated in closed form. For a single power k it equals
         rate(median) exp((k dispersion)^2/2) (Cornell).
         """
         return risk_of(self.curves, hazard, self.measure, self.description)
@@ -209,23 +214,27 @@ class Fragility(Result):
         confidence: float = 0.95,
         limit_state: str = "overturning",
     ) -> Survival:
-        """Constrain past shaking by a limit state that was not exceeded, as by a rock that still stands.
+        """Constrain past ground motions by a limit state that was not exceeded, as by a rock that still stands.
 
         Parameters
         ----------
         years : float
-            Time for which the limit state was not exceeded.
+            Time without exceedance of the limit state, years.
         hazard : HazardCurve, optional
-            Annual rates of the intensities, for the probability of the survival.
+            Annual rates of the intensities, for the probability of survival.
         confidence : float
-            Probability with which the limit would have been exceeded, were shaking any stronger or more frequent.
+            Probability with which stronger or more frequent motions would have exceeded the limit.
         limit_state : str
-            Name of the limit.
+            Name of the limit state.
 
         Returns
         -------
         Survival
-            Intensity most likely never reached, largest annual rates, and the probability of surviving.
+            Intensity that was most likely never reached, largest annual rates, and probability of survival.
+
+        See Also
+        --------
+        rocking.Fragility.annual_rate : Annual rates of exceeding the limit states.
         """
         curve = self.curve(limit_state)
         rate = None if hazard is None else self.annual_rate(hazard).rate(limit_state)
@@ -262,28 +271,28 @@ class Fragility(Result):
         loss_category: LossCategory = "contents",
         asset_category: str = "contents",
     ) -> None:
-        """Write the curves as an OpenQuake fragility model, NRML 0.5.
+        """Write the curves as an OpenQuake fragility model (NRML 0.5).
 
-        Lognormals are written by mean and standard deviation of the intensity (PGA and SA in g, PGV in cm/s, a measure
-        in a block's own unit as PGA or PGV of that block). The uplift acceleration is the limit of no damage of PGA,
-        unless a vertical motion was simulated, which lowers it.
+        Lognormals are written by mean and standard deviation of the intensity (PGA and SA in g, PGV in cm/s, a block's
+        own units as its PGA or PGV). For PGA the no-damage limit is the uplift acceleration, unless it is lowered by a
+        simulated vertical motion.
 
         Parameters
         ----------
         path : path
-            File to write.
+            Output file.
         taxonomy : str
-            Identifier of the function, which the exposure model refers to.
+            Identifier of the function in the exposure model.
         block : Block, optional
-            Block whose unit a dimensionless measure counts in, of curves of several.
+            Block for the unit of a dimensionless measure, for curves of several blocks.
         model_id, loss_category, asset_category : str
-            Attributes of the model; the category is structural, nonstructural, contents or business_interruption.
+            Attributes of the model. The category is structural, nonstructural, contents or business_interruption.
 
         Raises
         ------
         InvalidOption
-            If NRML does not allow a name, a block is needed, a spectral acceleration is not of 5 % damping, as
-            OpenQuake's are, or the dispersion is too wide; `OutputError` if the file cannot be written.
+            If NRML does not allow a name, `block` is missing, the damping of a spectral acceleration is not 5 % as in
+            OpenQuake, or the dispersion is too wide. `OutputError` if the file cannot be written.
         """
         if block is not None:
             bodies_of(block)
@@ -332,30 +341,32 @@ def fragility(
     threads: int | None = None,
     progress: bool | None = None,
 ) -> Fragility:
-    """Simulate blocks under motions and fit the probability that a limit is exceeded against the intensity.
+    """Simulate blocks under motions and fit the probability of exceedance against the intensity.
 
     Parameters
     ----------
     blocks : Blocks, Block, RestrainedBlock or sequence of one kind
-        One block; or several whose outcomes are pooled, as those of an ensemble that stands for one block, with
-        `weights` (`Calibration.fragility` does so).
+        One block, or several with pooled outcomes, for example a weighted ensemble for one block
+        (`Calibration.fragility`).
     motions : optional
         As for `simulate_many`: m motions.
     measure : {"pga", "pgv", "pga_ratio", "pgv_ratio"} or Measure
         Intensity measure, as for `incremental_dynamic_analysis`.
     levels : array_like, optional
-        Stripes: every motion scaled to each of these levels. Without them a cloud: every motion as it is.
+        Levels to which every motion is scaled (stripes). By default the motions are not scaled (cloud).
     limits : mapping of str to float
-        Limit states: peak rotation over slenderness (the smaller one of two sides); ``math.inf`` is overturning.
+        Limit states: ratio of peak rotation to slenderness (the smaller one of two sides), ``math.inf`` for
+        overturning.
     model, chattering : optional
         As for `simulate`.
     polarity : {"+", "-", "both"}
-        Motions as they are, reversed, or both. With both each motion counts twice, unless all blocks are symmetric.
+        Original motions, reversed motions, or both. With both, each motion counts twice unless all blocks are
+        symmetric.
     weights : array_like, optional
-        Weight of the outcomes of each block; by default all alike. Those of weight 0 are simulated, but are no data.
+        Weights of the blocks' outcomes, equal by default. Blocks of weight 0 are simulated but not used in the fit.
     clusters : "station" or array_like of labels, shape (m,), optional
-        Which motions belong together, for intervals: by default each alone, and multiples of one another. "station"
-        joins components of one station in one earthquake, as their files name them.
+        Labels of dependent motions, for intervals. By default only multiples of one another are dependent. "station"
+        combines components of one station and earthquake by their file names.
     confidence : float
         Probability of the intervals and bands, between 0 and 1.
     threads, progress : optional
@@ -364,13 +375,19 @@ def fragility(
     Returns
     -------
     Fragility
-        Curves, and all outcomes.
+        Curves and all outcomes.
 
     Raises
     ------
     InvalidOption
-        If an argument is out of its range, or no lognormal can be fitted (`fit_fragility`); `InvalidMotion` if a motion
-        is zero throughout.
+        If an argument is out of range, or no lognormal can be fitted (`fit_fragility`). `InvalidMotion` if a motion is
+        zero throughout.
+
+    See Also
+    --------
+    rocking.fit_fragility : Fit curves to given outcomes.
+    rocking.incremental_dynamic_analysis : Find the levels that overturn each block.
+    rocking.compare_measures : Compare the efficiency of intensity measures.
 
     Examples
     --------
@@ -409,7 +426,7 @@ def fragility(
     outcomes = outcomes_of(table, how, x, ratio, states)
     if weights is not None:
         outcomes["weight"] = trials
-    # Simulations that were given up, and those of a block of weight 0, are reported but are not data.
+    # Abandoned simulations and blocks of weight 0 are reported, but excluded from the fit.
     counts = (trials > 0.0) & ~missing.ravel()
     x, trials, groups = x[counts], trials[counts], groups.ravel()[counts]
     data = {name: (x, trials * passed(ratio, limit, name).ravel()[counts], trials) for name, limit in states.items()}
@@ -450,20 +467,20 @@ def fit_fragility(
     block: Body | None = None,
     description: str = "observed outcomes",
 ) -> Fragility:
-    """Fit a lognormal fragility to outcomes by maximum likelihood: a cloud (one outcome each) or stripes (counts).
+    """Fit a lognormal fragility to outcomes (cloud) or counts (stripes) by maximum likelihood.
 
     Parameters
     ----------
     intensity : array_like, shape (n,)
         Positive intensities, in SI units.
     exceeded : array_like, shape (n,), or mapping of str to array_like
-        At each intensity, whether the limit (by default "overturning") was exceeded, or in how many trials; or these
-        for several limit states by their names.
+        Whether the limit (default: "overturning") was exceeded, or in how many trials. A mapping contains several limit
+        states.
     trials : array_like
         Number of trials at each intensity.
     clusters : array_like of labels, shape (n,), optional
-        Which outcomes belong together (the motion, for instance), for the bands; by default each is on its own, as is
-        one whose label is NaN, None or empty. Fewer than three clusters of several outcomes bound nothing.
+        Labels of dependent outcomes (for example of one motion), for the bands. By default, and for labels NaN, None or
+        empty, outcomes are independent. Fewer than three clusters of several outcomes have no finite bounds.
     measure, confidence : optional
         As for `fragility`.
     block : Block, optional
@@ -474,17 +491,21 @@ def fit_fragility(
     Returns
     -------
     Fragility
-        A curve for each limit state.
+        Curve of each limit state.
 
     Raises
     ------
     InvalidOption
-        If an argument is out of its range, or no rising lognormal fits best: the outcomes are all alike, separated, at
-        one intensity, or no more frequent at higher ones, or put the median at more than 1000 times any intensity.
+        If an argument is out of range, or no rising lognormal fits best: all outcomes are equal, separated, at one
+        intensity, or not more frequent at higher ones, or the median is above 1000 times every intensity.
+
+    See Also
+    --------
+    rocking.fragility : Simulate the outcomes and fit the curves.
 
     Notes
     -----
-    The likelihood of P = Phi(ln(x/median)/dispersion) is that of independent binomial counts (Baker 2015).
+    The likelihood of P = Phi(ln(x/median)/dispersion) assumes independent binomial counts (Baker 2015).
 
     References
     ----------

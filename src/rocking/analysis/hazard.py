@@ -1,4 +1,4 @@
-"""Seismic hazard curves: how often a year the motion at a site exceeds an intensity, or a lognormal limit."""
+"""Seismic hazard curves: mean annual rates of exceeding an intensity or a lognormal limit."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from rocking.motion.scaling import IntensityName, Measure, intensities
 if TYPE_CHECKING:
     from rocking.plot.curves import HazardLine
 
-#: Headings of an intensity in a table, with its measure and the factor to SI units.
+#: Column headings of intensities: measure and factor to SI units.
 HEADINGS: Final[dict[str, tuple[IntensityName, float]]] = {
     "pga_g": ("pga", STANDARD_GRAVITY),
     "pga_percent_g": ("pga", 0.01 * STANDARD_GRAVITY),
@@ -36,7 +36,7 @@ HEADINGS: Final[dict[str, tuple[IntensityName, float]]] = {
     "sa_m_s2": ("sa", 1.0),
 }
 
-#: Names of intensities in OpenQuake's files, with the factor to SI units.
+#: OpenQuake's names of intensities: measure and factor to SI units.
 _OPENQUAKE: Final[dict[str, tuple[IntensityName, float]]] = {
     "PGA": ("pga", STANDARD_GRAVITY),
     "PGV": ("pgv", 0.01),
@@ -49,26 +49,31 @@ _ROOT: Final = math.sqrt(0.5)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class HazardCurve(Result):
-    """Mean annual rate at which the motion at a site exceeds an intensity.
+    """Seismic hazard curve: mean annual rate of exceeding an intensity at a site.
 
-    Between its points the rate is a power of the intensity, a straight line in logarithms; the first and the last such
-    line go on beyond them.
+    Between its points the rate is a power of the intensity, a straight line in logarithms. The first and the last line
+    are extrapolated.
 
     Parameters
     ----------
     intensity : array_like, shape (n,)
-        Intensities in SI units (m/s^2, m/s), n >= 2, increasing.
+        Increasing intensities in SI units (m/s^2, m/s), n >= 2.
     rate : array_like, shape (n,)
-        Exceedances a year, decreasing.
+        Decreasing numbers of exceedances per year.
     measure : Measure or str
-        What the intensity is: "pga", "pgv", or `Measure("sa", period)`.
+        Intensity measure: "pga", "pgv", or `Measure("sa", period)`.
     name : str
         Short name for tables and figures.
 
     Raises
     ------
     InvalidOption
-        If there are fewer than two points, or they do not increase in intensity and decrease in rate.
+        If there are fewer than two points, the intensities do not increase, or the rates do not decrease.
+
+    See Also
+    --------
+    rocking.Fragility.annual_rate : Annual rates of exceeding the limit states.
+    rocking.Fragility.survival : Constrain past ground motions.
 
     Examples
     --------
@@ -103,30 +108,30 @@ class HazardCurve(Result):
 
     @classmethod
     def read(cls, path: str | Path, *, site: int = 0, period: float | None = None) -> HazardCurve:
-        r"""Read a hazard curve: a table of two columns, or what OpenQuake exports.
+        """Read a hazard curve from a table of two columns or an OpenQuake export.
 
         Parameters
         ----------
         path : str or Path
-            CSV file. A table has a heading that names the intensity with its units (pga_g, pga_percent_g, pga_m_s2,
-            pgv_m_s, pgv_cm_s, sa_g, sa_percent_g or sa_m_s2; "PGA (g)" is pga_g as well) and the rate (annual_rate),
-            with commas between, or with semicolons where numbers have decimal commas. OpenQuake's
-            ``hazard_curve-...csv`` says all in its first line, and its probabilities of exceedance in T years become
-            rates by -ln(1 - probability)/T.
+            CSV file. The heading of a table names the intensity with its units (pga_g, pga_percent_g, pga_m_s2,
+            pgv_m_s, pgv_cm_s, sa_g, sa_percent_g or sa_m_s2; "PGA (g)" is equivalent to pga_g) and the rate
+            (annual_rate). The separator is a comma, or a semicolon if numbers have decimal commas. OpenQuake's
+            ``hazard_curve-...csv`` is self-describing. Its probabilities of exceedance in T years become rates by -ln(1
+            - probability)/T.
         site : int
-            Which row of OpenQuake's file; a table has one site only.
+            Row of OpenQuake's file. A table has only one site.
         period : float, optional
             Period of a table's spectral acceleration, s.
 
         Returns
         -------
         HazardCurve
-            Named like the file.
+            Curve with the name of the file.
 
         Raises
         ------
         InvalidOption
-            If the file cannot be read, or is neither, or has no such site.
+            If the file cannot be read, has another format, or does not contain the site.
         """
         file = checks.path(path, "path of a hazard curve", InvalidOption)
         checks.whole(site, "site", InvalidOption, 0)
@@ -148,9 +153,9 @@ class HazardCurve(Result):
             raise
 
     def rate_of(self, intensity: ArrayLike) -> Floats:
-        """Annual rates of exceeding intensities (SI units, 0 or more), shaped like them; infinite at 0.
+        """Compute annual rates of exceeding intensities >= 0 (SI units), with their shape, infinite at 0.
 
-        Below the first and above the last point of the curve they are those of its extended lines.
+        The curve is extrapolated below its first and above its last point.
         """
         at = intensities(intensity)
         exponents, factors = powers(self)
@@ -192,7 +197,7 @@ def shown_range(hazard: HazardCurve) -> tuple[float, float]:
 
 
 def hazard_line(hazard: HazardCurve, intensity: Floats) -> HazardLine:
-    """Return rates at intensities (SI) as a figure takes them: neither 0 nor infinite."""
+    """Return rates at intensities (SI) for a figure, without 0 and infinity."""
     from rocking.plot.curves import HazardLine
 
     return HazardLine(np.clip(hazard.rate_of(intensity), *(1e-200, 1e200)), shown_range(hazard))
@@ -211,13 +216,13 @@ def _check_order(what: str, values: Floats, way: float) -> None:
 
 
 def heading_of(cell: str) -> str:
-    """Name of a column as it is known here: "PGA (m/s²)" is pga_m_s2, "PGA (%g)" pga_percent_g."""
+    """Normalise a column name: "PGA (m/s²)" to pga_m_s2, "PGA (%g)" to pga_percent_g."""
     plain = cell.lower().replace("^", "").replace("²", "2").replace("%", " percent ")
     return re.sub(r"[^a-z0-9]+", "_", plain).strip("_")
 
 
 def _from_table(lines: list[str], period: float | None) -> tuple[Floats, Floats, Measure]:
-    """Intensities (SI), annual rates and measure of a table of two columns; lines that begin with # are remarks."""
+    """Read intensities (SI), annual rates and measure from a table of two columns with comments (#)."""
     (_, header), *rows = csv_rows("\n".join("" if line.lstrip().startswith("#") else line for line in lines)) or [
         (1, [])
     ]
@@ -240,12 +245,12 @@ def _from_table(lines: list[str], period: float | None) -> tuple[Floats, Floats,
     if (kind == "sa") != (period is not None):
         raise InvalidOption(f"{{}} (s) is for a spectral acceleration, and needed there; it is {kind}", "period")
     measure = Measure("sa", period) if kind == "sa" else Measure(kind)
-    with np.errstate(over="ignore"):  # what becomes infinite is refused as such
+    with np.errstate(over="ignore"):  # infinite values are rejected later
         return factor * intensity, rate, measure
 
 
 def _from_openquake(lines: list[str], site: int, period: float | None) -> tuple[Floats, Floats, Measure]:
-    """Intensities (SI), annual rates and measure of a site in a file of OpenQuake's."""
+    """Read intensities (SI), annual rates and measure of a site from an OpenQuake file."""
     said = dict(re.findall(r"(\w+)='?([^,'\"]+)'?", lines[0]))
     kind, _, rest = said.get("imt", "").partition("(")
     header, *rows = [*csv.reader(lines[1:])] or [[]]
@@ -265,14 +270,14 @@ def _from_openquake(lines: list[str], site: int, period: float | None) -> tuple[
         raise InvalidOption(f"{{}} is {period:g} s, and this curve is of {said['imt']}: leave it out", "period")
     measure_name, factor = _OPENQUAKE[kind]
     measure = Measure(measure_name) if at is None else Measure("sa", at)
-    # Probabilities that are printed as 0 or 1 say nothing of the rate.
+    # Probabilities printed as 0 or 1 contain no information on the rate.
     useful = (exceeded > 0.0) & (exceeded < 1.0)
     kept, rate = _corners(-np.log1p(-exceeded[useful]) / checks.positive(years, "investigation_time", InvalidOption))
     return factor * intensity[useful][kept], rate, measure
 
 
 def _corners(rate: Floats) -> tuple[Integers, Floats]:
-    """Points of a curve without its plateaus: their first point, and their last, lowered by almost nothing."""
+    """Return a curve with the first and the last (slightly lowered) point of each plateau only."""
     lowest = np.minimum.accumulate(rate)
     falls = np.diff(lowest) < 0.0
     first, last = np.append(True, falls)[: len(rate)], np.append(falls, False)[: len(rate)]
@@ -283,14 +288,14 @@ def _corners(rate: Floats) -> tuple[Integers, Floats]:
 def log_parts(fits: Probit, hazard: HazardCurve) -> Floats:
     """Logarithms of integrals below the hazard curve, over each of its segments, and above.
 
-    Their shape is (fits, n + 1). On a segment rate(x) = c x^-k, and with P = Phi(z), z = a + b ln x, the part is c
-    exp(k a/b + k^2/(2 b^2)) [Phi(z + k/b)]. Where both ends lie on one side of z = -k/b the large terms cancel: with
-    the scaled erfcx it is rate(x) exp(-z^2/2) erfcx(|z + k/b|/sqrt(2))/2 at the nearer end, less that at the other.
+    The shape is (fits, n + 1). On a segment rate(x) = c x^-k, and with P = Phi(z), z = a + b ln x, the part is c exp(k
+    a/b + k^2/(2 b^2)) [Phi(z + k/b)]. If both ends lie on one side of z = -k/b, large terms cancel. The scaled erfcx
+    then yields the difference of rate(x) exp(-z^2/2) erfcx(|z + k/b|/sqrt(2))/2 at the nearer and the farther end.
     """
     from scipy.special import erfcx, ndtr
 
     k, log_c = (_extended(values) for values in powers(hazard))
-    corners = np.concatenate([[-np.inf], np.log(hazard.intensity), [np.inf]])  # of the segments, and beyond them
+    corners = np.concatenate([[-np.inf], np.log(hazard.intensity), [np.inf]])  # ends of segments
     ends = corners[:-1], corners[1:]
     a, b = (values[:, None] for values in fits)
     with np.errstate(all="ignore"):
@@ -303,25 +308,25 @@ def log_parts(fits: Probit, hazard: HazardCurve) -> Floats:
         fall = np.exp(-0.5 * b * (ends[1] - ends[0]) * (near + far)) * erfcx(far * _ROOT) / erfcx(near * _ROOT)
         tail = log_c - k * end - 0.5 * z * z + np.log(0.5 * erfcx(near * _ROOT)) + np.log1p(-fall)
         middle = log_c + shift * a + 0.5 * shift * shift + np.log(ndtr(upper) - ndtr(lower))
-    # A curve that does not rise is exceeded by the weakest motions as often as they come; one of probability 0 never.
+    # The weakest motions always exceed the limit of a curve that does not rise, unless its probability is 0.
     level = np.where(np.isneginf(a), -np.inf, np.inf)
     return np.where(b > 0.0, np.where(near > 0.0, tail, middle), level)
 
 
 def log_rate_within(fits: Probit, hazard: HazardCurve) -> Floats:
-    """Logarithms of the integrals of P(x) |d rate(x)| between the ends of the hazard curve, shape (fits, 1)."""
+    """Logarithms of integrals of P(x) |d rate(x)| between the ends of the hazard curve, shape (fits, 1)."""
     from scipy.special import ndtr
 
     a, b = (values[:, None] for values in fits)
     first, last = ndtr(a + b * np.log(hazard.intensity[[0, -1]])).T
-    # Of a curve that does not rise, dP is 0 on every segment.
+    # dP is 0 on every segment for a curve that does not rise.
     between = np.where(fits.slope > 0.0, np.exp(log_parts(fits, hazard)[:, 1:-1]).sum(axis=1), 0.0)
     rate = first * hazard.rate[0] - last * hazard.rate[-1] + between
     return np.asarray(np.log(np.maximum(rate, np.finfo(float).tiny)))[:, None]
 
 
 def log_standing(fits: Probit, hazard: HazardCurve, years: float) -> Floats:
-    """Logarithms of the integral of exp(-rate(x) years) dP(x) over the hazard curve, shape (fits, 1)."""
+    """Logarithms of integrals of exp(-rate(x) years) dP(x) over the hazard curve, shape (fits, 1)."""
     from scipy.special import log_ndtr
 
     a, b = (values[:, None] for values in fits)
@@ -331,14 +336,14 @@ def log_standing(fits: Probit, hazard: HazardCurve, years: float) -> Floats:
         z = first + (last - first) * np.linspace(0.0, 1.0, 4001)
         density = -0.5 * z * z - years * np.exp(np.interp((z - a) / b, log_x, log_rate))
         between = np.logaddexp(density[:, 1:], density[:, :-1]) + np.log(np.diff(z) * math.sqrt(0.125 / math.pi))
-        # Under a curve that does not rise, what falls at all falls under the weakest motions.
+        # With a curve that does not rise, every block that falls does so under the weakest motions.
         between = np.where(b > 0.0, between, -np.inf)
         parts = np.column_stack([log_ndtr(first) - years * hazard.rate[0], between, log_ndtr(-last)])
         return np.asarray(np.logaddexp.reduce(parts, axis=1)[:, None])
 
 
 def _extended(values: Floats) -> Floats:
-    """One value for each segment of a hazard curve, with those of the first and the last also beyond them."""
+    """Repeat the values of the first and the last segment for the extrapolations."""
     return np.concatenate([values[:1], values, values[-1:]])
 
 
@@ -347,7 +352,7 @@ def _log_total(fitted: Probit, hazard: HazardCurve) -> float:
 
 
 def _log_seen(fitted: Probit, hazard: HazardCurve, log_at: Floats) -> tuple[Floats, Floats]:
-    """Logarithms of P(x) rate(x), and of its part k P(x) rate(x) = P(x) |d rate(x)/d ln x|, at logarithms of x."""
+    """Logarithms of P(x) rate(x), and of k P(x) rate(x) = P(x) |d rate(x)/d ln x|, at logarithms of x."""
     from scipy.special import log_ndtr
 
     segment = np.searchsorted(np.log(hazard.intensity), log_at, side="right")
@@ -358,7 +363,7 @@ def _log_seen(fitted: Probit, hazard: HazardCurve, log_at: Floats) -> tuple[Floa
 
 
 def shares_beyond(fitted: Probit, hazard: HazardCurve) -> tuple[float, float]:
-    """Shares of the integral of P(x) |d rate(x)| below the hazard curve's first point, and above its last, by parts."""
+    """Shares of the integral of P(x) |d rate(x)| below and above the hazard curve, by parts."""
     parts, total = log_parts(fitted, hazard)[0], _log_total(fitted, hazard)
     first, last = _log_seen(fitted, hazard, np.log(hazard.intensity[[0, -1]]))[0]
     with np.errstate(all="ignore"):
@@ -368,6 +373,6 @@ def shares_beyond(fitted: Probit, hazard: HazardCurve) -> tuple[float, float]:
 
 
 def share_density(fitted: Probit, hazard: HazardCurve, at: Floats) -> Floats:
-    """Share of the rate from motions of about an intensity, for each factor of e: its integral over ln x is 1."""
+    """Density of the rate by ln x, normalised to an integral of 1."""
     with np.errstate(under="ignore"):
         return np.asarray(np.exp(_log_seen(fitted, hazard, np.log(at))[1] - _log_total(fitted, hazard)))

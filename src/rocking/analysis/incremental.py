@@ -1,4 +1,4 @@
-"""Incremental dynamic analysis: motions scaled up until the block overturns, and on; and the scale where one does."""
+"""Incremental dynamic analysis, and critical scales of motions."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Levels that are simulated at once.
+#: Number of levels per simulation.
 _CHUNK: Final = 16
 
 
@@ -59,22 +59,22 @@ def incremental_dynamic_analysis(
     threads: int | None = None,
     progress: bool | None = None,
 ) -> IncrementalDynamicAnalysis:
-    """Scale motions up until every block overturns and beyond, and find the bands of levels that overturn it.
+    """Scale motions beyond overturning of every block, and find the bands of levels that overturn.
 
-    A rocking block may stand a motion that is stronger than one that overturns it. Bands of levels that overturn
-    therefore alternate with bands that do not.
+    A rocking block may survive a motion stronger than one that overturns it. Therefore bands of levels that overturn
+    alternate with others.
 
     Parameters
     ----------
     blocks, motions : optional
         As for `simulate_many`: n blocks, m motions.
     measure : {"pga", "pgv", "pga_ratio", "pgv_ratio"} or Measure
-        Intensity measure that motions are scaled to: peak acceleration (m/s^2), peak velocity (m/s); in each block's
-        own units PGA and p PGV over the acceleration that lifts it; or spectral acceleration (m/s^2) as
+        Intensity measure to which motions are scaled: peak acceleration (m/s^2), peak velocity (m/s), PGA or p PGV
+        normalised by each block's uplift acceleration, or spectral acceleration (m/s^2), for example
         ``rocking.Measure("sa", period=1.0)``.
     levels : array_like, optional
         Increasing levels of the measure. By default from the lowest that lifts a block, in steps of 5 %, to three times
-        the level by which every motion has overturned every block, and at most to 490 times the first.
+        the level by which every motion has overturned every block, at most 490 times the first.
     model : {"nonlinear", "linear"}
         Equation of motion.
     tolerance : float
@@ -85,19 +85,25 @@ def incremental_dynamic_analysis(
     Returns
     -------
     IncrementalDynamicAnalysis
-        Peaks at every level, and the bands of levels that overturn, as far as the levels show them.
+        Peaks at every level, and the bands of levels that overturn, at the resolution of the levels.
 
     Raises
     ------
     InvalidOption
-        If an argument is out of its range.
+        If an argument is out of range.
     InvalidMotion
         If a motion is zero throughout.
 
+    See Also
+    --------
+    rocking.critical_scale : Find one critical scale with its derivatives.
+    rocking.fragility : Fit fragility curves to scaled motions.
+    rocking.overturning_map : Map the outcomes of a pulse over amplitude and frequency.
+
     Notes
     -----
-    Ends of bands are found by bisection between neighbouring levels whose outcomes differ. A finer search may find
-    thinner bands under records, so that the lowest level depends on its resolution and is not a safety margin.
+    Ends of bands are located by bisection between neighbouring levels with different outcomes. Under records, a finer
+    search may reveal thinner bands. The lowest level therefore depends on the resolution and is not a safety margin.
 
     References
     ----------
@@ -135,7 +141,7 @@ def incremental_dynamic_analysis(
         for m in np.unique(motion):
             here = motion == m
             factor = level[here] * factors[m, block[here]]
-            # The treatment is that of the levels: how often restitution is drawn depends on it.
+            # Use the treatment of the levels, which determines how often the restitution is drawn.
             setup = Setup(many.select(block[here]), model, Certified())
             for task, outcomes in simulate_each(setup, shaken[m], factor, threads=threads):
                 verdicts[np.flatnonzero(here)[task.bodies]] = outcomes["overturned"]
@@ -153,18 +159,21 @@ def incremental_dynamic_analysis(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class IncrementalDynamicAnalysis(DatasetResult):
-    """Blocks under motions that are scaled up; from `incremental_dynamic_analysis`.
+    """Blocks under scaled motions, computed by `incremental_dynamic_analysis`.
 
     Attributes
     ----------
     data : xarray.Dataset
-        Over (motion, level, block): peak_rotation (rad; pi/2 where the block overturns), peak_over_alpha (over the
-        smaller slenderness; infinite where it overturns, NaN where the simulation was given up, which bands take for
-        one that does not overturn) and overturned. Over (motion, block): overturning_level, the lowest; NaN where no
-        level overturns, or the first one already does. Over (band): band_motion and band_block (positions along these
-        dimensions), band_start and band_end; NaN where the band goes on below or above the
-        levels. Its attribute lowest_uplift is the level from which on a motion lifts a block; its attribute undecided,
-        how many outcomes of a sample change within 3e-6 of the motion.
+        Over (motion, level, block): peak_rotation (rad, pi/2 for overturning), peak_over_alpha (normalised by the
+        smaller slenderness, infinite for overturning, NaN for abandoned simulations, which bands count as not
+        overturning) and overturned. Over (motion, block): overturning_level, the lowest that overturns, or NaN if none
+        or already the first does. Over (band): band_motion and band_block (positions), band_start and band_end, NaN
+        beyond the levels. Attributes: lowest_uplift, the lowest level that lifts a block, and undecided, the number of
+        outcomes in a sample that change within 3e-6 of the motion.
+
+    See Also
+    --------
+    rocking.incremental_dynamic_analysis : Run the analysis.
     """
 
     TABLES = MappingProxyType(
@@ -179,7 +188,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
         part = super()._table(name)
         if name == "levels":
             return part
-        at = self.data.band_motion.values  # under the names of the other table, so that the two can be joined
+        at = self.data.band_motion.values  # the names of the other table permit a join
         labels = {
             name: ("band", self.data[name].values[at])
             for name in ("motion", "vertical", "record")
@@ -191,7 +200,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
     def bands(self, *, block: int = 0, motion: int = 0) -> list[tuple[float, float]]:
         """Return start and end of the bands of levels that overturn a block under a motion, both by position.
 
-        Ends are in SI units or the block's own, NaN where the band goes on below or above the levels.
+        Ends are in SI units or the block's own, NaN beyond the levels.
         """
         m, b = self._position(motion, "motion"), self._position(block, "block")
         mine = (self.data.band_motion.values == m) & (self.data.band_block.values == b)
@@ -255,7 +264,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
     def plot(
         self, ax: Axes | None = None, *, block: int = 0, title: str = "", figsize: tuple[float, float] | None = None
     ) -> Figure:
-        """Draw level against peak rotation and bands for one block, by position; otherwise as `DrawnResult.plot`."""
+        """Plot level against peak rotation and bands of one block, by position, like `DrawnResult.plot`."""
         from rocking.plot.curves import ScaledMotion, ida_figure
 
         data, block = self.data, self._position(block, "block")
@@ -278,7 +287,7 @@ class IncrementalDynamicAnalysis(DatasetResult):
 
 
 def _lowest_uplift(blocks: Bodies, motions: Sequence[Motion], values: Floats, measure: Measure, model: Model) -> float:
-    """Lowest level of the measure from which on a motion lifts a block; its vertical component is scaled with it."""
+    """Return the lowest level at which a motion, scaled with its vertical component, lifts a block."""
     thresholds, own = thresholds_of(blocks, model)
     factors = np.array([lifting_factors(motion, thresholds, blocks.gravity, own) for motion in motions])
     lowest = float(np.min(factors * values[:, None] / units_of(blocks, measure, model)))
@@ -290,7 +299,7 @@ def _lowest_uplift(blocks: Bodies, motions: Sequence[Motion], values: Floats, me
 def _until_overturned(
     blocks: Bodies, motions: Sequence[Motion], measure: Measure, first: float, options: dict[str, Any]
 ) -> xr.Dataset:
-    """Levels in chunks, until each block has overturned under each motion, and on to three times that level."""
+    """Yield chunks of levels up to three times the level by which every motion has overturned each block."""
     import xarray as xr
 
     whole: list[xr.Dataset] = []
@@ -307,7 +316,7 @@ def _until_overturned(
 
 
 def _dataset(table: xr.Dataset, flat: Integers, edges: Boundaries, alpha: Floats, measure: Measure) -> xr.Dataset:
-    """Pair the levels at which verdicts of a grid of (level, column) change; NaN where it begins or ends in a band."""
+    """Pair the levels of outcome changes in a (level, column) grid, NaN for bands beyond it."""
     import xarray as xr
 
     columns, starts, ends = list[int](), list[float](), list[float]()
@@ -337,7 +346,7 @@ def _dataset(table: xr.Dataset, flat: Integers, edges: Boundaries, alpha: Floats
 
 
 class _Levels:
-    """Levels that motions were scaled to as people read them, and bands of them, in words: only what was looked at."""
+    """Description of simulated levels and of bands of them."""
 
     def __init__(self, level: xr.DataArray) -> None:
         self.scale, self.at = level.scale, level.scale * level.values
@@ -346,7 +355,7 @@ class _Levels:
         self.range = f"{low}{self.unit}" if low == high else f"{low} to {high}{self.unit}"
 
     def summary(self, lowest_uplift: float) -> str:
-        """Say what was looked at, and whether it is all below the level (SI) from which on a motion lifts a block."""
+        """Describe the levels, and whether all of them are below the level (SI) at which a motion lifts a block."""
         text = f"looked at: {counted(len(self.at), 'level')}, {self.range}"
         if len(self.at) > 1:
             steps, ratios = np.diff(self.at), self.at[1:] / self.at[:-1]
@@ -362,7 +371,7 @@ class _Levels:
         return text
 
     def overturning(self, bands: Sequence[tuple[float, float]]) -> str:
-        """Bands that overturn (SI); beyond the levels nothing is known of them, which is NaN."""
+        """Describe the bands that overturn (SI). NaN marks unknown ends beyond the levels."""
         return "; ".join(self._band(*(self.scale * end for end in band)) for band in bands) or (
             f"at no level looked at, {self.range}"
         )
@@ -384,18 +393,23 @@ _NO_BALANCE: Final = (
 
 @dataclass(frozen=True)
 class CriticalScale:
-    """Where a block begins to overturn along the scale of a motion, with derivatives; made by `critical_scale`.
+    """Critical scale of a motion with its derivatives, computed by `critical_scale`.
 
     Attributes
     ----------
     scale : float
-        The least scale, to the last digit, that overturns the block, next to one that does not.
+        Smallest floating-point scale that overturns the block, next to a scale that does not.
     gradient : Gradient
-        Its derivatives by the motion as it was given (unscaled) and by the start, per unit of each; `Gradient.value` is
-        the scale. Where the outcome changes there without the block coming to the balance point, all derivatives are
-        NaN, and `Gradient.reason` says so.
+        Derivatives with respect to the unscaled motion and the initial state, with the scale in `Gradient.value`. If
+        the outcome changes although the block does not reach the balance point, all derivatives are NaN, and
+        `Gradient.reason` explains this.
     p, alpha, restitution : float
-        Its change per relative change of these of both sides together: times 1e-3 it is that by 0.1 % more.
+        Derivatives with respect to relative changes of these parameters on both sides. Times 1e-3, they are changes of
+        the scale for 0.1 %.
+
+    See Also
+    --------
+    rocking.gradient : Compute derivatives of a response.
     """
 
     scale: float
@@ -415,37 +429,42 @@ def critical_scale(
     initial_rotation: float = 0.0,
     initial_velocity: float = 0.0,
 ) -> CriticalScale:
-    """Find a scale of a motion at which a block begins to overturn, and its derivatives.
+    """Find a critical scale of a motion, at which a block begins to overturn, and its derivatives.
 
     Parameters
     ----------
     block : Block
         Block, or another body that can overturn.
     motion : Motion
-        Motion that is scaled, both components alike.
+        Motion, both components of which are scaled.
     low, high : float
-        Positive scales between which it is: the block stands at the lower one and overturns at the higher one. Where
-        the outcome changes several times between them, one of the changes is found.
+        Positive scales that bracket the critical scale: the block stands at `low` and overturns at `high`. If the
+        outcome changes several times between them, one of the changes is found.
     model, initial_rotation, initial_velocity : optional
         As for `simulate`.
 
     Returns
     -------
     CriticalScale
-        The scale, and derivatives by every sample, the start and the block's parameters.
+        Scale, and derivatives with respect to every sample, the initial state and the block's parameters.
 
     Raises
     ------
     InvalidMotion
-        If the motion is no `Motion`.
+        If `motion` is not a `Motion`.
     InvalidOption
-        If there is none, the block overturns at the lower scale, or not at the higher one, or the scales are not
-        positive and in this order.
+        If there is no motion, the block overturns at `low` or stands at `high`, or the scales are not positive and
+        increasing.
+
+    See Also
+    --------
+    rocking.incremental_dynamic_analysis : Find all bands of levels that overturn.
+    rocking.gradient : Compute derivatives of a response.
 
     Notes
     -----
-    At the critical scale the response comes to the balance point and stays. The derivatives follow by the implicit
-    function theorem: see "Impacts: restitution and sensitivity" in the documentation.
+    At the critical scale the response approaches the balance point and stays there. The derivatives follow from the
+    implicit function theorem (see "Impacts: restitution and sensitivity" in the documentation).
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Blocks under motions that are scaled to levels of a measure, and where between levels an outcome changes."""
+"""Simulation of blocks under motions scaled to levels, and bisection for changes of the outcome."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ if TYPE_CHECKING:
 
 
 def numbered(labels: Sequence[object]) -> Integers:
-    """Give each label that is new the next number."""
+    """Replace labels by integers in the order of first appearance."""
     places: dict[object, int] = {}
     return np.array([places.setdefault(label, len(places)) for label in labels], dtype=np.int64)
 
 
 def groups_of(labels: object, name: str, count: int, each: str = "outcome") -> Integers:
-    """Numbers of given labels, one for each of so many; what has None, NaN or no text for a label is on its own."""
+    """Replace `count` labels by integers. Labels None, NaN or "" are distinct."""
     given = checks.several(labels, name, InvalidOption)
     if len(given) != count or not all(isinstance(label, Hashable) for label in given):
         raise InvalidOption(f"{{}} must hold {count} labels, numbers or texts, one for each {each}", name, value=labels)
@@ -47,13 +47,13 @@ def groups_of(labels: object, name: str, count: int, each: str = "outcome") -> I
 
 
 def _is_missing(label: object) -> bool:
-    # The missing value of pandas is equal to nothing, and no truth value either.
+    # The missing value of pandas equals nothing and has no truth value.
     is_none = label is None or type(label).__name__ == "NAType"
     return is_none or label == "" or (isinstance(label, float) and math.isnan(label))
 
 
 def labels_of(data: xr.Dataset, of: str = "motion", *, with_history: bool = True) -> list[str]:
-    """Names of the motions, or of their records, with their vertical components and with what was done to them."""
+    """Names of motions or records, with vertical components and processing."""
     names = data[of].values
     verticals = data.vertical.values if "vertical" in data.coords else [""] * len(names)
     histories = data.histories if with_history else [""] * len(names)
@@ -64,7 +64,7 @@ def labels_of(data: xr.Dataset, of: str = "motion", *, with_history: bool = True
 
 
 def motions_text(data: xr.Dataset) -> str:
-    """Name the motion, or count them, and those that were scaled or processed among them."""
+    """Return the name or number of motions, and the numbers of scaled or processed ones."""
     labels = labels_of(data)
     changed = sum(bool(done) for done in data.histories)
     if len(labels) == 1:
@@ -74,7 +74,7 @@ def motions_text(data: xr.Dataset) -> str:
 
 
 def curves_of(data: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
-    """Name and select each combination of slenderness and restitution; the blocks of an ensemble are one curve."""
+    """Return names and selections of all slenderness-restitution combinations, or one curve for an ensemble."""
     if "block" in data.dims:
         return [(data.blocks, data)]
     stacked = data.stack(curve=[name for name in ("alpha", "restitution") if name in data.dims])
@@ -85,15 +85,15 @@ def curves_of(data: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
     return curves
 
 
-#: Where only motions as they are were simulated, though the sides of a block differ.
+#: Note for blocks with unequal sides that were simulated in one polarity only.
 MIRROR_NOTE: Final = "the sides differ, so motions that are reversed (scaled by -1) overturn at other levels"
 
-#: What stands for labels of motions that are their stations.
+#: Option that clusters motions by station.
 BY_STATION: Final = "station"
 
 
 def described(blocks: Bodies | Body | Sequence[Body]) -> str:
-    """Name blocks in a few words: one by its sizes or parameters, several by their number."""
+    """Describe a block by its sizes or parameters, several by their number."""
     only = single_block(blocks)
     if only is None:
         return counted(len(bodies_of(blocks)), "block")
@@ -103,25 +103,25 @@ def described(blocks: Bodies | Body | Sequence[Body]) -> str:
 
 
 def pooled(blocks: Bodies | Body | Sequence[Body], weights: ArrayLike | None) -> str:
-    """Name blocks whose outcomes are pooled, and say whether one counts more than another."""
+    """Describe blocks with pooled outcomes, and whether their weights differ."""
     if single_block(blocks) is not None:
         return described(blocks)
     return f"{described(blocks)}, {'all of equal weight' if weights is None else 'weighted'}"
 
 
 def normalised_weights(weights: ArrayLike | None, count: int) -> Floats:
-    """Weights of blocks, one each and 1 in the mean; all 1 where none are given."""
+    """Weights of blocks with mean 1, equal by default."""
     if weights is None:
         return np.ones(count)
     given = checks.numbers(weights, "weights", InvalidOption)
     if given.shape != (count,) or not (np.all(np.isfinite(given) & (given >= 0.0)) and np.any(given > 0.0)):
         raise InvalidOption(f"{{}} must be {count} numbers of 0 or more, not all 0, one for each block", "weights")
-    given = given / given.max()  # else sums of very large or very small weights overflow
+    given = given / given.max()  # otherwise sums of very large or very small weights overflow
     return np.asarray(given * (count / given.sum()))
 
 
 def single_block(blocks: Bodies | Body | Sequence[Body]) -> Body | None:
-    """Return the block, as it was described, where there is one only."""
+    """Return the block as described, if there is only one."""
     if not isinstance(blocks, Sequence | Bodies):
         return blocks
     return blocks[0] if len(blocks) == 1 else None
@@ -132,12 +132,12 @@ def _pair(sides: Floats) -> str:
 
 
 def values_of(motions: Sequence[Motion], measure: Measure) -> Floats:
-    """Return what each motion alone measures, in SI units."""
+    """Return the measure of each motion, in SI units."""
     return np.array([measure.positive(motion, motion.name) for motion in motions])
 
 
 def clusters_of(motions: Sequence[Motion], labels: object = None) -> Integers:
-    """Whole numbers, the same for motions of one label ("station": of one record) or multiples of one another."""
+    """Cluster numbers of motions with equal labels ("station": of one record) or equal up to a factor."""
     families, origins = families_of(motions), [motion.description.origin or Origin() for motion in motions]
     stations = [f"{one.event}, {one.station}" if one.station else "" for one in origins]
     if labels is None:
@@ -160,14 +160,14 @@ def clusters_of(motions: Sequence[Motion], labels: object = None) -> Integers:
 
 
 def motions_in_words(clusters: Integers, labels: object) -> str:
-    """How many motions there are, and in how many clusters if they were given labels."""
+    """Return the number of motions and, if they have labels, of clusters."""
     text = counted(len(clusters), "motion")
     return text if labels is None else f"{text} in {counted(len(np.unique(clusters)), 'cluster')}"
 
 
 def families_of(motions: Sequence[Motion], *, reversed_too: bool = True) -> Integers:
-    """Whole numbers, the same for motions that are multiples of one another, ``reversed_too`` by negative factors."""
-    # None of these changes with the scale or the sign: only motions that are alike in all are compared in full.
+    """Family numbers of motions that are equal up to a factor, also a negative one if ``reversed_too``."""
+    # Invariants of scale and sign. Only motions with equal invariants are compared in full.
     alike = np.empty((len(motions), 2))
     for k, motion in enumerate(motions):
         size = np.abs(np.concatenate([part.coefficients.ravel() for part in (motion, motion.vertical) if part]))
@@ -184,7 +184,7 @@ def families_of(motions: Sequence[Motion], *, reversed_too: bool = True) -> Inte
 
 
 def units_of(blocks: Bodies, measure: Measure, model: Model) -> Floats:
-    """Return what counts as 1 for each block, in SI units: the block's own unit, or 1."""
+    """Return the unit of the measure for each block (SI): the block's own unit, or 1."""
     if not measure.in_block_units:
         return np.ones(len(blocks))
     lifting = [min(blocks[k].uplift_thresholds(model)) for k in range(len(blocks))]
@@ -194,7 +194,7 @@ def units_of(blocks: Bodies, measure: Measure, model: Model) -> Floats:
 def simulate_levels(
     blocks: Bodies, motions: Sequence[Motion], measure: Measure, levels: Floats, *, model: Model, **options: Any
 ) -> xr.Dataset:
-    """Simulate every block under every motion at every level, as `simulate_many`, with the dimension ``level``."""
+    """Simulate every block under every motion at every level, with the dimension ``level``."""
     import xarray as xr
 
     units = units_of(blocks, measure, model)
@@ -203,7 +203,7 @@ def simulate_levels(
     for group in groups:
         scaled = {"levels": levels * units[group[0]], "measure": measure.alone}
         part = simulate_many(blocks.select(group), motions, model=model, **scaled, **options)
-        part = part.drop_vars(body_coordinates(blocks.select(group)))  # their names hang on the whole: added at last
+        part = part.drop_vars(body_coordinates(blocks.select(group)))  # added to the whole
         parts.append(part.assign_coords(scale=("scale", levels, {"measure": measure.name, "units": measure.units})))
     whole = xr.concat(parts, "block", data_vars="all", coords="minimal", compat="override", join="override")
     ordered = whole.isel(block=np.argsort(np.concatenate(groups))).rename(scale="level")
@@ -211,18 +211,18 @@ def simulate_levels(
 
 
 def ratios_of(peak: Floats, overturned: Flags, unfinished: Flags, slenderness: Floats | float) -> Floats:
-    """Peak rotation over slenderness: infinite where a block overturned, NaN where the simulation was given up."""
+    """Ratio of peak rotation to slenderness: infinite for overturning, NaN for abandoned simulations."""
     return np.asarray(np.where(unfinished, np.nan, np.where(overturned, np.inf, peak / slenderness)))
 
 
 def passed(ratio: Floats, limit: float, name: str) -> Floats:
-    """Whether peak rotation over slenderness passes a limit: 1 or 0; infinite is overturning."""
+    """Whether the ratio of peak rotation to slenderness exceeds a limit (infinite: overturning), 1 or 0."""
     limit = checked_limit(limit, name)
     return np.asarray(np.isinf(ratio) if math.isinf(limit) else ratio > limit, dtype=np.float64)
 
 
 def checked_limit(limit: float, name: str) -> float:
-    """Return a limit of peak rotation over slenderness, checked."""
+    """Validate a limit of the ratio of peak rotation to slenderness."""
     what = f"the limit {name!r} (rotation over slenderness)"
     least = checks.number(limit, what, InvalidOption)
     if not least >= 0.0:
@@ -230,12 +230,12 @@ def checked_limit(limit: float, name: str) -> float:
     return least
 
 
-#: Limit states: peak rotation over slenderness that is exceeded; infinity is overturning.
+#: Limit states: limits of the ratio of peak rotation to slenderness (infinite: overturning).
 OVERTURNING: Final[Mapping[str, float]] = {"overturning": math.inf}
 
 
 def limit_states(given: Mapping[str, Any], name: str) -> Mapping[str, Any]:
-    """Return what is given for each limit state by its name, of which there is one at least."""
+    """Return values by limit state, at least one."""
     for state in checks.mapping(given, name, InvalidOption, "{'overturning': inf}"):
         checks.text(state, f"name of a limit state in {name}", InvalidOption)
     return given
@@ -244,11 +244,11 @@ def limit_states(given: Mapping[str, Any], name: str) -> Mapping[str, Any]:
 def outcomes_of(
     table: xr.Dataset, measure: Measure, intensity: Floats, ratio: Floats, limits: Mapping[str, float]
 ) -> pd.DataFrame:
-    """Table of every simulation of (level, motion, block, polarity), and which limits it exceeds."""
+    """Table of all simulations (level, motion, block, polarity) with the limits that they exceed."""
     import pandas as pd
 
     def along(values: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-        return np.broadcast_to(values, ratio.shape).ravel()  # of (level, motion, block, polarity)
+        return np.broadcast_to(values, ratio.shape).ravel()  # order: level, motion, block, polarity
 
     signs = table.polarity.values if "polarity" in table.coords else np.array(["+"])
     motions = [name for name in ("motion", "vertical") if name in table.coords]
@@ -268,20 +268,20 @@ def outcomes_of(
 
 
 def weights_of(weights: ArrayLike | None, count: int) -> Floats:
-    """Weights of blocks, 1 in the mean of those that have any: outcomes are as many as without the others."""
+    """Normalise weights to mean 1 over blocks of positive weight, so that zero weights do not change the count."""
     shares = normalised_weights(weights, count)
     return np.asarray(shares / shares[shares > 0.0].mean())
 
 
 def of_polarities(polarity: Polarity, *, is_symmetric: bool) -> str:
-    """Append to a description which polarities the outcomes come from, where both were requested."""
+    """Append the polarities to a description if both were requested."""
     if polarity != "both":
         return ""
     return ", one polarity, since a symmetric block does the same in both" if is_symmetric else ", both polarities"
 
 
 def note_missing(unfinished: Flags) -> None:
-    """Report simulations that were given up, where each counts as half overturned."""
+    """Report abandoned simulations, which count as half overturned."""
     if text := missing_text(unfinished):
         note(f"{text}, and each counts as half overturned")
 
@@ -289,9 +289,9 @@ def note_missing(unfinished: Flags) -> None:
 def undecided_text(
     setup: Setup, motions: Sequence[Motion], factors: ArrayLike, overturned: Flags, threads: int | None
 ) -> str:
-    """Repeat a sample of simulations with motions scaled by 1 +- 3e-6, and return in words how many outcomes change.
+    """Describe how many outcomes of a sample change when motions are scaled by 1 +- 3e-6.
 
-    Factors of the motions and outcomes are those of (level, motion, block, polarity).
+    Factors of the motions and outcomes are over (level, motion, block, polarity).
     """
     drawn = np.sort(np.random.default_rng(0).permutation(overturned.size)[:30])
     _, motion, block, _ = np.unravel_index(drawn, overturned.shape)
@@ -310,7 +310,7 @@ def undecided_text(
 
 @dataclass(frozen=True, eq=False)
 class Boundaries:
-    """Changes of the outcome in columns of a grid, by column, then level, each between a low and a high level."""
+    """Brackets (low, high) of changes of the outcome in columns of a grid, sorted by column and level."""
 
     column: Integers
     low: Floats
@@ -320,7 +320,7 @@ class Boundaries:
 
     @property
     def level(self) -> Floats:
-        """Middle of every bracket."""
+        """Midpoint of every bracket."""
         return bisection.middle(self.low, self.high)
 
 
@@ -334,8 +334,8 @@ def boundaries(
 ) -> Boundaries:
     """Find all changes of the outcome (m, columns) between neighbouring levels (m,) of a grid.
 
-    A bracket with a third outcome is followed in both halves, but for an interval with 64 changes or more, where one is
-    followed for all between two outcomes. Changes between two levels of the same outcome are not seen.
+    A bracket with a third outcome is split, but in an interval with 64 changes or more only one half is followed.
+    Changes between two levels of equal outcome are not detected.
     """
     row, column = np.nonzero(outcome[1:] != outcome[:-1])
     here = Boundaries(column, levels[row], levels[row + 1], outcome[row, column], outcome[row + 1, column])
@@ -346,7 +346,7 @@ def boundaries(
             found = here.below.copy()
             found[wide] = outcome_of(here.column[wide], here.level[wide])
             here, origin = _halved(here, wide, found, origin)
-            # A third outcome makes more of them: the bar waits until these are done, too.
+            # A third outcome adds brackets, which the bar waits for.
             before, left = left, min(left, _halvings(here, tolerance))
             bar.advance(before - left)
     order = np.lexsort((here.low, here.column))
@@ -354,12 +354,12 @@ def boundaries(
 
 
 def _halvings(here: Boundaries, tolerance: float) -> int:
-    """Count the bisections that are left, as far as is known."""
+    """Count the remaining bisections of the present brackets."""
     return int(np.ceil(np.log2(np.maximum(1.0, (here.high - here.low) / (tolerance * here.high)))).sum())
 
 
 def _halved(here: Boundaries, wide: Flags, found: Integers, origin: Integers) -> tuple[Boundaries, Integers]:
-    """Brackets after one bisection of the wide ones; those that contain a third outcome become two."""
+    """Bisect wide brackets, and split those with a third outcome."""
     few = np.bincount(origin)[origin] < 64
     third = wide & few & (found != here.below) & (found != here.above)
     up = wide & (found == here.below)

@@ -1,4 +1,4 @@
-"""Overturning maps of pulses: amplitude against frequency, both dimensionless, every boundary refined."""
+"""Overturning maps of pulses over dimensionless amplitude and frequency, with refined boundaries."""
 
 from __future__ import annotations
 
@@ -34,20 +34,24 @@ if TYPE_CHECKING:
 
 
 class Mode(IntEnum):
-    """What a block does; a mode n >= 0, which is none of these, is a block that overturns after n impacts.
+    """Outcome of a block under a pulse. Other modes n >= 0 are overturning after n impacts.
 
     Attributes
     ----------
     UNFINISHED
-        Its simulation was given up after too many steps.
+        The simulation was abandoned after too many steps.
     OVERTURNS_AFTER_REST
-        It overturns after it has been at rest.
+        The block overturns after it has been at rest.
     NO_UPLIFT
-        The pulse does not lift it.
+        The pulse does not lift the block.
     RESTS
-        It comes to rest at least once before the pulse is over.
+        The block comes to rest at least once before the end of the pulse.
     ROCKS
-        It rocks until the pulse is over.
+        The block rocks until the end of the pulse.
+
+    See Also
+    --------
+    rocking.analysis.mode_name : Describe a mode in words.
     """
 
     UNFINISHED = -5
@@ -66,11 +70,11 @@ _NAMES: Final = {
     0: "overturns without impact",
 }
 
-#: Families of one amplitude and one frequency; others of `rocking.pulses`, of a duration or of several amplitudes, are
-#: given as functions.
+#: Pulse families with one amplitude and one frequency. Other pulses of `rocking.pulses`, with a duration or several
+#: amplitudes, are passed as functions.
 PULSES: Final = ("sine", "half-sine", "one-sine", "one-cosine", "ricker", "mavroeidis-papageorgiou")
 
-#: By which share two motions of one shape may differ: those of samples at a constant step do.
+#: Largest relative difference of two motions of one shape, as in samples at a constant step.
 _SAME: Final = 0.02
 
 
@@ -86,22 +90,22 @@ def overturning_map(
     progress: bool | None = None,
     **parameters: Any,
 ) -> OverturningMap:
-    """Map what a pulse does to a block, over amplitude and frequency, and find the boundaries between the outcomes.
+    """Map the outcomes of a block under a pulse over amplitude and frequency, with their boundaries.
 
     Parameters
     ----------
     block : Block
-        Its slenderness and restitution count; its p does not, since only ratios to it enter.
+        Block, of which only slenderness and restitution matter.
     pulse : str or callable
-        "sine" (give `cycles`), "half-sine", "one-sine", "one-cosine", "ricker" (`kind`) or "mavroeidis-papageorgiou"
-        (`phase`, `gamma`); or a function of amplitude (m/s^2) and frequency (Hz) that returns a motion proportional to
-        the amplitude, and of one shape: at twice the frequency it is over in half the time, and so is its vertical
-        component.
+        "sine" (with `cycles`), "half-sine", "one-sine", "one-cosine", "ricker" (`kind`) or "mavroeidis-papageorgiou"
+        (`phase`, `gamma`), or a function of amplitude (m/s^2) and frequency (Hz) that returns a motion proportional to
+        the amplitude and of constant shape: the motion and its vertical component last half as long at twice the
+        frequency.
     amplitudes : array_like, shape (m,)
-        Increasing amplitudes, over the smallest acceleration that lifts the block: g tan(alpha), in the linear model g
-        alpha. The amplitude of a Mavroeidis-Papageorgiou pulse is here its peak acceleration.
+        Increasing amplitudes, normalised by the uplift acceleration (g tan(alpha), or g alpha in the linear model). The
+        amplitude of a Mavroeidis-Papageorgiou pulse is here its peak acceleration.
     frequencies : array_like, shape (n,)
-        Increasing values of 2 pi f/p, f the pulse's frequency and p the block's (the smaller one of two sides).
+        Increasing values of 2 pi f/p, with the pulse's frequency f and the block's p (the smaller one of two sides).
     model : {"nonlinear", "linear"}
         Equation of motion.
     tolerance : float
@@ -109,7 +113,7 @@ def overturning_map(
     threads, progress : optional
         As for `simulate_many`.
     **parameters : object
-        Further numbers of a pulse given by name, as the function of that name in `rocking.pulses` takes them.
+        Further parameters of a named pulse, as for the function of that name in `rocking.pulses`.
 
     Returns
     -------
@@ -119,16 +123,21 @@ def overturning_map(
     Raises
     ------
     InvalidOption
-        If an argument is out of its range, the shape of the pulse changes with the frequency (as that of one with a
-        `duration` does) or the amplitude, or the block never comes to rest (restitution 1).
+        If an argument is out of range, the shape of the pulse depends on the frequency (for example because of a fixed
+        `duration`) or the amplitude, or the block never comes to rest (restitution 1).
     InvalidMotion
-        If a function returns no motion.
+        If a function does not return a motion.
+
+    See Also
+    --------
+    rocking.incremental_dynamic_analysis : Scale any motion until the block overturns.
+    rocking.pulses : Analytic ground motions.
 
     Notes
     -----
-    By dimensional analysis one pulse of one frequency is enough: blocks of different p stand for the frequencies.
-    Changes of mode between neighbouring amplitudes of the grid are found by bisection, those between two of the same
-    mode are not.
+    By dimensional analysis, one pulse is simulated with blocks of different p for the frequencies. Changes of mode
+    between neighbouring amplitudes of the grid are located by bisection. Changes between amplitudes of equal mode are
+    not detected.
 
     References
     ----------
@@ -171,7 +180,7 @@ def overturning_map(
     p, alpha, restitution = (
         np.array([getattr(side, name) for side in block.sides]) for name in ("p", "alpha", "restitution")
     )
-    # Blocks of one shape, and of p such that the pulse, of the block's own frequency, has these ratios to it.
+    # Blocks of one shape with values of p that correspond to the ratios for a pulse of the block's frequency.
     blocks = Blocks(p / ratios[:, None], alpha[None, :], restitution[None, :], gravity=block.gravity)
     setup, threshold = Setup(blocks, model, Certified(width * unit.end)), min(block.uplift_thresholds(model))
     count = None if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
@@ -179,7 +188,7 @@ def overturning_map(
     def followed(
         column: Integers, level: Floats, done: Callable[[int], None] = lambda count: None
     ) -> tuple[Integers, Floats]:
-        """Mode and peak rotation of each block given by its column, under its own level."""
+        """Mode and peak rotation of each block, selected by column, at its level."""
         ends = np.empty(column.size, dtype=OUTCOME)
         here = replace(setup, bodies=setup.bodies.select(column))
         for task, outcomes in simulate_each(here, unit, threshold * level, threads=count):
@@ -206,17 +215,17 @@ def overturning_map(
 
 
 def mode_name(mode: int) -> str:
-    """Return a `Mode`, or the number of impacts before overturning, in words.
+    """Return the description of a `Mode` or of a number of impacts before overturning.
 
     Parameters
     ----------
     mode : int
-        As in the results of `overturning_map`.
+        Mode in the results of `overturning_map`.
 
     Returns
     -------
     str
-        "rocks until the pulse is over", "overturns after 2 impacts".
+        Description, for example "rocks until the pulse is over" or "overturns after 2 impacts".
 
     Examples
     --------
@@ -229,7 +238,7 @@ def mode_name(mode: int) -> str:
 
 
 def modes_of(ends: NDArray[np.void], duration: float) -> Integers:
-    """Modes of blocks under a motion of some duration (s), from what the engine keeps of each."""
+    """Modes of blocks under a motion of given duration (s), from the engine's results."""
     rested = (ends["uplifts"] > 1) | ((ends["rests"] > 0) & (ends["last_rest"] <= duration))
     modes = np.where(ends["uplifts"] == 0, Mode.NO_UPLIFT, np.where(rested, Mode.RESTS, Mode.ROCKS))
     overturns = np.where(ends["uplifts"] > 1, Mode.OVERTURNS_AFTER_REST, ends["impacts"])
@@ -243,17 +252,21 @@ def _overturns(modes: Integers) -> Flags:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class OverturningMap(DatasetResult):
-    """Outcomes of a block under a pulse, over amplitude and frequency; from `overturning_map`.
+    """Outcomes of a block under a pulse, over amplitude and frequency, computed by `overturning_map`.
 
-    Its figure has the modes as regions between the refined boundaries.
+    The figure shows the modes as regions between the refined boundaries.
 
     Attributes
     ----------
     data : xarray.Dataset
         Over (amplitude, frequency): mode (a `Mode`, or the number of impacts before overturning), and peak_rotation
-        (rad; pi/2 where the block overturns). Over (frequency): overturning_amplitude, the lowest that overturns the
-        block; NaN where none of the grid does, or its first already does. Over (boundary): boundary_frequency,
-        boundary_amplitude, and the modes below and above it.
+        (rad, pi/2 for overturning). Over (frequency): overturning_amplitude, the lowest that overturns, or NaN if none
+        or already the first does. Over (boundary): boundary_frequency, boundary_amplitude, and the modes below and
+        above the boundary.
+
+    See Also
+    --------
+    rocking.overturning_map : Compute the map.
     """
 
     TABLES = MappingProxyType(
@@ -288,7 +301,7 @@ class OverturningMap(DatasetResult):
         )
 
     def _lowest(self, k: int) -> str:
-        """Lowest amplitude that overturns at a frequency, in words; beyond the grid's amplitudes nothing is known."""
+        """Describe the lowest amplitude of the grid's range that overturns at a frequency."""
         lowest, amplitudes = float(self.data.overturning_amplitude[k]), self.data.amplitude.values
         if not math.isnan(lowest):
             return cell(lowest)
@@ -331,7 +344,7 @@ class OverturningMap(DatasetResult):
 
     @property
     def _proportions(self) -> str:
-        """What counts of the block, for people: the numbers are the same on both sides of most."""
+        """Describe the block's slenderness and restitution, which usually are equal on both sides."""
         alpha, restitution = (
             ", ".join(dict.fromkeys(f"{value:.5g}" for value in self.data.attrs[name]))
             for name in (named("alpha", "rad"), "restitution")
@@ -342,7 +355,7 @@ class OverturningMap(DatasetResult):
 def _pulse_function(
     pulse: str | Callable[[float, float], Motion], parameters: dict[str, Any]
 ) -> Callable[[float, float], Motion]:
-    """Return the function of amplitude (of a pulse by name its peak, m/s^2) and frequency (Hz) that makes a pulse."""
+    """Return a function of amplitude (m/s^2, peak for named pulses) and frequency (Hz) that creates a pulse."""
     if callable(pulse):
         if parameters:
             raise InvalidOption(
@@ -372,7 +385,7 @@ def _called(pulse: Callable[[float, float], Motion], amplitude: float, frequency
 
 
 def _is_alike(first: Motion | None, second: Motion | None, factor: float, ratio: float) -> bool:
-    """Whether the second component is the first by a factor, and so many times as fast; or none is there."""
+    """Whether one component equals the other up to a factor and a ratio of durations, or both are missing."""
     if first is None or second is None:
         return first is second
     if abs(ratio * second.duration - first.duration) > _SAME * first.duration:

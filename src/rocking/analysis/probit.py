@@ -1,8 +1,8 @@
-"""Maximum likelihood for a lognormal fragility, and the region of curves that are about as likely.
+"""Maximum-likelihood fit of a lognormal fragility, and its confidence region.
 
-The probability of exceedance at intensity x is Phi(ln(x/median)/dispersion). In z = ln x it is a probit, Phi(a + b z)
-with b = 1/dispersion and a = -b ln(median), whose likelihood is concave: it has one maximum, or none where the outcomes
-are separated.
+The probability of exceedance at intensity x is Phi(ln(x/median)/dispersion). In z = ln x it is a probit, Phi(a + b z),
+with b = 1/dispersion and a = -b ln(median). Its likelihood is concave and has one maximum, or none if the outcomes are
+separated.
 """
 
 from __future__ import annotations
@@ -19,45 +19,46 @@ from rocking.core.arrays import Flags, Floats, Integers
 _ITERATIONS: Final = 100
 
 
-#: Slope that stands for a step.
+#: Slope that represents a step.
 STEEP: Final = 1e9
 
-#: Outcomes in a group of the test of fit, at least; and groups of binary outcomes, at most (Hosmer and Lemeshow).
+#: Minimum number of outcomes in a group of the test of fit, and maximum number of groups of binary outcomes (Hosmer and
+#: Lemeshow).
 _GROUP: Final = 5
 
-#: Directions in which a region is measured: between them 4e-5 of an interval's width is lost.
+#: Directions that discretise a region, which loses 4e-5 of an interval's width.
 _RAYS: Final = 360
 
-#: Relative width of the end of a ray.
+#: Relative tolerance of the end of a ray.
 _SAME: Final = 1e-9
 
-#: Clusters that tell how far they differ, at least.
+#: Minimum number of clusters for an estimate of their differences.
 _FEWEST: Final = 3
 
 
 class Outcomes(NamedTuple):
-    """Outcomes that exceeded, of how many trials, at n logarithms of the intensity, of one data set or of several."""
+    """Numbers of exceedances and trials at n logarithms of the intensity, for one or several data sets."""
 
     z: Floats
     exceeded: Floats
     trials: Floats
 
     def alone(self) -> Outcomes:
-        """Return one data set as several, of which there is one."""
+        """Return one data set with an additional dimension of length 1."""
         return Outcomes(self.z, self.exceeded[None, :], self.trials[None, :])
 
     def of(self, sets: Flags) -> Outcomes:
-        """Return some of several data sets."""
+        """Return selected data sets."""
         return Outcomes(self.z, self.exceeded[sets], self.trials[sets])
 
 
 class Probit(NamedTuple):
-    """Parameters of one or many fits: probabilities are Phi(intercept + slope ln x) at intensities x.
+    """Parameters of one or several fits: probabilities are Phi(intercept + slope ln x) at intensities x.
 
     Attributes
     ----------
     intercept, slope : ndarray, shape (fits,)
-        Those of a single fit have one entry.
+        Parameters, with one entry for a single fit.
     """
 
     intercept: Floats
@@ -69,13 +70,13 @@ class Probit(NamedTuple):
         return f"<Probit: intercept {float(self.intercept[0]):.5g}, slope {float(self.slope[0]):.5g}>"
 
 
-#: Level curves at 0 and 1, and steps at intensities below and above all that there are.
+#: Level curves at 0 and 1, and steps below and above all possible intensities.
 _STEPS_AT: Final = 1000.0 * STEEP
 _WHOLE_PLANE: Final = Probit(np.array([-np.inf, np.inf, _STEPS_AT, -_STEPS_AT]), np.array([0.0, 0.0, STEEP, STEEP]))
 
 
 def normal_scores(fits: Probit, z: Floats) -> Floats:
-    """Return normal scores of the probability at logarithms of the intensity, shape (fits, len(z)); -inf at 0."""
+    """Return normal scores of the probability at logarithms of the intensity, shape (fits, len(z)), -inf at 0."""
     finite = np.isfinite(z)
     at = fits.intercept[:, None] + fits.slope[:, None] * np.where(finite, z, 0.0)
     return np.where(finite, at, z)
@@ -91,17 +92,17 @@ def probabilities(fits: Probit, z: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Goodness:
-    """Pearson's test of fit between groups of outcomes and the fitted probabilities.
+    """Pearson's test of the fitted probabilities against groups of outcomes.
 
     Attributes
     ----------
     statistic : float
         Sum over groups of (seen - expected)^2/variance.
     freedom : int
-        Groups less two.
+        Degrees of freedom: number of groups minus two.
     p_value : float
-        Probability of a larger statistic if the lognormal is right; NaN with fewer than three groups, and where
-        outcomes belong together.
+        Probability of a larger statistic if the lognormal is right, or NaN for fewer than three groups or dependent
+        outcomes.
     """
 
     statistic: float
@@ -110,7 +111,7 @@ class Goodness:
 
 
 def merge_equal_intensities(intensity: Floats) -> Floats:
-    """Return intensities of which those that differ by rounding alone, as those of scaled motions, are one."""
+    """Merge intensities that differ by rounding only, for example after scaling."""
     order = np.argsort(intensity, kind="stable")
     ordered = intensity[order]
     grows = np.diff(np.log(ordered), prepend=-np.inf) > 1e-9
@@ -120,7 +121,7 @@ def merge_equal_intensities(intensity: Floats) -> Floats:
 
 
 def unidentified(data: Outcomes, shown: Callable[[float], str]) -> str | None:
-    """Say why no rising lognormal fits a data set best, intensities as `shown` writes them; None where one does."""
+    """Return the reason why no rising lognormal fits a data set, with intensities formatted by `shown`, or None."""
     z, exceeded, trials = data
     yes, no, count = z[exceeded > 0], z[exceeded < trials], round(float(trials.sum()))
     if not yes.size or not no.size:
@@ -145,13 +146,13 @@ def unidentified(data: Outcomes, shown: Callable[[float], str]) -> str | None:
 
 
 def _tried(z: Floats, shown: Callable[[float], str]) -> str:
-    """Say at which intensities outcomes are."""
+    """Describe the range of intensities."""
     low, high = (shown(math.exp(end)) for end in (z.min(), z.max()))
     return f"at {low}" if low == high else f"at {low} to {high}"
 
 
 def fit(data: Outcomes) -> Probit:
-    """Fit several data sets, none of them `unidentified`, by maximum likelihood (Fisher's scoring)."""
+    """Fit several data sets that are not `unidentified` by maximum likelihood (Fisher's scoring)."""
     centre, spread = data.z.mean(), data.z.std()
     scaled = data._replace(z=(data.z - centre) / spread)
     beta = np.zeros((len(data.trials), 2))
@@ -162,7 +163,8 @@ def fit(data: Outcomes) -> Probit:
         with np.errstate(all="ignore"):
             gradient, information = _scores(scaled, beta)
             step = _solved(information, gradient)
-        # Far from the maximum the information may vanish to rounding; the complete data's (EM) still leads uphill.
+        # Far from the maximum the information may vanish by rounding. The step of the complete data (EM) still
+        # increases the likelihood.
         lost = ~np.isfinite(step).all(axis=1)
         step[lost] = _solved(most[lost], gradient[lost])
         step, then = _uphill(scaled, beta, step, now)
@@ -174,14 +176,14 @@ def fit(data: Outcomes) -> Probit:
 
 
 def fit_or_limits(data: Outcomes) -> Probit:
-    """Fit several data sets; where the likelihood of rising curves has no maximum, by the limit that it tends to."""
+    """Fit several data sets, with the limit of rising curves if their likelihood has no maximum."""
     from scipy.special import ndtri
 
     z, exceeded, trials = data
     lowest_yes = np.where(exceeded > 0, z, np.inf).min(axis=1)
     highest_no = np.where(exceeded < trials, z, -np.inf).max(axis=1)
     step = np.isfinite(highest_no - lowest_yes) & (highest_no <= lowest_yes + _overlap(z))
-    # A curve that would fall is level at best: one probability, 0 or 1 without either kind of outcome.
+    # If the best curve would fall, the limit is level: one probability, 0 or 1 if all outcomes are equal.
     fits = Probit(ndtri(exceeded.sum(axis=1) / trials.sum(axis=1)), np.where(step, STEEP, 0.0))
     fits.intercept[step] = -0.5 * STEEP * (highest_no + lowest_yes)[step]
     if (regular := ~step & _rises(data)).any():
@@ -190,7 +192,7 @@ def fit_or_limits(data: Outcomes) -> Probit:
 
 
 def likelihood(data: Outcomes, beta: Floats) -> Floats:
-    """Logarithm of the likelihood of parameters (fits, 2), without binomial coefficients."""
+    """Log-likelihood of parameters (fits, 2), without binomial coefficients."""
     from scipy.special import log_ndtr
 
     z, exceeded, trials = data
@@ -202,7 +204,7 @@ def likelihood(data: Outcomes, beta: Floats) -> Floats:
 
 
 def covariance(data: Outcomes, fitted: Probit) -> Floats:
-    """Inverse of Fisher's expected information of intercept and slope, shape (2, 2), of one fit."""
+    """Inverse of Fisher's expected information of intercept and slope for one fit, shape (2, 2)."""
     scaled, about, centre, spread = _standardised(data, fitted)
     counts = scaled._replace(exceeded=np.zeros_like(data.trials))
     change = np.array([[1.0, -centre / spread], [0.0, 1.0 / spread]])
@@ -212,14 +214,14 @@ def covariance(data: Outcomes, fitted: Probit) -> Floats:
 
 
 def _standardised(data: Outcomes, fitted: Probit) -> tuple[Outcomes, Probit, float, float]:
-    """Return data and fits with z about its mean and over its deviation, and these two, so that digits suffice."""
+    """Standardise z in data and fits for accuracy, and return mean and deviation of z as well."""
     centre, spread = float(data.z.mean()), float(data.z.std())
     scaled = data._replace(z=(data.z - centre) / spread)
     return scaled, Probit(fitted.intercept + fitted.slope * centre, fitted.slope * spread), centre, spread
 
 
 def groups(z: Floats, trials: Floats) -> Integers:
-    """Group of each outcome: the intensities where each has five outcomes or more, else up to ten equal groups."""
+    """Group of each outcome: its intensity if all have five outcomes or more, else one of up to ten equal groups."""
     level = np.unique(z, return_inverse=True)[1]
     held = np.bincount(level, trials)
     if held.min() >= _GROUP:
@@ -231,7 +233,7 @@ def groups(z: Floats, trials: Floats) -> Integers:
 
 
 def goodness(data: Outcomes, fitted: Probit, *, independent: bool) -> Goodness:
-    """Test the fit in its `groups`."""
+    """Test the fit by Pearson's statistic of its `groups`."""
     from scipy.special import gammaincc
 
     group = groups(data.z, data.trials)
@@ -241,7 +243,7 @@ def goodness(data: Outcomes, fitted: Probit, *, independent: bool) -> Goodness:
     freedom = len(seen) - 2
     if freedom < 1:
         return Goodness(math.nan, max(freedom, 0), math.nan)
-    # A group whose variance vanishes is one that the fit is certain of, and right about.
+    # If a group's variance vanishes, the fitted probability is 0 or 1, as observed.
     with np.errstate(over="ignore"):
         statistic = float(np.sum((seen - expected) ** 2 / np.maximum(variance, np.finfo(float).tiny)))
     chance_of_more = float(gammaincc(0.5 * freedom, 0.5 * statistic)) if independent else math.nan
@@ -249,12 +251,12 @@ def goodness(data: Outcomes, fitted: Probit, *, independent: bool) -> Goodness:
 
 
 def _overlap(z: Floats) -> float:
-    """Overlap of the outcomes of either kind that is too narrow for a slope to be found from it."""
+    """Largest overlap of both kinds of outcomes that is too narrow to determine a slope."""
     return 1e-6 * float(z.max() - z.min())
 
 
 def _rises(data: Outcomes) -> Flags:
-    """Whether the likelihood of each data set grows as the level curve begins to rise."""
+    """Whether the likelihood of each data set increases with the slope of a level curve."""
     z, exceeded, trials = data
     centred = z - z.mean()
     share = exceeded.sum(axis=1, keepdims=True) / trials.sum(axis=1, keepdims=True)
@@ -288,7 +290,7 @@ def _logarithms(at: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _uphill(data: Outcomes, beta: Floats, step: Floats, now: Floats) -> tuple[Floats, Floats]:
-    """Halve steps until the likelihood does not fall; return them and the likelihoods there."""
+    """Halve steps until the likelihood does not decrease, and return steps and likelihoods."""
     then = likelihood(data, beta + step)
     for _ in range(_ITERATIONS):
         falling = ~(then >= now - 1e-12 * np.abs(now))
@@ -300,11 +302,11 @@ def _uphill(data: Outcomes, beta: Floats, step: Floats, now: Floats) -> tuple[Fl
 
 
 def likely_region(data: Outcomes, fitted: Probit, clusters: Integers | None, confidence: float) -> Probit:
-    """Fits on the boundary of those whose likelihood is not significantly below the maximum; it ends where none rises.
+    """Return fits on the boundary of the confidence region, without curves that fall.
 
-    Intervals are extremes in it, as of the profile likelihood. Where clusters hold several outcomes each, it is
-    stretched to their covariance (Chandler and Bate 2007) by Student's distribution; of fewer than three clusters it is
-    the whole plane. Without clusters every outcome is on its own.
+    Intervals are extremes in this region, as for the profile likelihood. For clusters of several outcomes the region is
+    stretched to their covariance (Chandler and Bate 2007) with Student's distribution. For fewer than three clusters it
+    is the whole plane. Without clusters all outcomes are independent.
     """
     from scipy.special import chdtri, stdtrit
 
@@ -322,7 +324,7 @@ def likely_region(data: Outcomes, fitted: Probit, clusters: Integers | None, con
 
 
 def _around(data: Outcomes, best: Probit, drop: float) -> Floats:
-    """Points all around the maximum where the logarithm of the likelihood is lower by `drop`, shape (rays, 2)."""
+    """Points around the maximum at which the log-likelihood is lower by `drop`, shape (rays, 2)."""
     z, level = np.unique(data.z, return_inverse=True)
     yes, trials = (
         np.broadcast_to(np.bincount(level, counts).astype(np.float64), (_RAYS, z.size)) for counts in data[1:]
@@ -339,7 +341,7 @@ def _around(data: Outcomes, best: Probit, drop: float) -> Floats:
         if not short.any():
             break
         reach[short] *= 2.0
-    # From beyond, Newton's rule does not overshoot the root of a concave function.
+    # From outside, Newton's method does not overshoot the root of a concave function.
     for _ in range(80):
         here = top + reach[:, None] * directions
         above = likelihood(rays, here) - floor
@@ -354,7 +356,7 @@ def _around(data: Outcomes, best: Probit, drop: float) -> Floats:
 
 
 def _cut_where_level(around: Floats) -> Floats:
-    """Cut the region off where the slope is 0."""
+    """Cut the region off at slope 0."""
     after = np.roll(around, -1, axis=0)
     (intercept, slope), (next_intercept, next_slope) = around.T, after.T
     up = slope >= 0.0
@@ -365,11 +367,11 @@ def _cut_where_level(around: Floats) -> Floats:
 
 
 def _stretch(data: Outcomes, clusters: Integers, best: Probit) -> Floats:
-    """Map from the likelihood's covariance to that which the clusters show."""
+    """Linear map from the covariance of the likelihood to the covariance of the clusters."""
     pulls, bends = _by_cluster(data, clusters, best)
     count = len(pulls)
     root = np.linalg.cholesky(np.linalg.inv(bends.sum(axis=0)))
-    # Without the cluster the information is less by its leverage, so that its score moves the parameters further.
+    # Without the cluster, the information is smaller by its leverage, so that its score moves the parameters further.
     leverage, axes = np.linalg.eigh(root.T @ bends @ root)
     freed = np.einsum("cij,cj,ckj->cik", axes, 1.0 / (1.0 - np.minimum(leverage, 0.9)), axes)
     moved = np.einsum("cij,cj->ci", freed, pulls @ root)

@@ -1,4 +1,4 @@
-"""Risk, from fragility and hazard: how often a year a limit state is exceeded, and how likely in some years."""
+"""Risk from fragility and hazard: annual rates and probabilities of exceeding limit states, and survival."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Probabilities of exceedance of the intensities in the table of a survival, and those between which its figure is.
+#: Probabilities of exceedance for the intensities in the table of a survival, and for the limits of its figure.
 _CHANCES: Final = (0.05, 0.16, 0.5, 0.84, 0.95)
 _SHOWN: Final = (0.01, 0.999)
 
@@ -44,16 +44,19 @@ class Rate:
     Attributes
     ----------
     limit_state : str
-        Name of what is exceeded.
+        Name of the limit state.
     annual_rate : float
-        Exceedances a year.
+        Exceedances per year.
     interval : (float, float)
-        Confidence interval from the fragility's; the hazard is taken as it is.
+        Confidence interval due to the fragility, for the given hazard curve.
     below, above : float
-        Shares of the rate from motions below the hazard curve's first point and above its last, where its lines are
-        only extended.
+        Shares of the rate from the extrapolated parts of the hazard curve, below its first and above its last point.
     bounds : (float, float)
-        Rates between which the hazard curve can tell the rate; texts state the bound in place of a rate beyond them.
+        Smallest and largest rate that the hazard curve can resolve, printed for rates beyond.
+
+    See Also
+    --------
+    rocking.Fragility.annual_rate : Compute the rates from a hazard curve.
 
     Examples
     --------
@@ -73,16 +76,16 @@ class Rate:
         return f"<Rate: {self.limit_state}: {rate} a year ({between}), {self.in_words()}>"
 
     def in_words(self) -> str:
-        """Write the return period as "once in ... years", with the interval, to the digits that this leaves."""
+        """Return the period and its interval as "once in ... years", with the significant digits."""
         period, between = self._period_digits()
         return f"once in {period} year{'' if period == '1' else 's'} ({between})"
 
     def probability(self, years: float) -> float:
-        """Probability of at least one exceedance in a time (years), if exceedances are independent."""
+        """Compute the probability of at least one exceedance in a time (years), for independent exceedances."""
         return -math.expm1(-self.annual_rate * checks.positive(years, "years", InvalidOption))
 
     def survival(self, years: float) -> float:
-        """Probability of no exceedance in a time (years): of standing, for overturning."""
+        """Compute the probability of no exceedance (survival) in a time (years)."""
         return math.exp(-self.annual_rate * checks.positive(years, "years", InvalidOption))
 
     @property
@@ -108,20 +111,25 @@ def _period(rate: float) -> float:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Risk(Result):
-    """Annual rates of all limit states of a fragility under a hazard curve; from `Fragility.annual_rate`.
+    """Annual rates of the limit states of a fragility, computed by `Fragility.annual_rate`.
 
-    Its figure has the hazard curve, and below it for each limit state which intensities its rate comes from.
+    The figure shows the hazard curve and, for each limit state, the contributions of the intensities to its rate.
 
     Attributes
     ----------
     rates : tuple of Rate
-        One for each limit state.
+        Rate of each limit state.
     curves : tuple of FragilityCurve
         Probabilities of exceedance, in the same order.
     hazard : HazardCurve
         Annual rates of intensities.
     description : str
-        What was simulated or observed.
+        Description of the simulations or observations.
+
+    See Also
+    --------
+    rocking.Fragility.annual_rate : Compute the rates from a hazard curve.
+    rocking.HazardCurve : Rates of exceeding an intensity at a site.
 
     Examples
     --------
@@ -137,12 +145,12 @@ class Risk(Result):
     description: str
 
     def rate(self, limit_state: str) -> Rate:
-        """Return the rate of a limit state, by its name."""
+        """Return the rate of a limit state."""
         rates = {one.limit_state: one for one in self.rates}
         return rates[checks.one_of(limit_state, "limit_state", InvalidOption, [*rates])]
 
     def summary(self, years: float = 50.0) -> str:
-        """Write rates, return periods, and probabilities in a time (years) as a table."""
+        """Return rates, return periods, and probabilities in a time (years) as a text table."""
         years = checks.positive(years, "years", InvalidOption)
         confidence, rows = 100 * self.curves[0].confidence, []
         for one in self.rates:
@@ -166,7 +174,7 @@ class Risk(Result):
         return "\n".join([text_table(header, rows), *notes])
 
     def to_dict(self, years: float = 50.0) -> dict[str, Any]:
-        """Return rates, probabilities in a time (years) and the hazard curve by name; units are in the names, or SI."""
+        """Return rates, probabilities in a time (years) and the hazard curve by name, in named or SI units."""
         return {
             "description": self.description,
             "hazard": self.hazard.to_dict(),
@@ -190,7 +198,7 @@ class Risk(Result):
     def plot(self, ax: Axes | None = None, *, title: str = "", figsize: tuple[float, float] | None = None) -> Figure:
         from rocking.plot.curves import RiskLine, risk_figure
 
-        # The figure ends where next to nothing of the rates comes from.
+        # Limit the figure to intensities that contribute to the rates.
         low, high = self.hazard.intensity[[0, -1]]
         at = np.geomspace(1e-2 * low, 1e2 * high, 800)
         return risk_figure(
@@ -212,7 +220,7 @@ class Risk(Result):
 
 
 def risk_of(curves: Sequence[FragilityCurve], hazard: HazardCurve, measure: Measure, description: str) -> Risk:
-    """Integrate curves against a measure over a hazard curve."""
+    """Integrate fragility curves of a measure over a hazard curve."""
     if not isinstance(hazard, HazardCurve):
         raise InvalidOption(
             f"a HazardCurve is needed, not a {type(hazard).__name__}: make one with HazardCurve(intensity, rate), "
@@ -224,7 +232,7 @@ def risk_of(curves: Sequence[FragilityCurve], hazard: HazardCurve, measure: Meas
 
 
 def beyond_notes(rate: Rate) -> list[str]:
-    """Say how much of a rate is from where the lines of a hazard curve are only extended."""
+    """Describe the share of a rate from extrapolations of the hazard curve."""
     return [
         f"{rate.limit_state}: {100 * share:.{0 if share > 0.1 else 1}f} % of the rate is from {what} the hazard curve"
         for share, what in ((rate.below, "below"), (rate.above, "above"))
@@ -233,7 +241,7 @@ def beyond_notes(rate: Rate) -> list[str]:
 
 
 def check_measure(hazard: HazardCurve, measure: Measure) -> None:
-    """Raise an InvalidOption unless a hazard curve is of the measure that a fragility is against."""
+    """Raise an InvalidOption if the measures of a hazard curve and a fragility differ."""
     if measure != hazard.measure:
         raise InvalidOption(
             f"the fragility is against {measure.label}, the hazard curve of {hazard.measure.label}; "
@@ -252,7 +260,7 @@ def _rate(curve: FragilityCurve, hazard: HazardCurve) -> Rate:
     with np.errstate(over="ignore", under="ignore"):
         rate, lower, upper = (float(np.exp(value)) for value in (total, low[0], high[0]))
     below, above = shares_beyond(curve.fitted, hazard)
-    # Motions above the last point add no more than its rate; of a rate that is mostly theirs only the bound is known.
+    # Motions above the last point add no more than its rate. If most of the rate is theirs, only this bound is known.
     least = (1.0 - above) * rate + float(hazard.rate[-1]) if above > 0.5 else 0.0
     bounds = least, max(least, float(hazard.rate[0]))
     return Rate(curve.limit_state, rate, (lower, upper), below, above, bounds)
@@ -260,30 +268,35 @@ def _rate(curve: FragilityCurve, hazard: HazardCurve) -> Rate:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Survival(Result):
-    """A limit state that was not exceeded in a time, and the shaking that this allows; from `Fragility.survival`.
+    """Limit state that was not exceeded, and its constraints on ground motion, computed by `Fragility.survival`.
 
-    Its figure has the largest rates that fit with the survival, and the hazard curve beside them.
+    The figure shows the largest rates consistent with the survival, and the hazard curve.
 
-    A curve of several blocks (for example an ensemble that stands for one block which is not quite known) does not
-    separate their dispersion from that of the motions: rates and `probability` are those of motions that each meet
-    another of the blocks. If one of them has stood all the time, the probability is `mean_probability`, and
-    `most_probable` bounds it.
+    A curve of several blocks (for example an ensemble that represents one uncertain block) does not separate their
+    dispersion from the record-to-record variability: for rates and `probability`, the block parameters are resampled
+    for every motion. If a single one of the blocks has stood all the time, the probability is `mean_probability`, and
+    `most_probable` is its bound.
 
     Attributes
     ----------
     curve : FragilityCurve
-        Probabilities that the limit is exceeded.
+        Probabilities of exceeding the limit.
     measure, description, several_blocks : Measure, str, bool
-        As of the `Fragility`.
+        As for `Fragility`.
     years, confidence : float
         As for `Fragility.survival`.
     hazard : HazardCurve or None
         Annual rates of intensities at the site.
     rate : Rate or None
-        Annual rate of the limit state under that hazard curve.
+        Annual rate of the limit state for this hazard curve.
     mean_probability : float
-        Mean, by the weights of several blocks, of the probabilities of survival under the hazard curve, each by a
-        curve of its own. NaN of one block, without a hazard curve, and where outcomes are not kept.
+        Weighted mean of the survival probabilities of several blocks, each with its own curve, under the hazard curve.
+        NaN for one block, or without hazard curve or outcomes.
+
+    See Also
+    --------
+    rocking.Fragility.survival : Compute the constraints.
+    rocking.HazardCurve : Rates of exceeding an intensity at a site.
     """
 
     curve: FragilityCurve
@@ -307,28 +320,28 @@ class Survival(Result):
 
     @property
     def unlikely(self) -> float:
-        """Intensity (SI) that one motion, had it come, would have exceeded the limit with the confidence asked for."""
+        """Intensity (SI) of one motion that would have exceeded the limit with the requested confidence."""
         return self.curve.intensity_of(self.confidence)
 
     @property
     def largest_rate(self) -> Floats:
-        """Annual rates of motions of each `intensity` or more above which the limit would have been exceeded.
+        """Largest annual rates of motions of each `intensity` or more that are consistent with the survival.
 
-        Of several blocks, if each motion met another of them.
+        For several blocks, their parameters are resampled for every motion.
         """
         return self.curve.largest_rate(self.intensity, self.years, self.confidence)
 
     @property
     def probability(self) -> float:
-        """Probability, under the hazard curve, that the limit is not exceeded in the time; NaN without one.
+        """Probability under the hazard curve that the limit is not exceeded in the time, or NaN without a curve.
 
-        Of several blocks the least it can be: if each motion met another of them.
+        For several blocks this is the lower bound, with parameters resampled for every motion.
         """
         return math.nan if self.rate is None else self.rate.survival(self.years)
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Its confidence interval, from that of the fragility."""
+        """Confidence interval of `probability`, from the interval of the fragility."""
         if self.rate is None:
             return math.nan, math.nan
         low, high = self.rate.interval
@@ -336,11 +349,11 @@ class Survival(Result):
 
     @property
     def most_probable(self) -> float:
-        """The largest `probability` that fits with all that is known: with the interval, the hazard curve, the blocks.
+        """Largest `probability` consistent with its interval, the hazard curve and the blocks.
 
-        It is at the upper end of the interval, and without motions below the hazard curve's first point or above its
-        last, where its lines are only extended. Of several blocks it is that of one which has stood all the time, and
-        of which the intensity alone decides whether it falls: the integral of exp(-rate(x) years) dP(x).
+        This is the upper end of the interval, without the extrapolations of the hazard curve below its first and above
+        its last point. For several blocks, a single block has stood all the time, and the intensity alone determines
+        whether it falls, which yields the integral of exp(-rate(x) years) dP(x).
         """
         if self.hazard is None:
             return math.nan
@@ -398,7 +411,7 @@ class Survival(Result):
         return f"some intensity above {text}, beyond the data" if self.unlikely > self._known[1] else f"{text} or more"
 
     def _verdict(self, rate: Rate) -> str:
-        """Write how probable the survival is under the hazard curve."""
+        """Describe the probability of the survival under the hazard curve."""
         low, high = rate.bounds
         bounds = math.exp(-high * self.years), math.exp(-low * self.years)
         chance, between = known_digits(self.probability, self.interval, bounds)
@@ -451,7 +464,7 @@ class Survival(Result):
         from rocking.plot.curves import survival_figure
 
         ends = [end for end in map(self.curve.intensity_of, _SHOWN) if 0.0 < end < math.inf]
-        if len(ends) < len(_SHOWN):  # the curve is so wide that these are not numbers any more
+        if len(ends) < len(_SHOWN):  # the ends of a very wide curve are not finite numbers
             ends = [self.curve.intensity.min(), self.curve.intensity.max()]
         if self.hazard is not None:
             ends += self.hazard.intensity[[0, -1]].tolist()
@@ -474,7 +487,7 @@ class Survival(Result):
 
 
 def mean_of_blocks(outcomes: pd.DataFrame, column: str, limit_state: str, hazard: HazardCurve, years: float) -> float:
-    """Mean of the probabilities that blocks survive, each by a curve fitted to its own outcomes."""
+    """Mean survival probability of blocks, each with a curve fitted to its own outcomes."""
     table = outcomes.sort_values("block", kind="stable")
     blocks = table.drop_duplicates("block")
     intensity, exceeded, missing = (
@@ -482,7 +495,7 @@ def mean_of_blocks(outcomes: pd.DataFrame, column: str, limit_state: str, hazard
         for name in (column, f"exceeded_{limit_state}", "unfinished")
     )
     fits = fit_or_limits(Outcomes(np.log(intensity[0]), exceeded, 1.0 - missing))
-    # Of a curve that does not rise, motions below the hazard curve would exceed the limit as often as they come.
+    # For a curve that does not rise, the rate below the hazard curve is unbounded and therefore omitted.
     rising = np.logaddexp.reduce(log_parts(fits, hazard), axis=1)
     rates = np.exp(np.where(fits.slope > 0.0, rising, log_rate_within(fits, hazard)[:, 0]))
     return float(np.average(np.exp(-years * rates), weights=blocks.get("weight")))

@@ -56,44 +56,50 @@ def rocking_spectrum(
     threads: int | None = None,
     progress: bool | None = None,
 ) -> RockingSpectrum:
-    """Peak rotation against the frequency parameter or the size, of a grid of blocks or of an ensemble.
+    """Compute peak rotation against the frequency parameter or the size, for a grid or an ensemble.
 
     Parameters
     ----------
     blocks : Blocks, Block, RestrainedBlock or sequence of one kind
-        A grid of frequency parameters, slendernesses and restitutions (`Blocks.grid`), which are the dimensions of the
-        spectrum. Or an ensemble, such as that of a calibration: any other blocks, or a grid with `p`, `size` or
-        `weights`. Its blocks are resized together (`Blocks.resized`) so that their median p is each of `p`.
+        Grid of frequency parameters, slendernesses and restitutions (`Blocks.grid`), the dimensions of the spectrum.
+        Other blocks, for example from a calibration, and a grid with `p`, `size` or `weights` are an ensemble, resized
+        together (`Blocks.resized`) so that its median p equals each of `p`.
     motions : optional
         As for `simulate_many`.
     p : array_like, optional
-        Frequency parameters, rad/s, of an ensemble; by default half to twice its own, or those that `size` gives.
+        Frequency parameters of an ensemble, rad/s. The default is half to twice its own, or follows from `size`.
     size : array_like, optional
-        Half diagonals R, m, in place of `p`: p = sqrt(3 g/(4 R)), as of a rectangular block.
+        Half diagonals R in place of `p`, m, with p = sqrt(3 g/(4 R)) as for a rectangular block.
     weights : array_like, optional
-        Weight of each block of an ensemble; by default all alike.
+        Weights of the blocks of an ensemble, equal by default.
     fractiles : sequence of float
-        Shares, in (0, 1), of motions (and of the ensemble's weight) that stay below the fractile curves.
+        Shares, in (0, 1), of motions (and of the ensemble's weight) below the fractile curves.
     model, chattering, threads, progress : optional
         As for `simulate_many`.
 
     Returns
     -------
     RockingSpectrum
-        Peaks, fractiles and shares that overturn.
+        Peaks, fractiles, and shares that overturn.
 
     Raises
     ------
     InvalidOption
-        If an argument is out of its range.
+        If an argument is out of range.
     InvalidBlock
-        If p or size is, or one of the blocks is no block.
+        If p or size is out of range, or one of the blocks is not a block.
+
+    See Also
+    --------
+    rocking.Blocks.grid : Create a grid of blocks.
+    rocking.simulate_many : Simulate many blocks under many motions.
 
     Notes
     -----
-    A block that overturns counts as infinitely large: fractiles are interpolated in the ordered peaks, and are infinite
-    where that share of the motions, or the next motion above it, overturns. Those of an ensemble are the lowest peaks
-    that the share of the weight does not pass. Its peaks are over the smaller slenderness, of the blocks as they stand.
+    The peak of an overturning block is infinite. Fractiles are interpolated between the ordered peaks, and are infinite
+    if that share of the motions, or the next motion above it, overturns. For an ensemble, fractiles are the lowest
+    peaks that the share of the weight does not exceed. Its peaks are normalised by the smaller slenderness of the
+    blocks at rest.
 
     References
     ----------
@@ -144,11 +150,11 @@ def rocking_spectrum(
 
 
 def fractiles_of(peaks: Floats, shares: Floats) -> Floats:
-    """Fractiles (k, ...) of peaks (n, ...), interpolated in those not NaN, infinite where either neighbour is."""
-    ordered = np.sort(peaks, axis=0)  # those that are missing come last
+    """Interpolate fractiles (k, ...) of peaks (n, ...) without NaN, infinite if either neighbour is."""
+    ordered = np.sort(peaks, axis=0)  # NaN last
     known = np.maximum(np.count_nonzero(~np.isnan(peaks), axis=0), 1)
     place = shares.reshape(-1, *[1] * known.ndim) * (known - 1)
-    # Rounding must not take the place of one value for one above it, which may be infinite: 0.28 * 25 > 7.
+    # Rounding must not select the next higher value, which may be infinite: 0.28 * 25 > 7.
     nearest = np.rint(place)
     place = np.where(np.abs(place - nearest) <= 1e-12 * np.maximum(nearest, 1.0), nearest, place)
     below = np.floor(place).astype(np.int64)
@@ -160,17 +166,17 @@ def fractiles_of(peaks: Floats, shares: Floats) -> Floats:
 
 
 def weighted_fractiles(values: Floats, weights: Floats, shares: Floats) -> Floats:
-    """Lowest of the values (n, ...) that are not NaN which k shares of the weight do not pass, shape (k, ...)."""
+    """Return the lowest values (n, ...) not exceeded by k shares of the weight, without NaN, shape (k, ...)."""
     order = np.argsort(values, axis=0, kind="stable")
     ordered = np.take_along_axis(values, order, axis=0)
     passed = np.cumsum(weights[order] * ~np.isnan(ordered), axis=0)
-    # Rounding must not take a share that is met for one that is not.
+    # Tolerance, so that rounding does not miss a share that is reached.
     enough = passed[None] >= shares.reshape(-1, *[1] * values.ndim) * passed[-1] * (1.0 - 1e-12)
     return np.asarray(np.take_along_axis(ordered, np.argmax(enough, axis=1), axis=0))
 
 
 def overturned_share(peaks: Floats, weights: Floats | None = None) -> Floats:
-    """Share of the peaks (n, ...) along the first axis that are infinite, of those that are not NaN."""
+    """Return the share of infinite peaks (n, ...) along the first axis, without NaN."""
     known, fell = ~np.isnan(peaks), np.isinf(peaks)
     if weights is not None and known.all():
         return np.asarray(np.average(fell, axis=0, weights=weights))
@@ -181,17 +187,21 @@ def overturned_share(peaks: Floats, weights: Floats | None = None) -> Floats:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RockingSpectrum(DatasetResult):
-    """Peak rotation against the frequency parameter or the size; from `rocking_spectrum`.
+    """Peak rotation against the frequency parameter or the size, computed by `rocking_spectrum`.
 
     Attributes
     ----------
     data : xarray.Dataset
-        Over (motion, alpha, restitution if given, p): peak_rotation (rad; pi/2 where the block
-        overturns), peak_over_alpha (infinite where it overturns, NaN where the simulation was given
-        up, which fractiles and shares leave out) and overturned. Over (fractile, alpha, ..., p):
-        fractile_over_alpha. Over (alpha, ..., p): overturned_share. Coordinates besides: period 2 pi/p (s), and size R
-        (m) of the rectangular block. Of an ensemble peaks are over (motion, block, p), fractiles and shares over p
-        alone, p is the ensemble's median, and the blocks' weights (1 in the mean) are a coordinate.
+        Over (motion, alpha, restitution if given, p): peak_rotation (rad, pi/2 for overturning), peak_over_alpha
+        (infinite for overturning, NaN for abandoned simulations, which fractiles and shares exclude) and overturned.
+        Over (fractile, alpha, ..., p): fractile_over_alpha. Over (alpha, ..., p): overturned_share. Additional
+        coordinates: period 2 pi/p (s), and size R (m) of the rectangular block. For an ensemble, peaks are over
+        (motion, block, p), fractiles and shares over p alone, p is the median, and the blocks' weights (mean 1) are a
+        coordinate.
+
+    See Also
+    --------
+    rocking.rocking_spectrum : Compute the spectrum.
     """
 
     TABLES = MappingProxyType(
@@ -243,15 +253,15 @@ class RockingSpectrum(DatasetResult):
         title: str = "",
         figsize: tuple[float, float] | None = None,
     ) -> Figure:
-        """Draw single motions thin, fractiles thick, and the share that overturns, against "p", "period" or "size".
+        """Plot motions (thin), fractiles (thick) and the share that overturns against "p", "period" or "size".
 
-        Of more than two combinations of slenderness and restitution only the fractiles nearest to the median are drawn,
-        of more than four no single motions. Otherwise as `DrawnResult.plot`.
+        For more than two combinations of slenderness and restitution, only the fractiles nearest to the median are
+        drawn, and for more than four, no single motions. See also `DrawnResult.plot`.
         """
         from rocking.plot.curves import SpectrumCurves, spectrum_figure
 
         checks.one_of(against, "against", InvalidOption, get_args(Abscissa))
-        # A line goes along its abscissa, in whatever order p was given.
+        # Lines are drawn in the order of the abscissa, whatever the order of p.
         data = self.data.sortby("p") if "p" in self.data.dims else self.data
         named_curves = curves_of(data)
         alone = len(named_curves) == 1
@@ -281,7 +291,7 @@ class RockingSpectrum(DatasetResult):
         return "block" in self.data.dims
 
     def _peaks_of_motions(self, one: xr.Dataset) -> Floats:
-        """Peaks under each motion, shape (motions, p): of an ensemble its median."""
+        """Peaks under each motion, shape (motions, p), or their medians for an ensemble."""
         if not self._of_ensemble:
             return np.asarray(one.peak_over_alpha.transpose("motion", "p").values)
         peaks = one.peak_over_alpha.transpose("block", "motion", "p").values
@@ -297,7 +307,7 @@ def _dataset(
     shares: Floats,
     gravity: float,
 ) -> xr.Dataset:
-    """Peaks, verdicts and ratios over (motion, *names), and fractiles and shares found over their own dimensions."""
+    """Combine peaks, outcomes and ratios over (motion, *names) with fractiles and shares over their dimensions."""
     import xarray as xr
 
     (peak, overturned, over_alpha), (dims, fractiles, share) = peaks, found

@@ -1,4 +1,4 @@
-"""One block under many records: what becomes of it under each, in a row, and what rules of thumb say."""
+"""Responses of one block to many records, and comparison with rules of thumb."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from rocking.response.mechanics import friction_coefficient
 from rocking.simulation.ensemble import body_coordinates, verticals_of
 from rocking.simulation.simulate import simulate
 
-#: Columns for people; files hold all.
+#: Columns of the printed table. Files contain all columns.
 _SHOWN: Final = {
     "record": "record",
     named("pga", "g"): "PGA, g",
@@ -39,7 +39,7 @@ _SLIDING: Final = named("sliding_time", "s")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BlockUnderRecords(Result):
-    """One block under several motions, named `records`; `skipped` are the reasons why others could not be read."""
+    """Responses of one block to several motions, named `records`, with reasons for `skipped` ones."""
 
     TABLES = ("records",)
 
@@ -59,28 +59,32 @@ class BlockUnderRecords(Result):
         return columns_with_skipped(self.rows(), self.skipped)
 
     def _labels(self) -> list[dict[str, Any]]:
-        """First columns of each row: the record, its motion, the block."""
+        """First columns of each row: record, motion, block."""
         columns = body_coordinates(self.block.alone())
         numbers = {named(name, about["units"]): float(values[0]) for name, (_, values, about) in columns.items()}
         labels = record_columns(self.records, [motion_of(response) for response in self.responses])
         return [{**label, "block": self.block.description, **numbers} for label in labels]
 
     def _headline(self) -> str:
-        """Say under how many records the block overturns."""
+        """Summarise the number of records that overturn the block."""
         overturned = sum(one.overturned and one.perturbed().is_decided for one in self.responses)
         return f"{self.block.description}: {counted(len(self.records), 'record')}, overturned by {overturned}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Survey(BlockUnderRecords):
-    """Responses of a block to several motions; from `survey`.
+    """Responses of a block to several motions, computed by `survey`.
 
     Attributes
     ----------
     friction, precision : float
         As for `survey`.
     block, records, responses, skipped
-        Body, name of each motion, response to each, and why records could not be read.
+        Body, names of the motions, their responses, and reasons why records could not be read.
+
+    See Also
+    --------
+    rocking.survey : Run the simulations.
     """
 
     friction: float | None = None
@@ -126,16 +130,20 @@ class Survey(BlockUnderRecords):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Check(BlockUnderRecords):
-    """Rules of thumb compared with simulations, for a block under several motions; from `check`.
+    """Comparison of rules of thumb with simulations for a block under several motions, computed by `check`.
 
     Attributes
     ----------
     ratios : tuple of mapping of str to float
-        For each motion, demand over capacity by each rule.
+        Ratio of demand to capacity by rule, for each motion.
     margins : tuple of float
-        For each motion, one over the lowest factor on it at which the block overturns; NaN if it overturns at none.
+        Reciprocal of the lowest factor on each motion that overturns the block, or NaN.
     block, records, responses, skipped
-        The block, the name of each motion, the simulated response to each, and why records could not be read.
+        Block, names of the motions, their simulated responses, and reasons why records could not be read.
+
+    See Also
+    --------
+    rocking.rules.check : Run the comparison.
     """
 
     ratios: tuple[Mapping[str, float], ...]
@@ -143,7 +151,7 @@ class Check(BlockUnderRecords):
 
     @property
     def falls_under_less(self) -> tuple[bool, ...]:
-        """Whether the block stands under each motion as it is, and falls under the same motion times less than 1."""
+        """Whether the block stands under each motion, but falls under the same motion scaled down."""
         each = zip(self.responses, self.margins, strict=True)
         return tuple(margin > 1.0 and not (one.overturned or one.unfinished) for one, margin in each)
 
@@ -173,7 +181,7 @@ class Check(BlockUnderRecords):
         shown |= {"simulated": "simulated", "peak_over_slenderness": "peak/slenderness", "verdict": "outcome"}
         known = [{"peak_over_slenderness": known_ratio(response)} for response in self.responses]
         rows = [row | each for row, each in zip(self.rows(), known, strict=True)]
-        # No rule of thumb is better than to three digits.
+        # Rules of thumb are accurate to three digits at most.
         cells = [[float(f"{x:.3g}") if isinstance(x := row[name], float) else x for name in shown] for row in rows]
         table = text_table(list(shown.values()), cells)
         return "\n".join(
@@ -198,7 +206,7 @@ class Check(BlockUnderRecords):
         return f"{super()._headline()}; by {', '.join(self.ratios[0]) or 'no rule'}"
 
     def _disagreements(self, rules: list[str]) -> list[str]:
-        """Say how often each rule is wrong; records under which no single number can be right are not counted."""
+        """Count the errors of each rule, without records for which no single number can be right."""
         lines, less = [], self.falls_under_less
         kept = [
             (ratios, response.overturned)
@@ -221,12 +229,12 @@ class Check(BlockUnderRecords):
 
 
 def title_of(rule: str) -> str:
-    """Name a rule of thumb as people do."""
+    """Return the usual name of a rule of thumb."""
     return "ASCE 43-05" if rule == "asce_43_05" else rule.capitalize()
 
 
 def _short(factor: float) -> str:
-    """Write a factor below 1, with more digits near 1."""
+    """Format a factor below 1, with more digits near 1."""
     return f"{factor:.2f}" if factor < 0.985 else f"{factor:.4f}"
 
 
@@ -244,11 +252,12 @@ def survey(
     Parameters
     ----------
     block, motions : optional
-        As for `simulate_many`: one block, m motions; the table shows the names of a mapping, or else the motions' own.
+        As for `simulate_many`: one block, m motions. The table shows the keys of a mapping, or otherwise the names of
+        the motions.
     friction : float, optional
-        Coefficient of friction at which to look for sliding.
+        Coefficient of friction for the detection of sliding.
     precision : float
-        Relative precision of the motions, from 1e-6 to 0.1: outcomes are also counted within it.
+        Relative precision of the motions, from 1e-6 to 0.1. Outcomes are also counted within this precision.
     progress : bool, optional
         As for `simulate_many`.
     **options : object
@@ -257,14 +266,19 @@ def survey(
     Returns
     -------
     Survey
-        All responses, in a table with a row for each.
+        All responses, with a table row for each.
 
     Raises
     ------
     InvalidOption
         As for `rocking.simulate`, or if there is no motion.
     InvalidMotion
-        If a motion is anything else.
+        If an element of `motions` is not a motion.
+
+    See Also
+    --------
+    rocking.simulate_many : Simulate many blocks under many motions.
+    rocking.rules.check : Compare rules of thumb with simulations.
 
     Examples
     --------
@@ -283,16 +297,16 @@ def survey(
     with Progress("simulating", total=len(named_motions), show=progress) as bar:
         for motion in named_motions.values():
             responses.append(simulate(block, motion, **options))
-            _row(responses[-1], precision)  # what takes long in it, the response keeps: while the bar is there
+            _row(responses[-1], precision)  # the response caches the expensive results while the progress bar is shown
             bar.advance()
     return Survey(block, tuple(named_motions), tuple(responses), friction, precision)
 
 
 def folder_names(records: Sequence[str]) -> list[str]:
-    """Return a name for a folder of each record, no two alike."""
+    """Return a unique folder name for each record."""
     names: dict[str, None] = {}
     for record in records:
-        # A pulse is named by its text, with a colon, which not every system has in a name.
+        # Names of pulses contain a colon, which some file systems do not allow.
         stem = Path(record).stem.replace(":", "-") if record != "-" else "standard-input"
         others = (f"{stem}-{k}" for k in range(2, len(records) + 2))
         names[stem if stem not in names else next(name for name in others if name not in names)] = None
@@ -300,7 +314,7 @@ def folder_names(records: Sequence[str]) -> list[str]:
 
 
 def record_columns(records: Sequence[str], motions: Sequence[Motion]) -> list[dict[str, str]]:
-    """Name each record as it was asked for, and its motion as other analyses name it."""
+    """Return the name of each record as requested, and of its motion as in other analyses."""
     names, verticals = names_of(motions), verticals_of(motions)
     return [
         {"record": record, "motion": names[k], **{name: column[1][k] for name, column in verticals.items()}}

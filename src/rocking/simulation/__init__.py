@@ -1,1 +1,1 @@
-"""One simulation, and many."""
+"""Single simulations and ensembles."""

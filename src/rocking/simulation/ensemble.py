@@ -1,4 +1,4 @@
-"""Blocks by motions: the full product of simulations with scales and polarities, compiled, on every core."""
+"""Compiled, parallel simulation of all combinations of blocks, motions, scales and polarities."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ Polarity = Literal["+", "-", "both"]
 
 SIGNS: Final[Mapping[str, tuple[int, ...]]] = {"+": (1,), "-": (-1,), "both": (1, -1)}
 
-#: Outcomes that are kept of a simulation, from the fields of the engine's: units, and what each one means.
+#: Units and meanings of outcomes by their names in the engine's result.
 VARIABLES: Final[Mapping[str, tuple[str, str]]] = {
     "overturned": ("1", "whether the rotation reached pi/2"),
     "peak_rotation": ("rad", "largest rotation in size"),
@@ -58,7 +58,7 @@ VARIABLES: Final[Mapping[str, tuple[str, str]]] = {
     ),
 }
 
-#: Times that are kept besides where they are asked for, likewise.
+#: Optional times, likewise.
 TIMES: Final[Mapping[str, tuple[str, str]]] = {
     "first_uplift": ("s", "time of the first uplift; 0 without one"),
     "first_rest": ("s", "time at which the block first came to rest; 0 if it never did"),
@@ -69,14 +69,19 @@ _SHARE: Final = "share of the simulation and its repeats within 3e-6 of the moti
 
 @dataclass(frozen=True, eq=False)
 class Scales:
-    """Levels of a measure that motions are scaled to; without a measure, motions as they are.
+    """Levels of a measure to which motions are scaled. Without a measure, motions are not scaled.
 
     Attributes
     ----------
     measure : Measure or None
-        What `values` are: factors, peak accelerations (m/s^2), peak velocities (m/s), spectral accelerations (m/s^2).
+        Measure of `values`: factor, peak acceleration (m/s^2), peak velocity (m/s) or spectral acceleration (m/s^2).
     values : ndarray
         Levels of the measure.
+
+    See Also
+    --------
+    rocking.Measure : Measure of a ground motion.
+    rocking.Product : Combination of bodies, motions, scales and polarities.
     """
 
     measure: Measure | None = None
@@ -84,7 +89,7 @@ class Scales:
 
     @classmethod
     def of(cls, levels: ArrayLike | None, measure: MeasureName | Measure) -> Scales:
-        """Create scales from levels of a measure, as `simulate_many` accepts them, or motions as they are."""
+        """Create scales from `levels` and `measure` as in `simulate_many`, or for unscaled motions."""
         known = Measure.of(measure, among=SCALES)
         if levels is None:
             if known.name != "factor":
@@ -99,23 +104,23 @@ class Scales:
 
     @property
     def about(self) -> dict[str, Any]:
-        """Name of the measure, its units, and its period (s) and damping where it has them."""
+        """Name of the measure, units, and, for spectral accelerations, period (s) and damping."""
         measure = self.measure or FACTOR
         return {"measure": measure.name, "units": measure.units, **measure.options()}
 
     def factors(self, motion: Motion) -> Floats:
-        """Return the factors that bring a motion to the levels, one for each."""
+        """Return the factor that scales a motion to each level."""
         with np.errstate(over="ignore"):
             factors = self.values / (self.measure or FACTOR).positive(motion, motion.name)
             largest = factors.max() * np.abs(motion.coefficients).max()
         if not largest <= STRONGEST:
-            motion.scaled(float(factors.max()))  # refused where it is too strong, and not only steep
+            motion.scaled(float(factors.max()))  # raises for too strong motions, not only steep ones
         return factors
 
 
 @dataclass(frozen=True, eq=False)
 class Product:
-    """Every body under every motion at every scale and polarity.
+    """Combinations of all bodies, motions, scales and polarities.
 
     Attributes
     ----------
@@ -124,16 +129,21 @@ class Product:
     motions : tuple of Motion
         m motions.
     scales : Scales
-        What the motions are scaled to.
+        Scales of the motions.
     polarity : {"+", "-", "both"}
-        Motions as they are, reversed, or both.
+        Original motions, reversed motions, or both.
     model, treatment, duration
         As for `rocking.simulate`.
 
     Raises
     ------
     InvalidOption, InvalidMotion
-        If a rule is out of its range, or a motion of bodies on a line has a vertical component.
+        If an option is out of range, or bodies on a line have vertical motion.
+
+    See Also
+    --------
+    rocking.Scales : Levels of the motions.
+    rocking.simulate_many : Simulate all combinations.
     """
 
     bodies: Bodies
@@ -146,13 +156,13 @@ class Product:
 
     def __post_init__(self) -> None:
         checks.one_of(self.polarity, "polarity", InvalidOption, list(SIGNS))
-        settings_of(self.bodies, self.model, self.treatment, self.duration, record=False)  # checked before any work
+        settings_of(self.bodies, self.model, self.treatment, self.duration, record=False)  # raises before the work
         for motion in self.motions:
             check_components(self.bodies, motion)
 
     @property
     def signs(self) -> tuple[int, ...]:
-        """Factors of the polarities."""
+        """Signs of the polarities."""
         return SIGNS[self.polarity]
 
     @property
@@ -162,12 +172,12 @@ class Product:
 
     @property
     def blocks(self) -> Blocks:
-        """The bodies, for what only blocks can answer.
+        """Bodies as blocks, for results that are defined for blocks only.
 
         Raises
         ------
         InvalidOption
-            If they are of another kind.
+            If the bodies are not blocks.
         """
         if not isinstance(self.bodies, Blocks) or self.bodies.terms:
             raise InvalidOption(f"this is known of blocks alone, not of {self.bodies.kind}")
@@ -184,19 +194,19 @@ def product_of(
     chattering: str | Treatment,
     duration: float | None,
 ) -> Product:
-    """Product from the arguments of `simulate_many`."""
+    """Create a product from the arguments of `simulate_many`."""
     bodies, shaking = bodies_of(blocks), tuple(several_motions(motions))
     return Product(bodies, shaking, Scales.of(levels, measure), polarity, model, treatment(chattering), duration)
 
 
 def setup_of(product: Product, bodies: slice | None = None) -> Setup:
-    """Return how to simulate the bodies of a product, or some of them."""
+    """Return the setup for all or some bodies of a product."""
     chosen = product.bodies if bodies is None else product.bodies.select(bodies)
     return Setup(chosen, product.model, product.treatment, product.duration)
 
 
 def _tasks(product: Product, near: float) -> Iterator[Task]:
-    """Cut a product into tasks for the engine; their keys are (motion, scale, polarity)."""
+    """Divide a product into tasks for the engine with keys (motion, scale, polarity)."""
     for m, motion in enumerate(product.motions):
         for s, factor in enumerate(product.scales.factors(motion).tolist()):
             for k, sign in enumerate(product.signs):
@@ -205,7 +215,7 @@ def _tasks(product: Product, near: float) -> Iterator[Task]:
 
 
 def dataset_of(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
-    """Label arrays of the product's shape, by the names of `VARIABLES`; drop dimensions that nobody asked for."""
+    """Create a dataset from arrays named as in `VARIABLES`, without the dimensions that were not requested."""
     import xarray as xr
 
     dimensions = ("motion", "scale", "polarity", "block")
@@ -239,13 +249,13 @@ def dataset_of(product: Product, outcomes: Mapping[str, Any]) -> xr.Dataset:
 
 
 def verticals_of(motions: Sequence[Motion]) -> dict[str, Any]:
-    """Names of the vertical components, as a coordinate of the dimension ``motion``; none where no motion has one."""
+    """Return the vertical components as a coordinate of ``motion``, if there are any."""
     names = ["" if motion.vertical is None else motion.vertical.name for motion in motions]
     return {"vertical": ("motion", names)} if any(motion.vertical for motion in motions) else {}
 
 
 def body_coordinates(bodies: Bodies) -> dict[str, Any]:
-    """Parameters of bodies as coordinates of the dimension ``block``, with units; where sides differ one for each."""
+    """Return parameters with units as coordinates of ``block``, one for each side if the sides differ."""
     columns = bodies.parameters()
     if all(np.array_equal(values[:, 0], values[:, 1], equal_nan=True) for values, _ in columns.values()):
         return {name: ("block", values[:, 0], {"units": units}) for name, (values, units) in columns.items()}
@@ -271,50 +281,56 @@ def simulate_many(
     threads: int | None = None,
     progress: bool | None = None,
 ) -> xr.Dataset:
-    """Simulate every block under every motion, and keep the outcome of each simulation.
+    """Simulate every block under every motion.
 
     Parameters
     ----------
     blocks : Blocks, Block, RestrainedBlock or sequence of one kind
-        n blocks, or bodies of another kind (`rocking.block.body.Bodies`).
+        n blocks, or other bodies (`rocking.block.body.Bodies`).
     motions : Motion, sequence of Motion, or mapping of str to Motion
-        m motions; a mapping gives them its names.
+        m motions. The keys of a mapping are the names of its motions.
     model, chattering : str or Treatment
         As for `simulate`.
     levels : array_like, optional
-        Simulate every motion scaled to each of these levels of `measure`. Adds the dimension ``scale``.
+        Levels of `measure` to which every motion is scaled. Adds the dimension ``scale``.
     measure : {"factor", "pga", "pgv"} or Measure
-        What levels are: factors on the motions, peak accelerations (m/s^2), peak velocities (m/s), or spectral
-        accelerations (m/s^2) as ``rocking.Measure("sa", period=1.0)``.
+        Measure of `levels`: factors on the motions, peak accelerations (m/s^2), peak velocities (m/s), or spectral
+        accelerations (m/s^2), for example ``rocking.Measure("sa", period=1.0)``.
     polarity : {"+", "-", "both"}
-        Motions as they are, reversed, or both (adds the dimension ``polarity``).
+        Original motions, reversed motions, or both, which adds the dimension ``polarity``.
     duration : float, optional
         As for `simulate`.
     times : bool
-        Whether to keep the times of the first uplift and of the first and the last rest.
+        Whether to include the times of the first uplift and of the first and the last rest.
     robust : bool
-        Whether to repeat every simulation with the motion scaled by 1 +- 1e-6 and 1 +- 3e-6, as
-        `Response.perturbed` does, which takes five times as long.
+        Whether to repeat every simulation with the motion scaled by 1 +- 1e-6 and 1 +- 3e-6 (`Response.perturbed`), in
+        five times the computing time.
     threads, progress : int or bool, optional
-        Number of threads, by default one for every core; whether to draw a progress bar, by default if stderr is a
-        terminal and the work takes long.
+        Number of threads (default: one per core), and whether to draw a progress bar (default: if stderr is a terminal
+        and the computation is long).
 
     Returns
     -------
     xarray.Dataset
-        Dimensions (motion, scale, polarity, block), those that apply. Variables: overturned, peak_rotation (rad),
-        peak_time (s), impacts (resolved ones: those of a sequence after its proof are not among them), uplifts, rests,
-        time_at_rest (s), complete_chattering (whether the block came to rest after its first uplift before the motion
-        passed a threshold again), stalled (rests that were not proven), unfinished, stopped (by `duration`, so that
-        overturned is open). With `times` also first_uplift, first_rest and last_rest (s; 0 for what never happened).
-        With `robust` also overturned_share, the share of the five simulations that overturn: the outcome is undecided
-        unless it is 0 or 1. Coordinates name the motions and hold the blocks' parameters.
+        Dimensions (motion, scale, polarity, block), as far as they apply. Variables: overturned, peak_rotation (rad),
+        peak_time (s), impacts (without those after a certificate), uplifts, rests, time_at_rest (s),
+        complete_chattering (whether the block came to rest after its first uplift before the motion passed a threshold
+        again), stalled (rests without a certificate), unfinished, and stopped (by `duration`, which leaves overturned
+        undetermined). `times` adds first_uplift, first_rest and last_rest (s, or 0 without such an event). `robust`
+        adds overturned_share, the share of the five simulations that overturn. Shares other than 0 and 1 are undecided.
+        Coordinates contain the names of the motions and the parameters of the blocks.
+
+    See Also
+    --------
+    rocking.simulate : Simulate one block under one motion.
+    rocking.Blocks : Several blocks, for example a grid.
+    rocking.fragility : Fit fragility curves to such simulations.
 
     Notes
     -----
-    The same engine as `simulate`: every impact is located and chattering is proven. Under evenly sampled records the
-    blocks that rock step together through each sample, and only those with an event in it are marched one by one. What
-    becomes of a block depends on the block and the motion alone, bit for bit, whatever is simulated beside it.
+    The engine is the same as for `simulate`: every impact is located and chattering is proven. Under evenly sampled
+    records, rocking blocks advance together through samples without events. Each result depends, bit for bit, only on
+    its own block and motion.
 
     Examples
     --------
@@ -344,7 +360,7 @@ def outcomes_of(
     names: Iterable[str] = tuple(VARIABLES),
     near: float = 1.0,
 ) -> dict[str, NDArray[np.generic]]:
-    """Simulate a whole product, its motions times a factor near 1, and return arrays by names of `OUTCOME`."""
+    """Simulate a product with motions scaled by a factor near 1, and return arrays by names of `OUTCOME`."""
     count = cores() if threads is None else checks.whole(threads, "threads", InvalidOption, least=1)
     results: dict[str, NDArray[np.generic]] = {name: np.empty(product.shape, dtype=OUTCOME[name]) for name in names}
     with Progress("simulating", math.prod(product.shape), show=progress) as bar:

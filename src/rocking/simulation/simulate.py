@@ -1,4 +1,4 @@
-"""The main job: simulate one body under one motion."""
+"""Simulation of one body under one ground motion."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _EVENT = np.dtype([("time", "f8"), ("kind", "U8"), ("side", "i1")])
 _IMPACT = np.dtype([("time", "f8"), ("side", "i1"), ("speed_before", "f8"), ("speed_after", "f8")])
 _CHATTERING = np.dtype([("start", "f8"), ("end", "f8"), ("lower", "f8"), ("upper", "f8"), ("impacts", "i8")])
 
-#: Kinds of events by their codes, see `rocking.kernels.state`.
+#: Event kinds by code (`rocking.kernels.state`).
 _KINDS = np.array(["uplift", "rest", "overturn"])
 
 #: Rows of the first table per piece of the motion.
@@ -43,40 +43,49 @@ def simulate(
     initial_rotation: float = 0.0,
     initial_velocity: float = 0.0,
 ) -> Response:
-    """Simulate a block under a ground motion, locating impacts and resolving chattering by proof.
+    """Simulate a block under a ground motion.
+
+    Every impact is located, and chattering is resolved by a certificate.
 
     Parameters
     ----------
     block : Block
-        What rocks, or another body (`rocking.block.body.Body`).
+        Block, or another body (`rocking.block.body.Body`).
     motion : Motion or None
-        Horizontal ground acceleration; None for free rocking.
+        Horizontal ground acceleration. None means free rocking.
     model : {"nonlinear", "linear"}
-        Equation of motion: of finite rotations, or linearised for slender blocks (paper, Eqs 2 and 3).
+        Equation of motion, for finite rotations or linearised for slender blocks (paper, Eqs 2 and 3).
     chattering : str or treatment
-        How sequences of impacts end: "certified" (default), "velocity", "bypass", "interval" or "time", or the object
-        with its parameter (`Certified`, `VelocityThreshold`, `GeometricBypass`, `IntervalThreshold`, `AsymptoticTime`).
+        Method for the end of a sequence of impacts: "certified" (default), "velocity", "bypass", "interval" or "time",
+        or an object with its parameter (`Certified`, `VelocityThreshold`, `GeometricBypass`, `IntervalThreshold`,
+        `AsymptoticTime`).
     duration : float, optional
-        Time to stop at, s. By default to the end of the motion, and on until rest or overturning, or until it is proven
-        that restraints hold the block leaning for ever. Where the duration ends the response while the block still
-        moves or the motion goes on, the response is `stopped`, and has no verdict.
+        End of the simulation, s. By default the simulation continues beyond the motion until rest, overturning, or
+        proof that restraints hold the block leaning for ever. A response cut during the motion of ground or block is
+        `stopped`, with undetermined outcome.
     initial_rotation, initial_velocity : float
-        Rotation at time 0, rad, positive to side +, and angular velocity, rad/s. Of another body its coordinate.
+        Initial rotation (rad, positive to side +) and angular velocity (rad/s), or coordinate and rate of another body.
 
     Returns
     -------
     Response
-        Events, impacts, chattering sequences, and the rotation at any time.
+        Events, impacts, chattering sequences, and rotation history.
 
     Raises
     ------
     InvalidBlock, InvalidMotion
-        If the block is no body, or the motion no `Motion` or one with a vertical component for a body on a line.
+        If `block` is not a body, `motion` is not a `Motion`, or a body on a line has vertical motion.
+
+    See Also
+    --------
+    rocking.simulate_many : Simulate many blocks under many motions.
+    rocking.Motion : Ground motion.
+    rocking.Response : Result of a simulation.
 
     Notes
     -----
-    The block sticks to the ground. Whether it would slide at a coefficient of friction, and when, is asked of the
-    response: `Response.sliding_time`, ``summary(friction)``.
+    The block does not slide. `Response.sliding_time` and ``summary(friction)`` report sliding for a given coefficient
+    of friction.
 
     Examples
     --------
@@ -99,10 +108,10 @@ def response_to(
     name: str | None = None,
     factor: float = 1.0,
 ) -> Response:
-    """Compute a response as `simulate` does, with another ``name`` for the initial coordinate in messages."""
+    """Compute a response like `simulate`, with `name` for the initial coordinate in messages."""
     how, alone, motion = treatment(chattering), one_body(block).alone(), one_motion(motion)
     setup, ground = Setup(alone, model, how, duration, initial), None
-    if factor != 1.0:  # repeated simulations leave the cache as it is
+    if factor != 1.0:  # repeated simulations leave the cache unchanged
         ground = ground_of.__wrapped__(motion, block.gravity, factor)
     run = setup.run(motion, factor, record=True, ground=ground, name=name)
     if factor != 1.0:
@@ -149,7 +158,7 @@ def _scaled(initial: tuple[float, float], factor: float, records: state.Records,
 
 
 def marched(trail: Trail, start: state.Record) -> tuple[int, state.Records]:
-    """How a march ends, in slices so that an interrupt is seen; and its table, which grows as it is filled."""
+    """Integrate in interruptible slices, and return the end and the growing table."""
     ground, block, settings, _ = trail
     table = state.new_table(128 + int(_FIRST_ROWS * len(ground.pieces)))
     scratch = state.new_scratch()
