@@ -29,10 +29,6 @@ records = ["el-centro-meloland-270", "el-centro-meloland-360"]
 
 [scales]
 pga = "2:9:6"
-
-[report.fragility]
-measure = "pga"
-blocks = "together"
 """
 _TESTS: Final = "motion,overturned,scale\n" + "".join(
     f"el-centro-meloland-270,{int(scale > 1.0)},{scale}\n" for scale in (0.3, 0.6, 0.9, 1.2, 1.5)
