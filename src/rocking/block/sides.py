@@ -17,7 +17,7 @@ Number = TypeVar("Number", float, Floats)
 
 # Smallest and largest values, both included. They are far beyond any block, and far enough from the limits of double
 # precision for fourth powers of p, for the ratio of the largest acceleration of a motion to gravity and slenderness,
-# and for products of all these. With the smallest restitution one impact ends rocking, to double precision.
+# and for products of all these. Below the smallest restitution, one impact ends rocking, to double precision.
 _GRAVITY: Final = (1e-6, 1e6)
 _LENGTH: Final = (1e-20, 1e20)
 _MASS: Final = (1e-30, 1e30)
@@ -42,7 +42,7 @@ def checked_parameter(value: float, name: str, *, origin: str = "", which: str =
 
 
 def checked_sides(values: Floats, name: str) -> Floats:
-    """Return p, alpha or restitution of blocks, shape (n, 2), or raise InvalidBlock for the first value out of range."""
+    """Return p, alpha or restitution of blocks, shape (n, 2), or raise InvalidBlock for the first one out of range."""
     low, high, _ = _LIMITS[name]
     bad = np.argwhere(~((values >= low) & (values <= high)))
     if len(bad):
@@ -278,7 +278,7 @@ def sides_on_pivots(
     gravity: float,
     restitution: object,
 ) -> tuple[Side, Side]:
-    """Return the sides of a body, from the distances of its pivots, the height of its centre of mass, m, and k^2, m^2."""
+    """Return the sides of a body, from its pivot distances, the height of its centre of mass, m, and k^2, m^2."""
     plus, minus = distances
     radii = math.hypot(plus, height), math.hypot(minus, height)
     inertias = [gyration_squared + radius * radius for radius in radii]
