@@ -58,16 +58,15 @@ class Blocks:
     Attributes
     ----------
     terms : dict of str to ndarray
-        Terms of blocks with restraints, a lean or a single side; empty for free blocks. For a block that rocks to side
-        + only, `one_sided` is 1, and both columns of all parameters contain the values of side +.
+        Terms of blocks with restraints, a lean or a single side; empty for free blocks. For a one-sided block
+        `one_sided` is 1, and both columns of all parameters contain the values of side +.
     axes : dict of str to ndarray, or None
         Axes of a grid: p (rad/s), alpha (rad) and restitution if it was an argument. The last one varies fastest.
 
     Raises
     ------
     InvalidBlock
-        If a value is out of its range, or if p and alpha determine no restitution. The message contains the index of
-        the block.
+        If a value is out of range, or p and alpha determine no restitution. The message names the block.
 
     See Also
     --------
@@ -171,8 +170,8 @@ class Blocks:
     def of(cls, blocks: Blocks | Block | RestrainedBlock | Iterable[Block | RestrainedBlock]) -> Blocks:
         """Gather single blocks with the same gravity. `Blocks` are returned unchanged.
 
-        The arrays determine the motion, but they do not contain sizes. A block that is extracted again therefore has
-        the sizes and ground forces of a rectangle, as from `Block.from_parameters`.
+        The arrays determine the motion, but do not contain sizes. Therefore an extracted block has the sizes and
+        ground forces of a rectangle, as from `Block.from_parameters`.
 
         Parameters
         ----------
@@ -335,9 +334,8 @@ class Blocks:
     def resized(self, factors: Floats) -> Blocks:
         """Return blocks of the same shapes with p multiplied by these factors.
 
-        Lengths are divided by the square of the factor, and the forces of restraints keep their ratio to the weight.
-        For a tendon this applies to the prestress, the strength and the product of stiffness and length, so its strain
-        at yield is also the same.
+        Lengths are divided by the square of the factor. Forces of restraints keep their ratio to the weight: for a
+        tendon prestress, strength, and stiffness times length, so its yield strain is unchanged.
         """
         by = factors[:, None]
         terms = {name: values * by ** _POWERS.get(name, 0) for name, values in self.terms.items()}

@@ -1,8 +1,8 @@
 """Protocols of bodies with one coordinate, single or many of one kind, for example blocks.
 
-The equation of motion between impacts is given in `kernels.state.BLOCK`: u'' = lambda u - gain (threshold + side a/g),
-with any stiffness lambda, with or without damping, with one or two sides, or between two stops. Everything above the
-kernels accesses bodies through these protocols only.
+Between impacts (see `kernels.state.BLOCK`), u'' = lambda u - gain (threshold + side a/g), with any stiffness lambda,
+with or without damping, with one or two sides, or between two stops. Everything above the kernels uses only these
+protocols.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ class RestrainedBlock(Rocking):
     Parameters
     ----------
     block : Block
-        The block without restraints. If there are restraints, its `mass` is required.
+        Free block. Restraints require its `mass`.
     *restraints : Restraint
         `Tendon`, `Spring`, `Damper`, `Thrust`, `Load`.
     one_sided : bool
@@ -43,9 +43,9 @@ class RestrainedBlock(Rocking):
     lean : float
         Angle by which the block stands out of plumb to side +, rad.
     restitution : float, pair or Restitution, optional
-        Factor on the angular speed at an impact, or a `Restitution`, the law by which the factor varies. With such a
-        law the `sides` contain its largest value. The default is the restitution of the block. With a load that
-        follows, it conserves angular momentum. For a one-sided block it is `one_sided_restitution`.
+        Factor on the angular speed at an impact, or a law, whose largest value the `sides` then contain. The default
+        is the restitution of the block, for one-sided blocks `one_sided_restitution`. With a load that follows, it
+        conserves angular momentum.
 
     Raises
     ------
@@ -170,9 +170,9 @@ class RestrainedBlock(Rocking):
     def contact(self) -> ContactLaw | None:
         """Ratio of the ground forces to the weight, including loads that follow (see `rocking.block.body`).
 
-        The support behind a one-sided block pushes it to side +, without friction, only as far as the block at rest
-        needs it. Therefore the remaining force on the ground is smallest. None if the forces are not available,
-        because the block was taken from the arrays of `Blocks`.
+        The support behind a one-sided block at rest pushes it to side + without friction, as little as required.
+        Therefore the remaining ground force is smallest. None for a block from the arrays of `Blocks`, whose forces
+        are unknown.
         """
         return None if self.restraints is None else self._contact_forces
 

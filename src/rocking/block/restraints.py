@@ -66,8 +66,8 @@ class Pivot(NamedTuple):
     def arms(self, height: float, offset: float) -> tuple[float, float]:
         """Return the distance from the pivot inwards and the height above it, m, of a point of the standing block.
 
-        The point is specified by a height above the base and an offset to side + from the centre of mass of the block
-        without loads, both along the axes of the block.
+        The height is above the base, the offset from the centre of mass without loads to side +, both along the axes
+        of the block.
         """
         inwards = self.distance - self.sign * offset
         c, s = math.cos(self.lean), math.sin(self.lean)
@@ -120,7 +120,7 @@ class Tendon(Restraint):
         Distance of the duct from the centre of mass of the block without loads, m, positive to side +. A tendon at a
         pivot has no effect while the block rocks about this pivot.
     strength : float
-        Yield force, N. Yielding lengthens the tendon permanently, and it is slack after the block has returned.
+        Yield force, N. Yielding lengthens the tendon permanently, so it is slack after the block has returned.
 
     Raises
     ------
@@ -344,8 +344,7 @@ class Load(Restraint):
     offset : float
         Distance of this point from the centre of mass of the block without loads, m, positive to side +.
     follows : bool
-        Whether the load moves with the block. Otherwise it presses with its weight regardless of the ground motion,
-        and its own inertia is neglected.
+        Whether the load moves with the block. Otherwise it presses with its static weight, without inertia.
 
     Raises
     ------
@@ -404,10 +403,9 @@ class Restitution:
     slope : float or pair
         Decrease per angular speed before the impact, s/rad, at least 0.
     seed : int, optional
-        Whole number from 0 to 2^53. The factor depends only on the seed and the number of the impact. Therefore a body
-        draws the same factors under any ground motion, whether it is simulated alone or with others. Use a different
-        seed for each body. After a rest the count continues from the resolved impacts, which a finer treatment has
-        more of.
+        Whole number from 0 to 2^53, different for each body. The factor depends only on the seed and the number of the
+        impact. Therefore it is the same under any ground motion, for a body alone or among others. After a rest the
+        count continues from the resolved impacts, of which a finer treatment has more.
 
     Raises
     ------

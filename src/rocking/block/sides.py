@@ -86,8 +86,8 @@ def housner_restitution(alpha: float) -> float:
 def one_sided_restitution(alpha: float) -> float:
     """Compute the restitution of a wall that rocks against transverse walls, from angular momentum at three impacts.
 
-    The inner edge of the wall hits the ground, then the top hits the transverse walls, then the inner edge hits the
-    ground again (Sorrentino, AlShawa and Decanini 2011). A measured value is preferable.
+    The wall hits the ground with its inner edge, the transverse walls with its top, and the ground again (Sorrentino,
+    AlShawa and Decanini 2011). A measured value is preferable.
 
     Parameters
     ----------
@@ -130,13 +130,13 @@ def impact_restitution(
     Parameters
     ----------
     alpha : float, optional
-        Slenderness of a rectangular block, rad. For other bodies use the three sizes below instead.
+        Slenderness of a rectangular block, rad, instead of the three sizes below.
     contact : float
-        Position of the impulse of the impact, as a fraction of the distance from the point below the centre of mass to
-        the new pivot: 1 at the pivot (Housner), less for a contact that is narrower or distributed over a region.
+        Position of the impulse between the point below the centre of mass (0) and the new pivot (1, Housner). A
+        narrower or distributed contact has a smaller value.
     points : int
-        Number of points at which the base meets the ground, one after the other, evenly spaced from the old to the new
-        pivot. With 2, these are only the pivots.
+        Number of evenly spaced points, from the old to the new pivot, at which the base meets the ground in turn; 2
+        for the pivots only.
     distances : pair of float, optional
         Horizontal distances from the centre of mass to the pivots (side +, side -), m.
     height, radius_of_gyration : float, optional
@@ -150,9 +150,8 @@ def impact_restitution(
     Raises
     ------
     InvalidBlock
-        If a number is out of its range, if both the slenderness and the sizes or neither are given, if both `contact`
-        and `points` are given, if the body would not continue to rock, or if `contact` is so narrow that an uneven
-        body would gain energy.
+        If a value is out of range, both or neither of slenderness and sizes are given, both `contact` and `points` are
+        given, the body would not continue to rock, or `contact` is so narrow that an uneven body would gain energy.
 
     See Also
     --------
@@ -312,14 +311,11 @@ _ROUNDING: Final = 1e-12
 def rigid_bodies(p: Floats, alpha: Floats) -> tuple[Floats, Floats]:
     """Compute the rigid bodies whose sides have these parameters, arrays of shape (n, 2).
 
-    Returns the restitution on leaving each side by angular momentum, NaN if there is no such body, and the ratio of
-    the height of the centre of mass above the pivots to gravity, s^2, shape (n,). The latter is NaN if the sides are
-    equal, as for a rectangle.
+    Returns the restitutions by angular momentum, NaN without such a body, and the height of the centre of mass divided
+    by gravity, s^2, shape (n,), NaN for equal sides, as of a rectangle.
 
-    With depth h and radius of gyration k, R_i = h/cos(alpha_i) and g R_i/p_i^2 = k^2 + R_i^2. The difference between
-    the sides yields h, and angular momentum yields e_i = 1 - (h p_j^2/g) sin(alpha_j) (tan(alpha_+) + tan(alpha_-)), j
-    the other side. A body with positive h and k exists if |ln(p_+/p_-)| < |ln(cos(alpha_+)/cos(alpha_-))|/2 (derived
-    in the documentation).
+    With depth h, e_i = 1 - (h p_j^2/g) sin(alpha_j) (tan(alpha_+) + tan(alpha_-)), j the other side. A body with
+    positive h and k exists if |ln(p_+/p_-)| < |ln(cos(alpha_+)/cos(alpha_-))|/2 (derived in the documentation).
     """
     cosine, tangent = np.cos(alpha), np.tan(alpha)
     quotient = 1.0 / (cosine * p**2)  # (k^2 + R^2)/(g h)
@@ -351,10 +347,9 @@ def no_body(p: Floats, alpha: Floats) -> str:
 
 
 def eccentric_rectangles(alpha: Floats) -> tuple[Floats, Floats]:
-    """Compute rectangles with an offset centre of mass and these slendernesses of their sides, shape (n, 2).
+    """Compute rectangles with an offset centre of mass and these slendernesses, shape (n, 2).
 
-    Returns the ratio of p of each side to p of the rectangle with a central centre of mass, and the factor on leaving
-    each side, by angular momentum.
+    Returns p of each side divided by p of the symmetric rectangle, and the restitutions by angular momentum.
     """
     distances = np.tan(alpha)  # divided by the height of the centre of mass
     half_width, offset = 0.5 * distances.sum(axis=1), 0.5 * (distances[:, 1] - distances[:, 0])

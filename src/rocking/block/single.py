@@ -70,12 +70,11 @@ class Block(Rocking):
     Parameters
     ----------
     half_width, half_height : float
-        Half the width b and half the height h of a rectangular block, m. Sizes are keyword arguments.
+        Half width b and half height h of a rectangular block, m.
     width, height : float
-        Full sizes instead of half sizes, m.
+        Full sizes instead, m.
     offset : float
-        Horizontal distance of the centre of mass from the middle of the width, m, positive to side +; at most a
-        quarter of the width.
+        Horizontal distance of the centre of mass from the middle, m, positive to side +, up to a quarter of the width.
     restitution : float or pair, optional
         Factor on the angular speed at an impact, in (0, 1]. A pair is (on leaving side +, on leaving side -). The
         default conserves angular momentum about the new pivot: 1 - 1.5 sin(alpha)^2 (Housner) without an offset.
@@ -87,8 +86,8 @@ class Block(Rocking):
     Raises
     ------
     InvalidBlock
-        If the sizes are not two half or two full sizes, a size is not positive and finite, the offset exceeds a
-        quarter of the width, or the restitution (or its default) is outside (0, 1].
+        If the sizes are not two positive, finite half or full sizes, or the offset or the restitution (or its default)
+        is out of range.
 
     See Also
     --------
@@ -100,9 +99,9 @@ class Block(Rocking):
     alpha = atan(b/h), R = hypot(b, h), p = sqrt(3 g/(4 R)) (paper, section 2; Housner 1963).
 
     With an offset s the block is the body of `from_pivots` with distances (b - s, b + s), height h and radius of
-    gyration k = sqrt((b^2 + h^2)/3 - s^2). Its moment of inertia about the middle of the rectangle is unchanged, as
-    for two halves of different density or a density that is linear along the width. At a quarter of the width all mass
-    lies in one half. For other mass distributions use `from_pivots`.
+    gyration k = sqrt((b^2 + h^2)/3 - s^2). Its moment of inertia about the middle is unchanged, as for halves of
+    different density or a density linear along the width. At a quarter of the width all mass lies in one half. For
+    other distributions use `from_pivots`.
 
     Examples
     --------
@@ -199,13 +198,13 @@ class Block(Rocking):
         Returns
         -------
         Block
-            Block with the radii of that body. If its restitution differs, the radii are those of a rectangular block
-            with the same p, R = 3 g/(4 p^2).
+            Block with the radii of that body or, if its restitution differs, of a rectangle with the same p, R = 3
+            g/(4 p^2).
 
         Raises
         ------
         InvalidBlock
-            If a parameter is out of its range, or if no rigid body has these sides and the restitution is omitted.
+            If a parameter is out of range, or no rigid body with these sides determines a default restitution.
 
         See Also
         --------
@@ -213,9 +212,8 @@ class Block(Rocking):
 
         Notes
         -----
-        The depth h and the radius of gyration k of the body follow from R_i = h/cos(alpha_i), g R_i/p_i^2 = k^2 +
-        R_i^2. Because they depend on differences between the sides, p and alpha need many digits. (Derived in the
-        documentation.)
+        Depth h and radius of gyration k of the body follow from R_i = h/cos(alpha_i), g R_i/p_i^2 = k^2 + R_i^2.
+        Because the sides are subtracted, p and alpha need many digits. (Derived in the documentation.)
 
         Examples
         --------
@@ -270,14 +268,14 @@ class Block(Rocking):
             Factor on the angular speed on leaving a side. The default conserves angular momentum about the new pivot:
             e_i = (I + m (h^2 - d+ d-))/(I + m R_j^2), j the other side.
         mass, gravity : float, optional
-            Mass, kg, and acceleration of gravity, m/s^2, as of `Block`.
+            As of `Block`.
         description : str, optional
-            Description of the body; by default a description of its pivots.
+            Description of the body; by default of its pivots.
 
         Returns
         -------
         Block
-            Block with two sides, which are equal if the distances are equal.
+            Block with equal sides if the distances are equal.
 
         Raises
         ------
@@ -324,12 +322,11 @@ class Block(Rocking):
         Parameters
         ----------
         half_width, half_height : float
-            Half the width and half the height of one column, m.
+            Half width and half height of a column, m.
         mass_ratio : float
-            gamma: ratio of the mass of the beam to the mass of all columns. Zero means a single column.
+            Ratio gamma of the mass of the beam to the mass of all columns; 0 for a single column.
         restitution : float or pair, optional
-            Restitution. The default conserves angular momentum: (1 - 1.5 sin(alpha)^2 + 3 gamma cos(2 alpha))/(1 + 3
-            gamma).
+            Default from angular momentum: (1 - 1.5 sin(alpha)^2 + 3 gamma cos(2 alpha))/(1 + 3 gamma).
         gravity : float
             Acceleration of gravity, m/s^2.
 
@@ -462,8 +459,8 @@ class Block(Rocking):
         """Return the ratio of the ground forces to the weight, horizontal and vertical (see `rocking.block.body`).
 
         On side i, with psi = alpha - |theta|, the centre of mass is at x = -i R sin(psi), y = R cos(psi) from the
-        pivot, where R is the `arm` of the side if it has one. The forces are m (a + x'') and m (g + a_v + y''). At
-        rest the ratios are (a/g, 1 + a_v/g).
+        pivot, where R is the `arm` of the side if it has one. The forces are m (a + x'') and m (g + a_v + y''), at
+        rest m (a, g + a_v).
         """
         leaning, (rotation, velocity, acceleration) = np.maximum(side, 0), motion
         sides = [(each.alpha, each.radius if each.arm is None else each.arm) for each in self.sides]
@@ -481,7 +478,7 @@ class Block(Rocking):
 
 
 def one_block(block: object, needed: str = "a free Block") -> Block:
-    """Return the block, or raise `InvalidBlock` with a message that names the required object."""
+    """Return the block, or raise `InvalidBlock` that names the required object."""
     if not isinstance(block, Block):
         raise InvalidBlock(
             f"{needed} is needed, not a {type(block).__name__}: make one with Block(width=, height=), in m"

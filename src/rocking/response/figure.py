@@ -91,9 +91,8 @@ def histories(
 ) -> Figure:
     """Draw the rotation above the ground motion in a window.
 
-    Rotations beyond twice the slenderness (or balance) are outside the frame. The longest chattering sequence has a
-    separate panel with the interval to the next impact against the time to rest, both logarithmic. If `ax` is given,
-    only the rotation is drawn.
+    The frame ends at twice the slenderness (or balance). A separate panel shows the longest chattering sequence: the
+    interval to the next impact against the time to rest, both logarithmic. In `ax` only the rotation is drawn.
     """
     checks.one_of(units, "units", InvalidOption, get_args(RotationUnits))
     shown = shown_span(response, window)

@@ -45,12 +45,11 @@ class Gradient:
     Attributes
     ----------
     value : float
-        The result: a rotation (rad), an angular velocity (rad/s) or a time (s). For other bodies the units of the
-        coordinate apply.
+        The result: rotation (rad), angular velocity (rad/s) or time (s); for other bodies in units of the coordinate.
     coefficients : ndarray, shape (n, degree + 1)
         Derivatives by the coefficients of the n pieces of the motion: units of the value per m/s^2, per m/s^3, and so
-        on; for a peak rad per m/s^2, for a time s per m/s^2. They are exactly zero for all pieces that end before the
-        last uplift preceding the differentiated result, or begin after the result.
+        on; for a peak rad per m/s^2, for a time s per m/s^2. They are exactly zero for pieces before the last uplift
+        preceding the result, or after the result.
     vertical : ndarray or None
         Derivatives by the coefficients of the vertical component.
     initial_rotation, initial_velocity : float
@@ -112,8 +111,8 @@ def gradient(response: Response, of: Quantity = "peak", at: float | None = None)
         Differentiated quantity: the peak rotation (rad), the rotation (rad) or the angular velocity (rad/s) at a time,
         or the time (s) of an impact or an event (uplift, rest or overturning).
     at : float or int, optional
-        For a rotation or velocity, the time, s (at an impact, just after it). For an event or impact, the index in
-        `events` or `impacts` of the response; -1 is the last one. Not used for a peak.
+        Time, s, of a rotation or velocity (at an impact, just after it), or index of an event or impact in `events` or
+        `impacts` (-1 is the last). Not used for a peak.
 
     Returns
     -------
@@ -132,10 +131,10 @@ def gradient(response: Response, of: Quantity = "peak", at: float | None = None)
 
     Notes
     -----
-    The gradient is the adjoint of the forward computation in `Response.sensitivity`: a single pass for any number of
-    samples. The time of an uplift depends only on the motion near it, and not at all if the motion jumps past the
-    threshold. The time of a rest includes its impacts up to 0.01 ms before it, and the remainder to first order.
-    Values are NaN if the derivative does not exist, for the reason in `Gradient.reason`.
+    The gradient is the adjoint of `Response.sensitivity`, computed in one pass for any number of samples. The time of
+    an uplift depends only on the motion near it, and not at all if the motion jumps past the threshold. The time of a
+    rest includes impacts up to 0.01 ms before it, and the remainder to first order. Values are NaN without a
+    derivative, see `Gradient.reason`.
 
     Examples
     --------

@@ -163,8 +163,8 @@ def steps_to_impacts(nodes: Records) -> Integers:
 def with_all_impacts(trail: Trail, *, cut: bool) -> Trail:
     """Return the trail with the impacts between the last resolved one of each chattering sequence and its rest.
 
-    ``cut``: whether the response ends within a sequence after its proof. Resolution of a sequence ends at the proof,
-    while its impacts still exert forces. They are computed here as far as they contribute.
+    ``cut``: whether the response ends within a sequence after its proof. Later impacts still exert forces, and are
+    computed as far as they contribute.
     """
     nodes = trail.nodes
     # If the duration ends within a sequence after its proof, its last impact is not followed by a rest.

@@ -296,8 +296,8 @@ class Energy:
 def linear_balance(body: Block | RestrainedBlock) -> Floats:
     """Return the rotation of the unstable balance on each side in the linear model, rad; infinite if there is none.
 
-    A yielding tendon is assumed to yield for the first time. Its force is the smaller one of elastic force and
-    strength, so the balance is the nearer one of both cases.
+    A yielding tendon yields for the first time: with the smaller of elastic force and strength, so at the nearer
+    balance.
     """
     (made,) = body.alone().kernel_records("linear", np.zeros((1, 2)))
     elastic = _balance_on_a_line(made, made["added_weight"], made["added_push"], made["prestress"])

@@ -47,9 +47,8 @@ class Response(Simulated):
     unfinished : bool
         Whether the simulation was aborted after too many steps. All other results then end at this point.
     leans : bool
-        Whether restraints permanently hold the block in a leaning position, about `residual_rotation`. This is proven
-        at the end, `duration`. The block may still oscillate, but neither returns to zero rotation nor exceeds the
-        peak.
+        Whether restraints permanently hold the block leaning about `residual_rotation`, as proven at the end,
+        `duration`. It may still oscillate, but neither returns to zero rotation nor exceeds the peak.
     overturn_time : float
         Time at which the rotation first reached pi/2, s; NaN otherwise.
     peak_rotation, peak_time : float
@@ -62,8 +61,8 @@ class Response(Simulated):
         time (s), side entered, speed_before and speed_after (rad/s), in order of time. For a chattering sequence only
         the impacts that were resolved before its end was proven.
     chattering : structured array
-        One row for each sequence of impacts that ended at rest: start (time of the impact from which it was proven to
-        be complete), end (time of rest), lower and upper bound on the end, number of impacts resolved since the start.
+        One row for each sequence that ended at rest: start (time of the impact from which it was proven to be
+        complete), end (time of rest), lower and upper bound on the end, number of impacts resolved since the start.
         The bounds contain the exact time of rest for the given body, motion and initial state, including the effect of
         rounding before the proof. They are NaN if the rest is not proven. They are infinite if the rest is proven, but
         rounding may shift the response by as much as its distance from the balance or from grazing.
@@ -153,11 +152,9 @@ class Response(Simulated):
         Parameters
         ----------
         friction : float, optional
-            Coefficient of friction. If given, the summary includes whether the block would slide, and the time of the
-            first slip.
+            Coefficient of friction, for a check of sliding with the time of the first slip.
         precision : float
-            Relative precision of the ground motion, from 1e-6 to 0.1. The summary includes the frequency of the
-            outcome within this precision.
+            Relative precision of the ground motion, from 1e-6 to 0.1, for counting outcomes within it.
 
         Notes
         -----
@@ -273,10 +270,10 @@ class Response(Simulated):
         ax, title, figsize
             As of `Result.plot`.
         units : {"slenderness", "rad", "deg"}
-            Units of rotations. "slenderness" normalises by the slenderness of the side (for a restrained block by its
-            balance, if any).
+            Units; "slenderness" normalises by the slenderness of the side (or the balance of a restrained block, if
+            any).
         window : (start, end), optional
-            Time interval, s. By default it extends from shortly before the first event to shortly after the last.
+            Interval, s; by default from shortly before the first event to shortly after the last.
         longest_sequence : bool
             Whether to show the longest chattering sequence, impact by impact, in a separate panel.
         """
@@ -295,9 +292,8 @@ class Response(Simulated):
     ) -> Figure:
         """Draw the velocity against the rotation, with impacts as jumps and the energy of the balance; as `plot`.
 
-        Rotations are normalised by the slenderness of their side (for a restrained block by its balance), velocities
-        by p times the same value. If a side has no balance, rotations are in rad. Raises `InvalidOption` also as
-        `kinetic_energy`.
+        Rotations are normalised by the slenderness of their side (or the balance of a restrained block), velocities by
+        p times this value. Without a balance, rotations are in rad. Raises `InvalidOption` also as `kinetic_energy`.
         """
         return figure.phase_plane(self, window, title=title or figure.titled(self), ax=ax, figsize=figsize)
 

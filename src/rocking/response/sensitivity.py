@@ -119,15 +119,15 @@ class Sensitivity:
         Returns
         -------
         dict of str to ndarray
-            For each input and time: rad (for other bodies the unit of the coordinate) per unit of relative change,
-            with the sign of the rotation. Zero at rest, the value just before an impact at an impact, NaN outside the
-            response and everywhere for an unfinished simulation.
+            For each input and time: rad (or the unit of the coordinate) per unit of relative change, with the sign of
+            the rotation. Zero at rest, at an impact just before it, NaN outside the response and for unfinished
+            simulations.
 
         Notes
         -----
-        Each input requires one pass along the response, independent of the number of times. At a fixed time the
-        rotation is continuous, and its derivative jumps at each impact (see "Impacts: restitution and sensitivity" in
-        the documentation).
+        Each input requires one pass along the response, for any number of times. At a fixed time the rotation is
+        continuous, and its derivative jumps at each impact (see "Impacts: restitution and sensitivity" in the
+        documentation).
         """
         found = changes_along(self._history, time, of)
         return found if self._is_known else {name: np.full_like(values, np.nan) for name, values in found.items()}

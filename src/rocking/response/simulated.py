@@ -247,8 +247,8 @@ class Simulated(Result):
         Notes
         -----
         An initial rotation (for a body with a stop, its distance from the stop) and velocity are scaled with the
-        motion, or alone without a motion. An outcome that changes within a few millionths is undecided for practical
-        purposes. An outcome that agrees in a few simulations may still change between their factors.
+        motion, or alone without a motion. An outcome that changes within a few millionths is undecided in practice. An
+        outcome shared by all simulations may still change between their factors.
         """
         if (relative, count) not in self._repeated:
             repeats = tuple(self._repeat(factor) for factor in checked_factors(relative, count))
@@ -356,8 +356,8 @@ class Simulated(Result):
     def sliding_time(self, friction: float) -> float:
         """Return the first time, s, at which sticking requires more than a friction coefficient; NaN if never.
 
-        The coefficient is positive and at most 3. The search ends when the block tips (`tipping_time`) and excludes
-        the impulses at impacts. Motion after a slip is not modelled.
+        The coefficient is positive and at most 3. The search excludes impulses at impacts and ends at `tipping_time`.
+        Motion after a slip is not modelled.
         """
         level = friction_coefficient(friction)
         if not self.required_friction > level:

@@ -69,8 +69,8 @@ def one_of(surfaces: Sequence[Surface]) -> Surface:
 def oriented(surfaces: Sequence[Surface], hollow: Sequence[bool]) -> list[Surface]:
     """Turn the normals of closed surfaces outwards, except for cavities: pieces in a larger one with normals into it.
 
-    A cavity is assigned to the surface around it, but to a different surface only if ``hollow`` is true. Surfaces may
-    become empty.
+    A cavity belongs to the surface around it, but to another one only if ``hollow`` is true. Surfaces may become
+    empty.
     """
     labels = [shells_of(each.faces) for each in surfaces]
     of, shells = _pieces(surfaces, labels)

@@ -29,8 +29,8 @@ class Rose(DatasetResult):
     """Resistance of a body to rocking in every direction, returned by `Solid.rose`.
 
     The figure shows the uplift acceleration in each direction. Inside is the support polygon about the centre of mass,
-    divided by the height of the centre of mass, because its reach in a direction equals the ratio of this acceleration
-    to g. A second panel shows slenderness and frequency parameter against the azimuth.
+    divided by its height: its reach equals the ratio of this acceleration to g. A second panel shows slenderness and
+    frequency parameter against the azimuth.
 
     Attributes
     ----------

@@ -39,8 +39,8 @@ class Solid(Result):
     centre : array_like, shape (3,)
         Centre of mass.
     inertia_over_mass : array_like, shape (3, 3)
-        Tensor of inertia about the centre of mass divided by the mass, m^2. Its diagonal contains the squares of the
-        radii of gyration, and its other entries are the negative mean products of coordinates.
+        Tensor of inertia about the centre of mass divided by the mass, m^2: squared radii of gyration on the diagonal,
+        negative mean products of coordinates elsewhere.
     mass, gravity : float, optional
         Mass, kg, which does not affect rocking, and acceleration of gravity, m/s^2.
     description, height : str, float, optional
@@ -62,9 +62,9 @@ class Solid(Result):
 
     Notes
     -----
-    In the vertical plane of an azimuth the body is a block (`block`). It rocks about the edges, or corners, of the
-    support that are outermost in this direction and in the opposite one. Rotation about the vertical, rolling over
-    corners and products of inertia are neglected; `rose` reports their size.
+    In the vertical plane of an azimuth the body is a block (`block`). It rocks about the outermost edges or corners of
+    the support in this direction and the opposite one. Rotation about the vertical, rolling over corners and products
+    of inertia are neglected; `rose` reports their size.
 
     Examples
     --------
@@ -134,17 +134,17 @@ class Solid(Result):
         mesh : path, binary stream, trimesh.Trimesh or trimesh.Scene
             Triangles. "statue" is a mesh included in the package. A stream needs the name of the file as ``name``.
         density : float or mapping of str to float, optional
-            Density, kg/m^3, of the body, or of each part (object, group, node) by name. By default the density is
-            uniform and the mass unknown. Overlapping volumes count twice, and are reported in `notes`.
+            Density, kg/m^3, of the body, or of each part (object, group, node) by name. By default uniform, with
+            unknown mass. Overlaps count twice, and are reported in `notes`.
         support : array_like, shape (k, 2), optional
             Corners of the support, m, in the horizontal coordinates of the mesh after `up`, `unit` and `turn`. The
             default is the convex hull of all corners of the mesh within `tolerance` of the lowest one.
         tolerance : float, optional
-            Height of these corners above the lowest one, m. The default is a thousandth of the height. Only without
+            Height of these corners above the lowest one, m; by default a thousandth of the height. Only without
             `support`.
         up : {"x", "y", "z", "-x", "-y", "-z"} or array_like, optional
-            Axis of the mesh that points up, or a vector. The mesh is rotated by the smallest angle, so with "y" the x
-            axis still points east, and north is -z. The default is z, for glTF files y.
+            Axis of the mesh that points up, or a vector. The mesh is rotated by the smallest angle, so with "y" x
+            still points east, and north is -z. The default is z, for glTF files y.
         unit : {"m", "cm", "mm", "in", "ft"} or float
             Unit of the coordinates of the mesh, or its length in m.
         turn : float
@@ -172,8 +172,8 @@ class Solid(Result):
         -----
         Volume, centre and inertia are exact for the mesh, apart from rounding. A hole is filled by triangles between
         its edge and the mean of its corners. If several parts have one density and some are open, the open parts are
-        joined first. A surface inside another one, with its normals inwards, is a cavity. The same applies to such a
-        part without a value in `density`.
+        joined first. A surface inside another one, with its normals inwards, is a cavity, and so is such a part
+        without a `density`.
 
         Examples
         --------
@@ -212,8 +212,8 @@ class Solid(Result):
         Returns
         -------
         Block
-            Block from `Block.from_pivots`, with the azimuth in its description. The pivots are the ends of the support
-            in both directions. The radius of gyration is about the horizontal axis perpendicular to the plane.
+            Block from `Block.from_pivots`, with the azimuth in its description. Its pivots are the ends of the
+            support, and its radius of gyration is about the horizontal axis perpendicular to the plane.
 
         Raises
         ------
