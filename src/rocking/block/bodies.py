@@ -1,4 +1,4 @@
-"""Any number of blocks as a struct of arrays, the input of the kernels."""
+"""Blocks as a struct of arrays, the input of kernels."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from rocking.kernels import state
 
 _NAMES: Final = ("p", "alpha", "restitution")
 
-#: Terms of restraints on each side with their values in the absence of restraints, and `one_sided`.
+#: Terms of restraints on each side with their default values, and `one_sided`.
 _TERMS: Final = {**Terms()._asdict(), "one_sided": 0.0}
 _UNITS: Final = {
     "p": "rad/s", "alpha": "rad", "damping": "1/s", "opening": "m", "stiffness": "1/m", "yields": "m", "slack": "m",
     "restitution_slope": "s/rad",
 }  # fmt: skip
 
-#: Exponents of the factor on p in the terms of a resized block of the same shape; other terms do not change.
+#: Exponents of the factor on p in the terms of a resized block; other terms do not change.
 _POWERS: Final = {
     "damping": 1, "stiffness": 2, "opening": -2, "yields": -2, "slack": -2, "restitution_slope": -1,
 }  # fmt: skip
@@ -186,7 +186,7 @@ class Blocks:
         Raises
         ------
         InvalidBlock
-            If there are no blocks, an item is not a block, or the values of gravity differ.
+            If there are no blocks, an item is not a block, or gravities differ.
         """
         if isinstance(blocks, Blocks):
             return blocks
@@ -214,7 +214,7 @@ class Blocks:
         return {"p": self.p, "alpha": self.alpha, "restitution": self.restitution, **self.terms}
 
     def parameters(self) -> Mapping[str, tuple[Floats, str]]:
-        """Return p, alpha and restitution with their units, by name, and the terms of restrained blocks."""
+        """Return p, alpha, restitution and the terms of restrained blocks, with units, by name."""
         return {name: (values, _UNITS.get(name, "1")) for name, values in self._arrays().items()}
 
     def speed_limits(self, share: float) -> Floats:
@@ -222,7 +222,7 @@ class Blocks:
         return share * self.p * self.alpha
 
     def kernel_records(self, model: Model, limits: Floats) -> state.Records:
-        """Return all blocks as records for the kernels (`kernels.state.BLOCK`), shape (n,)."""
+        """Return records for kernels (`kernels.state.BLOCK`), shape (n,)."""
         p, alpha = self.p, self.alpha
         made = state.records(len(self), state.BLOCK)
         stiffness, cosine = p * p, np.cos(alpha)
@@ -239,7 +239,7 @@ class Blocks:
         return made
 
     def _add_terms(self, made: state.Records, model: Model) -> None:
-        """Add the terms of restraints to records of free blocks."""
+        """Add terms of restraints to records."""
         term, p, sine, cosine = self.terms, self.p, made["sine"], made["cosine"]
         one_way = term["one_sided"] > 0.0
         made["next_side"][one_way] = 0
@@ -343,7 +343,7 @@ class Blocks:
 
 
 def rates_of(p: ArrayLike | None, size: ArrayLike | None, gravity: float) -> ArrayLike:
-    """Return frequency parameters, rad/s, given directly or by half diagonals of rectangles, m."""
+    """Return frequency parameters, rad/s, from either argument."""
     if p is not None and size is None:
         return p
     if size is not None and p is None:
@@ -362,7 +362,7 @@ def _columns(array: Floats) -> Floats:
 
 
 def _conserved(p: Floats, alpha: Floats) -> Floats:
-    """Compute the restitutions that conserve angular momentum for rigid bodies with these p and alpha."""
+    """Compute the restitutions by angular momentum of rigid bodies with these p and alpha."""
     kept: Floats = 1.0 - 1.5 * np.sin(alpha) ** 2
     sided = np.flatnonzero((p[:, 0] != p[:, 1]) | (alpha[:, 0] != alpha[:, 1]))
     kept[sided], _ = rigid_bodies(p[sided], alpha[sided])

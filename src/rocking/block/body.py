@@ -1,4 +1,4 @@
-"""Protocols of bodies with one coordinate, single or many of one kind, for example blocks.
+"""Protocols of bodies with one coordinate, for example blocks.
 
 Between impacts (see `kernels.state.BLOCK`), u'' = lambda u - gain (threshold + side a/g), with any stiffness lambda,
 with or without damping, with one or two sides, or between two stops. Everything above the kernels uses only these
@@ -59,7 +59,7 @@ class Body(Protocol):
 
     @property
     def sides(self) -> Sequence[object]:
-        """One or two sides; the text of each contains its parameters."""
+        """One or two sides, whose texts contain the parameters."""
 
     @property
     def balance(self) -> tuple[float, float]:
@@ -67,7 +67,7 @@ class Body(Protocol):
 
     @property
     def stops(self) -> tuple[float, float]:
-        """Coordinate of the ground contact on each side. For a body with one side the second is not used."""
+        """Coordinate of the ground contact on each side; the second is unused for a single side."""
 
     @property
     def contact(self) -> ContactLaw | None:
@@ -98,7 +98,7 @@ class Bodies(Protocol):
 
     @property
     def restitution(self) -> Floats:
-        """Factors on the speed on leaving each side, shape (n, 2), equal for a body with one side."""
+        """Factors on the speed on leaving each side, shape (n, 2), equal for a single side."""
 
     @property
     def stops(self) -> Floats:
@@ -106,7 +106,7 @@ class Bodies(Protocol):
 
     @property
     def is_symmetric(self) -> bool:
-        """Whether mirrored ground motion mirrors the motion of every body; False if a body has a single side."""
+        """Whether mirrored ground motion mirrors all responses; False for a single side."""
 
     def __len__(self) -> int:
         """Return the number of bodies."""
@@ -115,7 +115,7 @@ class Bodies(Protocol):
         """Return one body."""
 
     def select(self, index: slice | Integers) -> Self:
-        """Return some bodies, by a slice, flat array of indices, or mask. Anything else raises `InvalidBlock`."""
+        """Return bodies by a slice, flat array of indices, or mask; otherwise raise `InvalidBlock`."""
 
     def parameters(self) -> Mapping[str, tuple[Floats, str]]:
         """Return the parameters by name: arrays of shape (n, 2), and units."""
@@ -131,14 +131,14 @@ class Kind(Protocol):
     """Class that creates bodies of one kind."""
 
     def __call__(self, *nothing: Any, **parameters: Any) -> Bodies:
-        """Create bodies from their `parameters`, by name, and gravity, for example when a study reads its inputs."""
+        """Create bodies from their `parameters`, by name, and gravity."""
 
     def of(self, bodies: Any, /) -> Bodies:
         """Gather single bodies."""
 
 
-#: Classes of many bodies by name: a registry that avoids circular imports.
+#: Registry of classes of many bodies, which avoids circular imports.
 KINDS: Final[dict[str, Kind]] = {}
 
-#: Classes of single bodies by name: another such registry.
+#: Registry of classes of single bodies.
 SINGLE: Final[dict[str, Callable[..., Any]]] = {}

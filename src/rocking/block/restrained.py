@@ -20,7 +20,7 @@ from rocking.core.bisection import bisected
 from rocking.core.constants import MODELS, Model
 from rocking.errors import InvalidBlock, InvalidOption
 
-#: Number of rotations at which the search for the balance evaluates the moment on each side.
+#: Number of rotations in the search for the balance on each side.
 _LOOKS: Final = 512
 
 _SOME: Final = "Tendon, Spring, Damper, Thrust or Load"
@@ -136,7 +136,7 @@ class RestrainedBlock(Rocking):
             )
 
     def _rows(self) -> list[tuple[float, ...]]:
-        """Return parameters and terms of both sides as stored in `Blocks`, without terms for a free block."""
+        """Return parameters and, unless free, terms of both sides as stored in `Blocks`."""
         rows = self.block._rows()
         if not self.is_one_sided and self._terms == (Terms(), Terms()):
             return rows
@@ -150,7 +150,7 @@ class RestrainedBlock(Rocking):
 
     @property
     def sides(self) -> Sequence[Side]:
-        """Sides of the standing block including loads that follow it; only side + if the block is one-sided."""
+        """Sides of the standing block including loads that follow; only side + if one-sided."""
         return self.block.sides[:1] if self.is_one_sided else self.block.sides
 
     @property
@@ -196,7 +196,7 @@ class RestrainedBlock(Rocking):
     def tendons_at(self, largest: tuple[float, float], model: Model = "nonlinear") -> list[tuple[float, float, float]]:
         """Return the largest elongation (m), largest force (N) and plastic elongation (m) of each tendon, in order.
 
-        `largest` is the largest rotation on each side, rad. The list is empty if the individual restraints are not
+        `largest` is the largest rotation on each side, rad. The list is empty if the restraints are not
         available.
         """
         plus, minus = largest if model == "linear" else (2.0 * math.sin(0.5 * u) for u in largest)
@@ -206,7 +206,7 @@ class RestrainedBlock(Rocking):
 
 
 def _listed(restraints: Sequence[object]) -> list[str]:
-    """Describe the restraints, if any: with a spring of ..., a load of ... and a tendon of ..."""
+    """Describe the restraints: with a spring of ..., a load of ... and a tendon of ..."""
     if not restraints:
         return []
     *first, last = [f"a {each}" for each in restraints]
@@ -214,7 +214,7 @@ def _listed(restraints: Sequence[object]) -> list[str]:
 
 
 def _check(restraints: Sequence[object], block: Block) -> None:
-    """Reject objects that are not restraints, and restraints of a block without a mass."""
+    """Reject invalid restraints, and restraints of a block without a mass."""
     for each in restraints:
         if not isinstance(each, Restraint):
             raise InvalidBlock(f"{checks.shown(each)} is no restraint: give {_SOME}, one by one")
@@ -223,7 +223,7 @@ def _check(restraints: Sequence[object], block: Block) -> None:
 
 
 def _with_loads(block: Block, loads: Sequence[Load], restitution: float | Sequence[float] | None) -> Block:
-    """Return the rigid body of a block and the loads that follow it, by default with conserved angular momentum."""
+    """Return a block combined with the loads that follow it, by default conserving angular momentum."""
     if not loads:
         return block
     assert block.mass is not None
@@ -276,7 +276,7 @@ def _following(restraints: Sequence[Restraint]) -> list[Load]:
 
 
 def _pivots_of(block: Block, lean: float, restraints: Sequence[Restraint]) -> tuple[Pivot, Pivot]:
-    """Return the pivots for restraints of both sides of a leaning block with the loads that follow it."""
+    """Return both pivots of a leaning block with the loads that follow it."""
     mass = math.nan if block.mass is None else block.mass
     shift = sum(load.mass * load.offset for load in _following(restraints)) / mass
     plus, minus = (
@@ -290,9 +290,9 @@ def _pivots_of(block: Block, lean: float, restraints: Sequence[Restraint]) -> tu
 
 
 def _balance_of(side: Side, terms: Terms) -> float:
-    """Return the first rotation without restoring moment, in the absence of ground motion, rad.
+    """Return the first rotation without restoring moment or ground motion, rad.
 
-    A yielding tendon is assumed to yield for the first time.
+    A yielding tendon yields for the first time.
     """
     if terms[:-3] == Terms()[:-3]:
         return side.alpha

@@ -1,4 +1,4 @@
-"""Restraints (tendons, springs, dampers, thrusts, loads) as moments about the pivots, and laws of restitution."""
+"""Restraints as moments about the pivots, and laws of restitution."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from rocking.errors import InvalidBlock
 #: Force on a block to side + and up, N.
 Force = tuple[Floats | float, Floats | float]
 
-#: Largest seed: whole numbers up to this one are exactly representable as floats.
+#: Largest seed. All whole numbers up to it are exact as floats.
 _LARGEST_SEED: Final = 2**53
 
 
@@ -46,7 +46,7 @@ class Terms(NamedTuple):
     restitution_seed: float = -1.0  # seed of a random restitution; -1 if not random
 
     def plus(self, other: Terms) -> Terms:
-        """Return the sum. At most one operand has a yielding tendon, and only `self` may have a law of restitution."""
+        """Return the sum, of which one operand may have a yielding tendon, and only `self` a law of restitution."""
         tendon = self if other.yields == math.inf else other
         sums = (a + b for a, b in zip(self[:5], other[:5], strict=True))
         return Terms._make((*sums, *tendon[5:9], *self[9:]))
@@ -64,7 +64,7 @@ class Pivot(NamedTuple):
     gravity: float  # m/s^2
 
     def arms(self, height: float, offset: float) -> tuple[float, float]:
-        """Return the distance from the pivot inwards and the height above it, m, of a point of the standing block.
+        """Return the inward distance from the pivot and the height above it, m, of a point of the standing block.
 
         The height is above the base, the offset from the centre of mass without loads to side +, both along the axes
         of the block.
@@ -74,7 +74,7 @@ class Pivot(NamedTuple):
         return inwards * c - height * s, height * c + inwards * s
 
     def turned(self, inwards: float, upwards: float) -> tuple[float, float]:
-        """Return ``rho sin`` and ``rho cos`` of the angle between a point and the line to the centre of mass, m."""
+        """Return ``rho sin`` and ``rho cos`` of the angle of a point from the line to the centre of mass, m."""
         c, s = math.cos(self.alpha), math.sin(self.alpha)
         return inwards * c - upwards * s, upwards * c + inwards * s
 
@@ -179,7 +179,7 @@ class Tendon(Restraint):
         return Terms(-stiff * math.cos(pivot.alpha), stiff * math.sin(pivot.alpha), self.prestress * x / pivot.moment)
 
     def _acting(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats) -> Force:
-        """Return the force of the tendon, along the chord between its ends in the block and in the ground."""
+        """Return the force of the tendon, along the chord between its ends."""
         if self.strength == math.inf:
             x = np.where(side == 1, self._opening(pivots[1]), self._opening(pivots[0]))
             stretch = 2.0 * x * np.sin(0.5 * np.abs(rotation))
@@ -403,9 +403,9 @@ class Restitution:
     slope : float or pair
         Decrease per angular speed before the impact, s/rad, at least 0.
     seed : int, optional
-        Whole number from 0 to 2^53, different for each body. The factor depends only on the seed and the number of the
-        impact. Therefore it is the same under any ground motion, for a body alone or among others. After a rest the
-        count continues from the resolved impacts, of which a finer treatment has more.
+        Whole number from 0 to 2^53, preferably different for each body. The factor depends only on the seed and the
+        number of the impact. Therefore it is the same under any ground motion, for a body alone or among others. After
+        a rest the count continues from the resolved impacts, of which a finer treatment has more.
 
     Raises
     ------
@@ -457,7 +457,7 @@ class Restitution:
                 raise InvalidBlock("a restitution either falls or is drawn: give a {} or a {}", "slope", "seed")
 
     def _terms(self, side: int) -> dict[str, float]:
-        """Return the law below the largest factor on leaving a side, as fields of `restraints.Terms`."""
+        """Return the law on leaving a side as fields of `Terms`, without the largest factor."""
         least, slope = (checked_pair(getattr(self, name), name)[side] for name in ("least", "slope"))
         seed = -1.0 if self.seed is None else float(self.seed)
         return {"restitution_least": least, "restitution_slope": slope, "restitution_seed": seed}
@@ -469,12 +469,12 @@ class Restitution:
 
 
 def _at(offset: float) -> str:
-    """Describe the position, or return an empty text at the centre of mass."""
+    """Describe a position off the centre of mass."""
     return f" {abs(offset):.5g} m to side {'+' if offset > 0.0 else '-'}" if offset else ""
 
 
 def _thousands(value: float, unit: str) -> str:
-    """Format a number with its unit, with the prefix kilo, mega or giga if it is large."""
+    """Format a number with its unit, if large with kilo, mega or giga."""
     for size, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
         if abs(value) >= size:
             return f"{value / size:.5g} {prefix}{unit}"

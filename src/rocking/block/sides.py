@@ -27,12 +27,12 @@ _LIMITS: Final = {
     "restitution": (1e-9, 1.0, "in (0, 1], at least 1e-09"),
 }
 
-#: Largest number of points at which a base meets the ground. Far beyond it, the loss is below rounding error.
+#: Largest number of contact points. Far beyond it, the loss is below rounding error.
 _MOST_POINTS: Final = 1_000_000
 
 
 def checked_parameter(value: float, name: str, *, origin: str = "", which: str = "") -> float:
-    """Return p, alpha or restitution of a side, or raise InvalidBlock with its origin and its block in the message."""
+    """Return p, alpha or restitution of a side, or raise InvalidBlock that names its origin and its block."""
     low, high, rule = _LIMITS[name]
     if not low <= value <= high:
         hint = checks.hint_of_degrees(value) if name == "alpha" else ""
@@ -42,7 +42,7 @@ def checked_parameter(value: float, name: str, *, origin: str = "", which: str =
 
 
 def checked_sides(values: Floats, name: str) -> Floats:
-    """Return p, alpha or restitution of blocks, shape (n, 2), or raise InvalidBlock for the first one out of range."""
+    """Return p, alpha or restitution, shape (n, 2), or raise InvalidBlock for the first one out of range."""
     low, high, _ = _LIMITS[name]
     bad = np.argwhere(~((values >= low) & (values <= high)))
     if len(bad):
@@ -123,9 +123,7 @@ def impact_restitution(
     height: float | None = None,
     radius_of_gyration: float | None = None,
 ) -> tuple[float, float]:
-    """Compute the restitution for a contact narrower than the base, or for successive contact points.
-
-    The restitution conserves angular momentum.
+    """Compute the restitution from angular momentum for a narrow contact or several contact points.
 
     Parameters
     ----------
@@ -255,7 +253,7 @@ class Side:
 
 
 def in_line(sides: Sequence[object]) -> str:
-    """Return the parameters of the sides in one line, named by side if they differ."""
+    """Return the parameters in one line, by side if they differ."""
     if len(sides) == 1 or sides[0] == sides[1]:
         return str(sides[0])
     return "; ".join(f"side {sign}: {side}" for sign, side in zip("+-", sides, strict=True))
@@ -291,7 +289,7 @@ def sides_on_pivots(
 
 
 def restitutions(given: object, conserved: Sequence[float]) -> tuple[float, float]:
-    """Return the given restitutions, or by default the conserved ones."""
+    """Return the given restitutions, by default the ones that conserve angular momentum."""
     if given is None:
         if min(conserved) <= 0.0:
             raise InvalidBlock(
@@ -332,7 +330,7 @@ def rigid_bodies(p: Floats, alpha: Floats) -> tuple[Floats, Floats]:
 
 
 def _differences(p: Floats, cosine: Floats) -> tuple[Floats, Floats]:
-    """Return log differences of p between both sides: the actual ones and the bounds for a rigid body."""
+    """Return logarithmic differences of p between sides, and their bounds for a rigid body."""
     return np.abs(np.log(p[:, 0] / p[:, 1])), 0.5 * np.abs(np.log(cosine[:, 0] / cosine[:, 1]))
 
 
@@ -362,5 +360,5 @@ def eccentric_rectangles(alpha: Floats) -> tuple[Floats, Floats]:
 
 
 def gyration_squared(half_width: Number, half_height: float, offset: Number) -> Number:
-    """Return the squared radius of gyration, m^2, of a rectangle with a centre of mass off the middle of its width."""
+    """Return the squared radius of gyration, m^2, of a rectangle with an offset centre of mass."""
     return (half_width * half_width + half_height * half_height) / 3.0 - offset * offset

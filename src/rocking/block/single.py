@@ -34,9 +34,9 @@ from rocking.errors import InvalidBlock, InvalidOption, UnequalSides
 #: The coordinate of every block.
 ROTATION: Final = Coordinate("rotation", "angular_velocity", "angular_acceleration", "rad", "slenderness")
 
-#: Relative rounding error of a computed length.
+#: Relative rounding error of a length.
 _ROUNDING: Final = 1e-12
-#: Largest difference between restitutions that count as equal: a computed value against the value of a rigid body.
+#: Largest difference of a restitution from the value of a rigid body that counts as equal.
 _SAME_RESTITUTION: Final = 1e-9
 _HEAVIEST_BEAM: Final = 1e12
 
@@ -157,7 +157,7 @@ class Block(Rocking):
         mass: float | None = None,
         rectangle: tuple[float | None, float | None, float] = (None, None, 0.0),
     ) -> Block:
-        """Set all attributes, for a rectangle including its half sizes and its offset, m."""
+        """Set all attributes, for a rectangle with half sizes and offset, m."""
         for side in sides:
             checked_parameter(side.p, "p", origin=" (from the sizes)")
             checked_parameter(side.alpha, "alpha", origin=" (from the sizes)")
@@ -198,8 +198,7 @@ class Block(Rocking):
         Returns
         -------
         Block
-            Block with the radii of that body or, if its restitution differs, of a rectangle with the same p, R = 3
-            g/(4 p^2).
+            Block with the radii of that body, or R = 3 g/(4 p^2), as of a rectangle, if its restitution differs.
 
         Raises
         ------
@@ -400,7 +399,7 @@ class Block(Rocking):
         >>> round(wall.sides[0].restitution, 4)
         0.4708
         """
-        # A wall may be too stocky for a restitution from angular momentum, so the block's own value is replaced.
+        # A wall may be too stocky for the default of a block.
         block = cls(restitution=None if restitution is None else 1.0, **sizes)
         return SINGLE["restrained"](block, *restraints, one_sided=True, lean=lean, restitution=restitution)
 
@@ -489,7 +488,7 @@ def one_block(block: object, needed: str = "a free Block") -> Block:
 def _half_sizes(
     halves: tuple[float | None, float | None], full: tuple[float | None, float | None]
 ) -> tuple[float, float]:
-    """Return half the width and half the height, m, from half sizes or full sizes."""
+    """Return half sizes, m, from half or full sizes."""
     given = [size is not None for size in (*halves, *full)]
     if given == [True, True, False, False]:
         return checked_length(halves[0], "half_width"), checked_length(halves[1], "half_height")

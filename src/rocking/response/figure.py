@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 #: Units of rotations in figures.
 RotationUnits = Literal["slenderness", "rad", "deg"]
 
-#: Number of even times of a drawn history or phase-plane trajectory.
+#: Number of even times of a line.
 _EVEN_TIMES: Final = 4001
 
 #: Largest number of drawn impacts; others are omitted evenly.
@@ -46,7 +46,7 @@ def titled(response: Simulated) -> str:
 
 
 def active_span(response: Simulated) -> tuple[float, float]:
-    """Return the interval from shortly before the first event to shortly after the last."""
+    """Return the interval of all events, with margins, s."""
     times = np.concatenate([response.events["time"], response.impacts["time"]])
     if len(times) == 0:
         return 0.0, response.duration
@@ -56,7 +56,7 @@ def active_span(response: Simulated) -> tuple[float, float]:
 
 
 def shown_span(response: Simulated, window: Sequence[float] | None) -> tuple[float, float]:
-    """Return a window of a response, s, or its active span; raise `InvalidOption` for an invalid window."""
+    """Return a valid window of a response, s, or its active span."""
     if window is None:
         return active_span(response)
     ends: Any = checks.numbers(window, "window", InvalidOption)
@@ -70,7 +70,7 @@ def shown_span(response: Simulated, window: Sequence[float] | None) -> tuple[flo
 
 
 def drawing_times(response: Simulated, start: float, end: float) -> Floats:
-    """Return times dense enough for a smooth line: even ones, and the times of visible steps."""
+    """Return times for a smooth line: even ones and visible steps."""
     even = np.linspace(start, end, _EVEN_TIMES)
     steps = _within(response._history.trail.nodes["time"], start, end)
     visible = np.diff(np.floor(steps / max(even[1] - even[0], 1e-12)), prepend=-1.0) > 0.0
@@ -157,7 +157,7 @@ def _ground_traces(response: Simulated, start: float, end: float) -> dict[str, t
 
 
 def _longest_sequence(response: Simulated, start: float, end: float) -> np.void | None:
-    """Return the chattering sequence with the most impacts in the interval, if its time of rest is bracketed."""
+    """Return the sequence with the most impacts in the interval, if its time of rest is bracketed."""
     inside = response.chattering[(response.chattering["start"] >= start) & (response.chattering["end"] <= end)]
     longest: np.void | None = max(inside, key=lambda row: row["impacts"], default=None)
     if longest is None or not math.isfinite(longest["upper"] - longest["lower"]):
@@ -210,7 +210,7 @@ def _mark_fall(axes: Axes, time: Floats, drawn: Floats, label: str) -> None:
 
 
 def _tell_sides(axes: Axes, factors: tuple[float, float]) -> None:
-    """Label the sides if their scales differ, with the angle of 1 on each."""
+    """Label the sides, with the angle of 1 on each."""
     for name, place, off, factor in zip(("side +", "side −"), ("bottom", "top"), (2, -2), factors, strict=True):
         words = name if factors[0] == factors[1] else f"{name}: 1 is {math.degrees(1.0 / factor):.3g}°"
         look = {"va": place, "color": INK, "fontsize": "small", "xycoords": axes.get_yaxis_transform()}
@@ -246,7 +246,7 @@ def _draw_sequence(main: Axes, axes: Axes, response: Simulated, sequence: np.voi
     look: dict[str, Any] = {"ha": "center", "va": "bottom", "color": ABOVE, "fontweight": "bold", "xycoords": at}
     write(main, "A", (0.5 * (first + last), 0.955), (0, 2), **look)
     rest, start, interval = 0.5 * (sequence["lower"] + sequence["upper"]), times[:-1], np.diff(times)
-    # If impacts are closer than the spacing of floating-point times, logarithms are undefined.
+    # Logarithms are undefined for impacts closer than floating-point spacing.
     shown = (interval > 0.0) & (rest > start)
     look = {"color": INK, "markersize": 2.6, "markerfacecolor": "white", "markeredgewidth": 0.6}
     axes.loglog(rest - start[shown], interval[shown], "o", **look)
@@ -282,12 +282,12 @@ class Course(NamedTuple):
     before: Integers
 
     def parted(self, values: Floats) -> Floats:
-        """Insert a gap at each impact, so that a line of these values does not jump."""
+        """Insert a gap at each impact, where a line would jump."""
         return np.insert(values, self.before + 1, np.nan)
 
 
 def course_of(response: Simulated, start: float, end: float) -> Course:
-    """Compute the course of a response, for a body with known energy, between two times, s."""
+    """Compute the course of a response between two times, s."""
     history, energy = response._history, response._energy
     impacts = response.impacts[(response.impacts["time"] >= start) & (response.impacts["time"] <= end)]
     impacts = impacts[:: 1 + len(impacts) // _MOST_IMPACTS]

@@ -24,7 +24,7 @@ from rocking.response.response import Response
 #: Quantities that can be differentiated.
 Quantity = Literal["peak", "rotation", "velocity", "event", "impact"]
 
-#: Time before a rest, s, up to which its impacts are followed. The remainder is of first order, and rounding smaller.
+#: Time before a rest, s, up to which impacts are followed. The remainder is of first order, and rounding smaller.
 _CLOSE: Final = 1e-5
 
 _OVERTURNS: Final = "the block overturns: its peak is where it falls, whatever changes a little"
@@ -247,14 +247,14 @@ def _time(response: Response, of: Quantity, at: float | None) -> _Target:
 
 
 def _later(response: Response, row: int, until: float) -> Records:
-    """Return the nodes after a row up to a time, including impacts after the proof of a sequence."""
+    """Return the nodes after a row up to a time, including impacts after a proof."""
     nodes: Records = response._history.trail.nodes
     found: Records = nodes[(nodes["time"] > response.solution.trail.nodes["time"][row]) & (nodes["time"] <= until)]
     return found
 
 
 def _ties_before(trail: Trail, instant: float) -> bool:
-    """Return whether rounding determined a touch up to an instant, by integrating again up to this instant."""
+    """Return whether rounding determined a touch up to an instant, by integrating again."""
     rules, start = trail.settings.copy(), state.state_at(trail.nodes[0])
     rules["stop"], rules["no_end_time"], rules["record"] = math.nextafter(instant, math.inf), False, False
     march(trail.ground, copy_trail(trail).block, rules, state.new_table(0), state.new_scratch(), start)
@@ -295,7 +295,7 @@ def _sign(side: int) -> float:
 
 
 def _by_components(motion: Motion | None, trail: Trail, gravity: float, out: Floats) -> tuple[Floats, Floats | None]:
-    """Return derivatives by the coefficients of both components from derivatives by their common pieces."""
+    """Return derivatives by both components from derivatives by their common pieces."""
     if motion is None:
         return np.zeros((0, 2)), None
     starts, columns = trail.ground.pieces[:-1, 0], trail.ground.columns
@@ -306,7 +306,7 @@ def _by_components(motion: Motion | None, trail: Trail, gravity: float, out: Flo
 
 
 def _by_own_pieces(motion: Motion, starts: Floats, values: Floats) -> Floats:
-    """Convert derivatives by finer pieces to derivatives by the pieces of a motion: the transpose of `refined`."""
+    """Convert derivatives by finer pieces to the pieces of a motion: the transpose of `refined`."""
     within = starts < motion.duration
     starts, values = starts[within], values[within]
     piece = np.searchsorted(motion.breakpoints, starts, side="right") - 1
@@ -320,7 +320,7 @@ def _by_own_pieces(motion: Motion, starts: Floats, values: Floats) -> Floats:
 
 
 def _by_samples(motion: Motion | None, values: Floats) -> Floats:
-    """Convert derivatives by the coefficients of lines to derivatives by the accelerations at their ends."""
+    """Convert derivatives by the coefficients of lines to accelerations at their ends."""
     if motion is None or values.shape[1] != 2 or piecewise.jumps(motion):
         raise InvalidOption("the motion is not linear between samples; take the derivatives by its `coefficients`")
     rates = values[:, 1] / np.diff(motion.breakpoints)

@@ -20,7 +20,7 @@ from rocking.kernels.march import march
 from rocking.kernels.state import Records
 from rocking.kernels.trace import Trail, copy_trail, trace
 
-#: Number of samples in each step of the last arc in the search for the last passage of the balance.
+#: Number of samples per step in the search for the last passage of the balance.
 _LOOKS: Final = 33
 
 #: Parts of a step in the search for turning points, and bisections of the time of a turning point, at which the
@@ -38,7 +38,7 @@ _LEAST_SHARE: Final = 1e-9
 
 
 class Solution(NamedTuple):
-    """Result of the integration, from which a response computes everything else."""
+    """Result of the integration, from which a response is computed."""
 
     trail: Trail  # ground, body and settings for kernels, and the nodes of the series
     sequences: NDArray[np.void]  # as proven, without the rounding before the proof
@@ -72,7 +72,7 @@ class History:
         return found.reshape((*times.shape, 3)), sides.reshape(times.shape)
 
     def states_in(self, times: Floats, rows: Integers) -> Floats:
-        """Return coordinate and rates, shape (n, 3), at each time in the step that starts at the node of its row."""
+        """Return coordinate and rates, shape (n, 3), at times in the steps that start at these rows."""
         found = np.empty((len(times), 3))
         given = times.view()
         given.flags.writeable = False  # one type for any caller: `trace` is compiled once
@@ -83,7 +83,7 @@ class History:
         return found
 
     def rows(self, times: Floats) -> Integers:
-        """Return the row of the node at which the step of each time starts."""
+        """Return the row of the first node of the step of each time."""
         rows = np.searchsorted(self.trail.nodes["time"], times, side="right") - 1
         return np.maximum(rows, 0).astype(np.int64)
 
@@ -146,7 +146,7 @@ def even_times(end: float, dt: float) -> Floats:
 
 
 def steps_to_events(nodes: Records, *, overturns: bool) -> Integers:
-    """Return the rows of nodes whose steps end in an uplift, a rest or, at the end of the response, overturning."""
+    """Return the rows of nodes whose steps end in an uplift, a rest or, if specified, overturning."""
     rests = nodes["side"] < 0
     rows = np.flatnonzero(rests[:-1] | rests[1:])
     return np.append(rows, len(nodes) - 2) if overturns else rows
@@ -167,7 +167,7 @@ def with_all_impacts(trail: Trail, *, cut: bool) -> Trail:
     computed as far as they contribute.
     """
     nodes = trail.nodes
-    # If the duration ends within a sequence after its proof, its last impact is not followed by a rest.
+    # No rest follows the last impact if the duration ends within a sequence after its proof.
     rests = np.append(nodes["side"][1:] < 0, cut)
     closing = np.flatnonzero(rests & (nodes["side"] >= 0) & (nodes["u"] == 0.0))
     slowest = _SLOWEST * np.sqrt(np.abs(trail.block["stiffness"]))

@@ -26,11 +26,11 @@ from rocking.kernels.state import Record
 from rocking.motion import piecewise
 from rocking.response.history import History, elongation, plastic_elongations
 
-#: Samples per step, and number of refinements around the largest sample, in the search for extreme forces.
+#: Samples per step, and refinements around the largest one, in the search for extreme forces.
 _SAMPLES: Final = 9
 _REFINEMENTS: Final = 10
 
-#: Upper bound of friction coefficients, above any pair of materials.
+#: Upper bound of the friction of any materials.
 _ROUGHEST: Final = 3.0
 
 #: Function of the ratios of horizontal and vertical force to the weight.
@@ -59,7 +59,7 @@ def pull(_: Floats, vertical: Floats) -> Floats:
 
 
 def _reach(values: Floats) -> Floats:
-    """Return an upper estimate of a smooth quantity in each step: its largest sample plus the span of its samples."""
+    """Return an upper estimate of a quantity in each step: its largest sample plus the span of samples."""
     return np.asarray(2.0 * values.max(axis=1) - values.min(axis=1))
 
 
@@ -90,7 +90,7 @@ class Contact:
         return horizontal.reshape(times.shape), vertical.reshape(times.shape)
 
     def extremes(self) -> tuple[float, float]:
-        """Return the largest friction required to stick, and the smallest normal force, from the same samples."""
+        """Return the largest friction required to stick, and the smallest normal force."""
         times, rows = self._samples()
         horizontal, vertical = (force.reshape(times.shape) for force in self._forces_in(times.ravel(), rows.ravel()))
         friction, least = float(friction_demand(horizontal, vertical).max()), float(vertical.min())
@@ -154,7 +154,7 @@ class Contact:
         return self.law((theta, rate, acceleration), ground, side, stretch)
 
     def _ground_in(self, times: Floats, rows: Integers, at_rest: Flags) -> tuple[Floats, Floats]:
-        """Return both ground accelerations in g, from the piece at the start of a step or, at rest, from any piece."""
+        """Return both ground accelerations in g, from the piece at the start of a step or, at rest, any piece."""
         ground = self.history.trail.ground
         anywhere = np.maximum(np.searchsorted(ground.pieces[:, 0], times, side="right") - 1, 0)
         piece = np.where(at_rest, anywhere, self.history.trail.nodes["piece"][rows])
@@ -219,7 +219,7 @@ class Energy:
 
     @cached_property
     def has_balances(self) -> bool:
-        """Whether each side to which the body leans has a balance, the unit of rotations."""
+        """Whether each side has a balance, the unit of rotations."""
         return bool(np.all(np.isfinite(self.balance[: len(self.body.sides)])))
 
     @property

@@ -145,7 +145,7 @@ class Perturbed(Result):
         return next((outcome for outcome in outcomes if outcome != UNMOVED), UNMOVED)
 
     def share(self) -> str:
-        """Return a text with the number of simulations that have the outcome of factor 1, and the range of factors."""
+        """Return as text the number of simulations with the outcome of factor 1, and the range of factors."""
         return f"{self.outcome} in {len(self.alike)} of {self.sample}"
 
     def sentence(self) -> str:
@@ -204,7 +204,7 @@ def factors_near(relative: float, count: int) -> list[float]:
 
 
 def steps_within(precision: float) -> tuple[float, int]:
-    """Return the relative step and the number of factors (eleven) within a precision, for `Response.perturbed`."""
+    """Return the relative step and number (eleven) of factors within a precision, for `Response.perturbed`."""
     most = checks.within(precision, "precision", InvalidOption, 1e-6, 0.1)
     return most / (_WITHIN_PRECISION - 2), _WITHIN_PRECISION
 

@@ -333,7 +333,7 @@ class Simulated(Result):
         return as_asked(self._contact.forces(time)[1])
 
     def friction_demand(self, time: ArrayLike) -> Floats:
-        """Return the friction coefficient required to stick: infinite without normal force, NaN outside."""
+        """Return the friction coefficient for sticking: infinite without normal force, NaN outside the response."""
         return as_asked(friction_demand(*self._contact.forces(time)))
 
     @cached_property
@@ -368,7 +368,7 @@ class Simulated(Result):
     def lift_off_time(self) -> float:
         """First time, s, at which the normal force is not positive, so that the base leaves the ground; NaN if never.
 
-        As for `sliding_time`, the search is limited to times between impacts and until the block tips.
+        The search is limited as for `sliding_time`.
         """
         if self.minimum_normal_force > 0.0:
             return math.nan

@@ -16,7 +16,7 @@ from rocking.engine.problem import thresholds_of
 from rocking.response.perturbed import percent, steps_within
 from rocking.response.simulated import Simulated
 
-#: Largest number of decimals of a time, largest number of digits of a peak, and digits of a range of peaks.
+#: Largest numbers of decimals of a time and digits of a peak, and digits of a range of peaks.
 _MOST_DECIMALS: Final = 9
 _MOST_DIGITS: Final = 6
 _FEWEST_DIGITS: Final = 3
@@ -151,12 +151,12 @@ def ratio_text(response: Simulated) -> str:
 
 
 def known_ratio(response: Simulated) -> float:
-    """Return the normalised peak rotation, rounded if fewer than four digits are known, for display with few digits."""
+    """Return the normalised peak rotation, rounded if fewer than four digits are known."""
     return response.peak_over_slenderness if _peak_digits(response) >= _SHORT else float(ratio_text(response))
 
 
 def time_text(time: float, low: float, high: float) -> str:
-    """Return a time, s, with the digits common to its range in repeated simulations, or its range if wide."""
+    """Return a time, s, with the digits common to its range, or its range if wide."""
     unknown = _unknown(time, low, high)
     decimals = _decimals(unknown)
     if unknown < _SHOWN:
@@ -165,7 +165,7 @@ def time_text(time: float, low: float, high: float) -> str:
 
 
 def tipping_text(response: Simulated) -> str:
-    """Return the tipping time with the known digits. Its uncertainty equals the uncertainty of the overturning time."""
+    """Return the tipping time with the known digits, which equal the ones of the overturning time."""
     unknown = 0.0
     if response.overturned:
         unknown = _unknown(response.overturn_time, *response.perturbed().overturn_range)
@@ -221,12 +221,12 @@ def _event_rows(response: Simulated) -> list[Row]:
 
 
 def _rest_note(unknown: float, sequence: np.void) -> str:
-    """Describe how a time of rest with this uncertainty was determined, with the digits that the record supports."""
+    """Describe the proof of a time of rest, with the digits that the record supports."""
     width = sequence["upper"] - sequence["lower"]
     if not width >= 0.0:
         return ", by the treatment, not proven"
     decimals = _decimals(unknown)
-    # The bracket applies to the motion to its last digit, so it would overstate the precision of a rounded time.
+    # The bracket applies to the exact motion, so it would overstate the precision of a rounded time.
     bracket = f", bracket {width:.1e} s wide" if decimals >= _MOST_DECIMALS else ""
     start = f" from {sequence['start']:.{min(decimals, 4)}f} s on" if unknown < _SHOWN else ""
     return f", complete chattering proven{start}{bracket}"
@@ -253,7 +253,7 @@ def _peak_rows(response: Simulated) -> list[Row]:
 
 
 def _balance_text(response: Simulated) -> str:
-    """Return the unstable balance of a restrained block, which differs from its slenderness."""
+    """Return the unstable balance of a restrained block."""
     plus, minus = (f"{value:.5g} rad" if math.isfinite(value) else "none" for value in response.balance)
     if plus != minus and not (isinstance(response.body, RestrainedBlock) and response.body.is_one_sided):
         return f"{plus} (side +), {minus} (side -)"
@@ -300,7 +300,7 @@ def _unknown(value: float, low: float, high: float) -> float:
 
 
 def _decimals(unknown: float) -> int:
-    """Return the decimals of a number with this uncertainty, including the first uncertain one in a range."""
+    """Return the decimals of a number with this uncertainty, including the first uncertain one for a range."""
     if not math.isfinite(unknown):
         return 0
     if unknown <= 0.0:

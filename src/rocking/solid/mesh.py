@@ -1,4 +1,4 @@
-"""Mass properties and support of a body from a mesh, with all repairs and assumptions."""
+"""Mass properties and support of a body from a mesh."""
 
 from __future__ import annotations
 
@@ -118,13 +118,13 @@ def _streamed(stream: BinaryIO, name: str) -> Scene:
 
 
 def _loaded(source: Path | BinaryIO, named: str, **how: Any) -> Scene:
-    """Read a file or a stream with trimesh, including the files named in it."""
+    """Read a file or stream, and files named in it, with trimesh."""
     try:
         import trimesh
     except ImportError:
         raise InvalidOption(f"meshes are read with trimesh, which is not installed: {install('mesh')}") from None
     suffix = PurePath(source.name).suffix.lower().removeprefix(".")
-    # Every object and group of an OBJ file is a part, regardless of its material. Corners are unchanged.
+    # Objects and groups of OBJ files are parts, regardless of material. Corners are unchanged.
     how |= {"split_objects": True, "split_groups": True, "skip_materials": True, "group_material": False}
     try:
         return trimesh.load_scene(source, file_type=suffix, process=False, **how)
@@ -156,7 +156,7 @@ def length_of(unit: object) -> float:
 
 
 def upright(up: object) -> Floats:
-    """Return the rotation matrix, shape (3, 3), that moves an axis of a mesh to z by the smallest angle."""
+    """Return the smallest rotation, shape (3, 3), of an axis of a mesh to z."""
     if isinstance(up, str):
         axis = checks.one_of(up, "up", InvalidBlock, ["x", "y", "z", "-x", "-y", "-z"])
         u = np.eye(3)["xyz".index(axis[-1])] * (-1.0 if axis[0] == "-" else 1.0)
@@ -201,7 +201,7 @@ def properties(
     turn: float,
     most: int | None = None,
 ) -> tuple[dict[str, Any], list[Surface]]:
-    """Return the arguments of `Solid`, by name, and closed surfaces of its parts with the lowest corner at height 0."""
+    """Return the arguments of `Solid`, and closed surfaces of its parts with the lowest corner at height 0."""
     if support is not None and tolerance is not None:
         raise InvalidBlock("{} is how a support is looked for: leave it out where {} is given", "tolerance", "support")
     found = parts_of(mesh, most)

@@ -1,4 +1,4 @@
-"""Closed surfaces from the triangles of a mesh, with a description of repairs, their moments and overlaps.
+"""Closed surfaces from the triangles of a mesh, with repairs, moments and overlaps.
 
 The inside of a surface is defined if its triangles form a cycle: every edge is traversed equally often in both
 directions.
@@ -43,7 +43,7 @@ def joined(name: str, vertices: Floats, faces: Integers) -> Surface:
     _, first, of_place = np.unique(places, axis=0, return_index=True, return_inverse=True)
     three = of_place.reshape(-1)[faces]
     kept = three[(three[:, 0] != three[:, 1]) & (three[:, 1] != three[:, 2]) & (three[:, 2] != three[:, 0])]
-    # Each triangle starts with its smallest index, so that triangles of the same orientation are equal.
+    # Starting with the smallest index, triangles of one orientation are equal.
     turned = np.take_along_axis(kept, (np.argmin(kept, axis=1)[:, None] + np.arange(3)) % 3, axis=1)
     kept = kept[np.sort(np.unique(turned, axis=0, return_index=True)[1])]
     edges, _, _, pairs = _shared(kept)
@@ -102,7 +102,7 @@ def _pieces(surfaces: Sequence[Surface], labels: Sequence[Integers]) -> tuple[In
 
 
 def _said(cavities: Floats, flipped: Flags) -> Iterator[str]:
-    """Describe cavities, with volumes in m^3, and the other pieces that were or were not turned."""
+    """Describe cavities, with volumes in m^3, and other turned pieces."""
     if flipped.all() and len(flipped):
         yield "normals pointed inwards: the surface was turned inside out"
     if len(cavities):
@@ -215,7 +215,7 @@ class Moments(NamedTuple):
 
 
 def signed_volumes(vertices: Floats, faces: Integers) -> Floats:
-    """Return the volume between each triangle and the middle of all corners, positive if its normal points outwards."""
+    """Return the volume between each triangle and the middle, positive if its normal points outwards."""
     one, two, three = (vertices[faces[:, k]] - _middle(vertices) for k in range(3))
     return np.asarray(np.einsum("ij,ij->i", one, np.cross(two, three)) / 6.0)
 
@@ -255,7 +255,7 @@ def _middle(vertices: Floats) -> Floats:
 
 
 def overlaps(surfaces: Sequence[Surface]) -> tuple[str, ...]:
-    """Return a note on the common volume of pieces of a mesh, by sampling the overlaps of their bounding boxes.
+    """Return a note on the common volume of pieces, by sampling overlaps of bounding boxes.
 
     The sum of the winding numbers of closed surfaces, including cavities, equals the number of bodies at a point.
     """

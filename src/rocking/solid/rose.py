@@ -1,4 +1,4 @@
-"""Resistance of a body in every direction: uplift, frequency parameter and slenderness against the azimuth."""
+"""Resistance of a body in every direction."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def checked_azimuths(azimuths: ArrayLike | None) -> Floats:
 def rose_of(
     polygon: Floats, height: float, inertia: Floats, gravity: float, azimuths: Floats, description: str
 ) -> Rose:
-    """Return the rose from the support about the centre of mass, its height, m, and inertia divided by mass, m^2."""
+    """Return the rose from the support about the centre of mass, its height, m, and `inertia_over_mass`, m^2."""
     import xarray as xr
 
     here, there = (polygons.extents(polygon, turned) for turned in (azimuths, azimuths + 180.0))

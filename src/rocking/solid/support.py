@@ -18,10 +18,10 @@ from rocking.errors import InvalidBlock
 from rocking.motion.processing import sine_cosine
 from rocking.solid.repair import Surface
 
-#: Distance from the outermost corner, relative to the size of the polygon, within which corners are on one edge.
+#: Largest distance from the outermost corner, relative to the polygon, of corners on one edge.
 _ON_EDGE: Final = 1e-6
 
-#: Largest number of bands. Each has a section just above its lower end and one just below its upper end.
+#: Largest number of bands, each with sections just above its lower and just below its upper end.
 _BANDS: Final = 120
 
 
@@ -85,7 +85,7 @@ def extents(polygon: Floats, azimuths: ArrayLike) -> Extent:
 
 
 def edges(polygon: Floats) -> tuple[Floats, Floats]:
-    """Return the azimuths of the outward normals of edges, degrees, and the distances of edges from the origin, m."""
+    """Return the azimuths of outward normals of edges, degrees, and distances of edges from the origin, m."""
     along = np.roll(polygon, -1, axis=0) - polygon
     outward = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1, keepdims=True)
     azimuth = np.mod(np.rad2deg(np.arctan2(outward[:, 0], outward[:, 1])), 360.0)
@@ -106,7 +106,7 @@ class Sections(NamedTuple):
 
 
 def sections_of(surfaces: Sequence[Surface]) -> Sections:
-    """Return sections of a body at the heights of all or some of its corners, from closed surfaces."""
+    """Return sections of closed surfaces at the heights of all or some corners."""
     corners = np.unique(np.concatenate([np.unique(each.vertices[each.faces, 2]) for each in surfaces]))
     size = float(corners[-1] - corners[0])
     first = np.unique(np.rint((corners - corners[0]) * (10.0 * _BANDS / size)), return_index=True)[1]
