@@ -1,4 +1,4 @@
-"""What rocks: one block, or many as a struct of arrays; free, or held back."""
+"""Rocking blocks, single or as arrays, free or restrained."""
 
 from rocking.block.bodies import Blocks
 from rocking.block.restrained import RestrainedBlock
@@ -6,7 +6,7 @@ from rocking.block.restraints import Damper, Load, Restitution, Restraint, Sprin
 from rocking.block.sides import Side, housner_restitution, impact_restitution, one_sided_restitution
 from rocking.block.single import Block, one_block
 
-#: The same class: arrays of terms say what restrains them.
+#: The same class, because restraints are arrays of terms.
 RestrainedBlocks = Blocks
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""Any number of blocks as a struct of arrays: all that a kernel needs."""
+"""Blocks as a struct of arrays, the input of kernels."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from rocking.kernels import state
 
 _NAMES: Final = ("p", "alpha", "restitution")
 
-#: Terms of restraints on each side, and their values without one; and whether a block rocks to side + only.
+#: Terms of restraints on each side with their default values, and `one_sided`.
 _TERMS: Final = {**Terms()._asdict(), "one_sided": 0.0}
 _UNITS: Final = {
     "p": "rad/s", "alpha": "rad", "damping": "1/s", "opening": "m", "stiffness": "1/m", "yields": "m", "slack": "m",
     "restitution_slope": "s/rad",
 }  # fmt: skip
 
-#: Powers of a factor on p by which a block of the same shape differs; all else stays.
+#: Exponents of the factor on p in the terms of a resized block; other terms do not change.
 _POWERS: Final = {
     "damping": 1, "stiffness": 2, "opening": -2, "yields": -2, "slack": -2, "restitution_slope": -1,
 }  # fmt: skip
@@ -39,7 +39,7 @@ _POWERS: Final = {
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """Any number n of blocks, each array of shape (n, 2): side +, side -.
+    """Any number n of blocks, as arrays of shape (n, 2): side +, side -.
 
     Arguments broadcast against each other: a number, shape (n,) for symmetric blocks, or shape (n, 2).
 
@@ -48,25 +48,30 @@ class Blocks:
     p, alpha : array_like
         Frequency parameters, rad/s, and slendernesses, rad.
     restitution : array_like, optional
-        Factors on the angular speed on leaving a side. By default those that conserve angular momentum: Housner's from
-        `alpha` where both sides are equal, else of the one rigid body whose sides have these p and alpha.
+        Factors on the angular speed on leaving a side. The default conserves angular momentum: Housner's value from
+        `alpha` if both sides are equal, otherwise the value of the only rigid body with these p and alpha.
     gravity : float
         Acceleration of gravity, m/s^2.
     **terms : array_like
-        Terms of restraints by name, as `parameters` of restrained blocks returns them.
+        Terms of restraints by name, as returned by `parameters` of restrained blocks.
 
     Attributes
     ----------
     terms : dict of str to ndarray
-        Terms of restraints of blocks that restraints hold, that lean, or that rock one way; of free ones none. Of a
-        block that rocks to side + only, `one_sided` is 1, and all of its parameters are those of side +, twice.
+        Terms of blocks with restraints, a lean or a single side; empty for free blocks. For a one-sided block
+        `one_sided` is 1, and both columns of all parameters contain the values of side +.
     axes : dict of str to ndarray, or None
-        Of a grid its axes p (rad/s), alpha (rad) and, where it was given, restitution; the last one varies fastest.
+        Axes of a grid: p (rad/s), alpha (rad) and restitution if it was an argument. The last one varies fastest.
 
     Raises
     ------
     InvalidBlock
-        If a value is out of its range, or no restitution follows from p and alpha; the message says which block.
+        If a value is out of range, or p and alpha determine no restitution. The message names the block.
+
+    See Also
+    --------
+    Block : Single free block.
+    RestrainedBlock : Single restrained block.
 
     Examples
     --------
@@ -114,7 +119,7 @@ class Blocks:
         self._fill(g, {name: np.array(values) for name, values in arrays.items()})
 
     def _fill(self, gravity: float, arrays: Mapping[str, Floats], axes: dict[str, Floats] | None = None) -> Blocks:
-        """Set all attributes, sound arrays of shape (n, 2) that nobody can change then."""
+        """Set all attributes from valid arrays of shape (n, 2), which become read-only."""
         held = {name: np.ascontiguousarray(values) for name, values in arrays.items()}
         for values in held.values():
             values.flags.writeable = False
@@ -131,25 +136,25 @@ class Blocks:
         restitution: ArrayLike | None = None,
         gravity: float = STANDARD_GRAVITY,
     ) -> Blocks:
-        """Symmetric blocks for every combination of p, alpha and restitution, the last one varying fastest.
+        """Create symmetric blocks for every combination of p, alpha and restitution; the last one varies fastest.
 
         Parameters
         ----------
         alpha : float or sequence of float
             Slendernesses, rad.
         p : float or sequence of float
-            Frequency parameters, rad/s; or give `size`.
+            Frequency parameters, rad/s. Alternative to `size`.
         size : float or sequence of float
-            Half diagonals R of rectangular blocks, m: p = sqrt(3 g/(4 R)); or give `p`.
+            Half diagonals R of rectangular blocks, m: p = sqrt(3 g/(4 R)). Alternative to `p`.
         restitution : float or sequence of float, optional
-            Restitutions; Housner's from each alpha by default.
+            Restitutions; by default Housner's value for each alpha.
         gravity : float
             Acceleration of gravity, m/s^2.
 
         Returns
         -------
         Blocks
-            With its `axes`.
+            Blocks with `axes`.
         """
         given = {"p": rates_of(p, size, gravity), "alpha": alpha}
         if restitution is not None:
@@ -163,10 +168,10 @@ class Blocks:
 
     @classmethod
     def of(cls, blocks: Blocks | Block | RestrainedBlock | Iterable[Block | RestrainedBlock]) -> Blocks:
-        """Gather single blocks, all under the same gravity; what is gathered already stays as it is.
+        """Gather single blocks with the same gravity. `Blocks` are returned unchanged.
 
-        Arrays decide all motion, but they do not contain sizes: a block that is taken out again has those of a
-        rectangle, as by `Block.from_parameters`, and so have its forces on the ground.
+        The arrays determine the motion, but do not contain sizes. Therefore an extracted block has the sizes and
+        ground forces of a rectangle, as from `Block.from_parameters`.
 
         Parameters
         ----------
@@ -176,12 +181,12 @@ class Blocks:
         Returns
         -------
         Blocks
-            In their order.
+            Blocks in the same order.
 
         Raises
         ------
         InvalidBlock
-            If there is none, one is no block, or their gravities differ.
+            If there are no blocks, an item is not a block, or gravities differ.
         """
         if isinstance(blocks, Blocks):
             return blocks
@@ -209,7 +214,7 @@ class Blocks:
         return {"p": self.p, "alpha": self.alpha, "restitution": self.restitution, **self.terms}
 
     def parameters(self) -> Mapping[str, tuple[Floats, str]]:
-        """Return p, alpha and restitution with their units, by name; of restrained blocks also the terms."""
+        """Return p, alpha, restitution and the terms of restrained blocks, with units, by name."""
         return {name: (values, _UNITS.get(name, "1")) for name, values in self._arrays().items()}
 
     def speed_limits(self, share: float) -> Floats:
@@ -217,7 +222,7 @@ class Blocks:
         return share * self.p * self.alpha
 
     def kernel_records(self, model: Model, limits: Floats) -> state.Records:
-        """Return every block as kernels take it (`kernels.state.BLOCK`), shape (n,)."""
+        """Return records for kernels (`kernels.state.BLOCK`), shape (n,)."""
         p, alpha = self.p, self.alpha
         made = state.records(len(self), state.BLOCK)
         stiffness, cosine = p * p, np.cos(alpha)
@@ -234,7 +239,7 @@ class Blocks:
         return made
 
     def _add_terms(self, made: state.Records, model: Model) -> None:
-        """Add what restraints do to records of free blocks."""
+        """Add terms of restraints to records."""
         term, p, sine, cosine = self.terms, self.p, made["sine"], made["cosine"]
         one_way = term["one_sided"] > 0.0
         made["next_side"][one_way] = 0
@@ -246,7 +251,7 @@ class Blocks:
         made["damping"] = term["damping"]
         at_zero = term["sine"] * sine + term["cosine"] * cosine  # of the moment, and its slope by -u
         slope = term["sine"] * cosine - term["cosine"] * sine
-        # A moment that only a tendon without prestress makes is zero there, whatever rounding says.
+        # The moment of a tendon without prestress is zero here apart from rounding.
         at_zero[np.abs(at_zero) <= 1e-14 * (np.abs(term["sine"] * sine) + np.abs(term["cosine"] * cosine))] = 0.0
         across = 1.0 if model == "linear" else cosine  # of the gain over p^2
         made["restraint_threshold"] = (at_zero + term["prestress"]) / across
@@ -255,7 +260,7 @@ class Blocks:
         else:
             made["added_weight"], made["added_push"] = term["sine"], term["cosine"]
         made["yielding"] = np.any(term["stiffness"] > 0.0, axis=1)
-        if np.any(made["yielding"]):  # elastic as such a tendon is at first
+        if np.any(made["yielding"]):  # at first such a tendon is elastic
             for name in ("added_weight", "added_push", "prestress", "restraint_threshold"):
                 made[f"base_{name.removeprefix('added_')}"] = made[name]
             made["tendon"] = p * p * term["stiffness"]
@@ -273,12 +278,12 @@ class Blocks:
 
     @property
     def stops(self) -> Floats:
-        """Rotation at which each stands, for each side: zero."""
+        """Rotation at which each block stands on each side: zero."""
         return np.zeros((len(self), 2))
 
     @property
     def is_symmetric(self) -> bool:
-        """Whether both sides of every block are equal, and it rocks to both."""
+        """Whether all blocks have two equal sides."""
         even = all(np.array_equal(values[:, 0], values[:, 1]) for values in self._arrays().values())
         return even and not np.any(self.terms.get("one_sided", 0.0))
 
@@ -313,7 +318,7 @@ class Blocks:
         return (self[index] for index in range(len(self)))
 
     def select(self, index: slice | NDArray[np.int64] | NDArray[np.bool_]) -> Blocks:
-        """Return some of the blocks: a slice, indices, or a mask."""
+        """Return some of the blocks, by a slice, indices, or a mask."""
         try:
             rows = np.arange(len(self))[index]
         except IndexError:
@@ -327,10 +332,10 @@ class Blocks:
         return Blocks.__new__(Blocks)._fill(self.gravity, chosen)
 
     def resized(self, factors: Floats) -> Blocks:
-        """Return blocks of the same shapes whose p is so many times theirs.
+        """Return blocks of the same shapes with p multiplied by these factors.
 
-        Lengths are then divided by the square of the factor, and forces of restraints keep their ratio to the weight:
-        of a tendon prestress, strength and stiffness times length, so that its strain at yield is the same, too.
+        Lengths are divided by the square of the factor. Forces of restraints keep their ratio to the weight: for a
+        tendon prestress, strength, and stiffness times length, so its yield strain is unchanged.
         """
         by = factors[:, None]
         terms = {name: values * by ** _POWERS.get(name, 0) for name, values in self.terms.items()}
@@ -338,7 +343,7 @@ class Blocks:
 
 
 def rates_of(p: ArrayLike | None, size: ArrayLike | None, gravity: float) -> ArrayLike:
-    """Return the frequency parameters, rad/s, that are given by themselves, or by half diagonals, m, of rectangles."""
+    """Return frequency parameters, rad/s, from either argument."""
     if p is not None and size is None:
         return p
     if size is not None and p is None:
@@ -357,7 +362,7 @@ def _columns(array: Floats) -> Floats:
 
 
 def _conserved(p: Floats, alpha: Floats) -> Floats:
-    """Restitutions that conserve angular momentum, of the rigid bodies whose sides have these p and alpha."""
+    """Compute the restitutions by angular momentum of rigid bodies with these p and alpha."""
     kept: Floats = 1.0 - 1.5 * np.sin(alpha) ** 2
     sided = np.flatnonzero((p[:, 0] != p[:, 1]) | (alpha[:, 0] != alpha[:, 1]))
     kept[sided], _ = rigid_bodies(p[sided], alpha[sided])

@@ -1,8 +1,8 @@
-"""What the engine moves: a body with one coordinate, or many of one kind. A block is one kind.
+"""Protocols of bodies with one coordinate, for example blocks.
 
-The equation of motion between impacts is that of `kernels.state.BLOCK`: u'' = lambda u - gain (threshold + side a/g),
-of any stiffness lambda, with damping or without, with one side or two, or between two stops. Everything above the
-kernels knows a body by these protocols alone.
+Between impacts (see `kernels.state.BLOCK`), u'' = lambda u - gain (threshold + side a/g), with any stiffness lambda,
+with or without damping, with one or two sides, or between two stops. Everything above the kernels uses only these
+protocols.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from rocking.kernels.state import Records
 
 
 class Coordinate(NamedTuple):
-    """How texts, columns and figures name the coordinate of a body.
+    """Names of the coordinate of a body in texts, columns and figures.
 
     Attributes
     ----------
     name, rate, acceleration : str
-        Names of the coordinate and its rates, as "rotation", "angular_velocity" and "angular_acceleration".
+        Names of the coordinate and its rates, for example "rotation", "angular_velocity" and "angular_acceleration".
     unit : str
         Unit of the coordinate.
     limit : str
-        Name of the value at which the body is in unstable balance, as "slenderness"; empty where there is none.
+        Name of the coordinate of the unstable balance, for example "slenderness"; empty if there is none.
     """
 
     name: str
@@ -35,19 +35,19 @@ class Coordinate(NamedTuple):
     limit: str = ""
 
 
-#: Forces of the ground on a body over its weight, horizontal and vertical: from the coordinate and its two rates, from
-#: the ground acceleration over g (horizontal, vertical), from the side (0, 1, or -1 at rest), and from the elongation
-#: of a tendon that yields beyond its plastic one, m (0 where there is none); arrays of one shape.
+#: Ratio of the ground forces on a body to its weight, horizontal and vertical. Arguments (arrays of one shape): the
+#: coordinate and its two rates, the ratio of the ground acceleration to g (horizontal, vertical), the side (0, 1, or
+#: -1 at rest), and the elongation of a yielding tendon beyond its plastic elongation, m (0 without such a tendon).
 ContactLaw = Callable[[tuple[Floats, Floats, Floats], tuple[Floats, Floats], Integers, Floats], tuple[Floats, Floats]]
 
 
 @runtime_checkable
 class Body(Protocol):
-    """One body, as simulations and responses know it."""
+    """Single body, as used by simulations and responses."""
 
     @property
     def description(self) -> str:
-        """What it is, in words."""
+        """Description of the body."""
 
     @property
     def gravity(self) -> float:
@@ -55,41 +55,42 @@ class Body(Protocol):
 
     @property
     def coordinate(self) -> Coordinate:
-        """Its coordinate."""
+        """Names and unit of the coordinate."""
 
     @property
     def sides(self) -> Sequence[object]:
-        """Its sides, one or two; the text of each states its parameters."""
+        """One or two sides, whose texts contain the parameters."""
 
     @property
     def balance(self) -> tuple[float, float]:
-        """Coordinate of the unstable balance on each side; infinite where there is none."""
+        """Coordinate of the unstable balance on each side; infinite if there is none."""
 
     @property
     def stops(self) -> tuple[float, float]:
-        """Coordinate at which it touches the ground on each side; of one side the second is not used."""
+        """Coordinate of the ground contact on each side; the second is unused for a single side."""
 
     @property
     def contact(self) -> ContactLaw | None:
-        """Forces of the ground; None where nothing is known of them."""
+        """Forces of the ground; None if they are not available."""
 
     def uplift_thresholds(self, model: Model = "nonlinear") -> tuple[float, float]:
-        """Return accelerations (m/s^2) that lift it: to side + when -a passes the first, to side - when a the second.
+        """Return accelerations, m/s^2, that lift the body to side + (if -a exceeds the first) and side - (if a does).
 
-        Of a block they are g tan(alpha), or g alpha in the linear model; infinite where there is no such side.
+        For a block they are g tan(alpha), or g alpha in the linear model. They are infinite for a side that does not
+        exist.
         """
 
     def alone(self) -> Bodies:
-        """Return bodies of which it is the only one: of a block `rocking.Blocks`."""
+        """Return bodies that contain only this one, for a block `rocking.Blocks`."""
 
 
 @runtime_checkable
 class Bodies(Protocol):
-    """Any number n of bodies of one kind under one gravity."""
+    """Any number n of bodies of one kind with the same gravity."""
 
     @property
     def kind(self) -> str:
-        """Name of the kind, by which `KINDS` finds it."""
+        """Name of the kind, the key in `KINDS`."""
 
     @property
     def gravity(self) -> float:
@@ -97,47 +98,47 @@ class Bodies(Protocol):
 
     @property
     def restitution(self) -> Floats:
-        """Factors on the speed on leaving each side, shape (n, 2); of one side twice the same."""
+        """Factors on the speed on leaving each side, shape (n, 2), equal for a single side."""
 
     @property
     def stops(self) -> Floats:
-        """Coordinates at which each touches the ground, as `Body.stops`, shape (n, 2)."""
+        """Coordinates of the ground contact, as `Body.stops`, shape (n, 2)."""
 
     @property
     def is_symmetric(self) -> bool:
-        """Whether a motion and its mirror image move every body to mirror images; never one of a single side."""
+        """Whether mirrored ground motion mirrors all responses; False for a single side."""
 
     def __len__(self) -> int:
-        """Return their number."""
+        """Return the number of bodies."""
 
     def __getitem__(self, index: int) -> Body:
-        """Return one of them."""
+        """Return one body."""
 
     def select(self, index: slice | Integers) -> Self:
-        """Return some of them, by a slice, flat array of indices, or mask; `InvalidBlock` if it is none of these."""
+        """Return bodies by a slice, flat array of indices, or mask; otherwise raise `InvalidBlock`."""
 
     def parameters(self) -> Mapping[str, tuple[Floats, str]]:
-        """Return what they are made from, by name: arrays of shape (n, 2), and units."""
+        """Return the parameters by name: arrays of shape (n, 2), and units."""
 
     def speed_limits(self, share: float) -> Floats:
-        """Return a share of the speed that is natural to each side, shape (n, 2): of a block p alpha, rad/s."""
+        """Return a share of the characteristic speed of each side, shape (n, 2): p alpha for a block, rad/s."""
 
     def kernel_records(self, model: Model, limits: Floats) -> Records:
-        """Return them as kernels take them (`kernels.state.BLOCK`), with the limits of a treatment, shape (n, 2)."""
+        """Return records for kernels (`kernels.state.BLOCK`), with speed limits of a treatment, shape (n, 2)."""
 
 
 class Kind(Protocol):
-    """What makes bodies of a kind: their class."""
+    """Class that creates bodies of one kind."""
 
     def __call__(self, *nothing: Any, **parameters: Any) -> Bodies:
-        """Make them of their `parameters`, by name, and of gravity; studies read their inputs so."""
+        """Create bodies from their `parameters`, by name, and gravity."""
 
     def of(self, bodies: Any, /) -> Bodies:
-        """Gather single ones."""
+        """Gather single bodies."""
 
 
-#: Classes of many bodies by name: a registry, so that a body need not import the class that imports it.
+#: Registry of classes of many bodies, which avoids circular imports.
 KINDS: Final[dict[str, Kind]] = {}
 
-#: Classes of single bodies by name, for the same reason.
+#: Registry of classes of single bodies.
 SINGLE: Final[dict[str, Callable[..., Any]]] = {}

@@ -1,4 +1,4 @@
-"""A block that is held back by restraints, leans, or rocks one way only."""
+"""Blocks with restraints, a lean, or a single side."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from rocking.core.bisection import bisected
 from rocking.core.constants import MODELS, Model
 from rocking.errors import InvalidBlock, InvalidOption
 
-#: Rotations at which the balance is looked for, on each side.
+#: Number of rotations in the search for the balance on each side.
 _LOOKS: Final = 512
 
 _SOME: Final = "Tendon, Spring, Damper, Thrust or Load"
@@ -29,27 +29,33 @@ _ROTATION: Final = Coordinate("rotation", "angular_velocity", "angular_accelerat
 
 @dataclass(frozen=True, repr=False)
 class RestrainedBlock(Rocking):
-    """A block that restraints hold back, that leans, or that rocks one way only, as a facade against its side walls.
+    """Block with restraints, a lean, or a single side, such as a facade against its side walls.
 
     Parameters
     ----------
     block : Block
-        The block by itself. With restraints it needs its `mass`.
+        Free block. Restraints require its `mass`.
     *restraints : Restraint
         `Tendon`, `Spring`, `Damper`, `Thrust`, `Load`.
     one_sided : bool
-        Whether it rocks to side + only, and bounces back from what stands behind it with `restitution` times its speed.
+        Whether the block rocks to side + only and bounces back from a support behind it with `restitution` times its
+        speed.
     lean : float
-        Angle by which it stands out of plumb to side +, rad.
+        Angle by which the block stands out of plumb to side +, rad.
     restitution : float, pair or Restitution, optional
-        Factor on the angular speed at an impact, or the law by which it varies, a `Restitution`; that of
-        the `sides` is then the largest. By default that of the block; with a load that
-        follows, the one that conserves angular momentum; of a one-sided block `one_sided_restitution`.
+        Factor on the angular speed at an impact, or a law, whose largest value the `sides` then contain. The default
+        is the restitution of the block, for one-sided blocks `one_sided_restitution`. With a load that follows, it
+        conserves angular momentum.
 
     Raises
     ------
     InvalidBlock
-        If there is no mass for the restraints, the block does not stand, or there is no such restraint.
+        If the mass is missing, the block does not stand, or a restraint is not a `Restraint`.
+
+    See Also
+    --------
+    Block.one_sided : Create a rectangular block with a single side.
+    Restitution : Law by which the restitution varies.
 
     Notes
     -----
@@ -57,8 +63,8 @@ class RestrainedBlock(Rocking):
 
         u'' = -p^2 [(W + s) sin(alpha - u) + (A + c) cos(alpha - u) + h cos(u/2) + k u] - d u'
 
-    where s, c, h, k and d are sums over the restraints. The linear model is that equation to first order in u, with
-    alpha for sin(alpha) and 1 for cos(alpha) in the block's own part (derived in the documentation).
+    where s, c, h, k and d are sums over the restraints. The linear model is this equation to first order in u, with
+    alpha for sin(alpha) and 1 for cos(alpha) in the terms of the block itself (derived in the documentation).
 
     Examples
     --------
@@ -130,7 +136,7 @@ class RestrainedBlock(Rocking):
             )
 
     def _rows(self) -> list[tuple[float, ...]]:
-        """Parameters and terms of both sides, as `Blocks` has them; without terms where it is a free block."""
+        """Return parameters and, unless free, terms of both sides as stored in `Blocks`."""
         rows = self.block._rows()
         if not self.is_one_sided and self._terms == (Terms(), Terms()):
             return rows
@@ -144,17 +150,17 @@ class RestrainedBlock(Rocking):
 
     @property
     def sides(self) -> Sequence[Side]:
-        """Sides of the block as it stands, with the loads that follow it; one of a block that rocks one way."""
+        """Sides of the standing block including loads that follow; only side + if one-sided."""
         return self.block.sides[:1] if self.is_one_sided else self.block.sides
 
     @property
     def balance(self) -> tuple[float, float]:
-        """Rotation of the unstable balance on each side, rad; infinite where the restraints hold it at any rotation."""
+        """Rotation of the unstable balance on each side, rad; infinite if restraints hold it at any rotation."""
         plus, minus = map(_balance_of, self.block.sides, self._terms)
         return plus, math.inf if self.is_one_sided else minus
 
     def uplift_thresholds(self, model: Model = "nonlinear") -> tuple[float, float]:
-        """Ground accelerations, m/s^2, that lift it to side + (when -a passes the first) and to side -."""
+        """Return the ground accelerations, m/s^2, that lift the block to side + (if -a exceeds it) and to side -."""
         checks.one_of(model, "model", InvalidOption, MODELS)
         made = self.alone().kernel_records(model, np.zeros((1, 2)))
         plus, minus = (self.gravity * (made["threshold"] + made["restraint_threshold"])[0]).tolist()
@@ -162,11 +168,11 @@ class RestrainedBlock(Rocking):
 
     @property
     def contact(self) -> ContactLaw | None:
-        """Forces of the ground over the weight of the block with the loads that follow it (see `rocking.block.body`).
+        """Ratio of the ground forces to the weight, including loads that follow (see `rocking.block.body`).
 
-        What stands behind a block of one side pushes it to side +, without friction, as far as that is needed while it
-        is at rest; so what is left for the ground is least then. None where the forces are not known: of a block that
-        was made of the arrays of `Blocks`.
+        The support behind a one-sided block at rest pushes it to side + without friction, as little as required.
+        Therefore the remaining ground force is smallest. None for a block from the arrays of `Blocks`, whose forces
+        are unknown.
         """
         return None if self.restraints is None else self._contact_forces
 
@@ -188,10 +194,10 @@ class RestrainedBlock(Rocking):
         return horizontal, vertical
 
     def tendons_at(self, largest: tuple[float, float], model: Model = "nonlinear") -> list[tuple[float, float, float]]:
-        """Return the largest elongation (m) and force (N) and the plastic elongation (m) of each tendon, in order.
+        """Return the largest elongation (m), largest force (N) and plastic elongation (m) of each tendon, in order.
 
-        `largest` is the largest rotation on each side, rad. The list is empty where restraints are not known one by
-        one.
+        `largest` is the largest rotation on each side, rad. The list is empty if the restraints are not
+        available.
         """
         plus, minus = largest if model == "linear" else (2.0 * math.sin(0.5 * u) for u in largest)
         pivots = _pivots_of(self.block, self.lean, self.restraints or ())
@@ -200,7 +206,7 @@ class RestrainedBlock(Rocking):
 
 
 def _listed(restraints: Sequence[object]) -> list[str]:
-    """Restraints in words, if there are some: with a spring of ..., a load of ... and a tendon of ..."""
+    """Describe the restraints: with a spring of ..., a load of ... and a tendon of ..."""
     if not restraints:
         return []
     *first, last = [f"a {each}" for each in restraints]
@@ -208,7 +214,7 @@ def _listed(restraints: Sequence[object]) -> list[str]:
 
 
 def _check(restraints: Sequence[object], block: Block) -> None:
-    """Refuse what is no restraint, and restraints of a block without a mass."""
+    """Reject invalid restraints, and restraints of a block without a mass."""
     for each in restraints:
         if not isinstance(each, Restraint):
             raise InvalidBlock(f"{checks.shown(each)} is no restraint: give {_SOME}, one by one")
@@ -217,7 +223,7 @@ def _check(restraints: Sequence[object], block: Block) -> None:
 
 
 def _with_loads(block: Block, loads: Sequence[Load], restitution: float | Sequence[float] | None) -> Block:
-    """Return the rigid body of a block and the loads that follow it, with a restitution or that of angular momentum."""
+    """Return a block combined with the loads that follow it, by default conserving angular momentum."""
     if not loads:
         return block
     assert block.mass is not None
@@ -265,12 +271,12 @@ def _tilted(block: Block, lean: float) -> Block:
 
 
 def _following(restraints: Sequence[Restraint]) -> list[Load]:
-    """Return the loads that follow the block, of all that restrains it."""
+    """Return the loads that follow the block."""
     return [each for each in restraints if isinstance(each, Load) and each.follows]
 
 
 def _pivots_of(block: Block, lean: float, restraints: Sequence[Restraint]) -> tuple[Pivot, Pivot]:
-    """Both sides of a block that leans, with the loads that follow it, as its restraints see them."""
+    """Return both pivots of a leaning block with the loads that follow it."""
     mass = math.nan if block.mass is None else block.mass
     shift = sum(load.mass * load.offset for load in _following(restraints)) / mass
     plus, minus = (
@@ -284,9 +290,9 @@ def _pivots_of(block: Block, lean: float, restraints: Sequence[Restraint]) -> tu
 
 
 def _balance_of(side: Side, terms: Terms) -> float:
-    """First rotation at which what brings a block back has become nothing, without ground motion, rad.
+    """Return the first rotation without restoring moment or ground motion, rad.
 
-    A tendon that yields does so for the first time.
+    A yielding tendon yields for the first time.
     """
     if terms[:-3] == Terms()[:-3]:
         return side.alpha

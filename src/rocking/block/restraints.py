@@ -1,4 +1,4 @@
-"""Tendons, springs, dampers, thrusts and loads as terms of the moment about the pivots of a block; laws of impacts."""
+"""Restraints as moments about the pivots, and laws of restitution."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from rocking.errors import InvalidBlock
 #: Force on a block to side + and up, N.
 Force = tuple[Floats | float, Floats | float]
 
-#: Largest seed: whole numbers up to it are floats, too.
+#: Largest seed. All whole numbers up to it are exact as floats.
 _LARGEST_SEED: Final = 2**53
 
 
 class Terms(NamedTuple):
-    """What restraints add on one side, at a rotation u and a rate u'; a law of restitution, too.
+    """Terms of restraints and of a law of restitution on one side, at a rotation u and a rate u'.
 
-    Their moment about the pivot, positive where it brings the block back, divided by weight times R, is
+    The moment of the restraints about the pivot, positive if it restores the block, divided by weight times R, is
 
         sine sin(alpha - u) + cosine cos(alpha - u) + prestress cos(u/2) + spring u + (damping/p^2) u'
 
-    and that of a tendon that yields.
+    plus the moment of a yielding tendon.
     """
 
     sine: float = 0.0
@@ -41,97 +41,102 @@ class Terms(NamedTuple):
     stiffness: float = 0.0  # its stiffness times that distance, divided by weight times R, 1/m
     yields: float = math.inf  # elongation beyond the plastic one at which it yields, m
     slack: float = 0.0  # elongation above which it is taut, m
-    restitution_least: float = 0.0  # lower bound of a restitution that varies
-    restitution_slope: float = 0.0  # how much it falls per angular speed of the impact, s/rad
-    restitution_seed: float = -1.0  # by which it is drawn at each impact; -1 where it is not
+    restitution_least: float = 0.0  # lower bound of a varying restitution
+    restitution_slope: float = 0.0  # decrease per angular speed of the impact, s/rad
+    restitution_seed: float = -1.0  # seed of a random restitution; -1 if not random
 
     def plus(self, other: Terms) -> Terms:
-        """Return both together; one of them at most has a tendon that yields, and only this one a restitution."""
+        """Return the sum, of which one operand may have a yielding tendon, and only `self` a law of restitution."""
         tendon = self if other.yields == math.inf else other
         sums = (a + b for a, b in zip(self[:5], other[:5], strict=True))
         return Terms._make((*sums, *tendon[5:9], *self[9:]))
 
 
 class Pivot(NamedTuple):
-    """One side of a standing block, as restraints see it."""
+    """Geometry of one side of a standing block, for restraints."""
 
     sign: float  # +1 on side +, -1 on side -
-    alpha: float  # slenderness as it stands, rad
+    alpha: float  # slenderness of the standing block, rad
     lean: float  # angle by which the block leans to this side, rad
-    distance: float  # of the pivot along the base from the centre of mass without loads that follow, m
+    distance: float  # distance along the base to the centre of mass without loads that follow, m
     p: float  # rad/s
     moment: float  # weight times R, N m
     gravity: float  # m/s^2
 
     def arms(self, height: float, offset: float) -> tuple[float, float]:
-        """Distance from the pivot inwards and height above it, m, of a point of the standing block.
+        """Return the inward distance from the pivot and the height above it, m, of a point of the standing block.
 
-        The point is at a height above the base and at an offset to side + from the centre of mass of the block without
-        loads, both along the block's own axes.
+        The height is above the base, the offset from the centre of mass without loads to side +, both along the axes
+        of the block.
         """
         inwards = self.distance - self.sign * offset
         c, s = math.cos(self.lean), math.sin(self.lean)
         return inwards * c - height * s, height * c + inwards * s
 
     def turned(self, inwards: float, upwards: float) -> tuple[float, float]:
-        """Return ``rho sin`` and ``rho cos`` of the angle of a point from the line of the centre of mass, m."""
+        """Return ``rho sin`` and ``rho cos`` of the angle of a point from the line to the centre of mass, m."""
         c, s = math.cos(self.alpha), math.sin(self.alpha)
         return inwards * c - upwards * s, upwards * c + inwards * s
 
 
 class Restraint(ABC):
-    """Force or moment on a block, as a term for each side."""
+    """Force or moment on a block, as terms for each side."""
 
     @abstractmethod
     def _terms(self, pivot: Pivot) -> Terms:
-        """Return what it adds while the block leans to a side."""
+        """Return the terms while the block leans to one side."""
 
     def _acting(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats) -> Force:
-        """Return the force on the block to side + and up, N; a spring and a damper have none.
+        """Return the force on the block to side + and up, N, which is zero for springs and dampers.
 
-        ``side`` is -1 at rest, ``stretch`` the elongation of a tendon that yields beyond its plastic one, m.
+        ``side`` is -1 at rest, ``stretch`` the elongation of a yielding tendon beyond its plastic elongation, m.
         """
         return 0.0, 0.0
 
     def _finite(self, *names: str) -> None:
-        """Check numbers and keep them as floats."""
+        """Check that attributes are finite and convert them to floats."""
         for name in names:
             object.__setattr__(self, name, checks.finite(getattr(self, name), name, InvalidBlock))
 
     def _positive(self, name: str, unit: str) -> None:
-        """Check that a number is positive and keep it as a float."""
+        """Check that an attribute is positive and convert it to a float."""
         object.__setattr__(self, name, checks.positive(getattr(self, name), name, InvalidBlock, unit))
 
 
 @dataclass(frozen=True)
 class Tendon(Restraint):
-    """Elastic tendon through a duct in the block and the ground, unbonded, as long as the block stands it is vertical.
+    """Unbonded elastic tendon through a duct in the block and the ground, vertical while the block stands.
 
-    Where the block's base opens at the duct by 2 x sin(u/2), x being the duct's distance from the pivot, the tendon
-    becomes longer by that.
+    The elongation of the tendon is the opening of the base at the duct, 2 x sin(u/2), with the distance x of the duct
+    from the pivot.
 
     Parameters
     ----------
     stiffness : float
-        Force per elongation, N/m: of a bar E A/L.
+        Force per elongation, N/m; E A/L for a bar.
     prestress : float
         Force while the block stands, N.
     offset : float
-        Distance of the duct from the centre of mass of the block without loads, m, positive to side +. At a pivot's
-        distance it is at that toe, and does nothing while the block rocks about it.
+        Distance of the duct from the centre of mass of the block without loads, m, positive to side +. A tendon at a
+        pivot has no effect while the block rocks about this pivot.
     strength : float
-        Force at which it yields, N: it becomes longer for good then, and hangs slack when the block has come back.
+        Yield force, N. Yielding lengthens the tendon permanently, so it is slack after the block has returned.
 
     Raises
     ------
     InvalidBlock
-        If the stiffness or the prestress is negative, or both are zero, or the strength is not above the prestress.
+        If the stiffness or the prestress is negative, both are zero, or the strength does not exceed the prestress.
+
+    See Also
+    --------
+    RestrainedBlock : Block with restraints.
+    Spring : Rotational spring.
 
     Notes
     -----
-    The moment is x cos(u/2) T with the force T = prestress + stiffness 2 x sin(u/2): without prestress
-    stiffness x^2 sin(u), so that uplift is unchanged, and the slender block has the stiffness p^2 less
-    stiffness x^2/I, which may be negative (Makris and Vassiliou 2015; derived in the documentation).
+    The moment is x cos(u/2) T with the force T = prestress + stiffness 2 x sin(u/2). Without prestress it is stiffness
+    x^2 sin(u). Therefore uplift is unchanged, and the slender block has the stiffness p^2 minus stiffness x^2/I, which
+    may be negative (Makris and Vassiliou 2015; derived in the documentation).
 
     Examples
     --------
@@ -174,7 +179,7 @@ class Tendon(Restraint):
         return Terms(-stiff * math.cos(pivot.alpha), stiff * math.sin(pivot.alpha), self.prestress * x / pivot.moment)
 
     def _acting(self, pivots: tuple[Pivot, Pivot], rotation: Floats, side: Integers, stretch: Floats) -> Force:
-        """Return its pull, along the chord from its end in the block to that in the ground."""
+        """Return the force of the tendon, along the chord between its ends."""
         if self.strength == math.inf:
             x = np.where(side == 1, self._opening(pivots[1]), self._opening(pivots[0]))
             stretch = 2.0 * x * np.sin(0.5 * np.abs(rotation))
@@ -202,7 +207,7 @@ class Tendon(Restraint):
         return f"tendon of {', '.join(filter(None, parts))}{_at(self.offset) or ' at the centre of mass'}"
 
     def _opening(self, pivot: Pivot) -> float:
-        """Distance of the duct from the pivot, m."""
+        """Return the distance of the duct from the pivot, m."""
         x = pivot.distance - pivot.sign * self.offset
         if x < -1e-12 * pivot.distance:
             raise InvalidBlock(
@@ -221,7 +226,12 @@ class Spring(Restraint):
     Parameters
     ----------
     stiffness : float
-        Moment per rotation, N m/rad. A vertical spring of k N/m at a distance x from the pivot is a `Tendon`.
+        Moment per rotation, N m/rad. For a vertical spring of k N/m at a distance x from the pivot use a `Tendon`.
+
+    See Also
+    --------
+    RestrainedBlock : Block with restraints.
+    Tendon : Vertical tendon or spring.
 
     Examples
     --------
@@ -250,6 +260,10 @@ class Damper(Restraint):
     coefficient : float
         Moment per angular velocity, N m s/rad.
 
+    See Also
+    --------
+    RestrainedBlock : Block with restraints.
+
     Examples
     --------
     >>> Damper(200.0)
@@ -270,19 +284,24 @@ class Damper(Restraint):
 
 @dataclass(frozen=True)
 class Thrust(Restraint):
-    """Horizontal force of constant size, as of a vault on a wall; vertical ground motion does not change it.
+    """Constant horizontal force, such as the thrust of a vault on a wall, independent of vertical ground motion.
 
     Parameters
     ----------
     force : float
-        N, positive to side +.
+        Force, N, positive to side +.
     height, offset : float
-        Height above the base of the point where it acts, and offset of that point as of a `Load`, m.
+        Height above the base and offset (as of a `Load`) of the point of application, m.
 
     Raises
     ------
     InvalidBlock
-        If the force is zero, or the height not positive.
+        If the force is zero, or the height is not positive.
+
+    See Also
+    --------
+    RestrainedBlock : Block with restraints.
+    Load : Weight on the block.
 
     Examples
     --------
@@ -314,24 +333,28 @@ class Thrust(Restraint):
 
 @dataclass(frozen=True)
 class Load(Restraint):
-    """Weight on the block: one that moves with it, or one that only presses, as a floor that slides on a wall.
+    """Weight on the block that either moves with it or only presses on it, like a floor that slides on a wall.
 
     Parameters
     ----------
     mass : float
-        kg.
+        Mass, kg.
     height : float
-        Height of the point where it rests, above the base, m.
+        Height of the point of support above the base, m.
     offset : float
-        Distance of that point from the centre of mass of the block without loads, m, positive to side +.
+        Distance of this point from the centre of mass of the block without loads, m, positive to side +.
     follows : bool
-        Whether it moves with the block. One that does not presses with its weight, whatever the ground does, and its
-        own inertia does not count.
+        Whether the load moves with the block. Otherwise it presses with its static weight, without inertia.
 
     Raises
     ------
     InvalidBlock
-        If mass or height are not positive.
+        If the mass or the height is not positive.
+
+    See Also
+    --------
+    RestrainedBlock : Block with restraints.
+    Thrust : Constant horizontal force.
 
     Examples
     --------
@@ -351,7 +374,7 @@ class Load(Restraint):
         object.__setattr__(self, "follows", checks.flag(self.follows, "follows", InvalidBlock))
 
     def _terms(self, pivot: Pivot) -> Terms:
-        if self.follows:  # it is part of the block
+        if self.follows:  # part of the block
             return Terms()
         across, along = pivot.turned(*pivot.arms(self.height, self.offset))
         weight = self.mass * pivot.gravity / pivot.moment
@@ -367,27 +390,31 @@ class Load(Restraint):
 
 @dataclass(frozen=True)
 class Restitution:
-    """A law by which the restitution of a `RestrainedBlock` varies from impact to impact, between two bounds.
+    """Law by which the restitution of a `RestrainedBlock` varies between two bounds from impact to impact.
 
-    With a slope it falls in a straight line with the speed of the impact: max(least, largest - slope speed). With a
-    seed it is drawn at each impact, evenly between both, by Philox 2x32 with ten rounds.
+    With a slope the restitution decreases linearly with the speed of the impact: max(least, largest - slope speed).
+    With a seed it is drawn at each impact, uniformly between both bounds, by Philox 2x32 with ten rounds.
 
     Parameters
     ----------
     largest, least : float or pair
-        Bounds of the factor on the angular speed, in (0, 1]; a pair is (on leaving side +, on leaving side -). The
-        largest takes the place of the restitution of each `Side`.
+        Bounds of the factor on the angular speed, in (0, 1]. A pair is (on leaving side +, on leaving side -). The
+        largest value replaces the restitution of each `Side`.
     slope : float or pair
-        How much it falls per angular speed before the impact, s/rad, at least 0.
+        Decrease per angular speed before the impact, s/rad, at least 0.
     seed : int, optional
-        Whole number from 0 to 2^53. The factor depends on it and on the number of the impact alone: a body draws the
-        same ones whatever shakes it, and whether it is simulated alone or with others. Give bodies seeds of their own.
-        After a rest it goes on from the impacts that were resolved, of which a finer treatment has more.
+        Whole number from 0 to 2^53, preferably different for each body. The factor depends only on the seed and the
+        number of the impact. Therefore it is the same under any ground motion, for a body alone or among others. After
+        a rest the count continues from the resolved impacts, of which a finer treatment has more.
 
     Raises
     ------
     InvalidBlock
-        If a bound, the slope or the seed is out of its range, or there are both a slope and a seed.
+        If a bound, the slope or the seed is out of its range, or both a slope and a seed are given.
+
+    See Also
+    --------
+    RestrainedBlock : Block that accepts this law.
 
     References
     ----------
@@ -430,7 +457,7 @@ class Restitution:
                 raise InvalidBlock("a restitution either falls or is drawn: give a {} or a {}", "slope", "seed")
 
     def _terms(self, side: int) -> dict[str, float]:
-        """Return what is below the largest factor on leaving a side, as fields of `restraints.Terms`."""
+        """Return the law on leaving a side as fields of `Terms`, without the largest factor."""
         least, slope = (checked_pair(getattr(self, name), name)[side] for name in ("least", "slope"))
         seed = -1.0 if self.seed is None else float(self.seed)
         return {"restitution_least": least, "restitution_slope": slope, "restitution_seed": seed}
@@ -442,12 +469,12 @@ class Restitution:
 
 
 def _at(offset: float) -> str:
-    """Say where it is, if not at the centre of mass."""
+    """Describe a position off the centre of mass."""
     return f" {abs(offset):.5g} m to side {'+' if offset > 0.0 else '-'}" if offset else ""
 
 
 def _thousands(value: float, unit: str) -> str:
-    """Write a number with its unit: with kilo, mega or giga where it is large."""
+    """Format a number with its unit, if large with kilo, mega or giga."""
     for size, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
         if abs(value) >= size:
             return f"{value / size:.5g} {prefix}{unit}"

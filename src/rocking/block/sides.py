@@ -1,4 +1,4 @@
-"""The two sides of a block: bounds of their numbers, their restitution, and the rigid body behind both."""
+"""Sides of a block: bounds of parameters, restitution, and the rigid body with these sides."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from rocking.errors import InvalidBlock
 
 Number = TypeVar("Number", float, Floats)
 
-# Lowest and highest values, both included: far beyond any block, and far enough from the ends of double precision for
-# fourth powers of p, for the quotients of a motion's largest acceleration with gravity and slenderness, and for
-# products of all of them. Below the least restitution one impact is the end of rocking, to double precision.
+# Smallest and largest values, both included. They are far beyond any block, and far enough from the limits of double
+# precision for fourth powers of p, for the ratio of the largest acceleration of a motion to gravity and slenderness,
+# and for products of all these. Below the smallest restitution, one impact ends rocking, to double precision.
 _GRAVITY: Final = (1e-6, 1e6)
 _LENGTH: Final = (1e-20, 1e20)
 _MASS: Final = (1e-30, 1e30)
@@ -27,12 +27,12 @@ _LIMITS: Final = {
     "restitution": (1e-9, 1.0, "in (0, 1], at least 1e-09"),
 }
 
-#: Most points at which a base meets the ground in turn: far beyond, rounding is what is left of the loss.
+#: Largest number of contact points. Far beyond it, the loss is below rounding error.
 _MOST_POINTS: Final = 1_000_000
 
 
 def checked_parameter(value: float, name: str, *, origin: str = "", which: str = "") -> float:
-    """Return p, alpha or restitution of a side, or raise InvalidBlock; the message says where it is from, and whose."""
+    """Return p, alpha or restitution of a side, or raise InvalidBlock that names its origin and its block."""
     low, high, rule = _LIMITS[name]
     if not low <= value <= high:
         hint = checks.hint_of_degrees(value) if name == "alpha" else ""
@@ -42,7 +42,7 @@ def checked_parameter(value: float, name: str, *, origin: str = "", which: str =
 
 
 def checked_sides(values: Floats, name: str) -> Floats:
-    """Return p, alpha or restitution of blocks, shape (n, 2), or raise InvalidBlock for the first out of its range."""
+    """Return p, alpha or restitution, shape (n, 2), or raise InvalidBlock for the first one out of range."""
     low, high, _ = _LIMITS[name]
     bad = np.argwhere(~((values >= low) & (values <= high)))
     if len(bad):
@@ -79,15 +79,15 @@ def checked_pair(value: Any, name: str) -> tuple[float, float]:
 
 
 def housner_restitution(alpha: float) -> float:
-    """Restitution of a rectangular block that conserves angular momentum: 1 - 1.5 sin(alpha)^2 (Housner 1963)."""
+    """Compute the restitution of a rectangular block from angular momentum: 1 - 1.5 sin(alpha)^2 (Housner 1963)."""
     return 1.0 - 1.5 * math.sin(checks.finite(alpha, "alpha", InvalidBlock)) ** 2
 
 
 def one_sided_restitution(alpha: float) -> float:
-    """Restitution of a wall that rocks against transverse walls, by angular momentum at three impacts.
+    """Compute the restitution of a wall that rocks against transverse walls, from angular momentum at three impacts.
 
-    The wall meets the ground with its inner edge, then the transverse walls with its top, then the ground again
-    (Sorrentino, AlShawa and Decanini 2011). A measured value is better.
+    The wall hits the ground with its inner edge, the transverse walls with its top, and the ground again (Sorrentino,
+    AlShawa and Decanini 2011). A measured value is preferable.
 
     Parameters
     ----------
@@ -97,7 +97,12 @@ def one_sided_restitution(alpha: float) -> float:
     Returns
     -------
     float
-        The size of (1 - 1.5 sin(alpha)^2)^2 (1 - 1.5 cos(alpha)^2): 0.47 for a slenderness of 0.1.
+        Absolute value of (1 - 1.5 sin(alpha)^2)^2 (1 - 1.5 cos(alpha)^2): 0.47 for a slenderness of 0.1.
+
+    See Also
+    --------
+    Block.one_sided : Create a rectangular block with a single side.
+    housner_restitution : Compute the restitution of a free rectangular block.
 
     Examples
     --------
@@ -118,22 +123,22 @@ def impact_restitution(
     height: float | None = None,
     radius_of_gyration: float | None = None,
 ) -> tuple[float, float]:
-    """Restitution by angular momentum of a contact narrower than the base, or at several points in turn.
+    """Compute the restitution from angular momentum for a narrow contact or several contact points.
 
     Parameters
     ----------
     alpha : float, optional
-        Slenderness of a rectangular block, rad. Of another body give the three sizes below in its place.
+        Slenderness of a rectangular block, rad, instead of the three sizes below.
     contact : float
-        Where the impulse of the impact acts, as a share of the distance from below the centre of mass to the new pivot:
-        1 at the pivot as Housner has it, less where the contact is narrower or spread over a region.
+        Position of the impulse between the point below the centre of mass (0) and the new pivot (1, Housner). A
+        narrower or distributed contact has a smaller value.
     points : int
-        Number of points, evenly from the old pivot to the new one, at which the base meets the ground, one after the
-        other: 2 are the pivots alone.
+        Number of evenly spaced points, from the old to the new pivot, at which the base meets the ground in turn; 2
+        for the pivots only.
     distances : pair of float, optional
         Horizontal distances from the centre of mass to the pivots (side +, side -), m.
     height, radius_of_gyration : float, optional
-        Height of the centre of mass above the pivots and sqrt(I/m) about it, m.
+        Height of the centre of mass above the pivots and sqrt(I/m) about the centre of mass, m.
 
     Returns
     -------
@@ -143,15 +148,20 @@ def impact_restitution(
     Raises
     ------
     InvalidBlock
-        If a number is out of its range, there are both a slenderness and sizes or neither, or both a `contact` and
-        `points`, the body would not rock on, or a `contact` is so narrow that an uneven body would gain energy.
+        If a value is out of range, both or neither of slenderness and sizes are given, both `contact` and `points` are
+        given, the body would not continue to rock, or `contact` is so narrow that an uneven body would gain energy.
+
+    See Also
+    --------
+    housner_restitution : Compute the restitution with a contact at the pivot.
+    Block.from_pivots : Create a block from its pivots and its radius of gyration.
 
     Notes
     -----
-    With A = k^2 + h^2 and pivots at d_i and d_j from the centre of mass: e_i = (A - kappa d_i d_j)/(A + kappa d_j^2)
+    With A = k^2 + h^2 and pivots at d_i and d_j from the centre of mass, e_i = (A - kappa d_i d_j)/(A + kappa d_j^2)
     for a contact kappa (after Kalliontzis, Sritharan and Schultz 2016, whose formula is mostly quoted with kappa^2 in
-    the place of kappa: give the square of such a share); the product of (A + x y)/(A + y^2) over points x and their
-    successors y (after Ther and Kollar 2017). (Derived in the documentation.)
+    place of kappa; square such a value). For several points, e_i is the product of (A + x y)/(A + y^2) over points x
+    and their successors y (after Ther and Kollar 2017). (Derived in the documentation.)
 
     References
     ----------
@@ -187,7 +197,7 @@ def impact_restitution(
             f"angular momentum leaves this body a restitution of {min(kept):.3g}: it is too stocky to rock that way"
         )
     near, far = sorted(away)
-    ratio = math.sqrt((inertia + far * far) / (inertia + near * near))  # of speeds without a loss of energy
+    ratio = math.sqrt((inertia + far * far) / (inertia + near * near))  # ratio of the speeds without energy loss
     least = inertia * (ratio - 1.0) / (far * (far + ratio * near))
     if share < least:
         raise InvalidBlock(f"{{}} must be at least {least:.4g} for this body, which would gain energy", "contact")
@@ -195,7 +205,7 @@ def impact_restitution(
 
 
 def _on_leaving(away: Sequence[float], inertia: float, share: float, points: int) -> float:
-    """Factor on leaving the first of two pivots, from their distances and k^2 + h^2."""
+    """Compute the factor on leaving the first of two pivots, from their distances and k^2 + h^2."""
     if points == 2:
         return (inertia - share * away[0] * away[1]) / (inertia + share * away[1] ** 2)
     step = (away[0] + away[1]) / (points - 1)
@@ -211,7 +221,7 @@ def _on_leaving(away: Sequence[float], inertia: float, share: float, points: int
 
 @dataclass(frozen=True)
 class Side:
-    """One side of a block: what counts while it leans to that side.
+    """Parameters of a block while it leans to one side.
 
     Attributes
     ----------
@@ -224,8 +234,8 @@ class Side:
     radius : float
         Distance R from the pivot to the centre of mass, m.
     arm : float or None
-        Momentum over mass and angular speed, m, from which the forces of the ground follow; None where it is the
-        radius, as in all but frames.
+        Momentum divided by mass and angular speed, m, which determines the ground forces. None if it equals the
+        radius, as for all blocks except frames.
     """
 
     p: float
@@ -235,7 +245,7 @@ class Side:
     arm: float | None = None
 
     def __str__(self) -> str:
-        """Return the parameters as people read them."""
+        """Return the parameters as readable text."""
         return f"p = {self.p:.5g} rad/s, alpha = {self.alpha:.5g} rad, restitution = {self.restitution:.5g}"
 
     def __repr__(self) -> str:
@@ -243,7 +253,7 @@ class Side:
 
 
 def in_line(sides: Sequence[object]) -> str:
-    """Return the parameters of one side or of two, which are named where they differ."""
+    """Return the parameters in one line, by side if they differ."""
     if len(sides) == 1 or sides[0] == sides[1]:
         return str(sides[0])
     return "; ".join(f"side {sign}: {side}" for sign, side in zip("+-", sides, strict=True))
@@ -252,7 +262,7 @@ def in_line(sides: Sequence[object]) -> str:
 def even_sides(
     gravity: float, radius: float, alpha: float, restitution: object, conserved: float, arm: float | None = None
 ) -> tuple[Side, Side]:
-    """Both sides of a body that rocks like a rectangle of this radius, m, and slenderness, rad."""
+    """Return both sides of a body that rocks like a rectangle of this radius, m, and slenderness, rad."""
     plus, minus = restitutions(restitution, (conserved, conserved))
     p = math.sqrt(0.75 * gravity / radius)
     return Side(p, alpha, plus, radius, arm), Side(p, alpha, minus, radius, arm)
@@ -265,7 +275,7 @@ def sides_on_pivots(
     gravity: float,
     restitution: object,
 ) -> tuple[Side, Side]:
-    """Sides of a body from the distances of its pivots from the centre of mass, its height, m, and k^2, m^2."""
+    """Return the sides of a body, from its pivot distances, the height of its centre of mass, m, and k^2, m^2."""
     plus, minus = distances
     radii = math.hypot(plus, height), math.hypot(minus, height)
     inertias = [gyration_squared + radius * radius for radius in radii]
@@ -279,7 +289,7 @@ def sides_on_pivots(
 
 
 def restitutions(given: object, conserved: Sequence[float]) -> tuple[float, float]:
-    """Return the factors that are given, or those that conserve angular momentum."""
+    """Return the given restitutions, by default the ones that conserve angular momentum."""
     if given is None:
         if min(conserved) <= 0.0:
             raise InvalidBlock(
@@ -292,21 +302,18 @@ def restitutions(given: object, conserved: Sequence[float]) -> tuple[float, floa
     return plus, minus
 
 
-#: Sides whose parameters differ by so little, relative, are equal but for rounding.
+#: Largest relative difference between parameters of sides that count as equal.
 _ROUNDING: Final = 1e-12
 
 
 def rigid_bodies(p: Floats, alpha: Floats) -> tuple[Floats, Floats]:
-    """Find the rigid bodies whose sides have these parameters, arrays of shape (n, 2).
+    """Compute the rigid bodies whose sides have these parameters, arrays of shape (n, 2).
 
-    Returned are the restitution on leaving each side by angular momentum, NaN where there is no such body, and the
-    height of the centre of mass above the pivots over gravity, s^2, shape (n,); NaN where the sides are equal, which
-    are those of a rectangle.
+    Returns the restitutions by angular momentum, NaN without such a body, and the height of the centre of mass divided
+    by gravity, s^2, shape (n,), NaN for equal sides, as of a rectangle.
 
-    With depth h and radius of gyration k, R_i = h/cos(alpha_i) and g R_i/p_i^2 = k^2 + R_i^2. The difference of both
-    sides gives h, and angular momentum e_i = 1 - (h p_j^2/g) sin(alpha_j) (tan(alpha_+) + tan(alpha_-)), j the other
-    side. A body with positive h and k exists where |ln(p_+/p_-)| < |ln(cos(alpha_+)/cos(alpha_-))|/2 (derived in the
-    documentation).
+    With depth h, e_i = 1 - (h p_j^2/g) sin(alpha_j) (tan(alpha_+) + tan(alpha_-)), j the other side. A body with
+    positive h and k exists if |ln(p_+/p_-)| < |ln(cos(alpha_+)/cos(alpha_-))|/2 (derived in the documentation).
     """
     cosine, tangent = np.cos(alpha), np.tan(alpha)
     quotient = 1.0 / (cosine * p**2)  # (k^2 + R^2)/(g h)
@@ -323,12 +330,12 @@ def rigid_bodies(p: Floats, alpha: Floats) -> tuple[Floats, Floats]:
 
 
 def _differences(p: Floats, cosine: Floats) -> tuple[Floats, Floats]:
-    """By how much the p of both sides differ, and by how much those of a body may: logarithms of ratios."""
+    """Return logarithmic differences of p between sides, and their bounds for a rigid body."""
     return np.abs(np.log(p[:, 0] / p[:, 1])), 0.5 * np.abs(np.log(cosine[:, 0] / cosine[:, 1]))
 
 
 def no_body(p: Floats, alpha: Floats) -> str:
-    """Say why there is no rigid body with the p and alpha of two sides."""
+    """Return the message that no rigid body has the p and alpha of two sides."""
     differ, most = (100.0 * math.expm1(float(each[0])) for each in _differences(p[None], np.cos(alpha)[None]))
     return (
         f"no rigid body has p = {p[0]:g} and {p[1]:g} rad/s on sides of alpha = {alpha[0]:g} and {alpha[1]:g} rad: its "
@@ -338,12 +345,11 @@ def no_body(p: Floats, alpha: Floats) -> str:
 
 
 def eccentric_rectangles(alpha: Floats) -> tuple[Floats, Floats]:
-    """Rectangles whose centre of mass is so far off the middle that their sides have these slendernesses, shape (n, 2).
+    """Compute rectangles with an offset centre of mass and these slendernesses, shape (n, 2).
 
-    Returned are p of each side over that of the rectangle with its centre of mass in the middle, and the factor on
-    leaving each side, by angular momentum.
+    Returns p of each side divided by p of the symmetric rectangle, and the restitutions by angular momentum.
     """
-    distances = np.tan(alpha)  # over the height of the centre of mass
+    distances = np.tan(alpha)  # divided by the height of the centre of mass
     half_width, offset = 0.5 * distances.sum(axis=1), 0.5 * (distances[:, 1] - distances[:, 0])
     squared = gyration_squared(half_width, 1.0, offset)[:, None]
     radius = np.hypot(distances, 1.0)
@@ -354,5 +360,5 @@ def eccentric_rectangles(alpha: Floats) -> tuple[Floats, Floats]:
 
 
 def gyration_squared(half_width: Number, half_height: float, offset: Number) -> Number:
-    """Square of the radius of gyration, m^2, of a rectangle whose centre of mass is off the middle of its width."""
+    """Return the squared radius of gyration, m^2, of a rectangle with an offset centre of mass."""
     return (half_width * half_width + half_height * half_height) / 3.0 - offset * offset

@@ -34,18 +34,18 @@ from rocking.errors import InvalidBlock, InvalidOption, UnequalSides
 #: The coordinate of every block.
 ROTATION: Final = Coordinate("rotation", "angular_velocity", "angular_acceleration", "rad", "slenderness")
 
-#: Rounding of a length that was computed, relative.
+#: Relative rounding error of a length.
 _ROUNDING: Final = 1e-12
-#: Restitutions so near are one: that of a body, from p and alpha or from itself.
+#: Largest difference of a restitution from the value of a rigid body that counts as equal.
 _SAME_RESTITUTION: Final = 1e-9
 _HEAVIEST_BEAM: Final = 1e12
 
 
 class Rocking:
-    """What free and restrained blocks share: text, the stops, and the arrays of one."""
+    """Text, stops and arrays shared by free and restrained blocks."""
 
     def __str__(self: Body) -> str:
-        """Return description and parameters in one line."""
+        """Return the description and the parameters in one line."""
         return f"{self.description}; {in_line(self.sides)}"
 
     def __repr__(self) -> str:
@@ -53,53 +53,55 @@ class Rocking:
 
     @property
     def stops(self) -> tuple[float, float]:
-        """Rotation at which it stands, for each side: zero."""
+        """Rotation at which the block stands on each side: zero."""
         return 0.0, 0.0
 
     def alone(self) -> Bodies:
-        """Return `Blocks` of which it is the only one."""
+        """Return `Blocks` that contain only this block."""
         return KINDS["blocks"].of([self])
 
 
 @dataclass(frozen=True, repr=False)
 class Block(Rocking):
-    """A free-standing rigid block that rocks without sliding or bouncing.
+    """Free-standing rigid block that rocks without sliding or bouncing.
 
-    Made from the sizes of a rectangular block here, or by `from_parameters`, `from_pivots` and `from_frame`.
+    The constructor creates rectangular blocks. For other blocks use `from_parameters`, `from_pivots` and `from_frame`.
 
     Parameters
     ----------
     half_width, half_height : float
-        Half the width b and half the height h of a rectangular block, m. Sizes are given by name.
+        Half width b and half height h of a rectangular block, m.
     width, height : float
-        The full sizes instead, m.
+        Full sizes instead, m.
     offset : float
-        Horizontal distance of the centre of mass from the middle of the width, m, positive to side +; a quarter of the
-        width at most.
+        Horizontal distance of the centre of mass from the middle, m, positive to side +, up to a quarter of the width.
     restitution : float or pair, optional
-        Factor on the angular speed at an impact, in (0, 1]; a pair is (on leaving side +, on leaving side -).
-        By default the one that conserves angular momentum about the new pivot: without an offset Housner's,
-        1 - 1.5 sin(alpha)^2.
+        Factor on the angular speed at an impact, in (0, 1]. A pair is (on leaving side +, on leaving side -). The
+        default conserves angular momentum about the new pivot: 1 - 1.5 sin(alpha)^2 (Housner) without an offset.
     mass : float, optional
-        Mass, kg; it only scales forces.
+        Mass, kg. It only scales forces.
     gravity : float
         Acceleration of gravity, m/s^2.
 
     Raises
     ------
     InvalidBlock
-        If the sizes are neither two halves nor two full ones, one is not positive and finite, the offset is more than
-        a quarter of the width, the restitution is outside (0, 1], or angular momentum gives one that is not positive.
+        If the sizes are not two positive, finite half or full sizes, or the offset or the restitution (or its default)
+        is out of range.
+
+    See Also
+    --------
+    Blocks : Many blocks as arrays.
+    RestrainedBlock : Block with restraints, a lean or a single side.
 
     Notes
     -----
     alpha = atan(b/h), R = hypot(b, h), p = sqrt(3 g/(4 R)) (paper, section 2; Housner 1963).
 
     With an offset s the block is the body of `from_pivots` with distances (b - s, b + s), height h and radius of
-    gyration k = sqrt((b^2 + h^2)/3 - s^2). Its moment of inertia about the middle of the rectangle is that of an even
-    block: so it is where one half of the width is heavier than the other, or where the density grows along the width in
-    a straight line. At a quarter of the width all mass lies in one half. Of a body with its mass farther out, or
-    spread otherwise, give the radius of gyration to `from_pivots`.
+    gyration k = sqrt((b^2 + h^2)/3 - s^2). Its moment of inertia about the middle is unchanged, as for halves of
+    different density or a density linear along the width. At a quarter of the width all mass lies in one half. For
+    other distributions use `from_pivots`.
 
     Examples
     --------
@@ -155,7 +157,7 @@ class Block(Rocking):
         mass: float | None = None,
         rectangle: tuple[float | None, float | None, float] = (None, None, 0.0),
     ) -> Block:
-        """Set all attributes; of a rectangle also half its sizes and its offset, m."""
+        """Set all attributes, for a rectangle with half sizes and offset, m."""
         for side in sides:
             checked_parameter(side.p, "p", origin=" (from the sizes)")
             checked_parameter(side.alpha, "alpha", origin=" (from the sizes)")
@@ -165,7 +167,7 @@ class Block(Rocking):
         return self
 
     def _rows(self) -> list[tuple[float, ...]]:
-        """Parameters of both sides, as `Blocks` has them."""
+        """Return the parameters of both sides as stored in `Blocks`."""
         return [(side.p, side.alpha, side.restitution) for side in self.sides]
 
     def _with_sides(self, sides: tuple[Side, Side]) -> Block:
@@ -181,33 +183,36 @@ class Block(Rocking):
         *,
         gravity: float = STANDARD_GRAVITY,
     ) -> Block:
-        """Block from its dynamic parameters, each a number or a pair (side +, side -).
+        """Create a block from its dynamic parameters, each a number or a pair (side +, side -).
 
         Parameters
         ----------
         p, alpha : float or pair
             Frequency parameter, rad/s, and slenderness, rad, between 0 and pi/2.
         restitution : float or pair, optional
-            Factor on the angular speed on leaving a side, in (0, 1]. By default the one that conserves angular
-            momentum: Housner's where the sides are equal, else of the one rigid body that has these p and alpha.
+            Factor on the angular speed on leaving a side, in (0, 1]. The default conserves angular momentum: Housner's
+            value if the sides are equal, otherwise the value of the only rigid body with these p and alpha.
         gravity : float
             Acceleration of gravity, m/s^2.
 
         Returns
         -------
         Block
-            Its radii are those of that body, or where it has another restitution those of a rectangular block with the
-            same p, R = 3 g/(4 p^2).
+            Block with the radii of that body, or R = 3 g/(4 p^2), as of a rectangle, if its restitution differs.
 
         Raises
         ------
         InvalidBlock
-            If a parameter is out of its range, or without a restitution no rigid body has these sides.
+            If a parameter is out of range, or no rigid body with these sides determines a default restitution.
+
+        See Also
+        --------
+        Block.from_pivots : Create a block from its pivots and its radius of gyration.
 
         Notes
         -----
-        Depth h and radius of gyration k of the body follow from R_i = h/cos(alpha_i), g R_i/p_i^2 = k^2 + R_i^2: from
-        differences of the sides, so that p and alpha need many digits. (Derived in the documentation.)
+        Depth h and radius of gyration k of the body follow from R_i = h/cos(alpha_i), g R_i/p_i^2 = k^2 + R_i^2.
+        Because the sides are subtracted, p and alpha need many digits. (Derived in the documentation.)
 
         Examples
         --------
@@ -250,7 +255,7 @@ class Block(Rocking):
         gravity: float = STANDARD_GRAVITY,
         description: str | None = None,
     ) -> Block:
-        """Rigid body of any shape that rocks on two pivots.
+        """Create a block from a rigid body of any shape that rocks on two pivots.
 
         Parameters
         ----------
@@ -259,22 +264,26 @@ class Block(Rocking):
         height, radius_of_gyration : float
             Height of the centre of mass above the pivots, and sqrt(I/m) about the centre of mass, m.
         restitution : float or pair, optional
-            Factor on the angular speed on leaving a side. By default angular momentum about the new pivot is
-            conserved: e_i = (I + m (h^2 - d+ d-))/(I + m R_j^2), j the other side.
+            Factor on the angular speed on leaving a side. The default conserves angular momentum about the new pivot:
+            e_i = (I + m (h^2 - d+ d-))/(I + m R_j^2), j the other side.
         mass, gravity : float, optional
             As of `Block`.
         description : str, optional
-            What it is, in words; by default its pivots are.
+            Description of the body; by default of its pivots.
 
         Returns
         -------
         Block
-            With two sides, which are equal where the distances are.
+            Block with equal sides if the distances are equal.
 
         Raises
         ------
         InvalidBlock
             If the body cannot stand (a distance or the height is not positive) or cannot rock (restitution <= 0).
+
+        See Also
+        --------
+        rocking.Solid.block : Create a block from a solid.
 
         Notes
         -----
@@ -307,23 +316,23 @@ class Block(Rocking):
         restitution: float | Sequence[float] | None = None,
         gravity: float = STANDARD_GRAVITY,
     ) -> Block:
-        """Solitary block that rocks like a frame: equal columns that carry a freely supported rigid beam.
+        """Create the single block that rocks like a frame: equal columns with a freely supported rigid beam.
 
         Parameters
         ----------
         half_width, half_height : float
-            Half the width and half the height of one column, m.
+            Half width and half height of a column, m.
         mass_ratio : float
-            gamma: mass of the beam over the mass of all columns; 0 is a column alone.
+            Ratio gamma of the mass of the beam to the mass of all columns; 0 for a single column.
         restitution : float or pair, optional
-            By default from angular momentum: (1 - 1.5 sin(alpha)^2 + 3 gamma cos(2 alpha))/(1 + 3 gamma).
+            Default from angular momentum: (1 - 1.5 sin(alpha)^2 + 3 gamma cos(2 alpha))/(1 + 3 gamma).
         gravity : float
             Acceleration of gravity, m/s^2.
 
         Returns
         -------
         Block
-            Symmetric.
+            Symmetric block.
 
         Raises
         ------
@@ -332,8 +341,8 @@ class Block(Rocking):
 
         Notes
         -----
-        The frame has the column's slenderness, and R' = R (1 + 3 gamma)/(1 + 2 gamma): a heavier beam makes it
-        more stable (Makris and Vassiliou 2013; derived in the documentation).
+        The block has the slenderness of a column and R' = R (1 + 3 gamma)/(1 + 2 gamma). Therefore a heavier beam
+        increases the stability (Makris and Vassiliou 2013; derived in the documentation).
 
         Examples
         --------
@@ -348,7 +357,7 @@ class Block(Rocking):
         alpha = math.atan2(b, h)
         radius = math.hypot(b, h) * (1.0 + 3.0 * gamma) / (1.0 + 2.0 * gamma)
         kept = 1.0 - 1.5 * math.sin(alpha) ** 2 + 3.0 * gamma * math.cos(2.0 * alpha)
-        # The beam moves twice as far as the centres of the columns do.
+        # The beam moves twice as far as the centres of the columns.
         arm = math.hypot(b, h) * (1.0 + 2.0 * gamma) / (1.0 + gamma)
         sides = even_sides(g, radius, alpha, restitution, kept / (1.0 + 3.0 * gamma), arm)
         text = f"frame of columns {2 * b:.5g} m x {2 * h:.5g} m, mass ratio {gamma:.5g}"
@@ -362,23 +371,27 @@ class Block(Rocking):
         restitution: Any = None,
         **sizes: Any,
     ) -> Any:
-        """Rectangular block that rocks to side + only, as a facade that stands against transverse walls.
+        """Create a rectangular block that rocks to side + only, such as a facade against transverse walls.
 
         Parameters
         ----------
         *restraints : Restraint
             `Thrust` of a vault, `Load`, `Tendon` and others.
         lean : float
-            Angle by which it stands out of plumb to side +, rad.
+            Angle by which the block stands out of plumb to side +, rad.
         restitution : float or Restitution, optional
-            Factor with which it bounces back to the same side. By default `one_sided_restitution`.
+            Factor on the speed when the block bounces back to the same side. The default is `one_sided_restitution`.
         **sizes
-            As of `Block`: `width` and `height`, m, or half of them, `mass`, kg, `gravity`.
+            Keyword arguments of `Block`: `width` and `height`, m, or the half sizes, `mass`, kg, `gravity`.
 
         Returns
         -------
         RestrainedBlock
-            With one side.
+            Block with one side.
+
+        See Also
+        --------
+        one_sided_restitution : Compute the default restitution.
 
         Examples
         --------
@@ -386,28 +399,28 @@ class Block(Rocking):
         >>> round(wall.sides[0].restitution, 4)
         0.4708
         """
-        # Of a wall too stocky for angular momentum, what is given takes the place of the block's own.
+        # A wall may be too stocky for the default of a block.
         block = cls(restitution=None if restitution is None else 1.0, **sizes)
         return SINGLE["restrained"](block, *restraints, one_sided=True, lean=lean, restitution=restitution)
 
     @property
     def p(self) -> float:
-        """Frequency parameter, rad/s, of a block whose sides are equal; else ask its `sides`."""
+        """Frequency parameter, rad/s, if both sides are equal. Otherwise use `sides`."""
         return self._of_both_sides("p")
 
     @property
     def alpha(self) -> float:
-        """Slenderness, rad, of a block whose sides are equal; else ask its `sides`."""
+        """Slenderness, rad, if both sides are equal. Otherwise use `sides`."""
         return self._of_both_sides("alpha")
 
     @property
     def radius(self) -> float:
-        """Distance R from pivot to centre of mass, m, of a block whose sides are equal; else ask its `sides`."""
+        """Distance R from the pivot to the centre of mass, m, if both sides are equal. Otherwise use `sides`."""
         return self._of_both_sides("radius")
 
     @property
     def restitution(self) -> float:
-        """Factor on the angular speed at an impact, of a block whose sides are equal; else ask its `sides`."""
+        """Factor on the angular speed at an impact if both sides are equal. Otherwise use `sides`."""
         return self._of_both_sides("restitution")
 
     @property
@@ -427,7 +440,7 @@ class Block(Rocking):
 
     @property
     def coordinate(self) -> Coordinate:
-        """Names and unit of its coordinate, the rotation."""
+        """Names and unit of the coordinate, the rotation."""
         return ROTATION
 
     @property
@@ -442,11 +455,11 @@ class Block(Rocking):
         side: Integers,
         stretch: Floats,
     ) -> tuple[Floats, Floats]:
-        """Return the forces of the ground over the weight, horizontal and vertical (see `rocking.block.body`).
+        """Return the ratio of the ground forces to the weight, horizontal and vertical (see `rocking.block.body`).
 
         On side i, with psi = alpha - |theta|, the centre of mass is at x = -i R sin(psi), y = R cos(psi) from the
-        pivot, R being the arm where there is one; forces are m (a + x'') and m (g + a_v + y''). At rest they are
-        (a/g, 1 + a_v/g).
+        pivot, where R is the `arm` of the side if it has one. The forces are m (a + x'') and m (g + a_v + y''), at
+        rest m (a, g + a_v).
         """
         leaning, (rotation, velocity, acceleration) = np.maximum(side, 0), motion
         sides = [(each.alpha, each.radius if each.arm is None else each.arm) for each in self.sides]
@@ -458,13 +471,13 @@ class Block(Rocking):
         return ground_over_g[0] + horizontal, 1.0 + ground_over_g[1] + vertical
 
     def uplift_thresholds(self, model: Model = "nonlinear") -> tuple[float, float]:
-        """Ground accelerations, m/s^2, that lift the block to side + (when -a passes the first) and to side -."""
+        """Return the ground accelerations, m/s^2, that lift the block to side + (if -a exceeds it) and to side -."""
         steepness = math.tan if checks.one_of(model, "model", InvalidOption, MODELS) == "nonlinear" else float
         return self.gravity * steepness(self.sides[0].alpha), self.gravity * steepness(self.sides[1].alpha)
 
 
 def one_block(block: object, needed: str = "a free Block") -> Block:
-    """Return the block, or say that it is none, and what is needed."""
+    """Return the block, or raise `InvalidBlock` that names the required object."""
     if not isinstance(block, Block):
         raise InvalidBlock(
             f"{needed} is needed, not a {type(block).__name__}: make one with Block(width=, height=), in m"
@@ -475,7 +488,7 @@ def one_block(block: object, needed: str = "a free Block") -> Block:
 def _half_sizes(
     halves: tuple[float | None, float | None], full: tuple[float | None, float | None]
 ) -> tuple[float, float]:
-    """Half width and half height from either pair of sizes, m."""
+    """Return half sizes, m, from half or full sizes."""
     given = [size is not None for size in (*halves, *full)]
     if given == [True, True, False, False]:
         return checked_length(halves[0], "half_width"), checked_length(halves[1], "half_height")

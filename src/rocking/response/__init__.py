@@ -1,4 +1,4 @@
-"""What one simulation found, and what a practitioner asks of it."""
+"""Responses: results of a single simulation."""
 
 from rocking.response.figure import active_span, drawing_times
 from rocking.response.gradient import Gradient, gradient

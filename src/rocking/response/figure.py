@@ -1,4 +1,4 @@
-"""Figures of a response: its histories, its course in the phase plane, its energy over time."""
+"""Figures of a response: histories, phase plane, energy."""
 
 from __future__ import annotations
 
@@ -24,29 +24,29 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: What rotations are drawn in.
+#: Units of rotations in figures.
 RotationUnits = Literal["slenderness", "rad", "deg"]
 
-#: Even times of a drawn line: a history, and a course in the phase plane.
+#: Number of even times of a line.
 _EVEN_TIMES: Final = 4001
 
-#: Impacts of a course that are drawn at most, evenly left out.
+#: Largest number of drawn impacts; others are omitted evenly.
 _MOST_IMPACTS: Final = 2000
 
-#: Rotations and velocities beyond this leave the frame: past it a block only falls.
+#: Limit of drawn rotations and velocities; beyond it a block only falls.
 _FARTHEST: Final = 2.0
 
 _BOUNDARY: Final[dict[str, Any]] = {"color": ABOVE, "linewidth": 0.9, "linestyle": (0, (6, 2, 1, 2))}
 
 
 def titled(response: Simulated) -> str:
-    """Return what was simulated, for the title of a figure."""
+    """Return the title of a figure: the body and its motion."""
     shaken = "no motion" if response.motion is None else response.motion.label
     return as_written(f"{response.body.description} under {shaken}")
 
 
 def active_span(response: Simulated) -> tuple[float, float]:
-    """Stretch worth drawing: from a little before the first event to a little after the last."""
+    """Return the interval of all events, with margins, s."""
     times = np.concatenate([response.events["time"], response.impacts["time"]])
     if len(times) == 0:
         return 0.0, response.duration
@@ -56,7 +56,7 @@ def active_span(response: Simulated) -> tuple[float, float]:
 
 
 def shown_span(response: Simulated, window: Sequence[float] | None) -> tuple[float, float]:
-    """Return a window of a response, s, or else what is worth drawing; refuse what is no stretch of the response."""
+    """Return a valid window of a response, s, or its active span."""
     if window is None:
         return active_span(response)
     ends: Any = checks.numbers(window, "window", InvalidOption)
@@ -70,7 +70,7 @@ def shown_span(response: Simulated, window: Sequence[float] | None) -> tuple[flo
 
 
 def drawing_times(response: Simulated, start: float, end: float) -> Floats:
-    """Return times dense enough for a smooth line: even ones, and those of steps that are long enough to see."""
+    """Return times for a smooth line: even ones and visible steps."""
     even = np.linspace(start, end, _EVEN_TIMES)
     steps = _within(response._history.trail.nodes["time"], start, end)
     visible = np.diff(np.floor(steps / max(even[1] - even[0], 1e-12)), prepend=-1.0) > 0.0
@@ -89,11 +89,10 @@ def histories(
     longest_sequence: bool,
     **place: Unpack[Place],
 ) -> Figure:
-    """Draw the rotation over the ground motion in a window.
+    """Draw the rotation above the ground motion in a window.
 
-    The rotation leaves the frame beyond twice the slenderness (or balance). The longest chattering sequence has a panel
-    of its own, the interval to the next impact against the time to rest, both logarithmic. In `ax`, the rotation is
-    drawn without the other panels.
+    The frame ends at twice the slenderness (or balance). A separate panel shows the longest chattering sequence: the
+    interval to the next impact against the time to rest, both logarithmic. In `ax` only the rotation is drawn.
     """
     checks.one_of(units, "units", InvalidOption, get_args(RotationUnits))
     shown = shown_span(response, window)
@@ -140,13 +139,13 @@ def histories(
 
 
 def _balances(response: Simulated) -> tuple[float, float]:
-    """Balance on each side; of a body of one side, that one."""
+    """Return the balance on each side, for a one-sided body the same value twice."""
     (pair,), _ = thresholds_of(response.body.alone(), response.model)
     return response.balance[0], response.balance[0 if math.isinf(pair[1]) else 1]
 
 
 def _ground_traces(response: Simulated, start: float, end: float) -> dict[str, tuple[Floats, Floats]]:
-    """Return times, and ground accelerations, g, by their labels."""
+    """Return times and ground accelerations, g, by label."""
     motion = response.motion
     if motion is None:
         return {}
@@ -158,7 +157,7 @@ def _ground_traces(response: Simulated, start: float, end: float) -> dict[str, t
 
 
 def _longest_sequence(response: Simulated, start: float, end: float) -> np.void | None:
-    """Chattering sequence with the most impacts in the stretch, if its time of rest is bracketed."""
+    """Return the sequence with the most impacts in the interval, if its time of rest is bracketed."""
     inside = response.chattering[(response.chattering["start"] >= start) & (response.chattering["end"] <= end)]
     longest: np.void | None = max(inside, key=lambda row: row["impacts"], default=None)
     if longest is None or not math.isfinite(longest["upper"] - longest["lower"]):
@@ -167,7 +166,7 @@ def _longest_sequence(response: Simulated, start: float, end: float) -> np.void 
 
 
 def _panels(page: Page, histories: int, *, zoomed: bool) -> list[Axes]:
-    """Panels of the rotation and of the motion; below them that of the chattering sequence."""
+    """Return the panels of rotation and motion, above the panel of the chattering sequence."""
     panels = page.panels(
         ";".join("RGV"[:histories] + "Z" * zoomed), height_ratios=[*(1.3, 1.0, 0.7)[:histories]] + [1.0] * zoomed
     )
@@ -188,7 +187,7 @@ def _draw_rotation(axes: Axes, time: Floats, drawn: Floats, tipping: Floats, lim
     lowest = max(float(np.min(drawn, initial=0.0)), _FARTHEST * float(tipping[0]))
     highest = min(float(np.max(drawn, initial=0.0)), _FARTHEST * float(tipping[1]))
     span = (highest - lowest) or 1.0
-    # Space below for the marks of the impacts and uplifts.
+    # Space for the marks of impacts and uplifts.
     low, high = axes.set_ylim(lowest - 0.28 * span, highest + 0.1 * span)
     label = "tipping, θ = ±α" if limit == "slenderness" else "unstable balance without ground motion"
     for level in tipping[(tipping > low) & (tipping < high)]:
@@ -204,14 +203,14 @@ def _mark_events(axes: Axes, response: Simulated, start: float, end: float) -> N
 
 
 def _mark_fall(axes: Axes, time: Floats, drawn: Floats, label: str) -> None:
-    """Put a cross where the curve ends, or where it has left the frame before."""
+    """Draw a cross where the curve ends or leaves the frame."""
     low, high = axes.get_ylim()
     end = np.flatnonzero((drawn >= low) & (drawn <= high))[-1]
     axes.plot(time[end], drawn[end], "X", color=ABOVE, markersize=7, clip_on=False, zorder=4, label=label)
 
 
 def _tell_sides(axes: Axes, factors: tuple[float, float]) -> None:
-    """Name the sides where rotations are theirs, with what 1 is on each."""
+    """Label the sides, with the angle of 1 on each."""
     for name, place, off, factor in zip(("side +", "side −"), ("bottom", "top"), (2, -2), factors, strict=True):
         words = name if factors[0] == factors[1] else f"{name}: 1 is {math.degrees(1.0 / factor):.3g}°"
         look = {"va": place, "color": INK, "fontsize": "small", "xycoords": axes.get_yaxis_transform()}
@@ -219,13 +218,13 @@ def _tell_sides(axes: Axes, factors: tuple[float, float]) -> None:
 
 
 def _draw_thresholds(axes: Axes, response: Simulated, time: Floats, acceleration: Floats) -> None:
-    """Draw what lifts the body to each side, which changes with its weight, and the motion beyond it."""
+    """Draw the uplift thresholds, which vary with the weight, and the motion beyond them."""
     (pair,), (own,) = thresholds_of(response.body.alone(), response.model)
     lift = response.motion.vertical.acceleration(time) if response.motion and response.motion.vertical else 0.0 * time
     above: dict[str, Any] = {"color": ABOVE, "linewidth": 0.9, "interpolate": True, "zorder": 3}
     for sign, size, change in ((-1.0, pair[0], own[0]), (1.0, pair[1], own[1])):
         if math.isinf(size):
-            continue  # nothing lifts it to that side
+            continue  # no uplift to this side
         threshold = sign * (size + lift / response.body.gravity * change) / STANDARD_GRAVITY
         beyond = sign * acceleration > sign * threshold
         if np.any(beyond):
@@ -239,7 +238,7 @@ def _time_label(start: float, end: float, duration: float) -> str:
 
 
 def _draw_sequence(main: Axes, axes: Axes, response: Simulated, sequence: np.void) -> None:
-    """Draw a sequence impact by impact, and where it is among the histories."""
+    """Draw a sequence impact by impact, and mark it in the histories."""
     times = _within(response.impacts["time"], sequence["start"], sequence["end"])
     low, high = response.perturbed().event_ranges[response.events["time"] == sequence["end"]].T.max(axis=1)
     first, last, at = float(times[0]), float(sequence["upper"]), main.get_xaxis_transform()
@@ -247,7 +246,7 @@ def _draw_sequence(main: Axes, axes: Axes, response: Simulated, sequence: np.voi
     look: dict[str, Any] = {"ha": "center", "va": "bottom", "color": ABOVE, "fontweight": "bold", "xycoords": at}
     write(main, "A", (0.5 * (first + last), 0.955), (0, 2), **look)
     rest, start, interval = 0.5 * (sequence["lower"] + sequence["upper"]), times[:-1], np.diff(times)
-    # Where impacts lie closer than the spacing of floating point times, neither axis has a logarithm.
+    # Logarithms are undefined for impacts closer than floating-point spacing.
     shown = (interval > 0.0) & (rest > start)
     look = {"color": INK, "markersize": 2.6, "markerfacecolor": "white", "markeredgewidth": 0.6}
     axes.loglog(rest - start[shown], interval[shown], "o", **look)
@@ -260,19 +259,19 @@ def _draw_sequence(main: Axes, axes: Axes, response: Simulated, sequence: np.voi
 
 
 class Course(NamedTuple):
-    """A stretch of a response, with the points of its impacts twice: before each and, at the same time, after it.
+    """Interval of a response, with two points at each impact: before it and, at the same time, after it.
 
     Attributes
     ----------
     time : ndarray
-        s.
+        Times, s.
     rotation, velocity : ndarray
-        Rotation over the balance of its side (of a free block the slenderness), velocity over p times that; where a
-        side has no balance, rotation in rad and velocity over p.
+        Rotation divided by the balance of its side (the slenderness of a free block), velocity divided by p times the
+        balance. If a side has no balance, rotation in rad and velocity divided by p.
     kinetic, potential : ndarray
         Energies as of `Response.kinetic_energy`.
     before : ndarray of int
-        Places of the points before impacts.
+        Indices of the points before impacts.
     """
 
     time: Floats
@@ -283,12 +282,12 @@ class Course(NamedTuple):
     before: Integers
 
     def parted(self, values: Floats) -> Floats:
-        """Put a gap at each impact into values at these points: a line of them does not jump."""
+        """Insert a gap at each impact, where a line would jump."""
         return np.insert(values, self.before + 1, np.nan)
 
 
 def course_of(response: Simulated, start: float, end: float) -> Course:
-    """Follow a response, of a body whose energy is known, from a time to a later one, s."""
+    """Compute the course of a response between two times, s."""
     history, energy = response._history, response._energy
     impacts = response.impacts[(response.impacts["time"] >= start) & (response.impacts["time"] <= end)]
     impacts = impacts[:: 1 + len(impacts) // _MOST_IMPACTS]
@@ -318,7 +317,7 @@ def course_of(response: Simulated, start: float, end: float) -> Course:
 
 
 def boundary_of(response: Simulated) -> tuple[Floats, Floats]:
-    """Rotations and velocities, in units of a `Course`, with as much energy as at the balance."""
+    """Return rotations and velocities, in units of a `Course`, with the energy of the balance."""
     energy, gap = response._energy, np.array([np.nan])
     x: list[Floats] = []
     y: list[Floats] = []
@@ -333,14 +332,14 @@ def boundary_of(response: Simulated) -> tuple[Floats, Floats]:
 
 
 def marked(response: Simulated, start: float, end: float) -> dict[str, Floats]:
-    """Return the times of uplift and rest within a stretch, s."""
+    """Return the times of uplift and rest within an interval, s."""
     events = response.events
     inside = (events["time"] >= start) & (events["time"] <= end)
     return {kind: np.asarray(events["time"][inside & (events["kind"] == kind)], float) for kind in ("uplift", "rest")}
 
 
 def phase_plane(response: Simulated, window: Sequence[float] | None, **place: Unpack[Place]) -> Figure:
-    """Draw velocity over p times the slenderness (or balance) against the rotation over that, in a window."""
+    """Draw normalised velocity against normalised rotation in a window, in units of a `Course`."""
     span = shown_span(response, window)
     course = course_of(response, *span)
     limit = response.body.coordinate.limit if response._energy.has_balances else "rad"
@@ -365,7 +364,7 @@ def phase_plane(response: Simulated, window: Sequence[float] | None, **place: Un
 
 
 def energies(response: Simulated, window: Sequence[float] | None, **place: Unpack[Place]) -> Figure:
-    """Draw kinetic, potential and total energy over the least energy that overturns the body, in a window."""
+    """Draw kinetic, potential and total energy, divided by the overturning energy, in a window."""
     course = course_of(response, *shown_span(response, window))
     time, total = course.time, course.kinetic + course.potential
     with page_for((7.0, 3.0), **place) as page:

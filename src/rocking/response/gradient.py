@@ -1,4 +1,4 @@
-"""Derivatives of a number of a response by every coefficient, and so by every sample, of its motion."""
+"""Derivatives of a result of a response by the coefficients, and therefore the samples, of its motion."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from rocking.motion.motion import Motion
 from rocking.response.history import steps_to_events, steps_to_impacts
 from rocking.response.response import Response
 
-#: What a gradient is of.
+#: Quantities that can be differentiated.
 Quantity = Literal["peak", "rotation", "velocity", "event", "impact"]
 
-#: To so long before a rest, s, its impacts are followed: what is left is to first order, and rounding counts for less.
+#: Time before a rest, s, up to which impacts are followed. The remainder is of first order, and rounding smaller.
 _CLOSE: Final = 1e-5
 
 _OVERTURNS: Final = "the block overturns: its peak is where it falls, whatever changes a little"
@@ -40,23 +40,22 @@ _REASONS: Final = {
 
 @dataclass(frozen=True, eq=False)
 class Gradient:
-    """Derivatives of a number that a response tells by what it was computed from; made by `gradient`.
+    """Derivatives of a result of a response by its inputs, returned by `gradient`.
 
     Attributes
     ----------
     value : float
-        The number itself: a rotation (rad), an angular velocity (rad/s) or a time (s); of another body in the units of
-        its coordinate.
+        The result: rotation (rad), angular velocity (rad/s) or time (s); for other bodies in units of the coordinate.
     coefficients : ndarray, shape (n, degree + 1)
-        By the coefficients of the motion's n pieces: units of the value per m/s^2, per m/s^3, and so on; of a peak rad
-        per m/s^2, of a time s per m/s^2. Exactly zero for all pieces that end before the last uplift in front of what
-        is differentiated, or begin after it.
+        Derivatives by the coefficients of the n pieces of the motion: units of the value per m/s^2, per m/s^3, and so
+        on; for a peak rad per m/s^2, for a time s per m/s^2. They are exactly zero for pieces before the last uplift
+        preceding the result, or after the result.
     vertical : ndarray or None
-        The same, of the vertical component.
+        Derivatives by the coefficients of the vertical component.
     initial_rotation, initial_velocity : float
-        By the start: units of the value per rad, and per rad/s.
+        Derivatives by the initial state: units of the value per rad, and per rad/s.
     reason : str
-        Why numbers are NaN, one sentence; empty where none is.
+        Reason for NaN values, one sentence; empty if there are none.
     motion : Motion or None
         The motion.
     """
@@ -71,7 +70,7 @@ class Gradient:
 
     @property
     def samples(self) -> Floats:
-        """By the samples of a record, per m/s^2, shape (n + 1,): by the motion's accelerations at breakpoints.
+        """Derivatives by the samples of a record, per m/s^2, shape (n + 1,): by the accelerations at breakpoints.
 
         Raises
         ------
@@ -82,12 +81,12 @@ class Gradient:
 
     @property
     def vertical_samples(self) -> Floats:
-        """The same, of the vertical component.
+        """Derivatives by the samples of the vertical component.
 
         Raises
         ------
         InvalidOption
-            If there is none, or if it is not linear between samples.
+            If there is no vertical component, or it is not linear between samples.
         """
         if self.motion is None or self.motion.vertical is None or self.vertical is None:
             raise InvalidOption("the motion has no vertical component; give it one by `with_vertical`")
@@ -102,35 +101,40 @@ class Gradient:
 
 
 def gradient(response: Response, of: Quantity = "peak", at: float | None = None) -> Gradient:
-    """Differentiate what a response tells by its motion, sample by sample, and by the start.
+    """Differentiate a result of a response by the samples of its motion and by the initial state.
 
     Parameters
     ----------
     response : Response
-        What `simulate` found, for a block or another body.
+        Result of `simulate`, for a block or another body.
     of : {"peak", "rotation", "velocity", "event", "impact"}
-        What is differentiated: the peak rotation (rad); the rotation (rad) or the angular velocity (rad/s) at a time;
-        or the time (s) of an event, an uplift, a rest or an overturning, or of an impact.
+        Differentiated quantity: the peak rotation (rad), the rotation (rad) or the angular velocity (rad/s) at a time,
+        or the time (s) of an impact or an event (uplift, rest or overturning).
     at : float or int, optional
-        Of a rotation or a velocity the time, s, just after an impact if there is one; of an event or an impact its
-        position among the response's `events` or `impacts`, the last one's being -1. A peak needs none.
+        Time, s, of a rotation or velocity (at an impact, just after it), or index of an event or impact in `events` or
+        `impacts` (-1 is the last). Not used for a peak.
 
     Returns
     -------
     Gradient
-        By the coefficients of the motion's pieces, both components, by its samples, and by the initial state.
+        Derivatives by the coefficients of both components of the motion, by its samples, and by the initial state.
 
     Raises
     ------
     InvalidOption
-        If the response is none, there is no such quantity, or `at` is missing, out of place or out of range.
+        If the response is not a `Response`, the quantity does not exist, or `at` is missing, superfluous or out of
+        range.
+
+    See Also
+    --------
+    Response.sensitivity : Derivatives by relative changes of the inputs.
 
     Notes
     -----
-    The adjoint of what `Response.sensitivity` carries forwards: one pass, whatever the number of samples. The time
-    of an uplift changes with the motion about it alone, and not at all where the motion jumps past the threshold; that
-    of a rest follows its impacts up to 0.01 ms before it, and is to first order from there. Numbers are NaN where there
-    is no derivative, and `Gradient.reason` says why.
+    The gradient is the adjoint of `Response.sensitivity`, computed in one pass for any number of samples. The time of
+    an uplift depends only on the motion near it, and not at all if the motion jumps past the threshold. The time of a
+    rest includes impacts up to 0.01 ms before it, and the remainder to first order. Values are NaN without a
+    derivative, see `Gradient.reason`.
 
     Examples
     --------
@@ -175,10 +179,10 @@ def gradient(response: Response, of: Quantity = "peak", at: float | None = None)
 
 @dataclass(frozen=True, eq=False)
 class _Target:
-    """A number: where in the steps it is told, how it changes with the state there, and why perhaps it has no gradient.
+    """Differentiated result: position in the steps, derivative by the state, and reason for a missing gradient.
 
-    ``since`` is the time after the node of ``row``. ``by_state`` is None of the time at which the step of that row
-    ends. A height is the size of a rotation.
+    ``since`` is the time after the node of ``row``. ``by_state`` is None for the time at which the step of this row
+    ends. A height is the absolute value of a rotation.
     """
 
     value: float
@@ -206,7 +210,7 @@ def _peak(response: Response, at: float | None) -> _Target:
 
 
 def _state(response: Response, of: Quantity, at: float | None) -> _Target:
-    """Rotation or velocity at a time."""
+    """Return the target for the rotation or velocity at a time."""
     if at is None:
         raise InvalidOption(f"a {of} needs the time, {{}}, at which it is asked for, s", "at")
     time = checks.within(at, "at", InvalidOption, 0.0, response.duration, "s")
@@ -223,7 +227,7 @@ def _state(response: Response, of: Quantity, at: float | None) -> _Target:
 
 
 def _time(response: Response, of: Quantity, at: float | None) -> _Target:
-    """Time of an event or of an impact."""
+    """Return the target for the time of an event or impact."""
     trail, rows = response.solution.trail, response.events if of == "event" else response.impacts
     if not len(rows):
         raise InvalidOption(f"the response has no {of}; ask for another quantity, {{}}", "of", value=of)
@@ -243,14 +247,14 @@ def _time(response: Response, of: Quantity, at: float | None) -> _Target:
 
 
 def _later(response: Response, row: int, until: float) -> Records:
-    """Nodes after that of a row up to a time, of impacts that follow where a sequence is closed."""
+    """Return the nodes after a row up to a time, including impacts after a proof."""
     nodes: Records = response._history.trail.nodes
     found: Records = nodes[(nodes["time"] > response.solution.trail.nodes["time"][row]) & (nodes["time"] <= until)]
     return found
 
 
 def _ties_before(trail: Trail, instant: float) -> bool:
-    """Whether the last digits decided on a touch up to an instant: the march is followed once more, as far as that."""
+    """Return whether rounding determined a touch up to an instant, by integrating again."""
     rules, start = trail.settings.copy(), state.state_at(trail.nodes[0])
     rules["stop"], rules["no_end_time"], rules["record"] = math.nextafter(instant, math.inf), False, False
     march(trail.ground, copy_trail(trail).block, rules, state.new_table(0), state.new_scratch(), start)
@@ -258,7 +262,7 @@ def _ties_before(trail: Trail, instant: float) -> bool:
 
 
 def _by_adjoint(target: _Target, change: Floats, out: Floats) -> str:
-    """Write derivatives by the state at the start and by pieces of the ground; returns why there are none."""
+    """Write derivatives by the initial state and by pieces of the motion; return the reason if there are none."""
     nodes, scratch = target.trail.nodes, state.new_scratch()
     starts_at_rest, begin = int(nodes["side"][0]) < 0, float(nodes["time"][0])
     ends = Ends.START
@@ -267,7 +271,7 @@ def _by_adjoint(target: _Target, change: Floats, out: Floats) -> str:
     else:
         change[:2] = target.by_state
         if not np.any(change) or (target.instant == begin and not target.is_height):
-            return ""  # at rest, or the start itself
+            return ""  # at rest, or the initial state itself
     if ends in _REASONS:
         return _REASONS[ends]
     if target.instant > begin:
@@ -277,7 +281,7 @@ def _by_adjoint(target: _Target, change: Floats, out: Floats) -> str:
             return _REASONS[ends]
         waits = starts_at_rest and (len(nodes) == 1 or nodes["time"][1] > begin)
         if ends == Ends.REST or waits:
-            return ""  # what comes to rest again before an uplift leaves nothing
+            return ""  # a new rest before any uplift removes all dependence
         if not starts_at_rest:
             change[0] = math.nan if nodes["u"][0] == 0.0 else change[0]
     if starts_at_rest:
@@ -286,12 +290,12 @@ def _by_adjoint(target: _Target, change: Floats, out: Floats) -> str:
 
 
 def _sign(side: int) -> float:
-    """Sign of a coordinate in the frame of a side, or at rest."""
+    """Return the sign of a coordinate in the frame of a side, or at rest."""
     return -1.0 if side == 1 else 1.0
 
 
 def _by_components(motion: Motion | None, trail: Trail, gravity: float, out: Floats) -> tuple[Floats, Floats | None]:
-    """Return derivatives by the coefficients of both components, from those by the pieces that they have in common."""
+    """Return derivatives by both components from derivatives by their common pieces."""
     if motion is None:
         return np.zeros((0, 2)), None
     starts, columns = trail.ground.pieces[:-1, 0], trail.ground.columns
@@ -302,7 +306,7 @@ def _by_components(motion: Motion | None, trail: Trail, gravity: float, out: Flo
 
 
 def _by_own_pieces(motion: Motion, starts: Floats, values: Floats) -> Floats:
-    """Take derivatives by the coefficients of finer pieces to those of a motion's own: the transpose of `refined`."""
+    """Convert derivatives by finer pieces to the pieces of a motion: the transpose of `refined`."""
     within = starts < motion.duration
     starts, values = starts[within], values[within]
     piece = np.searchsorted(motion.breakpoints, starts, side="right") - 1
@@ -316,7 +320,7 @@ def _by_own_pieces(motion: Motion, starts: Floats, values: Floats) -> Floats:
 
 
 def _by_samples(motion: Motion | None, values: Floats) -> Floats:
-    """Take derivatives by the coefficients of lines to those by the accelerations at their ends."""
+    """Convert derivatives by the coefficients of lines to accelerations at their ends."""
     if motion is None or values.shape[1] != 2 or piecewise.jumps(motion):
         raise InvalidOption("the motion is not linear between samples; take the derivatives by its `coefficients`")
     rates = values[:, 1] / np.diff(motion.breakpoints)

@@ -1,4 +1,4 @@
-"""States, rests and tipping from the nodes of a solution, and the impacts beyond a proof."""
+"""States, rests and tipping from the nodes of a solution, and the impacts after a proof."""
 
 from __future__ import annotations
 
@@ -20,28 +20,28 @@ from rocking.kernels.march import march
 from rocking.kernels.state import Records
 from rocking.kernels.trace import Trail, copy_trail, trace
 
-#: Times at which each step of the last arc is looked at for its last passage of the balance point.
+#: Number of samples per step in the search for the last passage of the balance.
 _LOOKS: Final = 33
 
-#: Parts of a step, each of which is looked at for where a body turns back; and halvings of the time at which it does:
-#: the coordinate is stationary there.
+#: Parts of a step in the search for turning points, and bisections of the time of a turning point, at which the
+#: coordinate is stationary.
 _PARTS: Final = 8
 _TURNINGS: Final = 30
 
 
-#: Impacts beyond the last resolved one are followed down to this speed, over p and in rad: what the motion changes and
-#: what their speed adds are then nothing. So many of a sequence at most: all, up to a restitution of 0.998. And, of
-#: bodies without stiffness, down to this share of the speed at which the sequence was closed.
+#: Bounds on the impacts after the last resolved one: smallest speed, divided by p and in rad, below which the motion
+#: and the impacts no longer contribute; largest number per sequence, which suffices for restitutions up to 0.998; for
+#: bodies without stiffness, smallest ratio to the speed at the end of the resolved sequence.
 _SLOWEST: Final = 1e-10
 _MOST_IMPACTS: Final = 10_000
 _LEAST_SHARE: Final = 1e-9
 
 
 class Solution(NamedTuple):
-    """What the integration returned, from which a response computes everything else."""
+    """Result of the integration, from which a response is computed."""
 
-    trail: Trail  # ground, body and settings as kernels take them, and the nodes of the series
-    sequences: NDArray[np.void]  # as they were proven, without the rounding before the proof
+    trail: Trail  # ground, body and settings for kernels, and the nodes of the series
+    sequences: NDArray[np.void]  # as proven, without the rounding before the proof
     residual: float  # coordinate at the end
     again: Callable[[float], Any]  # repeats the simulation with the motion and the start multiplied by a factor
 
@@ -51,14 +51,14 @@ class Solution(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """The trail of a march as functions of time, from 0 to `end` (s)."""
+    """The computed trail as functions of time, from 0 to `end` (s)."""
 
     trail: Trail
     end: float
     stops: tuple[float, float]
 
     def states(self, time: ArrayLike) -> Floats:
-        """Coordinate and its two rates at times of any shape, in one more dimension; NaN outside [0, end]."""
+        """Return the coordinate and its two rates at times of any shape, as last dimension; NaN outside [0, end]."""
         return self.states_and_sides(time)[0]
 
     def states_and_sides(self, time: ArrayLike) -> tuple[Floats, Integers]:
@@ -72,10 +72,10 @@ class History:
         return found.reshape((*times.shape, 3)), sides.reshape(times.shape)
 
     def states_in(self, times: Floats, rows: Integers) -> Floats:
-        """Coordinate and its two rates at each time in the step that starts at the node of its row, shape (n, 3)."""
+        """Return coordinate and rates, shape (n, 3), at times in the steps that start at these rows."""
         found = np.empty((len(times), 3))
         given = times.view()
-        given.flags.writeable = False  # one type, whatever the caller may do: `trace` is compiled once
+        given.flags.writeable = False  # one type for any caller: `trace` is compiled once
         trace(copy_trail(self.trail), state.new_scratch(), given, rows, found)
         if any(self.stops):
             side = self.trail.nodes["side"][rows]
@@ -83,23 +83,23 @@ class History:
         return found
 
     def rows(self, times: Floats) -> Integers:
-        """Row of the node at which the step of each time starts."""
+        """Return the row of the first node of the step of each time."""
         rows = np.searchsorted(self.trail.nodes["time"], times, side="right") - 1
         return np.maximum(rows, 0).astype(np.int64)
 
     def outside(self, times: Floats) -> Flags:
-        """Whether each time is outside [0, end], or none."""
+        """Return whether each time is outside [0, end] or NaN."""
         return ~((times >= 0.0) & (times <= self.end))
 
     def rests(self) -> Floats:
-        """Start and end of each interval at rest, shape (n, 2), s."""
+        """Return start and end of each interval at rest, shape (n, 2), s."""
         nodes = self.trail.nodes
         rows = np.flatnonzero(nodes["side"] < 0)
         after = np.append(nodes["time"][1:], self.end)
         return np.column_stack([nodes["time"][rows], after[rows]])
 
     def tipping_time(self, balances: tuple[float, float]) -> float:
-        """Last time, s, at which a body passes its unstable balance on the way out; NaN if it ends within it.
+        """Return the last time, s, at which a body passes its unstable balance outwards; NaN if it ends within it.
 
         ``balances``: coordinates of the balance on side + and side -.
         """
@@ -122,7 +122,7 @@ class History:
         return bisected(float(times[within[-1]]), float(times[min(within[-1] + 1, len(times) - 1)]), is_beyond)[1]
 
     def largest(self) -> tuple[float, float]:
-        """Largest rotation of a block on each side, rad: at the ends of parts of steps, or where it turns."""
+        """Return the largest rotation of a block on each side, rad, from parts of steps and turning points."""
         nodes = self.trail.nodes
         moving = np.flatnonzero(nodes["side"] >= 0)
         side = nodes["side"][moving]
@@ -141,19 +141,19 @@ class History:
 
 
 def even_times(end: float, dt: float) -> Floats:
-    """Multiples of a step from 0 to the end, s."""
+    """Return multiples of a step from 0 to the end, s."""
     return np.minimum(dt * np.arange(math.floor(end / dt * (1.0 + 1e-12)) + 1, dtype=np.float64), end)
 
 
 def steps_to_events(nodes: Records, *, overturns: bool) -> Integers:
-    """Rows of the nodes whose steps end in an uplift, a rest or, where the response so ends, an overturning."""
+    """Return the rows of nodes whose steps end in an uplift, a rest or, if specified, overturning."""
     rests = nodes["side"] < 0
     rows = np.flatnonzero(rests[:-1] | rests[1:])
     return np.append(rows, len(nodes) - 2) if overturns else rows
 
 
 def steps_to_impacts(nodes: Records) -> Integers:
-    """Rows of the nodes whose steps end in an impact; as `trace.is_impact`."""
+    """Return the rows of nodes whose steps end in an impact, as `trace.is_impact`."""
     side, moves = nodes["side"], nodes["side"] >= 0
     onto_ground = moves[:-1] & moves[1:] & (nodes["u"][1:] == 0.0)
     rests = np.append(~moves, False)[2:]
@@ -163,11 +163,11 @@ def steps_to_impacts(nodes: Records) -> Integers:
 def with_all_impacts(trail: Trail, *, cut: bool) -> Trail:
     """Return the trail with the impacts between the last resolved one of each chattering sequence and its rest.
 
-    ``cut``: whether the response ends within a sequence that is closed already. A sequence is closed where its end is
-    proven, while its impacts still push and pull. They are followed here as far as that counts.
+    ``cut``: whether the response ends within a sequence after its proof. Later impacts still exert forces, and are
+    computed as far as they contribute.
     """
     nodes = trail.nodes
-    # A duration that ends within a sequence that is closed leaves no rest behind its last impact.
+    # No rest follows the last impact if the duration ends within a sequence after its proof.
     rests = np.append(nodes["side"][1:] < 0, cut)
     closing = np.flatnonzero(rests & (nodes["side"] >= 0) & (nodes["u"] == 0.0))
     slowest = _SLOWEST * np.sqrt(np.abs(trail.block["stiffness"]))
@@ -181,7 +181,7 @@ def with_all_impacts(trail: Trail, *, cut: bool) -> Trail:
     for row in closing:
         start = state.state_at(nodes[row], plastic[row], _MOST_IMPACTS)
         body["limit"] = np.maximum(slowest, _LEAST_SHARE * start["v"])
-        start["peak"] = math.inf  # nobody asks for the highest rotation; weight presses down where a rest is proven
+        start["peak"] = math.inf  # the peak is not needed, and weight is positive at a proven rest
         rules["stop"] = nodes["time"][row + 1] if row + 1 < len(nodes) else trail.settings["stop"]
         while march(trail.ground, body, rules, table, scratch, start) == state.Ending.FULL:
             table = state.grown(table)
@@ -192,13 +192,13 @@ def with_all_impacts(trail: Trail, *, cut: bool) -> Trail:
 
 
 def elongation(trail: Trail, rotations: Floats, side: Integers) -> Floats:
-    """Elongation of the tendon that may yield at rotations to each side, m."""
+    """Return the elongation of a yielding tendon at rotations to each side, m."""
     bend = 2.0 * np.sin(0.5 * rotations) if trail.settings["nonlinear"] else rotations
     return np.asarray(trail.block["lever_arm"][np.maximum(side, 0)] * bend)
 
 
 def plastic_elongations(trail: Trail) -> Floats:
-    """Plastic elongation of a tendon from each node on, m; as `tendon.plastic_after`."""
+    """Return the plastic elongation of a tendon from each node on, m, as `tendon.plastic_after`."""
     nodes = trail.nodes
     if not trail.block["yielding"]:
         return np.zeros(len(nodes))

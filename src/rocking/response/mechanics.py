@@ -1,7 +1,7 @@
-"""Forces of the ground on a body, the friction that sticking needs, and a block's energy over what overturns it.
+"""Ground forces, friction demand and energy of a body.
 
-The energy is that of the equation of motion without ground motion, u'' = -V'(u): kinetic u'^2/2 and potential V(u),
-both times the moment of inertia about the pivot. (Derived in the documentation.)
+The energy follows from the equation of motion without ground motion, u'' = -V'(u): kinetic u'^2/2 and potential V(u),
+both multiplied by the moment of inertia about the pivot. (Derived in the documentation.)
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ from rocking.kernels.state import Record
 from rocking.motion import piecewise
 from rocking.response.history import History, elongation, plastic_elongations
 
-#: Samples per step, and rounds of sampling again around the largest, when the forces' extremes are searched.
+#: Samples per step, and refinements around the largest one, in the search for extreme forces.
 _SAMPLES: Final = 9
 _REFINEMENTS: Final = 10
 
-#: Coefficients of friction beyond those of any two materials.
+#: Upper bound of the friction of any materials.
 _ROUGHEST: Final = 3.0
 
-#: What is asked of the horizontal and the vertical force over the weight.
+#: Function of the ratios of horizontal and vertical force to the weight.
 Measure = Callable[[Floats, Floats], Floats]
 
 
 def friction_coefficient(value: object) -> float:
-    """Return a coefficient of friction; refuse one that is not positive, or larger than that of any two materials."""
+    """Return a coefficient of friction, or raise `InvalidOption` if it is not in (0, 3]."""
     coefficient = checks.positive(value, "friction", InvalidOption)
     if coefficient > _ROUGHEST:
         text = f"{{}} must be at most {_ROUGHEST:g}, not {coefficient:g}; of an angle of friction take the tangent"
@@ -47,28 +47,28 @@ def friction_coefficient(value: object) -> float:
 
 
 def friction_demand(horizontal: Floats, vertical: Floats) -> Floats:
-    """Friction coefficient that sticking needs: |H|/N, infinite where the block would leave the ground, NaN of NaN."""
+    """Return the friction coefficient required to stick: |H|/N, infinite without normal force, NaN for NaN."""
     demand = np.where(np.isnan(vertical), np.nan, np.inf)
     np.divide(np.abs(horizontal), vertical, out=demand, where=vertical > 0.0)
     return demand
 
 
 def pull(_: Floats, vertical: Floats) -> Floats:
-    """Return how much the ground would have to pull: the normal force's opposite."""
+    """Return the required tensile force of the ground: the negative normal force."""
     return -vertical
 
 
 def _reach(values: Floats) -> Floats:
-    """How high a smooth quantity may rise within each step: above its samples by less than they span."""
+    """Return an upper estimate of a quantity in each step: its largest sample plus the span of samples."""
     return np.asarray(2.0 * values.max(axis=1) - values.min(axis=1))
 
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """Horizontal and vertical force of the ground over the weight, up to the time `until` (s).
+    """Ratios of horizontal and vertical ground force to the weight, up to the time `until` (s).
 
-    Within a step the forces are smooth; both limits at every impact and at every jump of the motion are looked at. The
-    impulses at impacts are not part of it.
+    Within a step the forces are smooth. Both limits at every impact and at every jump of the motion are evaluated. The
+    impulses of impacts are not included.
     """
 
     history: History
@@ -80,7 +80,7 @@ class Contact:
         return plastic_elongations(self.history.trail)
 
     def forces(self, time: ArrayLike) -> tuple[Floats, Floats]:
-        """Both forces at times of any shape; NaN outside the response."""
+        """Return both forces at times of any shape; NaN outside the response."""
         times = checks.numbers(time, "time", InvalidOption)
         flat = times.ravel()
         outside = self.history.outside(flat)
@@ -90,23 +90,23 @@ class Contact:
         return horizontal.reshape(times.shape), vertical.reshape(times.shape)
 
     def extremes(self) -> tuple[float, float]:
-        """Largest friction that sticking needs, and least normal force, from the same samples."""
+        """Return the largest friction required to stick, and the smallest normal force."""
         times, rows = self._samples()
         horizontal, vertical = (force.reshape(times.shape) for force in self._forces_in(times.ravel(), rows.ravel()))
         friction, least = float(friction_demand(horizontal, vertical).max()), float(vertical.min())
 
         def refined(measure: Measure, beyond: Floats) -> float:
-            """Largest value of a measure in the steps where what is positive beyond the samples may be so."""
+            """Return the largest value of a measure in the steps where ``beyond`` may become positive."""
             near = np.flatnonzero(_reach(beyond) > 0.0)
             return float(self._peaks(measure, times[near], rows[near])[1].max(initial=-math.inf))
 
         if math.isfinite(friction):
-            # Unlike the demand it is smooth, and bounded, where the normal force nearly vanishes.
+            # Unlike the demand, this measure is smooth and bounded if the normal force nearly vanishes.
             friction = max(friction, refined(friction_demand, np.abs(horizontal) - friction * vertical))
         return friction, min(least, -refined(pull, least - vertical))
 
     def first(self, measure: Measure, is_beyond: Callable[[Floats], Flags]) -> float:
-        """First time, s, at which a measure is beyond a level, as then all greater values are; NaN if it never is."""
+        """Return the first time, s, at which a measure exceeds a level (``is_beyond`` is monotonic); NaN if never."""
         times, rows = self._samples()
         values = self._measured(measure, times, rows)
         near = np.flatnonzero(is_beyond(_reach(values)))
@@ -122,7 +122,7 @@ class Contact:
         high = float(looks[beyond].min())
         before = looks[~beyond & (looks < high)]
         if not len(before):
-            return high  # at once: a jump
+            return high  # at a jump
 
         def passes(time: float) -> bool:
             return bool(is_beyond(self._measured(measure, np.array([time]), rows[step, :1]))[0])
@@ -130,7 +130,7 @@ class Contact:
         return bisected(float(before.max()), high, passes)[1]
 
     def _peaks(self, measure: Measure, times: Floats, rows: Integers) -> tuple[Floats, Floats]:
-        """Where each of some steps has its largest value, and that value."""
+        """Return the times and values of the maxima in these steps."""
         at, best = times[:, 0], np.full(len(times), -np.inf)
         for _ in range(_REFINEMENTS):
             values = self._measured(measure, times, rows)
@@ -146,7 +146,7 @@ class Contact:
         return measure(*self._forces_in(times.ravel(), rows.ravel())).reshape(times.shape)
 
     def _forces_in(self, times: Floats, rows: Integers) -> tuple[Floats, Floats]:
-        """Compute the forces in the steps that start at these rows: on the side and under the piece of each."""
+        """Compute the forces in the steps that start at these rows, with the side and the piece of each."""
         theta, rate, acceleration = self.history.states_in(times, rows).T
         side = self.history.trail.nodes["side"][rows]
         ground = self._ground_in(times, rows, side < 0)
@@ -154,7 +154,7 @@ class Contact:
         return self.law((theta, rate, acceleration), ground, side, stretch)
 
     def _ground_in(self, times: Floats, rows: Integers, at_rest: Flags) -> tuple[Floats, Floats]:
-        """Both ground accelerations in g: in the piece where a step starts; at rest, which may span many, anywhere."""
+        """Return both ground accelerations in g, from the piece at the start of a step or, at rest, any piece."""
         ground = self.history.trail.ground
         anywhere = np.maximum(np.searchsorted(ground.pieces[:, 0], times, side="right") - 1, 0)
         piece = np.where(at_rest, anywhere, self.history.trail.nodes["piece"][rows])
@@ -163,28 +163,28 @@ class Contact:
         return push, lift[0] if lift else np.zeros_like(push)
 
     def _samples(self) -> tuple[Floats, Integers]:
-        """Sample every step, and at rest every piece of the motion, ends included and in order; with their steps."""
+        """Return samples of every step and, at rest, of every piece of the motion, in order, with their steps."""
         nodes = self.history.trail.nodes
         corners = self.history.trail.ground.pieces[:, 0]
         corners = corners[nodes["side"][self.history.rows(corners)] < 0]
         starts = np.unique(np.concatenate([nodes["time"], corners]))
         starts = starts[(starts < self.until) | (starts == starts[0])]
         if nodes["side"][self.history.rows(np.array([self.until]))[0]] < 0:
-            starts = np.union1d(starts, [self.until])  # what the motion is after a jump at the end
+            starts = np.union1d(starts, [self.until])  # motion after a jump at the end
         ends = np.append(starts[1:], max(self.until, starts[-1]))
         rows = self.history.rows(starts)
         fractions = 0.5 - 0.5 * np.cos(np.linspace(0.0, math.pi, _SAMPLES))
         times = starts[:, None] + fractions * (ends - starts)[:, None]
-        resting = nodes["side"][rows] < 0  # what the motion is before a jump
+        resting = nodes["side"][rows] < 0  # motion before a jump
         times[resting, -1] = np.maximum(np.nextafter(times[resting, -1], 0.0), times[resting, 0])
         return times, np.repeat(rows[:, None], _SAMPLES, axis=1)
 
 
-#: Points of a boundary, and how far it reaches, over the balance.
+#: Number of points of a boundary, and its extent divided by the balance.
 _BOUNDARY: Final = 201
 _FARTHEST: Final = 1.6
 
-#: Fields of a body's record that make its potential.
+#: Fields of a record that determine the potential.
 _FIELDS: Final = (
     "stiffness", "threshold_slope", "threshold", "slenderness", "added_weight", "added_push", "prestress", "spring",
 )  # fmt: skip
@@ -192,10 +192,10 @@ _FIELDS: Final = (
 
 @dataclass(frozen=True, eq=False)
 class Energy:
-    """Energy of a body on two pivots over the least that takes it from rest to an unstable balance without shaking.
+    """Energy of a block divided by the smallest energy from rest to an unstable balance without ground motion.
 
-    ``record`` is the body as kernels take it. Rotations are counted in the frame of a side, u = |theta|; a side is 0,
-    1, or negative at rest.
+    ``record`` is the body as a record for kernels. Rotations are in the frame of a side, u = |theta|. A side is 0, 1,
+    or negative at rest.
     """
 
     body: Block | RestrainedBlock
@@ -204,7 +204,7 @@ class Energy:
 
     @cached_property
     def _inertia(self) -> Floats:
-        """Moment of inertia about the pivot of each side over the weight, m s^2: R/p^2."""
+        """Ratio of the moment of inertia about the pivot of each side to the weight, m s^2: R/p^2."""
         return np.array([self.body.sides[0].radius, self.body.sides[-1].radius]) / self.p**2
 
     @property
@@ -214,22 +214,22 @@ class Energy:
 
     @cached_property
     def balance(self) -> Floats:
-        """Rotation of the unstable balance on each side in this model, rad; infinite where there is none."""
+        """Rotation of the unstable balance on each side in this model, rad; infinite if there is none."""
         return np.array(self.body.balance) if self.nonlinear else linear_balance(self.body)
 
     @cached_property
     def has_balances(self) -> bool:
-        """Whether rotations can be counted in balances: each side to which the body leans has one."""
+        """Whether each side has a balance, the unit of rotations."""
         return bool(np.all(np.isfinite(self.balance[: len(self.body.sides)])))
 
     @property
     def unit_of_rotation(self) -> Floats:
-        """What rotations to each side are counted in, rad: the balance; one radian where they cannot be so counted."""
+        """Unit of rotations to each side, rad: the balance, or one radian if a balance is missing."""
         return np.where(np.isfinite(self.balance), self.balance, 1.0) if self.has_balances else np.ones(2)
 
     @cached_property
     def highest(self) -> Floats:
-        """Potential energy at the balance of each side, over inertia, 1/s^2; infinite where there is none."""
+        """Potential energy at the balance of each side, divided by inertia, 1/s^2; infinite if there is none."""
         found = np.full(2, math.inf)
         for k, at in enumerate(self.balance):
             if math.isfinite(at):
@@ -238,7 +238,7 @@ class Energy:
 
     @cached_property
     def needed(self) -> Floats:
-        """Energy that overturns the body to each side, over the least: 1 to the easier side."""
+        """Overturning energy to each side, divided by the smaller one: 1 to the easier side."""
         return self.highest * self._inertia / self._unit
 
     @cached_property
@@ -246,18 +246,18 @@ class Energy:
         return float(np.min(self.highest * self._inertia))
 
     def kinetic(self, velocity: Floats, side: Integers) -> Floats:
-        """Kinetic energy at velocities, rad/s."""
+        """Return the kinetic energy at velocities, rad/s."""
         found: Floats = 0.5 * velocity**2 * (self._inertia / self._unit)[np.maximum(side, 0)]
         return found
 
     def potential(self, rotation: Floats, side: Integers) -> Floats:
-        """Potential energy at rotations, rad: zero upright; what a motion shakes is no part of it."""
+        """Return the potential energy at rotations, rad: zero upright, without the ground motion."""
         of = np.maximum(side, 0)
         found: Floats = self._potential(np.abs(rotation), of) * (self._inertia / self._unit)[of]
         return found
 
     def _potential(self, u: Floats, side: Integers) -> Floats:
-        """V(u) of these sides, 1/s^2, without cancellation at small rotations."""
+        """Return V(u) of these sides, 1/s^2, without cancellation at small rotations."""
         made = {name: self.record[name][side] for name in _FIELDS}
         weight, push = 1.0 + made["added_weight"], made["added_push"]
         if self.nonlinear:
@@ -269,7 +269,10 @@ class Energy:
         return np.asarray(u * (stands - 0.5 * (made["stiffness"] * weight - made["spring"]) * u))
 
     def boundary(self, side: int) -> tuple[Floats, Floats]:
-        """Rotation over balance and |velocity| over p times balance with as much energy as at the balance of a side."""
+        """Return normalised rotations and velocities with the energy of the balance of a side.
+
+        Rotations are divided by the balance, absolute velocities by p times the balance.
+        """
         balance = self.balance[side]
         if not math.isfinite(balance):
             return np.empty(0), np.empty(0)
@@ -280,21 +283,21 @@ class Energy:
         return u / balance, speed
 
     def sides_at(self, impacts: NDArray[np.void]) -> tuple[Integers, Integers]:
-        """Sides that the body leaves and enters at impacts of a response."""
+        """Return the sides that the body leaves and enters at impacts of a response."""
         into: Integers = np.where(impacts["side"] > 0, 0, 1)
         return (into if int(self.record["next_side"][0]) == 0 else 1 - into), into
 
     def losses(self, impacts: NDArray[np.void]) -> Floats:
-        """Energy that each impact of a response takes."""
+        """Return the energy loss of each impact of a response."""
         left, entered = self.sides_at(impacts)
         return self.kinetic(impacts["speed_before"], left) - self.kinetic(impacts["speed_after"], entered)
 
 
 def linear_balance(body: Block | RestrainedBlock) -> Floats:
-    """Rotation of the unstable balance on each side in the linear model, rad; infinite where there is none.
+    """Return the rotation of the unstable balance on each side in the linear model, rad; infinite if there is none.
 
-    A tendon that yields does so for the first time: it pulls as one that is elastic or with its strength, whichever is
-    less, so that the balance is the nearer one of both.
+    A yielding tendon yields for the first time: with the smaller of elastic force and strength, so at the nearer
+    balance.
     """
     (made,) = body.alone().kernel_records("linear", np.zeros((1, 2)))
     elastic = _balance_on_a_line(made, made["added_weight"], made["added_push"], made["prestress"])
@@ -305,7 +308,7 @@ def linear_balance(body: Block | RestrainedBlock) -> Floats:
 
 
 def _balance_on_a_line(made: Record, added_weight: Floats, added_push: Floats, prestress: Floats) -> Floats:
-    """Rotation at which what brings a block back has become nothing, where it is a straight line in the rotation."""
+    """Return the rotation without restoring moment, if the moment is linear in the rotation."""
     found, weight = np.full(2, math.inf), 1.0 + added_weight
     falls = made["stiffness"] * weight - made["spring"]
     stands = made["threshold_slope"] * (made["threshold"] * weight + added_push) + prestress
@@ -314,7 +317,7 @@ def _balance_on_a_line(made: Record, added_weight: Floats, added_push: Floats, p
 
 
 def energy_of(body: Body, record: Record, *, nonlinear: bool) -> Energy:
-    """Return the energy of a body; refuse what is no block, has a tendon that yields, or is held at any rotation."""
+    """Return the energy of a block; raise `InvalidOption` for a yielding tendon or a missing balance."""
     if not isinstance(body, Block | RestrainedBlock):
         raise InvalidOption(
             f"the energy that overturns a body is known of blocks alone, not of a {type(body).__name__}"

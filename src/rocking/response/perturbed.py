@@ -1,4 +1,4 @@
-"""A simulation repeated with its motion, or its initial state, scaled by factors near 1: which results survive."""
+"""Repeated simulations with the motion or the initial state scaled by factors near 1."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from rocking.core.result import Result
 from rocking.core.tables import Column, records_of, text_of_columns
 from rocking.errors import InvalidOption
 
-#: Relative step of the factors, and their number, in summaries and tables.
+#: Relative step and number of factors in summaries and tables.
 RELATIVE: Final = 1e-6
 COUNT: Final = 5
 
-#: Relative precision of a ground motion, and the number of factors within it, in summaries and tables.
+#: Relative precision of a ground motion, and number of factors within it, in summaries and tables.
 PRECISION: Final = 1e-3
 _WITHIN_PRECISION: Final = 11
 
-#: Outcomes; a block that does not move stands, too.
+#: Outcomes. A block that does not move also stands.
 OVERTURNS: Final = "overturns"
 UNMOVED: Final = "does not move"
 STANDS: Final = "stands"
 
 
 class Repeat(NamedTuple):
-    """One of the repeated simulations: its factor, outcome, peak and times (s; NaN where there is none), and events."""
+    """One repeated simulation: factor, outcome, peak, times (s; NaN if there is none) and events."""
 
     factor: float
     outcome: str
@@ -44,21 +44,21 @@ class Repeat(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Perturbed(Result):
-    """One simulation repeated with its motion, or its initial state, scaled; from `Response.perturbed`.
+    """Repeated simulations with the motion or the initial state scaled, from `Response.perturbed`.
 
-    Its table "repeats" has a row for each factor.
+    The table "repeats" has a row for each factor.
 
     Attributes
     ----------
     relative : float
         Relative step of the factors.
     repeats : tuple of Repeat
-        Factor, outcome, peak (rad), peak_time, overturn_time, last_rest (s; NaN where there is none) and events of
-        each simulation, by ascending factor; the one in the middle has factor 1.
+        Factor, outcome, peak (rad), peak_time, overturn_time, last_rest (s; NaN if there is none) and events of each
+        simulation, by ascending factor. The middle one has factor 1.
     coordinate : Coordinate
-        Name and unit of what the peak is of.
+        Name and unit of the coordinate.
     scaled : str
-        What was scaled: "motions" or "initial states".
+        Scaled input: "motions" or "initial states".
     """
 
     TABLES = ("repeats",)
@@ -75,7 +75,7 @@ class Perturbed(Result):
 
     @property
     def sample(self) -> str:
-        """Number of simulations, what was scaled and how far, in words."""
+        """Text with the number of simulations, the scaled input and the range of factors."""
         return f"{len(self.repeats)} {self.scaled} within {percent(self.within)}"
 
     @property
@@ -105,14 +105,14 @@ class Perturbed(Result):
 
     @property
     def overturn_range(self) -> tuple[float, float]:
-        """Earliest and latest time at which the block overturns, s; NaN where it does not at factor 1."""
+        """Earliest and latest time of overturning, s; NaN if the block does not overturn at factor 1."""
         return _range([repeat.overturn_time for repeat in self.alike])
 
     @property
     def event_ranges(self) -> Floats:
         """Earliest and latest time of each event at factor 1, s, shape (n, 2).
 
-        NaN from the first event on that is not the same (kind and side) for all factors.
+        NaN from the first event whose kind or side differs between factors.
         """
         events = self._middle.events
         ranges = np.full((len(events), 2), np.nan)
@@ -126,7 +126,7 @@ class Perturbed(Result):
 
     @property
     def event_spreads(self) -> Floats:
-        """Largest distance of each event from its time at factor 1, s; NaN as `event_ranges`."""
+        """Largest distance of each event from its time at factor 1, s; NaN as in `event_ranges`."""
         return np.asarray(np.abs(self.event_ranges - self._middle.events["time"][:, None]).max(axis=1))
 
     @property
@@ -135,21 +135,21 @@ class Perturbed(Result):
 
     @property
     def alike(self) -> list[Repeat]:
-        """The simulations with the outcome of factor 1."""
+        """Simulations with the outcome of factor 1."""
         return [repeat for repeat in self.repeats if _kind(repeat.outcome) == _kind(self._middle.outcome)]
 
     @property
     def outcome(self) -> str:
-        """Outcome at factor 1, as a verb: a block that moves for other factors "stands"."""
+        """Outcome at factor 1, as a verb. A block that moves only for other factors "stands"."""
         outcomes = [self._middle.outcome, *(repeat.outcome for repeat in self.alike)]
         return next((outcome for outcome in outcomes if outcome != UNMOVED), UNMOVED)
 
     def share(self) -> str:
-        """Return in words how many simulations have the outcome of factor 1, and how far the factors are from 1."""
+        """Return as text the number of simulations with the outcome of factor 1, and the range of factors."""
         return f"{self.outcome} in {len(self.alike)} of {self.sample}"
 
     def sentence(self) -> str:
-        """Return the outcome in words: `share`, or "undecided" and how many overturn where outcomes differ."""
+        """Return the outcome as text: `share`, or "undecided" and the number of overturnings if outcomes differ."""
         if self.is_decided:
             return self.share()
         overturned = int(np.count_nonzero(self.overturned))
@@ -167,7 +167,7 @@ class Perturbed(Result):
         ]
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return a mapping for each factor, with units in the names: the rows of `to_dataframe`."""
+        """Return the rows of `to_dataframe` as mappings, with units in the names."""
         return records_of(self._columns("repeats"))
 
     def summary(self) -> str:
@@ -186,7 +186,7 @@ class Perturbed(Result):
 
 
 def checked_factors(relative: float, count: int) -> list[float]:
-    """Return the factors of `factors_near`, or refuse a step or a number that is out of range."""
+    """Return the factors of `factors_near`, or raise `InvalidOption` if an argument is out of range."""
     step = checks.within(relative, "relative", InvalidOption, 1e-12, 0.1)
     if checks.whole(count, "count", InvalidOption, 3, 1001) % 2 == 0:
         odd = f"{{}} must be odd, with as many factors below 1 as above; got {count}"
@@ -204,13 +204,13 @@ def factors_near(relative: float, count: int) -> list[float]:
 
 
 def steps_within(precision: float) -> tuple[float, int]:
-    """Return the relative step and the number of eleven factors within a precision, for `Response.perturbed`."""
+    """Return the relative step and number (eleven) of factors within a precision, for `Response.perturbed`."""
     most = checks.within(precision, "precision", InvalidOption, 1e-6, 0.1)
     return most / (_WITHIN_PRECISION - 2), _WITHIN_PRECISION
 
 
 def percent(share: float) -> str:
-    """Return a small share as text: in percent from a hundredth of that on."""
+    """Return a small share as text, in percent from 0.01 % on."""
     if share >= 1e-4:
         return f"{100.0 * share:.3g} %"
     mantissa, _, exponent = f"{share:.1e}".partition("e")

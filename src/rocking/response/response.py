@@ -1,4 +1,4 @@
-"""The response of one body to one motion."""
+"""Response of one body to one motion."""
 
 from __future__ import annotations
 
@@ -26,56 +26,61 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Letters of the column of names in a summary.
+#: Width of the column of names in a summary, in characters.
 _WIDTH = 20
 
-#: Points that a computer's memory holds, and those of a history whose motion has no step of its own.
+#: Largest number of points of a history (memory), and the number for a motion without a step.
 _MOST_POINTS = 50_000_000
 _POINTS = 2000
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Response(Simulated):
-    """Response of one body to one motion, made by `rocking.simulate`.
+    """Response of one body to one motion, returned by `rocking.simulate`.
 
     Attributes
     ----------
     body, motion, model, treatment
-        What was simulated, and how.
+        Inputs of the simulation.
     overturned : bool
         Whether the rotation reached pi/2.
     unfinished : bool
-        Whether the simulation was given up after too many steps; all else is then as far as it came.
+        Whether the simulation was aborted after too many steps. All other results then end at this point.
     leans : bool
-        Whether restraints hold it leaning for ever, about `residual_rotation`: proven at the end, `duration`. It may
-        still oscillate then, and never reaches zero rotation again nor more than the peak.
+        Whether restraints permanently hold the block leaning about `residual_rotation`, as proven at the end,
+        `duration`. It may still oscillate, but neither returns to zero rotation nor exceeds the peak.
     overturn_time : float
-        When it first did, s; NaN otherwise.
+        Time at which the rotation first reached pi/2, s; NaN otherwise.
     peak_rotation, peak_time : float
-        Largest |theta|, rad, and when, s; pi/2 when overturned. Of another body its coordinate.
+        Largest |theta|, rad, and its time, s; pi/2 if overturned. For other bodies the peak of the coordinate.
     duration : float
-        End of the response, s; of one that leans when that was proven.
+        End of the response, s. For a leaning block, the time of the proof.
     events : structured array
         time (s), kind ("uplift", "rest", "overturn"), side (+1, -1; 0 at rest).
     impacts : structured array
-        time (s), side entered, speed_before and speed_after (rad/s), in order of time; of a chattering sequence those
-        that were resolved before its rest was closed.
+        time (s), side entered, speed_before and speed_after (rad/s), in order of time. For a chattering sequence only
+        the impacts that were resolved before its end was proven.
     chattering : structured array
-        One row for each sequence of impacts that ended at rest: start (time of the impact from which it was proven to
-        be complete), end (time of rest), lower and upper bound on the end, number of impacts resolved since the start.
-        The bounds contain the time of rest that follows exactly from the body, the motion and the start as they are
-        given: what rounding may have changed before the proof is part of them. They are NaN if the rest is not proven,
-        and infinite if it is, but rounding may move it as far as the response is from its balance or a touch.
+        One row for each sequence that ended at rest: start (time of the impact from which it was proven to be
+        complete), end (time of rest), lower and upper bound on the end, number of impacts resolved since the start.
+        The bounds contain the exact time of rest for the given body, motion and initial state, including the effect of
+        rounding before the proof. They are NaN if the rest is not proven. They are infinite if the rest is proven, but
+        rounding may shift the response by as much as its distance from the balance or from grazing.
     tendons : structured array
         One row for each tendon of a restrained block: largest elongation (m) and force (N), and the plastic_elongation
-        (m) that a tendon which yields has at the end.
+        (m) of a yielding tendon at the end.
     stalled : int
-        Sequences that ended because time no longer advanced between impacts, without proof.
+        Number of sequences that ended without proof because time no longer advanced between impacts.
     near_ties : int
-        Times that the last digits decided whether a block touches the ground, or to which side it leaves it where
-        nothing weighs it down.
+        Number of times that rounding determined whether a block touches the ground, or to which side it uplifts when
+        no weight presses it down.
     solution : Solution
-        What the integration returned, for the methods of the response.
+        Result of the integration, used by the methods of the response.
+
+    See Also
+    --------
+    rocking.simulate : Simulate a body under a motion.
+    rocking.gradient : Differentiate a result of a response.
     """
 
     TABLES = ("histories", "events", "impacts", "chattering")
@@ -84,7 +89,7 @@ class Response(Simulated):
         return summary.line(self)
 
     def summary_rows(self, friction: float | None = None, *, precision: float = PRECISION) -> Sequence[Row]:
-        """Return the lines of `summary` as rows of name, value, unit and note; arguments as there."""
+        """Return the lines of `summary` as rows of name, value, unit and note; arguments as of `summary`."""
         return summary.summary_rows(self, friction, precision)
 
     def facts(self, friction: float | None = None, *, precision: float = PRECISION) -> Sequence[Row]:
@@ -142,36 +147,36 @@ class Response(Simulated):
         ]
 
     def summary(self, friction: float | None = None, *, precision: float = PRECISION) -> str:
-        """Return what happened in words, line by line, as ``rocking simulate`` prints it.
+        """Return a description of the response, line by line, as printed by ``rocking simulate``.
 
         Parameters
         ----------
         friction : float, optional
-            Coefficient of friction: says whether the block would slide, and when first.
+            Coefficient of friction, for a check of sliding with the time of the first slip.
         precision : float
-            Relative precision of the ground motion, from 1e-6 to 0.1: the outcome is also counted within it.
+            Relative precision of the ground motion, from 1e-6 to 0.1, for counting outcomes within it.
 
         Notes
         -----
-        Times and the peak have the digits that are the same in five simulations with the motion (without one, the
-        initial state) scaled by 1, 1 +- 1e-6 and 1 +- 3e-6, at most nine decimals and six digits; where these differ
-        by a millisecond, or in the third digit of the peak, their range is given. See `Response.perturbed`.
+        Times and the peak have the digits that agree in five simulations with the motion (without a motion, the
+        initial state) scaled by 1, 1 +- 1e-6 and 1 +- 3e-6, at most nine decimals and six digits. If the times differ
+        by a millisecond, or the peaks in the third digit, their range is reported. See `Response.perturbed`.
         """
         return text_of(self.summary_rows(friction, precision=precision), _WIDTH)
 
     def to_dict(self, friction: float | None = None, *, precision: float = PRECISION) -> dict[str, Any]:
-        """Return the result in plain values, as ``rocking simulate --json`` prints it; arguments as of `summary`.
+        """Return the result as plain values, as printed by ``rocking simulate --json``; arguments as of `summary`.
 
-        Units are in the names; None stands for what is not a finite number.
+        Names contain units. Numbers that are not finite are None.
         """
         return dictionary_of(self.facts(friction, precision=precision))
 
     def to_xarray(self, dt: float | None = None) -> xr.Dataset:
-        """Return time histories and events as a dataset; its ``to_dataframe`` multiplies all dimensions.
+        """Return time histories and events as a dataset. Its ``to_dataframe`` multiplies all dimensions.
 
-        Rotation, angular velocity and ground acceleration are over time, at steps `dt` (s; by default the motion's own,
-        or a two-thousandth of the duration); events, impacts and chattering sequences have a dimension each. The block
-        and the verdict are attributes.
+        Rotation, angular velocity and ground acceleration depend on time, at steps `dt` (s; by default the step of the
+        motion, or the duration divided by 2000). Events, impacts and chattering sequences have a dimension each. The
+        block and the outcome are attributes.
         """
         import xarray as xr
 
@@ -212,7 +217,7 @@ class Response(Simulated):
         motion, (name, rate, _, unit, _) = self.motion, self.body.coordinate
         if dt is None:
             step = motion and motion.step
-            # A pulse of a few straight lines has a step, too, that shows nothing.
+            # A pulse of a few straight lines also has a step, but its resolution is too coarse.
             dt = step if step and step <= 0.01 * self.duration else max(self.duration, 1e-3) / _POINTS
         step = checks.positive(dt, "dt", InvalidOption, "s")
         if self.duration > _MOST_POINTS * step:
@@ -232,16 +237,16 @@ class Response(Simulated):
         return columns
 
     def to_dataframe(self, table: str | None = None, *, dt: float | None = None) -> pd.DataFrame:
-        """Return a table as a data frame: "histories", "events", "impacts" or "chattering"; units are in the names.
+        """Return a table as a data frame: "histories", "events", "impacts" or "chattering"; names contain units.
 
-        Histories are rotation, angular velocity and ground acceleration over ``time_s``, at steps `dt` as of
-        `to_xarray`.
+        Histories contain rotation, angular velocity and ground acceleration, indexed by ``time_s``, at steps `dt` as
+        of `to_xarray`.
         """
         frame = frame_of(self._columns(table or "histories", dt))
         return frame.set_index("time_s") if table in (None, "histories") else frame
 
     def to_netcdf(self, path: str | Path, dt: float | None = None) -> None:
-        """Write `to_xarray` to a NetCDF file, whole or not at all; raises `OutputError` if it cannot be written."""
+        """Write `to_xarray` to a NetCDF file, completely or not at all; raises `OutputError` on failure."""
         write_netcdf(path, self.to_xarray(dt))
 
     def to_csv(self, path: str | Path, table: str | None = None, *, dt: float | None = None) -> None:
@@ -265,12 +270,12 @@ class Response(Simulated):
         ax, title, figsize
             As of `Result.plot`.
         units : {"slenderness", "rad", "deg"}
-            Rotations over the slenderness of their side (of a restrained block over its balance, if it has one), or as
-            they are.
+            Units; "slenderness" normalises by the slenderness of the side (or the balance of a restrained block, if
+            any).
         window : (start, end), optional
-            Stretch of time, s; by default from a little before the first event to a little after the last.
+            Interval, s; by default from shortly before the first event to shortly after the last.
         longest_sequence : bool
-            Whether to show the longest chattering sequence, impact by impact, in a panel of its own.
+            Whether to show the longest chattering sequence, impact by impact, in a separate panel.
         """
         title = title or figure.titled(self)
         return figure.histories(
@@ -287,8 +292,8 @@ class Response(Simulated):
     ) -> Figure:
         """Draw the velocity against the rotation, with impacts as jumps and the energy of the balance; as `plot`.
 
-        Rotations are over the slenderness of their side (of a restrained block over its balance), velocities over p
-        times that; where a side has no balance, rotations are in rad. `InvalidOption` also as of `kinetic_energy`.
+        Rotations are normalised by the slenderness of their side (or the balance of a restrained block), velocities by
+        p times this value. Without a balance, rotations are in rad. Raises `InvalidOption` also as `kinetic_energy`.
         """
         return figure.phase_plane(self, window, title=title or figure.titled(self), ax=ax, figsize=figsize)
 
@@ -300,5 +305,5 @@ class Response(Simulated):
         title: str = "",
         figsize: tuple[float, float] | None = None,
     ) -> Figure:
-        """Draw kinetic, potential and total energy over time, as `plot_phase_plane` and in its units."""
+        """Draw kinetic, potential and total energy against time; arguments and errors as of `plot_phase_plane`."""
         return figure.energies(self, window, title=title or figure.titled(self), ax=ax, figsize=figsize)

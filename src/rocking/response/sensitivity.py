@@ -1,4 +1,4 @@
-"""How a response changes with what it was computed from, and what one unit in the last place of that would change."""
+"""Sensitivity of a response to its inputs, and to one unit in their last place."""
 
 from __future__ import annotations
 
@@ -20,37 +20,41 @@ from rocking.kernels.trace import Quantity, Trail, copy_trail, vary
 from rocking.kernels.uplift import next_uplifts
 from rocking.response.history import History
 
-#: A response is ambiguous when changes of the motion, the initial state and the block by one unit in the last place
-#: move its peak by more than this fraction, or one of its events or impacts by more than this many seconds.
+#: A response is ambiguous if changes of its inputs by one unit in the last place change its peak by more than this
+#: fraction, or the time of an event or impact by more than this number of seconds.
 AMBIGUITY: Final = 1e-6
 
-#: What a sensitivity is to.
+#: Inputs of a sensitivity.
 QUANTITIES: Final = ("motion", "initial_rotation", "initial_velocity", "p", "alpha", "restitution")
 
-#: What a rotation may be differentiated by, in the order of the kernels.
+#: Inputs for derivatives of a rotation, in the order of the kernels.
 _NAMES: Final = (*QUANTITIES, *(f"{name}_{side}" for side in ("plus", "minus") for name in QUANTITIES[3:]))
 
-#: What a node holds of a start, by the quantity that changes it.
+#: Field of a node that contains the initial state, by input.
 _STARTS: Final[dict[int, str]] = {Quantity.ROTATION: "u", Quantity.VELOCITY: "v"}
 
 _ULP: Final = 2.0**-52
 
-#: A motion that passes a threshold by less than this share of it, or misses it by less, may do either.
+#: Relative distance from a threshold within which a motion may or may not exceed it.
 _TIE: Final = 2.0**-44
 
-#: Largest product of an error with the rates of balance and impacts at which its first order is taken for a bound.
+#: Largest product of an error and the rates of balance and impacts for which its first order is used as a bound.
 _MOST_NONLINEAR: Final = 0.5
 
-#: Of peak, impacts and events; in rows where there are several quantities.
+#: Changes of peak, impacts and events, in rows for several inputs.
 Changes = tuple[Floats, Floats, Floats]
 
 
 class Sensitivity:
-    """Changes of a response per unit of relative change of what it was computed from, found when first asked for.
+    """Derivatives of a response by relative changes of its inputs, from `Response.sensitivity`.
 
-    Structured arrays with the fields motion, initial_rotation, initial_velocity, p, alpha and restitution (of both
-    sides together): a field times 1e-3 is what 0.1 % more of that quantity changes, to first order. NaN throughout
-    where the simulation was not finished. Made by `Response.sensitivity`.
+    The results are structured arrays with the fields motion, initial_rotation, initial_velocity, p, alpha and
+    restitution (the latter three for both sides), computed on first access. A field times 1e-3 is the change for
+    0.1 % more of this input, to first order. All values are NaN if the simulation is unfinished.
+
+    See Also
+    --------
+    rocking.gradient : Derivatives by each sample of the motion.
     """
 
     def __init__(
@@ -70,21 +74,21 @@ class Sensitivity:
 
     @cached_property
     def peak(self) -> NDArray[np.void]:
-        """Of the peak rotation, rad, shape (1,); 0 when overturned."""
+        """Derivatives of the peak rotation, rad, shape (1,); 0 if overturned."""
         return self._table(0)
 
     @cached_property
     def impacts(self) -> NDArray[np.void]:
-        """Of the times of the response's impacts, s."""
+        """Derivatives of the times of impacts, s."""
         return self._table(1)
 
     @cached_property
     def events(self) -> NDArray[np.void]:
-        """Of the times of the response's events, s."""
+        """Derivatives of the times of events, s."""
         return self._table(2)
 
     def _table(self, which: int) -> NDArray[np.void]:
-        """Return changes of peak, impacts or events, in a field for each quantity."""
+        """Return changes of peak, impacts or events, with a field for each input."""
         values = self._all[which]
         table = np.empty(values.shape[1], dtype=[(name, "f8") for name in QUANTITIES])
         for name, row in zip(QUANTITIES, values, strict=True):
@@ -96,32 +100,32 @@ class Sensitivity:
         return self._along(QUANTITIES)
 
     def _along(self, names: Iterable[str]) -> Changes:
-        """Return changes of peak, impacts and events, in a row for each name: one pass along the steps for each."""
+        """Return changes of peak, impacts and events, in a row for each name, computed in one pass per name."""
         rows = [_varied(self._trail, _NAMES.index(name), self._peak_time, *self._sizes) for name in names]
         peak, impacts, events = (np.array(values) for values in zip(*rows, strict=True))
         return np.zeros_like(peak) if self._is_peak_fixed else peak, impacts, events
 
     def rotation(self, time: ArrayLike, of: Iterable[str] = QUANTITIES) -> dict[str, Floats]:
-        """Return the change of the rotation at given times with each quantity.
+        """Return the derivative of the rotation at given times by each input.
 
         Parameters
         ----------
         time : array_like
             Times, s, of any shape.
         of : iterable of str
-            Quantities: "motion", "initial_rotation", "initial_velocity", "p", "alpha" or "restitution"; the last three
-            also with "_plus" or "_minus", of that side alone.
+            Inputs: "motion", "initial_rotation", "initial_velocity", "p", "alpha" or "restitution". The last three
+            accept the suffix "_plus" or "_minus" for a single side.
 
         Returns
         -------
         dict of str to ndarray
-            By quantity, for each time: rad (of another body in the unit of its coordinate) per unit of relative change,
-            with the sign of the rotation. 0 at rest; just before an impact, at one; NaN outside the response, and
-            throughout where the simulation was not finished.
+            For each input and time: rad (or the unit of the coordinate) per unit of relative change, with the sign of
+            the rotation. Zero at rest, at an impact just before it, NaN outside the response and for unfinished
+            simulations.
 
         Notes
         -----
-        One pass along the response for each quantity, whatever the number of times. At a fixed time the rotation is
+        Each input requires one pass along the response, for any number of times. At a fixed time the rotation is
         continuous, and its derivative jumps at each impact (see "Impacts: restitution and sensitivity" in the
         documentation).
         """
@@ -138,19 +142,19 @@ class Sensitivity:
 
 
 def _varied(trail: Trail, quantity: int, times: Floats, impacts: int, events: int) -> Changes:
-    """Change heights at given times, so many impacts, and so many events with a quantity."""
+    """Compute derivatives by an input: of heights at given times, and of the times of impacts and events."""
     heights, at_impacts, at_events = np.zeros(len(times)), np.zeros(impacts), np.zeros(events)
     start = _STARTS.get(quantity)
-    if start is None or trail.nodes[start][0] != 0.0:  # a share of nothing changes nothing
+    if start is None or trail.nodes[start][0] != 0.0:  # a share of zero has no effect
         scratch, work = state.new_scratch(), state.record(state.VARIATION)
         vary(copy_trail(trail), scratch, work, quantity, times, heights, at_impacts, at_events)
     return heights, at_impacts, at_events
 
 
 def ambiguities(changes: Sensitivity, trail: Trail, height: float, near_ties: int) -> tuple[str, ...]:
-    """Which of "peak", "events" and "touch" one unit in the last place of everything changes visibly.
+    """Return the results ("peak", "events", "touch") that one unit in the last place of all inputs changes visibly.
 
-    ``height`` is that of the peak above the stop; ``near_ties``: those that are known otherwise.
+    ``height`` is the height of the peak above the stop, and ``near_ties`` counts the ties that are already known.
     """
     early, late = (_uplifts(trail, share) for share in (1.0 - _TIE, 1.0 + _TIE))
     near_ties += int(np.any(late > early + AMBIGUITY))
@@ -164,7 +168,7 @@ def ambiguities(changes: Sensitivity, trail: Trail, height: float, near_ties: in
 
 
 def _uplifts(trail: Trail, share: float) -> Floats:
-    """Return times of the next uplifts from all rests, with thresholds that are multiplied by a share."""
+    """Return times of the next uplifts from all rests, with thresholds scaled by a factor."""
     block, times = trail.block.copy(), np.zeros(len(trail.nodes))
     block["threshold"] *= share
     block["restraint_threshold"] *= share
@@ -173,9 +177,9 @@ def _uplifts(trail: Trail, share: float) -> Floats:
 
 
 def carried_errors(trail: Trail, proven: Flags, stop: float) -> Floats:
-    """Bound what the rounding of all steps before their proofs changes of rests, s; infinite: no bound.
+    """Bound the changes of times of rest by rounding before their proofs, s; infinite if there is no bound.
 
-    ``proven``: which rests are; ``stop``: size of the coordinate at which the body stands.
+    ``proven``: which rests are proven; ``stop``: absolute coordinate at which the body stands.
     """
     nodes = state.attributed(np.append(trail.nodes, trail.nodes[-1:]))
     nodes["side"][-1] = state.AT_REST
@@ -187,7 +191,7 @@ def carried_errors(trail: Trail, proven: Flags, stop: float) -> Floats:
         row, time = (last[k], 0.0) if node["v"] > 0.0 else (last[k] - 1, math.inf)
         if adjoint_of_final_state(trail, scratch, row, change, out) != Ends.START:
             continue
-        if node["v"] > 0.0:  # as the time to rest differs from its first order, so do its derivatives, twice and more
+        if node["v"] > 0.0:  # derivatives deviate from first order at least twice as much as the time to rest
             change[:3] *= 1.0 + 4.0 * abs((following["time"] - node["time"]) / (change[1] * node["v"]) - 1.0)
         ends = adjoint(trail, scratch, work, row, time, change, out)
         error = change[3] + 4.0 * _ULP * stop * abs(change[0])
@@ -198,7 +202,7 @@ def carried_errors(trail: Trail, proven: Flags, stop: float) -> Floats:
 
 
 def changes_along(history: History, time: ArrayLike, of: Iterable[str]) -> dict[str, Floats]:
-    """Change the coordinate at times of any shape with each quantity, see `Sensitivity.rotation`."""
+    """Compute the derivative of the coordinate at times of any shape by each input, see `Sensitivity.rotation`."""
     times, nodes = checks.numbers(time, "time", InvalidOption), history.trail.nodes
     flat = times.ravel()
     order = np.argsort(flat, kind="stable")

@@ -1,4 +1,4 @@
-"""What one simulation found, and the answers that follow from it."""
+"""Data of a simulation and the results derived from them."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from rocking.response.sensitivity import Sensitivity, ambiguities, carried_error
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Simulated(Result):
-    """Data of a response, and what is computed from them; `Response` is the class that also shows them."""
+    """Data and computed results of a response. `Response` adds the output methods."""
 
     body: Body
     motion: Motion | None
@@ -55,19 +55,19 @@ class Simulated(Result):
     solution: Solution
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the data alone: answers are found again."""
+        """Return only the data. Derived results are computed again."""
         return {entry.name: getattr(self, entry.name) for entry in fields(self)}
 
     @property
     def block(self) -> Block:
-        """The body; raises `InvalidOption` if it is no block."""
+        """The body; raises `InvalidOption` if it is not a block."""
         if not isinstance(self.body, Block):
             raise InvalidOption(f"this is known of blocks alone, not of a {type(self.body).__name__}")
         return self.body
 
     @cached_property
     def _history(self) -> History:
-        """Course in time, with the impacts that follow where a proof has closed a sequence."""
+        """Time history, including the impacts after the proof of a sequence."""
         trail, sequences = self.solution.trail, self.solution.sequences
         if int(trail.settings["treatment"]) == state.RestRule.CERTIFIED:
             closed = bool(len(sequences)) and bool(sequences["end"][-1] >= self.duration)
@@ -97,9 +97,9 @@ class Simulated(Result):
 
     @cached_property
     def balance(self) -> tuple[float, float]:
-        """Rotation of the unstable balance on each side in this model, rad; infinite without one.
+        """Rotation of the unstable balance on each side in this model, rad; infinite if there is none.
 
-        Of a free block it is the slenderness in both models.
+        For a free block it equals the slenderness in both models.
         """
         if isinstance(self.body, RestrainedBlock) and self.model == "linear":
             plus, minus = linear_balance(self.body).tolist()
@@ -108,9 +108,9 @@ class Simulated(Result):
 
     @cached_property
     def peak_over_slenderness(self) -> float:
-        """Peak rotation over the slenderness of its side; infinite where the block overturns.
+        """Ratio of the peak rotation to the slenderness of its side; infinite if the block overturns.
 
-        Of a restrained block over its balance; NaN where there is none.
+        For a restrained block the balance replaces the slenderness; NaN if there is none.
         """
         if self.overturned:
             return math.inf
@@ -118,14 +118,14 @@ class Simulated(Result):
 
     @cached_property
     def _balance_at_peak(self) -> float:
-        """Balance on the side of the peak, rad; of a block that does not move the nearer one."""
+        """Balance on the side of the peak, rad, or the smaller one if the block does not move."""
         if self.peak_rotation == 0.0:
             return min(self.balance)
         return self.balance[0 if float(self.rotation(self.peak_time)) > 0.0 else 1]
 
     @property
     def _reaches_second_stop(self) -> bool:
-        """Whether the peak is where the second of two stops is."""
+        """Whether the peak is at the second of two stops."""
         return bool(self.solution.trail.block["two_stops"]) and self.peak_rotation == self.body.stops[1]
 
     @cached_property
@@ -152,10 +152,10 @@ class Simulated(Result):
 
     @property
     def outcome(self) -> str:
-        """What becomes of the body, as a verb: "overturns", "stands", "leans", "does not move".
+        """Outcome as a verb: "overturns", "stands", "leans", "does not move".
 
-        Also "comes to rest" (of a body that cannot overturn), "has not overturned" (`stopped`) and "is given up"
-        (`unfinished`).
+        Further outcomes are "comes to rest" (for a body that cannot overturn), "has not overturned" (`stopped`) and
+        "is given up" (`unfinished`).
         """
         if self.overturned:
             return OVERTURNS
@@ -171,15 +171,15 @@ class Simulated(Result):
 
     @property
     def residual_rotation(self) -> float:
-        """Rotation at which the block stays, rad: 0 where it rests upright, the equilibrium where it `leans`.
+        """Final rotation, rad: 0 at rest in upright position, the equilibrium of a block that `leans`.
 
-        NaN where it overturns or its end is not known. Of another body its coordinate.
+        NaN if the block overturns or its final state is unknown. For other bodies the coordinate.
         """
         return math.nan if self.overturned or self.unfinished or self.stopped else self.solution.residual
 
     @property
     def stopped(self) -> bool:
-        """Whether `duration` ended the simulation before a verdict: the block still moved, or the motion went on."""
+        """Whether `duration` ended the simulation while the block or the ground still moved."""
         over = self.motion is None or self.duration >= self.motion.end
         return not (self.overturned or self.unfinished or self.leans) and (self.moves_at_end or not over)
 
@@ -187,7 +187,7 @@ class Simulated(Result):
     def tipping_time(self) -> float:
         """Last time, s, at which the block passes its `balance`; NaN if it ends within it.
 
-        From then on a block that overturns only falls.
+        After this time an overturning block only falls.
         """
         return self._history.tipping_time(self.balance)
 
@@ -198,31 +198,31 @@ class Simulated(Result):
 
     @property
     def time_at_rest(self) -> float:
-        """Time that the block spends at rest, s."""
+        """Total time at rest, s."""
         starts, ends = self.rest_intervals.T
         return float(np.sum(ends - starts))
 
     @cached_property
     def sensitivity(self) -> Sensitivity:
-        """Derivatives of the peak and of the times of events and impacts by the motion, the start and the block."""
+        """Derivatives of the peak and of event and impact times by the motion, the initial state and the block."""
         trail, history = self.solution.trail, self._history
         if int(trail.block["seed"]) >= 0 and trail.block["variable_restitution"]:
-            # What is drawn goes by the number of the impact, which those beyond a proof do not count in.
+            # Random restitutions depend on the number of the impact, which excludes the impacts after a proof.
             history = History(trail, self.duration, self.body.stops)
         sizes, is_fixed = (len(self.impacts), len(self.events)), self.overturned or self._reaches_second_stop
         return Sensitivity(trail, history, self.peak_time, sizes, is_fixed=is_fixed, is_known=not self.unfinished)
 
     @property
     def ambiguous(self) -> bool:
-        """Whether no double-precision program can know this response: one ulp of what was given changes it visibly."""
+        """Whether a change of the input by one ulp, i.e. rounding in double precision, changes the response visibly."""
         return bool(self.ambiguities)
 
     @cached_property
     def ambiguities(self) -> tuple[str, ...]:
-        """What one ulp of the input changes visibly: "peak", "events" (a time of one, or of an impact) and "touch".
+        """Results that one ulp of the input changes visibly: "peak", "events" (time of an event or impact), "touch".
 
-        With the last, rounding decides whether the motion passes a threshold of uplift, whether the body touches the
-        ground, or whether it falls from its balance. `perturbed` has the spread of such results.
+        "touch" means that rounding determines whether the motion exceeds an uplift threshold, whether the body touches
+        the ground, or whether it falls from its balance. `perturbed` returns the spread of such results.
         """
         start, velocity, acceleration = self.states(0.0)
         balanced = velocity == acceleration == 0.0 and bool(np.any(np.isclose(abs(start), self.balance)))
@@ -242,13 +242,13 @@ class Simulated(Result):
         Returns
         -------
         Perturbed
-            Outcome, peak and times for each factor, and the ranges of these.
+            Outcome, peak and times for each factor, and their ranges.
 
         Notes
         -----
-        An initial rotation (of a body with a stop its distance from the stop) and velocity are scaled with the motion,
-        or alone where there is no motion. An outcome that changes within a few millionths is undecided for every
-        practical purpose; one that is the same in a few simulations may still change between them.
+        An initial rotation (for a body with a stop, its distance from the stop) and velocity are scaled with the
+        motion, or alone without a motion. An outcome that changes within a few millionths is undecided in practice. An
+        outcome shared by all simulations may still change between their factors.
         """
         if (relative, count) not in self._repeated:
             repeats = tuple(self._repeat(factor) for factor in checked_factors(relative, count))
@@ -271,27 +271,27 @@ class Simulated(Result):
         return Repeat(factor, again.outcome, peak, peak_time, again.overturn_time, last_rest, again.events)
 
     def states(self, time: ArrayLike) -> Floats:
-        """Return coordinate, velocity and acceleration of the body (of a block its rotation) at times, s, of any shape.
+        """Return coordinate, velocity and acceleration of the body (rotation for a block) at times, s, of any shape.
 
-        They are the last dimension, of length 3; NaN at times outside [0, duration]. `InvalidOption` if `time` contains
-        anything but numbers.
+        They are the last dimension, of length 3; NaN outside [0, duration]. Raises `InvalidOption` if `time` is not
+        numeric.
         """
         return self._history.states(time)
 
     def rotation(self, time: ArrayLike) -> Floats:
-        """Rotation theta, rad, at any time, from the series of the arc in which it lies; NaN outside [0, duration]."""
+        """Return the rotation theta, rad, at any time, from the series of the arc; NaN outside [0, duration]."""
         return as_asked(self.states(time)[..., 0])
 
     def angular_velocity(self, time: ArrayLike) -> Floats:
-        """Angular velocity, rad/s, at any time (just after an impact, at one); NaN outside [0, duration]."""
+        """Return the angular velocity, rad/s, at any time (at an impact, just after it); NaN outside [0, duration]."""
         return as_asked(self.states(time)[..., 1])
 
     def angular_acceleration(self, time: ArrayLike) -> Floats:
-        """Angular acceleration, rad/s^2, at any time; NaN outside [0, duration]."""
+        """Return the angular acceleration, rad/s^2, at any time; NaN outside [0, duration]."""
         return as_asked(self.states(time)[..., 2])
 
     def kinetic_energy(self, time: ArrayLike) -> Floats:
-        """Kinetic energy over the least that overturns the block, at any time (just after an impact, at one).
+        """Return the kinetic energy divided by the overturning energy, at any time (at an impact, just after it).
 
         Parameters
         ----------
@@ -301,39 +301,39 @@ class Simulated(Result):
         Returns
         -------
         ndarray
-            Over the energy that takes the block, without ground motion, from rest to the unstable balance of the side
-            where that is less, m g R (1 - cos alpha) of a free block (m g R alpha^2/2 in the linear model); NaN outside
-            [0, duration]. Velocities are relative to the ground.
+            Energy relative to the smallest energy that moves the block without ground motion from rest to an unstable
+            balance, m g R (1 - cos alpha) for a free block (m g R alpha^2/2 in the linear model). NaN outside [0,
+            duration]. Velocities are relative to the ground.
 
         Raises
         ------
         InvalidOption
-            If `time` contains anything but numbers, the body is no block, one of its tendons yields, or its restraints
-            hold it back at any rotation.
+            If `time` is not numeric, the body is not a block, one of its tendons yields, or its restraints hold it at
+            any rotation.
         """
         states, sides = self._history.states_and_sides(time)
         return as_asked(self._energy.kinetic(states[..., 1], sides))
 
     def potential_energy(self, time: ArrayLike) -> Floats:
-        """Potential energy of weight and restraints, zero upright, in the unit of `kinetic_energy`; NaN outside.
+        """Return the potential energy of weight and restraints, zero upright, in the unit of `kinetic_energy`.
 
-        Between impacts the sum of both stays the same where nothing shakes or damps the block. Arguments and errors are
-        those of `kinetic_energy`.
+        The result is NaN outside [0, duration]. Between impacts the sum of both energies is constant without ground
+        motion and damping. Arguments and errors are the same as of `kinetic_energy`.
         """
         states, sides = self._history.states_and_sides(time)
         return as_asked(self._energy.potential(states[..., 0], sides))
 
     @cached_property
     def impact_losses(self) -> Floats:
-        """Energy that each of `impacts` takes, over the least that overturns the block, as `kinetic_energy`."""
+        """Energy loss at each of `impacts`, divided by the overturning energy, as `kinetic_energy`."""
         return self._energy.losses(self.impacts)
 
     def normal_force(self, time: ArrayLike) -> Floats:
-        """Return the normal force over the weight without the impulses of impacts; NaN outside the response."""
+        """Return the ratio of normal force to weight, without the impulses of impacts; NaN outside the response."""
         return as_asked(self._contact.forces(time)[1])
 
     def friction_demand(self, time: ArrayLike) -> Floats:
-        """Friction coefficient that sticking needs: infinite without normal force, NaN outside the response."""
+        """Return the friction coefficient for sticking: infinite without normal force, NaN outside the response."""
         return as_asked(friction_demand(*self._contact.forces(time)))
 
     @cached_property
@@ -342,7 +342,7 @@ class Simulated(Result):
 
     @property
     def required_friction(self) -> float:
-        """Largest friction coefficient that sticking needs, between impacts and until `tipping_time`.
+        """Largest friction coefficient required to stick, between impacts and until `tipping_time`.
 
         Infinite if the normal force does not stay positive.
         """
@@ -350,14 +350,14 @@ class Simulated(Result):
 
     @property
     def minimum_normal_force(self) -> float:
-        """Smallest normal force over the weight, between impacts and until `tipping_time`."""
+        """Smallest ratio of normal force to weight, between impacts and until `tipping_time`."""
         return self._extremes[1]
 
     def sliding_time(self, friction: float) -> float:
-        """Return the first time, s, at which sticking needs more than a friction coefficient; NaN if it never does.
+        """Return the first time, s, at which sticking requires more than a friction coefficient; NaN if never.
 
-        The coefficient is positive and at most 3. The time is before the block tips (`tipping_time`), without the
-        impulses at impacts. What happens after a slip is not part of the model.
+        The coefficient is positive and at most 3. The search excludes impulses at impacts and ends at `tipping_time`.
+        Motion after a slip is not modelled.
         """
         level = friction_coefficient(friction)
         if not self.required_friction > level:
@@ -368,7 +368,7 @@ class Simulated(Result):
     def lift_off_time(self) -> float:
         """First time, s, at which the normal force is not positive, so that the base leaves the ground; NaN if never.
 
-        As for `sliding_time`, until the block tips and between impacts.
+        The search is limited as for `sliding_time`.
         """
         if self.minimum_normal_force > 0.0:
             return math.nan

@@ -1,4 +1,4 @@
-"""A response in words for people, to the digits that are known."""
+"""Text summaries of a response, with the digits that are known."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from rocking.engine.problem import thresholds_of
 from rocking.response.perturbed import percent, steps_within
 from rocking.response.simulated import Simulated
 
-#: Decimals of a time at most; digits of a peak, at most and where its range is shown.
+#: Largest numbers of decimals of a time and digits of a peak, and digits of a range of peaks.
 _MOST_DECIMALS: Final = 9
 _MOST_DIGITS: Final = 6
 _FEWEST_DIGITS: Final = 3
 
-#: Decimals of a time in a table, and of one beside others in a summary.
+#: Decimals of a time in a table, and next to other values in a summary.
 _BRIEF: Final = 2
 _SHORT: Final = 4
 
-#: From so much on, s, the range of a time is shown.
+#: Smallest range of a time, s, that is reported.
 _SHOWN: Final = 1e-3
 
-#: Events that a summary lists.
+#: Largest number of events in a summary.
 _LISTED: Final = 12
 
-#: What is not known where a response is ambiguous.
+#: Unknown results of an ambiguous response.
 _AFFECTED: Final = {
     "peak": "the peak rotation",
     "events": "times of events or impacts",
@@ -40,7 +40,7 @@ _AFFECTED: Final = {
 
 
 def summary_rows(response: Simulated, friction: float | None, precision: float) -> list[Row]:
-    """Return what happened, line by line; with a coefficient of friction, whether it is enough."""
+    """Return the rows of a summary, including the check of a coefficient of friction if given."""
     body = response.body
     sliding = math.nan if friction is None else response.sliding_time(friction)
     rows = [
@@ -87,7 +87,7 @@ def summary_rows(response: Simulated, friction: float | None, precision: float) 
 
 
 def line(response: Simulated) -> str:
-    """Return what happened, in one line."""
+    """Return the response in one line."""
     motion, limit = response.motion, response.body.coordinate.limit
     peak = ""
     if limit and not response.overturned and math.isfinite(response._balance_at_peak):
@@ -101,7 +101,7 @@ def line(response: Simulated) -> str:
 
 
 def in_words(response: Simulated, overturn_time: str) -> str:
-    """Return what became of the body, for its summary; the time at which it overturns is given as text."""
+    """Return the outcome for the summary. The time of overturning is passed as text."""
     if response.overturned:
         return f"overturns at {overturn_time}"
     if response.unfinished:
@@ -119,7 +119,7 @@ def in_words(response: Simulated, overturn_time: str) -> str:
 
 
 def in_brief(response: Simulated, precision: float) -> str:
-    """Return what became of the body, for a row of a table."""
+    """Return the outcome for a row of a table."""
     near, further = response.perturbed(), response.perturbed(*steps_within(precision))
     if not near.is_decided and near.overturned.any():
         shares = [int(each.overturned.sum()) for each in (near, further)]
@@ -141,22 +141,22 @@ def in_brief(response: Simulated, precision: float) -> str:
 
 
 def _residual_text(response: Simulated) -> str:
-    """Rotation about which the block leans; it depends on the peak where a tendon has yielded."""
+    """Return the residual rotation, which depends on the peak if a tendon has yielded."""
     return f"{response.residual_rotation:.{_peak_digits(response)}g} {response.body.coordinate.unit}"
 
 
 def ratio_text(response: Simulated) -> str:
-    """Peak rotation over slenderness, to the digits that are known."""
+    """Return the normalised peak rotation with the known digits."""
     return f"{response.peak_over_slenderness:.{min(_peak_digits(response), 4)}g}"
 
 
 def known_ratio(response: Simulated) -> float:
-    """Peak rotation over slenderness, rounded where fewer than four digits are known: to show it in fewer still."""
+    """Return the normalised peak rotation, rounded if fewer than four digits are known."""
     return response.peak_over_slenderness if _peak_digits(response) >= _SHORT else float(ratio_text(response))
 
 
 def time_text(time: float, low: float, high: float) -> str:
-    """Return a time, s, with the digits that its range in repeated simulations leaves, or its range if wide."""
+    """Return a time, s, with the digits common to its range, or its range if wide."""
     unknown = _unknown(time, low, high)
     decimals = _decimals(unknown)
     if unknown < _SHOWN:
@@ -165,7 +165,7 @@ def time_text(time: float, low: float, high: float) -> str:
 
 
 def tipping_text(response: Simulated) -> str:
-    """Time at which the block tips, as far as it is known: it falls as late or as early as it tips."""
+    """Return the tipping time with the known digits, which equal the ones of the overturning time."""
     unknown = 0.0
     if response.overturned:
         unknown = _unknown(response.overturn_time, *response.perturbed().overturn_range)
@@ -174,7 +174,7 @@ def tipping_text(response: Simulated) -> str:
 
 
 def _motion_text(response: Simulated) -> str:
-    """Say what shakes the body; here and below a g is the standard one, as wherever accelerations are given in g."""
+    """Describe the ground motion. In all texts g is standard gravity."""
     motion = response.motion
     if motion is None:
         return "none: free rocking"
@@ -185,7 +185,7 @@ def _motion_text(response: Simulated) -> str:
 
 
 def _thresholds_text(response: Simulated) -> str:
-    """Return what lifts the body; under a vertical motion it changes with the weight."""
+    """Return the uplift thresholds, which vary with the weight under vertical motion."""
     motion = response.motion
     (pair,), (own,) = thresholds_of(response.body.alone(), response.model)
     plus, minus = (pair / STANDARD_GRAVITY).tolist()
@@ -221,19 +221,19 @@ def _event_rows(response: Simulated) -> list[Row]:
 
 
 def _rest_note(unknown: float, sequence: np.void) -> str:
-    """Return how a time of rest, of which so much is unknown, is known: no more of it than the record's digits tell."""
+    """Describe the proof of a time of rest, with the digits that the record supports."""
     width = sequence["upper"] - sequence["lower"]
     if not width >= 0.0:
         return ", by the treatment, not proven"
     decimals = _decimals(unknown)
-    # The bracket is for the motion to the last place: beside a time with fewer digits it would say too much.
+    # The bracket applies to the exact motion, so it would overstate the precision of a rounded time.
     bracket = f", bracket {width:.1e} s wide" if decimals >= _MOST_DECIMALS else ""
     start = f" from {sequence['start']:.{min(decimals, 4)}f} s on" if unknown < _SHOWN else ""
     return f", complete chattering proven{start}{bracket}"
 
 
 def _peak_rows(response: Simulated) -> list[Row]:
-    """Peak and its time, each as far as it is known."""
+    """Return rows of the peak and its time, each with the known digits."""
     near, (name, _, _, unit, limit) = response.perturbed(), response.body.coordinate
     (low, high), digits, balance = near.peak_range, _peak_digits(response), response._balance_at_peak
     value = f"{response.peak_rotation:.{digits}g}"
@@ -253,7 +253,7 @@ def _peak_rows(response: Simulated) -> list[Row]:
 
 
 def _balance_text(response: Simulated) -> str:
-    """Unstable balance of a block that is not free, which its slenderness does not tell."""
+    """Return the unstable balance of a restrained block."""
     plus, minus = (f"{value:.5g} rad" if math.isfinite(value) else "none" for value in response.balance)
     if plus != minus and not (isinstance(response.body, RestrainedBlock) and response.body.is_one_sided):
         return f"{plus} (side +), {minus} (side -)"
@@ -284,7 +284,7 @@ def _when_stopped(response: Simulated) -> str:
 
 
 def _peak_digits(response: Simulated) -> int:
-    """Digits that are known of the peak."""
+    """Return the number of known digits of the peak."""
     unknown = _unknown(response.peak_rotation, *response.perturbed().peak_range)
     value = abs(response.peak_rotation - response.body.stops[0])
     if not math.isfinite(unknown):
@@ -295,12 +295,12 @@ def _peak_digits(response: Simulated) -> int:
 
 
 def _unknown(value: float, low: float, high: float) -> float:
-    """Largest distance of a value from the ends of its range."""
+    """Return the largest distance of a value from the ends of its range."""
     return max(high - value, value - low)
 
 
 def _decimals(unknown: float) -> int:
-    """Decimals of a number of which so much is unknown: where that is shown as well, the first uncertain one too."""
+    """Return the decimals of a number with this uncertainty, including the first uncertain one for a range."""
     if not math.isfinite(unknown):
         return 0
     if unknown <= 0.0:
@@ -310,7 +310,7 @@ def _decimals(unknown: float) -> int:
 
 
 def _short_text(time: float, low: float, high: float, most: int = _SHORT) -> str:
-    """Time, s, or its range, to ``most`` decimals."""
+    """Return a time, s, or its range, with at most ``most`` decimals."""
     unknown = _unknown(time, low, high)
     decimals = min(_decimals(unknown), most)
     if 10.0**decimals * unknown < 1.0:

@@ -1,4 +1,4 @@
-"""Rigid bodies in space, as a mesh gives them, and the blocks that they are in the plane of each azimuth."""
+"""Rigid bodies in space, from meshes or mass properties, and their blocks in vertical planes."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""From a mesh to the mass properties and the support of a body, with all that was assumed on the way."""
+"""Mass properties and support of a body from a mesh."""
 
 from __future__ import annotations
 
@@ -33,18 +33,18 @@ if TYPE_CHECKING:
 
     from trimesh import Scene, Trimesh
 
-    #: A file, the name of the mesh that ships with the package, a stream with a name, or what trimesh has read.
+    #: Path, name of a mesh included in the package, stream with a name, or object of trimesh.
     Mesh = str | PathLike[str] | BinaryIO | Trimesh | Scene
 
-#: The mesh that ships with the package, and its name.
+#: Meshes included in the package, by name.
 SHIPPED: Final = {"statue": Path(__file__).with_name("data") / "statue.obj"}
 
-#: Lengths of units, m.
+#: Units of length, m.
 UNITS: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 
 
 class Part(NamedTuple):
-    """One part of a mesh: its corners, shape (n, 3), and three of them for each triangle, shape (m, 3)."""
+    """Part of a mesh: corners, shape (n, 3), and indices of the corners of triangles, shape (m, 3)."""
 
     name: str
     vertices: Floats
@@ -52,7 +52,7 @@ class Part(NamedTuple):
 
 
 class Parts(NamedTuple):
-    """All parts of a mesh, what it is called, and the axis that points up in it."""
+    """All parts of a mesh, the name of the mesh, and its axis that points up."""
 
     parts: tuple[Part, ...]
     name: str
@@ -60,7 +60,7 @@ class Parts(NamedTuple):
 
 
 def parts_of(mesh: Mesh, most: int | None = None) -> Parts:
-    """Return the parts of a mesh, which share no name, in the order of their names; of so many triangles at most."""
+    """Return the parts of a mesh, with unique names and in their order, of ``most`` triangles at most."""
     name, up, path = type(mesh).__name__, "z", ""
     found: list[tuple[str, Any, Any]]
     if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
@@ -108,7 +108,7 @@ def _read(file: Path, named: str) -> Scene:
 
 
 def _streamed(stream: BinaryIO, name: str) -> Scene:
-    """Read a stream, and no file or address that it names; a mesh without a name has the stream's, as from a path."""
+    """Read a stream, but no file or address named in it. An unnamed mesh has the name of the stream."""
     scene = _loaded(stream, name, resolver={})
     if PurePath(name).suffix.lower() in (".ply", ".stl") and len(scene.geometry) == 1:
         (mesh,) = scene.geometry.values()
@@ -118,17 +118,17 @@ def _streamed(stream: BinaryIO, name: str) -> Scene:
 
 
 def _loaded(source: Path | BinaryIO, named: str, **how: Any) -> Scene:
-    """Read a file or a stream with trimesh, with all that it names."""
+    """Read a file or stream, and files named in it, with trimesh."""
     try:
         import trimesh
     except ImportError:
         raise InvalidOption(f"meshes are read with trimesh, which is not installed: {install('mesh')}") from None
     suffix = PurePath(source.name).suffix.lower().removeprefix(".")
-    # Every object and group of an OBJ file is a part, whatever its material; corners stay as they are.
+    # Objects and groups of OBJ files are parts, regardless of material. Corners are unchanged.
     how |= {"split_objects": True, "split_groups": True, "skip_materials": True, "group_material": False}
     try:
         return trimesh.load_scene(source, file_type=suffix, process=False, **how)
-    except Exception as error:  # what a reader of foreign files raises is of any kind
+    except Exception as error:  # readers of foreign files raise any type
         formats = sorted(trimesh.available_formats())
         said = f"it lacks {error}" if isinstance(error, KeyError) else " ".join(str(error).split())
         reason = f"{said or type(error).__name__}; is it whole, and what its name says?"
@@ -143,20 +143,20 @@ def _part(name: str, mesh: Any, transform: Any) -> Part:
     faces = np.asarray(mesh.faces, dtype=np.int64)
     if not np.array_equal(matrix, np.eye(4)):
         vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
-        if np.linalg.det(matrix[:3, :3]) < 0.0:  # a mirror image turns the normals round
+        if np.linalg.det(matrix[:3, :3]) < 0.0:  # a mirror image reverses the normals
             faces = faces[:, ::-1]
     return Part(name, vertices, faces)
 
 
 def length_of(unit: object) -> float:
-    """Return the length of the unit that a mesh's coordinates are in, m: by its name, or as a number."""
+    """Return the length of the unit of a mesh, m, from its name or a number."""
     if isinstance(unit, str):
         return UNITS[checks.one_of(unit, "unit", InvalidBlock, [*UNITS])]
     return checks.positive(unit, "unit", InvalidBlock, "m")
 
 
 def upright(up: object) -> Floats:
-    """Return the rotation, shape (3, 3), by the shortest way, that turns an axis of a mesh to z."""
+    """Return the smallest rotation, shape (3, 3), of an axis of a mesh to z."""
     if isinstance(up, str):
         axis = checks.one_of(up, "up", InvalidBlock, ["x", "y", "z", "-x", "-y", "-z"])
         u = np.eye(3)["xyz".index(axis[-1])] * (-1.0 if axis[0] == "-" else 1.0)
@@ -169,14 +169,21 @@ def upright(up: object) -> Floats:
     if u[2] < 0.0 and not u[0] * u[0] + u[1] * u[1] > 0.0:
         return np.diag([1.0, -1.0, -1.0])
     x, y, _ = u
-    # Rodrigues' formula for the axis u x z: 1 + V + V^2/(1 + u_z), whose divisor loses its digits near -z.
+    # Rodrigues' formula for the axis u x z: 1 + V + V^2/(1 + u_z), whose divisor loses digits near -z.
     v = np.array([[0.0, 0.0, -x], [0.0, 0.0, -y], [x, y, 0.0]])
     share = 1.0 / (1.0 + u[2]) if u[2] > 0.0 else (1.0 - u[2]) / (x * x + y * y)
     return np.asarray(np.eye(3) + v + v @ v * share)
 
 
 class Region(NamedTuple):
-    """A part of a body: its name, its volume, m^3, and its density, kg/m^3; None where it is not known."""
+    """Part of a body.
+
+    Its fields are name, volume, m^3, and density, kg/m^3; None if the density is not known.
+
+    See Also
+    --------
+    Solid : Rigid body in space.
+    """
 
     name: str
     volume: float
@@ -194,7 +201,7 @@ def properties(
     turn: float,
     most: int | None = None,
 ) -> tuple[dict[str, Any], list[Surface]]:
-    """Return what `Solid` is made from, by name, and closed surfaces of its parts, the lowest corner at height 0."""
+    """Return the arguments of `Solid`, and closed surfaces of its parts with the lowest corner at height 0."""
     if support is not None and tolerance is not None:
         raise InvalidBlock("{} is how a support is looked for: leave it out where {} is given", "tolerance", "support")
     found = parts_of(mesh, most)
@@ -248,7 +255,7 @@ def properties(
 def _densities(
     given: float | Mapping[str, float] | None, names: Sequence[str], every: Sequence[str]
 ) -> dict[str, float | None]:
-    """Density of each surface, kg/m^3, by its name; every part of the mesh may have one."""
+    """Return the density of each surface, kg/m^3, by name. Every part of the mesh may have a density."""
     if given is None:
         return dict.fromkeys(names)
     if not isinstance(given, Mapping):
@@ -268,7 +275,7 @@ def _densities(
 def _surfaces(
     parts: Sequence[Part], density: float | Mapping[str, float] | None, file: str
 ) -> tuple[list[str], list[Surface]]:
-    """Close the surfaces of the parts, and name them; open ones of one density are joined before."""
+    """Close and name the surfaces of the parts. Open parts of one density are joined first."""
     names = [part.name for part in parts]
     found = [joined(file, part.vertices, part.faces) for part in parts]
     is_open = [not is_closed(surface.faces) for surface in found]
@@ -285,7 +292,7 @@ def _surfaces(
 
 
 def _support(corners: Floats, given: ArrayLike | None, tolerance: float, path: str) -> tuple[Floats, tuple[str, ...]]:
-    """Support polygon, and notes on it, of a mesh whose lowest corner is at height zero."""
+    """Return the support polygon, with notes, of a mesh whose lowest corner is at height zero."""
     if given is not None:
         polygon = polygons.given_polygon(given)
         (west, south), (east, north) = corners[:, :2].min(axis=0), corners[:, :2].max(axis=0)

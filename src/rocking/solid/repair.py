@@ -1,6 +1,7 @@
-"""Closed surfaces from the triangles of a mesh, with a sentence for every repair; their moments, and their overlaps.
+"""Closed surfaces from the triangles of a mesh, with repairs, moments and overlaps.
 
-What is inside a surface is known where its triangles make a cycle: every edge is passed as often one way as the other.
+The inside of a surface is defined if its triangles form a cycle: every edge is traversed equally often in both
+directions.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Surface(NamedTuple):
-    """Corners, m, shape (n, 3), triangles, shape (m, 3), and what was repaired."""
+    """Corners, m, shape (n, 3), triangles, shape (m, 3), and descriptions of repairs."""
 
     vertices: Floats
     faces: Integers
@@ -28,12 +29,12 @@ class Surface(NamedTuple):
 
 
 def is_closed(faces: Integers) -> bool:
-    """Whether every edge is passed as often one way as the other."""
+    """Return whether every edge is traversed equally often in both directions."""
     return not len(_open_edges(faces))
 
 
 def joined(name: str, vertices: Floats, faces: Integers) -> Surface:
-    """Join corners at one place; leave out triangles that are none then, or are there already."""
+    """Merge coincident corners; remove degenerate and duplicate triangles."""
     low = vertices.min(axis=0)
     size = float(np.max(vertices.max(axis=0) - low))
     if not size > 0.0:
@@ -42,7 +43,7 @@ def joined(name: str, vertices: Floats, faces: Integers) -> Surface:
     _, first, of_place = np.unique(places, axis=0, return_index=True, return_inverse=True)
     three = of_place.reshape(-1)[faces]
     kept = three[(three[:, 0] != three[:, 1]) & (three[:, 1] != three[:, 2]) & (three[:, 2] != three[:, 0])]
-    # Each begins with its least corner, so that those of one orientation are equal.
+    # Starting with the smallest index, triangles of one orientation are equal.
     turned = np.take_along_axis(kept, (np.argmin(kept, axis=1)[:, None] + np.arange(3)) % 3, axis=1)
     kept = kept[np.sort(np.unique(turned, axis=0, return_index=True)[1])]
     edges, _, _, pairs = _shared(kept)
@@ -58,7 +59,7 @@ def joined(name: str, vertices: Floats, faces: Integers) -> Surface:
 
 
 def one_of(surfaces: Sequence[Surface]) -> Surface:
-    """Return one surface of several."""
+    """Combine several surfaces."""
     starts = np.cumsum([0, *(len(each.vertices) for each in surfaces)])
     faces = np.vstack([each.faces + start for each, start in zip(surfaces, starts[:-1], strict=True)])
     repairs = tuple(sentence for each in surfaces for sentence in each.repairs)
@@ -66,9 +67,10 @@ def one_of(surfaces: Sequence[Surface]) -> Surface:
 
 
 def oriented(surfaces: Sequence[Surface], hollow: Sequence[bool]) -> list[Surface]:
-    """Turn the normals of closed surfaces outwards; a piece in a larger one whose normals point into it is a cavity.
+    """Turn the normals of closed surfaces outwards, except for cavities: pieces in a larger one with normals into it.
 
-    It goes to the surface around it, where it is another one only if ``hollow`` says so; what is left may be empty.
+    A cavity belongs to the surface around it, but to another one only if ``hollow`` is true. Surfaces may become
+    empty.
     """
     labels = [shells_of(each.faces) for each in surfaces]
     of, shells = _pieces(surfaces, labels)
@@ -93,14 +95,14 @@ def oriented(surfaces: Sequence[Surface], hollow: Sequence[bool]) -> list[Surfac
 
 
 def _pieces(surfaces: Sequence[Surface], labels: Sequence[Integers]) -> tuple[Integers, list[Surface]]:
-    """Return the closed pieces of surfaces from the labels of their triangles, and of which surface each is."""
+    """Return the index of the surface of each closed piece, and the pieces, from labels of triangles."""
     of = [(k, n) for k, label in enumerate(labels) for n in range(int(label.max(initial=-1)) + 1)]
     pieces = [Surface(surfaces[k].vertices, surfaces[k].faces[labels[k] == n]) for k, n in of]
     return np.array([k for k, _ in of]), pieces
 
 
 def _said(cavities: Floats, flipped: Flags) -> Iterator[str]:
-    """Sentences on cavities, m^3, and on the other pieces of a surface that were turned, or not."""
+    """Describe cavities, with volumes in m^3, and other turned pieces."""
     if flipped.all() and len(flipped):
         yield "normals pointed inwards: the surface was turned inside out"
     if len(cavities):
@@ -111,12 +113,12 @@ def _said(cavities: Floats, flipped: Flags) -> Iterator[str]:
 
 
 def _edges(faces: Integers) -> Integers:
-    """Edges of every triangle, in its sense: shape (3 m, 2)."""
+    """Return the directed edges of every triangle, shape (3 m, 2)."""
     return np.asarray(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2))
 
 
 def _shared(faces: Integers) -> tuple[Integers, Integers, int, Integers]:
-    """Edges of triangles, their numbers without a sense and how many these are, and pairs of edges that two share."""
+    """Return directed edges, undirected indices of edges and their number, and pairs shared by two triangles."""
     edges = _edges(faces)
     _, key, counts = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
     key = key.reshape(-1)
@@ -125,7 +127,7 @@ def _shared(faces: Integers) -> tuple[Integers, Integers, int, Integers]:
 
 
 def components(count: int, pairs: Integers) -> Integers:
-    """Label each of so many things by the connected ones that it is among, from pairs of neighbours."""
+    """Label ``count`` items by connected component, from pairs of neighbours."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -134,7 +136,7 @@ def components(count: int, pairs: Integers) -> Integers:
 
 
 def _open_edges(faces: Integers) -> Integers:
-    """Edges that are passed one way more often than the other, in the sense that closes them; shape (k, 2)."""
+    """Return the edges with unbalanced directions, in the direction that closes them, shape (k, 2)."""
     edges = _edges(faces)
     undirected, key = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
     net = np.bincount(key.reshape(-1), weights=np.where(edges[:, 0] < edges[:, 1], 1.0, -1.0)).astype(np.int64)
@@ -143,7 +145,7 @@ def _open_edges(faces: Integers) -> Integers:
 
 
 def filled(surface: Surface) -> Surface:
-    """Fill every hole with triangles from its edge to the mean of its corners, which is exact where it is flat."""
+    """Fill every hole with triangles from its edge to the mean of its corners, which is exact for flat holes."""
     vertices, faces, repairs = surface
     edges = _open_edges(faces)
     if not len(edges):
@@ -161,10 +163,10 @@ def filled(surface: Surface) -> Surface:
 
 
 def shells_of(faces: Integers) -> Integers:
-    """Label the triangles of each closed surface, from 0 up: pieces that touch at corners or edges are apart."""
+    """Label the triangles of each closed surface, from 0. Pieces that touch at corners or edges are separate."""
     edges, key, count_edges, pairs = _shared(faces)
     patch = components(len(faces), pairs // 3)
-    # Patches that are not closed are parts of one surface where they share an edge.
+    # Open patches belong to one surface if they share an edge.
     of_edge = np.repeat(patch, 3)
     each, place = np.unique(of_edge * count_edges + key, return_inverse=True)
     net = np.bincount(place.reshape(-1), weights=np.where(edges[:, 0] < edges[:, 1], 1.0, -1.0))
@@ -180,7 +182,7 @@ def _area(vertices: Floats, faces: Integers) -> float:
 
 
 def surrounds(vertices: Floats, faces: Integers, other: Floats, others: Integers) -> bool:
-    """Whether a surface goes round another one, as that of its corners and triangles says which is least doubtful."""
+    """Return whether a surface surrounds another one, from the sample with the clearest winding number."""
     some = others[np.linspace(0, len(others) - 1, 12).astype(np.int64)]
     places = np.vstack([other[some[:, 0]], other[some].mean(axis=1)])
     around = [abs(winding(vertices, faces, place)) for place in np.unique(places, axis=0)]
@@ -188,13 +190,13 @@ def surrounds(vertices: Floats, faces: Integers, other: Floats, others: Integers
 
 
 def winding(vertices: Floats, faces: Integers, place: Floats) -> float:
-    """Return how often a surface goes round a place: solid angles over 4 pi (Van Oosterom and Strackee 1983)."""
+    """Return the winding number of a surface around a point from solid angles (Van Oosterom and Strackee 1983)."""
     a, b, c = (vertices[faces[:, k]] - place for k in range(3))
     la, lb, lc = (np.linalg.norm(each, axis=1) for each in (a, b, c))
     above = np.einsum("ij,ij->i", a, np.cross(b, c))
     below = la * lb * lc + np.sum(a * b, axis=1) * lc + np.sum(b * c, axis=1) * la + np.sum(c * a, axis=1) * lb
     halves = np.arctan2(above, below)
-    # In a triangle itself the sign of its solid angle is that of rounding; halfway from one side to the other it is 0.
+    # For a point in a triangle, rounding determines the sign of the solid angle. The mean of both sides is 0.
     halves[(below < 0.0) & (np.abs(above) <= 1e-12 * la * lb * lc)] = 0.0
     return float(np.sum(halves) / (2.0 * np.pi))
 
@@ -207,22 +209,22 @@ class Moments(NamedTuple):
     second: Floats
 
     def inertia_over_amount(self) -> Floats:
-        """Return the tensor of inertia about the centre over the amount, m^2: of x x^T its trace less itself."""
+        """Return the tensor of inertia about the centre divided by the amount, m^2: the trace of x x^T minus x x^T."""
         mean = self.second / self.amount
         return np.asarray(np.trace(mean) * np.eye(3) - mean)
 
 
 def signed_volumes(vertices: Floats, faces: Integers) -> Floats:
-    """Volumes between each triangle and the middle of all corners, positive where its normal points away from it."""
+    """Return the volume between each triangle and the middle, positive if its normal points outwards."""
     one, two, three = (vertices[faces[:, k]] - _middle(vertices) for k in range(3))
     return np.asarray(np.einsum("ij,ij->i", one, np.cross(two, three)) / 6.0)
 
 
 def moments(vertices: Floats, faces: Integers) -> Moments:
-    """Return the moments of what a closed surface encloses, exact but for rounding.
+    """Compute the moments of the interior of a closed surface, exact except for rounding.
 
-    Every triangle and one place span a tetrahedron of signed volume V. With s the sum of its corners a, b, c from that
-    place, its first moment is V s/4, its second V (s s^T + a a^T + b b^T + c c^T)/20.
+    Every triangle and a common point span a tetrahedron of signed volume V. With the sum s of its corners a, b, c
+    relative to this point, its first moment is V s/4, its second V (s s^T + a a^T + b b^T + c c^T)/20.
     """
     middle = _middle(vertices)
     corners = vertices[faces] - middle
@@ -236,7 +238,7 @@ def moments(vertices: Floats, faces: Integers) -> Moments:
 
 
 def together(parts: Sequence[Moments], densities: Sequence[float]) -> Moments:
-    """Return the moments of several parts, each with its density."""
+    """Combine the moments of parts with their densities."""
     masses = np.array([part.amount * density for part, density in zip(parts, densities, strict=True)])
     total = float(masses.sum())
     centre = masses @ np.array([part.centre for part in parts]) / total
@@ -248,14 +250,14 @@ def together(parts: Sequence[Moments], densities: Sequence[float]) -> Moments:
 
 
 def _middle(vertices: Floats) -> Floats:
-    """Place in the middle of all corners: differences from it keep their digits."""
+    """Return the middle of all corners, a reference point that avoids cancellation."""
     return np.asarray(0.5 * (vertices.min(axis=0) + vertices.max(axis=0)))
 
 
 def overlaps(surfaces: Sequence[Surface]) -> tuple[str, ...]:
-    """Return a sentence on what pieces of a mesh have in common, by sampling where the boxes around them overlap.
+    """Return a note on the common volume of pieces, by sampling overlaps of bounding boxes.
 
-    Of several closed surfaces with their cavities all go round a place as often as bodies are there.
+    The sum of the winding numbers of closed surfaces, including cavities, equals the number of bodies at a point.
     """
     _, shells = _pieces(surfaces, [shells_of(each.faces) for each in surfaces])
     corners = [each.vertices[each.faces] for each in shells]
@@ -267,7 +269,7 @@ def overlaps(surfaces: Sequence[Surface]) -> tuple[str, ...]:
         return ()
     low, high = np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)
     count = min(max(20_000_000 // sum(len(each.faces) for each in surfaces), 30), 1000)
-    # An additive recurrence fills the box evenly, with no place on a face of a common shape.
+    # An additive recurrence fills the box evenly and avoids the faces of common shapes.
     places = low + (0.5 + np.arange(count)[:, None] * 1.2207440846057596 ** -np.arange(1.0, 4.0)) % 1.0 * (high - low)
     times = np.array([sum(winding(*each[:2], place) for each in surfaces) for place in places])
     twice = float(np.prod(high - low) * np.mean(np.maximum(np.rint(times) - 1.0, 0.0)))

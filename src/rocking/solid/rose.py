@@ -1,4 +1,4 @@
-"""How a body resists in every direction: uplift, frequency parameter and slenderness over the azimuth."""
+"""Resistance of a body in every direction."""
 
 from __future__ import annotations
 
@@ -20,28 +20,32 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Azimuths unless others are asked for, degrees.
+#: Default azimuths, degrees.
 EVERY: Final = np.arange(0.0, 360.0, 5.0)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Rose(DatasetResult):
-    """Resistance of a body to rocking in every direction; from `Solid.rose`.
+    """Resistance of a body to rocking in every direction, returned by `Solid.rose`.
 
-    Its figure has the acceleration that lifts the body in each direction, and in it the support polygon about the
-    centre of mass, over the height of that: how far it reaches in a direction is that acceleration over g. Beside it
-    are slenderness and frequency parameter over the azimuth.
+    The figure shows the uplift acceleration in each direction. Inside is the support polygon about the centre of mass,
+    divided by its height: its reach equals the ratio of this acceleration to g. A second panel shows slenderness and
+    frequency parameter against the azimuth.
 
     Attributes
     ----------
     data : xarray.Dataset
-        Over (azimuth), degrees clockwise from north: acceleration, that of the ground which lifts the body to that
-        side, in g, and overturns it where it lasts; alpha (rad), at which a tilted table overturns it; p (rad/s);
-        restitution, on leaving that side; radius R (m); rise, of the centre of mass up to the unstable balance (m). And
-        what planar rocking leaves out: coupling, products of inertia about the axis over the moment; aside, how far the
-        pivot lies to the side of the centre of mass (m); gap, how far it is from facing that of the other side (m).
-        Over (corner): east and north of the centre of mass (m), the support polygon. In its attributes weakest_azimuth
-        and weakest_acceleration, exact, and height_of_mass (m).
+        Over (azimuth), degrees clockwise from north: acceleration of the ground, in g, that lifts the body to this
+        side, and overturns it if it lasts; alpha (rad), the tilt of a table that overturns the body; p (rad/s);
+        restitution on leaving this side; radius R (m); rise of the centre of mass up to the unstable balance (m).
+        Effects neglected in planar rocking: coupling, ratio of the products of inertia to the moment about the axis;
+        aside, lateral distance of the pivot from the centre of mass (m); gap, lateral distance between the pivots of
+        both sides (m). Over (corner): east and north of the centre of mass (m), the support polygon. Attributes:
+        weakest_azimuth and weakest_acceleration, exact, and height_of_mass (m).
+
+    See Also
+    --------
+    Solid : Rigid body in space.
     """
 
     TABLES = MappingProxyType(
@@ -113,7 +117,7 @@ class Rose(DatasetResult):
 
 
 def checked_azimuths(azimuths: ArrayLike | None) -> Floats:
-    """Return azimuths, degrees, each once from 0 to below 360 and in increasing order, or refuse them."""
+    """Return unique, increasing azimuths in [0, 360), degrees, or raise `InvalidOption`."""
     if azimuths is None:
         return EVERY
     given = np.atleast_1d(checks.numbers(azimuths, "azimuths", InvalidOption))
@@ -125,7 +129,7 @@ def checked_azimuths(azimuths: ArrayLike | None) -> Floats:
 def rose_of(
     polygon: Floats, height: float, inertia: Floats, gravity: float, azimuths: Floats, description: str
 ) -> Rose:
-    """Return the rose of a body: support about the centre of mass, its height, m, and inertia over the mass, m^2."""
+    """Return the rose from the support about the centre of mass, its height, m, and `inertia_over_mass`, m^2."""
     import xarray as xr
 
     here, there = (polygons.extents(polygon, turned) for turned in (azimuths, azimuths + 180.0))
@@ -172,7 +176,7 @@ def rose_of(
 
 
 def about_axes(inertia: Floats, azimuths: Floats) -> tuple[Floats, Floats]:
-    """Return the moments about the horizontal axes across azimuths, and products of inertia over them."""
+    """Return moments about horizontal axes perpendicular to azimuths, and ratios of products of inertia to them."""
     towards = polygons.directions(azimuths)
     axis = np.column_stack([towards[:, 1], -towards[:, 0], np.zeros(len(towards))])
     torque = axis @ inertia

@@ -1,4 +1,4 @@
-"""A rigid body in space that stands on a support polygon: from a mesh, or from its mass properties."""
+"""Rigid bodies in space on a support polygon, from a mesh or from mass properties."""
 
 from __future__ import annotations
 
@@ -28,38 +28,43 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Solid(Result):
-    """A rigid body in space that stands on a horizontal plane; `from_mesh` makes it, or here its mass properties.
+    """Rigid body in space on a horizontal plane, from its mass properties or by `from_mesh`.
 
-    Coordinates are to the east, to the north, and up from the plane, m.
+    Coordinates are east, north, and up from the plane, m.
 
     Parameters
     ----------
     support : array_like, shape (k, 2)
-        Corners of its support; what counts is the convex polygon around them.
+        Corners of the support, which is their convex hull.
     centre : array_like, shape (3,)
         Centre of mass.
     inertia_over_mass : array_like, shape (3, 3)
-        Tensor of inertia about the centre of mass over the mass, m^2: squares of radii of gyration on its diagonal, and
-        the negative of the mean products of coordinates beside it.
+        Tensor of inertia about the centre of mass divided by the mass, m^2: squared radii of gyration on the diagonal,
+        negative mean products of coordinates elsewhere.
     mass, gravity : float, optional
-        Mass, kg, on which rocking does not depend, and acceleration of gravity, m/s^2.
+        Mass, kg, which does not affect rocking, and acceleration of gravity, m/s^2.
     description, height : str, float, optional
-        What it is, and its height, m.
+        Description and height, m.
     regions : sequence of Region
-        Its parts, each with its name, volume (m^3) and density (kg/m^3).
+        Parts of the body, with name, volume (m^3) and density (kg/m^3).
     repairs, notes : sequence of str
-        What was done to the mesh to close its surface, and what looks like a mistake.
+        Repairs that closed the surface of the mesh, and warnings about probable mistakes.
 
     Raises
     ------
     InvalidBlock
-        If it does not stand, or no body has that tensor of inertia.
+        If the body does not stand, or the tensor of inertia is impossible.
+
+    See Also
+    --------
+    Rose : Resistance to rocking in every direction.
+    Block : Block that rocks in a plane.
 
     Notes
     -----
-    In the vertical plane of an azimuth the body is a block (`block`): it rocks about the edges, or corners, where its
-    support ends in that direction and in the opposite one. Turning about the vertical, rolling over corners and
-    products of inertia are left out; `rose` contains their sizes.
+    In the vertical plane of an azimuth the body is a block (`block`). It rocks about the outermost edges or corners of
+    the support in this direction and the opposite one. Rotation about the vertical, rolling over corners and products
+    of inertia are neglected; `rose` reports their size.
 
     Examples
     --------
@@ -119,50 +124,56 @@ class Solid(Result):
         turn: float = 0.0,
         gravity: float = STANDARD_GRAVITY,
     ) -> Solid:
-        """Body that the surface of a mesh encloses: from a file (OBJ, PLY, STL, glTF, ...), or what trimesh has read.
+        """Create a body from a mesh: a file (OBJ, PLY, STL, glTF, ...) or an object of trimesh.
 
-        The lowest corner stands on the ground. Unless `up` or `turn` change it, x is to the east and y to the north, so
-        that azimuths are counted clockwise from y.
+        The lowest corner stands on the ground. Unless `up` or `turn` change it, x points east and y north, so azimuths
+        are clockwise from y.
 
         Parameters
         ----------
         mesh : path, binary stream, trimesh.Trimesh or trimesh.Scene
-            Triangles; "statue" is a mesh that ships with the package. A stream needs the file's name as its ``name``.
+            Triangles. "statue" is a mesh included in the package. A stream needs the name of the file as ``name``.
         density : float or mapping of str to float, optional
-            Density, kg/m^3: of all, or of each part (object, group, node) by its name. Without it all is of one
-            density, and the mass not known. What parts have in common counts twice, and is noted.
+            Density, kg/m^3, of the body, or of each part (object, group, node) by name. By default uniform, with
+            unknown mass. Overlaps count twice, and are reported in `notes`.
         support : array_like, shape (k, 2), optional
-            Corners of the support, m, in the mesh's own horizontal coordinates after `up`, `unit` and `turn`. By
-            default the convex polygon around all corners of the mesh within `tolerance` of the lowest one.
+            Corners of the support, m, in the horizontal coordinates of the mesh after `up`, `unit` and `turn`. The
+            default is the convex hull of all corners of the mesh within `tolerance` of the lowest one.
         tolerance : float, optional
-            That distance, m; by default a thousandth of the height. Without `support` only.
+            Height of these corners above the lowest one, m; by default a thousandth of the height. Only without
+            `support`.
         up : {"x", "y", "z", "-x", "-y", "-z"} or array_like, optional
-            Axis of the mesh that points up, or a vector; the mesh is turned there by the shortest way, so that with "y"
-            x stays in the east, and north is -z. By default z; of glTF files y.
+            Axis of the mesh that points up, or a vector. The mesh is rotated by the smallest angle, so with "y" x
+            still points east, and north is -z. The default is z, for glTF files y.
         unit : {"m", "cm", "mm", "in", "ft"} or float
-            Unit of the mesh's coordinates, or its length in m.
+            Unit of the coordinates of the mesh, or its length in m.
         turn : float
-            Degrees, clockwise seen from above, by which the mesh is then turned.
+            Final rotation of the mesh, degrees, clockwise from above.
         gravity : float
             Acceleration of gravity, m/s^2.
 
         Returns
         -------
         Solid
-            With what was repaired: holes, and normals that point inwards; and with notes, as on parts that overlap.
+            Body with `repairs` (holes, normals that pointed inwards) and `notes`, for example on overlapping parts.
 
         Raises
         ------
         InvalidBlock
-            If the mesh cannot be read, encloses no volume or does not stand, or an argument is not usable.
+            If the mesh cannot be read, encloses no volume or does not stand, or an argument is invalid.
         InvalidOption
-            If a file is to be read and trimesh is not installed.
+            If trimesh is required to read a file but not installed.
+
+        See Also
+        --------
+        Region : Part of a body.
 
         Notes
         -----
-        Volume, centre and inertia are exact for the mesh. A hole is filled by triangles between its edge and the mean
-        of its corners. Where several parts are of one density and some are open, these are joined first. A surface in
-        another one, with its normals inwards, is a cavity; so is such a part to which `density` gives none.
+        Volume, centre and inertia are exact for the mesh, apart from rounding. A hole is filled by triangles between
+        its edge and the mean of its corners. If several parts have one density and some are open, the open parts are
+        joined first. A surface inside another one, with its normals inwards, is a cavity, and so is such a part
+        without a `density`.
 
         Examples
         --------
@@ -174,40 +185,44 @@ class Solid(Result):
 
     @property
     def volume(self) -> float | None:
-        """Volume of all its regions, m^3; None where it is not known."""
+        """Total volume of the regions, m^3; None if it is not known."""
         return sum(region.volume for region in self.regions) if self.regions else None
 
     @property
     def weakest_azimuth(self) -> float:
-        """Direction, degrees clockwise from north, in which it is lifted first; an edge of the support faces it."""
+        """Direction of the first uplift, degrees clockwise from north, perpendicular to an edge of the support."""
         facing, distances = polygons.edges(self._about_centre)
         return float(facing[np.argmin(distances)])
 
     @property
     def _about_centre(self) -> Floats:
-        """Support about the centre of mass."""
+        """Support relative to the centre of mass."""
         return np.asarray(self.support - self.centre[:2])
 
     def block(self, azimuth: float, *, restitution: float | Sequence[float] | None = None) -> Block:
-        """Block that the body is in the vertical plane of an azimuth.
+        """Return the block of the body in the vertical plane of an azimuth.
 
         Parameters
         ----------
         azimuth : float
-            Direction of side +, degrees clockwise from north; that in which the ground acceleration is positive.
+            Direction of side +, and of positive ground acceleration, degrees clockwise from north.
         restitution : float or pair, optional
-            Factor on the angular speed on leaving a side; by default angular momentum about the new pivot is conserved.
+            Factor on the angular speed on leaving a side. The default conserves angular momentum about the new pivot.
 
         Returns
         -------
         Block
-            As `Block.from_pivots` makes it, with the azimuth in its description: the pivots are where the support ends
-            in both directions, the radius of gyration is that about the horizontal axis across the plane.
+            Block from `Block.from_pivots`, with the azimuth in its description. Its pivots are the ends of the
+            support, and its radius of gyration is about the horizontal axis perpendicular to the plane.
 
         Raises
         ------
         InvalidBlock
-            If the body is too stocky to rock that way.
+            If the body is too stocky to rock in this plane.
+
+        See Also
+        --------
+        Block.from_pivots : Create a block from its pivots and its radius of gyration.
         """
         plane = plane_of(self, azimuth)
         plus, minus = plane.pivots.distance.tolist()
@@ -284,7 +299,7 @@ class Solid(Result):
 
 
 class Plane(NamedTuple):
-    """A body in the plane of an azimuth, deg: pivots of side + and -, height of the mass, radius of gyration, m."""
+    """Body in the plane of an azimuth, deg: pivots of both sides, height of the mass, radius of gyration, m."""
 
     azimuth: float
     pivots: polygons.Extent
@@ -293,11 +308,11 @@ class Plane(NamedTuple):
 
 
 def plane_of(solid: Solid, azimuth: float) -> Plane:
-    """Return a body in the vertical plane of an azimuth."""
+    """Return the body in the vertical plane of an azimuth."""
     towards = checks.finite(azimuth, "azimuth", InvalidBlock)
     pivots = polygons.extents(solid.support - solid.centre[:2], [towards, towards + 180.0])
     middle, apart = pivots.distance.mean(), np.ptp(pivots.distance)
-    if apart <= 1e-12 * middle:  # by rounding alone: a body that is symmetric has equal sides wherever it stands
+    if apart <= 1e-12 * middle:  # rounding only: a symmetric body has equal sides at any position
         pivots = pivots._replace(distance=np.full(2, middle))
     squared, _ = about_axes(solid.inertia_over_mass, np.array([towards]))
     return Plane(towards, pivots, float(solid.centre[2]), math.sqrt(float(squared[0])))
@@ -313,7 +328,7 @@ def _shaped(value: ArrayLike, name: str, shape: tuple[int, ...]) -> Floats:
 def _checked_inertia(value: ArrayLike) -> Floats:
     found = _shaped(value, "inertia_over_mass", (3, 3))
     rounding = 1e-9 * float(np.abs(found).max())
-    # Principal moments: none is larger than the sum of both others.
+    # No principal moment exceeds the sum of the other two.
     least, middle, most = np.linalg.eigvalsh(0.5 * (found + found.T))
     is_symmetric = np.allclose(found, found.T, rtol=0.0, atol=rounding)
     if not (rounding > 0.0 and is_symmetric and least + middle >= most - rounding and least > -rounding):

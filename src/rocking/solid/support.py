@@ -1,7 +1,7 @@
-"""The convex polygon of a body's support, in any direction; horizontal sections of a body, and its outline from them.
+"""Support polygons in any direction, and horizontal sections of a body for its outline.
 
-Seen along a horizontal axis, a section covers what its convex hull does, from one end to the other. So hulls at some
-heights are all that an outline needs, for every azimuth.
+Seen along a horizontal axis, a section and its convex hull have the same ends. Therefore convex hulls at some heights
+determine the outline for every azimuth.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from rocking.errors import InvalidBlock
 from rocking.motion.processing import sine_cosine
 from rocking.solid.repair import Surface
 
-#: Corners of a polygon within this part of its size of the outermost one are on one edge with it.
+#: Largest distance from the outermost corner, relative to the polygon, of corners on one edge.
 _ON_EDGE: Final = 1e-6
 
-#: Most bands between sections; each has a section just above its lower end and one just below its upper end.
+#: Largest number of bands, each with sections just above its lower and just below its upper end.
 _BANDS: Final = 120
 
 
@@ -34,7 +34,7 @@ class Extent(NamedTuple):
 
     @property
     def aside(self) -> Floats:
-        """How far the edge or corner lies to the side of the centre of mass, m; 0 where an edge reaches past it."""
+        """Lateral distance of the edge or corner from the centre of mass, m; 0 if an edge extends past it."""
         return np.asarray(np.maximum(np.maximum(self.low, -self.high), 0.0))
 
 
@@ -45,7 +45,7 @@ def directions(azimuths: ArrayLike) -> Floats:
 
 
 def hull(points: Floats) -> Floats | None:
-    """Return the corners of the convex polygon around points in a plane, counterclockwise; None if it has no area."""
+    """Return the convex hull of points in a plane, counterclockwise; None if it has no area."""
     from scipy.spatial import ConvexHull, QhullError
 
     off = points - points.mean(axis=0)
@@ -58,13 +58,13 @@ def hull(points: Floats) -> Floats | None:
 
 
 def area(polygon: Floats) -> float:
-    """Area of a polygon, m^2."""
+    """Compute the area of a polygon, m^2."""
     x, y = (polygon - polygon[0]).T
     return float(0.5 * np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
 
 
 def given_polygon(value: ArrayLike) -> Floats:
-    """Return the convex polygon around points that somebody gives, shape (n, 2), or refuse them."""
+    """Return the convex hull of the corners from a user, shape (n, 2), or raise `InvalidBlock`."""
     points = checks.numbers(value, "support", InvalidBlock)
     if points.ndim != 2 or points.shape[1] != 2 or not np.all(np.isfinite(points)):
         raise InvalidBlock("{} must be corners of a polygon, each a finite (east, north) in m", "support", value=value)
@@ -75,7 +75,7 @@ def given_polygon(value: ArrayLike) -> Floats:
 
 
 def extents(polygon: Floats, azimuths: ArrayLike) -> Extent:
-    """Return how far a polygon about the centre of mass reaches in each direction."""
+    """Return the reach in each direction of a polygon around the centre of mass."""
     towards = directions(azimuths)
     reach, across = polygon @ towards.T, polygon @ np.column_stack([-towards[:, 1], towards[:, 0]]).T
     most = reach.max(axis=0)
@@ -85,7 +85,7 @@ def extents(polygon: Floats, azimuths: ArrayLike) -> Extent:
 
 
 def edges(polygon: Floats) -> tuple[Floats, Floats]:
-    """Return the azimuths that the edges of a polygon face, degrees, and their distances from the origin, m."""
+    """Return the azimuths of outward normals of edges, degrees, and distances of edges from the origin, m."""
     along = np.roll(polygon, -1, axis=0) - polygon
     outward = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1, keepdims=True)
     azimuth = np.mod(np.rad2deg(np.arctan2(outward[:, 0], outward[:, 1])), 360.0)
@@ -106,14 +106,14 @@ class Sections(NamedTuple):
 
 
 def sections_of(surfaces: Sequence[Surface]) -> Sections:
-    """Return sections of a body at the heights of its corners, or of some of them, from closed surfaces."""
+    """Return sections of closed surfaces at the heights of all or some corners."""
     corners = np.unique(np.concatenate([np.unique(each.vertices[each.faces, 2]) for each in surfaces]))
     size = float(corners[-1] - corners[0])
     first = np.unique(np.rint((corners - corners[0]) * (10.0 * _BANDS / size)), return_index=True)[1]
     kept = np.append(corners[first[:-1]], corners[-1])
     if len(kept) > _BANDS + 1:
         kept = np.linspace(corners[0], corners[-1], _BANDS + 1)
-    within = 1e-6 * np.diff(kept)  # so that a step in the outline stays one
+    within = 1e-6 * np.diff(kept)  # preserves a step in the outline
     heights = np.column_stack([kept[:-1] + within, kept[1:] - within]).ravel()
     reach = [(tall.min(axis=1), tall.max(axis=1)) for tall in (each.vertices[each.faces, 2] for each in surfaces)]
     hulls = tuple(_section(surfaces, reach, float(height)) for height in heights)
@@ -121,7 +121,7 @@ def sections_of(surfaces: Sequence[Surface]) -> Sections:
 
 
 def _section(surfaces: Sequence[Surface], reach: Sequence[tuple[Floats, Floats]], height: float) -> Floats:
-    """Return the convex hull of a section, or a polygon in it that differs by at most 2e-4 of its size."""
+    """Return the convex hull of a section, or a polygon inside it that differs by at most 2e-4 of its size."""
     places = []
     for (vertices, faces, _), (low, high) in zip(surfaces, reach, strict=True):
         cut = faces[(low < height) & (high > height)]
@@ -132,7 +132,7 @@ def _section(surfaces: Sequence[Surface], reach: Sequence[tuple[Floats, Floats]]
         part = (height - one[:, 2]) / (other[:, 2] - one[:, 2])
         places.append(one[:, :2] + part[:, None] * (other[:, :2] - one[:, :2]))
     every = np.vstack(places)
-    if not len(every):  # between pieces that lie apart: no width
+    if not len(every):  # between separate pieces: no width
         return surfaces[0].vertices[:1, :2]
     around = hull(every)
     if around is None:  # on one line: its ends
