@@ -275,3 +275,12 @@ def test_rests_that_are_proven_are_episodes_with_shaking_and_without(motion, opt
     assert (len(response.chattering) > 0) == (motion is None or "chattering" in options)
     assert math.isnan(found.share_at_rest) == ("chattering" not in options) and not found.amid_shaking.any()
     assert ("never passes a threshold" in str(found)) == ("chattering" not in options)
+
+
+def test_the_parameters_of_a_family_are_taken_by_their_names():
+    family = families.lobes(rocking.Block.from_parameters(p=1.0, alpha=0.2, restitution=0.9), count=3)
+    ratio, a = [0.2, 5.0], [1.01, 1.5, 3.0]
+    named = chattering_map(family, {"a": a, "ratio": ratio}).data.outcome
+    swapped = chattering_map(family, {"ratio": ratio, "a": a}).data.outcome
+    assert swapped.dims == ("ratio", "a") and (swapped.T.values == named.values).all()
+    assert np.unique(named.values).size > 1

@@ -377,3 +377,27 @@ def test_dollars_in_names_begin_no_formula():
         assert not [text for text in texts if re.search(r"[a-z]_[a-z]{2}", text)], kind
         seen += any("\\$" in text for text in texts)
     assert seen >= 4
+
+
+def test_a_response_that_leaves_the_frame_at_once_or_rests_as_it_ends_is_drawn():
+    block = rocking.Block(width=0.4, height=2.0)
+    fallen = rocking.simulate(block, None, initial_rotation=0.5)
+    assert fallen.plot().axes
+    falling = rocking.simulate(block, rocking.pulses.one_sine(9.0, 0.8))
+    assert falling.overturned
+    assert falling.plot(window=(falling.overturn_time - 0.01, falling.duration)).axes
+    resting = rocking.simulate(block, None, initial_rotation=0.1).duration
+    assert rocking.simulate(block, None, initial_rotation=0.1, duration=resting).plot(longest_sequence=True).axes
+
+
+def test_fractiles_of_many_motions_are_drawn_where_the_first_overturns_at_every_level():
+    motions = [rocking.pulses.one_sine(1.0, frequency) for frequency in (0.3, 4.0, 4.5, 5.0, 5.5, 6.0)]
+    found = rocking.incremental_dynamic_analysis(rocking.Block(width=0.4, height=2.0), motions, levels=[3.0, 5.0, 8.0])
+    drawn = [line for line in found.plot().axes[0].lines if "suffices" in str(line.get_label())]
+    assert drawn and all(np.isfinite(line.get_ydata()).any() for line in drawn)
+
+
+def test_the_ground_panel_names_the_side_of_each_threshold_of_an_asymmetric_block():
+    block = rocking.Block(width=0.4, height=2.0, offset=0.05)
+    axes = rocking.simulate(block, rocking.pulses.one_sine(5.0, 1.0)).plot().axes
+    assert {"lifts to side +", "lifts to side −"} <= {text.get_text() for each in axes for text in each.texts}

@@ -242,3 +242,11 @@ def test_unusable_arguments_are_refused(arguments):
 def test_filters_ask_for_even_samples(arguments):
     with pytest.raises(InvalidMotion, match="resample"):
         pulses.ricker(1.0, 1.0).processed(**arguments)
+
+
+def test_a_coarser_vertical_component_stays_even_when_it_is_trimmed_between_its_samples():
+    rng = np.random.default_rng(3)
+    horizontal = Motion.from_samples(rng.normal(size=401), 0.005)
+    motion = horizontal.with_vertical(Motion.from_samples(rng.normal(size=201), 0.01))
+    found = motion.processed(trim=(0.105, 1.5), baseline=1)
+    assert found.vertical.step == found.step == 0.005

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -153,7 +154,8 @@ def chattering_map(
             value=family,
         )
     (first, x), (second, y) = ((k, checks.axis(values, k, InvalidOption)) for k, values in parameters.items())
-    inputs = [family(float(one), float(other)) for one in x for other in y]
+    swapped = _is_swapped(family, str(first), str(second))
+    inputs = [family(*map(float, (other, one) if swapped else (one, other))) for one in x for other in y]
     for each in inputs:
         if not (isinstance(each, SimulationInput) and isinstance(each.motion, Motion)):
             raise InvalidOption(
@@ -174,6 +176,15 @@ def chattering_map(
         {"program": f"rocking {VERSION}", "case": _in_common(inputs[0], inputs[-1])},
     )
     return ChatteringMap(dataset.assign(complete=dataset.outcome == Outcome.COMPLETE))
+
+
+def _is_swapped(family: Family, first: str, second: str) -> bool:
+    """Whether the parameters of a family have these names in the opposite order."""
+    try:
+        names = [*inspect.signature(family).parameters]
+    except (TypeError, ValueError):  # a callable without a signature
+        return False
+    return len(names) > 1 and (first == names[1] or second == names[0])
 
 
 @dataclass(frozen=True, eq=False, repr=False)

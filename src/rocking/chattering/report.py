@@ -138,7 +138,7 @@ class ChatteringReport(Result):
 
     def _pair(self, values: dict[str, float], equation: str, *, time: bool) -> str:
         if math.isnan(values["exact"]):
-            return f"none within half a period; Eq. {equation[2:]} means nothing here"
+            return f"none within half a period; {values[equation]:.9g} by Eq. {equation[2:]}"
         approximate = f"{values[equation]:.9g} by Eq. {equation[2:]}"
         exact = self._time(values["exact"]) if time else f"{values['exact']:.9g}"
         return f"{exact} exact, {approximate}"

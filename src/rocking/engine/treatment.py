@@ -156,6 +156,7 @@ class AsymptoticTime(Treatment):
         critical[lossy] = critical_amplitudes_by(self.critical, frequency[lossy], eta[lossy])
         complete = (amplitude >= 1.0) & (amplitude < critical)
         first, third = np.reshape([eq65_sums(e) for e in eta.flat], (*eta.shape, 2)).T
+        first, third = (np.where(np.isfinite(sums), sums, 0.0) for sums in (first, third))  # infinite without losses
         excess = np.where(complete, amplitude - 1.0, 0.0).T
         times = (np.sqrt(excess) * (first + excess * third) / frequency.T).T
         return np.where(complete, times / bodies.p, np.inf)

@@ -210,18 +210,18 @@ class Processable(Measured):
         if vertical is not None and kept is not None and kept[0] > vertical.duration - piecewise.SHORTEST:
             vertical = None  # it is over by then
         if vertical is not None:
-            vertical = vertical._processed(kept, steps)
+            vertical = vertical._processed(kept, steps, self.step)
         return replace(self._processed(kept, steps), vertical=vertical)  # type: ignore[type-var]
 
-    def _processed(self, kept: tuple[float, float] | None, steps: list[_Step]) -> Self:
-        """Return the part between two times (s), after these steps."""
+    def _processed(self, kept: tuple[float, float] | None, steps: list[_Step], grid: float | None = None) -> Self:
+        """Return the part between two times (s; even samples stay even on a finer `grid`), after these steps."""
         motion: Piecewise = self
         history = self.history
         # What is made of samples is the motion from then on: the lines between them are exact.
         error = 0.0 if steps else self.error
         if kept is not None:
             start, end = kept[0], min(kept[1], self.duration)
-            steps = [lambda motion: _cut(motion, start, end), *steps]
+            steps = [lambda motion: _cut(motion, start, end, grid), *steps]
         for step in steps:
             motion = done = step(motion)
             history = (*history, done.done)
@@ -257,19 +257,27 @@ def _ends(motion: Piecewise, start: float, end: float) -> tuple[float, float]:
     return round(first / step) * step, round(last / step) * step
 
 
-def _cut(motion: Piecewise, start: float, end: float) -> Processed:
-    """Keep the part from `start` to `end` (s)."""
+def _cut(motion: Piecewise, start: float, end: float, grid: float | None = None) -> Processed:
+    """Keep the part from `start` to `end` (s); even samples stay even, where needed with a step `grid` (s)."""
     done = f"trimmed to {start:.6g}-{end:.6g} s"
     step = piecewise.even_step(motion)
     if step is not None:
-        first, last = round(start / step), round(end / step)
-        if max(abs(first * step - start), abs(last * step - end)) <= 1e-8 * step:
-            return Processed(piecewise.even_times(last - first + 1, step), motion.coefficients[first:last], done)
+        for finer in (step, grid or step):
+            first, last, parts = (_whole(value / finer) for value in (start, end, step))
+            if first is not None and last is not None and parts:
+                sample, part = np.divmod(np.arange(first, last), parts)
+                coefficients = piecewise.moved(motion.coefficients[sample], part * finer)
+                return Processed(piecewise.even_times(last - first + 1, finer), coefficients, done)
     breakpoints = motion.breakpoints
     inside = breakpoints[(breakpoints > start) & (breakpoints < end)]
     kept = np.concatenate([[start], inside, [end]])
     coefficients = piecewise.refined(breakpoints, motion.coefficients, kept, motion.coefficients.shape[1])
     return Processed(kept - start, coefficients, done)
+
+
+def _whole(ratio: float) -> int | None:
+    """Return the whole number that a ratio is up to rounding, or None."""
+    return round(ratio) if abs(ratio - round(ratio)) <= 1e-8 else None
 
 
 def _baseline(motion: Piecewise, degree: int) -> Processed:
@@ -350,8 +358,8 @@ def _floor_pieces(
     if ringing is None and ratio == 0.0:
         raise InvalidMotion("a floor without {} moves for ever: give {}, s", "damping", "ringing")
     # Without a time, a free oscillation is followed until it has faded to a thousandth of itself.
-    ring = -math.log(1e-3) / (ratio * rate) if ringing is None else ringing
-    after = checks.within(ring, "ringing", InvalidMotion, 0.0, 1e15, "s")
+    after = -math.log(1e-3) / (ratio * rate) if ringing is None else ringing
+    after = after if ringing is None else checks.within(ringing, "ringing", InvalidMotion, 0.0, 1e15, "s")
     step = _RADIANS / rate
     if not (end + after) / step <= 1e6:
         raise InvalidMotion(

@@ -287,7 +287,8 @@ def ida_figure(*, motions: Sequence[ScaledMotion], level_label: str, **place: Un
                     color = style["color"] if few else INK
                     panel.plot([k, k], band, "_-", color=color, linewidth=5.0, markersize=5.0, solid_capstyle="butt")
         if not few:
-            peaks = np.linspace(0.0, max(float(np.nanmax(line.get_xdata())) for line in curves.lines), 200)[1:]
+            every = np.concatenate([motion.peak for motion in motions])
+            peaks = np.linspace(0.0, float(np.max(every[np.isfinite(every)], initial=0.0)), 200)[1:]
             reached = np.sort([levels_reaching(motion, peaks) for motion in motions], axis=0)
             for share, linestyle in _FRACTILES.items():
                 # The lowest level that is enough for this share of the motions.

@@ -205,8 +205,11 @@ def _mark_events(axes: Axes, response: Simulated, start: float, end: float) -> N
 def _mark_fall(axes: Axes, time: Floats, drawn: Floats, label: str) -> None:
     """Draw a cross where the curve ends or leaves the frame."""
     low, high = axes.get_ylim()
-    end = np.flatnonzero((drawn >= low) & (drawn <= high))[-1]
-    axes.plot(time[end], drawn[end], "X", color=ABOVE, markersize=7, clip_on=False, zorder=4, label=label)
+    inside = np.flatnonzero((drawn >= low) & (drawn <= high))
+    end = inside[-1] if inside.size else -1
+    axes.plot(
+        time[end], np.clip(drawn[end], low, high), "X", color=ABOVE, markersize=7, clip_on=False, zorder=4, label=label
+    )
 
 
 def _tell_sides(axes: Axes, factors: tuple[float, float]) -> None:
@@ -230,6 +233,10 @@ def _draw_thresholds(axes: Axes, response: Simulated, time: Floats, acceleration
         if np.any(beyond):
             axes.fill_between(time, acceleration, threshold, where=beyond, label="beyond a threshold", **above)
         axes.plot(time, threshold, color=INK, linewidth=0.8, linestyle=(0, (5, 2)), label="uplift thresholds")
+        if pair[0] != pair[1]:
+            words, place = ("lifts to side +", "bottom") if sign < 0.0 else ("lifts to side −", "top")
+            look = {"va": place, "color": INK, "fontsize": "small", "xycoords": axes.get_yaxis_transform()}
+            write(axes, words, (0.0, threshold[0]), (3, -2.0 * sign), **look)
 
 
 def _time_label(start: float, end: float, duration: float) -> str:
@@ -240,7 +247,8 @@ def _time_label(start: float, end: float, duration: float) -> str:
 def _draw_sequence(main: Axes, axes: Axes, response: Simulated, sequence: np.void) -> None:
     """Draw a sequence impact by impact, and mark it in the histories."""
     times = _within(response.impacts["time"], sequence["start"], sequence["end"])
-    low, high = response.perturbed().event_ranges[response.events["time"] == sequence["end"]].T.max(axis=1)
+    ranges = response.perturbed().event_ranges[response.events["time"] == sequence["end"]]
+    low, high = ranges.T.max(axis=1, initial=0.0)
     first, last, at = float(times[0]), float(sequence["upper"]), main.get_xaxis_transform()
     main.plot([first, last], [0.95, 0.95], "|-", color=ABOVE, linewidth=1.3, transform=at)
     look: dict[str, Any] = {"ha": "center", "va": "bottom", "color": ABOVE, "fontweight": "bold", "xycoords": at}
