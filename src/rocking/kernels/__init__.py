@@ -1,1 +1,1 @@
-"""Compiled functions: numbers in, numbers and a code out; they never raise."""
+"""Compiled functions. They accept and return numbers, report failure by a code, and never raise."""
