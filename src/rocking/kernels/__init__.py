@@ -1,1 +1,1 @@
-"""Compiled functions. They accept and return numbers, report failure by a code, and never raise."""
+"""Compiled functions, which accept numbers, return numbers and a code, and never raise."""

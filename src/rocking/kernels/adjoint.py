@@ -1,10 +1,10 @@
-"""Derivatives of one number of a response with respect to all coefficients of its motion, in one backward pass.
+"""Derivatives of one number of a response by all coefficients of its motion, in one backward pass.
 
-`trace.vary` propagates one change of the input forwards to all numbers of a response. This module propagates the
-derivatives of one number by the state, d number = l du + m dv, backwards to all inputs. Along an arc with du'' = k(t)
-du - c du' + f(t), m'' = k(t) m + c m' and l = c m - m', and a forcing f adds the integral of m f. Through an impact,
-the transposed saltation applies. A tendon that yields adds its plastic elongation to the state, which forces arcs with
-an elastic tendon and is written when the body turns back.
+Whereas `trace.vary` propagates one change of the input forwards to all numbers of a response, this module propagates
+the derivatives of one number by the state, d number = l du + m dv, backwards to all inputs. Along an arc with
+du'' = k(t) du - c du' + f(t), m'' = k(t) m + c m' and l = c m - m', and a forcing f adds the integral of m f. Through
+an impact, the transposed saltation applies. A tendon that yields adds its plastic elongation to the state, which forces
+arcs with an elastic tendon and is written when the body turns back.
 """
 
 import math
@@ -35,18 +35,18 @@ from rocking.kernels.trace import (
 #: Number of derivatives: by u, v and a plastic elongation.
 _PLAIN = 3
 
-#: Rounding of a step, divided by the largest terms from which it is computed.
+#: Rounding of a step, divided by its largest terms.
 _ROUNDING = 2.0**-51
 
 
 class Ends(IntEnum):
-    """End of a backward pass: the start of the response, a rest, or a point without derivative."""
+    """End of a backward pass."""
 
     START = 0
     REST = 1
     #: The body touches the ground without speed.
     GRAZES = 2
-    #: The body leaves the ground at the instant at which it comes to rest.
+    #: The body leaves the ground at the instant of rest.
     LEAVES_AT_ONCE = 3
     #: The motion touches the threshold of a side without a rate.
     TOUCHES_THRESHOLD = 4
@@ -59,9 +59,9 @@ def adjoint(trail: Trail, scratch: Record, work: Record, row: int, time: float, 
     """Propagate ``change``, the derivatives of a number, back to the start of the response; return the `Ends`.
 
     The derivatives are by u, v and plastic elongation at ``time`` after the node of a row; if infinite, at the end of
-    its step, before an impact there. On return, they are by those at the start, and 0 if the body has come to rest. The
-    derivatives by the coefficients of piece k, in units of g, horizontal ones first, are added to row k of ``out``.
-    ``work`` is scratch space (`state.VARIATION`). For two more numbers in ``change``, see `add_rounding`.
+    its step, before an impact there. On return they refer to the start, and are 0 if the body has come to rest.
+    Derivatives by the coefficients of piece k (units of g, horizontal first) are added to row k of ``out``. ``work`` is
+    scratch space (`state.VARIATION`). For two more numbers in ``change``, see `add_rounding`.
     """
     block, nodes = trail.block, trail.nodes
     number = impacts_up_to(nodes, row)
@@ -124,7 +124,7 @@ def add_rounding(trail: Trail, scratch: Record, k: int, order: int, t: float, ch
 
 @inlined
 def at_rest(nodes: Records, k: int, change: Floats) -> int:
-    """Propagate ``change`` back through a rest, if the node or the one before is at rest; GOES_ON if anything is left.
+    """Propagate ``change`` back through a rest at the node or the one before; GOES_ON if anything is left.
 
     Impacts between the last resolved one and the rest have no effect.
     """
@@ -144,7 +144,7 @@ def at_rest(nodes: Records, k: int, change: Floats) -> int:
 def back_through_impact(trail: Trail, k: int, v: float, number: int, change: Floats) -> bool:
     """Propagate ``change`` back through the impact after the k-th node, at velocity v; False if the body only touches.
 
-    ``number``: number of earlier impacts.
+    ``number`` of impacts came before.
     """
     if change[0] == 0.0 and change[1] == 0.0:
         return True
@@ -162,7 +162,7 @@ def back_through_impact(trail: Trail, k: int, v: float, number: int, change: Flo
 def adjoint_of_final_state(trail: Trail, scratch: Record, row: int, change: Floats, out: Floats) -> int:
     """Write the derivative of the time at which the step of a row ends by the state before it; return the `Ends`.
 
-    That state is at the end of the step, before an impact or an overturning, otherwise at its node. For an uplift or a
+    That state is at the end of the step, before an impact or an overturning, otherwise at its node. For an uplift or
     rest, derivatives by the motion at that instant are added to ``out``, as in `adjoint`.
     """
     block, nodes = trail.block, trail.nodes
@@ -194,7 +194,7 @@ def adjoint_of_final_state(trail: Trail, scratch: Record, row: int, change: Floa
 
 @inlined
 def by_rest(trail: Trail, node: Record, plastic: float, change: Floats, out: Floats) -> None:
-    """Write the derivatives of the time of rest after the impact with which a node begins (see `trace.rest_shift`)."""
+    """Write the derivatives of the time of rest after the impact of a node (see `trace.rest_shift`)."""
     block, i = trail.block, node.side
     j = block.next_side[i]
     g_i = restoring(trail.ground, block, i, node.piece, node.offset)
@@ -217,7 +217,7 @@ def by_rest(trail: Trail, node: Record, plastic: float, change: Floats, out: Flo
 
 @inlined
 def add_instant(trail: Trail, node: Record, by: tuple[float, float], out: Floats) -> None:
-    """Add the derivatives by the coefficients of a node's piece, given those ``by`` push and weight at its instant."""
+    """Add the derivatives by the coefficients of a node's piece; ``by``: derivatives by push and weight at the node."""
     columns = trail.ground.columns
     push, weight = by
     for j in range(columns):
@@ -230,13 +230,13 @@ def add_instant(trail: Trail, node: Record, by: tuple[float, float], out: Floats
 
 @inlined
 def turns_back(nodes: Records, row: int) -> bool:
-    """Return whether a body with a yielded tendon turns back at a node, where its plastic elongation is written."""
+    """Return whether the body turns back at a node, where the plastic elongation is written."""
     return bool(nodes[row - 1].law == TendonLaw.PLASTIC and nodes[row].law == TendonLaw.ELASTIC)
 
 
 @inlined
 def plastic_at(trail: Trail, row: int) -> float:
-    """Return the plastic elongation of a tendon at a node; 0 if no tendon yields."""
+    """Return the plastic elongation at a node; 0 if no tendon yields."""
     if not trail.block.yielding:
         return 0.0
     while row > 0 and not turns_back(trail.nodes, row):
@@ -264,7 +264,7 @@ def back_through(
     change: Floats,
     out: Floats,
 ) -> None:
-    """Propagate ``change`` back through a time t of the arc from a node, expanded to the given order and degree."""
+    """Propagate ``change`` back through a time t of the arc from a node, for the given order and degree."""
     order, degree = orders
     x = work.change
     expand_free(trail, scratch, work, node.side, degree, order)

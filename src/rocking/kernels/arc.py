@@ -19,7 +19,7 @@ from rocking.kernels.series import (
 )
 from rocking.kernels.state import ORDER, Record
 
-#: Length of the first step after an impact, divided by the arc's duration under constant acceleration.
+#: First step after an impact, divided by the arc's duration under constant acceleration.
 _FIRST_STEP = 1.3
 
 
@@ -38,7 +38,7 @@ def restoring(ground: Ground, block: Record, side: int, piece: int, offset: floa
 
 @inlined
 def weight_at(ground: Ground, piece: int, offset: float) -> float:
-    """Compute the weight in the ground's frame, divided by the weight at rest: 1 + a_v/g."""
+    """Compute the weight in the ground's frame, divided by the weight at rest."""
     return 1.0 + acceleration(vertical_of(ground), piece, offset) if has_vertical(ground) else 1.0
 
 
@@ -105,7 +105,7 @@ def step_length(ground: Ground, block: Record, state: Record, left: float) -> fl
 
 @inlined
 def restrained_step(block: Record, side: int) -> float:
-    """Return the longest step, the inverse of the largest rate at which a restrained body moves or slows down."""
+    """Return the longest step: the inverse of the largest rate of motion or damping under restraints."""
     stiffness = abs(block.stiffness[side]) * (1.0 + abs(block.added_weight[side])) + abs(block.spring[side])
     fastest = max(math.sqrt(stiffness), block.damping[side])
     return 1.0 / fastest if fastest > 0.0 else np.inf
@@ -113,7 +113,7 @@ def restrained_step(block: Record, side: int) -> float:
 
 @inlined
 def significant_degree(A: Floats, degree: int, h: float) -> int:
-    """Return the degree of a polynomial without its highest powers that are negligible within h."""
+    """Return the degree of a polynomial without negligible highest powers within h."""
     while degree > 1 and abs(A[degree]) * h**degree < NEGLIGIBLE * abs(A[0]):
         degree -= 1
     return degree
@@ -121,10 +121,10 @@ def significant_degree(A: Floats, degree: int, h: float) -> int:
 
 @inlined
 def linear_order(lam: float, h: float) -> int:
-    """Return the order at which the series of a linear arc has converged within h, for a motion of degree 0 or 1.
+    """Return the order at which the series of a linear arc has converged within h (motion of degree 0 or 1).
 
-    Each later coefficient follows from the one two before, so that the ratio of c[k] h^k to c[2] h^2, which decreases
-    most slowly, is known in advance.
+    The ratio of c[k] h^k to c[2] h^2, which decreases most slowly, is known in advance, because each later coefficient
+    follows from the one two before.
     """
     squared = abs(lam) * h * h
     ratio = 1.0
@@ -137,9 +137,9 @@ def linear_order(lam: float, h: float) -> int:
 
 @inlined
 def converged(c: Floats, degree: int, h: float) -> int:
-    """Return the order at which a full series under constant weight has converged within h, or a value above `ORDER`.
+    """Return the order at which a full series under constant weight has converged within h, or more than `ORDER`.
 
-    Each coefficient beyond the motion's degree follows from the one two before: two negligible ones end the series.
+    Beyond the motion's degree, each coefficient follows from the one two before: two negligible ones end the series.
     """
     largest = term = abs(c[1]) * h
     power = h * h
@@ -159,7 +159,7 @@ def expand_checked(
 ) -> tuple[int, float]:
     """Compute the series of an arc and of its sines and cosines, for the degrees of motion and weight.
 
-    Returns (order, h'). The series ends as soon as a bound shows that its truncation is negligible.
+    Returns (order, h'). The series ends as soon as a bound on its truncation is negligible.
     """
     c, side = scratch.rotation, state.side
     if block.restrained:

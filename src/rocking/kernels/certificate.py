@@ -63,8 +63,8 @@ class Bounds(NamedTuple):
 def geometric_bracket(v: float, first: Bounds, second: Bounds, e: Pair, least_e: Pair) -> tuple[float, float]:
     """Compute a lower and an upper bound on the time to rest if the bounds hold that long; NaN, NaN: no proof.
 
-    ``first`` bounds the side entered, ``second`` the other one; ``e``, ``least_e``: largest and smallest restitution on
-    leaving them.
+    ``first`` bounds the side entered, ``second`` the other; ``e``, ``least_e``: largest, smallest restitution on
+    leaving.
     """
     change_i, shortest_i, longest_i = arc_bounds(v, first)
     fastest = e[0] * math.sqrt(1.0 + change_i) * v
@@ -82,7 +82,7 @@ def geometric_bracket(v: float, first: Bounds, second: Bounds, e: Pair, least_e:
 
 @inlined
 def fastest_impact(v: float, first: Bounds, second: Bounds, e_i: float) -> float:
-    """Bound the speeds of all impacts until rest, for a body that a `geometric_bracket` brings to rest."""
+    """Bound all impact speeds until rest, for a body that a `geometric_bracket` brings to rest."""
     fastest = math.sqrt(1.0 + arc_bounds(v, first)[0]) * v
     following = e_i * fastest * math.sqrt(1.0 + arc_bounds(e_i * fastest, second)[0])
     return max(fastest, following) * (1.0 + ROUNDING)
@@ -112,9 +112,9 @@ def arc_bounds(v: float, bounds: Bounds) -> tuple[float, float, float]:
 
 
 class Proof(NamedTuple):
-    """Bounds on the time to rest from an impact, an estimate of it, and a bound on all rotations until then.
+    """Bounds on the time to rest from an impact, its estimate, and a bound on all rotations until then.
 
-    All are NaN without a proof.
+    All NaN: no proof.
     """
 
     lower: float
@@ -125,13 +125,13 @@ class Proof(NamedTuple):
 
 @inlined
 def unproven() -> Proof:
-    """Return NaN for all bounds."""
+    """Return an all-NaN proof."""
     return Proof(np.nan, np.nan, np.nan, np.nan)
 
 
 @shared
 def prove_rest(ground: Ground, block: Record, settings: Record, scratch: Record, state: Record) -> Proof:
-    """Compute a bracket on the time to rest from the state after an impact; all NaN: no proof."""
+    """Compute a bracket on the time to rest after an impact; all NaN: no proof."""
     v, i = state.v, state.side
     j = block.next_side[i]
     e_i, e_j = block.restitution[i], block.restitution[j]
@@ -140,7 +140,7 @@ def prove_rest(ground: Ground, block: Record, settings: Record, scratch: Record,
     if not (g_i > 0.0 and g_j > 0.0 and e_i * e_j < 1.0 and abs(block.stiffness[i]) * v * v < g_i * g_i):
         return unproven()
     window = _WINDOW * 2.0 * v * (1.0 / g_i + e_i / g_j) / (1.0 - e_i * e_j)
-    # Rounding of the times decides on which side of a jump of the motion the window ends.
+    # Rounding decides on which side of a jump of the motion the window ends.
     rounding = ROUNDING * (start_of(ground, state.piece) + state.offset)
     motion = bounds_on_motion(ground, block, state, window + rounding, scratch)
     first = side_bounds(block, settings, i, motion)
@@ -184,7 +184,7 @@ def prove_rest(ground: Ground, block: Record, settings: Record, scratch: Record,
 
 
 class MotionBounds(NamedTuple):
-    """Bounds on both components of the motion during a window; the vertical one is added to a weight of 1."""
+    """Bounds on both components of the motion during a window; the vertical one adds to a weight of 1."""
 
     horizontal: Window
     vertical: Window
@@ -192,7 +192,7 @@ class MotionBounds(NamedTuple):
 
 @inlined
 def bounds_on_motion(ground: Ground, block: Record, state: Record, window: float, scratch: Record) -> MotionBounds:
-    """Bound the motion from a state on, its error included; NaN if it passes a threshold."""
+    """Bound the motion from a state on, including its error; NaN beyond a threshold."""
     vertical = Window(0.0, 0.0, 0.0, 0.0)
     if has_vertical(ground):
         limits = (-1.0, np.inf)
@@ -236,7 +236,7 @@ def with_drag(bounds: Bounds, drag: float) -> Bounds:
 
 @inlined
 def restoring_parabola(block: Record, settings: Record, j: int, scratch: Record, horizon: Horizon) -> Restoring:
-    """Compute side j after an impact: restoring acceleration as a parabola in time, stiffness, and their error.
+    """Compute side j after an impact: restoring acceleration as a parabola in time, stiffness, and error.
 
     ``scratch`` contains the ground acceleration and the weight about the impact.
     """
@@ -245,7 +245,7 @@ def restoring_parabola(block: Record, settings: Record, j: int, scratch: Record,
     weight, push = W[0] + block.added_weight[j], sign * A[0] + block.added_push[j]
     horizontal, vertical = horizon.motion
     error = horizon.error + beyond_parabola(A, horizon)
-    # If almost no weight presses the block down, weight and push cancel, and the rounding of both remains.
+    # If almost no weight presses the block down, the rounding of weight and push remains.
     error += ROUNDING * (
         abs(threshold) * (1.0 + largest(vertical)) + abs(block.restraint_threshold[j]) + largest(horizontal)
     )
@@ -292,7 +292,7 @@ def set_zero(A: Floats) -> Floats:
 
 @inlined
 def widened(motion: Window, error: float) -> Window:
-    """Return bounds on a motion that differs from a bounded one by at most ``error`` at any time."""
+    """Return bounds on a motion that differs from a bounded one by at most ``error``."""
     return Window(motion.low - error, motion.high + error, motion.slope, motion.jumps + 2.0 * error)
 
 

@@ -71,7 +71,7 @@ def fingerprint() -> str:
 
 
 def state() -> str:
-    """Return the name of the implementation that runs the kernels in this process."""
+    """Return a description of how the kernels run in this process."""
     if UNCOMPILED:
         return "none: NUMBA_DISABLE_JIT is set, and Python runs the kernels"
     if compiler is not None:

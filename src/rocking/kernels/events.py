@@ -98,7 +98,7 @@ _SAME_PEAK = 2.0**-40
 class StepEnd(NamedTuple):
     """End of a step: `Outcome`; time, u, u' there; time and value of the largest rotation during the step.
 
-    The last two are those at its end if no rotation exceeds the largest so far.
+    The last two refer to its end if no rotation exceeds the largest so far.
     """
 
     outcome: int
@@ -192,7 +192,7 @@ def highest(order: int, h: float, c: Floats, d: Floats) -> tuple[float, float]:
 
 @inlined
 def first_passage(c: Floats, order: int, level: float, h: float, d: Floats) -> float:
-    """Find the first time in (0, h] at which a series reaches ``level``, with the start below and the end not below it.
+    """Find the first time in (0, h] at which a series that is below ``level`` at 0, but not at h, reaches it.
 
     ``d`` is scratch space.
     """
@@ -205,7 +205,7 @@ def first_passage(c: Floats, order: int, level: float, h: float, d: Floats) -> f
 
 @inlined
 def apply_impact(block: Record, state: Record) -> float:
-    """Reduce the angular speed and change the side at an impact; return the speed before it."""
+    """Reduce the angular speed and change the side at an impact; return the earlier speed."""
     left = state.side
     speed = max(0.0, -state.v)
     state.side = block.next_side[left]
@@ -232,7 +232,7 @@ _WORD = 0xFFFFFFFF
 
 @inlined
 def factor(block: Record, side: int, speed: float, number: int) -> float:
-    """Return the factor on the speed at an impact that leaves a side, after ``number`` earlier impacts."""
+    """Return the factor on the speed of an impact that leaves a side, after ``number`` others."""
     if block.variable_restitution:
         return varying_factor(block, side, speed, number)
     return float(block.restitution[side])
@@ -255,7 +255,7 @@ def is_drawn(block: Record) -> bool:
 
 @inlined
 def relative_slope(block: Record, side: int, speed: float, e: float) -> float:
-    """Return the derivative of the speed after an impact by that before, divided by the factor e (1 if constant)."""
+    """Return d(speed after)/d(speed before) of an impact, divided by the factor e (1 if the factor is constant)."""
     if block.variable_restitution and block.seed < 0 and e > block.min_restitution[side]:
         return 1.0 - block.restitution_slope[side] * speed / e
     return 1.0
@@ -263,7 +263,7 @@ def relative_slope(block: Record, side: int, speed: float, e: float) -> float:
 
 @inlined
 def least_factor(block: Record, side: int, fastest: float) -> float:
-    """Return the smallest factor of all impacts up to a speed; the largest is ``block.restitution``."""
+    """Return the smallest factor up to a speed; the largest is ``block.restitution``."""
     if not block.variable_restitution:
         return float(block.restitution[side])
     if block.seed >= 0:
@@ -273,7 +273,7 @@ def least_factor(block: Record, side: int, fastest: float) -> float:
 
 @inlined
 def middle_factor(block: Record, side: int, fastest: float) -> float:
-    """Return the mean of the smallest and the largest factor of all impacts up to a speed."""
+    """Return the midpoint of all factors up to a speed."""
     return 0.5 * (least_factor(block, side, fastest) + block.restitution[side])
 
 

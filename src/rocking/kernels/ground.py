@@ -113,7 +113,7 @@ def stretch_bounds(ground: Ground, stretch: int) -> Window:
 
 @inlined
 def component_of(ground: Ground) -> int:
-    """Return the index of the component among the bounds on stretches: 0 horizontal, 1 vertical."""
+    """Return the index of the component in bounds on stretches: 0 horizontal, 1 vertical."""
     return 0 if ground.first == _FIRST else 1
 
 
@@ -155,7 +155,7 @@ def length_of(ground: Ground, piece: int) -> float:
 
 @inlined
 def coefficient(ground: Ground, piece: int, power: int) -> float:
-    """Return the coefficient of a power of the time since the start of a piece."""
+    """Return the coefficient of a power of the time within a piece."""
     return ground.pieces[piece, ground.first + power]
 
 
@@ -213,7 +213,7 @@ def move(c: Floats, degree: int, t: float) -> None:
 def bounds_within(ground: Ground, piece: int, offset: float, window: float, A: Floats) -> Window:
     """Compute bounds on one piece in [offset, offset + window]; ``jumps`` is the allowance for rounding in the others.
 
-    They are exact except for rounding for degree 1. ``A`` is scratch space.
+    For degree 1 they are exact except for rounding. ``A`` is scratch space.
     """
     columns = ground.columns
     if columns == 2:
@@ -250,7 +250,7 @@ def absolute_sums(ground: Ground, piece: int, t: float) -> tuple[float, float]:
 def bounds_over(
     ground: Ground, piece: int, offset: float, window: float, limits: tuple[float, float], A: Floats
 ) -> Window:
-    """Compute bounds, rounding included, on a window that starts within a piece; ``A`` is scratch space.
+    """Compute bounds, rounding included, on a window from an offset on; ``A`` is scratch space.
 
     NaN if they exceed ``limits`` or the window spans too many pieces.
     """

@@ -1,7 +1,7 @@
-"""One step of all lanes of a group (linear, linear under varying weight, or nonlinear), and bounds on its events.
+"""One step of a group of lanes (linear, linear under varying weight, or nonlinear), and bounds on its events.
 
 A step marks and counts the lanes in which an event may occur (always with NaN, never without a block), and changes only
-the others. Lanes without a block do not change. Weights are in the ground's frame, divided by the weight at rest.
+the others that have a block. Weights are in the ground's frame, divided by the weight at rest.
 """
 
 from typing import TypeVar
@@ -18,8 +18,8 @@ WIDTH = 32
 _LANES = ("f8", (WIDTH,))
 _SIDES = ("f8", (2,))
 
-#: Group of lanes: index of the block; whether its step may contain an event; u, u' and (nonlinear) sin and cos(alpha -
-#: u) before and after the step; constants of the present side (`STEP_CONSTANTS`); largest rotation.
+#: Group of lanes: index of the block; whether its step may contain an event; u, u' and (nonlinear)
+#: sin and cos(alpha - u) before and after the step; constants of the present side (`STEP_CONSTANTS`); largest rotation.
 GROUP = np.dtype(
     [("block", "i8", (WIDTH,)), ("event", "i8", (WIDTH,))]
     + [
@@ -32,8 +32,8 @@ GROUP = np.dtype(
     align=True,
 )  # fmt: skip
 
-#: Constants of a step of length h on each side. Linear: lam, gain threshold, side gain (u'' = lam u - pull - push a), h
-#: c1, h^2 c2, h^3 c3 with Stumpff's functions c_k of lam h^2. Nonlinear: -lam h^2/2 instead of lam, sign of the side
+#: Constants of a step of length h on each side. Linear: lam, gain threshold, side gain (u'' = lam u - pull - push a),
+#: h c1, h^2 c2, h^3 c3 with Stumpff's functions c_k of lam h^2. Nonlinear: -lam h^2/2 instead of lam, sign of the side
 #: instead of its gain. ``curve`` max |u''| bounds the distance of the rotation above or below both ends of the step.
 STEP_CONSTANTS = np.dtype(
     [(name, *_SIDES) for name in ("stiffness", "pull", "push", "first", "second", "third", "curve")],
@@ -42,8 +42,7 @@ STEP_CONSTANTS = np.dtype(
 
 MaybeLine = TypeVar("MaybeLine", Line, None, Line | None)
 
-#: Largest bound on the next terms, computed from the last ones, divided by the first two; the truncation is 1/100 of
-#: it.
+#: Largest bound on the next terms by the last ones, divided by the first two; the truncation is 1/100 of it.
 _NEXT_TERMS = 2.0**-46
 
 
@@ -115,7 +114,7 @@ def copy_states(group: Record, h: float) -> None:
 
 @inlined
 def over_substep(line: MaybeLine, k: int, h: float) -> MaybeLine:
-    """Return the value at the start of the k-th substep of length h and the change during it; None for None."""
+    """Return the value at the start of the k-th substep of length h and the change during it, or None for None."""
     if line is None:
         return line
     change = line[1] * h
@@ -124,7 +123,7 @@ def over_substep(line: MaybeLine, k: int, h: float) -> MaybeLine:
 
 @inlined
 def accept_states(group: Record, rate: float) -> int:
-    """Copy the new states into the lanes without an event, and return the number of lanes with one."""
+    """Copy the new states of lanes without an event, and return the number of the other lanes."""
     events = 0
     for lane in range(WIDTH):
         event = group.event[lane]

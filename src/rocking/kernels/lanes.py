@@ -28,8 +28,8 @@ from rocking.kernels.state import (
     records,
 )
 
-#: Largest sqrt(|lam W|) h of a block in lanes, where W is its weight divided by the weight at rest; of one substep of
-#: the nonlinear model; and of one substep of the linear model under varying weight.
+#: Largest sqrt(|lam W|) h of a block in lanes, where W is its weight divided by the weight at rest; of a substep of the
+#: nonlinear model; and of a substep of the linear model under varying weight.
 LONGEST_STEP = 1.0
 LONGEST_SUBSTEP = 0.04
 LONGEST_WEIGHTED_SUBSTEP = 0.125
@@ -37,7 +37,7 @@ LONGEST_WEIGHTED_SUBSTEP = 0.125
 #: Rotation of a lane without a block.
 EMPTY_ROTATION = 1e-300
 
-#: Numbers of lanes in use, of these lanes that have become free, and of blocks that wait for their uplift.
+#: Numbers of lanes in use, of lanes that have become free, and of blocks that wait for their uplift.
 COUNTS = np.dtype([("active", "i8"), ("free", "i8"), ("waiting", "i8")], align=True)
 
 
@@ -79,7 +79,7 @@ def pool_of(blocks: Records, states: Records, pieces: int, h: float, substeps: i
 
 
 def _on_cache_lines(count: int, kind: np.dtype[np.void]) -> Records:
-    """Return zeroed records that start on a cache line, because vectors across two lines are read at half the speed."""
+    """Return zeroed records that start on a cache line (vectors across two lines are read at half the speed)."""
     line = 64
     space = np.zeros(count * kind.itemsize + line, dtype=np.uint8)
     skip = -space.ctypes.data % line
@@ -147,7 +147,7 @@ def set_angles(pool: Pool, lane: int, index: int) -> None:
 
 @inlined
 def write_lane(ground: Ground, pool: Pool, lane: int, piece: int) -> int:
-    """Write the numbers of a lane into the state of its block at the start of a piece, and return the block's index.
+    """Write a lane into the state of its block at the start of a piece, and return the block's index.
 
     The state does not yet contain the largest rotation of a block that still rises.
     """
@@ -165,7 +165,7 @@ def write_lane(ground: Ground, pool: Pool, lane: int, piece: int) -> int:
 
 @inlined
 def empty(pool: Pool, lane: int) -> None:
-    """Remove the block of a lane; no step then changes the numbers of the lane or detects an event."""
+    """Remove the block of a lane; no step then changes the lane or detects an event."""
     group, slot = pool.groups[lane // WIDTH], lane % WIDTH
     group.block[slot] = -1
     group.u[slot] = EMPTY_ROTATION
@@ -197,7 +197,7 @@ def move_block(pool: Pool, lane: int, to: int) -> None:
 
 @kernel
 def run_lanes(ground: Ground, settings: Record, scratch: Record, pool: Pool, substeps: int) -> None:
-    """Simulate every block of a pool under an evenly sampled record to its own end.
+    """Simulate every block of a pool under an evenly sampled record to its end.
 
     ``substeps`` per sample is 0 in the linear model under constant weight. Afterwards ``ending`` of every state is an
     `Ending`; RUNNING and PAUSED states can be continued individually.
@@ -221,14 +221,14 @@ def run_lanes(ground: Ground, settings: Record, scratch: Record, pool: Pool, sub
 
 @kernel
 def march_each(ground: Ground, settings: Record, scratch: Record, pool: Pool) -> None:
-    """Simulate every block of a pool to its end, one after the other; ``ending`` of every state is then an `Ending`."""
+    """Simulate every block of a pool to its end, one by one; ``ending`` of every state is then an `Ending`."""
     for index in range(pool.blocks.shape[0]):
         march_until(ground, settings, scratch, pool, index, TO_THE_END)
 
 
 @inlined
 def next_waited_for(pool: Pool, piece: int) -> int:
-    """Return the first piece from ``piece`` on for which a block waits, or the end of the motion."""
+    """Return the first piece from ``piece`` on with a waiting block, or the end of the motion."""
     while piece < pool.first.shape[0] - 1 and pool.first[piece] < 0:
         piece += 1
     return piece
@@ -250,7 +250,7 @@ def step_groups(ground: Ground, settings: Record, scratch: Record, pool: Pool, p
 
 @inlined
 def step_group(ground: Ground, settings: Record, group: Record, piece: int, substeps: int, fallen: float) -> int:
-    """Step a group through one sample and return the number of lanes that may contain an event."""
+    """Step a group through one sample and return the number of lanes with possible events."""
     push = (coefficient(ground, piece, 0), coefficient(ground, piece, 1))
     length, h = length_of(ground, piece), length_of(ground, 0)
     if has_vertical(ground):
@@ -266,7 +266,7 @@ def step_group(ground: Ground, settings: Record, group: Record, piece: int, subs
 
 @inlined
 def march_sample(ground: Ground, settings: Record, scratch: Record, pool: Pool, piece: int, lane: int) -> None:
-    """March the block of a lane through one sample; the block keeps its lane if it still rocks."""
+    """March the block of a lane through one sample; it keeps its lane if still rocking."""
     index = write_lane(ground, pool, lane, piece)
     if march_until(ground, settings, scratch, pool, index, piece + 1):
         start_lane(settings, pool, lane, index)

@@ -133,7 +133,7 @@ def _caller(name: str, library: Library) -> Callable[..., Any]:
 
 
 def _format(kind: Any) -> str:
-    """Return the format of an argument for `struct`: eight bytes for each number or address."""
+    """Return the `struct` format of an argument: eight bytes per number or address."""
     if isinstance(kind, str):
         return {"int": "q", "bool": "q", "float": "d"}[kind]
     if "tuple" in kind:
@@ -193,7 +193,7 @@ def _record_taker(kind: dict[str, Any]) -> Taker:
 
 
 def _layout_check(expected: str) -> Callable[[np.dtype[Any]], None]:
-    """Return a check of types that compares the layout only if the type differs from the last one."""
+    """Return a check of types that compares layouts only if the type has changed."""
     known: np.dtype[Any] | None = None
 
     def check(kind: np.dtype[Any]) -> None:

@@ -1,4 +1,4 @@
-"""Complete response of one block to one motion: rest, uplift, arc, impact, and so on to the end."""
+"""Complete response of one block to one motion."""
 
 import math
 from typing import Any
@@ -70,7 +70,7 @@ def march(ground: Ground, block: Record, settings: Record, table: Records, scrat
 
 @inlined
 def initialise_tendon(ground: Ground, block: Record, settings: Record, state: Record) -> None:
-    """Apply the law of the state to the tendon of a body; one that starts too far from rest has already yielded."""
+    """Apply the law of the state to a tendon; one that starts too far from rest has already yielded."""
     if time_of(ground, state) == 0.0 and state.side >= 0:
         stretched = elongation_at(block, settings.nonlinear, state.side, state.u) - block.yields
         state.plastic = max(state.plastic, stretched)
@@ -79,7 +79,7 @@ def initialise_tendon(ground: Ground, block: Record, settings: Record, state: Re
 
 @inlined
 def march_step(ground: Ground, block: Record, settings: Record, table: Records, scratch: Record, state: Record) -> Any:
-    """Advance a block at rest to its next uplift, or a rocking block along an arc to its first event."""
+    """Advance a block to its next uplift or, along an arc, to its first event."""
     write_node(ground, settings, table, state)
     if state.side < 0:
         return rest_until_uplift(ground, block, settings, table, scratch, state)
@@ -110,7 +110,7 @@ def march_step(ground: Ground, block: Record, settings: Record, table: Records, 
 def rest_until_uplift(
     ground: Ground, block: Record, settings: Record, table: Records, scratch: Record, state: Record
 ) -> int:
-    """Keep a block at rest until the motion passes a threshold; DONE if it never does, so that the response is over."""
+    """Keep a block at rest until the motion passes a threshold; DONE if it never does."""
     found = next_uplift(ground, block, scratch, state.side, state.piece, state.offset, settings.stop)
     if found.side == AT_REST or start_of(ground, found.piece) + found.offset >= settings.stop:
         over = start_of(ground, last_piece(ground))
@@ -239,7 +239,7 @@ def pass_impact(ground: Ground, block: Record, settings: Record, table: Records,
 
 @inlined
 def is_weightless(ground: Ground, block: Record, state: Record, offset: float) -> bool:
-    """Return whether a block at zero rotation is pushed off to both sides at an offset of its piece."""
+    """Return whether a block at zero rotation is pushed off to both sides."""
     here = restoring(ground, block, state.side, state.piece, offset)
     other = restoring(ground, block, block.next_side[state.side], state.piece, offset)
     return bool(here < 0.0 and other < 0.0)

@@ -67,7 +67,7 @@ def _peak(
 def _advance(series: Floats, force: Floats, h: float, frequency: float, damping: float, peak: float) -> float:
     """Expand the solution about the start of a step, and move ``series[:2]`` to its end.
 
-    Returns the largest displacement of the step, or ``peak`` if that is larger.
+    Returns the largest displacement of the step, or ``peak`` if larger.
     """
     for k in range(len(series) - 2):
         acceleration = force[k] if k < len(force) else 0.0
@@ -80,7 +80,7 @@ def _advance(series: Floats, force: Floats, h: float, frequency: float, damping:
 
 @shared
 def _larger(series: Floats, h: float, peak: float) -> float:
-    """Return the largest absolute value of a series from 0 to h, or ``peak`` if that is larger, except for rounding.
+    """Return the largest absolute value of a series from 0 to h, or ``peak`` if larger, except for rounding.
 
     Between two points a distance d apart, the series exceeds both values by at most d^2/8 times its second derivative.
     The step is halved if the largest value could be there.

@@ -171,7 +171,7 @@ def steps_over(row: Floats, fallen: float, state: Record) -> bool:
 def step_rows(ground: Ground, block: Record) -> Floats:
     """Compute rows for `steps_over` for each side and piece of the first period, shape (2, pieces, columns).
 
-    There are no rows if a piece is too long for the bounds or the body has no such side.
+    There are none if a piece is too long for the bounds or the body has no such side.
     """
     pieces = (len(ground.pieces) - 3) // 2
     rows = np.zeros((2, pieces, _COLUMNS))
@@ -204,26 +204,24 @@ def step_rows(ground: Ground, block: Record) -> Floats:
     return rows
 
 
-#: Number of terms of the series for rows of steps, sufficient for the motion and for convergence in pieces of that
-#: length.
+#: Number of terms of the series for rows of steps, sufficient for the motion and for pieces of that length.
 _TERMS = 40
 
 
 @inlined
 def pieces_of(ground: Ground) -> int:
-    """Return the number of pieces of one period."""
+    """Count the pieces of one period."""
     return (ground.pieces.shape[0] - 3) // 2
 
 
 @inlined
 def put_back(ground: Ground, block: Record, state: Record, ending: int) -> int:
-    """Move a state that has passed a period back by one period and return its `Fate`."""
+    """Move a state back by the period that it has passed, and return its `Fate`."""
     pieces = pieces_of(ground)
     if ending == Ending.OVERTURNED:
         return Fate.OVERTURNED
     if ending == Ending.DONE or (ending == Ending.RUNNING and state.piece >= 2 * pieces):
-        # Even the second period does not lift the body. The march may have followed an uplift by the two additional
-        # pieces.
+        # Even the second period does not lift the body; the march may have followed an uplift by the additional pieces.
         if state.u == 0.0 and state.v == 0.0:
             state.side = AT_REST if state.side < 0 or not block.two_stops else -1 - state.side
             return Fate.RESTS_FOR_EVER
@@ -251,7 +249,7 @@ def differentiate(trail: Trail, scratch: Record, work: Record, table: Records, s
 
     It is exactly zero if the body has come to rest for any time, or is held at rest at the start. At a stop that does
     not hold the body, it is the derivative for states off the stop. The trail's settings make the march write its
-    table, whose rows are reused. ``states`` become those after the period, with ``ending`` their `Fate`.
+    table, whose rows are reused. ``states`` are advanced by the period, with ``ending`` their `Fate`.
     """
     for k in range(states.shape[0]):
         differentiate_period(trail, scratch, work, table, states[k], out[k])
@@ -271,8 +269,7 @@ def differentiate_period(
     if state.side < 0:
         lifted = next_uplift(ground, block, scratch, state.side, state.piece, state.offset, settings.stop)
         held = lifted.side < 0 or lifted.piece > state.piece or lifted.offset > state.offset
-        # The state of a body at rest is independent of its past; the frame of one that leaves immediately belongs to no
-        # side.
+        # The state at rest is independent of the past; the frame of a body that leaves immediately belongs to no side.
         one = 0.0 if held else sign_of(lifted.side)
     M[0, 0], M[0, 1], M[1, 0], M[1, 1] = one, 0.0, 0.0, one
     state.stop_piece = pieces_of(ground)
@@ -303,9 +300,9 @@ def stretch(
 
     A row contains the logarithms of the stretch along a direction that follows the derivatives, and so becomes the one
     that grows fastest, and across it: the diagonal of R where the derivative times Q is Q' R. Both are -inf in a period
-    with a rest, after which the direction is arbitrary. Rows end before the period in which the body overturns or rests
-    forever; ``ending`` is the `Fate`. Row 2 of ``frame``, shape (3, 2), is the direction, the others are scratch space.
-    Returns the number of impacts.
+    with a rest, after which the direction is arbitrary. Rows end before the period of overturning or permanent rest;
+    ``ending`` is the `Fate`. Row 2 of ``frame``, shape (3, 2), is the direction, the others are scratch space. Returns
+    the number of impacts.
     """
     M = frame[:2]
     impacts = 0
@@ -328,7 +325,7 @@ def stretch(
 
 @shared
 def carry_on(trail: Trail, scratch: Record, work: Record, node: Record, following: Record, M: Floats) -> float:
-    """Multiply a derivative by that of the step from a node to ``following``, including an impact at its end.
+    """Multiply a derivative by the derivative of the step from a node to ``following``, with any impact at its end.
 
     Returns the logarithm of the |determinant| of the step.
     """
@@ -358,10 +355,10 @@ def carry_on(trail: Trail, scratch: Record, work: Record, node: Record, followin
 
 @inlined
 def come_to_rest(ground: Ground, block: Record, node: Record, following: Record, M: Floats) -> float:
-    """Multiply a derivative by that from a node to a rest: zero, unless the ground ends the rest immediately.
+    """Multiply a derivative by the derivative until a rest: zero, unless the ground ends the rest immediately.
 
-    In that case no speed is left, and the time of leaving depends on the time of the impact. Returns the logarithm of
-    the |determinant|.
+    No speed is left then, and the time of leaving depends on the time of impact. Returns the logarithm of the
+    |determinant|.
     """
     side = node.side
     after = restoring(ground, block, side, following.piece, following.offset)

@@ -4,14 +4,14 @@ Within one smooth piece of the motion, the restoring acceleration of side j at a
 
     g + rate t + curvature t^2 - stiffness u,    to within an error,
 
-with a stiffness of any sign: p^2 for a block, 0 for a ball on a moving table, negative for an oscillator with a stop. A
-body that bounces on one side has two equal sides. The derivation is in the documentation ("Theory").
+with a stiffness of p^2 for a block, 0 for a ball on a moving table, and a negative one for an oscillator with a stop. A
+body that bounces on one side has two equal sides. See "Theory" in the documentation.
 
 Let s be the remaining time at an impact that enters side i, before a candidate for the time of rest. Half the duration
 of the arc is a polynomial Y_i(s), so that s - 2 Y_i(s) remains at the next impact. The speeds at both ends of an arc
-between two given impacts are polynomials of the two times. A comparison of coefficients determines Y_i, and the
-remaining terms, also a polynomial, bound the error (`remainder`). Below, z is the remaining time divided by its value
-at the first impact. NaN arguments make the results NaN, and a NaN bracket proves nothing.
+are polynomials of the times of both impacts. Comparison of coefficients determines Y_i, and the remaining terms, also a
+polynomial, bound the error (`remainder`). Below, z is the remaining time divided by its value at the first impact. NaN
+arguments make the results NaN, and a NaN bracket proves nothing.
 """
 
 import math
@@ -44,7 +44,7 @@ class Restoring(NamedTuple):
 
 
 class Terms(NamedTuple):
-    """One side at the candidate: g, and rate, curvature and stiffness with the remaining time as the unit of time."""
+    """One side at the candidate: g, rate, curvature and stiffness, with the remaining time as the unit of time."""
 
     g: float
     rate: float
@@ -63,7 +63,7 @@ class Curve(NamedTuple):
 def remaining_time(v: float, i: Restoring, j: Restoring) -> float:
     """Compute the time to rest from an impact that enters side i with speed v, to second order in v.
 
-    The first order is a geometric sum (the paper's Eq. 75). For the second, the accelerations change linearly in time:
+    The first order is a geometric sum (the paper's Eq. 75). For the second, with accelerations linear in time,
     T_i(v, t) = A_i v + B_i v^2 solves T_i = (arc) + T_j(next impact). The only third-order term is the effect of the
     stiffness on every arc, complete under constant acceleration.
     """
@@ -95,9 +95,10 @@ def terms_at(side: Restoring, s: float) -> Terms:
 def mean_restoring(a: Terms, half: Series, sign: float) -> Three:
     """Compute coefficients 1, 2, 3 of B, where Y B is the speed at the start (sign -1) or end (+1) of an arc.
 
-    With half the duration Y, the remaining time C = z - Y at its middle, the acceleration G = g - rate C + curvature
-    C^2 there and the stiffness k, B = G (1 - k Y^2/3) + sign ((rate - 2 curvature C) Y/3 - rate k Y^3/45) + curvature
-    Y^2/3.
+    Y is half the duration, C = z - Y the remaining time and G = g - rate C + curvature C^2 the acceleration at its
+    middle, and k the stiffness:
+
+        B = G (1 - k Y^2/3) + sign ((rate - 2 curvature C) Y/3 - rate k Y^3/45) + curvature Y^2/3.
     """
     y, y2, y3, _ = half
     c = 1.0 - y
@@ -203,7 +204,7 @@ def power(x: float, order: int) -> float:
 
 @inlined
 def with_coefficient(A: Curve, y: float, speed: float, order: int) -> Curve:
-    """Return a curve with the coefficients of one order set."""
+    """Set the coefficients of one order."""
     h, s = A
     if order == 2:
         return Curve((h[0], y, 0.0, 0.0), (s[0], speed, 0.0, 0.0))
@@ -214,7 +215,7 @@ def with_coefficient(A: Curve, y: float, speed: float, order: int) -> Curve:
 
 @inlined
 def first_speed(a: Terms, half: Series) -> float:
-    """Compute the speed at the start of the first arc (z = 1), divided by the remaining time."""
+    """Compute the initial speed of the first arc (z = 1) divided by the remaining time."""
     y = half[0] + half[1] + half[2] + half[3]
     c = 1.0 - y
     g = a.g - c * (a.rate - c * a.curvature)
@@ -235,7 +236,7 @@ def first_candidate(v: float, i: Restoring, j: Restoring) -> float:
 def rest_candidate(v: float, i: Restoring, j: Restoring, s: float) -> tuple[float, Terms, Terms, Curve, Curve, float]:
     """Compute the time to rest from an impact that enters side i with speed v, to fourth order, by Newton steps from s.
 
-    Returns the time, both sides at that time, their curves, and the residual of speed(time) = v divided by the time.
+    Returns the time, both sides at that time, their curves, and the residual of speed(time) = v, divided by the time.
     """
     e_i, e_j = i.restitution, j.restitution
     a, b = terms_at(i, s), terms_at(j, s)
@@ -260,7 +261,7 @@ def rest_candidate(v: float, i: Restoring, j: Restoring, s: float) -> tuple[floa
 #: Relative allowance for rounding.
 _ROUNDING = 2.0**-48
 
-#: Largest relative distance from the candidate for the proof, and the factor by which it widens the bounds.
+#: Largest relative distance from the candidate for the proof, and its factor on the bounds.
 _NEAR = 2.0**-12
 _MARGIN = 1.0 + 2.0**-7
 
@@ -306,7 +307,7 @@ def speed_bound(half: Series, b: Three, beyond: float) -> float:
 def mismatch(m: Series, end: float, start: float, speed: Series, e: float) -> float:
     """Bound the difference of the speeds at an impact, divided by z^5; its orders 1 to 4 are zero.
 
-    ``end``, ``start``: `speed_bound` of the end of this arc and the start of the next.
+    ``end``, ``start``: `speed_bound` of this arc's end and the next one's start.
     """
     M = total(m)
     square, m1, m2 = M * M, abs(m[0]), abs(m[1])
@@ -394,7 +395,7 @@ def ratio(m: Series, shift: Three, following: Three) -> float:
 def refined_bracket(v: float, i: Restoring, j: Restoring, window: float) -> Pair:
     """Compute a bracket on the time to rest from an impact that enters side i with speed v; NaN, NaN: no proof.
 
-    ``window``: time during which i and j hold, and within which complete chattering has been proven.
+    Complete chattering has been proven within ``window``, during which i and j hold.
     """
     if not (0.0 < v < math.inf and i.g > 0.0 and j.g > 0.0 and i.restitution * j.restitution < 1.0):
         return math.nan, math.nan
@@ -425,10 +426,10 @@ def remainder(
 
 @inlined
 def deviation(error: float, change: float, curvature: float, height: float) -> float:
-    """Compute the error of a `Restoring` up to a height, where G = g - k u + ... and the stiffness k is not constant.
+    """Compute the error of a `Restoring` up to a height, where G = g - k u + ... with a variable stiffness k.
 
     ``error`` of g; ``change`` of k during the window; ``curvature`` bounds |d2G/du2|. For a nonlinear block under
-    ground accelerations a in units of g, k = p^2 (cos(alpha) - j a sin(alpha)), with a curvature of p^2 hypot(1,
-    |a|max).
+    ground accelerations a in units of g, k = p^2 (cos(alpha) - j a sin(alpha)), with a curvature of
+    p^2 hypot(1, |a|max).
     """
     return (error + height * (change + 0.5 * curvature * height)) * (1.0 + _ROUNDING)

@@ -1,4 +1,4 @@
-"""Decision whether and when a block comes to rest after an impact, and the impacts of a sequence after its proof."""
+"""Decision whether and when a block comes to rest after an impact, and impacts of a proven sequence."""
 
 import math
 from typing import NamedTuple
@@ -15,7 +15,7 @@ from rocking.kernels.state import PROVEN_PER_ITERATION, Record, Records, RestRul
 
 ULP = 2.0**-52
 
-#: After a failed proof, the next one is attempted when the speed has decreased by this factor.
+#: Decrease of the speed after a failed proof at which the next one is attempted.
 _SLOWER = 0.6
 
 #: After a proof with too wide a bracket, the next one is attempted at the speed expected for a sufficiently narrow one,
@@ -56,7 +56,7 @@ def count_impact(state: Record) -> None:
 
 @inlined
 def record_proof(ground: Ground, block: Record, settings: Record, state: Record, proof: Proof) -> None:
-    """Store the time since which chattering is proven and the speed at which the next proof is attempted."""
+    """Store the time since which chattering is proven and the speed for the next proof."""
     if not proof.upper >= 0.0:
         state.certificate_speed = _SLOWER * state.v
         return
@@ -102,7 +102,7 @@ def proven_bounds(ground: Ground, block: Record, settings: Record, scratch: Reco
 
 @inlined
 def allowance(time: float, upper: float, state: Record) -> float:
-    """Compute an allowance for the rounding of the times and of the arcs resolved since the first proof."""
+    """Compute an allowance for the rounding of times and of the arcs since the first proof."""
     since = time - state.run_start if state.proven_impacts > 0 else 0.0
     return 4.0 * ULP * time + 8.0 * ULP * (max(state.proven_impacts, 1) + 4) * (since + upper)
 
@@ -168,7 +168,7 @@ LARGEST_GAMMA = 2.0**-14
 def pass_proven_impacts(
     ground: Ground, block: Record, settings: Record, table: Records, state: Record, left: float
 ) -> None:
-    """March the linear model through some impacts within ``left``, up to the one at which another proof is attempted.
+    """March the linear model through some impacts within ``left``, up to the one with another proof.
 
     The ground acceleration is linear in time, and the state immediately after an impact.
     """
@@ -197,8 +197,8 @@ def pass_proven_impacts(
 def proven_arc(v: float, g: float, rate: float, stiffness: float) -> Pair:
     """Compute duration and impact speed of an arc with initial speed v under g + rate t - stiffness u.
 
-    They have full precision for |beta| = |rate| v/g^2 and |gamma| = |stiffness| v^2/g^2 up to the limits above, and are
-    NaN beyond. Half the duration is (v/g) x with x + b x^2 = 1, b = 2 beta/3, and a correction for gamma.
+    Full precision for |beta| = |rate| v/g^2 and |gamma| = |stiffness| v^2/g^2 up to the limits above, NaN beyond. Half
+    the duration is (v/g) x with x + b x^2 = 1, b = 2 beta/3, and a correction for gamma.
     """
     if not g > 0.0:
         return math.nan, math.nan
@@ -226,7 +226,7 @@ def proven_arc(v: float, g: float, rate: float, stiffness: float) -> Pair:
 
 @inlined
 def half_duration(b: float) -> float:
-    """Compute the root of x + b x^2 = 1 near 1 for |b| <= 1/96, to full precision, by a sum with Catalan's numbers."""
+    """Compute the root of x + b x^2 = 1 near 1 for |b| <= 1/96, to full precision, by Catalan's numbers."""
     square = b * b
     fourth = square * square
     low = (1.0 - b) + square * (2.0 - 5.0 * b)

@@ -27,7 +27,7 @@ _ROUNDING = 2.0**-44
 
 @shared
 def apply_tendon_law(block: Record, law: int, plastic: float) -> None:
-    """Write a law, and the quantities that follow from the plastic elongation, into the record of a block."""
+    """Write a law and its quantities at a plastic elongation into the record of a block."""
     for side in range(2):
         force = -block.tendon[side] * (plastic + block.slack)  # at zero elongation, divided by inertia and lever arm
         weight = push = prestress = 0.0
@@ -45,7 +45,7 @@ def apply_tendon_law(block: Record, law: int, plastic: float) -> None:
 
 @inlined
 def rotation_at(block: Record, nonlinear: bool, side: int, elongation: float) -> float:
-    """Compute the rotation at which the tendon has an elongation, or an infinity of the same sign if there is none."""
+    """Compute the rotation for an elongation of the tendon, or an infinity of the same sign if there is none."""
     x = block.lever_arm[side]
     if x <= 0.0 or (nonlinear and abs(elongation) >= 2.0 * x):
         return math.copysign(np.inf, elongation)
@@ -121,7 +121,7 @@ def first_of(d: Floats, order: int, h: float) -> float:
 
 @inlined
 def plastic_after(block: Record, settings: Record, nodes: Records, row: int, before: float) -> float:
-    """Return the plastic elongation at a node from its value ``before`` at the previous node or, if first, the node."""
+    """Return the plastic elongation at a node, from the node itself or from its value ``before``."""
     node = nodes[row]
     turns = row > 0 and node.law == TendonLaw.ELASTIC and nodes[row - 1].law == TendonLaw.PLASTIC
     if turns or (row == 0 and node.side >= 0):
@@ -206,7 +206,7 @@ def barrier(block: Record, body: tuple[bool, int, float], start: float, end: flo
 
 @inlined
 def last_before(block: Record, body: tuple[bool, int, float], one: float, other: float) -> float:
-    """Find the rotation at which the moment changes its sign between two rotations of different sign, by bisection."""
+    """Find the rotation at which the moment changes its sign between two rotations, by bisection."""
     sign = moment_at(block, body, one)
     for _ in range(_HALVINGS):
         middle = 0.5 * (one + other)

@@ -43,7 +43,7 @@ _INTEGRATED = 1.0 / np.maximum(np.arange(ORDER + 2), 1)
 
 @inlined
 def times_weight(weight: Line | None, this: float, before: float) -> float:
-    """Compute a coefficient of weight times series from two neighbouring coefficients of the series; None: weight 1."""
+    """Compute a coefficient of weight times series from two neighbouring ones of the series; None: weight 1."""
     return this if weight is None else weight[0] * this + weight[1] * before
 
 
@@ -110,7 +110,7 @@ def angle_coefficients(scratch: Record, k: int) -> None:
 def restrained_force(
     block: Record, side: int, scratch: Record, degrees: tuple[int, int], nonlinear: bool, k: int
 ) -> float:
-    """Compute coefficient k of u'' + c u' from the coefficients of the rotation up to k."""
+    """Compute coefficient k of u'' + c u' from the rotation up to k."""
     c, A, W = scratch.rotation, scratch.ground, scratch.weight
     lam = block.stiffness[side]
     value = -block.spring[side] * c[k]
@@ -171,7 +171,7 @@ def variation_coefficients(work: Record, damping: float, order: int) -> None:
         x[k + 2] = value * INTEGRATED_TWICE[k]
 
 
-# ---- Nine terms of one arc, under a motion and a weight that are linear in time ----
+# ---- Nine terms of one arc, with motion and weight linear in time ----
 
 
 @inlined
@@ -236,7 +236,7 @@ def nonlinear_ten(start: Line, angle: Line, lam: float, push: Line, weight: Line
     return (u, v, u2, u3, u4, u5, u6, u7, u8, u9), (*low, abs(s5) + abs(c5), abs(s6) + abs(c6), abs(s7) + abs(c7))
 
 
-# ---- Terms of the velocity in lanes; the unit of time is a substep, so that their sum is the change during one ----
+# ---- Terms of the velocity in lanes, in units of substeps, so that their sum is the change during one ----
 
 
 @inlined
@@ -263,8 +263,8 @@ def weighted_rates(r1: float, z0: float, q: float, push: Line, weight: Line) -> 
 def nonlinear_rates(r1: float, angle: Line, l2: float, push: Line, weight: Line | None) -> tuple[Nine, Seven]:
     """Compute the terms r1 to r9 of the velocity of a nonlinear arc.
 
-    ``l2`` is -lam/2 and ``angle`` the initial sine and cosine of alpha - u. A weight of None is 1. The second tuple is
-    the same as in `nonlinear_ten`.
+    ``l2`` is -lam/2, ``angle`` the initial sine and cosine of alpha - u; a weight of None is 1. The second tuple is as
+    in `nonlinear_ten`.
     """
     s0, c0 = angle
     a, b = push
@@ -302,7 +302,7 @@ _QUARTER = 0.25
 
 @inlined
 def strength_of(weight: Line | None, push: Line, t: float) -> Line:
-    """Compute the sum of |weight| and |push| within t, and the sum of their changes; lines are values and slopes."""
+    """Compute the sum of |weight| and |push| within t, and of their changes; lines are values and slopes."""
     if weight is None:
         return 1.0 + abs(push[0]) + abs(push[1]) * t, abs(push[1]) * t
     change = (abs(push[1]) + abs(weight[1])) * t

@@ -37,10 +37,10 @@ _WORTH = 0.125
 #: is smaller by a factor of at least 18,000.
 _LAST_TERMS = 2.0**-40
 
-#: Largest ratio of the quantity tested by `is_complete_weighted` to the first two terms; the truncation is 1/60 of it.
+#: Largest quantity tested by `is_complete_weighted`, divided by the first two terms; the truncation is 1/60 of it.
 _NEXT_TERMS = 2.0**-46
 
-#: Largest number of Newton steps, and the relative size of the last step, whose square is the order of the error.
+#: Largest number of Newton steps, and relative size of the last, whose square is the order of the error.
 _NEWTON_STEPS = 8
 _CONVERGED = 1e-8
 
@@ -132,7 +132,7 @@ def reach(size: float, limit: float, left: float) -> float:
 
 @inlined
 def greatest(weight: Line | None, left: float) -> float:
-    """Return the largest absolute value of the weight during a time; 1 if it does not change."""
+    """Return the largest absolute weight during a time; 1 if constant."""
     return 1.0 if weight is None else max(abs(weight[0]), abs(weight[0] + weight[1] * left))
 
 
@@ -270,7 +270,7 @@ def highest_time(c: Ten, left: float) -> float:
 
 @inlined
 def impact_from_ground(c: Ten, left: float) -> float:
-    """Find the duration of an arc after an impact if it ends before ``left`` and u/t decreases throughout; else NaN."""
+    """Find the duration of an arc from an impact if it ends before ``left`` and u/t decreases throughout; else NaN."""
     root = c[2] * c[2] - 4.0 * c[3] * c[1]
     if not (c[2] < 0.0 and root > 0.0):
         return np.nan

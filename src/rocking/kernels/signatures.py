@@ -13,7 +13,7 @@ from rocking.kernels.trace import Trail
 
 
 def named(name: str) -> Any:
-    """Return a kernel by its name in `signatures`, which consists of module and function."""
+    """Return a kernel by its name (module and function) in `signatures`."""
     module, _, function = name.rpartition(".")
     return getattr(importlib.import_module(f"rocking.kernels.{module}"), function)
 
@@ -25,7 +25,7 @@ def signatures() -> dict[str, tuple[Any, ...]]:
         return np.ones(shape or (1,), dtype=kind)
 
     def given(*shape: int) -> Any:
-        """Return an array that a kernel only reads and that may be read-only in Python."""
+        """Return an array that a kernel only reads."""
         array = reals(*shape)
         array.flags.writeable = False
         return array

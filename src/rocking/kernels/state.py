@@ -33,13 +33,13 @@ class Outcome(IntEnum):
     STEP = 0
     IMPACT = 1
     OVERTURN = 2
-    #: The time at which the march must stop is reached.
+    #: Stop time reached.
     STOPPED = 3
-    #: The block is balanced on a corner forever.
+    #: Balanced on a corner forever.
     BALANCED = 4
-    #: The short step is inconclusive, and the full series is required.
+    #: Inconclusive short step: the full series is required.
     UNDECIDED = 5
-    #: The motion is over, and restraints hold the body in a leaning position forever.
+    #: The body leans forever after the motion, held by restraints.
     LEANS = 6
 
 
@@ -66,25 +66,25 @@ class RestRule(IntEnum):
     VELOCITY = 1
     INTERVAL = 2
     TIME = 3
-    #: As VELOCITY, but the duration of all further impacts is added.
+    #: As VELOCITY, plus the duration of all further impacts.
     BYPASS = 4
 
 
 class Ending(IntEnum):
-    """Reason why a march ended. A march with RUNNING, FULL or PAUSED can be continued."""
+    """Reason why a march ended; RUNNING, FULL and PAUSED marches can be continued."""
 
     DONE = 0
     OVERTURNED = 1
     BALANCED = 2
-    #: The table is full.
+    #: Table full.
     FULL = 3
-    #: The final piece of the march is reached.
+    #: Final piece reached.
     RUNNING = 4
-    #: The budget of iterations is spent.
+    #: Budget of iterations spent.
     PAUSED = 5
-    #: The whole budget of a simulation is spent.
+    #: Budget of the simulation spent.
     UNFINISHED = 6
-    #: Restraints hold the body in a leaning position forever.
+    #: The body leans forever, held by restraints.
     LEANS = 7
 
 
@@ -108,7 +108,7 @@ BLOCK = _record(
     restitution=_SIDES,  # factor on the speed on leaving the side; the largest one if it varies
     next_side=("i8", (2,)),  # side entered from this side
     overturn_angle="f8",  # rotation at overturning, or distance of two stops
-    restrained="?",  # whether any of added_weight to damping, or restraint_threshold, is not zero
+    restrained="?",  # whether added_weight to damping, or restraint_threshold, is nonzero
     two_stops="?",  # whether the sides are two facing stops
     slenderness=_SIDES,  # alpha, rad
     sine=_SIDES,  # of alpha
@@ -126,10 +126,10 @@ BLOCK = _record(
     tendon_push=_SIDES,  # added to the push by the elastic tendon
     yields="f8",  # elongation at yield, m
     slack="f8",  # elongation below which the tendon is slack, m
-    base_weight=_SIDES,  # added_weight without the tendon
-    base_push=_SIDES,  # added_push without the tendon
-    base_prestress=_SIDES,  # prestress without the tendon
-    base_restraint_threshold=_SIDES,  # restraint_threshold without the tendon
+    base_weight=_SIDES,  # without the tendon
+    base_push=_SIDES,  # without the tendon
+    base_prestress=_SIDES,  # without the tendon
+    base_restraint_threshold=_SIDES,  # without the tendon
     variable_restitution="?",  # whether the restitution varies
     seed="i8",  # seed of the draws; -1 if the restitution decreases with the speed
     min_restitution=_SIDES,  # smallest restitution
@@ -138,7 +138,7 @@ BLOCK = _record(
 
 #: Settings of the computation.
 SETTINGS = _record(
-    nonlinear="?",  # whether the model is nonlinear
+    nonlinear="?",  # model
     treatment="i8",  # `RestRule` that ends chattering
     tolerance="f8",  # largest accepted width of a bracket on the time of rest, s
     stop="f8",  # time at which to stop, s
@@ -148,7 +148,7 @@ SETTINGS = _record(
 
 #: State of a march.
 STATE = _record(
-    piece="i8",  # present piece of the motion
+    piece="i8",  # present piece
     offset="f8",  # time since its start, s
     side="i8",  # 0 is side +, 1 side -; negative at rest
     u="f8",  # rotation in the frame of the side
@@ -157,7 +157,7 @@ STATE = _record(
     stop_piece="i8",  # first piece beyond the march
     budget="i8",  # iterations left
     proven_impacts="i8",  # impacts since chattering was proven
-    certificate_speed="f8",  # speed below which the next proof is attempted
+    certificate_speed="f8",  # speed below which another proof is attempted
     last_impact_time="f8",  # time of the last impact or uplift
     impacts="i8",  # number so far
     ending="i8",  # an `Ending`
@@ -175,7 +175,7 @@ STATE = _record(
     sequences="i8",
     uplifts="i8",  # number so far
     rests="i8",
-    rests_by_rounding="i8",  # rests only because time hardly advanced between impacts
+    rests_by_rounding="i8",  # rests because time hardly advanced between impacts
     rounding_decisions="i8",  # contacts, or sides of uplift without weight, decided by rounding
     law="i8",  # `TendonLaw` of a tendon that yields
     plastic="f8",  # its plastic elongation, m
@@ -256,7 +256,7 @@ def new_table(rows: int) -> Records:
 
 
 def grown(table: Records) -> Records:
-    """Return a table with the same rows, followed by an equal number of empty rows."""
+    """Return a table with the same rows and as many empty ones."""
     return attributed(np.concatenate([table, np.zeros_like(table)]))
 
 
@@ -282,19 +282,19 @@ def signed(side: int) -> int:
 
 @inlined
 def resting_side(block: Record, side: int) -> int:
-    """Return the side of a body at rest on a side; for two facing stops it identifies the stop (see `stop_of`)."""
+    """Return the side of a body at rest on a side, which identifies one of two facing stops (see `stop_of`)."""
     return -1 - side if block.two_stops else AT_REST
 
 
 @inlined
 def stop_of(resting: int) -> int:
-    """Return the stop at which a body rests whose side is ``resting``; 0 unless the body is between two stops."""
+    """Return the stop at which a body rests whose side is ``resting``; 0 without two stops."""
     return -1 - resting
 
 
 @inlined
 def write_node(ground: Ground, settings: Record, table: Records, state: Record) -> None:
-    """Write the state to the table."""
+    """Write the state."""
     if not settings.record:
         return
     row = table[state.nodes].node
@@ -310,7 +310,7 @@ def write_node(ground: Ground, settings: Record, table: Records, state: Record) 
 
 @inlined
 def write_event(settings: Record, table: Records, state: Record, time: float, kind: int) -> None:
-    """Write an uplift, a rest or an overturning to the table."""
+    """Write an uplift, rest or overturning."""
     if settings.record:
         row = table[state.events].event
         row.time = time
@@ -321,7 +321,7 @@ def write_event(settings: Record, table: Records, state: Record, time: float, ki
 
 @inlined
 def write_impact(settings: Record, table: Records, state: Record, time: float, speed: float) -> None:
-    """Write the last impact to the table, from the state after it and the speed before."""
+    """Write the last impact, from the state after it and the speed before."""
     if not settings.record:
         return
     row = table[state.impacts - 1].impact
@@ -335,9 +335,9 @@ def write_impact(settings: Record, table: Records, state: Record, time: float, s
 def write_sequence(
     settings: Record, table: Records, state: Record, time: float, rest: tuple[float, float, float]
 ) -> None:
-    """Write a finished chattering sequence to the table.
+    """Write a finished chattering sequence.
 
-    ``time`` is the time of the last impact, ``rest`` the (lower, upper, time) to rest.
+    ``time``: last impact; ``rest``: (lower, upper, time) to rest.
     """
     lower, upper, to_rest = rest
     if settings.record:

@@ -1,4 +1,4 @@
-"""Rotation of a response at any time, and its derivatives with respect to the input, recomputed from the nodes.
+"""Rotation of a response at any time, and its derivatives by the input, recomputed from the nodes.
 
 For a change of x to x (1 + epsilon), d/d epsilon at 0 is propagated: through an arc by the linearised equation of
 motion, through an impact by the saltation due to its shift in time.
@@ -33,7 +33,7 @@ class Trail(NamedTuple):
 
 
 def copy_trail(trail: Trail) -> Trail:
-    """Return a trail with its own block if a tendon yields, because following its steps changes the block's law."""
+    """Return a trail with its own block if a tendon yields, because its law changes from step to step."""
     return trail._replace(block=trail.block.copy()) if trail.block["yielding"] else trail
 
 
@@ -95,7 +95,7 @@ def trace(trail: Trail, scratch: Record, times: Floats, rows: Integers, out: Flo
 class Quantity(IntEnum):
     """Quantity that varies: the motion; the initial rotation or velocity; p, slenderness or restitution of both sides.
 
-    The last three are followed by their values for side + alone and for side - alone, and by NOTHING.
+    The last three follow for side + and side - alone, then NOTHING.
     """
 
     MOTION = 0
@@ -204,7 +204,7 @@ def count_until(times: Floats, count: int, last: float) -> int:
 def note_changes(
     trail: Trail, scratch: Record, work: Record, node: Record, order: int, times: Floats, changes: Floats, lands: bool
 ) -> None:
-    """Write changes of u along the arc from a node, whose series are in scratch; no changes from landing on."""
+    """Write changes of u along the arc from a node, whose series are in scratch, until it lands."""
     for n in range(times.shape[0]):
         t = times[n] - start_of(trail.ground, node.piece) - node.offset
         u, _, _ = evaluate(scratch.rotation, order, t)
@@ -214,7 +214,7 @@ def note_changes(
 
 @inlined
 def on_side(quantity: int, side: int) -> int:
-    """Return the part of a quantity on a side: the quantity itself, its counterpart for both sides, or NOTHING."""
+    """Return the part of a quantity on a side: itself, its counterpart for both sides, or NOTHING."""
     if quantity <= Quantity.RESTITUTION:
         return quantity
     own = quantity - Quantity.FREQUENCY_PLUS - 3 * side
@@ -223,13 +223,13 @@ def on_side(quantity: int, side: int) -> int:
 
 @inlined
 def elongation_rate(trail: Trail, side: int, u: float) -> float:
-    """Compute the elongation of a tendon per rotation, at a rotation."""
+    """Compute the elongation of a tendon per rotation."""
     return trail.block.lever_arm[side] * (math.cos(0.5 * u) if trail.settings.nonlinear else 1.0)
 
 
 @inlined
 def plastic_by_start(trail: Trail) -> float:
-    """Return the plastic elongation of a tendon per rotation at the start of a response: 0 unless it yields there."""
+    """Return the plastic elongation per rotation at the start of a response: 0 unless the tendon yields there."""
     node = trail.nodes[0]
     if not trail.block.yielding or plastic_after(trail.block, trail.settings, trail.nodes, 0, 0.0) <= 0.0:
         return 0.0
@@ -238,7 +238,7 @@ def plastic_by_start(trail: Trail) -> float:
 
 @inlined
 def is_impact(nodes: Records, k: int) -> bool:
-    """Return whether the step from the k-th node to the next ends in an impact, and not in a contact without speed."""
+    """Return whether the step from the k-th node ends in an impact, and not in a contact without speed."""
     node, following = nodes[k], nodes[k + 1]
     if node.side < 0 or following.side < 0 or following.u != 0.0:
         return False
@@ -262,7 +262,7 @@ def expand_variation(
 ) -> int:
     """Write the series of the variation along the arc from a node into ``work.change``, and return its order.
 
-    ``start``: variations of rotation, velocity, and plastic elongation of a tendon at the node.
+    ``start``: variations of rotation, velocity and a tendon's plastic elongation.
     """
     order, _, degree = expand(trail.ground, trail.block, trail.settings, scratch, node, left)
     expand_coefficients(trail, scratch, work, node.side, degree, order)
@@ -344,7 +344,7 @@ def expand_free(trail: Trail, scratch: Record, work: Record, side: int, degree: 
 
 @inlined
 def added_weight(W: Floats, k: int, changes: int) -> float:
-    """Return a coefficient of the contribution of the motion to the weight."""
+    """Return a coefficient of the weight added by the motion."""
     if k > changes:
         return 0.0
     return W[0] - 1.0 if k == 0 else W[k]
@@ -372,7 +372,7 @@ def saltation(
 
 @inlined
 def uplift_shift(trail: Trail, node: Record, quantity: int, by_tendon: float) -> float:
-    """Compute the shift of the uplift with which a node begins; ``by_tendon``: see `restoring_by_tendon`."""
+    """Compute the shift of the uplift of a node; ``by_tendon``: see `restoring_by_tendon`."""
     ground, block, settings, _ = trail
     threshold = block.threshold[node.side]
     push = -push_at(ground, block, node.side, node.piece, node.offset)
@@ -393,7 +393,7 @@ def uplift_shift(trail: Trail, node: Record, quantity: int, by_tendon: float) ->
 
 @inlined
 def is_jump(trail: Trail, node: Record) -> bool:
-    """Return whether the motion jumps past the threshold at the uplift with which a node begins."""
+    """Return whether the motion jumps past the threshold at the uplift of a node."""
     threshold, hold = trail.block.threshold[node.side], trail.block.restraint_threshold[node.side]
     push = -push_at(trail.ground, trail.block, node.side, node.piece, node.offset)
     return bool(abs(push - threshold - hold) > _JUMP * (abs(threshold) + abs(hold)))
@@ -401,7 +401,7 @@ def is_jump(trail: Trail, node: Record) -> bool:
 
 @inlined
 def restoring_by_tendon(block: Record, side: int, plastic: float, change: float) -> float:
-    """Compute the change of the restoring acceleration at zero rotation due to a change of plastic elongation."""
+    """Compute the effect of a change of plastic elongation on the restoring acceleration at zero rotation."""
     if not block.yielding or law_of_standing(block, plastic) == TendonLaw.SLACK:
         return 0.0
     return -block.tendon[side] * change
@@ -409,7 +409,7 @@ def restoring_by_tendon(block: Record, side: int, plastic: float, change: float)
 
 @inlined
 def push_at(ground: Ground, block: Record, side: int, piece: int, offset: float) -> float:
-    """Compute the acceleration towards a side plus the contribution of the weight to its threshold."""
+    """Compute the acceleration towards a side plus the weight's contribution to its threshold."""
     added = weight_at(ground, piece, offset) - 1.0
     return sign_of(side) * acceleration(ground, piece, offset) + block.threshold[side] * added
 
@@ -451,7 +451,7 @@ def rest_shift(
 
 @inlined
 def restoring_shift(trail: Trail, node: Record, j: int, quantity: int, shift: float) -> float:
-    """Compute the change of a side's restoring acceleration at an impact that shifts."""
+    """Compute the change of a restoring acceleration at an impact that shifts."""
     ground, block, settings, _ = trail
     here = acceleration(ground, node.piece, node.offset)
     change = block.threshold_slope[j] * shift * push_rate(ground, block, j, node.piece, node.offset)

@@ -26,7 +26,7 @@ from rocking.kernels.restraints import apply_tendon_law, plastic_after
 from rocking.kernels.state import AT_REST, Record, Records, stop_of
 from rocking.kernels.trace import Trail
 
-#: Accelerations that differ from a threshold by less than this fraction of it are considered equal to it.
+#: Accelerations that differ from a threshold by less than this fraction are at the threshold.
 _ROUNDING = 2.0**-48
 
 
@@ -123,7 +123,7 @@ def is_hardly_pushed(ground: Ground, block: Record, piece: int, offset: float, h
 
 @inlined
 def difference_series(ground: Ground, block: Record, piece: int, offset: float, A: Floats, d: Floats) -> int:
-    """Write half the excess over the threshold of side - minus that of side + into A; return its degree.
+    """Write half the difference of the excess over both thresholds (side - minus side +) into A; return its degree.
 
     Without restraints this is the horizontal motion, even for unequal sides: both thresholds vanish with the weight.
     """
@@ -173,8 +173,7 @@ def first_excess(A: Floats, degree: int, h: float, threshold: float, sign: float
 def first_passing(d: Floats, degree: int, h: float) -> float:
     """Find the first time in [0, h) from which a polynomial is negative beyond rounding; inf if never.
 
-    It is not negative before. After a root without a change of sign, the root is divided out and the search continues.
-    Changes ``d``.
+    It is not negative before. A root without a change of sign is divided out, and the search continues. Changes ``d``.
     """
     rounding = rounding_of(d, degree, h)
     start = 0.0
@@ -208,7 +207,7 @@ def rounding_of(d: Floats, degree: int, h: float) -> float:
 
 @inlined
 def leading_power(d: Floats, degree: int, h: float, rounding: float) -> int:
-    """Return the lowest power of a polynomial whose term is not negligible within h; above ``degree`` if all are."""
+    """Return the lowest power of a polynomial that is not negligible within h; above ``degree`` if there is none."""
     lead = 0
     power = 1.0
     while lead <= degree and abs(d[lead]) * power <= rounding:
@@ -217,7 +216,7 @@ def leading_power(d: Floats, degree: int, h: float, rounding: float) -> int:
     return lead
 
 
-#: A motion is back within a threshold once it is below by this fraction, so that rounding causes no second passing.
+#: A motion is back within a threshold once below by this fraction, so that rounding causes no second passing.
 _BACK = 2.0**-40
 
 
@@ -231,7 +230,7 @@ def note_complete(ground: Ground, blocks: Records, states: Records, scratch: Rec
 
 @inlined
 def passes_again(ground: Ground, block: Record, scratch: Record, state: Record) -> bool:
-    """Return whether a motion that has lifted a block and returned within the thresholds passes one before its rest."""
+    """Return whether the motion, after an uplift and a return within the thresholds, passes one before the rest."""
     until = state.first_rest
     lifted = next_uplift(ground, block, scratch, AT_REST, piece_before(ground, state.first_uplift), 0.0, until)
     if lifted.side == AT_REST:
@@ -277,7 +276,7 @@ def back_within(ground: Ground, block: Record, scratch: Record, lifted: Uplift) 
 
 @inlined
 def time_beyond(ground: Ground, block: Record, scratch: Record, piece: int, offset: float, side: int) -> float:
-    """Return the time for which the motion stays beyond a side's threshold within a piece; inf if to its end."""
+    """Return the time for which the motion exceeds a threshold within a piece; inf if to its end."""
     sign, threshold = 1.0 if side == 1 else -1.0, block.threshold[side]
     if threshold == np.inf:
         return 0.0

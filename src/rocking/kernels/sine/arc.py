@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.sine import Verdict
 
-#: Orders of the sums, and the largest t^2 (1 + delta) at which that number of terms reaches full precision.
+#: Orders of the sums, and the largest t^2 (1 + delta) at which they reach full precision.
 SHORT: Final = 3
 MEDIUM: Final = 5
 LONG: Final = 9
@@ -74,7 +74,7 @@ def closed_basis(t: float, delta: float) -> Basis:
 
 @shared
 def basis(t: float, delta: float) -> Basis:
-    """Compute the basis at any t > 0, by the shortest sum of full precision or else by its definition."""
+    """Compute the basis at t > 0, by the shortest sum of full precision or else by its definition."""
     q = t * t
     reach = q * (1.0 + delta)
     if reach < REACH_SHORT:
@@ -95,7 +95,7 @@ LARGEST_EXCESS: Final = math.hypot(1.0, math.pi / 2 - 2 / math.pi) - 1.0
 #: an ulp.
 _LARGEST_CORRECTION: Final = 1e-4
 
-#: Number of corrections of an estimate before the root is bracketed, and of steps of that search.
+#: Number of corrections of an estimate before the root is bracketed, and of search steps.
 _CORRECTIONS: Final = 3
 _MAXIMUM_STEPS: Final = 400
 
@@ -203,7 +203,7 @@ def is_precise(correction: Correction, t: float, delta: float) -> bool:
 
 @shared
 def arc(start: State, t: float, s: float, delta: float, left: float) -> tuple[int, float, State]:
-    """Compute the duration of an arc and the state just before its impact, from an estimate t of the duration.
+    """Compute the duration of an arc, from an estimate t, and the state just before its impact.
 
     Status: FOUND; INCOMPLETE if the arc is still up after the time ``left`` to x = pi; UNRESOLVED.
     """
@@ -267,7 +267,7 @@ def uplift_state(excess: float) -> State:
 
 @shared
 def first_arc(excess: float, delta: float) -> tuple[int, float, State]:
-    """Compute status and phase of the first impact for a = 1 + excess > 1, and the state just before it."""
+    """Compute status and phase of the first impact for a = 1 + excess > 1, and the state just before."""
     start = uplift_state(min(excess, LARGEST_EXCESS))
     if excess > LARGEST_EXCESS:
         return Verdict.INCOMPLETE, math.pi, start

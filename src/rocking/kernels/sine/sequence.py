@@ -1,7 +1,7 @@
-"""One sequence, impact by impact: phase of rest with its proof, resolved impacts, and critical amplitude.
+"""One sequence: phase of rest with its proof, resolved impacts, and critical amplitude.
 
-The remaining phase to rest is an expansion in the speed, extrapolated over successive pairs of impacts. The critical
-amplitude is the largest a whose first chattering sequence accumulates before x = pi. Parameters are finite.
+The remaining phase is an expansion in the speed, extrapolated over successive pairs of impacts. The critical amplitude
+is the largest a whose first chattering sequence accumulates before x = pi. Parameters are finite.
 """
 
 import math
@@ -17,11 +17,11 @@ from rocking.kernels.remaining import Restoring, remaining_time
 from rocking.kernels.sine import Verdict
 from rocking.kernels.sine.arc import LARGEST_EXCESS, State, arc, bounced, estimated_duration, first_arc
 
-#: Number of extrapolations of that expansion, and the relative agreement at which their result is accepted.
+#: Number of extrapolations of that expansion, and relative agreement at which they are accepted.
 LEVELS: Final = 5
 _AGREEMENT: Final = 1e-13
 
-#: One estimate of the remaining phase and its successive extrapolations; their factors.
+#: Estimate of the remaining phase and its successive extrapolations; their factors.
 Row = tuple[float, float, float, float, float, float]
 Weights = tuple[float, float, float, float, float]
 
@@ -35,7 +35,7 @@ def remaining_phase(entered: State, delta: float, eta: float) -> float:
 
 @inlined
 def richardson_weights(eta: float) -> Weights:
-    """Compute the factors of the change from one pair of impacts to the next in each extrapolation.
+    """Compute the factors of the change between pairs of impacts in each extrapolation.
 
     With Q = eta^2, the errors of successive pairs are sums of Q^{kn}, k = 3, 4, ..., with these ratios at any
     amplitude, because the estimate is correct to second order in the speed. Therefore each column removes one term.
@@ -65,7 +65,7 @@ def extrapolate(T: float, passed: float, weights: Weights, last: Row) -> Row:
 
 @inlined
 def agree(row: Row, last: Row, passed: float, x: float) -> bool:
-    """Return whether the remaining phase has converged: the last extrapolation and the last pair changed it little.
+    """Return whether the last extrapolation and the last pair changed the remaining phase little.
 
     The first criterion is insufficient for small Q, the second for Q close to one.
     """
@@ -107,7 +107,7 @@ def proven(x: float, entered: State, delta: float, eta: float, remaining: float)
     return (upper <= window) & (lower <= remaining) & (remaining <= upper) & (x + window < math.pi)
 
 
-#: Speed below which a block is at rest, because the remainder changes no phase.
+#: Speed below which a block is at rest, because no phase changes any more.
 STILL: Final = 1e-120
 
 #: Number of impact pairs after which a sequence is UNRESOLVED (eta = 0.99999 requires about a million).
@@ -209,7 +209,7 @@ def semianalytical_phases(sequences: Sequences, resolved: Integers, phases: Floa
 
 @shared
 def semianalytical_phase(excess: float, delta: float, eta: float, resolved: int) -> tuple[int, float]:
-    """Compute Eq. 75 in phase: the resolved intervals, then two more as the first terms of two geometric sums."""
+    """Compute Eq. 75 in phase: the resolved intervals, then two more that start two geometric sums."""
     status, newer, impact = first_arc(excess, delta)
     older = 0.0
     x = newer

@@ -31,7 +31,7 @@ class PowerSeries:
         self.lowest = lowest
 
     def from_power(self, lowest: int) -> Floats:
-        """Return the coefficients from a lower power on, without the last ones that no longer fit."""
+        """Return the coefficients from a lower power on, without the last ones."""
         shift = (self.lowest - lowest) // 2
         raised = np.zeros_like(self.coefficients)
         raised[shift:] = self.coefficients[: raised.shape[0] - shift]
@@ -148,14 +148,14 @@ def extrapolated(remaining: Series, passed: Series, eta: float) -> tuple[Series,
 
 
 def first_impact(delta: float, eta: float, order: int) -> tuple[Series, Series]:
-    """Compute the phase of the first impact divided by r, and v, p, d after it; shapes (1, order), (1, 3, order)."""
+    """Compute phase divided by r and v, p, d after the first impact; shapes (1, order), (1, 3, order)."""
     start = np.zeros((3, order))
     start[2] = -square_root_of_two_plus(order)
     return _arcs(start, True, delta, eta, 1)
 
 
 def impact_pairs(start: Series, delta: float, eta: float, count: int) -> tuple[Series, Series]:
-    """Compute the phases of the next pairs of impacts divided by r, and v, p, d after them, from those in ``start``."""
+    """Compute phases divided by r and v, p, d after the next pairs of impacts, from those in ``start``."""
     durations, states = _arcs(start, False, delta, eta, 2 * count)
     passed = durations[1::2]
     passed[:, 1:] += durations[::2, :-1]
@@ -163,7 +163,7 @@ def impact_pairs(start: Series, delta: float, eta: float, count: int) -> tuple[S
 
 
 def _arcs(start: Series, first_side: bool, delta: float, eta: float, count: int) -> tuple[Series, Series]:
-    """Compute scaled durations of arcs on alternating sides, and v, p, d after the impacts at their ends."""
+    """Compute scaled durations of arcs on alternating sides, and v, p, d after their impacts."""
     order = start.shape[1]
     durations, states = np.zeros((count, order)), np.zeros((count, 3, order))
     series_arcs(start, first_side, delta, eta, np.empty((_ROWS, order)), durations, states)
@@ -241,7 +241,7 @@ def series_arc(state: Series, first_side: bool, delta: float, space: Series, z: 
 
 @inlined
 def _set_forces(state: Series, first_side: bool, mean: Series, forces: ThreeSeries) -> None:
-    """Write the restoring forces: their mean, and their coefficients of degrees 0, 1 and 2 in time."""
+    """Write the restoring forces: mean, and coefficients of degrees 0, 1 and 2 in time."""
     _shift(state[1], 1, -1.0, mean)
     mean[0] += 1.0
     if first_side:
@@ -260,7 +260,7 @@ def _rise(
     v: Series, z: Series, q: Series, basis: FourSeries, forces: ThreeSeries, delta: float,
     spare: Series, height: Series, speed: Series,
 ) -> None:  # fmt: skip
-    """Write the height divided by z, and the speed, after the duration z."""
+    """Write height divided by z, and speed, after the duration z."""
     sine, versine, E, W = basis
     A, B, bend, product = spare[2], spare[3], spare[4], spare[5]
     _multiply(q, E, A)
