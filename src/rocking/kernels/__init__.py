@@ -1,1 +1,1 @@
-"""Compiled functions: numbers in, numbers and a code out; they never raise."""
+"""Compiled functions, which accept numbers, return numbers and a code, and never raise."""

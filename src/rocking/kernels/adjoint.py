@@ -1,10 +1,10 @@
-"""How one number of a response changes with every coefficient of its motion: one pass back along the nodes.
+"""Derivatives of one number of a response by all coefficients of its motion, in one backward pass.
 
-`trace.vary` carries one change of the input forwards, to all numbers of a response; this carries the change of one
-number with the state, (l, m) with d number = l du + m dv, backwards to all inputs. Along an arc with
+Whereas `trace.vary` propagates one change of the input forwards to all numbers of a response, this module propagates
+the derivatives of one number by the state, d number = l du + m dv, backwards to all inputs. Along an arc with
 du'' = k(t) du - c du' + f(t), m'' = k(t) m + c m' and l = c m - m', and a forcing f adds the integral of m f. Through
-an impact the transposed saltation takes it. A tendon that yields adds a third number to the state, its plastic
-elongation, which forces the arcs on which it is elastic and is written where it turns back.
+an impact, the transposed saltation applies. A tendon that yields adds its plastic elongation to the state, which forces
+arcs with an elastic tendon and is written when the body turns back.
 """
 
 import math
@@ -32,36 +32,36 @@ from rocking.kernels.trace import (
     saltation,
 )
 
-#: Numbers of a change with u, v and a plastic elongation.
+#: Number of derivatives: by u, v and a plastic elongation.
 _PLAIN = 3
 
-#: Rounding of a step, over the largest terms that it is computed from.
+#: Rounding of a step, divided by its largest terms.
 _ROUNDING = 2.0**-51
 
 
 class Ends(IntEnum):
-    """Where a pass back ends: at the start of the response, at a rest, or where there is no derivative."""
+    """End of a backward pass."""
 
     START = 0
     REST = 1
     #: The body touches the ground without speed.
     GRAZES = 2
-    #: The body leaves the ground at the instant at which it comes to rest.
+    #: The body leaves the ground at the instant of rest.
     LEAVES_AT_ONCE = 3
     #: The motion touches the threshold of a side without a rate.
     TOUCHES_THRESHOLD = 4
-    #: Nowhere yet.
+    #: Not ended.
     GOES_ON = 5
 
 
 @kernel
 def adjoint(trail: Trail, scratch: Record, work: Record, row: int, time: float, change: Floats, out: Floats) -> int:
-    """Take ``change``, of a number with u, v and a plastic elongation, back to the start; returns the `Ends`.
+    """Propagate ``change``, the derivatives of a number, back to the start of the response; return the `Ends`.
 
-    It is that at ``time`` after the node of a row; infinite, at the end of its step, before an impact there. In
-    ``change`` stays that at the start of the response, 0 where the body has come to rest. To row k of ``out`` is added
-    the change with the coefficients of piece k, in units of g, horizontal ones first. ``work`` is scratch space
-    (`state.VARIATION`). Where ``change`` has two numbers more, see `add_rounding`.
+    The derivatives are by u, v and plastic elongation at ``time`` after the node of a row; if infinite, at the end of
+    its step, before an impact there. On return they refer to the start, and are 0 if the body has come to rest.
+    Derivatives by the coefficients of piece k (units of g, horizontal first) are added to row k of ``out``. ``work`` is
+    scratch space (`state.VARIATION`). For two more numbers in ``change``, see `add_rounding`.
     """
     block, nodes = trail.block, trail.nodes
     number = impacts_up_to(nodes, row)
@@ -96,9 +96,9 @@ def adjoint(trail: Trail, scratch: Record, work: Record, row: int, time: float, 
 
 @inlined
 def add_rounding(trail: Trail, scratch: Record, k: int, order: int, t: float, change: Floats) -> None:
-    """Add what the rounding of a time t of the arc from the k-th node changes, at most, to ``change[3]``.
+    """Add a bound on the effect of rounding during a time t of the arc from the k-th node to ``change[3]``.
 
-    In ``change[4]`` stays the greatest rate of the relative decrease of a speed just before its impact.
+    ``change[4]`` becomes the largest relative rate of decrease of a speed just before its impact.
     """
     ground, block, node = trail.ground, trail.block, trail.nodes[k]
     side, end = node.side, node.offset + t
@@ -124,9 +124,9 @@ def add_rounding(trail: Trail, scratch: Record, k: int, order: int, t: float, ch
 
 @inlined
 def at_rest(nodes: Records, k: int, change: Floats) -> int:
-    """Take ``change`` back through a rest, of which a node, or the one before it, is; GOES_ON where anything is left.
+    """Propagate ``change`` back through a rest at the node or the one before; GOES_ON if anything is left.
 
-    The impacts between the last resolved one and the rest count for nothing.
+    Impacts between the last resolved one and the rest have no effect.
     """
     if nodes[k].side >= 0:
         return Ends.GOES_ON
@@ -134,7 +134,7 @@ def at_rest(nodes: Records, k: int, change: Floats) -> int:
     change[0] = change[1] = 0.0
     if k == 0:
         return Ends.START
-    # Where the ground ends the rest at once, the time of landing is that of leaving.
+    # If the ground ends the rest immediately, landing and leaving have the same time.
     if moved and nodes[k + 1].time == nodes[k].time:
         return Ends.LEAVES_AT_ONCE
     return Ends.REST if change[2] == 0.0 else Ends.GOES_ON
@@ -142,7 +142,7 @@ def at_rest(nodes: Records, k: int, change: Floats) -> int:
 
 @inlined
 def back_through_impact(trail: Trail, k: int, v: float, number: int, change: Floats) -> bool:
-    """Take ``change`` back through the impact after the k-th node, at the velocity v; False where it only touches.
+    """Propagate ``change`` back through the impact after the k-th node, at velocity v; False if the body only touches.
 
     ``number`` of impacts came before.
     """
@@ -160,10 +160,10 @@ def back_through_impact(trail: Trail, k: int, v: float, number: int, change: Flo
 
 @kernel
 def adjoint_of_final_state(trail: Trail, scratch: Record, row: int, change: Floats, out: Floats) -> int:
-    """Write how the time at which the step of a row ends changes with the state before it; returns the `Ends`.
+    """Write the derivative of the time at which the step of a row ends by the state before it; return the `Ends`.
 
-    That is at the end of the step, before an impact or an overturning, else at its node. What the time of an uplift or
-    a rest changes with the motion at that instant is added to ``out``, as in `adjoint`.
+    That state is at the end of the step, before an impact or an overturning, otherwise at its node. For an uplift or
+    rest, derivatives by the motion at that instant are added to ``out``, as in `adjoint`.
     """
     block, nodes = trail.block, trail.nodes
     node, following = nodes[row], nodes[row + 1]
@@ -194,7 +194,7 @@ def adjoint_of_final_state(trail: Trail, scratch: Record, row: int, change: Floa
 
 @inlined
 def by_rest(trail: Trail, node: Record, plastic: float, change: Floats, out: Floats) -> None:
-    """Write the change of the time of rest after the impact with which a node begins: `trace.rest_shift`, by parts."""
+    """Write the derivatives of the time of rest after the impact of a node (see `trace.rest_shift`)."""
     block, i = trail.block, node.side
     j = block.next_side[i]
     g_i = restoring(trail.ground, block, i, node.piece, node.offset)
@@ -217,7 +217,7 @@ def by_rest(trail: Trail, node: Record, plastic: float, change: Floats, out: Flo
 
 @inlined
 def add_instant(trail: Trail, node: Record, by: tuple[float, float], out: Floats) -> None:
-    """Add the change with the coefficients of a node's piece, from that ``by`` push and weight at its instant."""
+    """Add the derivatives by the coefficients of a node's piece; ``by``: derivatives by push and weight at the node."""
     columns = trail.ground.columns
     push, weight = by
     for j in range(columns):
@@ -230,13 +230,13 @@ def add_instant(trail: Trail, node: Record, by: tuple[float, float], out: Floats
 
 @inlined
 def turns_back(nodes: Records, row: int) -> bool:
-    """Whether a tendon that has yielded turns back at a node: there its plastic elongation is written."""
+    """Return whether the body turns back at a node, where the plastic elongation is written."""
     return bool(nodes[row - 1].law == TendonLaw.PLASTIC and nodes[row].law == TendonLaw.ELASTIC)
 
 
 @inlined
 def plastic_at(trail: Trail, row: int) -> float:
-    """Plastic elongation of a tendon at a node; 0 without one that yields."""
+    """Return the plastic elongation at a node; 0 if no tendon yields."""
     if not trail.block.yielding:
         return 0.0
     while row > 0 and not turns_back(trail.nodes, row):
@@ -264,7 +264,7 @@ def back_through(
     change: Floats,
     out: Floats,
 ) -> None:
-    """Take ``change`` back through a time t of the arc from a node, expanded to the order and of the degree given."""
+    """Propagate ``change`` back through a time t of the arc from a node, for the given order and degree."""
     order, degree = orders
     x = work.change
     expand_free(trail, scratch, work, node.side, degree, order)
@@ -277,13 +277,13 @@ def back_through(
     u_by_v, v_by_v, _ = evaluate(x, order, t)
     change[0], change[1] = change[0] * u_by_u + change[1] * v_by_u, change[0] * u_by_v + change[1] * v_by_v
     ground, block = trail.ground, trail.block
-    if change.shape[0] > _PLAIN and not block.yielding:  # only the rounding is asked for
+    if change.shape[0] > _PLAIN and not block.yielding:  # only the rounding is required
         return
     x[0], x[1] = change[1], drag * change[1] - change[0]
     variation_coefficients(work, -drag, order)
     lam, gain, threshold = block.stiffness[node.side], block.threshold_slope[node.side], block.threshold[node.side]
     m = work.forcing
-    for k in range(order - 1):  # times d u'' / d A, of the horizontal motion in the frame of the side
+    for k in range(order - 1):  # times d u'' / d A, for the horizontal motion in the frame of the side
         m[k] = -gain * x[k]
         if trail.settings.nonlinear:
             m[k] = 0.0
@@ -313,7 +313,7 @@ def plastic_series(trail: Trail, scratch: Record, side: int, x: Floats, order: i
 
 @inlined
 def add_moments(moments: Floats, m: Floats, order: int, offset: float, t: float, sign: float, out: Floats) -> None:
-    """Add to ``out[j]`` the integrals of m(s) (offset + s)^j, times ``sign``, over s from 0 to t."""
+    """Add the integrals of m(s) (offset + s)^j over s from 0 to t, times ``sign``, to ``out[j]``."""
     count = out.shape[0]
     for i in range(count):
         value = 0.0

@@ -1,7 +1,6 @@
-"""One arc between two events as a Taylor series (paper, Eq. 15): its order, the length of a step, its truncation.
+"""Taylor series of one arc between two events (paper, Eq. 15): order, step length and truncation.
 
-The equations and the recurrences for the coefficients are in `series`. A NaN among the numbers makes series and
-bounds NaN.
+The equations and recurrences are in `series`. A NaN among the numbers makes series and bounds NaN.
 """
 
 import math
@@ -20,32 +19,32 @@ from rocking.kernels.series import (
 )
 from rocking.kernels.state import ORDER, Record
 
-#: First step from an impact, over the arc's duration under constant acceleration.
+#: First step after an impact, divided by the arc's duration under constant acceleration.
 _FIRST_STEP = 1.3
 
 
 @inlined
 def sign_of(side: int) -> float:
-    """Sign of the rotation on a side."""
+    """Return the sign of the rotation on a side."""
     return 1.0 - 2.0 * side
 
 
 @inlined
 def restoring(ground: Ground, block: Record, side: int, piece: int, offset: float) -> float:
-    """Restoring acceleration of a side at zero rotation."""
+    """Compute the restoring acceleration of a side at zero rotation."""
     standing = block.threshold[side] * weight_at(ground, piece, offset) + block.restraint_threshold[side]
     return block.threshold_slope[side] * (standing + sign_of(side) * acceleration(ground, piece, offset))
 
 
 @inlined
 def weight_at(ground: Ground, piece: int, offset: float) -> float:
-    """Weight in the ground's frame, over that at rest: 1 + a_v/g."""
+    """Compute the weight in the ground's frame, divided by the weight at rest."""
     return 1.0 + acceleration(vertical_of(ground), piece, offset) if has_vertical(ground) else 1.0
 
 
 @inlined
 def weight_series(ground: Ground, piece: int, offset: float, W: Floats) -> int:
-    """Put the polynomial of the weight about ``offset`` into W; returns its degree."""
+    """Write the polynomial of the weight about ``offset`` into W and return its degree."""
     W[0] = 0.0
     degree = local_series(vertical_of(ground), piece, offset, 1.0, W) if has_vertical(ground) else 0
     W[0] += 1.0
@@ -56,9 +55,9 @@ def weight_series(ground: Ground, piece: int, offset: float, W: Floats) -> int:
 def expand(
     ground: Ground, block: Record, settings: Record, scratch: Record, state: Record, left: float
 ) -> tuple[int, float, int]:
-    """Series of the arc from a state into scratch, for a time of at most ``left``; returns (order, step, degree).
+    """Write the series of the arc from a state into scratch; return (order, step, degree of both components).
 
-    The degree is that of both components of the motion.
+    The step is at most ``left``.
     """
     h = step_length(ground, block, state, left)
     degree = local_series(ground, state.piece, state.offset, sign_of(state.side), scratch.ground)
@@ -82,7 +81,7 @@ def expand(
 
 @inlined
 def raise_degree(A: Floats, degree: int, W: Floats, other: int) -> int:
-    """Larger degree of two polynomials; both are filled up with zeros to it."""
+    """Return the larger degree of two polynomials, and pad both with zeros to this degree."""
     highest = max(degree, other)
     for k in range(degree + 1, highest + 1):
         A[k] = 0.0
@@ -93,7 +92,7 @@ def raise_degree(A: Floats, degree: int, W: Floats, other: int) -> int:
 
 @inlined
 def step_length(ground: Ground, block: Record, state: Record, left: float) -> float:
-    """Length of the next Taylor step."""
+    """Compute the length of the next Taylor step."""
     h = min(left, 1.0 / np.sqrt(abs(block.stiffness[state.side])))
     if block.restrained:
         h = min(h, restrained_step(block, state.side))
@@ -106,7 +105,7 @@ def step_length(ground: Ground, block: Record, state: Record, left: float) -> fl
 
 @inlined
 def restrained_step(block: Record, side: int) -> float:
-    """Longest step: the inverse of the greatest rate at which the restraints let the body move or slow down."""
+    """Return the longest step: the inverse of the largest rate of motion or damping under restraints."""
     stiffness = abs(block.stiffness[side]) * (1.0 + abs(block.added_weight[side])) + abs(block.spring[side])
     fastest = max(math.sqrt(stiffness), block.damping[side])
     return 1.0 / fastest if fastest > 0.0 else np.inf
@@ -114,7 +113,7 @@ def restrained_step(block: Record, side: int) -> float:
 
 @inlined
 def significant_degree(A: Floats, degree: int, h: float) -> int:
-    """Degree of a polynomial without the highest powers that are negligible within h."""
+    """Return the degree of a polynomial without negligible highest powers within h."""
     while degree > 1 and abs(A[degree]) * h**degree < NEGLIGIBLE * abs(A[0]):
         degree -= 1
     return degree
@@ -122,10 +121,10 @@ def significant_degree(A: Floats, degree: int, h: float) -> int:
 
 @inlined
 def linear_order(lam: float, h: float) -> int:
-    """Order at which a linear arc's series has converged over h, for a motion of degree 0 or 1.
+    """Return the order at which the series of a linear arc has converged within h (motion of degree 0 or 1).
 
-    Every coefficient after the motion's own follows from the one two before, so the ratio of c[k] h^k to c[2] h^2,
-    which falls the most slowly, is known beforehand.
+    The ratio of c[k] h^k to c[2] h^2, which decreases most slowly, is known in advance, because each later coefficient
+    follows from the one two before.
     """
     squared = abs(lam) * h * h
     ratio = 1.0
@@ -138,9 +137,9 @@ def linear_order(lam: float, h: float) -> int:
 
 @inlined
 def converged(c: Floats, degree: int, h: float) -> int:
-    """Order at which a full series under a constant weight has converged over h; above `ORDER` where it has not.
+    """Return the order at which a full series under constant weight has converged within h, or more than `ORDER`.
 
-    Past the motion's degree a coefficient follows from the one two before: two negligible ones end the series.
+    Beyond the motion's degree, each coefficient follows from the one two before: two negligible ones end the series.
     """
     largest = term = abs(c[1]) * h
     power = h * h
@@ -158,9 +157,9 @@ def converged(c: Floats, degree: int, h: float) -> int:
 def expand_checked(
     block: Record, settings: Record, state: Record, scratch: Record, degrees: tuple[int, int], h: float
 ) -> tuple[int, float]:
-    """Series of an arc, and of the sines and cosines in it, for a motion and a weight of these degrees.
+    """Compute the series of an arc and of its sines and cosines, for the degrees of motion and weight.
 
-    Returns (order, h'). The series ends where a bound shows that its truncation is negligible.
+    Returns (order, h'). The series ends as soon as a bound on its truncation is negligible.
     """
     c, side = scratch.rotation, state.side
     if block.restrained:
@@ -192,26 +191,26 @@ def expand_checked(
     return ORDER, shortened(block, settings, side, scratch, degrees, h)
 
 
-# ---- Where a series may end: bounds on all terms of an arc's velocity that are left out ----
-# The derivations are in the documentation ("Where a series may end"). A NaN among the numbers makes a bound NaN.
+# ---- Bounds on all omitted terms of an arc's velocity ----
+# See "Where a series may end" in the documentation. A NaN among the numbers makes a bound NaN.
 
-#: Terms of the velocity below this fraction of the largest one are negligible. (Those of the rotation are no measure:
-#: over a step that is short beside 1/p they are negligible beside u long before the velocity has converged.)
+#: Terms of the velocity below this fraction of the largest term are negligible. (In a step that is short compared with
+#: 1/p, terms of the rotation are negligible relative to u long before the velocity has converged.)
 NEGLIGIBLE = 2.0**-56
 
-#: Largest bound on the truncation of a velocity, over its largest term: a quarter of the last place.
+#: Largest bound on the truncation of a velocity, divided by its largest term: a quarter of the last place.
 TRUNCATION = 2.0**-54
 
 #: Smaller terms of the velocity are negligible.
 SMALLEST = 1e-290
 
-#: Largest number of times that a step is shortened; each time by a tenth at least.
+#: Largest number of times that a step is shortened, each time by at least a tenth.
 SHORTENINGS = 200
 
 
 @shared
 def shortened(block: Record, settings: Record, side: int, scratch: Record, degrees: tuple[int, int], h: float) -> float:
-    """Step, not longer than h, over which the truncation of a full series is negligible."""
+    """Return a step, at most h, within which the truncation of a full series is negligible."""
     for _ in range(SHORTENINGS):
         beyond, largest = truncation(block, settings, side, scratch, degrees, ORDER, h)
         excess = beyond / max(TRUNCATION * largest, SMALLEST)
@@ -225,9 +224,9 @@ def shortened(block: Record, settings: Record, side: int, scratch: Record, degre
 def truncation(
     block: Record, settings: Record, side: int, scratch: Record, degrees: tuple[int, int], order: int, h: float
 ) -> tuple[float, float]:
-    """Bound on the truncation of an arc's velocity over h, and its largest term; both times h.
+    """Bound the truncation of an arc's velocity within h, and return its largest term, both times h.
 
-    inf: h is too long for a bound. The motion's degree is below order - 1.
+    The bound is inf if h is too long. The motion's degree is below order - 1.
     """
     if block.restrained:
         return truncation_restrained(block, settings, side, scratch, degrees, order, h)
@@ -240,8 +239,8 @@ def truncation(
 def truncation_linear(scratch: Record, lam: float, changes: int, order: int, h: float) -> tuple[float, float]:
     """Bound the truncation of a linear arc, for a weight of degree ``changes``.
 
-    With u_k = |c_k| h^k and w_j = |W_j| h^j the products w_j u_k with j + k >= order - 1 are left out of u'' h^2, and
-    all terms that follow from them.
+    With u_k = |c_k| h^k and w_j = |W_j| h^j, u'' h^2 omits the products w_j u_k with j + k >= order - 1 and all terms
+    that follow from them.
     """
     c, W, d = scratch.rotation, scratch.weight, scratch.other
     power = 1.0
@@ -250,7 +249,7 @@ def truncation_linear(scratch: Record, lam: float, changes: int, order: int, h: 
         d[k] = abs(c[k]) * power
         largest = max(largest, k * d[k])
         power *= h
-    for k in range(order - 1, order - 2 - changes, -1):  # from here on: sums of all later terms
+    for k in range(order - 1, order - 2 - changes, -1):  # sums of all later terms
         d[k] += d[k + 1]
     weight = products = 0.0
     power = 1.0
@@ -269,8 +268,8 @@ def truncation_nonlinear(
 ) -> tuple[float, float]:
     """Bound the truncation of a nonlinear arc.
 
-    With r the velocity's terms, z those of sin and cos(alpha - u), b those of motion and weight, the products r z from
-    order - 2 on are left out of z', and b z from order - 1 on of u'', and all terms that follow from them.
+    With the terms r of the velocity, z of sin and cos(alpha - u), and b of motion and weight, z' omits the products r z
+    from order - 2 on, u'' the products b z from order - 1 on, and both all terms that follow from them.
     """
     c, A, W = scratch.rotation, scratch.ground, scratch.weight
     S, C, d = scratch.sine, scratch.cosine, scratch.other
@@ -280,7 +279,7 @@ def truncation_nonlinear(
         d[k] = (k + 1) * abs(c[k + 1]) * power
         largest = max(largest, d[k])
         power *= h
-    for k in range(order - 2, -1, -1):  # from here on: sums of all later terms
+    for k in range(order - 2, -1, -1):  # sums of all later terms
         d[k] += d[k + 1]
     velocity = d[0]
     angles, angle_products = angle_terms(S, C, d, order, h)
@@ -294,8 +293,8 @@ def truncation_nonlinear(
         if j > 0:
             push_products += push * d[max(0, order - 1 - j)]
         power *= h
-    # The truncation of z is at most (angle_products + velocity z + (that of u') (angles + z))/(order - 1), with z below
-    # 1; that of u' at most stiffness (push_products + strength z)/order.
+    # The truncation of z is at most (angle_products + velocity z + (truncation of u') (angles + z))/(order - 1), with z
+    # below 1; the truncation of u' is at most stiffness (push_products + strength z)/order.
     stiffness = abs(lam) * h * h
     feedback = (velocity + stiffness * strength * (angles + 1.0) / order) / (order - 1)
     if not feedback < 0.5:
@@ -308,13 +307,13 @@ def truncation_nonlinear(
 def truncation_restrained(
     block: Record, settings: Record, side: int, scratch: Record, degrees: tuple[int, int], order: int, h: float
 ) -> tuple[float, float]:
-    """Bound the truncation of an arc of a body that is held back.
+    """Bound the truncation of an arc of a restrained body.
 
-    U and V being the sums of all terms of rotation and velocity that are left out,
+    The sums U and V of all omitted terms of rotation and velocity satisfy
 
-        order V <= (what follows from known terms) + (push, weight, prestress) Z + s h^2 U + c h V,   order U <= V,
+        order V <= (terms from known terms) + (push, weight, prestress) Z + s h^2 U + c h V,   order U <= V,
 
-    where Z bounds what is left out of sin and cos of both angles; in the linear model Z is U.
+    where Z, in the linear model U, bounds the omitted terms of the sine and cosine of both angles.
     """
     c, d = scratch.rotation, scratch.other
     largest = last = 0.0
@@ -331,7 +330,7 @@ def truncation_restrained(
     if settings.nonlinear:
         prestress = abs(block.prestress[side]) * h * h
         return beyond_angles(scratch, degrees, order, h, (stiffness, prestress, known, feedback)), largest
-    for k in range(order - 1, order - 2 - degrees[1], -1):  # from here on: sums of all later terms
+    for k in range(order - 1, order - 2 - degrees[1], -1):  # sums of all later terms
         d[k] += d[k + 1]
     weight = 0.0
     power = stiffness
@@ -347,9 +346,9 @@ def truncation_restrained(
 def beyond_angles(
     scratch: Record, degrees: tuple[int, int], order: int, h: float, forces: tuple[float, float, float, float]
 ) -> float:
-    """Bound V of `truncation_restrained` in the nonlinear model; scratch.other has the terms of the rotation.
+    """Bound V of `truncation_restrained` in the nonlinear model; scratch.other contains the terms of the rotation.
 
-    ``forces``: stiffness and prestress times h^2, what follows from known terms, and what V adds to itself.
+    ``forces``: stiffness and prestress times h^2, contribution of known terms, and feedback of V.
     """
     A, W, d = scratch.ground, scratch.weight, scratch.other
     power, strength, known, feedback = forces
@@ -357,7 +356,7 @@ def beyond_angles(
         return np.inf
     for k in range(1, order + 1):
         d[k - 1] = k * d[k]
-    for k in range(order - 2, -1, -1):  # from here on: sums of all later terms
+    for k in range(order - 2, -1, -1):  # sums of all later terms
         d[k] += d[k + 1]
     velocity = d[0]
     total, products = angle_terms(scratch.sine, scratch.cosine, d, order, h)
@@ -382,9 +381,9 @@ def beyond_angles(
 
 @inlined
 def angle_terms(S: Floats, C: Floats, later: Floats, order: int, h: float) -> tuple[float, float]:
-    """Sum of the terms of an angle's sine and cosine up to ``order`` - 2; and of the products left out of their rates.
+    """Sum the terms of an angle's sine and cosine up to ``order`` - 2, and the products omitted from their rates.
 
-    ``later[k]`` is the sum of the velocity's terms from k on. The first terms are those of a unit vector.
+    ``later[k]`` is the sum of the velocity's terms from k on. The first terms form a unit vector.
     """
     total, products = 1.0, later[order - 2]
     power = h
@@ -398,7 +397,7 @@ def angle_terms(S: Floats, C: Floats, later: Floats, order: int, h: float) -> tu
 
 @inlined
 def sums_of_terms(S: Floats, C: Floats, d: Floats, order: int, h: float) -> None:
-    """Write the sums of the terms of sine and cosine, from each on, into d."""
+    """Write the sums of the terms of sine and cosine from each index on into d."""
     d[0] = 1.0
     power = h
     for k in range(1, order - 1):
@@ -410,7 +409,7 @@ def sums_of_terms(S: Floats, C: Floats, d: Floats, order: int, h: float) -> None
 
 @inlined
 def evaluate(c: Floats, order: int, t: float) -> tuple[float, float, float]:
-    """Rotation, velocity and acceleration (u, u', u'') of a series at time t after its centre."""
+    """Evaluate rotation, velocity and acceleration (u, u', u'') of a series at time t after its centre."""
     u = c[order]
     v = 0.0
     w = 0.0

@@ -1,12 +1,13 @@
-"""The chattering certificate: complete chattering proven for any motion, with a bracket on the time of rest.
+"""Chattering certificate: proof of complete chattering under any motion, with a bracket on the time of rest.
 
-At an impact the block enters side i with speed v. Over a window, side j's restoring acceleration at zero rotation
+At an impact the block enters side i with speed v. During a window, the restoring acceleration of side j at zero
+rotation
 
     g_j(t) = gain_j (threshold_j W(t) + j a(t)/g),    W = 1 + a_v/g,
 
-stays within [m_j, M_j]. Comparison of the arc with two of constant acceleration bounds its duration and its height,
-energy bounds the next impact's speed, and a geometric sum bounds all that follows. The derivation is in the
-documentation ("Theory"). A NaN among the arguments gives NaN: no proof.
+stays within [m_j, M_j]. Two arcs of constant acceleration bound the duration and height of the arc, energy bounds the
+speed of the next impact, and a geometric sum all later arcs. See "Theory" in the documentation. NaN arguments result in
+NaN, no proof.
 """
 
 import math
@@ -33,21 +34,21 @@ from rocking.kernels.remaining import Pair, Restoring, deviation, refined_bracke
 from rocking.kernels.restraints import may_change_below
 from rocking.kernels.state import Record
 
-#: Window of the proof over the first estimate of the remaining time.
+#: Window of the proof divided by the first estimate of the remaining time.
 _WINDOW = 1.5
 
-#: Bound on every speed until rest over the first, where damping counts; and on what energy the first two arcs gain for
-#: it to hold.
+#: With damping: bound on every speed until rest divided by the first, valid for this bound on the energy gained in the
+#: first two arcs.
 _FASTEST = 1.5
 _GAINED = 2.25
 
 
 class Bounds(NamedTuple):
-    """Bounds on one side over a window.
+    """Bounds on one side during a window.
 
     The restoring acceleration at zero rotation stays within [least, greatest] and changes by at most ``stiffness`` per
-    unit of rotation; what the motion adds to it changes by at most ``change``, and within a time by at most ``rate``
-    times that time and ``jumps``.
+    unit of rotation. The motion changes it by at most ``change``, and within a time by at most ``rate`` times that time
+    plus ``jumps``.
     """
 
     stiffness: float
@@ -60,10 +61,10 @@ class Bounds(NamedTuple):
 
 @inlined
 def geometric_bracket(v: float, first: Bounds, second: Bounds, e: Pair, least_e: Pair) -> tuple[float, float]:
-    """Lower and upper bound on the time to rest, for bounds that hold as long as needed; NaN, NaN: no proof.
+    """Compute a lower and an upper bound on the time to rest if the bounds hold that long; NaN, NaN: no proof.
 
-    ``first`` bounds the side that the block enters, ``second`` the other one; ``e`` and ``least_e`` are the largest and
-    the least restitution on leaving them.
+    ``first`` bounds the side entered, ``second`` the other; ``e``, ``least_e``: largest, smallest restitution on
+    leaving.
     """
     change_i, shortest_i, longest_i = arc_bounds(v, first)
     fastest = e[0] * math.sqrt(1.0 + change_i) * v
@@ -81,7 +82,7 @@ def geometric_bracket(v: float, first: Bounds, second: Bounds, e: Pair, least_e:
 
 @inlined
 def fastest_impact(v: float, first: Bounds, second: Bounds, e_i: float) -> float:
-    """Bound on the speeds of all impacts until rest, for a body that a `geometric_bracket` brings to rest."""
+    """Bound all impact speeds until rest, for a body that a `geometric_bracket` brings to rest."""
     fastest = math.sqrt(1.0 + arc_bounds(v, first)[0]) * v
     following = e_i * fastest * math.sqrt(1.0 + arc_bounds(e_i * fastest, second)[0])
     return max(fastest, following) * (1.0 + ROUNDING)
@@ -89,16 +90,16 @@ def fastest_impact(v: float, first: Bounds, second: Bounds, e_i: float) -> float
 
 @inlined
 def with_restitution(side: Restoring, e: float) -> Restoring:
-    """One side with another restitution."""
+    """Return one side with another restitution."""
     return Restoring(side.g, side.rate, side.curvature, side.stiffness, e, side.error)
 
 
 @inlined
 def arc_bounds(v: float, bounds: Bounds) -> tuple[float, float, float]:
-    """Bounds on one arc of initial speed v: |w^2/v^2 - 1| for its impact speed w, least and greatest duration.
+    """Bound an arc of initial speed v: |w^2/v^2 - 1| for its impact speed w, and its shortest and longest duration.
 
-    The durations (2/sqrt(k)) atan(x), atanh(x), with k the stiffness and x = sqrt(k) v/greatest and /least, are
-    replaced by the rational bounds x - x^3/3 and x + x^3/(3 (1 - x^2)), which need no transcendental function.
+    The durations (2/sqrt(k)) atan(x), atanh(x), with the stiffness k and x = sqrt(k) v/greatest and /least, are
+    replaced by the rational bounds x - x^3/3 and x + x^3/(3 (1 - x^2)) without transcendental functions.
     """
     k, m, M, change, rate, jumps = bounds
     if not (m > 0.0 and k * v * v < m * m):
@@ -111,9 +112,9 @@ def arc_bounds(v: float, bounds: Bounds) -> tuple[float, float, float]:
 
 
 class Proof(NamedTuple):
-    """Bounds on the time to rest from an impact, an estimate of it, and a bound on all rotations until then.
+    """Bounds on the time to rest from an impact, its estimate, and a bound on all rotations until then.
 
-    All NaN where nothing is proven.
+    All NaN: no proof.
     """
 
     lower: float
@@ -124,13 +125,13 @@ class Proof(NamedTuple):
 
 @inlined
 def unproven() -> Proof:
-    """No proof."""
+    """Return an all-NaN proof."""
     return Proof(np.nan, np.nan, np.nan, np.nan)
 
 
 @shared
 def prove_rest(ground: Ground, block: Record, settings: Record, scratch: Record, state: Record) -> Proof:
-    """Bracket on the time to rest from the state after an impact; all NaN: no proof."""
+    """Compute a bracket on the time to rest after an impact; all NaN: no proof."""
     v, i = state.v, state.side
     j = block.next_side[i]
     e_i, e_j = block.restitution[i], block.restitution[j]
@@ -139,7 +140,7 @@ def prove_rest(ground: Ground, block: Record, settings: Record, scratch: Record,
     if not (g_i > 0.0 and g_j > 0.0 and e_i * e_j < 1.0 and abs(block.stiffness[i]) * v * v < g_i * g_i):
         return unproven()
     window = _WINDOW * 2.0 * v * (1.0 / g_i + e_i / g_j) / (1.0 - e_i * e_j)
-    # The rounding of the times decides on which side of a jump of the motion the window ends.
+    # Rounding decides on which side of a jump of the motion the window ends.
     rounding = ROUNDING * (start_of(ground, state.piece) + state.offset)
     motion = bounds_on_motion(ground, block, state, window + rounding, scratch)
     first = side_bounds(block, settings, i, motion)
@@ -158,7 +159,8 @@ def prove_rest(ground: Ground, block: Record, settings: Record, scratch: Record,
         return unproven()
     least, change = min(first.least, second.least), max(first.change, second.change)
     height = v * v * (1.0 + 2.0 * change / least) / least
-    # Up to twice the slenderness the weight's part of the restoring acceleration is greatest at zero rotation.
+    # Up to twice the slenderness, the contribution of the weight to the restoring acceleration is largest at zero
+    # rotation.
     if has_vertical(ground) and not height <= 2.0 * min(block.slenderness[0], block.slenderness[1]):
         return unproven()
     if (block.two_stops and height >= block.overturn_angle) or (
@@ -182,7 +184,7 @@ def prove_rest(ground: Ground, block: Record, settings: Record, scratch: Record,
 
 
 class MotionBounds(NamedTuple):
-    """Bounds on both components of the motion over a window; the vertical one adds to a weight of 1."""
+    """Bounds on both components of the motion during a window; the vertical one adds to a weight of 1."""
 
     horizontal: Window
     vertical: Window
@@ -190,7 +192,7 @@ class MotionBounds(NamedTuple):
 
 @inlined
 def bounds_on_motion(ground: Ground, block: Record, state: Record, window: float, scratch: Record) -> MotionBounds:
-    """Bounds on the motion from a state on, its error included; NaN where it passes a threshold."""
+    """Bound the motion from a state on, including its error; NaN beyond a threshold."""
     vertical = Window(0.0, 0.0, 0.0, 0.0)
     if has_vertical(ground):
         limits = (-1.0, np.inf)
@@ -208,10 +210,10 @@ def bounds_on_motion(ground: Ground, block: Record, state: Record, window: float
 
 
 class Horizon(NamedTuple):
-    """Bounds over the window of a proof.
+    """Bounds during the window of a proof.
 
-    Those on the motion, its error and the number of its coefficients, the window's length, the highest rotation, the
-    greatest acceleration by damping.
+    The fields are bounds on the motion, its error and number of coefficients, length of the window, largest rotation,
+    and largest acceleration by damping.
     """
 
     motion: MotionBounds
@@ -224,9 +226,9 @@ class Horizon(NamedTuple):
 
 @inlined
 def with_drag(bounds: Bounds, drag: float) -> Bounds:
-    """Bounds on a side whose acceleration differs by at most ``drag``, at any time and whichever way the body moves.
+    """Widen bounds on a side for an acceleration that differs by at most ``drag`` at any time and in either direction.
 
-    On the way up and down again that takes as much energy as a motion which changes by twice as much.
+    On the way up and down, this takes as much energy as a motion that changes by twice as much.
     """
     k, m, M, change, rate, jumps = bounds
     return Bounds(k, m - drag, M + drag, change + 2.0 * drag, rate, jumps + 2.0 * drag)
@@ -234,16 +236,16 @@ def with_drag(bounds: Bounds, drag: float) -> Bounds:
 
 @inlined
 def restoring_parabola(block: Record, settings: Record, j: int, scratch: Record, horizon: Horizon) -> Restoring:
-    """Side j from an impact on: its restoring acceleration as a parabola in time, its stiffness, and their error.
+    """Compute side j after an impact: restoring acceleration as a parabola in time, stiffness, and error.
 
-    ``scratch`` holds the ground acceleration and the weight about the impact.
+    ``scratch`` contains the ground acceleration and the weight about the impact.
     """
     A, W = scratch.ground, scratch.weight
     sign, gain, threshold, lam = sign_of(j), block.threshold_slope[j], block.threshold[j], block.stiffness[j]
     weight, push = W[0] + block.added_weight[j], sign * A[0] + block.added_push[j]
     horizontal, vertical = horizon.motion
     error = horizon.error + beyond_parabola(A, horizon)
-    # Where almost no weight presses the block down, weight and push cancel, and the rounding of both remains.
+    # If almost no weight presses the block down, the rounding of weight and push remains.
     error += ROUNDING * (
         abs(threshold) * (1.0 + largest(vertical)) + abs(block.restraint_threshold[j]) + largest(horizontal)
     )
@@ -274,7 +276,7 @@ def restoring_parabola(block: Record, settings: Record, j: int, scratch: Record,
 
 @inlined
 def beyond_parabola(A: Floats, horizon: Horizon) -> float:
-    """Bound on the terms of a polynomial beyond degree 2."""
+    """Bound the terms of a polynomial beyond degree 2."""
     beyond = 0.0
     for k in range(horizon.columns - 1, 2, -1):
         beyond = (beyond + abs(A[k])) * horizon.window
@@ -283,57 +285,57 @@ def beyond_parabola(A: Floats, horizon: Horizon) -> float:
 
 @inlined
 def set_zero(A: Floats) -> Floats:
-    """Set the lowest coefficients of a polynomial to zero, and return it."""
+    """Set the lowest coefficients of a polynomial to zero and return it."""
     A[0] = A[1] = A[2] = 0.0
     return A
 
 
 @inlined
 def widened(motion: Window, error: float) -> Window:
-    """Bounds on a motion that differs from a bounded one by at most ``error`` at any time."""
+    """Return bounds on a motion that differs from a bounded one by at most ``error``."""
     return Window(motion.low - error, motion.high + error, motion.slope, motion.jumps + 2.0 * error)
 
 
 @inlined
 def largest(motion: Window) -> float:
-    """Largest absolute value of an acceleration."""
+    """Return the largest absolute value of an acceleration."""
     return max(abs(motion.low), abs(motion.high))
 
 
 @inlined
 def largest_weight(vertical: Window) -> float:
-    """Largest absolute value of the weight, over that at rest."""
+    """Return the largest absolute weight divided by the weight at rest."""
     return max(1.0 + vertical.high, -(1.0 + vertical.low))
 
 
 @inlined
 def max_weight(block: Record, j: int, vertical: Window) -> float:
-    """Largest absolute value of the weight on side j with what restraints add to it."""
+    """Return the largest absolute weight on side j, including restraints."""
     return largest_weight(vertical) + abs(block.added_weight[j])
 
 
 @inlined
 def max_push(block: Record, j: int, horizontal: Window) -> float:
-    """Largest absolute value of the push on side j with what restraints add to it."""
+    """Return the largest absolute push on side j, including restraints."""
     return largest(horizontal) + abs(block.added_push[j])
 
 
 @inlined
 def diagonal(a: float, b: float) -> float:
-    """Length of a vector. The C library's hypot rounds differently from version to version, and in Python."""
+    """Compute the length of a vector; hypot rounds differently across C libraries and in Python."""
     return math.sqrt(a * a + b * b)
 
 
 @inlined
 def side_bounds(block: Record, settings: Record, j: int, motion: MotionBounds) -> Bounds:
-    """Bounds on side j, rounding included, for bounds on the motion."""
+    """Compute bounds on side j, rounding included, from bounds on the motion."""
     horizontal, vertical = motion
     sign, threshold = sign_of(j), block.threshold[j]
     from_weight = (threshold * (1.0 + vertical.low), threshold * (1.0 + vertical.high))
     from_push = (sign * horizontal.low, sign * horizontal.high)
     push, weight = largest(horizontal), largest_weight(vertical)
     rounding = ROUNDING * (abs(threshold) * weight + abs(block.restraint_threshold[j]) + push)
-    # A rotation changes both models' stiffness and, in the nonlinear one, what the motion adds (at most p^2 a/g).
+    # A rotation changes the stiffness and, in the nonlinear model, the effect of the motion (by at most p^2 a/g).
     bend = max_weight(block, j, vertical)
     spring = abs(block.spring[j])
     if settings.nonlinear:

@@ -1,8 +1,7 @@
-"""How kernels are declared, and what runs them.
+"""Declaration of kernels, and choice of how they run.
 
-A kernel's machine code comes from the library that was built with the package (see `library`). Two variables of the
-environment are for work on kernels: with ROCKING_JIT=1 numba, which must be installed, compiles each kernel when it is
-first called, and with NUMBA_DISABLE_JIT=1 Python runs them.
+Their machine code is in the library that was built with the package (see `library`). For development, ROCKING_JIT=1
+makes numba, if installed, compile each kernel at its first call, and NUMBA_DISABLE_JIT=1 makes Python run them.
 """
 
 import hashlib
@@ -19,12 +18,12 @@ F = TypeVar("F", bound=Callable[..., object])
 #: Whether Python runs the kernels: slowly, with the same results to the last bit.
 UNCOMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 
-# - error_model: a kernel that divides by zero continues with inf or NaN, and its code reports the consequence.
-# - Fast-math is never switched on: the proofs rest on IEEE rounding, and every machine computes the same result.
-# - _nrt=False: kernels never allocate, so counting references to their array arguments (atomic operations, which take
-#   longer than a whole Taylor step) is switched off.
-# - forceinline is set for every function: otherwise numba adopts the value of the first caller, and one inlined
-#   function would inline everything that it calls, including whole marches.
+# - error_model: after a division by zero, a kernel continues with inf or NaN, and its code reports the consequence.
+# - Fast-math is never enabled: the proofs rely on IEEE rounding, and every machine computes the same result.
+# - _nrt=False: kernels never allocate, so that reference counting of arrays (atomic operations, slower than a Taylor
+#   step) is disabled.
+# - forceinline is set for every function. Otherwise numba adopts the value of the first caller, and one inlined
+#   function would inline everything that it calls, including entire marches.
 _OPTIONS = {"error_model": "numpy", "_nrt": False}
 
 
@@ -34,12 +33,12 @@ def _by_numba(function: Callable[..., Any], **options: Any) -> Any:
     return numba.njit(**options)(function)
 
 
-#: Compiler of the functions that are declared from now on; None where the library holds their code.
+#: Compiler of all functions declared from now on; None if the library contains their code.
 compiler: Callable[..., Any] | None = None if os.environ.get("ROCKING_JIT", "0") in ("", "0") else _by_numba
 
 
 def kernel(function: F) -> F:
-    """Declare a function that Python calls; it releases Python's lock while it runs."""
+    """Declare a function that Python calls and that releases the interpreter lock."""
     if UNCOMPILED:
         return function
     if compiler is None:
@@ -53,7 +52,7 @@ def inlined(function: F) -> F:
 
 
 def shared(function: F) -> F:
-    """Declare a part of kernels that is called from several places, where inlining would only multiply code."""
+    """Declare a part of kernels with several callers, where inlining would only duplicate code."""
     return _part(function, forceinline=False)
 
 
@@ -64,7 +63,7 @@ def _part(function: F, *, forceinline: bool) -> F:
 
 
 def fingerprint() -> str:
-    """Identify the code of all kernels and what compiled it."""
+    """Return a hash of the code of all kernels and their compiler."""
     if UNCOMPILED or compiler is not None:
         return code_hash(Path(__file__).parent)
     made = library.manifest()["made"]
@@ -72,7 +71,7 @@ def fingerprint() -> str:
 
 
 def state() -> str:
-    """Name what runs the kernels in this process."""
+    """Return a description of how the kernels run in this process."""
     if UNCOMPILED:
         return "none: NUMBA_DISABLE_JIT is set, and Python runs the kernels"
     if compiler is not None:

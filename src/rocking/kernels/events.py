@@ -1,6 +1,6 @@
-"""What ends a step of an arc: an impact, a rotation at which the block has fallen, or nothing; and the impact.
+"""Events that end a step of an arc (impact, overturning), and the change of state at an impact.
 
-The first positive root of a power series is found without any chance of stepping over it.
+The search for the first positive root of a power series cannot step over it.
 """
 
 import math
@@ -16,23 +16,23 @@ from rocking.kernels.state import Outcome, Record
 
 _EPSILON = 2.0**-53
 
-#: After so many steps the search continues within a window so many times as long as what has been searched.
+#: After each _STEPS_PER_WINDOW steps, the search continues in a window _WINDOW times as long as the part searched.
 _STEPS_PER_WINDOW = 8
 _WINDOW = 4.0
 
-#: Some six steps find a simple root, tens to thousands a minimum near zero. A series that is still not negative after
-#: so many is within 1e-10 of zero, relative to its curvature: that counts as a root.
+#: About six steps find a simple root, tens to thousands a minimum near zero. A series that is still not negative after
+#: _MAXIMUM_STEPS is within 1e-10 of zero relative to its curvature, which counts as a root.
 _MAXIMUM_STEPS = 100_000
 
 
 @shared
 def first_root(c: Floats, lead: int, order: int, h: float) -> float:
-    """First root in (0, h] of sum_k c[lead + k] t^k (Eq. 20: Eq. 15 divided by t^lead); NaN when there is none.
+    """Find the first root in (0, h] of sum_k c[lead + k] t^k (Eq. 20: Eq. 15 divided by t^lead); NaN if there is none.
 
-    A zero at 0 is no root, nor is a negative value there, which is rounding. The parabola through the current value and
-    slope with the least curvature on [0, h] is below the series, so no root precedes the parabola's: a step to it
-    passes none, and near a simple root these steps converge quadratically. Where that curvature is much larger than
-    needed, a shorter window with its own bound is searched first.
+    A zero at 0 is not a root, nor is a negative value there, which is rounding. The parabola through the current value
+    and slope with the smallest curvature on [0, h] is below the series, so that a step to its root passes no root of
+    the series. Near a simple root, these steps converge quadratically. If that curvature is much larger than needed, a
+    shorter window with its own bound is searched first.
     """
     while lead < order and c[lead] == 0.0:
         lead += 1
@@ -45,7 +45,7 @@ def first_root(c: Floats, lead: int, order: int, h: float) -> float:
     bound = curvature_bound(c, lead, order, window)
     for n in range(1, _MAXIMUM_STEPS + 1):
         root = math.sqrt(slope * slope + 2.0 * bound * f)
-        if root == 0.0:  # by underflow, where it is not
+        if root == 0.0:  # by underflow only
             root = math.sqrt(2.0 * bound) * math.sqrt(f)
         # The two forms of the parabola's root; neither subtracts numbers of the same sign.
         above, below = (slope + root, bound) if slope > 0.0 else (2.0 * f, root - slope)
@@ -69,7 +69,7 @@ def first_root(c: Floats, lead: int, order: int, h: float) -> float:
 
 @inlined
 def curvature_bound(c: Floats, lead: int, order: int, h: float) -> float:
-    """Bound B >= 0 with f'' >= -B on [0, h] for the deflated series f, from its negative terms."""
+    """Compute a bound B >= 0 with f'' >= -B on [0, h] for the deflated series f, from its negative terms."""
     lowest = 0.0
     power = 1.0
     for k in range(2, order - lead + 1):
@@ -82,7 +82,7 @@ def curvature_bound(c: Floats, lead: int, order: int, h: float) -> float:
 
 @inlined
 def deflated(c: Floats, lead: int, order: int, t: float) -> tuple[float, float]:
-    """Value and slope of sum_k c[lead + k] t^k."""
+    """Compute value and slope of sum_k c[lead + k] t^k."""
     f = c[order]
     slope = 0.0
     for k in range(order - 1, lead - 1, -1):
@@ -91,14 +91,14 @@ def deflated(c: Floats, lead: int, order: int, t: float) -> tuple[float, float]:
     return f, slope
 
 
-#: Relative difference of maxima that rounding may make.
+#: Relative difference of maxima that rounding may cause.
 _SAME_PEAK = 2.0**-40
 
 
 class StepEnd(NamedTuple):
-    """How a step ends (`Outcome`); time, u, u' there; time and value of the highest rotation on it.
+    """End of a step: `Outcome`; time, u, u' there; time and value of the largest rotation during the step.
 
-    Where no rotation on it is above the highest so far, the last two are those of its end.
+    The last two refer to its end if no rotation exceeds the largest so far.
     """
 
     outcome: int
@@ -120,7 +120,7 @@ def advance(state: Record, scratch: Record, order: int, h: float, fallen: float)
         time = h
         outcome = Outcome.STEP
     end, speed, _ = evaluate(c, order, time)
-    if end <= 0.0:  # also without a root: one within rounding of the step's end must not be missed
+    if end <= 0.0:  # also without a root, which may be within rounding of the step's end
         outcome, end = Outcome.IMPACT, 0.0
     peak_time, peak = time, end
     if is_higher_between(state, end, c, order, time):
@@ -136,9 +136,9 @@ def advance(state: Record, scratch: Record, order: int, h: float, fallen: float)
 
 @inlined
 def raise_peak(state: Record, peak: float, time: float) -> None:
-    """Keep a rotation above all before. Its time is that of the first of maxima which differ by rounding alone.
+    """Store a new largest rotation, with the time of the first of maxima that differ only by rounding.
 
-    A step that starts at the highest rotation so far goes on with the same rise.
+    A step from the largest rotation so far continues the same rise.
     """
     if state.u == state.peak or peak > state.peak * (1.0 + _SAME_PEAK):
         state.peak_time = time
@@ -147,7 +147,7 @@ def raise_peak(state: Record, peak: float, time: float) -> None:
 
 @inlined
 def is_higher_between(state: Record, end: float, c: Floats, order: int, h: float) -> bool:
-    """Whether a series may be higher within (0, h) than at both ends, and than the highest rotation so far."""
+    """Return whether a series may exceed, within (0, h), its values at both ends and the largest rotation so far."""
     bend = curvature_bound(c, 0, order, h)
     if max(state.u, end) + 0.125 * h * h * bend <= state.peak:
         return False
@@ -163,7 +163,7 @@ def is_higher_between(state: Record, end: float, c: Floats, order: int, h: float
 
 @shared
 def highest(order: int, h: float, c: Floats, d: Floats) -> tuple[float, float]:
-    """Time and value of a series' maximum on (0, h], from one turning point to the next. ``d`` is scratch space."""
+    """Find time and value of a series' maximum on (0, h] between turning points; ``d`` is scratch space."""
     best_time = h
     best, _, _ = evaluate(c, order, h)
     for k in range(order):
@@ -192,7 +192,7 @@ def highest(order: int, h: float, c: Floats, d: Floats) -> tuple[float, float]:
 
 @inlined
 def first_passage(c: Floats, order: int, level: float, h: float, d: Floats) -> float:
-    """First time in (0, h] at which a series that starts below ``level``, and is not below it at h, reaches it.
+    """Find the first time in (0, h] at which a series that is below ``level`` at 0, but not at h, reaches it.
 
     ``d`` is scratch space.
     """
@@ -205,7 +205,7 @@ def first_passage(c: Floats, order: int, level: float, h: float, d: Floats) -> f
 
 @inlined
 def apply_impact(block: Record, state: Record) -> float:
-    """Impact: the angular speed drops and the side changes; returns the speed before."""
+    """Reduce the angular speed and change the side at an impact; return the earlier speed."""
     left = state.side
     speed = max(0.0, -state.v)
     state.side = block.next_side[left]
@@ -219,11 +219,11 @@ def apply_impact(block: Record, state: Record) -> float:
     return speed
 
 
-# ---- The factor on the speed at an impact ----
-# Where it varies, it falls with the speed or is drawn anew at each impact. A factor that is drawn depends on the seed
-# of the body and on the number of the impact alone, so that one simulation and many draw the same.
+# ---- Restitution factor of an impact ----
+# A variable factor decreases with the speed or is drawn at each impact. A draw depends only on the body's seed and the
+# number of the impact, and is the same in single and multiple simulations.
 
-#: Philox 2x32 with ten rounds (Salmon, Moraes, Dror and Shaw 2011): its multiplier, and what is added to its key.
+#: Philox 2x32 with ten rounds (Salmon, Moraes, Dror and Shaw 2011): its multiplier and the increment of its key.
 _MULTIPLIER = 0xD256D193
 _WEYL = 0x9E3779B9
 _ROUNDS = 10
@@ -232,7 +232,7 @@ _WORD = 0xFFFFFFFF
 
 @inlined
 def factor(block: Record, side: int, speed: float, number: int) -> float:
-    """Factor on the speed of an impact that leaves a side; ``number`` of them came before."""
+    """Return the factor on the speed of an impact that leaves a side, after ``number`` others."""
     if block.variable_restitution:
         return varying_factor(block, side, speed, number)
     return float(block.restitution[side])
@@ -240,7 +240,7 @@ def factor(block: Record, side: int, speed: float, number: int) -> float:
 
 @shared
 def varying_factor(block: Record, side: int, speed: float, number: int) -> float:
-    """`factor` where it varies."""
+    """Compute a variable factor; see `factor`."""
     least, largest = block.min_restitution[side], block.restitution[side]
     if is_drawn(block):
         return min(largest, least + (largest - least) * uniform(int(block.seed), int(number)))
@@ -249,13 +249,13 @@ def varying_factor(block: Record, side: int, speed: float, number: int) -> float
 
 @inlined
 def is_drawn(block: Record) -> bool:
-    """Whether the factor is drawn at each impact."""
+    """Return whether the factor is drawn at each impact."""
     return bool(block.variable_restitution and block.seed >= 0)
 
 
 @inlined
 def relative_slope(block: Record, side: int, speed: float, e: float) -> float:
-    """Return the derivative of the speed after an impact by that before it, over the factor e: 1 for a constant one."""
+    """Return d(speed after)/d(speed before) of an impact, divided by the factor e (1 if the factor is constant)."""
     if block.variable_restitution and block.seed < 0 and e > block.min_restitution[side]:
         return 1.0 - block.restitution_slope[side] * speed / e
     return 1.0
@@ -263,7 +263,7 @@ def relative_slope(block: Record, side: int, speed: float, e: float) -> float:
 
 @inlined
 def least_factor(block: Record, side: int, fastest: float) -> float:
-    """Least factor of all impacts up to a speed; the largest is ``block.restitution``."""
+    """Return the smallest factor up to a speed; the largest is ``block.restitution``."""
     if not block.variable_restitution:
         return float(block.restitution[side])
     if block.seed >= 0:
@@ -273,16 +273,16 @@ def least_factor(block: Record, side: int, fastest: float) -> float:
 
 @inlined
 def middle_factor(block: Record, side: int, fastest: float) -> float:
-    """Middle of the factors of all impacts up to a speed."""
+    """Return the midpoint of all factors up to a speed."""
     return 0.5 * (least_factor(block, side, fastest) + block.restitution[side])
 
 
 @shared
 def uniform(seed: int, number: int) -> float:
-    """Draw from [0, 1): a multiple of 2^-53 that depends on a seed below 2^63 and a number below 2^32 alone.
+    """Draw from [0, 1) a multiple of 2^-53 that depends only on a seed below 2^63 and a number below 2^32.
 
-    Only the lower half of what is added or multiplied counts but for one product, of which the upper half of 64 bits is
-    the same whether a machine's integers wrap around or Python's grow.
+    Only lower halves of sums and products matter, except for one product, whose upper half of 64 bits is the same for
+    wrapping machine integers and Python's.
     """
     a, b, key = number & _WORD, (seed >> 32) & _WORD, seed & _WORD
     for _ in range(_ROUNDS):

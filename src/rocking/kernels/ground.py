@@ -1,8 +1,8 @@
-"""The ground acceleration as kernels read it: a polynomial on each piece, in units of g, and zero after the last.
+"""Ground acceleration for kernels: a polynomial on each piece, in units of g, and zero after the last.
 
-A row of `Ground.pieces` is one piece: start (s), length (s), coefficients in powers of the time since the start, those
-of the vertical component, where there is one, after the horizontal ones. The last row has no end and no acceleration,
-so that no function has to check whether the motion is over. Nothing here checks for NaN; it is passed on.
+A row of `Ground.pieces` contains the start (s), the length (s), and the coefficients in powers of the time since the
+start, of the horizontal and then of any vertical component. The last row has infinite length and zero acceleration, so
+that no function needs to check whether the motion is over. NaN propagates unchecked.
 """
 
 from typing import NamedTuple
@@ -15,13 +15,13 @@ from rocking.kernels.compiled import inlined, kernel, shared
 #: Relative allowance for rounding in bounds.
 ROUNDING = 2.0**-48
 
-#: Pieces of one stretch: `next_beyond` and `bounds_over` skip whole stretches.
+#: Pieces per stretch: `next_beyond` and `bounds_over` skip whole stretches.
 STRETCH = 16
 
-#: Pieces and whole stretches that a window may span.
+#: Largest number of pieces and whole stretches in a window.
 _LONGEST_WINDOW = 128
 
-#: Columns of a piece: start, length, first coefficient; and of the bounds on a stretch, which are those of a `Window`.
+#: Columns of a piece (start, length, first coefficient), and of the bounds on a stretch (as in `Window`).
 _START, _LENGTH, _FIRST = 0, 1, 2
 _LOW, _HIGH, _SLOPE, _JUMPS = 0, 1, 2, 3
 
@@ -29,8 +29,9 @@ _LOW, _HIGH, _SLOPE, _JUMPS = 0, 1, 2, 3
 class Ground(NamedTuple):
     """One component of a motion.
 
-    The motion's pieces; bounds on stretches of them, shape (stretches, components, 4); approximation error (g); number
-    of coefficients of a component; column of this component's first one (the horizontal one's, but for `vertical_of`).
+    The fields are the pieces of the motion, bounds on stretches of them, shape (stretches, components, 4),
+    approximation error (g), number of coefficients per component, and first column of this component (horizontal except
+    after `vertical_of`).
     """
 
     pieces: Floats
@@ -41,9 +42,9 @@ class Ground(NamedTuple):
 
 
 class Window(NamedTuple):
-    """Bounds on the acceleration over some time: least, greatest, steepest slope, sum of all jumps.
+    """Bounds on the acceleration during a time: minimum, maximum, steepest slope and sum of all jumps.
 
-    The jump at the end of a stretch is one of its jumps.
+    A stretch includes the jump at its end.
     """
 
     low: float
@@ -55,9 +56,9 @@ class Window(NamedTuple):
 def ground_of(
     breakpoints: Floats, coefficients: Floats, unit: float, error: float, vertical: Floats | None = None
 ) -> Ground:
-    """Ground from a motion's breakpoints (s), coefficients of both components on the same pieces, and error.
+    """Create a ground from breakpoints (s), coefficients of both components on the same pieces, and error.
 
-    ``unit``: factor that makes of coefficients and error units of g.
+    ``unit`` is the factor that converts coefficients and error to units of g.
     """
     components = [coefficients] if vertical is None else [coefficients, vertical]
     columns = max(2, *(component.shape[1] for component in components))
@@ -70,19 +71,19 @@ def ground_of(
 
 
 def components(ground: Ground, pieces: Integers) -> list[Floats]:
-    """Coefficients (g, g/s, ...) of a motion on some pieces: horizontal ones, and vertical ones if it has any."""
+    """Return the coefficients (g, g/s, ...) of a motion on some pieces: horizontal and, if present, vertical."""
     columns = ground.columns
     return [ground.pieces[pieces, _FIRST + k * columns :][:, :columns] for k in range(ground.stretches.shape[1])]
 
 
 def greatest_weight(ground: Ground) -> float:
-    """Greatest absolute value of the weight in the ground's frame, over that at rest."""
+    """Return the largest absolute weight in the ground's frame, divided by the weight at rest."""
     return float(np.max(np.abs(1.0 + ground.stretches[:, 1:, _LOW : _HIGH + 1]), initial=1.0))
 
 
 @kernel
 def fill(breakpoints: Floats, coefficients: Floats, unit: float, ground: Ground, A: Floats) -> None:
-    """Write the pieces of one component, and the bounds on stretches of them. ``A`` is scratch space."""
+    """Write the pieces of one component and the bounds on their stretches. ``A`` is scratch space."""
     pieces, last = ground.pieces, coefficients.shape[0]
     for k in range(last):
         pieces[k, _START] = breakpoints[k]
@@ -105,62 +106,62 @@ def fill(breakpoints: Floats, coefficients: Floats, unit: float, ground: Ground,
 
 @inlined
 def stretch_bounds(ground: Ground, stretch: int) -> Window:
-    """Bounds on a stretch."""
+    """Return the bounds on a stretch."""
     row = ground.stretches[stretch, component_of(ground)]
     return Window(row[_LOW], row[_HIGH], row[_SLOPE], row[_JUMPS])
 
 
 @inlined
 def component_of(ground: Ground) -> int:
-    """Index of the component among the bounds on stretches: 0 for the horizontal one, 1 for the vertical one."""
+    """Return the index of the component in bounds on stretches: 0 horizontal, 1 vertical."""
     return 0 if ground.first == _FIRST else 1
 
 
 @inlined
 def has_vertical(ground: Ground) -> bool:
-    """Whether the motion has a vertical component."""
+    """Return whether the motion has a vertical component."""
     return ground.stretches.shape[1] > 1
 
 
 @inlined
 def vertical_of(ground: Ground) -> Ground:
-    """Take the motion's vertical component in place of the horizontal one."""
+    """Return the vertical component of the motion."""
     return Ground(ground.pieces, ground.stretches, ground.error, ground.columns, ground.first + ground.columns)
 
 
 @inlined
 def is_straight(ground: Ground) -> bool:
-    """Whether the motion is linear in time on each piece, as records are."""
+    """Return whether the motion is linear in time on each piece, as records are."""
     return ground.columns == 2
 
 
 @inlined
 def last_piece(ground: Ground) -> int:
-    """Index of the piece without end, in which the motion is over."""
+    """Return the index of the infinite piece after the motion."""
     return ground.pieces.shape[0] - 1
 
 
 @inlined
 def start_of(ground: Ground, piece: int) -> float:
-    """Time at which a piece starts."""
+    """Return the start time of a piece."""
     return ground.pieces[piece, _START]
 
 
 @inlined
 def length_of(ground: Ground, piece: int) -> float:
-    """Length of a piece; infinite for the last."""
+    """Return the length of a piece; infinite for the last."""
     return ground.pieces[piece, _LENGTH]
 
 
 @inlined
 def coefficient(ground: Ground, piece: int, power: int) -> float:
-    """Coefficient of a power of the time since a piece's start."""
+    """Return the coefficient of a power of the time within a piece."""
     return ground.pieces[piece, ground.first + power]
 
 
 @inlined
 def acceleration(ground: Ground, piece: int, offset: float) -> float:
-    """Ground acceleration within a piece, g."""
+    """Compute the ground acceleration within a piece, g."""
     value = 0.0
     for k in range(ground.columns - 1, -1, -1):
         value = value * offset + ground.pieces[piece, ground.first + k]
@@ -169,7 +170,7 @@ def acceleration(ground: Ground, piece: int, offset: float) -> float:
 
 @inlined
 def slope(ground: Ground, piece: int, offset: float) -> float:
-    """Rate of the ground acceleration within a piece, g/s."""
+    """Compute the rate of the ground acceleration within a piece, g/s."""
     value = 0.0
     for k in range(ground.columns - 1, 0, -1):
         value = value * offset + k * ground.pieces[piece, ground.first + k]
@@ -178,7 +179,7 @@ def slope(ground: Ground, piece: int, offset: float) -> float:
 
 @inlined
 def local_series(ground: Ground, piece: int, offset: float, sign: float, A: Floats) -> int:
-    """Put a piece's polynomial about ``offset``, times ``sign``, into A; returns its degree."""
+    """Write a piece's polynomial about ``offset``, times ``sign``, into A and return its degree."""
     degree = ground.columns - 1
     while degree > 0 and coefficient(ground, piece, degree) == 0.0:
         A[degree] = 0.0
@@ -187,7 +188,7 @@ def local_series(ground: Ground, piece: int, offset: float, sign: float, A: Floa
         for k in range(degree + 1):
             A[k] = sign * coefficient(ground, piece, k)
         return degree
-    # Horner's rule, for all coefficients at once: unlike in `move` the sums of one turn do not depend on each other.
+    # Horner's rule for all coefficients at once; unlike in `move`, the sums of one iteration are independent.
     A[0] = sign * coefficient(ground, piece, degree)
     for k in range(1, degree + 1):
         before = A[0]
@@ -202,7 +203,7 @@ def local_series(ground: Ground, piece: int, offset: float, sign: float, A: Floa
 
 @inlined
 def move(c: Floats, degree: int, t: float) -> None:
-    """Expand a polynomial about t, in place (repeated synthetic division)."""
+    """Expand a polynomial about t in place (repeated synthetic division)."""
     for k in range(degree):
         for j in range(degree - 1, k - 1, -1):
             c[j] += t * c[j + 1]
@@ -210,9 +211,9 @@ def move(c: Floats, degree: int, t: float) -> None:
 
 @inlined
 def bounds_within(ground: Ground, piece: int, offset: float, window: float, A: Floats) -> Window:
-    """Bounds over [offset, offset + window] of one piece; ``jumps`` is the allowance for rounding in the others.
+    """Compute bounds on one piece in [offset, offset + window]; ``jumps`` is the allowance for rounding in the others.
 
-    Exact but for rounding for degree 1. ``A`` is scratch space.
+    For degree 1 they are exact except for rounding. ``A`` is scratch space.
     """
     columns = ground.columns
     if columns == 2:
@@ -237,7 +238,7 @@ def bounds_within(ground: Ground, piece: int, offset: float, window: float, A: F
 
 @inlined
 def absolute_sums(ground: Ground, piece: int, t: float) -> tuple[float, float]:
-    """Return the sums of the |terms| of a piece and of its slope at t, of which rounding is a fraction."""
+    """Compute the sums of the |terms| of a piece and of its slope at t, to which the rounding is proportional."""
     size = size_of_slope = 0.0
     for k in range(ground.columns - 1, -1, -1):
         size_of_slope = size_of_slope * t + size
@@ -249,9 +250,9 @@ def absolute_sums(ground: Ground, piece: int, t: float) -> tuple[float, float]:
 def bounds_over(
     ground: Ground, piece: int, offset: float, window: float, limits: tuple[float, float], A: Floats
 ) -> Window:
-    """Bounds over a window that starts in a piece, rounding included; ``A`` is scratch space.
+    """Compute bounds, rounding included, on a window from an offset on; ``A`` is scratch space.
 
-    NaN where they are not within ``limits``, or the window spans too many pieces.
+    NaN if they exceed ``limits`` or the window spans too many pieces.
     """
     low, high, steepest, jumps = np.inf, -np.inf, 0.0, 0.0
     for _ in range(_LONGEST_WINDOW):
@@ -278,7 +279,7 @@ def bounds_over(
 
 @inlined
 def is_whole_stretch(ground: Ground, piece: int, offset: float, window: float) -> bool:
-    """Whether a stretch starts here and ends within the window."""
+    """Return whether a stretch starts here and ends within the window."""
     if piece % STRETCH != 0 or offset > 0.0 or piece + STRETCH > last_piece(ground):
         return False
     return bool(start_of(ground, piece + STRETCH) - start_of(ground, piece) < window)
@@ -286,15 +287,15 @@ def is_whole_stretch(ground: Ground, piece: int, offset: float, window: float) -
 
 @inlined
 def jump_after(ground: Ground, piece: int) -> float:
-    """Size of the motion's jump at the end of a piece."""
+    """Return the size of the jump at the end of a piece."""
     return abs(coefficient(ground, piece + 1, 0) - acceleration(ground, piece, length_of(ground, piece)))
 
 
 @inlined
 def next_beyond(ground: Ground, piece: int, limits: tuple[float, float], added: tuple[float, float]) -> int:
-    """First piece from this one on whose stretch is not within limits, times the weight, and what is added to them.
+    """Return the first piece from ``piece`` on whose stretch is not within limits, or the last piece.
 
-    The last one where none is.
+    ``limits`` are multiplied by the weight before ``added`` is added.
     """
     below, above = limits
     while piece < last_piece(ground):

@@ -1,7 +1,7 @@
-"""One step of all lanes of a group: linear, linear while the weight changes, nonlinear; and bounds on its events.
+"""One step of a group of lanes (linear, linear under varying weight, or nonlinear), and bounds on its events.
 
-A step marks and counts the lanes in which it may hold an event, and changes only the others. Lanes without a block
-never have an event, nor do their numbers change. A lane with a NaN always has one.
+A step marks and counts the lanes in which an event may occur (always with NaN, never without a block), and changes only
+the others that have a block. Weights are in the ground's frame, divided by the weight at rest.
 """
 
 from typing import TypeVar
@@ -12,14 +12,14 @@ from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.series import Line, nonlinear_rates, strength_of, truncation_is_negligible, weighted_rates
 from rocking.kernels.state import Record
 
-#: Lanes that step together. A constant, so that their loops have a fixed length.
+#: Number of lanes that step together, a constant so that their loops have a fixed length.
 WIDTH = 32
 
 _LANES = ("f8", (WIDTH,))
 _SIDES = ("f8", (2,))
 
-#: A group of lanes: the block's index, and whether its step may hold an event; u, u' and (nonlinear) sin and
-#: cos(alpha - u), now and after the step; constants of the block's present side (`STEP_CONSTANTS`); highest rotation.
+#: Group of lanes: index of the block; whether its step may contain an event; u, u' and (nonlinear)
+#: sin and cos(alpha - u) before and after the step; constants of the present side (`STEP_CONSTANTS`); largest rotation.
 GROUP = np.dtype(
     [("block", "i8", (WIDTH,)), ("event", "i8", (WIDTH,))]
     + [
@@ -33,8 +33,8 @@ GROUP = np.dtype(
 )  # fmt: skip
 
 #: Constants of a step of length h on each side. Linear: lam, gain threshold, side gain (u'' = lam u - pull - push a),
-#: h c1, h^2 c2, h^3 c3 with Stumpff's functions c_k of lam h^2. Nonlinear: -lam h^2/2 in place of lam, the side's sign
-#: in place of its gain. ``curve`` max |u''| bounds how far the rotation is above or below both ends of the step.
+#: h c1, h^2 c2, h^3 c3 with Stumpff's functions c_k of lam h^2. Nonlinear: -lam h^2/2 instead of lam, sign of the side
+#: instead of its gain. ``curve`` max |u''| bounds the distance of the rotation above or below both ends of the step.
 STEP_CONSTANTS = np.dtype(
     [(name, *_SIDES) for name in ("stiffness", "pull", "push", "first", "second", "third", "curve")],
     align=True,
@@ -42,7 +42,7 @@ STEP_CONSTANTS = np.dtype(
 
 MaybeLine = TypeVar("MaybeLine", Line, None, Line | None)
 
-#: Largest bound on the next terms, from the last ones, over the first two: the truncation is a hundredth of it.
+#: Largest bound on the next terms by the last ones, divided by the first two; the truncation is 1/100 of it.
 _NEXT_TERMS = 2.0**-46
 
 
@@ -50,29 +50,28 @@ _NEXT_TERMS = 2.0**-46
 def is_event_free(
     ends: Line, rate: float, below: float, above: float, change: Line, peak: float, fallen: float
 ) -> bool:
-    """Whether a step certainly holds no impact, no new peak and no overturning; never with a NaN among the numbers.
+    """Return whether a step certainly contains no impact, new peak or overturning; False for NaN.
 
-    Over a step from u to u1 (``ends``) the rotation stays above min(u, u1) - below and under max(u, u1) + above, and
-    its rate, ``rate`` at the start, changes by no less than the first and no more than the second number of
-    ``change``. A rotation that rises throughout has its peak at the end, which the next step compares; one that falls
-    throughout has it at the start, and must not be above the peak so far.
+    During a step from u to u1 (``ends``), the rotation stays above min(u, u1) - below and under max(u, u1) + above, and
+    its rate, initially ``rate``, changes by between ``change[0]`` and ``change[1]``. A rising rotation has its peak at
+    the end, which the next step compares; a falling one has it at the start, which must not exceed the peak so far.
     """
     u, u1 = ends
     least, most = change
     highest = max(u, u1)
     rises = rate + least > 0.0
     falls = (rate + most < 0.0) & (u <= peak)
-    # One by one: a minimum may ignore a NaN.
+    # The comparisons are separate because a minimum may ignore a NaN.
     return (u > below) & (u1 > below) & ((highest + above <= peak) | rises | falls) & (highest + above < fallen)
 
 
 @shared
 def step_linear(group: Record, push: Line, h: float, longer: float, fallen: float) -> int:
-    """Step a group through one sample by Stumpff's functions, exact for any lam and h; returns how many have an event.
+    """Step a group through one sample by Stumpff's functions (exact for any lam and h); return the number of events.
 
-    ``push`` is the ground acceleration and its slope. w = u'' obeys w'' = lam w under a ground acceleration that is
-    linear in time, so its extrema are at the ends of the step (but for what ``curve`` allows). Samples whose times are
-    rounded are not all of one length: this one is longer than ``h`` by ``longer``.
+    ``push`` is the ground acceleration and its slope. Because w = u'' then satisfies w'' = lam w, its extrema are at
+    the ends of the step (except for ``curve``). Rounding of sample times makes the sample longer than ``h`` by
+    ``longer``.
     """
     start, slope = push
     end = start + slope * h
@@ -89,7 +88,7 @@ def step_linear(group: Record, push: Line, h: float, longer: float, fallen: floa
         v1 += longer * w1
         least, most = min(min(w, w1), 0.0), max(max(w, w1), 0.0)
         curve = group.curve[lane]
-        # Eight times ``curve`` is h^2: times the least w, that is h times the least change of the rate.
+        # Eight times ``curve`` is h^2; its product with the smallest w is h times the smallest change of the rate.
         change = (8.0 * curve * least, 8.0 * curve * most)
         free = is_event_free((u, u1), h * v, curve * most, -(curve * least), change, group.peak[lane], fallen)
         group.u[lane] = u1 if free else u
@@ -115,7 +114,7 @@ def copy_states(group: Record, h: float) -> None:
 
 @inlined
 def over_substep(line: MaybeLine, k: int, h: float) -> MaybeLine:
-    """Value at the start of the k-th substep of length h, and the change over it; None for None."""
+    """Return the value at the start of the k-th substep of length h and the change during it, or None for None."""
     if line is None:
         return line
     change = line[1] * h
@@ -124,7 +123,7 @@ def over_substep(line: MaybeLine, k: int, h: float) -> MaybeLine:
 
 @inlined
 def accept_states(group: Record, rate: float) -> int:
-    """Make the copies the state of the lanes that have no event; returns how many have one."""
+    """Copy the new states of lanes without an event, and return the number of the other lanes."""
     events = 0
     for lane in range(WIDTH):
         event = group.event[lane]
@@ -138,9 +137,9 @@ def accept_states(group: Record, rate: float) -> int:
 
 @shared
 def step_weighted(group: Record, push: Line, weight: Line, length: float, substeps: int, fallen: float) -> int:
-    """Step a group of the linear model through one sample while the weight changes; returns how many have an event.
+    """Step a group of the linear model through one sample under varying weight; return the number of events.
 
-    ``push`` is the ground acceleration, ``weight`` that in the ground's frame over that at rest.
+    ``push`` is the ground acceleration.
     """
     h = length / substeps
     copy_states(group, 1.0)
@@ -151,10 +150,10 @@ def step_weighted(group: Record, push: Line, weight: Line, length: float, subste
 
 @shared
 def weighted_substep(group: Record, push: Line, weight: Line, h: float, fallen: float) -> None:
-    """Move the copies through a substep of length h; mark the lanes in which it may hold an event.
+    """Move the copies through a substep of length h and mark the lanes in which an event may occur.
 
-    With z = h^2 (lam u - pull), r' = weight z - h^2 push: a term contributes to the next but one, and by the change of
-    the weight to the one after that. So the last ones bound the truncation.
+    With z = h^2 (lam u - pull), r' = weight z - h^2 push. A term contributes to the second next and, as the weight
+    changes, to the third. Therefore the last terms bound the truncation.
     """
     w, d = weight
     square, rate = h * h, 1.0 / h
@@ -183,11 +182,10 @@ def weighted_substep(group: Record, push: Line, weight: Line, h: float, fallen: 
 def step_nonlinear(
     group: Record, push: Line, weight: Line | None, length: float, h: float, substeps: int, fallen: float
 ) -> int:
-    """Step a group of the nonlinear model through one sample; returns how many have an event.
+    """Step a group of the nonlinear model through one sample and return the number of events.
 
-    ``push`` is the ground acceleration, ``weight`` that in the ground's frame over that at rest (None: it does not
-    change). Samples whose times are rounded are not all of one length: this one has ``length``, the lanes' constants
-    are for ``h``.
+    ``push`` is the ground acceleration; a weight of None is constant. Due to rounded sample times, the sample has
+    ``length``, but the constants of the lanes are for ``h``.
     """
     share = length / substeps
     copy_states(group, share)
@@ -199,10 +197,10 @@ def step_nonlinear(
 
 @shared
 def nonlinear_substep(group: Record, push: Line, weight: Line | None, scale: float, fallen: float) -> None:
-    """Move the copies through one substep; mark the lanes in which it may hold an event.
+    """Move the copies through one substep and mark the lanes in which an event may occur.
 
-    ``push`` and ``weight`` have the changes over it; ``scale`` is the square of its length over the usual one. The
-    sine and cosine of alpha - u follow by the addition theorem.
+    ``push`` and ``weight`` include their changes. ``scale`` is the squared ratio of its length to the usual one. The
+    addition theorem gives the sine and cosine of alpha - u.
     """
     for lane in range(WIDTH):
         u, r1 = group.next_u[lane], group.next_v[lane]
@@ -222,7 +220,7 @@ def nonlinear_substep(group: Record, push: Line, weight: Line | None, scale: flo
         free = is_event_free((u, u1), r1, 0.125 * most, -0.125 * least, (least, most), group.peak[lane], fallen)
         free &= converged
         group.event[lane] |= not free
-        # sin and 1 - cos of the change of the rotation
+        # sine and 1 - cosine of the change of the rotation
         square = change * change
         higher = 1.0 / 120.0 - square * (1.0 / 5040.0 - square * (1.0 / 362880.0))
         sine = change * (1.0 - square * (1.0 / 6.0 - square * higher))

@@ -1,9 +1,9 @@
-"""Many blocks through one evenly sampled record: together without events, one by one where there may be one.
+"""Simulation of many blocks under one evenly sampled record: together, or one by one where an event may occur.
 
-A lane is one block. Over each sample all lanes step together, in loops that vectorise; where the step may hold an event
-(an impact, a new peak, an overturning) the lane does not change, and `march` takes the block through that sample. What
-may hold an event is decided by bounds, never by sampling (`lane_steps.is_event_free`). A lane's arithmetic depends on
-its block and the motion alone, never on the other lanes. A block with a NaN always marches alone.
+A lane contains one block. All lanes step through a sample together, in loops that vectorise. A lane whose step may
+contain an event (an impact, a new peak, an overturning) is left unchanged, and `march` simulates its block during that
+sample. Bounds decide, never sampling (`lane_steps.is_event_free`). The arithmetic of a lane depends only on its block
+and the motion, never on other lanes. A block with a NaN is always simulated by `march`.
 """
 
 import math
@@ -28,8 +28,8 @@ from rocking.kernels.state import (
     records,
 )
 
-#: Largest sqrt(|lam W|) h of a block in lanes, W being its weight over that at rest; of one substep of the nonlinear
-#: model; and of one of the linear model while the weight changes.
+#: Largest sqrt(|lam W|) h of a block in lanes, where W is its weight divided by the weight at rest; of a substep of the
+#: nonlinear model; and of a substep of the linear model under varying weight.
 LONGEST_STEP = 1.0
 LONGEST_SUBSTEP = 0.04
 LONGEST_WEIGHTED_SUBSTEP = 0.125
@@ -37,15 +37,15 @@ LONGEST_WEIGHTED_SUBSTEP = 0.125
 #: Rotation of a lane without a block.
 EMPTY_ROTATION = 1e-300
 
-#: How many lanes are in use, how many of them have become free, and how many blocks wait for their uplift.
+#: Numbers of lanes in use, of lanes that have become free, and of blocks that wait for their uplift.
 COUNTS = np.dtype([("active", "i8"), ("free", "i8"), ("waiting", "i8")], align=True)
 
 
 class Pool(NamedTuple):
-    """Blocks, their states and step constants; groups of lanes; and which blocks wait for which piece of the motion.
+    """Blocks, their states and step constants, groups of lanes, and queues of blocks that wait for a piece.
 
-    ``first[piece]`` is the first block that waits for a piece, ``following[block]`` the next one (-1: none). ``free``
-    lists the lanes that have become free. ``table`` has no rows.
+    ``first[piece]`` is the first block that waits for a piece, ``following[block]`` the next one (-1: none), and
+    ``free`` the lanes that have become free. ``table`` has no rows.
     """
 
     blocks: Records
@@ -61,7 +61,7 @@ class Pool(NamedTuple):
 
 
 def pool_of(blocks: Records, states: Records, pieces: int, h: float, substeps: int) -> Pool:
-    """Pool in which every block waits for the first piece; ``substeps`` is 0 in the linear model."""
+    """Return a pool in which every block waits for the first piece; ``substeps`` is 0 in the linear model."""
     count = len(blocks)
     groups = _on_cache_lines(-(-count // WIDTH), GROUP)
     groups["block"] = -1
@@ -79,7 +79,7 @@ def pool_of(blocks: Records, states: Records, pieces: int, h: float, substeps: i
 
 
 def _on_cache_lines(count: int, kind: np.dtype[np.void]) -> Records:
-    """Zeroed records that start on a cache line: vectors across two lines are read at half the speed."""
+    """Return zeroed records that start on a cache line (vectors across two lines are read at half the speed)."""
     line = 64
     space = np.zeros(count * kind.itemsize + line, dtype=np.uint8)
     skip = -space.ctypes.data % line
@@ -87,7 +87,7 @@ def _on_cache_lines(count: int, kind: np.dtype[np.void]) -> Records:
 
 
 def step_constants(blocks: Records, h: float, substeps: int) -> Records:
-    """Constants of a step of length h for every block (`STEP_CONSTANTS`)."""
+    """Compute the constants of a step of length h for every block (`STEP_CONSTANTS`)."""
     steps = records(len(blocks), STEP_CONSTANTS)
     lam = blocks["stiffness"]
     sign = np.array([1.0, -1.0])
@@ -102,13 +102,13 @@ def step_constants(blocks: Records, h: float, substeps: int) -> Records:
     steps["first"] = h * stumpff(1, q)
     steps["second"] = h * h * stumpff(2, q)
     steps["third"] = h * h * h * stumpff(3, q)
-    # For lam < 0 u'' may be larger inside a step than at both its ends, by |lam| h^2/8 of the largest value.
+    # For lam < 0, u'' inside a step may exceed both ends by |lam| h^2/8 of its largest value.
     steps["curve"] = h * h / 8.0 / (1.0 - np.maximum(-q, 0.0) / 8.0)
     return steps
 
 
 def stumpff(k: int, q: Any) -> Floats:
-    """Stumpff's function c_k(q), the sum of q^j/(k + 2j)!, for |q| <= 1: to the last bit or two."""
+    """Compute Stumpff's function c_k(q), the sum of q^j/(k + 2j)!, for |q| <= 1 to the last one or two bits."""
     q = np.asarray(q, dtype=np.float64)
     total = np.ones_like(q)
     for j in range(9, 0, -1):
@@ -118,7 +118,7 @@ def stumpff(k: int, q: Any) -> Floats:
 
 @inlined
 def fill_lane(pool: Pool, lane: int, index: int) -> None:
-    """Write a block's state and constants into a lane, but for its sine and cosine."""
+    """Write a block's state and constants, except its sine and cosine, into a lane."""
     group, slot = pool.groups[lane // WIDTH], lane % WIDTH
     state, steps = pool.states[index], pool.steps[index]
     side = state.side
@@ -137,7 +137,7 @@ def fill_lane(pool: Pool, lane: int, index: int) -> None:
 
 @inlined
 def set_angles(pool: Pool, lane: int, index: int) -> None:
-    """Set a lane's sine and cosine of alpha - u."""
+    """Set the sine and cosine of alpha - u in a lane."""
     group, slot = pool.groups[lane // WIDTH], lane % WIDTH
     state = pool.states[index]
     psi = pool.blocks[index].slenderness[state.side] - state.u
@@ -147,9 +147,9 @@ def set_angles(pool: Pool, lane: int, index: int) -> None:
 
 @inlined
 def write_lane(ground: Ground, pool: Pool, lane: int, piece: int) -> int:
-    """Write a lane's numbers into its block's state, at the start of a piece; returns the block's index.
+    """Write a lane into the state of its block at the start of a piece, and return the block's index.
 
-    The highest rotation of a block that still rises is not in its state yet.
+    The state does not yet contain the largest rotation of a block that still rises.
     """
     group, slot = pool.groups[lane // WIDTH], lane % WIDTH
     index = group.block[slot]
@@ -165,7 +165,7 @@ def write_lane(ground: Ground, pool: Pool, lane: int, piece: int) -> int:
 
 @inlined
 def empty(pool: Pool, lane: int) -> None:
-    """Make a lane one without a block: no step changes its numbers or finds an event."""
+    """Remove the block of a lane; no step then changes the lane or detects an event."""
     group, slot = pool.groups[lane // WIDTH], lane % WIDTH
     group.block[slot] = -1
     group.u[slot] = EMPTY_ROTATION
@@ -197,10 +197,10 @@ def move_block(pool: Pool, lane: int, to: int) -> None:
 
 @kernel
 def run_lanes(ground: Ground, settings: Record, scratch: Record, pool: Pool, substeps: int) -> None:
-    """March every block of a pool through a record of even samples, and on to its own end.
+    """Simulate every block of a pool under an evenly sampled record to its end.
 
-    ``substeps`` divide a sample: 0 in the linear model under a constant weight. Afterwards ``ending`` of every state
-    is an `Ending`; RUNNING and PAUSED ones can be continued one by one.
+    ``substeps`` per sample is 0 in the linear model under constant weight. Afterwards ``ending`` of every state is an
+    `Ending`; RUNNING and PAUSED states can be continued individually.
     """
     piece = next_waited_for(pool, 0)
     while piece < last_piece(ground) and start_of(ground, piece + 1) <= settings.stop:
@@ -221,14 +221,14 @@ def run_lanes(ground: Ground, settings: Record, scratch: Record, pool: Pool, sub
 
 @kernel
 def march_each(ground: Ground, settings: Record, scratch: Record, pool: Pool) -> None:
-    """March every block of a pool to its end, one after the other; ``ending`` of every state is then an `Ending`."""
+    """Simulate every block of a pool to its end, one by one; ``ending`` of every state is then an `Ending`."""
     for index in range(pool.blocks.shape[0]):
         march_until(ground, settings, scratch, pool, index, TO_THE_END)
 
 
 @inlined
 def next_waited_for(pool: Pool, piece: int) -> int:
-    """First piece from this one on for which a block waits; the motion's end where there is none."""
+    """Return the first piece from ``piece`` on with a waiting block, or the end of the motion."""
     while piece < pool.first.shape[0] - 1 and pool.first[piece] < 0:
         piece += 1
     return piece
@@ -236,7 +236,7 @@ def next_waited_for(pool: Pool, piece: int) -> int:
 
 @inlined
 def step_groups(ground: Ground, settings: Record, scratch: Record, pool: Pool, piece: int, substeps: int) -> None:
-    """Move all lanes through one sample: together, or by a march where that may hold an event."""
+    """Move all lanes through one sample: together, or by a march if an event may occur."""
     for first in range(0, pool.counts.active, WIDTH):
         group = pool.groups[first // WIDTH]
         events = step_group(ground, settings, group, piece, substeps, pool.fallen)
@@ -250,7 +250,7 @@ def step_groups(ground: Ground, settings: Record, scratch: Record, pool: Pool, p
 
 @inlined
 def step_group(ground: Ground, settings: Record, group: Record, piece: int, substeps: int, fallen: float) -> int:
-    """Step a group through one sample; returns in how many lanes that may hold an event."""
+    """Step a group through one sample and return the number of lanes with possible events."""
     push = (coefficient(ground, piece, 0), coefficient(ground, piece, 1))
     length, h = length_of(ground, piece), length_of(ground, 0)
     if has_vertical(ground):
@@ -266,7 +266,7 @@ def step_group(ground: Ground, settings: Record, group: Record, piece: int, subs
 
 @inlined
 def march_sample(ground: Ground, settings: Record, scratch: Record, pool: Pool, piece: int, lane: int) -> None:
-    """March the block of a lane through one sample; it keeps its lane if it rocks on."""
+    """March the block of a lane through one sample; it keeps its lane if still rocking."""
     index = write_lane(ground, pool, lane, piece)
     if march_until(ground, settings, scratch, pool, index, piece + 1):
         start_lane(settings, pool, lane, index)
@@ -278,7 +278,7 @@ def march_sample(ground: Ground, settings: Record, scratch: Record, pool: Pool, 
 
 @inlined
 def start_lane(settings: Record, pool: Pool, lane: int, index: int) -> None:
-    """Let a lane carry a block."""
+    """Assign a block to a lane."""
     fill_lane(pool, lane, index)
     if settings.nonlinear:
         set_angles(pool, lane, index)
@@ -286,7 +286,7 @@ def start_lane(settings: Record, pool: Pool, lane: int, index: int) -> None:
 
 @inlined
 def march_until(ground: Ground, settings: Record, scratch: Record, pool: Pool, index: int, until: int) -> bool:
-    """March a block up to a piece; returns whether it rocks there, else it waits for the piece in which it does."""
+    """March a block up to a piece and return whether it rocks there; if not, queue it for the piece where it will."""
     state = pool.states[index]
     state.stop_piece = until
     state.ending = march(ground, pool.blocks[index], settings, pool.table, scratch, state)

@@ -1,8 +1,8 @@
-"""Call kernels in the library that was built with the package.
+"""Calls of kernels in the library that was built with the package.
 
-The build makes a library for each level of the processor and a manifest: what it was built from, and the types of each
-kernel's arguments. A kernel in the library takes the address of its arguments, packed into eight bytes each: numbers,
-the address of a record, the address of an array and its shape, and the members of a tuple.
+The build creates a library for each processor level, and a manifest with hashes of the sources and argument types of
+the kernels. A kernel accepts the address of its arguments, packed into eight bytes each: numbers, addresses of records,
+addresses and shapes of arrays, and members of tuples.
 """
 
 import ctypes
@@ -21,17 +21,17 @@ from rocking.kernels.sources import code_hash, text_hash
 
 SOURCES: Final = Path(__file__).parent
 
-#: Where the build puts the libraries and the manifest.
+#: Folder of the libraries and the manifest.
 FOLDER: Final = SOURCES / "built"
 
 _ADVICE: Final = "run make kernels in the source tree, or install rocking again"
 
-#: Appends an argument to a list as it is packed; a TypeError or ValueError for an argument of another type.
+#: Function that appends an argument to a list, or raises TypeError or ValueError for another type.
 Taker = Callable[[Any, list[Any]], None]
 
 
 class Library(NamedTuple):
-    """An open library."""
+    """Open library."""
 
     name: str
     handle: ctypes.CDLL
@@ -40,12 +40,12 @@ class Library(NamedTuple):
 
 @functools.cache
 def opened() -> Library:
-    """Open the library of the highest level that this processor has.
+    """Open the library of the highest level that this processor supports.
 
     Raises
     ------
     KernelsError
-        Where there is none, it is damaged, or it was built from other sources.
+        If it is missing, damaged, or built from other sources.
     """
     built = manifest()
     try:
@@ -59,12 +59,12 @@ def opened() -> Library:
 
 @functools.cache
 def manifest() -> dict[str, Any]:
-    """Read the manifest of libraries that were built from the sources of this process.
+    """Read the manifest of the libraries, which must be built from the sources of this process.
 
     Raises
     ------
     KernelsError
-        Where there is none, or they were built from other sources.
+        If it is missing, or the sources differ.
     """
     try:
         built: dict[str, Any] = json.loads((FOLDER / "manifest.json").read_text("utf-8"))
@@ -78,14 +78,14 @@ def manifest() -> dict[str, Any]:
 
 def _open(described: dict[str, Any]) -> ctypes.CDLL:
     path = FOLDER / described["file"]
-    # The system opens half a library without an error, and ends the process when a function is called.
+    # The system opens a truncated library without error, but calling it terminates the process.
     if hashlib.sha256(path.read_bytes()).hexdigest() != described["sha256"]:
         raise ValueError(f"{path.name} is not the file that was built")
     return ctypes.CDLL(str(path))
 
 
 class Kernel:
-    """A function in the library, which is opened at the first call."""
+    """Function in the library, which is opened at the first call."""
 
     __name__: str
 
@@ -99,7 +99,7 @@ class Kernel:
         return _caller(name, opened())
 
     def __call__(self, *arguments: Any) -> Any:
-        """Call the function; a `TypeError` for arguments of other types than it was compiled for."""
+        """Call the function; raise `TypeError` for arguments of types for which it was not compiled."""
         return self.native(*arguments)
 
 
@@ -133,7 +133,7 @@ def _caller(name: str, library: Library) -> Callable[..., Any]:
 
 
 def _format(kind: Any) -> str:
-    """Format of an argument for `struct`: eight bytes for each number or address."""
+    """Return the `struct` format of an argument: eight bytes per number or address."""
     if isinstance(kind, str):
         return {"int": "q", "bool": "q", "float": "d"}[kind]
     if "tuple" in kind:
@@ -193,7 +193,7 @@ def _record_taker(kind: dict[str, Any]) -> Taker:
 
 
 def _layout_check(expected: str) -> Callable[[np.dtype[Any]], None]:
-    """Return a check of types, which compares the layout of another type than the last one only."""
+    """Return a check of types that compares layouts only if the type has changed."""
     known: np.dtype[Any] | None = None
 
     def check(kind: np.dtype[Any]) -> None:

@@ -1,4 +1,4 @@
-"""The whole response of one block to one motion: rest, uplift, arc, impact, and so on to the end."""
+"""Complete response of one block to one motion."""
 
 import math
 from typing import Any
@@ -40,19 +40,19 @@ from rocking.kernels.state import (
 )
 from rocking.kernels.uplift import is_hardly_pushed, next_uplift
 
-#: Distance from zero rotation that is within rounding, over the highest rotation so far.
+#: Distance from zero rotation within rounding, divided by the largest rotation so far.
 _TOUCH = 2.0**-46
 
-#: Distance from zero rotation at which the rounding of the input may decide on an impact.
+#: Distance, divided likewise, at which the rounding of the input may decide on an impact.
 _NEAR_TIE = 2.0**-36
 
 
 @kernel
 def march(ground: Ground, block: Record, settings: Record, table: Records, scratch: Record, state: Record) -> int:
-    """Follow one block through one motion, from its state on; returns how it ended (`Ending`), as a plain integer.
+    """Simulate one block under one motion from its state on; return an `Ending` as a plain integer.
 
     RUNNING: the piece ``state.stop_piece`` is reached; a block at rest may be at its next uplift. PAUSED: the budget is
-    spent. FULL: the table has no space left. After each of them, call again with the same state.
+    spent. FULL: the table is full. After each, call again with the same state.
     """
     if block.yielding:
         initialise_tendon(ground, block, settings, state)
@@ -70,7 +70,7 @@ def march(ground: Ground, block: Record, settings: Record, table: Records, scrat
 
 @inlined
 def initialise_tendon(ground: Ground, block: Record, settings: Record, state: Record) -> None:
-    """Give a body's tendon the law of its state; one that starts too far from rest has already yielded."""
+    """Apply the law of the state to a tendon; one that starts too far from rest has already yielded."""
     if time_of(ground, state) == 0.0 and state.side >= 0:
         stretched = elongation_at(block, settings.nonlinear, state.side, state.u) - block.yields
         state.plastic = max(state.plastic, stretched)
@@ -79,7 +79,7 @@ def initialise_tendon(ground: Ground, block: Record, settings: Record, state: Re
 
 @inlined
 def march_step(ground: Ground, block: Record, settings: Record, table: Records, scratch: Record, state: Record) -> Any:
-    """One iteration of a march: to the next uplift of a block at rest, or along an arc to its first event."""
+    """Advance a block to its next uplift or, along an arc, to its first event."""
     write_node(ground, settings, table, state)
     if state.side < 0:
         return rest_until_uplift(ground, block, settings, table, scratch, state)
@@ -97,7 +97,7 @@ def march_step(ground: Ground, block: Record, settings: Record, table: Records, 
         return Ending.OVERTURNED
     if outcome == Outcome.STOPPED:
         state.end = settings.stop
-        state.peak_time = min(state.peak_time, settings.stop)  # a peak there may be a rounding later
+        state.peak_time = min(state.peak_time, settings.stop)  # rounding may put a peak at the stop slightly later
         write_node(ground, settings, table, state)
         return Ending.DONE
     if outcome == Outcome.LEANS:
@@ -110,7 +110,7 @@ def march_step(ground: Ground, block: Record, settings: Record, table: Records, 
 def rest_until_uplift(
     ground: Ground, block: Record, settings: Record, table: Records, scratch: Record, state: Record
 ) -> int:
-    """Stay at rest until the motion passes a threshold; DONE when it never does, and the response is over."""
+    """Keep a block at rest until the motion passes a threshold; DONE if it never does."""
     found = next_uplift(ground, block, scratch, state.side, state.piece, state.offset, settings.stop)
     if found.side == AT_REST or start_of(ground, found.piece) + found.offset >= settings.stop:
         over = start_of(ground, last_piece(ground))
@@ -134,14 +134,14 @@ def rest_until_uplift(
         if block.next_side[0] != 0 and is_hardly_pushed(ground, block, state.piece, state.offset, left, A, d):
             state.rounding_decisions += 1
         elif state.rests > 0 and state.last_uplift_time - state.last_rest_time <= _NEAR_TIE * state.last_uplift_time:
-            state.rounding_decisions += 1  # the last of its impacts may have come too late
+            state.rounding_decisions += 1  # the last of its impacts may have been too late
     write_event(settings, table, state, state.last_uplift_time, EventKind.UPLIFT)
     return Ending.RUNNING
 
 
 @inlined
 def follow_arc(ground: Ground, block: Record, settings: Record, scratch: Record, state: Record) -> int:
-    """One Taylor step along the arc, up to its first event at most; returns what ended it (`Outcome`)."""
+    """Take one Taylor step along the arc, at most to its first event, and return its `Outcome`."""
     left = time_left(ground, settings, state)
     if left <= 0.0:
         return Outcome.STOPPED
@@ -159,7 +159,7 @@ def follow_arc(ground: Ground, block: Record, settings: Record, scratch: Record,
 def long_step(ground: Ground, block: Record, settings: Record, scratch: Record, state: Record, left: float) -> StepEnd:
     """Step along the full series of the arc."""
     order, h, _ = expand(ground, block, settings, scratch, state, left)
-    if state.continuous_uplift:  # rounding may say that the body is pushed back at an uplift
+    if state.continuous_uplift:  # by rounding, an uplift may seem to be pushed back
         scratch.rotation[2] = max(0.0, scratch.rotation[2])
     if block.restrained and settings.no_end_time and state.piece == last_piece(ground):
         leaning = leaning_at(block, settings, state, 2.0 * scratch.rotation[2])
@@ -176,7 +176,7 @@ def long_step(ground: Ground, block: Record, settings: Record, scratch: Record, 
 
 @shared
 def yielding_step(block: Record, settings: Record, scratch: Record, state: Record, order: int, h: float) -> StepEnd:
-    """Step along a series up to its first event, or to where the law of the tendon changes."""
+    """Step along a series to its first event or the next change of the tendon's law."""
     change, law = next_law(block, settings, scratch, state, order, h)
     end = advance(state, scratch, order, min(h, change), block.overturn_angle)
     if end.outcome == Outcome.STEP and end.time >= change:
@@ -188,7 +188,7 @@ def yielding_step(block: Record, settings: Record, scratch: Record, state: Recor
 
 @inlined
 def finish_step(ground: Ground, settings: Record, state: Record, end: StepEnd, left: float) -> int:
-    """Move the state to the end of a step; returns what ended it (`Outcome`)."""
+    """Move the state to the end of a step and return its `Outcome`."""
     if end.peak > state.peak:
         raise_peak(state, end.peak, time_of(ground, state) + end.peak_time)
     until_stop = settings.stop - start_of(ground, state.piece) - state.offset
@@ -196,7 +196,7 @@ def finish_step(ground: Ground, settings: Record, state: Record, end: StepEnd, l
     stopped = end.outcome == Outcome.STEP and end.time >= left and is_last
     start = state.offset
     state.offset += end.time
-    if state.offset == start:  # an ulp at least, so that every march ends
+    if state.offset == start:  # at least one ulp, so that every march ends
         state.offset += ULP * start
     state.u = end.u
     state.v = end.v
@@ -213,13 +213,13 @@ def finish_step(ground: Ground, settings: Record, state: Record, end: StepEnd, l
 
 @inlined
 def pass_impact(ground: Ground, block: Record, settings: Record, table: Records, scratch: Record, state: Record) -> int:
-    """Pass an impact, and come to rest where it is so decided; DONE when the march ends there."""
+    """Process an impact and the decision on rest; DONE if the march ends there."""
     normalize_offset(ground, state)
     if has_vertical(ground) and is_weightless(ground, block, state, state.offset):
         pushed = abs(restoring(ground, block, state.side, state.piece, state.offset))
-        depth = 0.5 * state.v * state.v / pushed  # distance below zero rotation, if there were no ground
+        depth = 0.5 * state.v * state.v / pushed  # distance below zero rotation without ground
         state.rounding_decisions += depth <= _NEAR_TIE * state.peak
-        if depth <= _TOUCH * state.peak:  # no impact: after one the block would be on the other side
+        if depth <= _TOUCH * state.peak:  # no impact, because it would put the block on the other side
             state.v = 0.0
             return Ending.RUNNING
     time = time_of(ground, state)
@@ -239,7 +239,7 @@ def pass_impact(ground: Ground, block: Record, settings: Record, table: Records,
 
 @inlined
 def is_weightless(ground: Ground, block: Record, state: Record, offset: float) -> bool:
-    """Whether a block at zero rotation is pushed off to both sides at an offset of its piece."""
+    """Return whether a block at zero rotation is pushed off to both sides."""
     here = restoring(ground, block, state.side, state.piece, offset)
     other = restoring(ground, block, block.next_side[state.side], state.piece, offset)
     return bool(here < 0.0 and other < 0.0)
@@ -247,9 +247,9 @@ def is_weightless(ground: Ground, block: Record, state: Record, offset: float) -
 
 @shared
 def nearly_touches(ground: Ground, block: Record, settings: Record, scratch: Record, state: Record, h: float) -> bool:
-    """Whether the arc from a state has within h a minimum so near zero that rounding may hide an impact.
+    """Return whether the arc from a state has a minimum within h so near zero that rounding may hide an impact.
 
-    With a positive weight the motion is the same with the impact and without, and the number of impacts is not.
+    With positive weight, the impact would change the number of impacts, but not the motion.
     """
     order, _, _ = expand(ground, block, settings, scratch, state, h)
     c, d = scratch.rotation, scratch.other
@@ -263,7 +263,7 @@ def nearly_touches(ground: Ground, block: Record, settings: Record, scratch: Rec
 
 @inlined
 def come_to_rest(ground: Ground, block: Record, settings: Record, table: Records, state: Record, rest: Rest) -> int:
-    """Close a sequence of impacts; DONE when the march stops before the block is at rest."""
+    """Finish a sequence of impacts; DONE if the march stops before the block is at rest."""
     time = time_of(ground, state)
     state.rests_by_rounding += rest.stalled
     if state.proven_impacts == 0 or not rest.upper >= 0.0:
@@ -289,7 +289,7 @@ def come_to_rest(ground: Ground, block: Record, settings: Record, table: Records
 
 @inlined
 def time_left(ground: Ground, settings: Record, state: Record) -> float:
-    """Time to the end of the piece, or of the response where that comes first."""
+    """Return the time to the end of the piece or of the response, whichever is first."""
     until_stop = settings.stop - start_of(ground, state.piece) - state.offset
     return min(length_of(ground, state.piece) - state.offset, until_stop)
 

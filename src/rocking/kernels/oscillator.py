@@ -1,4 +1,4 @@
-"""Largest displacement of a linear oscillator under a piecewise polynomial base acceleration."""
+"""Peak displacement of a linear oscillator under a piecewise polynomial base acceleration."""
 
 import math
 
@@ -7,11 +7,11 @@ from rocking.kernels.compiled import inlined, kernel, shared
 from rocking.kernels.events import deflated
 from rocking.kernels.ground import move
 
-#: Length of the work array beyond the columns of the motion: 0.25**16 / 16! = 1e-23.
+#: Length of the work array in excess of the motion's columns: 0.25**16 / 16! = 1e-23.
 TERMS = 18
 _RADIANS_PER_STEP = 0.25
 
-#: Parts of a step at most, and by how much a peak may be missed: some units in its last place.
+#: Largest number of parts of a step, and relative error of a peak: some units in its last place.
 _FINEST = 2**30
 _ROUNDED_UP = 1.0 + 2.0**-50
 
@@ -27,9 +27,9 @@ def peak_displacements(
 ) -> None:
     """Write the largest |u| (m) of u'' + 2 z w u' + w^2 u = -a(t) from rest into ``peaks``, for each w (rad/s).
 
-    On each step of at most a quarter radian u is the Taylor series of the exact solution; past the end of the motion it
-    is followed to the first extremum there. The frequencies must be positive and 0 <= z < 1; ``work`` is scratch space
-    of twice the motion's columns plus TERMS numbers. All numbers must be finite.
+    In each step of at most a quarter radian, u is the Taylor series of the exact solution. After the motion, u is
+    followed to its first extremum. The frequencies must be positive, 0 <= z < 1, and all numbers finite. ``work`` is
+    scratch space of twice the motion's columns plus TERMS.
     """
     columns = coefficients.shape[1]
     for i in range(len(frequencies)):
@@ -45,7 +45,7 @@ def _peak(
     force: Floats,
     series: Floats,
 ) -> float:
-    """Largest displacement of one oscillator; ``force`` and ``series`` are scratch space."""
+    """Compute the peak displacement of one oscillator; ``force`` and ``series`` are scratch space."""
     series[:] = 0.0
     peak = 0.0
     for k in range(len(coefficients)):
@@ -67,7 +67,7 @@ def _peak(
 def _advance(series: Floats, force: Floats, h: float, frequency: float, damping: float, peak: float) -> float:
     """Expand the solution about the start of a step, and move ``series[:2]`` to its end.
 
-    Returns the largest displacement of the step, or ``peak`` where that is larger.
+    Returns the largest displacement of the step, or ``peak`` if larger.
     """
     for k in range(len(series) - 2):
         acceleration = force[k] if k < len(force) else 0.0
@@ -80,10 +80,10 @@ def _advance(series: Floats, force: Floats, h: float, frequency: float, damping:
 
 @shared
 def _larger(series: Floats, h: float, peak: float) -> float:
-    """Largest size of a series from 0 to h, or ``peak`` where that is larger, but for rounding.
+    """Return the largest absolute value of a series from 0 to h, or ``peak`` if larger, except for rounding.
 
-    Between two points a distance d apart it is larger than at both by d^2/8 of its second derivative at most. Where
-    that could be the largest, the step is halved.
+    Between two points a distance d apart, the series exceeds both values by at most d^2/8 times its second derivative.
+    The step is halved if the largest value could be there.
     """
     bend = 0.0
     for k in range(len(series) - 1, 1, -1):
@@ -105,7 +105,7 @@ def _larger(series: Floats, h: float, peak: float) -> float:
 
 @inlined
 def _slope(series: Floats, x: float) -> float:
-    """Slope of a series at x."""
+    """Compute the slope of a series at x."""
     result = 0.0
     for k in range(len(series) - 1, 0, -1):
         result = result * x + k * series[k]
@@ -114,5 +114,5 @@ def _slope(series: Floats, x: float) -> float:
 
 @shared
 def _move(force: Floats, shift: float) -> None:
-    """Expand a polynomial about ``shift``, in place; inlined it would slow the loop over the steps down."""
+    """Expand a polynomial about ``shift`` in place; inlined, it would slow the loop over the steps."""
     move(force, len(force) - 1, shift)

@@ -1,8 +1,8 @@
-"""Bodies under a motion that repeats for ever: their states after periods and after impacts, and how these change.
+"""Bodies under a periodic motion: states after periods and impacts, and their derivatives.
 
-The ground holds the motion twice, so that whatever is decided within one period is known for one more, and two pieces
-after that which lift any body off either side: nothing is proven across them. After each period a state is put back
-by as many pieces. What becomes of a state that is not a number is UNFINISHED.
+The ground contains the motion twice, so that a decision within one period is valid for one more, and two further pieces
+that lift any body off either side: no proof extends across them. After each period, a state is moved back by as many
+pieces. A state with a NaN is UNFINISHED.
 """
 
 import math
@@ -22,28 +22,28 @@ from rocking.kernels.state import AT_REST, Ending, Record, Records
 from rocking.kernels.trace import Trail, expand_free
 from rocking.kernels.uplift import next_uplift
 
-#: Turns of a march that one period, or one impact, may take, and the coordinate and the speed from which on none is
-#: taken: a state beyond all sense, or that is no number, would take all of them.
+#: Largest number of march iterations for one period or impact, and the coordinate and speed from which none is allowed:
+#: absurd states and NaN would require all of them.
 TURNS = 100_000
 BEYOND = 1e100
 
 
 class Fate(IntEnum):
-    """What a state is after some periods, or after an impact."""
+    """Outcome of a state after some periods or after an impact."""
 
     MOVES = 0
     RESTS = 1
     OVERTURNED = 2
-    #: It took too many steps: nothing is known.
+    #: Too many steps: the outcome is unknown.
     UNFINISHED = 3
-    #: At rest, and the motion never lifts it.
+    #: The body is at rest, and the motion never lifts it.
     RESTS_FOR_EVER = 4
 
 
 class Setting(NamedTuple):
-    """A body under a motion that repeats, and what the march of its states needs.
+    """Body under a periodic motion, and the data that the march of its states requires.
 
-    ``table`` has no rows. ``steps[side, piece]`` is a row of `step_rows`; without rows every step is marched.
+    ``table`` has no rows. ``steps[side, piece]`` is a row of `step_rows`; without rows, every step is marched.
     """
 
     ground: Ground
@@ -53,7 +53,7 @@ class Setting(NamedTuple):
     steps: Floats
 
 
-#: Columns of a trap: its side (negative at rest), its middle (u, v), and a, b, c of a du^2 + 2 b du dv + c dv^2 <= 1.
+#: Columns of a trap: side (negative at rest), middle (u, v), and a, b, c of a du^2 + 2 b du dv + c dv^2 <= 1.
 TRAP = 6
 
 
@@ -68,11 +68,11 @@ def iterate(
     found: Integers,
     taken: Integers,
 ) -> None:
-    """Take each state through at most so many periods, until it is in one of the traps, overturns or rests for ever.
+    """Take each state through at most ``periods`` periods, until it enters a trap, overturns or rests forever.
 
-    ``ending`` of each is then its `Fate`, ``found[k]`` the row of its trap in ``traps``, of shape (n, `TRAP`), or -1,
-    and ``taken[k]`` counts the periods. Row n of ``orbit[k]``, where it has rows, is (u, v, side) after n + 1 periods,
-    and stays as it is after the last known one.
+    ``ending`` is then its `Fate`, ``found[k]`` the row of its trap in ``traps``, shape (n, `TRAP`), or -1, and
+    ``taken[k]`` the number of periods. Row n of ``orbit[k]``, if any, is (u, v, side) after n + 1 periods, unchanged
+    after the last known state.
     """
     for k in range(states.shape[0]):
         state = states[k]
@@ -95,11 +95,11 @@ def iterate(
 
 @inlined
 def trap_of(traps: Floats, state: Record, rests: bool, facing: bool) -> int:
-    """Row of the first trap that a state is in, or -1."""
+    """Return the row of the first trap that contains a state, or -1."""
     for j in range(traps.shape[0]):
         row = traps[j]
         if row[0] < 0.0:
-            # At rest, on the same stop; the march may have taken the state to its next uplift, and given it a side.
+            # At rest, on the same stop. The march may have moved the state to its next uplift and assigned a side.
             if rests and (not facing or row[0] == min(state.side, -1 - state.side)):
                 return j
             continue
@@ -111,13 +111,13 @@ def trap_of(traps: Floats, state: Record, rests: bool, facing: bool) -> int:
 
 @inlined
 def write_state(row: Floats, state: Record) -> None:
-    """Write a state: the coordinate in the frame of its side, the velocity, the side."""
+    """Write a state: coordinate in the frame of its side, velocity, side."""
     row[0], row[1], row[2] = state.u, state.v, state.side
 
 
 @shared
 def pass_period(setting: Setting, scratch: Record, state: Record) -> int:
-    """Take a state through one period; returns its `Fate`."""
+    """Take a state through one period and return its `Fate`."""
     ground, block, settings, table, steps = setting
     pieces = pieces_of(ground)
     state.budget = turns_from(state)
@@ -134,27 +134,27 @@ def pass_period(setting: Setting, scratch: Record, state: Record) -> int:
 
 @inlined
 def turns_from(state: Record) -> int:
-    """Return the number of turns that a march from a state may take."""
+    """Return the number of march iterations allowed from a state."""
     return TURNS if state.u < BEYOND and abs(state.v) < BEYOND else 0
 
 
-# ---- Pieces of a linear body's motion that hold no event, in closed form ----
+# ---- Pieces of a linear body's motion without events, in closed form ----
 
-#: What a row of steps holds: the derivatives of (u, v) after a piece by those before it, row by row; (u, v) after it
-#: from (0, 0); the largest |u''| by the motion and the weight; sqrt(|lam|), and that plus c; the piece's length.
+#: Columns of a row of steps: derivatives of (u, v) after a piece by those before it, row by row; (u, v) after the piece
+#: from (0, 0); largest |u''| by motion and weight; sqrt(|lam|), and sqrt(|lam|) + c; length of the piece.
 _FROM, _ADDED, _FORCE, _ROOT, _RATE, _LENGTH, _COLUMNS = 0, 4, 6, 7, 8, 9, 10
 
-#: Largest (sqrt(|lam|) + c) L of a piece of length L for which there is a row; and e to that, rounded up.
+#: Largest (sqrt(|lam|) + c) L of a piece of length L with a row, and its exponential, rounded up.
 _LONGEST = 0.75
 _GROWTH = 2.118
 
 
 @inlined
 def steps_over(row: Floats, fallen: float, state: Record) -> bool:
-    """Step over a whole piece in closed form, if bounds show that it holds no event; returns whether it did.
+    """Step over a whole piece in closed form if bounds exclude an event; return whether the step was taken.
 
     N = sqrt(|lam|) |u| + |v| grows at a rate of at most (sqrt(|lam|) + c) N + F under a force F, and |u''| is at most
-    that rate. So the rotation is within L^2/8 of it of the line between both ends.
+    that rate. Therefore the rotation is within L^2/8 times that rate of the line between both ends.
     """
     u, v, h = state.u, state.v, row[_LENGTH]
     size = _GROWTH * (row[_ROOT] * u + abs(v) + h * row[_FORCE])
@@ -169,9 +169,9 @@ def steps_over(row: Floats, fallen: float, state: Record) -> bool:
 
 
 def step_rows(ground: Ground, block: Record) -> Floats:
-    """Rows for `steps_over`, one for each side and piece of the first period, shape (2, pieces, columns).
+    """Compute rows for `steps_over` for each side and piece of the first period, shape (2, pieces, columns).
 
-    Without rows where a piece is too long for the bounds, or the body has no such side.
+    There are none if a piece is too long for the bounds or the body has no such side.
     """
     pieces = (len(ground.pieces) - 3) // 2
     rows = np.zeros((2, pieces, _COLUMNS))
@@ -204,25 +204,24 @@ def step_rows(ground: Ground, block: Record) -> Floats:
     return rows
 
 
-#: Terms of the series that rows of steps are summed from: the motion's own, and as many as converge for pieces of
-#: that length.
+#: Number of terms of the series for rows of steps, sufficient for the motion and for pieces of that length.
 _TERMS = 40
 
 
 @inlined
 def pieces_of(ground: Ground) -> int:
-    """Pieces of one period."""
+    """Count the pieces of one period."""
     return (ground.pieces.shape[0] - 3) // 2
 
 
 @inlined
 def put_back(ground: Ground, block: Record, state: Record, ending: int) -> int:
-    """Put a state that has passed a period back by one; returns its `Fate`."""
+    """Move a state back by the period that it has passed, and return its `Fate`."""
     pieces = pieces_of(ground)
     if ending == Ending.OVERTURNED:
         return Fate.OVERTURNED
     if ending == Ending.DONE or (ending == Ending.RUNNING and state.piece >= 2 * pieces):
-        # Not even the second period lifts it; the march may have followed a lift by the pieces behind that.
+        # Even the second period does not lift the body; the march may have followed an uplift by the additional pieces.
         if state.u == 0.0 and state.v == 0.0:
             state.side = AT_REST if state.side < 0 or not block.two_stops else -1 - state.side
             return Fate.RESTS_FOR_EVER
@@ -241,17 +240,16 @@ def put_back(ground: Ground, block: Record, state: Record, ending: int) -> int:
     return Fate.RESTS if state.side < 0 or (state.u == 0.0 and state.v == 0.0) else Fate.MOVES
 
 
-# ---- How a state after a period changes with the state before it ----
+# ---- Derivatives of a state after a period by the state before it ----
 
 
 @kernel
 def differentiate(trail: Trail, scratch: Record, work: Record, table: Records, states: Records, out: Floats) -> None:
     """Write the derivative of each state after one period by the state before it, in the frames of their sides.
 
-    It is exactly zero where the body has come to rest on the way, for any time, and where it is held at rest at the
-    start. From a stop that does not hold it, it is that of the states off the stop. The settings of the trail have the
-    march write its table, whose rows are used again and again. The states are those after the period; ``ending`` is
-    their `Fate`.
+    It is exactly zero if the body has come to rest for any time, or is held at rest at the start. At a stop that does
+    not hold the body, it is the derivative for states off the stop. The trail's settings make the march write its
+    table, whose rows are reused. ``states`` are advanced by the period, with ``ending`` their `Fate`.
     """
     for k in range(states.shape[0]):
         differentiate_period(trail, scratch, work, table, states[k], out[k])
@@ -263,15 +261,15 @@ def differentiate_period(
 ) -> tuple[int, float]:
     """Take one state through a period and write its derivative, as `differentiate`.
 
-    Returns the number of impacts, and the logarithm of the determinant's size where the derivative is not zero. That is
-    a sum over steps: from the derivative itself it could not be had, whose columns become parallel to rounding.
+    Returns the number of impacts and, for a nonzero derivative, the logarithm of its |determinant|: a sum over steps,
+    because the columns of the derivative become parallel to rounding.
     """
     ground, block, settings, _ = trail
     one = 1.0
     if state.side < 0:
         lifted = next_uplift(ground, block, scratch, state.side, state.piece, state.offset, settings.stop)
         held = lifted.side < 0 or lifted.piece > state.piece or lifted.offset > state.offset
-        # A body at rest has forgotten what was before; the frame of one that leaves at once is that of no side.
+        # The state at rest is independent of the past; the frame of a body that leaves immediately belongs to no side.
         one = 0.0 if held else sign_of(lifted.side)
     M[0, 0], M[0, 1], M[1, 0], M[1, 1] = one, 0.0, 0.0, one
     state.stop_piece = pieces_of(ground)
@@ -298,13 +296,13 @@ def differentiate_period(
 def stretch(
     trail: Trail, scratch: Record, work: Record, table: Records, state: Record, frame: Floats, logs: Floats
 ) -> int:
-    """Take a state through as many periods as ``logs`` has rows, and write how each stretches a frame of directions.
+    """Take a state through one period per row of ``logs``, and write the stretches of a frame of directions.
 
-    A row is the logarithm of the stretch along a direction that follows the derivatives, and so becomes the one that
-    grows fastest, and of that across it: the diagonal of R where the derivative times Q is Q' R. Both are minus
-    infinity in a period with a rest, after which any direction is as good. From the period on in which the body
-    overturns or rests for ever no row is written; ``ending`` is the `Fate`. Row 2 of ``frame``, of shape (3, 2), is the
-    direction; the others are space. Returns the number of impacts.
+    A row contains the logarithms of the stretch along a direction that follows the derivatives, and so becomes the one
+    that grows fastest, and across it: the diagonal of R where the derivative times Q is Q' R. Both are -inf in a period
+    with a rest, after which the direction is arbitrary. Rows end before the period of overturning or permanent rest;
+    ``ending`` is the `Fate`. Row 2 of ``frame``, shape (3, 2), is the direction, the others are scratch space. Returns
+    the number of impacts.
     """
     M = frame[:2]
     impacts = 0
@@ -327,12 +325,12 @@ def stretch(
 
 @shared
 def carry_on(trail: Trail, scratch: Record, work: Record, node: Record, following: Record, M: Floats) -> float:
-    """Multiply a derivative by that along the step from a node to what follows it, an impact at its end included.
+    """Multiply a derivative by the derivative of the step from a node to ``following``, with any impact at its end.
 
-    Returns the logarithm of the size of that step's determinant.
+    Returns the logarithm of the |determinant| of the step.
     """
     ground, block, settings, _ = trail
-    if node.side < 0:  # what coming to rest has made of it
+    if node.side < 0:  # the derivative since coming to rest
         return 0.0
     if following.side < 0:
         return come_to_rest(ground, block, node, following, M)
@@ -357,10 +355,10 @@ def carry_on(trail: Trail, scratch: Record, work: Record, node: Record, followin
 
 @inlined
 def come_to_rest(ground: Ground, block: Record, node: Record, following: Record, M: Floats) -> float:
-    """Multiply a derivative by that from a node to a rest: zero, but where the ground ends the rest at once.
+    """Multiply a derivative by the derivative until a rest: zero, unless the ground ends the rest immediately.
 
-    The impact has then left no speed, or what it left was taken away. When the body leaves depends on when it came.
-    Returns the logarithm of the size of the determinant.
+    No speed is left then, and the time of leaving depends on the time of impact. Returns the logarithm of the
+    |determinant|.
     """
     side = node.side
     after = restoring(ground, block, side, following.piece, following.offset)
@@ -378,14 +376,14 @@ def come_to_rest(ground: Ground, block: Record, node: Record, following: Record,
 
 @inlined
 def apply_saltation(ground: Ground, block: Record, left: int, following: Record, v: float, M: Floats) -> float:
-    """Multiply a derivative by that through an impact, before which the velocity was v.
+    """Multiply a derivative by the saltation of an impact, before which the velocity was v.
 
-    Returns the logarithm of the size of its determinant.
+    Returns the logarithm of its |determinant|.
     """
-    across = block.two_stops and following.side != left  # at the other stop: seen from there, all signs change
+    across = block.two_stops and following.side != left  # at the other stop, in whose frame all signs change
     hit, sign = (following.side, -1.0) if across else (left, 1.0)
     speed = -sign * v
-    e = factor(block, hit, speed, 0)  # which is not drawn
+    e = factor(block, hit, speed, 0)  # not drawn
     rate = e * relative_slope(block, hit, speed, e)
     before = restoring(ground, block, hit, following.piece, following.offset) - block.damping[hit] * speed
     after = restoring(ground, block, following.side, following.piece, following.offset) + block.damping[

@@ -1,4 +1,4 @@
-"""Populations of blocks: the share of each that overturns, from blocks that were simulated once; and their density."""
+"""Populations of blocks: fraction that overturns, computed from blocks simulated once, and density."""
 
 import math
 from typing import Any, Final
@@ -11,7 +11,7 @@ from rocking.kernels.compiled import inlined, kernel
 Singles = NDArray[np.float32]
 Reals = NDArray[Any]
 
-#: Exponents by so much less than the largest one add less than rounding: in single precision, and in double.
+#: Exponents smaller than the largest one by at least this contribute less than rounding (single, double precision).
 _NEGLIGIBLE_SINGLE: Final = np.float32(16.0)
 _NEGLIGIBLE: Final = 40.0
 
@@ -25,11 +25,11 @@ def shares(
     found: Singles,
     effective: NDArray[np.float64],
 ) -> None:
-    """Write the share of each population that overturns into ``found``, shape (populations, motions).
+    """Write the fraction of each population that overturns into ``found``, shape (populations, motions).
 
-    Block j has the weight exp(factors[c] @ powers[:, j]) in population c; ``overturned``, shape (blocks, motions), is 1
-    where it overturns, else 0. ``effective`` becomes the effective number of blocks of each population; ``exponents``,
-    of a number per block, is scratch space. All numbers must be finite.
+    Block j has the weight exp(factors[c] @ powers[:, j]) in population c. ``overturned``, shape (blocks, motions), is 1
+    if it overturns, else 0. The effective number of blocks of each population is written into ``effective``;
+    ``exponents``, with a number per block, is scratch space. All numbers must be finite.
     """
     for c in range(factors.shape[0]):
         _exponents(factors[c], powers, exponents)
@@ -57,7 +57,7 @@ def log_density(
 ) -> None:
     """Write the logarithm of the sum over j of exp(factors[c] @ powers[:, j]) into ``found``, for each c.
 
-    ``exponents``, of a number per j, is scratch space. All numbers must be finite.
+    ``exponents``, with a number per j, is scratch space. All numbers must be finite.
     """
     for c in range(factors.shape[0]):
         _exponents(factors[c], powers, exponents)
@@ -80,7 +80,7 @@ def _exponents(factors: Reals, powers: Reals, exponents: Reals) -> None:
 
 @inlined
 def _largest(values: Reals) -> Any:
-    """Largest of some numbers."""
+    """Return the largest of some numbers."""
     largest = values[0]
     for i in range(1, values.shape[0]):
         if values[i] > largest:

@@ -1,17 +1,17 @@
-"""The remaining time of complete chattering, estimated to fourth order in the speed.
+"""Remaining time of complete chattering, estimated to fourth order in the speed.
 
-Within one smooth piece of the motion side j's restoring acceleration at a rotation u is
+Within one smooth piece of the motion, the restoring acceleration of side j at a rotation u is
 
     g + rate t + curvature t^2 - stiffness u,    to within an error,
 
-with a stiffness of any sign: p^2 for a block, 0 for a ball on a moving table, negative for an oscillator with a stop.
-A body that bounces on one side only has that side for both. The derivation is in the documentation ("Theory").
+with a stiffness of p^2 for a block, 0 for a ball on a moving table, and a negative one for an oscillator with a stop. A
+body that bounces on one side has two equal sides. See "Theory" in the documentation.
 
-Counted back from a candidate for the time of rest, with s the remaining time at an impact that enters side i, half the
-arc's duration is sought as a polynomial Y_i(s), so that s - 2 Y_i(s) remains at the next impact. The speeds at both
-ends of an arc between two given impacts are polynomials of the two times, so Y_i follows by comparison of coefficients.
-The terms beyond those compared are a polynomial, too, and bound the error (`remainder`). Below, z is the remaining time
-in units of that at the first impact. A NaN among the arguments makes the results NaN, and a NaN bracket proves nothing.
+Let s be the remaining time at an impact that enters side i, before a candidate for the time of rest. Half the duration
+of the arc is a polynomial Y_i(s), so that s - 2 Y_i(s) remains at the next impact. The speeds at both ends of an arc
+are polynomials of the times of both impacts. Comparison of coefficients determines Y_i, and the remaining terms, also a
+polynomial, bound the error (`remainder`). Below, z is the remaining time divided by its value at the first impact. NaN
+arguments make the results NaN, and a NaN bracket proves nothing.
 """
 
 import math
@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 from rocking.kernels.compiled import inlined, shared
 
-#: Newton's steps to the time of rest, and the relative error of the speed that ends them.
+#: Number of Newton steps to the time of rest, and the relative error of the speed that ends them.
 _CANDIDATES = 5
 _AGREEMENT = 2.0**-40
 
@@ -44,7 +44,7 @@ class Restoring(NamedTuple):
 
 
 class Terms(NamedTuple):
-    """One side at the candidate: g, and rate, curvature and stiffness with the remaining time for the unit of time."""
+    """One side at the candidate: g, rate, curvature and stiffness, with the remaining time as the unit of time."""
 
     g: float
     rate: float
@@ -53,7 +53,7 @@ class Terms(NamedTuple):
 
 
 class Curve(NamedTuple):
-    """Half the arc's duration, and the speed at its start over the remaining time, as series in the remaining time."""
+    """Half the duration of an arc, and its initial speed divided by the remaining time s, as series in s."""
 
     half: Series
     speed: Series
@@ -61,11 +61,11 @@ class Curve(NamedTuple):
 
 @inlined
 def remaining_time(v: float, i: Restoring, j: Restoring) -> float:
-    """Time to rest from an impact that enters side i with speed v, to second order in v.
+    """Compute the time to rest from an impact that enters side i with speed v, to second order in v.
 
-    The first order is a geometric sum (the paper's Eq. 75); the second lets the accelerations change linearly in time:
-    T_i(v, t) = A_i v + B_i v^2 solved from T_i = (arc) + T_j(next impact). Of the third order only what the stiffness
-    adds to every arc is kept, the whole of it under a constant acceleration.
+    The first order is a geometric sum (the paper's Eq. 75). For the second, with accelerations linear in time,
+    T_i(v, t) = A_i v + B_i v^2 solves T_i = (arc) + T_j(next impact). The only third-order term is the effect of the
+    stiffness on every arc, complete under constant acceleration.
     """
     e_i, e_j = i.restitution, j.restitution
     pair = e_i * e_j
@@ -85,7 +85,7 @@ def remaining_time(v: float, i: Restoring, j: Restoring) -> float:
 
 @inlined
 def terms_at(side: Restoring, s: float) -> Terms:
-    """One side about a candidate s later, with s for the unit of time; g is NaN where it would not be positive."""
+    """Return one side about a candidate s later, with s as the unit of time; g is NaN if not positive."""
     g = side.g + s * (side.rate + s * side.curvature)
     rate = s * (side.rate + 2.0 * s * side.curvature)
     return Terms(g if g > 0.0 else math.nan, rate, side.curvature * s * s, side.stiffness * s * s)
@@ -93,11 +93,12 @@ def terms_at(side: Restoring, s: float) -> Terms:
 
 @inlined
 def mean_restoring(a: Terms, half: Series, sign: float) -> Three:
-    """Coefficients 1, 2, 3 of B: the speeds at an arc's start (sign -1) and end (+1) are Y B.
+    """Compute coefficients 1, 2, 3 of B, where Y B is the speed at the start (sign -1) or end (+1) of an arc.
 
-    With Y half the duration and C = z - Y the remaining time at its middle, where the acceleration is G = g - rate C
-    + curvature C^2, B = G (1 - k Y^2/3) + sign ((rate - 2 curvature C) Y/3 - rate k Y^3/45) + curvature Y^2/3 and k
-    the stiffness.
+    Y is half the duration, C = z - Y the remaining time and G = g - rate C + curvature C^2 the acceleration at its
+    middle, and k the stiffness:
+
+        B = G (1 - k Y^2/3) + sign ((rate - 2 curvature C) Y/3 - rate k Y^3/45) + curvature Y^2/3.
     """
     y, y2, y3, _ = half
     c = 1.0 - y
@@ -125,7 +126,7 @@ def mean_restoring(a: Terms, half: Series, sign: float) -> Three:
 
 @inlined
 def known_part(a: Terms, half: Series, sign: float) -> Three:
-    """Coefficients 2, 3, 4 of Y B, each without the part g Y, which holds the coefficient that is sought."""
+    """Compute coefficients 2, 3, 4 of Y B without g Y, which contains the unknown coefficient."""
     b = mean_restoring(a, half, sign)
     y, y2, y3, _ = half
     return y * b[0], y2 * b[0] + y * b[1], y3 * b[0] + y2 * b[1] + y * b[2]
@@ -133,17 +134,17 @@ def known_part(a: Terms, half: Series, sign: float) -> Three:
 
 @inlined
 def solved(first: float, second: float, p: float, q: float) -> Pair:
-    """Solution of x = first + p y, y = second + q x."""
+    """Solve x = first + p y, y = second + q x."""
     inverse = 1.0 / (1.0 - p * q)
     return (first + p * second) * inverse, (second + q * first) * inverse
 
 
 @inlined
 def speed_difference(m: Series, ends: Three, starts: Three, speed: Series, e: float) -> Three:
-    """Orders 2, 3, 4 of the difference of the speeds at an impact, with zero half durations of that order.
+    """Compute orders 2, 3, 4 of the difference of the speeds at an impact, with zero half durations of that order.
 
-    ``m``: the remaining time at the next impact; ``ends``, ``starts``: `known_part` of this arc's end and the next
-    one's start; ``speed``: the next arc's speed at its start.
+    ``m``: remaining time at the next impact; ``ends``, ``starts``: `known_part` of this arc's end and the next one's
+    start; ``speed``: initial speed of the next arc.
     """
     square = m[0] * m[0]
     second = square * starts[0] - e * ends[0]
@@ -159,13 +160,13 @@ def speed_difference(m: Series, ends: Three, starts: Three, speed: Series, e: fl
 
 @inlined
 def remaining_after(half: Series) -> Series:
-    """Remaining time at the next impact, z - 2 Y."""
+    """Compute the remaining time at the next impact, z - 2 Y."""
     return 1.0 - 2.0 * half[0], -2.0 * half[1], -2.0 * half[2], -2.0 * half[3]
 
 
 @inlined
 def rest_curves(a: Terms, b: Terms, e_a: float, e_b: float) -> tuple[Curve, Curve]:
-    """Half durations and speeds of the arcs before rest at the candidate, to fourth order in the remaining time."""
+    """Compute half durations and speeds of the arcs before rest at the candidate, to order 4 in the remaining time."""
     half = 0.5 * (1.0 - e_a * e_b)
     inverse_a, inverse_b = 1.0 / a.g, 1.0 / b.g
     speed_a, speed_b = half / (inverse_a + e_a * inverse_b), half / (inverse_b + e_b * inverse_a)
@@ -178,7 +179,7 @@ def rest_curves(a: Terms, b: Terms, e_a: float, e_b: float) -> tuple[Curve, Curv
 
 @inlined
 def with_order(a: Terms, b: Terms, e_a: float, e_b: float, A: Curve, B: Curve, order: int) -> tuple[Curve, Curve]:
-    """Both curves with the coefficients of one order more: 2, 3 or 4."""
+    """Return both curves with the coefficients of one more order: 2, 3 or 4."""
     starts_a, starts_b = known_part(a, A.half, -1.0), known_part(b, B.half, -1.0)
     ends_a, ends_b = known_part(a, A.half, 1.0), known_part(b, B.half, 1.0)
     m_a, m_b = remaining_after(A.half), remaining_after(B.half)
@@ -194,7 +195,7 @@ def with_order(a: Terms, b: Terms, e_a: float, e_b: float, A: Curve, B: Curve, o
 
 @inlined
 def power(x: float, order: int) -> float:
-    """X to the power 2, 3 or 4."""
+    """Return x to the power of 2, 3 or 4."""
     square = x * x
     if order == 2:
         return square
@@ -214,7 +215,7 @@ def with_coefficient(A: Curve, y: float, speed: float, order: int) -> Curve:
 
 @inlined
 def first_speed(a: Terms, half: Series) -> float:
-    """Speed at the start of the first arc (z = 1), over the remaining time."""
+    """Compute the initial speed of the first arc (z = 1) divided by the remaining time."""
     y = half[0] + half[1] + half[2] + half[3]
     c = 1.0 - y
     g = a.g - c * (a.rate - c * a.curvature)
@@ -225,7 +226,7 @@ def first_speed(a: Terms, half: Series) -> float:
 
 @inlined
 def first_candidate(v: float, i: Restoring, j: Restoring) -> float:
-    """Time to rest to second order in v, as the root of a quadratic: exact where restitution is nearly one."""
+    """Compute the time to rest to second order in v as the root of a quadratic: exact for a restitution near one."""
     constant = 2.0 * v * (1.0 / i.g + i.restitution / j.g) / (1.0 - i.restitution * j.restitution)
     correction = remaining_time(v, i, j) - constant
     return 2.0 * constant / (1.0 + math.sqrt(max(0.0, 1.0 - 4.0 * correction / constant)))
@@ -233,9 +234,9 @@ def first_candidate(v: float, i: Restoring, j: Restoring) -> float:
 
 @inlined
 def rest_candidate(v: float, i: Restoring, j: Restoring, s: float) -> tuple[float, Terms, Terms, Curve, Curve, float]:
-    """Time to rest from an impact that enters side i with speed v, to fourth order, by Newton's steps from s.
+    """Compute the time to rest from an impact that enters side i with speed v, to fourth order, by Newton steps from s.
 
-    Returns it, both sides at that time, their curves, and the residual of speed(time) = v, over the time.
+    Returns the time, both sides at that time, their curves, and the residual of speed(time) = v, divided by the time.
     """
     e_i, e_j = i.restitution, j.restitution
     a, b = terms_at(i, s), terms_at(j, s)
@@ -244,7 +245,7 @@ def rest_candidate(v: float, i: Restoring, j: Restoring, s: float) -> tuple[floa
     for _ in range(_CANDIDATES):
         if not abs(residual) > _AGREEMENT * A.speed[0]:
             break
-        # The slope includes how the first coefficient changes with the candidate; what else changes is smaller.
+        # The slope includes the change of the first coefficient with the candidate; other changes are smaller.
         first = A.speed[0]
         change = a.rate / (a.g * a.g) + e_i * b.rate / (b.g * b.g)
         slope = first + 2.0 * A.speed[1] + 3.0 * A.speed[2] + 2.0 * first * first * change / (1.0 - e_i * e_j)
@@ -260,7 +261,7 @@ def rest_candidate(v: float, i: Restoring, j: Restoring, s: float) -> tuple[floa
 #: Relative allowance for rounding.
 _ROUNDING = 2.0**-48
 
-#: Relative distance from the candidate within which the proof holds, and the factor by which it widens the bounds.
+#: Largest relative distance from the candidate for the proof, and its factor on the bounds.
 _NEAR = 2.0**-12
 _MARGIN = 1.0 + 2.0**-7
 
@@ -270,13 +271,13 @@ _LARGEST_STIFFNESS = 1.0 / 16.0
 
 @inlined
 def total(series: Series) -> float:
-    """Sum of the absolute values of coefficients."""
+    """Sum the absolute values of coefficients."""
     return abs(series[0]) + abs(series[1]) + abs(series[2]) + abs(series[3])
 
 
 @inlined
 def mean_restoring_bound(a: Terms, half: Series) -> Pair:
-    """Bounds on the terms of B (`mean_restoring`) beyond order 3, over z^4, and on all of it."""
+    """Bound the terms of B (`mean_restoring`) beyond order 3, divided by z^4, and all of B."""
     y, y2 = half[0], abs(half[1])
     c = abs(1.0 - y)
     Y = total(half)
@@ -296,7 +297,7 @@ def mean_restoring_bound(a: Terms, half: Series) -> Pair:
 
 @inlined
 def speed_bound(half: Series, b: Three, beyond: float) -> float:
-    """Bound on the terms of Y B beyond order 4, over z^5."""
+    """Bound the terms of Y B beyond order 4, divided by z^5."""
     y2, y3, y4 = abs(half[1]), abs(half[2]), abs(half[3])
     b1, b2, b3 = abs(b[0]), abs(b[1]), abs(b[2])
     return y2 * b3 + y3 * (b2 + b3) + y4 * (b1 + b2 + b3) + total(half) * beyond
@@ -304,9 +305,9 @@ def speed_bound(half: Series, b: Three, beyond: float) -> float:
 
 @inlined
 def mismatch(m: Series, end: float, start: float, speed: Series, e: float) -> float:
-    """Bound on the difference of the speeds at an impact, over z^5; its orders 1 to 4 are zero.
+    """Bound the difference of the speeds at an impact, divided by z^5; its orders 1 to 4 are zero.
 
-    ``end``, ``start``: `speed_bound` of this arc's end and of the next one's start.
+    ``end``, ``start``: `speed_bound` of this arc's end and the next one's start.
     """
     M = total(m)
     square, m1, m2 = M * M, abs(m[0]), abs(m[1])
@@ -318,7 +319,7 @@ def mismatch(m: Series, end: float, start: float, speed: Series, e: float) -> fl
 
 
 class Limits(NamedTuple):
-    """Bounds on one side's arcs, in units of the remaining time: see `limits`."""
+    """Bounds on the arcs of one side, in units of the remaining time: see `limits`."""
 
     half: float
     change: float
@@ -332,11 +333,11 @@ class Limits(NamedTuple):
 
 @inlined
 def limits(side: Restoring, a: Terms, half: Series) -> Limits:
-    """Bounds on one side's arcs within the remaining time; NaN where the assumptions of the proof do not hold.
+    """Compute bounds on the arcs of one side within the remaining time; NaN if the proof's assumptions are violated.
 
-    Half duration, error of the speeds, and of their expansions, over z; change of the acceleration; inverse of the
-    least slope of the speed at an arc's start by the time of rest; `speed_bound` of both ends; sum of the absolute
-    values of all terms of the speeds.
+    Half duration; change of the acceleration; inverse of the smallest slope of an arc's initial speed by the time of
+    rest; error of the speeds, and of their expansions; `speed_bound` of both ends; sum of all |terms| of the speeds.
+    Half duration and errors are divided by z.
     """
     rate, curvature = abs(a.rate), abs(a.curvature)
     change = rate + 2.0 * curvature
@@ -358,7 +359,7 @@ def limits(side: Restoring, a: Terms, half: Series) -> Limits:
 
 @inlined
 def shifts(m: Series, here: Limits, there: Limits, speed: Series, e: float) -> Three:
-    """Bounds on how far one arc and impact shift the time of rest: over z^5, over z, over z and the distance so far."""
+    """Bound the shift of the time of rest by one arc and impact, divided by z^5, z, and z and the distance so far."""
     M = total(m)
     fifth = mismatch(m, here.end, there.start, speed, e) * there.inverse
     rounding = 4.0 * _ROUNDING * (e * here.speeds + there.speeds * M)
@@ -370,7 +371,7 @@ def shifts(m: Series, here: Limits, there: Limits, speed: Series, e: float) -> T
 
 @inlined
 def distance(first: float, ratios: Pair, one: Three, other: Three) -> float:
-    """Bound on the distance of the time of rest from the candidate: the geometric sum of all shifts; NaN: no proof."""
+    """Bound the distance of the time of rest from the candidate by the geometric sum of all shifts; NaN: no proof."""
     pair = ratios[0] * ratios[1]
     square = ratios[0] * ratios[0]
     inverse = 1.0 / (1.0 - pair)
@@ -383,7 +384,7 @@ def distance(first: float, ratios: Pair, one: Three, other: Three) -> float:
 
 @inlined
 def ratio(m: Series, shift: Three, following: Three) -> float:
-    """Largest ratio of the remaining times at two impacts, shifts included; NaN where their order is not certain."""
+    """Compute the largest ratio of remaining times at two impacts, shifts included; NaN if their order is uncertain."""
     shifted = shift[0] + shift[1] + shift[2] * _NEAR + following[1]
     higher = (abs(m[1]) + abs(m[2]) + abs(m[3])) * _MARGIN
     largest = abs(m[0]) + higher + shifted
@@ -392,9 +393,9 @@ def ratio(m: Series, shift: Three, following: Three) -> float:
 
 @shared
 def refined_bracket(v: float, i: Restoring, j: Restoring, window: float) -> Pair:
-    """Bracket on the time to rest from an impact that enters side i with speed v; NaN, NaN: no proof.
+    """Compute a bracket on the time to rest from an impact that enters side i with speed v; NaN, NaN: no proof.
 
-    ``window``: time over which i and j hold, and within which complete chattering has been proven.
+    Complete chattering has been proven within ``window``, during which i and j hold.
     """
     if not (0.0 < v < math.inf and i.g > 0.0 and j.g > 0.0 and i.restitution * j.restitution < 1.0):
         return math.nan, math.nan
@@ -412,7 +413,7 @@ def refined_bracket(v: float, i: Restoring, j: Restoring, window: float) -> Pair
 def remainder(
     i: Restoring, j: Restoring, terms: tuple[Terms, Terms], curves: tuple[Curve, Curve], residual: float
 ) -> float:
-    """Bound on the distance of the time of rest from a candidate (see `rest_candidate`), over it; NaN: no proof."""
+    """Bound the distance of the time of rest from a candidate (see `rest_candidate`), divided by it; NaN: no proof."""
     A, B = curves
     limits_i, limits_j = limits(i, terms[0], A.half), limits(j, terms[1], B.half)
     m_i, m_j = remaining_after(A.half), remaining_after(B.half)
@@ -425,9 +426,10 @@ def remainder(
 
 @inlined
 def deviation(error: float, change: float, curvature: float, height: float) -> float:
-    """Error of a `Restoring` up to a height, where G = g - k u + ... with a stiffness k that is not constant.
+    """Compute the error of a `Restoring` up to a height, where G = g - k u + ... with a variable stiffness k.
 
-    ``error`` of g; ``change`` of k over the window; ``curvature`` bounds |d2G/du2|. A nonlinear block with ground
-    accelerations a in units of g has k = p^2 (cos(alpha) - j a sin(alpha)) and a curvature of p^2 hypot(1, |a|max).
+    ``error`` of g; ``change`` of k during the window; ``curvature`` bounds |d2G/du2|. For a nonlinear block under
+    ground accelerations a in units of g, k = p^2 (cos(alpha) - j a sin(alpha)), with a curvature of
+    p^2 hypot(1, |a|max).
     """
     return (error + height * (change + 0.5 * curvature * height)) * (1.0 + _ROUNDING)

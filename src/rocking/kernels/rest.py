@@ -1,4 +1,4 @@
-"""Whether a block comes to rest after an impact, and when; the impacts of a sequence after its proof."""
+"""Decision whether and when a block comes to rest after an impact, and impacts of a proven sequence."""
 
 import math
 from typing import NamedTuple
@@ -15,22 +15,22 @@ from rocking.kernels.state import PROVEN_PER_ITERATION, Record, Records, RestRul
 
 ULP = 2.0**-52
 
-#: A proof that failed is tried again once the speed has fallen by this factor.
+#: Decrease of the speed after a failed proof at which the next one is attempted.
 _SLOWER = 0.6
 
-#: A proof whose bracket is too wide is tried again at the speed at which it is expected to be narrow enough, times the
-#: first factor, and at most at the speed times the second.
+#: After a proof with too wide a bracket, the next one is attempted at the speed expected for a sufficiently narrow one,
+#: times the first factor, but at most the present speed times the second.
 _SOONER = 0.97
 _SLOWEST = 0.95
 
-#: Impacts are about this many times the rounding of the time apart, at least, when a proof is tried again.
+#: Smallest interval between impacts, approximately, at a repeated proof, divided by the rounding of the time.
 _RESOLVED = 8.0
 
 
 class Rest(NamedTuple):
-    """Time to rest, with proven bounds; NaN bounds: not proven; NaN time: the block does not come to rest yet.
+    """Time to rest (NaN: not yet), with proven bounds (NaN: not proven).
 
-    ``stalled``: at rest only because time does not advance any more.
+    ``stalled``: at rest only because time no longer advances.
     """
 
     lower: float
@@ -41,13 +41,13 @@ class Rest(NamedTuple):
 
 @inlined
 def time_of(ground: Ground, state: Record) -> float:
-    """Time of a state."""
+    """Return the time of a state."""
     return start_of(ground, state.piece) + state.offset
 
 
 @inlined
 def count_impact(state: Record) -> None:
-    """Count an impact of a proven sequence; before a proof, set the speed at which the next one is tried."""
+    """Count an impact of a proven sequence or, before a proof, set the speed for the next attempt."""
     if state.proven_impacts > 0:
         state.proven_impacts += 1
     elif state.v > state.certificate_speed:
@@ -56,7 +56,7 @@ def count_impact(state: Record) -> None:
 
 @inlined
 def record_proof(ground: Ground, block: Record, settings: Record, state: Record, proof: Proof) -> None:
-    """Store since when chattering is proven, and at which speed the next proof is tried."""
+    """Store the time since which chattering is proven and the speed for the next proof."""
     if not proof.upper >= 0.0:
         state.certificate_speed = _SLOWER * state.v
         return
@@ -65,15 +65,15 @@ def record_proof(ground: Ground, block: Record, settings: Record, state: Record,
         state.run_start = time_of(ground, state)
     excess = (proof.upper - proof.lower) / settings.tolerance
     if block.variable_restitution:
-        # The width is proportional to the square of the speed, or to the speed where the factor is drawn.
+        # The width is proportional to the square of the speed, or to the speed if the factor is drawn.
         ratio = 1.0 / excess if is_drawn(block) else math.sqrt(1.0 / excess)
     else:
         wait = time_to_piece(ground, state, proof.time)
-        # The width of a bracket of fourth order is proportional to the fifth power of the speed, that of the geometric
-        # one to its square. The former needs a rest within the present piece.
+        # The width of a fourth-order bracket is proportional to the fifth power of the speed, of the geometric one to
+        # its square. The former requires a rest within the present piece.
         ratio = _SOONER * excess**-0.2 if wait == 0.0 else 1.0 - wait / proof.time
         ratio = max(ratio, math.sqrt(1.0 / excess))
-    # The next arc is about this long; arcs go with the speed, and must not be lost in the rounding of times.
+    # Approximate length of the next arc. Arcs are proportional to the speed, and must exceed the rounding of times.
     arc = (1.0 - max(block.restitution[0], block.restitution[1])) * proof.time
     least = _RESOLVED * ULP * time_of(ground, state) / arc if arc > 0.0 else 0.0
     state.certificate_speed = state.v * min(_SLOWEST, max(ratio, least))
@@ -81,7 +81,7 @@ def record_proof(ground: Ground, block: Record, settings: Record, state: Record,
 
 @inlined
 def time_to_piece(ground: Ground, state: Record, time: float) -> float:
-    """Time from a state to the start of the piece in which it will be some time later."""
+    """Return the time from a state to the start of the piece that is reached ``time`` later."""
     piece = state.piece
     wait = 0.0
     reached = length_of(ground, piece) - state.offset
@@ -94,7 +94,7 @@ def time_to_piece(ground: Ground, state: Record, time: float) -> float:
 
 @shared
 def proven_bounds(ground: Ground, block: Record, settings: Record, scratch: Record, state: Record) -> Proof:
-    """Proven bounds on the time to rest, widened by the rounding of all times; all NaN: no proof."""
+    """Compute proven bounds on the time to rest, widened by the rounding of all times; all NaN: no proof."""
     lower, upper, time, height = prove_rest(ground, block, settings, scratch, state)
     rounding = allowance(time_of(ground, state), upper, state)
     return Proof(lower - rounding, upper + rounding, time, height)
@@ -102,20 +102,20 @@ def proven_bounds(ground: Ground, block: Record, settings: Record, scratch: Reco
 
 @inlined
 def allowance(time: float, upper: float, state: Record) -> float:
-    """Allow for the rounding of the times, and of the arcs resolved since the first proof."""
+    """Compute an allowance for the rounding of times and of the arcs since the first proof."""
     since = time - state.run_start if state.proven_impacts > 0 else 0.0
     return 4.0 * ULP * time + 8.0 * ULP * (max(state.proven_impacts, 1) + 4) * (since + upper)
 
 
 @shared
 def rest_after_impact(ground: Ground, block: Record, settings: Record, state: Record, proof: Proof) -> Rest:
-    """Whether the block comes to rest at an impact, given the bounds that are proven there (NaN: none)."""
+    """Decide whether the block comes to rest at an impact, given the proven bounds (NaN: none)."""
     time = time_of(ground, state)
     if settings.treatment == RestRule.CERTIFIED:
         if state.v == 0.0:
             rounding = allowance(time, 0.0, state)
             return Rest(-rounding, rounding, 0.0, False)
-        # No rotation that is not resolved may be higher than those that are.
+        # No unresolved rotation may exceed the resolved ones.
         good = max(settings.tolerance, 4.0 * allowance(time, proof.upper, state))
         if proof.upper - proof.lower <= good and proof.height <= state.peak:
             return Rest(proof.lower, proof.upper, proof.time, False)
@@ -136,9 +136,9 @@ def rest_after_impact(ground: Ground, block: Record, settings: Record, state: Re
 
 @inlined
 def geometric_time(ground: Ground, block: Record, state: Record) -> float:
-    """Time to rest after an impact as if the accelerations stayed what they are, NaN where one does not press down.
+    """Compute the time to rest after an impact under constant accelerations, or NaN if one does not press down.
 
-    The sum of the paper's Eq. 75 without its remainder: arcs of 2 v/g, and speeds that fall by a factor at each impact.
+    Sum of the paper's Eq. 75 without remainder: arcs of 2 v/g, with speeds reduced by a factor at each impact.
     """
     i, j = state.side, block.next_side[state.side]
     g_i = restoring(ground, block, i, state.piece, state.offset)
@@ -151,7 +151,7 @@ def geometric_time(ground: Ground, block: Record, state: Record) -> float:
 
 @inlined
 def has_stalled(ground: Ground, block: Record, state: Record) -> bool:
-    """Whether time hardly advanced since the last impact, and will not until the next."""
+    """Return whether time hardly advanced since the last impact and will not until the next."""
     time = time_of(ground, state)
     fastest = max(abs(block.stiffness[0]), abs(block.stiffness[1]))
     least = ULP * (time + (1.0 / math.sqrt(fastest) if fastest > 0.0 else 0.0))
@@ -159,7 +159,7 @@ def has_stalled(ground: Ground, block: Record, state: Record) -> bool:
     return bool(time - state.last_impact_time <= least and 2.0 * state.v <= least * pressed)
 
 
-#: Largest |beta| and |gamma| of `proven_arc`: the truncation of its sums is below 2^-54 of them.
+#: Largest |beta| and |gamma| of `proven_arc`, for which the relative truncation of its sums is below 2^-54.
 LARGEST_BETA = 1.0 / 64.0
 LARGEST_GAMMA = 2.0**-14
 
@@ -168,9 +168,9 @@ LARGEST_GAMMA = 2.0**-14
 def pass_proven_impacts(
     ground: Ground, block: Record, settings: Record, table: Records, state: Record, left: float
 ) -> None:
-    """March the linear model through some impacts within ``left``, up to the one at which another proof is tried.
+    """March the linear model through some impacts within ``left``, up to the one with another proof.
 
-    The ground acceleration is linear in time; the state is one just after an impact.
+    The ground acceleration is linear in time, and the state immediately after an impact.
     """
     rate = coefficient(ground, state.piece, 1)
     end = state.offset + left
@@ -195,10 +195,10 @@ def pass_proven_impacts(
 
 @inlined
 def proven_arc(v: float, g: float, rate: float, stiffness: float) -> Pair:
-    """Duration and impact speed of an arc under g + rate t - stiffness u that starts with speed v.
+    """Compute duration and impact speed of an arc with initial speed v under g + rate t - stiffness u.
 
-    To full precision for |beta| = |rate| v/g^2 and |gamma| = |stiffness| v^2/g^2 up to the limits above, NaN beyond.
-    Half the duration is (v/g) x with x + b x^2 = 1, b = 2 beta/3, and a correction for gamma.
+    Full precision for |beta| = |rate| v/g^2 and |gamma| = |stiffness| v^2/g^2 up to the limits above, NaN beyond. Half
+    the duration is (v/g) x with x + b x^2 = 1, b = 2 beta/3, and a correction for gamma.
     """
     if not g > 0.0:
         return math.nan, math.nan
@@ -210,7 +210,7 @@ def proven_arc(v: float, g: float, rate: float, stiffness: float) -> Pair:
     x = half_duration(2.0 * THIRD * beta)
     y = beta * x
     q = gamma * x * x
-    # The equation's value, slope and half its second derivative at x.
+    # Value, slope and half the second derivative of the equation at x.
     tangent = q * (q * (2.0 / 15.0 - q * (17.0 / 315.0)) - THIRD)
     value = x * ((1.0 + y) * tangent + y * q * (1.0 / 45.0 - q * (2.0 / 945.0)))
     change = 2.0 * q * (1.0 + y) * (q * (4.0 / 15.0) - THIRD)
@@ -226,7 +226,7 @@ def proven_arc(v: float, g: float, rate: float, stiffness: float) -> Pair:
 
 @inlined
 def half_duration(b: float) -> float:
-    """Root of x + b x^2 = 1 near 1 for |b| <= 1/96, to full precision: the sum with Catalan's numbers."""
+    """Compute the root of x + b x^2 = 1 near 1 for |b| <= 1/96, to full precision, by Catalan's numbers."""
     square = b * b
     fourth = square * square
     low = (1.0 - b) + square * (2.0 - 5.0 * b)

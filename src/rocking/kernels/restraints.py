@@ -1,15 +1,15 @@
-"""What restraints change in time: a tendon that yields, and a body that leans for ever.
+"""Variable restraints: a tendon that yields, and a body that leans forever.
 
-A tendon that yields hangs slack afterwards: what it does to the record of a block, and when that changes.
-
-The tendon is longer by e = 2 x sin(u/2), or x u in the linear model, than while the block stands, and its force is
-k (e - plastic - slack), between nothing and that at e - plastic = yields. So there are three laws:
+A tendon that has yielded is slack afterwards. The tendon is longer by e = 2 x sin(u/2), or x u in the linear model,
+than while the block stands. Its force is k (e - plastic - slack), between zero and the force at e - plastic = yields.
+There are three laws:
 
     ELASTIC   until e - plastic rises to ``yields``, or falls to ``slack``
     SLACK     until e - plastic rises to ``slack``
     PLASTIC   until the block turns back; the plastic elongation is then e - yields
 
-Each law is that of an arc. The block's record has the present one, so that all other kernels know constants alone.
+A law is constant during an arc. The block's record contains the present one, so that other kernels have constant
+coefficients.
 """
 
 import math
@@ -27,9 +27,9 @@ _ROUNDING = 2.0**-44
 
 @shared
 def apply_tendon_law(block: Record, law: int, plastic: float) -> None:
-    """Write a law, and what follows from the plastic elongation, into the record of a block."""
+    """Write a law and its quantities at a plastic elongation into the record of a block."""
     for side in range(2):
-        force = -block.tendon[side] * (plastic + block.slack)  # at no elongation, over inertia and lever arm
+        force = -block.tendon[side] * (plastic + block.slack)  # at zero elongation, divided by inertia and lever arm
         weight = push = prestress = 0.0
         if law == TendonLaw.ELASTIC:
             weight, push, prestress = block.tendon_weight[side], block.tendon_push[side], force
@@ -45,7 +45,7 @@ def apply_tendon_law(block: Record, law: int, plastic: float) -> None:
 
 @inlined
 def rotation_at(block: Record, nonlinear: bool, side: int, elongation: float) -> float:
-    """Rotation at which the tendon is longer by so much; an infinity with the sign of that where it never is."""
+    """Compute the rotation for an elongation of the tendon, or an infinity of the same sign if there is none."""
     x = block.lever_arm[side]
     if x <= 0.0 or (nonlinear and abs(elongation) >= 2.0 * x):
         return math.copysign(np.inf, elongation)
@@ -54,19 +54,19 @@ def rotation_at(block: Record, nonlinear: bool, side: int, elongation: float) ->
 
 @inlined
 def elongation_at(block: Record, nonlinear: bool, side: int, u: float) -> float:
-    """Elongation of the tendon at a rotation."""
+    """Compute the elongation of the tendon at a rotation."""
     return block.lever_arm[side] * (2.0 * math.sin(0.5 * u) if nonlinear else u)
 
 
 @inlined
 def law_of_standing(block: Record, plastic: float) -> int:
-    """Law while the block stands."""
+    """Return the law while the block stands."""
     return TendonLaw.ELASTIC if plastic + block.slack <= 0.0 else TendonLaw.SLACK
 
 
 @inlined
 def may_change_below(block: Record, settings: Record, plastic: float, height: float) -> bool:
-    """Whether the law of a standing block changes below a height on one of its sides."""
+    """Return whether the law of a standing block changes below a height on one of its sides."""
     level = block.slack if law_of_standing(block, plastic) == TendonLaw.SLACK else block.yields
     plus = rotation_at(block, settings.nonlinear, 0, plastic + level)
     minus = rotation_at(block, settings.nonlinear, 1, plastic + level)
@@ -77,7 +77,7 @@ def may_change_below(block: Record, settings: Record, plastic: float, height: fl
 def next_law(
     block: Record, settings: Record, scratch: Record, state: Record, order: int, h: float
 ) -> tuple[float, int]:
-    """Time of the first change of the law along an arc, inf without one within h; and the law after it."""
+    """Find the time of the first change of the law along an arc, inf if none within h, and the law after it."""
     c, d, side = scratch.rotation, scratch.other, state.side
     if state.law == TendonLaw.PLASTIC:
         for k in range(order):
@@ -96,7 +96,7 @@ def next_law(
 
 @inlined
 def time_to_level(c: Floats, order: int, h: float, level: float, sign: float, d: Floats) -> float:
-    """First time within h at which a series that is below a level (sign 1), or above it (-1), passes it; else inf."""
+    """Find the first time within h at which a series passes a level from below (sign 1) or above (-1); else inf."""
     if level == np.inf:
         return np.inf
     d[0] = sign * (level - c[0])
@@ -109,7 +109,7 @@ def time_to_level(c: Floats, order: int, h: float, level: float, sign: float, d:
 
 @inlined
 def first_of(d: Floats, order: int, h: float) -> float:
-    """First time from which a series is negative; 0 where it is so at once, inf where it is not within h."""
+    """Find the first time from which a series is negative: 0 if immediately, inf if not within h."""
     lead = 0
     while lead < order and d[lead] == 0.0:
         lead += 1
@@ -121,7 +121,7 @@ def first_of(d: Floats, order: int, h: float) -> float:
 
 @inlined
 def plastic_after(block: Record, settings: Record, nodes: Records, row: int, before: float) -> float:
-    """Plastic elongation at a node of a response, from that at the node before it; of the first node from itself."""
+    """Return the plastic elongation at a node, from the node itself or from its value ``before``."""
     node = nodes[row]
     turns = row > 0 and node.law == TendonLaw.ELASTIC and nodes[row - 1].law == TendonLaw.PLASTIC
     if turns or (row == 0 and node.side >= 0):
@@ -138,24 +138,24 @@ def change_law(block: Record, settings: Record, state: Record, law: int, u: floa
     apply_tendon_law(block, law, state.plastic)
 
 
-# ---- Whether a body that restraints hold while it leans stays between two rotations for ever ----
-# Once the motion is over its energy no longer grows: it is kept, or dampers and a tendon that yields take some. So a
-# body never passes a rotation at which its potential energy would be above its present energy. With one such rotation
-# below it and one above, it neither reaches zero rotation nor falls. On the way out a tendon pulls as far as its
-# strength, on the way back less than that, so that it raises no later barrier below what it is now, nor can the body
-# come back to where it last yielded.
+# ---- Proof that a leaning body stays between two rotations forever ----
+# After the motion, the energy of the body is constant or reduced by dampers and a tendon that yields. Therefore the
+# body never passes a rotation whose potential energy exceeds its present energy. With one such rotation below and one
+# above, it neither reaches zero rotation nor falls. A tendon pulls with at most its strength on the way out and with
+# less on the way back: it reduces no later barrier below its present height, and the body cannot return to the last
+# yield.
 
-#: Largest part of the peak by which a body that leans may yet exceed it.
+#: Largest fraction of the peak by which a leaning body may still exceed it.
 PEAK = 2.0**-30
 
-#: Bound on the rounding of the moment over the sum of what its terms are made of, with room for that of the integral.
+#: Bound on the rounding of the moment divided by the sum of the sizes of its terms, with allowance for the integral.
 _ROUNDING_OF_MOMENT = 2.0**-45
 
-#: Places of a search, over the length of its way; and halvings of an interval.
+#: Places of a search, as fractions of its path, and number of bisections of an interval.
 _PLACES = np.concatenate([np.zeros(1), 2.0 ** np.arange(-40.0, 1.0)])
 _HALVINGS = 60
 
-#: Positive nodes of Gauss and Legendre's rule of eight points, and their weights.
+#: Positive nodes and weights of the Gauss-Legendre rule of eight points.
 _RULE = (
     (0.1834346424956498, 0.362683783378362), (0.525532409916329, 0.3137066458778873),
     (0.7966664774136267, 0.2223810344533745), (0.9602898564975363, 0.1012285362903763),
@@ -164,11 +164,11 @@ _RULE = (
 
 @shared
 def leaning_at(block: Record, settings: Record, state: Record, rate: float) -> float:
-    """Return the rotation about which a body leans for ever, at which nothing turns it; NaN where that is not proven.
+    """Return the rotation without moment about which a body leans forever; NaN if this is not proven.
 
-    The highest rotation so far will not be exceeded by more than `PEAK` of itself. The body has the acceleration
-    ``rate`` and goes out though it is pushed out, as where it has turned back in front of the ground, which no body
-    that rocks does below its balance; or it has crept back to within `PEAK` of the rotation, with the speed of that.
+    The largest rotation so far will not be exceeded by more than the fraction `PEAK`. Either the body, with the
+    acceleration ``rate``, moves and is pushed outwards, as after turning back before the ground, which no rocking body
+    does below its balance. Or it has crept back to within `PEAK` of the rotation, at the corresponding speed.
     """
     side, u, nonlinear = state.side, state.u, settings.nonlinear
     drag = block.damping[side]
@@ -190,9 +190,9 @@ def leaning_at(block: Record, settings: Record, state: Record, rate: float) -> f
 
 @shared
 def barrier(block: Record, body: tuple[bool, int, float], start: float, end: float) -> tuple[float, float]:
-    """Search the way from one rotation to another for the first place that turns a body back, and where that ends.
+    """Find the first rotation between two that turns a body back, and the end of the interval that does so.
 
-    The latter is the end of the way where all places beyond the first turn it back. NaN: there is no such place.
+    The interval ends at ``end`` if all later places turn the body back. NaN: no such place.
     """
     first = last = np.nan
     for share in _PLACES:
@@ -206,7 +206,7 @@ def barrier(block: Record, body: tuple[bool, int, float], start: float, end: flo
 
 @inlined
 def last_before(block: Record, body: tuple[bool, int, float], one: float, other: float) -> float:
-    """Rotation at which the moment changes its sign between two at which it has different ones, by halving."""
+    """Find the rotation at which the moment changes its sign between two rotations, by bisection."""
     sign = moment_at(block, body, one)
     for _ in range(_HALVINGS):
         middle = 0.5 * (one + other)
@@ -219,7 +219,7 @@ def last_before(block: Record, body: tuple[bool, int, float], one: float, other:
 
 @shared
 def rise(block: Record, body: tuple[bool, int, float], start: float, end: float) -> float:
-    """Lower bound on the change of the potential energy along a way, over inertia; part by part of the tendon's law."""
+    """Compute a lower bound on the change of potential energy along a path, divided by inertia, law by law."""
     nonlinear, side, plastic = body
     low, high, total = min(start, end), max(start, end), 0.0
     slack = rotation_at(block, nonlinear, side, plastic + block.slack)
@@ -239,7 +239,7 @@ def rise(block: Record, body: tuple[bool, int, float], start: float, end: float)
 
 @inlined
 def moment_at(block: Record, body: tuple[bool, int, float], u: float) -> float:
-    """Restoring acceleration at a rotation without ground motion and damping."""
+    """Compute the restoring acceleration at a rotation without ground motion and damping."""
     nonlinear, side, plastic = body
     weight, push, pull = block.added_weight[side], block.added_push[side], block.prestress[side]
     if block.yielding:

@@ -1,27 +1,24 @@
-"""The Taylor series of an arc: all recurrences for its coefficients, side by side.
+"""Recurrences for the coefficients of an arc's Taylor series.
 
-The rotation u >= 0 is counted in the frame of the block's side, and so is the ground acceleration A(t) = i a(t)/g with
-i the sign of that side. A vertical ground acceleration changes the weight: W(t) = 1 + a_v(t)/g. The equations are
+The rotation u >= 0 and the ground acceleration A(t) = i a(t)/g are in the frame of the block's side of sign i. A
+vertical ground acceleration changes the weight to W(t) = 1 + a_v(t)/g. The equations are
 
     linear      u'' = W lam u - gain (W threshold + A)
     nonlinear   u'' = -lam (W sin(alpha - u) + A cos(alpha - u))
 
-In the linear model lam may have any sign: p^2 for a rocking block (whose gain is p^2, too), 0 for a ball, negative for
-an oscillator with a stop.
-
-A body may be held back: by tendons, springs, thrusts, loads and dampers. With the weight W + W' and the push A + A' in
-place of W and A, since what a thrust or an elastic tendon adds is of the form of sin and cos(alpha - u),
+In the linear model lam is p^2 for a rocking block (as is the gain), 0 for a ball, and negative for an oscillator with a
+stop. A thrust or elastic tendon contributes terms of the form of sin and cos(alpha - u), so that restraints change W
+and A to W + W' and A + A':
 
     linear      u'' = (lam (W + W') - s) u - gain (threshold (W + W') + A + A') - H - c u'
     nonlinear   u'' = -lam ((W + W') sin(alpha - u) + (A + A') cos(alpha - u)) - H cos(u/2) - s u - c u'
 
-with H for the prestress of tendons, s for springs, c for dampers: see "Restraints" in the documentation.
+with the prestress H of tendons, the stiffness s of springs and the damping c (see "Restraints" in the documentation).
 
-Without these each equation is written three times, for three purposes: to any order into arrays (`arc`); nine terms of
-one arc in registers (`short_arc`); and some ten terms of many lanes at once (`lanes`). One form for all was measured:
-as loops over tuples it takes twelve times as long in lanes, which then do not vectorise; unrolled, it changes the last
-bit of some results, since each form adds its terms in the order that makes the shortest chain of operations for it. So
-one test compares all forms with one calculation in 40 digits.
+Without restraints, each equation is implemented three times: to any order in arrays (`arc`), nine terms in registers
+(`short_arc`), and about ten terms of many lanes (`lanes`). A single form was measured: as loops over tuples, lanes do
+not vectorise and take twelve times as long; unrolled, the last bit of some results changes, because each form adds its
+terms in its shortest chain of operations. One test compares all forms with a calculation in 40 digits.
 
 A NaN among the arguments makes every later coefficient NaN.
 """
@@ -31,7 +28,7 @@ import numpy as np
 from rocking.kernels.compiled import inlined
 from rocking.kernels.state import ORDER, Record
 
-#: A quantity that is linear in time: its value, and its slope or its change over a step.
+#: Value of a quantity that is linear in time, and its slope or change during a step.
 Line = tuple[float, float]
 
 #: Coefficients c[0] to c[9] of a rotation; nine terms of a velocity; seven sums of |terms| of sin and cos(alpha - u).
@@ -39,23 +36,23 @@ Ten = tuple[float, float, float, float, float, float, float, float, float, float
 Nine = tuple[float, float, float, float, float, float, float, float, float]
 Seven = tuple[float, float, float, float, float, float, float]
 
-#: Factors that integrate the term of power k twice, 1/((k + 1) (k + 2)), and the term of power k - 1 once, 1/k.
+#: Factors that integrate the term of power k twice, 1/((k + 1) (k + 2)), and of power k - 1 once, 1/k.
 INTEGRATED_TWICE = 1.0 / ((np.arange(ORDER + 1) + 1.0) * (np.arange(ORDER + 1) + 2.0))
 _INTEGRATED = 1.0 / np.maximum(np.arange(ORDER + 2), 1)
 
 
 @inlined
 def times_weight(weight: Line | None, this: float, before: float) -> float:
-    """Coefficient of the weight times a series, from two neighbouring ones of the series; None: the weight is 1."""
+    """Compute a coefficient of weight times series from two neighbouring ones of the series; None: weight 1."""
     return this if weight is None else weight[0] * this + weight[1] * before
 
 
-# ---- To any order: the motion's and the weight's polynomials are scratch.ground and scratch.weight ----
+# ---- Series to any order: scratch.ground and scratch.weight contain the polynomials of motion and weight ----
 
 
 @inlined
 def linear_coefficients(block: Record, state: Record, scratch: Record, degree: int, order: int) -> None:
-    """Write c[0] to c[order] of a linear arc under a constant weight and a motion of a degree into scratch.rotation."""
+    """Write c[0] to c[order] of a linear arc under constant weight and a motion of ``degree`` into scratch.rotation."""
     c, A, side = scratch.rotation, scratch.ground, state.side
     lam, gain = block.stiffness[side], block.threshold_slope[side]
     c[0] = state.u
@@ -69,9 +66,9 @@ def linear_coefficients(block: Record, state: Record, scratch: Record, degree: i
 
 @inlined
 def weighted_coefficient(block: Record, side: int, scratch: Record, degree: int, k: int) -> float:
-    """Coefficient c[k + 2] of a linear arc while the weight changes, from those before it.
+    """Compute c[k + 2] of a linear arc under varying weight from the earlier coefficients.
 
-    ``degree`` is that of both the motion and the weight.
+    ``degree`` applies to both the motion and the weight.
     """
     c, A, W = scratch.rotation, scratch.ground, scratch.weight
     lam, gain, threshold = block.stiffness[side], block.threshold_slope[side], block.threshold[side]
@@ -83,7 +80,7 @@ def weighted_coefficient(block: Record, side: int, scratch: Record, degree: int,
 
 @inlined
 def nonlinear_coefficient(lam: float, scratch: Record, degrees: tuple[int, int], k: int) -> float:
-    """Coefficient c[k + 2] of a nonlinear arc, from sin and cos(alpha - u) up to k; degrees of motion and weight."""
+    """Compute c[k + 2] of a nonlinear arc from sin and cos(alpha - u) up to k, for the degrees of motion and weight."""
     A, W, S, C = scratch.ground, scratch.weight, scratch.sine, scratch.cosine
     degree, changes = degrees
     value = W[0] * S[k]
@@ -97,7 +94,7 @@ def nonlinear_coefficient(lam: float, scratch: Record, degrees: tuple[int, int],
 
 @inlined
 def angle_coefficients(scratch: Record, k: int) -> None:
-    """Write the coefficients k + 1 of sin and cos(alpha - u), from those before and c[1] to c[k + 1]."""
+    """Write the coefficients k + 1 of sin and cos(alpha - u) from the earlier ones and c[1] to c[k + 1]."""
     c, S, C = scratch.rotation, scratch.sine, scratch.cosine
     sine = 0.0
     cosine = 0.0
@@ -113,7 +110,7 @@ def angle_coefficients(scratch: Record, k: int) -> None:
 def restrained_force(
     block: Record, side: int, scratch: Record, degrees: tuple[int, int], nonlinear: bool, k: int
 ) -> float:
-    """Coefficient k of u'' + c u', from the coefficients of the rotation up to k."""
+    """Compute coefficient k of u'' + c u' from the rotation up to k."""
     c, A, W = scratch.rotation, scratch.ground, scratch.weight
     lam = block.stiffness[side]
     value = -block.spring[side] * c[k]
@@ -133,7 +130,7 @@ def restrained_force(
 
 @inlined
 def half_angle_coefficients(scratch: Record, k: int) -> None:
-    """Write the coefficients k + 1 of sin and cos(u/2), from those before and c[1] to c[k + 1]."""
+    """Write the coefficients k + 1 of sin and cos(u/2) from the earlier ones and c[1] to c[k + 1]."""
     c, S, C = scratch.rotation, scratch.half_sine, scratch.half_cosine
     sine = 0.0
     cosine = 0.0
@@ -149,7 +146,7 @@ def half_angle_coefficients(scratch: Record, k: int) -> None:
 def next_coefficient(
     block: Record, settings: Record, side: int, scratch: Record, degrees: tuple[int, int], k: int
 ) -> float:
-    """Coefficient c[k + 2] of an arc from those before it, for a motion and a weight of these degrees."""
+    """Compute c[k + 2] of an arc from the earlier coefficients, for the degrees of motion and weight."""
     if block.restrained:
         force = restrained_force(block, side, scratch, degrees, settings.nonlinear, k)
         return (force - block.damping[side] * ((k + 1) * scratch.rotation[k + 1])) * INTEGRATED_TWICE[k]
@@ -162,7 +159,7 @@ def next_coefficient(
 def variation_coefficients(work: Record, damping: float, order: int) -> None:
     """Write the coefficients 2 to ``order`` of x'' = stiffness x - damping x' + forcing into work.change.
 
-    Its first two are given.
+    The first two must be set beforehand.
     """
     stiffness, forcing, x = work.stiffness, work.forcing, work.change
     for k in range(order - 1):
@@ -174,12 +171,12 @@ def variation_coefficients(work: Record, damping: float, order: int) -> None:
         x[k + 2] = value * INTEGRATED_TWICE[k]
 
 
-# ---- Nine terms of one arc, under a motion and a weight that are linear in time ----
+# ---- Nine terms of one arc, with motion and weight linear in time ----
 
 
 @inlined
 def linear_ten(u: float, v: float, lam: float, pull: float, rate: float) -> Ten:
-    """Coefficients of u'' = lam u - pull - rate t."""
+    """Compute the coefficients of u'' = lam u - pull - rate t."""
     c2, c3 = 0.5 * (lam * u - pull), (lam * v - rate) * (1.0 / 6.0)
     c4, c5 = lam * c2 * (1.0 / 12.0), lam * c3 * (1.0 / 20.0)
     c6, c7 = lam * c4 * (1.0 / 30.0), lam * c5 * (1.0 / 42.0)
@@ -189,7 +186,7 @@ def linear_ten(u: float, v: float, lam: float, pull: float, rate: float) -> Ten:
 
 @inlined
 def weighted_ten(u: float, v: float, lam: float, at_rest: float, push: Line, weight: Line) -> Ten:
-    """Coefficients of u'' = weight (lam u - at_rest) - push, weight and push being lines in time."""
+    """Compute the coefficients of u'' = weight (lam u - at_rest) - push, with weight and push linear in time."""
     z = lam * u - at_rest
     c2 = 0.5 * (times_weight(weight, z, 0.0) - push[0])
     c3 = (1.0 / 6.0) * (times_weight(weight, lam * v, z) - push[1])
@@ -201,10 +198,10 @@ def weighted_ten(u: float, v: float, lam: float, at_rest: float, push: Line, wei
 
 @inlined
 def nonlinear_ten(start: Line, angle: Line, lam: float, push: Line, weight: Line | None) -> tuple[Ten, Seven]:
-    """Coefficients of u'' = -lam (weight sin(alpha - u) + push cos(alpha - u)), weight and push being lines in time.
+    """Compute the coefficients of u'' = -lam (weight sin(alpha - u) + push cos(alpha - u)).
 
-    ``start`` is u and v, ``angle`` sin and cos(alpha - u) there; a weight of None is 1. The second tuple has the sums
-    of the absolute values of the coefficients of sin and cos, from the first power to the seventh.
+    Weight (None: 1) and push are linear in time. ``start`` is (u, v) and ``angle`` the sine and cosine of alpha - u
+    there. The second tuple contains the sums of the |coefficients| of sine and cosine, from power 1 to 7.
     """
     u, v = start
     s0, c0 = angle
@@ -239,14 +236,14 @@ def nonlinear_ten(start: Line, angle: Line, lam: float, push: Line, weight: Line
     return (u, v, u2, u3, u4, u5, u6, u7, u8, u9), (*low, abs(s5) + abs(c5), abs(s6) + abs(c6), abs(s7) + abs(c7))
 
 
-# ---- Terms of the velocity in lanes: time is counted in substeps, so that they add up to the change over one ----
+# ---- Terms of the velocity in lanes, in units of substeps, so that their sum is the change during one ----
 
 
 @inlined
 def weighted_rates(r1: float, z0: float, q: float, push: Line, weight: Line) -> tuple[Nine, float, float]:
-    """Terms r1 to r9, and r10 and r11, of the velocity of a linear arc while the weight changes.
+    """Compute the terms r1 to r9, r10 and r11 of the velocity of a linear arc under varying weight.
 
-    u'' = weight z - push with z = q u - (a constant) and z0 its value at the start.
+    u'' = weight z - push, where z is q u minus a constant and z0 is its initial value.
     """
     w, d = weight
     r2, z1 = w * z0 - push[0], q * r1
@@ -264,9 +261,10 @@ def weighted_rates(r1: float, z0: float, q: float, push: Line, weight: Line) -> 
 
 @inlined
 def nonlinear_rates(r1: float, angle: Line, l2: float, push: Line, weight: Line | None) -> tuple[Nine, Seven]:
-    """Terms r1 to r9 of the velocity of a nonlinear arc; l2 is -lam/2, ``angle`` sin and cos(alpha - u) at the start.
+    """Compute the terms r1 to r9 of the velocity of a nonlinear arc.
 
-    A weight of None is 1. The second tuple is as that of `nonlinear_ten`.
+    ``l2`` is -lam/2, ``angle`` the initial sine and cosine of alpha - u; a weight of None is 1. The second tuple is as
+    in `nonlinear_ten`.
     """
     s0, c0 = angle
     a, b = push
@@ -294,17 +292,17 @@ def nonlinear_rates(r1: float, angle: Line, l2: float, push: Line, weight: Line 
     return (r1, r2, r3, r4, r5, r6, r7, r8, r9), angles
 
 
-# ---- Where nine terms are enough; see "Where a series may end" in the documentation ----
+# ---- Sufficiency of nine terms; see "Where a series may end" in the documentation ----
 
-#: Nine times the largest bound on the truncation of a nonlinear velocity after nine terms, over the sum of their
-#: absolute values. The bound is a few times the truncation. It holds where two sums are below a quarter.
+#: Nine times the largest bound on the truncation of a nonlinear velocity after nine terms, divided by the sum of their
+#: absolute values. The bound, a few times the truncation, is valid if two sums are below a quarter.
 _TRUNCATION_OF_NINE = 9.0 * 2.0**-52
 _QUARTER = 0.25
 
 
 @inlined
 def strength_of(weight: Line | None, push: Line, t: float) -> Line:
-    """Return the sums of |weight| and |push| within t, and of their changes; lines are values and slopes."""
+    """Compute the sum of |weight| and |push| within t, and of their changes; lines are values and slopes."""
     if weight is None:
         return 1.0 + abs(push[0]) + abs(push[1]) * t, abs(push[1]) * t
     change = (abs(push[1]) + abs(weight[1])) * t
@@ -313,12 +311,12 @@ def strength_of(weight: Line | None, push: Line, t: float) -> Line:
 
 @inlined
 def truncation_is_negligible(r: Nine, z: Seven, stiffness: float, strength: Line) -> tuple[bool, float]:
-    """Whether the truncation after nine terms is below 2^-52; and a bound on all terms of u'' after the first.
+    """Return whether the truncation after nine terms is below 2^-52, and a bound on all terms of u'' after the first.
 
-    `truncation_nonlinear` for a motion and a weight that are linear in time, which is counted in steps of length h;
-    ``stiffness`` is lam h^2. Of a NaN it is False.
+    Special case of `truncation_nonlinear` for motion and weight linear in time, with steps of length h as the unit of
+    time and ``stiffness`` = lam h^2. False for NaN.
     """
-    t8 = r[7] + r[8]  # sums of all later terms from here on
+    t8 = r[7] + r[8]  # sums of all later terms
     t7 = r[6] + t8
     t6 = r[5] + t7
     t5 = r[4] + t6
@@ -328,7 +326,7 @@ def truncation_is_negligible(r: Nine, z: Seven, stiffness: float, strength: Line
     velocity = r[0] + t2
     products = (t8 + z[0] * t7) + (z[1] * t6 + z[2] * t5) + ((z[3] * t4 + z[4] * t3) + (z[5] * t2 + z[6] * velocity))
     most, change = stiffness * strength[0], stiffness * strength[1]
-    # The factors include the feedback where velocity and most are below a quarter.
+    # The factors include the feedback if velocity and most are below a quarter.
     beyond = 1.01 * change * z[6] + 0.131 * (most * products)
     negligible = (beyond <= _TRUNCATION_OF_NINE * velocity) & (velocity <= _QUARTER) & (most <= _QUARTER)
     return negligible, (t3 + t3) + ((t4 + t5) + (t6 + t7) + (t8 + r[8]))

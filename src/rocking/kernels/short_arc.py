@@ -1,7 +1,7 @@
-"""Steps so short that nine terms of the series are exact: in registers, with one bound on what may happen on the way.
+"""Steps so short that nine terms of the series suffice, in registers, with one bound on possible events.
 
-What the bound does not decide (two impacts close to each other, a rotation near the highest so far, a fall) is
-UNDECIDED, and so is a step with a NaN: it is for `expand` and `advance`, whose series are the same.
+The outcome is UNDECIDED for NaN and if the bound is inconclusive (two close impacts, a rotation near the largest so
+far, overturning). `expand` and `advance` then compute the step from the same series.
 """
 
 import math
@@ -24,37 +24,37 @@ from rocking.kernels.series import (
 )
 from rocking.kernels.state import Outcome, Record
 
-#: Largest lam t^2 of a linear step, lam |W| t^2 of one while the weight W changes, and (lam (|W| + |a|/g) + v^2) t^2 of
-#: a nonlinear one.
+#: Largest lam t^2 of a linear step, lam |W| t^2 under a varying weight W, and (lam (|W| + |a|/g) + v^2) t^2 of a
+#: nonlinear step.
 SHORT_LINEAR = 4e-3
 SHORT_WEIGHTED = 2e-3
 SHORT_NONLINEAR = 1.2e-3
 
-#: Least part of what is left that a short step is worth: a full series goes further, and is rounded less often.
+#: Smallest fraction of the remaining time for which a short step pays: full series reach further with less rounding.
 _WORTH = 0.125
 
-#: Largest sum of the last two terms of a linear velocity, over the first two: as lam t^2 is small, the truncation is
-#: smaller by a factor of 18,000 or more.
+#: Largest sum of the last two terms of a linear velocity, divided by the first two. For small lam t^2, the truncation
+#: is smaller by a factor of at least 18,000.
 _LAST_TERMS = 2.0**-40
 
-#: Largest of what `is_complete_weighted` tests over the first two terms: the truncation is a sixtieth of it.
+#: Largest quantity tested by `is_complete_weighted`, divided by the first two terms; the truncation is 1/60 of it.
 _NEXT_TERMS = 2.0**-46
 
-#: Newton's steps at most, and the relative size of the one that ends them: the error is of the order of its square.
+#: Largest number of Newton steps, and relative size of the last, whose square is the order of the error.
 _NEWTON_STEPS = 8
 _CONVERGED = 1e-8
 
 
 @inlined
 def short_step(ground: Ground, block: Record, settings: Record, state: Record, left: float) -> StepEnd:
-    """Step to the next impact or over ``left``, or a part of it; UNDECIDED where it is small or not simple."""
+    """Step to the next impact, over ``left``, or part of it; UNDECIDED if the step is small or not simple."""
     end = short_part(ground, block, settings, state, left)
     return undecided() if end.outcome == Outcome.STEP and end.time < _WORTH * left else end
 
 
 @inlined
 def short_part(ground: Ground, block: Record, settings: Record, state: Record, left: float) -> StepEnd:
-    """Step to the next impact or over ``left``, or the part of it that is short."""
+    """Step to the next impact, over ``left``, or over the part of it that is short."""
     if not is_straight(ground) or block.restrained:
         return undecided()
     if has_vertical(ground):
@@ -68,7 +68,7 @@ def short_part(ground: Ground, block: Record, settings: Record, state: Record, l
 
 @shared
 def short_weighted_step(ground: Ground, block: Record, settings: Record, state: Record, left: float) -> StepEnd:
-    """Step in the same way while the weight changes."""
+    """Compute a short step under varying weight."""
     lam = block.stiffness[state.side]
     weight = weight_at(ground, state.piece, state.offset), coefficient(vertical_of(ground), state.piece, 1)
     if settings.nonlinear:
@@ -80,7 +80,7 @@ def short_weighted_step(ground: Ground, block: Record, settings: Record, state: 
 
 @inlined
 def short_nonlinear_step(ground: Ground, block: Record, state: Record, left: float, weight: Line | None) -> StepEnd:
-    """Step in the same way in the nonlinear model."""
+    """Compute a short step in the nonlinear model."""
     c, angles = nonlinear_series(ground, block, state, weight)
     lam, slope = block.stiffness[state.side], coefficient(ground, state.piece, 1)
     start = coefficient(ground, state.piece, 0) + slope * state.offset
@@ -93,10 +93,10 @@ def short_nonlinear_step(ground: Ground, block: Record, state: Record, left: flo
 
 @inlined
 def is_complete_weighted(c: Ten, lam: float, weight: Line, t: float) -> bool:
-    """Whether nine terms of a linear series are enough at t while the weight changes.
+    """Return whether nine terms of a linear series are sufficient at t under varying weight.
 
-    Each coefficient follows from the one two before and, as the weight changes, from the one three before. So the last
-    three bound the truncation, by a geometric sum with the ratio lam (|W| + |W'| t) t^2, which is at most 0.006.
+    Each coefficient follows from those two and, by the change of weight, three before. Therefore the last three bound
+    the truncation by a geometric sum with the ratio lam (|W| + |W'| t) t^2 <= 0.006.
     """
     t2, change = t * t, abs(weight[1]) * t
     t6 = t2 * t2 * t2
@@ -107,7 +107,7 @@ def is_complete_weighted(c: Ten, lam: float, weight: Line, t: float) -> bool:
 
 @inlined
 def is_complete_nonlinear(c: Ten, z: Seven, lam: float, push: Line, weight: Line | None, t: float) -> bool:
-    """Whether nine terms of a nonlinear series are enough at t."""
+    """Return whether nine terms of a nonlinear series are sufficient at t."""
     t2 = t * t
     t3, t4 = t2 * t, t2 * t2
     t5, t6, t7 = t2 * t3, t3 * t3, t3 * t4
@@ -120,25 +120,25 @@ def is_complete_nonlinear(c: Ten, z: Seven, lam: float, push: Line, weight: Line
 
 @inlined
 def undecided() -> StepEnd:
-    """No answer."""
+    """Return an UNDECIDED step."""
     return StepEnd(Outcome.UNDECIDED, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @inlined
 def reach(size: float, limit: float, left: float) -> float:
-    """Time t, at most ``left``, up to which size t^2 is within a limit."""
+    """Return the time t, at most ``left``, up to which size t^2 is within a limit."""
     return left if size * left * left <= limit else min(left, math.sqrt(limit / size))
 
 
 @inlined
 def greatest(weight: Line | None, left: float) -> float:
-    """Greatest absolute value of the weight over a time; 1 where it does not change."""
+    """Return the largest absolute weight during a time; 1 if constant."""
     return 1.0 if weight is None else max(abs(weight[0]), abs(weight[0] + weight[1] * left))
 
 
 @inlined
 def linear_series(ground: Ground, block: Record, state: Record) -> Ten:
-    """Series of a linear arc under a ground acceleration that is linear in time."""
+    """Compute the series of a linear arc under a ground acceleration that is linear in time."""
     side = state.side
     gain = block.threshold_slope[side]
     push = push_line(ground, state)
@@ -147,7 +147,7 @@ def linear_series(ground: Ground, block: Record, state: Record) -> Ten:
 
 @inlined
 def weighted_series(ground: Ground, block: Record, state: Record, weight: Line) -> Ten:
-    """Series of a linear arc under two ground accelerations that are linear in time."""
+    """Compute the series of a linear arc under two ground accelerations that are linear in time."""
     side, gain = state.side, block.threshold_slope[state.side]
     push = push_line(ground, state)
     pushes = (gain * push[0], gain * push[1])
@@ -156,7 +156,7 @@ def weighted_series(ground: Ground, block: Record, state: Record, weight: Line) 
 
 @inlined
 def nonlinear_series(ground: Ground, block: Record, state: Record, weight: Line | None) -> tuple[Ten, Seven]:
-    """Series of a nonlinear arc under ground accelerations that are linear in time; see `nonlinear_ten`."""
+    """Compute the series of a nonlinear arc under ground accelerations that are linear in time; see `nonlinear_ten`."""
     side, u = state.side, state.u
     angle = (block.sine[side], block.cosine[side])
     if u != 0.0:
@@ -167,27 +167,27 @@ def nonlinear_series(ground: Ground, block: Record, state: Record, weight: Line 
 
 @inlined
 def push_line(ground: Ground, state: Record) -> Line:
-    """Ground acceleration in the frame of the state's side, and its slope, where it is linear in time."""
+    """Return the ground acceleration (linear in time) in the frame of the state's side, and its slope."""
     sign = sign_of(state.side)
     return sign * acceleration(ground, state.piece, state.offset), sign * coefficient(ground, state.piece, 1)
 
 
 @inlined
 def resolve_step(c: Ten, t: float, state: Record, fallen: float) -> StepEnd:
-    """End of a step over t, or at the first impact before; UNDECIDED where the bounds do not decide it."""
-    if c[1] == 0.0 and c[2] == 0.0:  # balanced, perhaps for ever
+    """Return the end of a step of duration t, or its first impact; UNDECIDED if the bounds are inconclusive."""
+    if c[1] == 0.0 and c[2] == 0.0:  # balanced, perhaps forever
         return undecided()
     outcome = Outcome.STEP
     rest = later_curvature(c, t)
     most = 2.0 * c[2] + 6.0 * max(c[3], 0.0) * t + rest
     least = 2.0 * c[2] + 6.0 * min(c[3], 0.0) * t - rest
     if c[0] == 0.0:
-        # u/t > v + min(u'')/2 t: no impact while that is positive.
+        # u/t > v + min(u'')/2 t: no impact while the right side is positive.
         if not c[1] + 0.5 * min(least, 0.0) * t > 0.0:
             t, outcome = impact_from_ground(c, t), Outcome.IMPACT
     else:
         end = rotation(c, t)
-        # The rotation is not below both ends by more than t^2/8 of the curvature.
+        # The rotation is at most t^2/8 times the curvature below the lower of both ends.
         if not min(c[0], end) > 0.125 * t * t * max(most, 0.0):
             falls = most < 0.0 or c[1] + max(most, 0.0) * t < 0.0
             t, outcome = impact_from_above(c, t) if end < 0.0 and falls else np.nan, Outcome.IMPACT
@@ -208,7 +208,7 @@ def resolve_step(c: Ten, t: float, state: Record, fallen: float) -> StepEnd:
 
 @inlined
 def later_curvature(c: Ten, t: float) -> float:
-    """Bound on the absolute value of what the terms from the fourth power on add to u'' within t."""
+    """Bound the contribution of the terms from the fourth power on to |u''| within t."""
     high = 56.0 * abs(c[8]) + 72.0 * abs(c[9]) * t
     middle = 30.0 * abs(c[6]) + 42.0 * abs(c[7]) * t
     low = 12.0 * abs(c[4]) + 20.0 * abs(c[5]) * t
@@ -218,7 +218,7 @@ def later_curvature(c: Ten, t: float) -> float:
 
 @inlined
 def is_complete(c: Ten, t: float) -> bool:
-    """Whether nine terms of a linear series are enough at t, for the velocity to its last place."""
+    """Return whether nine terms of a linear series are sufficient at t for the velocity to its last place."""
     t2 = t * t
     t4 = t2 * t2
     return 9.0 * (abs(c[8]) + abs(c[9]) * t) * (t4 * t4) <= _LAST_TERMS * (abs(c[1]) * t + 2.0 * abs(c[2]) * t2)
@@ -226,7 +226,7 @@ def is_complete(c: Ten, t: float) -> bool:
 
 @inlined
 def rotation(c: Ten, t: float) -> float:
-    """Value of a series, added up in pairs: a shorter chain of operations than Horner's rule."""
+    """Evaluate a series in pairs, a shorter chain of operations than Horner's rule."""
     t2 = t * t
     low = (c[2] + c[3] * t) + (c[4] + c[5] * t) * t2
     high = (c[6] + c[7] * t) + (c[8] + c[9] * t) * t2
@@ -235,7 +235,7 @@ def rotation(c: Ten, t: float) -> float:
 
 @inlined
 def velocity(c: Ten, t: float) -> float:
-    """Value of a series' derivative."""
+    """Evaluate the derivative of a series."""
     t2 = t * t
     low = (2.0 * c[2] + 3.0 * c[3] * t) + (4.0 * c[4] + 5.0 * c[5] * t) * t2
     high = (6.0 * c[6] + 7.0 * c[7] * t) + (8.0 * c[8] + 9.0 * c[9] * t) * t2
@@ -244,7 +244,7 @@ def velocity(c: Ten, t: float) -> float:
 
 @inlined
 def over_time(c: Ten, t: float) -> tuple[float, float]:
-    """Value and slope of a series without constant term, divided by t."""
+    """Compute value and slope of a series without constant term, divided by t."""
     t2 = t * t
     low = (c[2] + c[3] * t) + (c[4] + c[5] * t) * t2
     high = (c[6] + c[7] * t) + (c[8] + c[9] * t) * t2
@@ -255,7 +255,7 @@ def over_time(c: Ten, t: float) -> tuple[float, float]:
 
 @inlined
 def highest_time(c: Ten, left: float) -> float:
-    """Time of the highest rotation of an arc that is concave, rises first and falls at ``left``; NaN: not found."""
+    """Find the time of the peak of a concave arc that rises first and falls at ``left``; NaN if not found."""
     t = min(left, -0.5 * c[1] / c[2])
     for _ in range(_NEWTON_STEPS):
         t2 = t * t
@@ -270,7 +270,7 @@ def highest_time(c: Ten, left: float) -> float:
 
 @inlined
 def impact_from_ground(c: Ten, left: float) -> float:
-    """Duration of the arc that an impact starts, where it ends before ``left`` and u/t falls all the way; else NaN."""
+    """Find the duration of an arc from an impact if it ends before ``left`` and u/t decreases throughout; else NaN."""
     root = c[2] * c[2] - 4.0 * c[3] * c[1]
     if not (c[2] < 0.0 and root > 0.0):
         return np.nan
@@ -289,7 +289,7 @@ def impact_from_ground(c: Ten, left: float) -> float:
 
 @inlined
 def impact_from_above(c: Ten, left: float) -> float:
-    """Time to the one root of an arc that is above ground now and below it at ``left``; NaN if it is not found."""
+    """Find the time of the only root of an arc that is above ground now and below at ``left``; NaN if not found."""
     square = c[1] * c[1] - 4.0 * c[2] * c[0]
     if not square > 0.0:
         return np.nan

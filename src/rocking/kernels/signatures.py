@@ -1,4 +1,4 @@
-"""The types for which kernels are compiled."""
+"""Argument types for which kernels are compiled."""
 
 import importlib
 from typing import Any
@@ -13,19 +13,19 @@ from rocking.kernels.trace import Trail
 
 
 def named(name: str) -> Any:
-    """Return a kernel by its name in `signatures`: module and function."""
+    """Return a kernel by its name (module and function) in `signatures`."""
     module, _, function = name.rpartition(".")
     return getattr(importlib.import_module(f"rocking.kernels.{module}"), function)
 
 
 def signatures() -> dict[str, tuple[Any, ...]]:
-    """Return arguments as Python passes them to each kernel, by its name: of them only the types count."""
+    """Return sample arguments of each kernel by its name; only their types matter."""
 
     def reals(*shape: int, kind: Any = np.float64) -> Any:
         return np.ones(shape or (1,), dtype=kind)
 
     def given(*shape: int) -> Any:
-        """Numbers that a kernel only reads: whether Python may write them does not matter."""
+        """Return an array that a kernel only reads."""
         array = reals(*shape)
         array.flags.writeable = False
         return array

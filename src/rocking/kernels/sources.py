@@ -1,4 +1,4 @@
-"""Hashes of the kernels' sources. The build runs this file alone, so it imports the standard library only."""
+"""Hashes of the kernels' sources. This module imports only the standard library because the build runs it alone."""
 
 import ast
 import hashlib
@@ -12,7 +12,7 @@ def text_hash(folder: Path) -> str:
 
 
 def code_hash(folder: Path) -> str:
-    """Hash the code of all kernels without comments and docstrings; takes longer than `text_hash`."""
+    """Hash the code of all kernels without comments and docstrings, slower than `text_hash`."""
     return _hash(folder, _code)
 
 

@@ -1,7 +1,7 @@
-"""What is computed again from the nodes of a response: its rotation at any time, and how it changes with the input.
+"""Rotation of a response at any time, and its derivatives by the input, recomputed from the nodes.
 
-For the latter a quantity x is changed to x (1 + epsilon), and d/d epsilon at 0 is carried along: through an arc by the
-linearised equation of motion, through an impact by the saltation that follows from its shift in time.
+For a change of x to x (1 + epsilon), d/d epsilon at 0 is propagated: through an arc by the linearised equation of
+motion, through an impact by the saltation due to its shift in time.
 """
 
 import math
@@ -24,7 +24,7 @@ NO_NODES = records(0, NODE_ROW)
 
 
 class Trail(NamedTuple):
-    """The problem and the nodes of a response, from which it can be computed again."""
+    """Problem and nodes of a response, sufficient to recompute it."""
 
     ground: Ground
     block: Record
@@ -33,14 +33,14 @@ class Trail(NamedTuple):
 
 
 def copy_trail(trail: Trail) -> Trail:
-    """Trail with a block of its own where a tendon yields: what follows its steps changes the law of that block."""
+    """Return a trail with its own block if a tendon yields, because its law changes from step to step."""
     return trail._replace(block=trail.block.copy()) if trail.block["yielding"] else trail
 
 
 #: Three variations.
 Three = tuple[float, float, float]
 
-#: Columns of what `trace` writes.
+#: Columns of the output of `trace`.
 _ROTATION, _VELOCITY, _ACCELERATION = 0, 1, 2
 
 
@@ -48,19 +48,18 @@ _ROTATION, _VELOCITY, _ACCELERATION = 0, 1, 2
 def trace(trail: Trail, scratch: Record, times: Floats, rows: Integers, out: Floats) -> None:
     """Write theta, theta', theta'' at times[k], in the step that starts at trail.nodes[rows[k]], into out[k].
 
-    From the end of the last resolved arc to rest, or to the end of the response, they are zero. For a
-    NaN the values mean nothing.
+    They are zero from the end of the last resolved arc to rest or the end of the response, and meaningless for NaN.
     """
     ground, block, settings, nodes = trail
     expanded = -1
     order = 0
-    known, plastic = -1, 0.0  # of a tendon that yields
+    known, plastic = -1, 0.0  # for a tendon that yields
     landing = np.inf
     for k in range(times.shape[0]):
         row = rows[k]
         node = nodes[row]
         last = row + 1 == nodes.shape[0]
-        closes = last or nodes[row + 1].side < 0  # what follows its arc is not resolved
+        closes = last or nodes[row + 1].side < 0  # the motion after its arc is not resolved
         if node.side < 0:
             out[k, _ROTATION] = out[k, _VELOCITY] = out[k, _ACCELERATION] = 0.0
             continue
@@ -90,13 +89,13 @@ def trace(trail: Trail, scratch: Record, times: Floats, rows: Integers, out: Flo
         out[k, _ACCELERATION] = sign * w
 
 
-# ---- How a response changes with what it was computed from ----
+# ---- Derivatives of a response with respect to its input ----
 
 
 class Quantity(IntEnum):
-    """What is changed: the motion, the initial rotation or velocity, or p, slenderness or restitution of both sides.
+    """Quantity that varies: the motion; the initial rotation or velocity; p, slenderness or restitution of both sides.
 
-    Then the same three of side + alone, and of side - alone; and nothing.
+    The last three follow for side + and side - alone, then NOTHING.
     """
 
     MOTION = 0
@@ -114,7 +113,7 @@ class Quantity(IntEnum):
     NOTHING = 12
 
 
-#: An uplift is a jump where the motion is beyond the threshold by more than this fraction of it.
+#: An uplift is a jump if the motion exceeds the threshold by more than this fraction of it.
 _JUMP = 1e-9
 
 
@@ -129,15 +128,15 @@ def vary(
     impacts: Floats,
     events: Floats,
 ) -> None:
-    """Write changes of u at given times, and the shifts of all impacts and events, per unit of epsilon, into arrays.
+    """Write changes of u at given times, and shifts of all impacts and events, per unit of epsilon, into arrays.
 
-    ``times`` ascend; at an impact the change is that before it. ``work`` is scratch space (`state.VARIATION`).
+    ``times`` ascend; at an impact, the change before it is written. ``work`` is scratch space (`state.VARIATION`).
     """
     nodes = trail.nodes
     impact_count = event_count = 0
     du = nodes[0].u if quantity == Quantity.ROTATION else 0.0
     dv = nodes[0].v if quantity == Quantity.VELOCITY else 0.0
-    plastic, dp = 0.0, plastic_by_start(trail) * du  # elongation of a tendon for good, and its variation
+    plastic, dp = 0.0, plastic_by_start(trail) * du  # plastic elongation of a tendon, and its variation
     done = count_until(times, 0, nodes[0].time)
     changes[:done] = du
     changes[done:] = 0.0
@@ -186,16 +185,16 @@ def vary(
 def leaving(
     trail: Trail, node: Record, following: Record, quantity: int, by_tendon: float, landing: float
 ) -> tuple[float, float]:
-    """Shift of an uplift and variation of the velocity after it, from a rest whose own start shifts by ``landing``."""
+    """Return shift and velocity variation of an uplift after a rest whose start shifts by ``landing``."""
     if following.time > node.time or node.time == trail.nodes[0].time:
         return uplift_shift(trail, following, quantity, by_tendon), 0.0
-    # The ground ends the rest at once: the arc starts where that does.
+    # The ground ends the rest immediately: the arc starts at the same time.
     return landing, landing * restoring(trail.ground, trail.block, following.side, following.piece, following.offset)
 
 
 @inlined
 def count_until(times: Floats, count: int, last: float) -> int:
-    """Count the times up to the last one, of which so many are known."""
+    """Count the times up to ``last``, starting from a known ``count``."""
     while count < times.shape[0] and times[count] <= last:
         count += 1
     return count
@@ -205,7 +204,7 @@ def count_until(times: Floats, count: int, last: float) -> int:
 def note_changes(
     trail: Trail, scratch: Record, work: Record, node: Record, order: int, times: Floats, changes: Floats, lands: bool
 ) -> None:
-    """Write changes of u along the arc from a node, as it and its variation are in scratch; from landing on none."""
+    """Write changes of u along the arc from a node, whose series are in scratch, until it lands."""
     for n in range(times.shape[0]):
         t = times[n] - start_of(trail.ground, node.piece) - node.offset
         u, _, _ = evaluate(scratch.rotation, order, t)
@@ -215,7 +214,7 @@ def note_changes(
 
 @inlined
 def on_side(quantity: int, side: int) -> int:
-    """Tell what a quantity is on a side: itself, that of both sides where it is this side's own, or nothing."""
+    """Return the part of a quantity on a side: itself, its counterpart for both sides, or NOTHING."""
     if quantity <= Quantity.RESTITUTION:
         return quantity
     own = quantity - Quantity.FREQUENCY_PLUS - 3 * side
@@ -224,13 +223,13 @@ def on_side(quantity: int, side: int) -> int:
 
 @inlined
 def elongation_rate(trail: Trail, side: int, u: float) -> float:
-    """Elongation of a tendon per rotation, at a rotation."""
+    """Compute the elongation of a tendon per rotation."""
     return trail.block.lever_arm[side] * (math.cos(0.5 * u) if trail.settings.nonlinear else 1.0)
 
 
 @inlined
 def plastic_by_start(trail: Trail) -> float:
-    """Return the plastic elongation of a tendon per rotation at the start of a response: 0 unless it yields there."""
+    """Return the plastic elongation per rotation at the start of a response: 0 unless the tendon yields there."""
     node = trail.nodes[0]
     if not trail.block.yielding or plastic_after(trail.block, trail.settings, trail.nodes, 0, 0.0) <= 0.0:
         return 0.0
@@ -239,17 +238,17 @@ def plastic_by_start(trail: Trail) -> float:
 
 @inlined
 def is_impact(nodes: Records, k: int) -> bool:
-    """Whether the step from the k-th node to the next ends in an impact, and not in a touch without speed."""
+    """Return whether the step from the k-th node ends in an impact, and not in a contact without speed."""
     node, following = nodes[k], nodes[k + 1]
     if node.side < 0 or following.side < 0 or following.u != 0.0:
         return False
-    rests = k + 2 < nodes.shape[0] and nodes[k + 2].side < 0  # at once, where nothing is left of the speed
+    rests = k + 2 < nodes.shape[0] and nodes[k + 2].side < 0  # immediately, if no speed is left
     return bool(following.side != node.side or following.v > 0.0 or rests)
 
 
 @inlined
 def elapsed(trail: Trail, node: Record, following: Record) -> float:
-    """Length of a step, without the rounding of absolute times."""
+    """Compute the length of a step without the rounding of absolute times."""
     if following.piece == node.piece:
         return following.offset - node.offset
     if following.piece == node.piece + 1:
@@ -261,9 +260,9 @@ def elapsed(trail: Trail, node: Record, following: Record) -> float:
 def expand_variation(
     trail: Trail, scratch: Record, work: Record, node: Record, quantity: int, start: Three, left: float
 ) -> int:
-    """Series of the variation along the arc from a node, into ``work.change``; returns its order.
+    """Write the series of the variation along the arc from a node into ``work.change``, and return its order.
 
-    ``start``: variations of rotation and velocity there, and of a tendon's plastic elongation.
+    ``start``: variations of rotation, velocity and a tendon's plastic elongation.
     """
     order, _, degree = expand(trail.ground, trail.block, trail.settings, scratch, node, left)
     expand_coefficients(trail, scratch, work, node.side, degree, order)
@@ -291,9 +290,9 @@ def expand_variation(
 
 @inlined
 def expand_coefficients(trail: Trail, scratch: Record, work: Record, side: int, degree: int, order: int) -> None:
-    """Write the series of d u''/d u but for `add_restraints`, and of u'' per unit of change of the motion, to ``work``.
+    """Write the series of d u''/d u without `add_restraints`, and of u'' per unit change of the motion, to ``work``.
 
-    The motion is then in scratch without what restraints add to it.
+    This removes the contribution of restraints from the motion in scratch.
     """
     lam, gain, threshold = trail.block.stiffness[side], trail.block.threshold_slope[side], trail.block.threshold[side]
     A, W, S, C = scratch.ground, scratch.weight, scratch.sine, scratch.cosine
@@ -327,7 +326,7 @@ def expand_coefficients(trail: Trail, scratch: Record, work: Record, side: int, 
 
 @inlined
 def add_restraints(trail: Trail, scratch: Record, work: Record, side: int, order: int) -> None:
-    """Add what prestress and springs are to d u''/d u, after `expand_coefficients`."""
+    """Add the contribution of prestress and springs to d u''/d u, after `expand_coefficients`."""
     work.stiffness[0] -= trail.block.spring[side]
     if trail.settings.nonlinear and trail.block.prestress[side] != 0.0:
         for k in range(order - 1):
@@ -336,7 +335,7 @@ def add_restraints(trail: Trail, scratch: Record, work: Record, side: int, order
 
 @inlined
 def expand_free(trail: Trail, scratch: Record, work: Record, side: int, degree: int, order: int) -> None:
-    """Write the series of d u''/d u, and no forcing, to ``work``."""
+    """Write the series of d u''/d u without forcing to ``work``."""
     expand_coefficients(trail, scratch, work, side, degree, order)
     for k in range(order - 1):
         work.forcing[k] = 0.0
@@ -345,7 +344,7 @@ def expand_free(trail: Trail, scratch: Record, work: Record, side: int, degree: 
 
 @inlined
 def added_weight(W: Floats, k: int, changes: int) -> float:
-    """Coefficient of what the motion adds to the weight."""
+    """Return a coefficient of the weight added by the motion."""
     if k > changes:
         return 0.0
     return W[0] - 1.0 if k == 0 else W[k]
@@ -355,9 +354,9 @@ def added_weight(W: Floats, k: int, changes: int) -> float:
 def saltation(
     trail: Trail, node: Record, following: Record, quantity: int, shift: float, rates: tuple[float, float], number: int
 ) -> tuple[float, float]:
-    """Variation after an impact that shifts; ``rates``: variation of the velocity before it, and speed of impact.
+    """Compute the variation after an impact that shifts; ``rates``: velocity variation before it, and impact speed.
 
-    ``number`` of impacts came before. Where the restitution varies, its law is changed as a whole.
+    ``number`` of impacts came before. A variable restitution varies as a whole.
     """
     block = trail.block
     dv, speed = rates
@@ -373,7 +372,7 @@ def saltation(
 
 @inlined
 def uplift_shift(trail: Trail, node: Record, quantity: int, by_tendon: float) -> float:
-    """Shift of the uplift with which a node begins; ``by_tendon``: see `restoring_by_tendon`."""
+    """Compute the shift of the uplift of a node; ``by_tendon``: see `restoring_by_tendon`."""
     ground, block, settings, _ = trail
     threshold = block.threshold[node.side]
     push = -push_at(ground, block, node.side, node.piece, node.offset)
@@ -394,7 +393,7 @@ def uplift_shift(trail: Trail, node: Record, quantity: int, by_tendon: float) ->
 
 @inlined
 def is_jump(trail: Trail, node: Record) -> bool:
-    """Whether the motion jumps past the threshold at the uplift with which a node begins."""
+    """Return whether the motion jumps past the threshold at the uplift of a node."""
     threshold, hold = trail.block.threshold[node.side], trail.block.restraint_threshold[node.side]
     push = -push_at(trail.ground, trail.block, node.side, node.piece, node.offset)
     return bool(abs(push - threshold - hold) > _JUMP * (abs(threshold) + abs(hold)))
@@ -402,7 +401,7 @@ def is_jump(trail: Trail, node: Record) -> bool:
 
 @inlined
 def restoring_by_tendon(block: Record, side: int, plastic: float, change: float) -> float:
-    """Change of the restoring acceleration at zero rotation with that of a tendon's plastic elongation."""
+    """Compute the effect of a change of plastic elongation on the restoring acceleration at zero rotation."""
     if not block.yielding or law_of_standing(block, plastic) == TendonLaw.SLACK:
         return 0.0
     return -block.tendon[side] * change
@@ -410,14 +409,14 @@ def restoring_by_tendon(block: Record, side: int, plastic: float, change: float)
 
 @inlined
 def push_at(ground: Ground, block: Record, side: int, piece: int, offset: float) -> float:
-    """Acceleration towards a side, and what the weight adds to its threshold."""
+    """Compute the acceleration towards a side plus the weight's contribution to its threshold."""
     added = weight_at(ground, piece, offset) - 1.0
     return sign_of(side) * acceleration(ground, piece, offset) + block.threshold[side] * added
 
 
 @inlined
 def push_rate(ground: Ground, block: Record, side: int, piece: int, offset: float) -> float:
-    """Rate of `push_at`."""
+    """Compute the rate of `push_at`."""
     vertical = slope(vertical_of(ground), piece, offset) if has_vertical(ground) else 0.0
     return sign_of(side) * slope(ground, piece, offset) + block.threshold[side] * vertical
 
@@ -426,11 +425,11 @@ def push_rate(ground: Ground, block: Record, side: int, piece: int, offset: floa
 def rest_shift(
     trail: Trail, node: Record, quantity: int, changes: tuple[float, float, float, float], rest: Record
 ) -> float:
-    """Shift of the rest that follows an impact, to first order in the speed (the paper's Eq. 75).
+    """Compute the shift of the rest that follows an impact, to first order in the speed (the paper's Eq. 75).
 
-    ``changes``: variation of the velocity after the impact with which the node begins, at the unchanged time, shift of
-    that impact, and a tendon's plastic elongation with its variation. The time to rest is
-    T = 2 v (1/g_i + e_i/g_j)/(1 - e_i e_j), with v and g at the impact.
+    ``changes``: velocity variation after the node's impact at the unchanged time, shift of that impact, plastic
+    elongation of a tendon and its variation. The time to rest is T = 2 v (1/g_i + e_i/g_j)/(1 - e_i e_j), with v and g
+    at the impact.
     """
     dv, shift, plastic, dp = changes
     if rest.time == node.time:
@@ -452,7 +451,7 @@ def rest_shift(
 
 @inlined
 def restoring_shift(trail: Trail, node: Record, j: int, quantity: int, shift: float) -> float:
-    """Change of a side's restoring acceleration at an impact that shifts."""
+    """Compute the change of a restoring acceleration at an impact that shifts."""
     ground, block, settings, _ = trail
     here = acceleration(ground, node.piece, node.offset)
     change = block.threshold_slope[j] * shift * push_rate(ground, block, j, node.piece, node.offset)

@@ -1,4 +1,7 @@
-"""Uplift: when the ground acceleration first passes the threshold of a side. A NaN never passes one."""
+"""Uplift: first time at which the ground acceleration passes the threshold of a side. A NaN never does.
+
+The arguments ``A`` and ``d`` are scratch space.
+"""
 
 from typing import NamedTuple
 
@@ -23,12 +26,12 @@ from rocking.kernels.restraints import apply_tendon_law, plastic_after
 from rocking.kernels.state import AT_REST, Record, Records, stop_of
 from rocking.kernels.trace import Trail
 
-#: Accelerations closer to a threshold than this fraction of it are at the threshold.
+#: Accelerations that differ from a threshold by less than this fraction are at the threshold.
 _ROUNDING = 2.0**-48
 
 
 class Uplift(NamedTuple):
-    """Where a block lifts off: piece of the motion, offset within it, side, and whether the motion jumps there."""
+    """Uplift of a block: piece of the motion, offset within it, side, and whether the motion jumps there."""
 
     piece: int
     offset: float
@@ -40,14 +43,14 @@ class Uplift(NamedTuple):
 def next_uplift(
     ground: Ground, block: Record, scratch: Record, resting: int, piece: int, offset: float, stop: float
 ) -> Uplift:
-    """First instant from (piece, offset) at which the motion passes a side's threshold; the body's side is ``resting``.
+    """Find the first instant from (piece, offset) at which the motion passes a threshold of a body at rest.
 
-    Side AT_REST when it never does before ``stop``; the piece is then the last one looked at.
+    Without an uplift before ``stop``, the side is AT_REST and the piece the last one examined.
     """
     A, d = scratch.ground, scratch.other
     plus, minus = block.threshold[0], block.threshold[1]
     hold_plus, hold_minus = block.restraint_threshold[0], block.restraint_threshold[1]
-    if block.two_stops:  # only the stop at which it rests
+    if block.two_stops:  # only the stop at which the body rests
         plus, minus = (plus, np.inf) if stop_of(resting) == 0 else (np.inf, minus)
     while True:
         following = next_beyond(ground, piece, (-plus, minus), (-hold_plus, hold_minus))
@@ -67,10 +70,11 @@ def next_uplift(
             degree = push_series(ground, piece, offset, minus, 1.0, A, d)
             to_minus, jump_minus = first_excess(A, degree, left, minus + hold_minus, 1.0, d)
             passed = min(to_plus, to_minus)
-            # A passing that rounding puts at the end of the piece is decided in the next one, which may turn back.
+            # If rounding puts a passing at the end of the piece, the next one decides, because the motion may turn
+            # back.
             if offset + passed < length:
                 side = stop_of(resting) if block.two_stops else 0
-                if block.next_side[0] != 0:  # it rests on both sides
+                if block.next_side[0] != 0:  # the body rests on both sides
                     side = lifted_side(ground, block, piece, offset + passed, length - offset - passed, A, d)
                 return Uplift(piece, offset + passed, side, jump_minus if side == 1 else jump_plus)
         piece += 1
@@ -79,9 +83,9 @@ def next_uplift(
 
 @kernel
 def next_uplifts(trail: Trail, scratch: Record, times: Floats) -> None:
-    """Write the time of the next uplift from each node at rest; an infinity where there is none.
+    """Write the time of the next uplift from each node at rest, or inf if there is none.
 
-    The law of a tendon that yields changes in the trail's block.
+    The law of a tendon that yields changes in the block of the trail.
     """
     ground, block, settings, nodes = trail
     plastic = 0.0
@@ -97,11 +101,10 @@ def next_uplifts(trail: Trail, scratch: Record, times: Floats) -> None:
 
 @inlined
 def lifted_side(ground: Ground, block: Record, piece: int, offset: float, h: float, A: Floats, d: Floats) -> int:
-    """Side of an uplift of a body that rests on both: that whose threshold is exceeded by more within h from here.
+    """Return the side of an uplift of a body that rests on both: the side whose threshold is exceeded by more within h.
 
-    With what presses the body down it is the side of the threshold that is passed. Without it both are passed at
-    instants that differ by rounding only, and what pushes the body decides: side + without a push. ``A`` and ``d`` are
-    scratch space.
+    With a positive weight, it is the side whose threshold is passed. Without, both are passed at instants that differ
+    only by rounding, and the push on the body decides: side + without a push.
     """
     degree = difference_series(ground, block, piece, offset, A, d)
     lead = leading_power(A, degree, h, rounding_of(A, degree, h))
@@ -110,10 +113,7 @@ def lifted_side(ground: Ground, block: Record, piece: int, offset: float, h: flo
 
 @inlined
 def is_hardly_pushed(ground: Ground, block: Record, piece: int, offset: float, h: float, A: Floats, d: Floats) -> bool:
-    """Whether a push that counts as none within h is first: rounding decides the side of an uplift without weight.
-
-    ``A`` and ``d`` are scratch space.
-    """
+    """Return whether the push has negligible leading terms, so that rounding decides the side without weight."""
     degree = difference_series(ground, block, piece, offset, A, d)
     hidden = 0.0
     for k in range(leading_power(A, degree, h, rounding_of(A, degree, h))):
@@ -123,10 +123,9 @@ def is_hardly_pushed(ground: Ground, block: Record, piece: int, offset: float, h
 
 @inlined
 def difference_series(ground: Ground, block: Record, piece: int, offset: float, A: Floats, d: Floats) -> int:
-    """Write half of what the excess over the threshold of side - has beyond that of side + into A; return its degree.
+    """Write half the difference of the excess over both thresholds (side - minus side +) into A; return its degree.
 
-    Without restraints it is the horizontal motion, of unequal sides as well: both thresholds vanish with the weight.
-    ``d`` is scratch space.
+    Without restraints this is the horizontal motion, even for unequal sides: both thresholds vanish with the weight.
     """
     if block.restraint_threshold[0] == 0.0 and block.restraint_threshold[1] == 0.0:
         return local_series(ground, piece, offset, 1.0, A)
@@ -140,10 +139,10 @@ def difference_series(ground: Ground, block: Record, piece: int, offset: float, 
 def push_series(ground: Ground, piece: int, offset: float, threshold: float, sign: float, A: Floats, d: Floats) -> int:
     """Write the polynomial that, times ``sign``, is compared with a threshold into A, and return its degree.
 
-    It is the motion less what the vertical component adds to the threshold. ``d`` is scratch space.
+    It is the motion minus the contribution of the vertical component to the threshold.
     """
     degree = local_series(ground, piece, offset, 1.0, A)
-    if not has_vertical(ground) or threshold == np.inf:  # the threshold of a side that nothing lifts stays infinite
+    if not has_vertical(ground) or threshold == np.inf:  # the threshold of a side that is never lifted stays infinite
         return degree
     changes = local_series(vertical_of(ground), piece, offset, 1.0, d)
     for k in range(degree + 1, changes + 1):
@@ -155,10 +154,7 @@ def push_series(ground: Ground, piece: int, offset: float, threshold: float, sig
 
 @shared
 def first_excess(A: Floats, degree: int, h: float, threshold: float, sign: float, d: Floats) -> tuple[float, bool]:
-    """First time in [0, h) from which sign * A(t) > threshold, and whether it is so by a jump; inf when never.
-
-    ``d`` is scratch space.
-    """
+    """Find the first time in [0, h) from which sign * A(t) > threshold (else inf), and whether that is a jump."""
     gap = threshold - sign * A[0]
     if gap < -_ROUNDING * abs(threshold):
         return 0.0, True
@@ -175,9 +171,9 @@ def first_excess(A: Floats, degree: int, h: float, threshold: float, sign: float
 
 @shared
 def first_passing(d: Floats, degree: int, h: float) -> float:
-    """First time in [0, h) from which a polynomial, not negative before, is negative beyond rounding; inf when never.
+    """Find the first time in [0, h) from which a polynomial is negative beyond rounding; inf if never.
 
-    After a root without a change of sign the search continues from there with the root divided out. Changes ``d``.
+    It is not negative before. A root without a change of sign is divided out, and the search continues. Changes ``d``.
     """
     rounding = rounding_of(d, degree, h)
     start = 0.0
@@ -211,7 +207,7 @@ def rounding_of(d: Floats, degree: int, h: float) -> float:
 
 @inlined
 def leading_power(d: Floats, degree: int, h: float, rounding: float) -> int:
-    """Lowest power of a polynomial whose term is not negligible within h; above ``degree`` where all are."""
+    """Return the lowest power of a polynomial that is not negligible within h; above ``degree`` if there is none."""
     lead = 0
     power = 1.0
     while lead <= degree and abs(d[lead]) * power <= rounding:
@@ -220,13 +216,13 @@ def leading_power(d: Floats, degree: int, h: float, rounding: float) -> int:
     return lead
 
 
-#: A motion is back within a threshold once it is below it by this fraction, so that rounding makes no second passing.
+#: A motion is back within a threshold once below by this fraction, so that rounding causes no second passing.
 _BACK = 2.0**-40
 
 
 @kernel
 def note_complete(ground: Ground, blocks: Records, states: Records, scratch: Record, complete: Flags) -> None:
-    """Write for each block that started at rest whether the chattering after its first uplift was complete."""
+    """Write whether the chattering after the first uplift was complete, for each block that started at rest."""
     for k in range(blocks.shape[0]):
         state = states[k]
         complete[k] = state.rests > 0 and not passes_again(ground, blocks[k], scratch, state)
@@ -234,7 +230,7 @@ def note_complete(ground: Ground, blocks: Records, states: Records, scratch: Rec
 
 @inlined
 def passes_again(ground: Ground, block: Record, scratch: Record, state: Record) -> bool:
-    """Whether the motion, having lifted a block and come back within the thresholds, passes one before its rest."""
+    """Return whether the motion, after an uplift and a return within the thresholds, passes one before the rest."""
     until = state.first_rest
     lifted = next_uplift(ground, block, scratch, AT_REST, piece_before(ground, state.first_uplift), 0.0, until)
     if lifted.side == AT_REST:
@@ -246,7 +242,7 @@ def passes_again(ground: Ground, block: Record, scratch: Record, state: Record) 
 
 @inlined
 def piece_before(ground: Ground, time: float) -> int:
-    """Last piece that is over before a time; the first one where there is none."""
+    """Return the last piece that is over before a time, or the first one."""
     low, high = 0, last_piece(ground)
     while high - low > 1:
         middle = (low + high) // 2
@@ -259,9 +255,9 @@ def piece_before(ground: Ground, time: float) -> int:
 
 @inlined
 def back_within(ground: Ground, block: Record, scratch: Record, lifted: Uplift) -> tuple[int, float]:
-    """Piece and offset at which the motion is beyond neither threshold any more.
+    """Return the piece and offset from which the motion exceeds neither threshold.
 
-    It may jump from one to the other and, without a positive weight, be beyond both.
+    The motion may jump from one threshold to the other and, without a positive weight, exceed both.
     """
     piece, offset, side = lifted.piece, lifted.offset, lifted.side
     while piece < last_piece(ground):
@@ -280,7 +276,7 @@ def back_within(ground: Ground, block: Record, scratch: Record, lifted: Uplift) 
 
 @inlined
 def time_beyond(ground: Ground, block: Record, scratch: Record, piece: int, offset: float, side: int) -> float:
-    """Time from here for which the motion stays beyond a side's threshold within a piece; inf when to its end."""
+    """Return the time for which the motion exceeds a threshold within a piece; inf if to its end."""
     sign, threshold = 1.0 if side == 1 else -1.0, block.threshold[side]
     if threshold == np.inf:
         return 0.0

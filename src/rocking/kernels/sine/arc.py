@@ -1,6 +1,6 @@
-"""One arc: the functions of time that it is a sum of, its duration and its impact.
+"""One arc: its basis functions of time, duration and impact.
 
-No number may be NaN; a search that finds nothing is UNRESOLVED.
+No argument may be NaN. A search without a result is UNRESOLVED.
 """
 
 import math
@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 from rocking.kernels.compiled import inlined, shared
 from rocking.kernels.sine import Verdict
 
-#: Orders of the sums, and the largest t^2 (1 + delta) at which so many terms reach full precision.
+#: Orders of the sums, and the largest t^2 (1 + delta) at which they reach full precision.
 SHORT: Final = 3
 MEDIUM: Final = 5
 LONG: Final = 9
@@ -25,8 +25,8 @@ _INVERSE_FACTORIAL: Final = tuple(1.0 / math.factorial(k) for k in range(2 * LON
 class Basis(NamedTuple):
     """Values at a time t; E and W, which grow exponentially, are multiplied by ``decay`` > 0.
 
-    With S = sinh(sqrt(delta) t)/sqrt(delta) and C = (cosh(sqrt(delta) t) - 1)/delta,
-    t^3 E = (S - sin t)/(1 + delta) and t^4 W = (C - 1 + cos t)/(1 + delta).
+    With S = sinh(sqrt(delta) t)/sqrt(delta) and C = (cosh(sqrt(delta) t) - 1)/delta, t^3 E = (S - sin t)/(1 + delta)
+    and t^4 W = (C - 1 + cos t)/(1 + delta).
     """
 
     sine: float  # sin(t)/t
@@ -60,7 +60,7 @@ def summed_basis(q: float, delta: float, order: int) -> Basis:
 
 @inlined
 def closed_basis(t: float, delta: float) -> Basis:
-    """Compute the basis by its definition, for long arcs; decay is exp(-sqrt(delta) t), so that nothing overflows."""
+    """Compute the basis of long arcs by its definition; decay is exp(-sqrt(delta) t), so that nothing overflows."""
     q = t * t
     growth = math.sqrt(delta) * t
     decay = math.exp(-growth)
@@ -74,7 +74,7 @@ def closed_basis(t: float, delta: float) -> Basis:
 
 @shared
 def basis(t: float, delta: float) -> Basis:
-    """Basis at any t > 0: by the shortest sum of full precision, by definition where there is none."""
+    """Compute the basis at t > 0, by the shortest sum of full precision or else by its definition."""
     q = t * t
     reach = q * (1.0 + delta)
     if reach < REACH_SHORT:
@@ -91,21 +91,22 @@ def basis(t: float, delta: float) -> Basis:
 #: No first arc ends before x = pi beyond this a - 1: even without growth, U(pi) = pi kappa - pi^2/2 + 2.
 LARGEST_EXCESS: Final = math.hypot(1.0, math.pi / 2 - 2 / math.pi) - 1.0
 
-#: A fourth-order correction of this size, over the shorter of the arc and its time of growth, errs by less than an ulp.
+#: A fourth-order correction of this size, relative to the shorter of the arc and its time of growth, errs by less than
+#: an ulp.
 _LARGEST_CORRECTION: Final = 1e-4
 
-#: Corrections of an estimate before the root is bracketed, and steps of that search.
+#: Number of corrections of an estimate before the root is bracketed, and of search steps.
 _CORRECTIONS: Final = 3
 _MAXIMUM_STEPS: Final = 400
 
-#: Growth sqrt(delta) t above which a search only halves: an impact there is within rounding of none.
+#: Growth sqrt(delta) t above which a search only bisects, because an impact there is within rounding of none.
 _LARGEST_GROWTH: Final = 100.0
 
 _SIXTH: Final = 1.0 / 6.0
 
 
 class State(NamedTuple):
-    """Speed, and the first side's restoring acceleration with its rate of change, at an impact."""
+    """Speed, restoring acceleration of the first side and its rate at an impact."""
 
     V: float
     P: float
@@ -113,7 +114,7 @@ class State(NamedTuple):
 
 
 class Correction(NamedTuple):
-    """A corrected duration, the state just before the impact (V is positive), and the size of the correction."""
+    """Corrected duration, state just before the impact (V is positive), and size of the correction."""
 
     t: float
     impact: State
@@ -122,7 +123,7 @@ class Correction(NamedTuple):
 
 @inlined
 def pull(P: float, s: float) -> float:
-    """Restoring acceleration of the first (s > 0) or second side."""
+    """Return the restoring acceleration of the first (s > 0) or second side."""
     return P if s > 0.0 else 2.0 - P
 
 
@@ -130,7 +131,7 @@ def pull(P: float, s: float) -> float:
 def estimated_duration(start: State, s: float, delta: float) -> float:
     """Estimate the duration of a short arc: root of the series to t^2, then one Newton step on it to t^3.
 
-    Reciprocals are written out, here and below: a compiler may not replace the division by a constant by a product.
+    Reciprocals are written out, because a compiler may not replace a division by a constant by a product.
     """
     V, P, D = start
     G = pull(P, s)
@@ -145,7 +146,7 @@ def estimated_duration(start: State, s: float, delta: float) -> float:
 
 @inlined
 def height(t: float, start: State, s: float, delta: float, at: Basis) -> float:
-    """Height of an arc at t, where the basis is ``at``, times its decay."""
+    """Compute the height of an arc at t, where the basis is ``at``, times its decay."""
     V, P, D = start
     q = t * t
     A = at.decay * at.sine + (1.0 + delta) * q * at.E
@@ -155,7 +156,7 @@ def height(t: float, start: State, s: float, delta: float, at: Basis) -> float:
 
 @inlined
 def rise(t: float, start: State, s: float, delta: float, at: Basis) -> float:
-    """Rate of the height of an arc at t, where the basis is ``at``, times its decay."""
+    """Compute the rate of the height of an arc at t, where the basis is ``at``, times its decay."""
     V, P, D = start
     q = t * t
     A = at.decay * at.sine + (1.0 + delta) * q * at.E
@@ -168,8 +169,8 @@ def rise(t: float, start: State, s: float, delta: float, at: Basis) -> float:
 def corrected_duration(t: float, start: State, s: float, delta: float, at: Basis) -> Correction:
     """Correct an estimate t of an arc's duration to fourth order; ``at`` is the basis at t.
 
-    The size is that of Newton's step, increased where the impact speed is small: relative to t, its fourth power is the
-    error. The size of the whole correction would be no measure: it is zero also where there is no root.
+    The size is that of the Newton step, increased for small impact speeds; the fourth power of its ratio to t is the
+    error. (The whole correction is also zero without a root.)
     """
     P, D = start.P, start.D
     q = t * t
@@ -195,16 +196,16 @@ def corrected_duration(t: float, start: State, s: float, delta: float, at: Basis
 
 @inlined
 def is_precise(correction: Correction, t: float, delta: float) -> bool:
-    """Whether the correction of the estimate t is small enough to be the last; False for NaN."""
+    """Return whether the correction of the estimate t is small enough to be the last; False for NaN."""
     reach = t * t * (1.0 + delta)
     return correction.change * correction.change * (1.0 + reach) <= _LARGEST_CORRECTION * _LARGEST_CORRECTION * (t * t)
 
 
 @shared
 def arc(start: State, t: float, s: float, delta: float, left: float) -> tuple[int, float, State]:
-    """Duration of an arc and state just before its impact, from an estimate t of the duration.
+    """Compute the duration of an arc, from an estimate t, and the state just before its impact.
 
-    Status: FOUND; INCOMPLETE if it is still up after the time ``left`` to x = pi; UNRESOLVED.
+    Status: FOUND; INCOMPLETE if the arc is still up after the time ``left`` to x = pi; UNRESOLVED.
     """
     for _ in range(_CORRECTIONS):
         if not (0.0 < t < left and delta * t * t < _LARGEST_GROWTH**2):
@@ -218,9 +219,9 @@ def arc(start: State, t: float, s: float, delta: float, left: float) -> tuple[in
 
 @shared
 def bracketed_arc(start: State, s: float, delta: float, left: float) -> tuple[int, float, State]:
-    """Find the same in a bracket, where the corrections do not converge: a long arc, or one that never ends.
+    """Compute the same as `arc` in a bracket if the corrections do not converge (long arc, or arc without end).
 
-    A corrected estimate is tried where the bracket was at least halved by the one before.
+    A corrected estimate is tried after the bracket was at least halved.
     """
     if outlasts(start, s, delta, left):
         return Verdict.INCOMPLETE, left, start
@@ -248,25 +249,25 @@ def bracketed_arc(start: State, s: float, delta: float, left: float) -> tuple[in
 
 @inlined
 def outlasts(start: State, s: float, delta: float, left: float) -> bool:
-    """Whether an arc is still up after the time ``left`` to x = pi."""
+    """Return whether an arc is still up after the time ``left`` to x = pi."""
     return height(left, start, s, delta, basis(left, delta)) >= 0.0
 
 
 @inlined
 def estimated_first_impact(kappa: float, delta: float) -> float:
-    """Phase of the first impact to two orders in kappa (Eq. 32, corrected)."""
+    """Estimate the phase of the first impact to two orders in kappa (Eq. 32, corrected)."""
     return 4.0 * kappa / (1.0 + (4.0 / 15.0) * (1.0 - delta) * kappa * kappa)
 
 
 @inlined
 def uplift_state(excess: float) -> State:
-    """State at uplift for a = 1 + excess; there D is -kappa."""
+    """Return the state at uplift for a = 1 + excess, where D is -kappa."""
     return State(0.0, 0.0, -math.sqrt(excess * (2.0 + excess)))
 
 
 @shared
 def first_arc(excess: float, delta: float) -> tuple[int, float, State]:
-    """Status and phase of the first impact for a = 1 + excess > 1, and the state just before it."""
+    """Compute status and phase of the first impact for a = 1 + excess > 1, and the state just before."""
     start = uplift_state(min(excess, LARGEST_EXCESS))
     if excess > LARGEST_EXCESS:
         return Verdict.INCOMPLETE, math.pi, start
@@ -275,5 +276,5 @@ def first_arc(excess: float, delta: float) -> tuple[int, float, State]:
 
 @inlined
 def bounced(impact: State, eta: float) -> State:
-    """State after an impact."""
+    """Return the state after an impact."""
     return State(eta * impact.V, impact.P, impact.D)

@@ -1,7 +1,7 @@
-"""One sequence, impact by impact: the phase of rest with its proof, the resolved impacts, and the critical amplitude.
+"""One sequence: phase of rest with its proof, resolved impacts, and critical amplitude.
 
-The phase that remains to rest is an expansion in the speed, extrapolated over successive pairs of impacts. The
-critical amplitude is the largest a whose first chattering sequence accumulates before x = pi. Parameters are finite.
+The remaining phase is an expansion in the speed, extrapolated over successive pairs of impacts. The critical amplitude
+is the largest a whose first chattering sequence accumulates before x = pi. Parameters are finite.
 """
 
 import math
@@ -17,28 +17,28 @@ from rocking.kernels.remaining import Restoring, remaining_time
 from rocking.kernels.sine import Verdict
 from rocking.kernels.sine.arc import LARGEST_EXCESS, State, arc, bounced, estimated_duration, first_arc
 
-#: Extrapolations above that expansion, and the relative agreement at which their result is taken.
+#: Number of extrapolations of that expansion, and relative agreement at which they are accepted.
 LEVELS: Final = 5
 _AGREEMENT: Final = 1e-13
 
-#: One estimate of the remaining phase and its successive extrapolations; the factors of these.
+#: Estimate of the remaining phase and its successive extrapolations; their factors.
 Row = tuple[float, float, float, float, float, float]
 Weights = tuple[float, float, float, float, float]
 
 
 @inlined
 def remaining_phase(entered: State, delta: float, eta: float) -> float:
-    """Remaining phase on entering the second side, to second order in the speed: `remaining_time`, in phase."""
+    """Compute the remaining phase on entering the second side, to second order in the speed (`remaining_time`)."""
     V, P, D = entered
     return remaining_time(V, Restoring(2.0 - P, -D, 0.0, delta, eta, 0.0), Restoring(P, D, 0.0, delta, eta, 0.0))
 
 
 @inlined
 def richardson_weights(eta: float) -> Weights:
-    """Factors of the change from one pair of impacts to the next in each extrapolation.
+    """Compute the factors of the change between pairs of impacts in each extrapolation.
 
-    With Q = eta^2 the estimates of successive pairs err by sums of Q^{kn}, k = 3, 4, ..., with these ratios at any
-    amplitude, since the estimate is right to second order in the speed; so each column removes one term.
+    With Q = eta^2, the errors of successive pairs are sums of Q^{kn}, k = 3, 4, ..., with these ratios at any
+    amplitude, because the estimate is correct to second order in the speed. Therefore each column removes one term.
     """
     Q = eta * eta
     q1 = Q * Q * Q
@@ -51,10 +51,9 @@ def richardson_weights(eta: float) -> Weights:
 
 @inlined
 def extrapolate(T: float, passed: float, weights: Weights, last: Row) -> Row:
-    """Next row of Richardson's table, from an estimate T of the remaining phase and the ``last`` row.
+    """Compute the next row of Richardson's table from an estimate T of the remaining phase and the ``last`` row.
 
-    ``passed`` is the phase between both. In remaining, not absolute, phase the amplified rounding is relative to what
-    remains.
+    ``passed`` is the phase between both. With remaining phases, the amplified rounding is relative to what remains.
     """
     r1 = T + (T - (last[0] - passed)) * weights[0]
     r2 = r1 + (r1 - (last[1] - passed)) * weights[1]
@@ -66,28 +65,28 @@ def extrapolate(T: float, passed: float, weights: Weights, last: Row) -> Row:
 
 @inlined
 def agree(row: Row, last: Row, passed: float, x: float) -> bool:
-    """Whether the remaining phase is settled: the last extrapolation changed little, and so did the last pair.
+    """Return whether the last extrapolation and the last pair changed the remaining phase little.
 
-    The first criterion is not enough where Q is small, the second not where Q is close to one.
+    The first criterion is insufficient for small Q, the second for Q close to one.
     """
     remaining = row[LEVELS]
     expected = last[LEVELS] - passed
     return (abs(remaining - row[LEVELS - 1]) <= _AGREEMENT * x) & (abs(remaining - expected) <= _AGREEMENT * x)
 
 
-#: Window of the proof over the estimate of the remaining phase.
+#: Window of the proof divided by the estimate of the remaining phase.
 _WINDOW: Final = 1.5
 
-#: Relative allowance for the rounding of P over a sequence.
+#: Relative allowance for the rounding of P during a sequence.
 _ROUNDING: Final = 1e-12
 
 
 @inlined
 def bracket(entered: State, window: float, delta: float, eta: float) -> tuple[float, float]:
-    """Bounds on the remaining phase on entering the second side; NaN, NaN: no proof.
+    """Compute bounds on the remaining phase on entering the second side; NaN, NaN: no proof.
 
-    They hold if the upper one lies within the window and the window ends before x = pi: P rises there, at a rate of D
-    at first, and |P''| <= a.
+    They are valid if the upper one lies within the window, which ends before x = pi: P increases, at a rate of D at
+    first, and |P''| <= a.
     """
     if not window > 0.0:
         return np.nan, np.nan
@@ -102,19 +101,19 @@ def bracket(entered: State, window: float, delta: float, eta: float) -> tuple[fl
 
 @inlined
 def proven(x: float, entered: State, delta: float, eta: float, remaining: float) -> bool:
-    """Whether complete chattering is proven on entering the second side, with this remaining phase in the bracket."""
+    """Return whether complete chattering is proven on entering the second side, with ``remaining`` in the bracket."""
     window = _WINDOW * remaining
     lower, upper = bracket(entered, window, delta, eta)
     return (upper <= window) & (lower <= remaining) & (remaining <= upper) & (x + window < math.pi)
 
 
-#: Below this speed a block is at rest: no phase changes by what remains.
+#: Speed below which a block is at rest, because no phase changes any more.
 STILL: Final = 1e-120
 
-#: Impact pairs after which a sequence is UNRESOLVED (eta = 0.99999 takes about a million).
+#: Number of impact pairs after which a sequence is UNRESOLVED (eta = 0.99999 requires about a million).
 _MAXIMUM_PAIRS: Final = 5_000_000
 
-#: A resolved impact: phase since the one before, speed before and after.
+#: Resolved impact: phase since the previous one, speed before and after.
 IMPACT: Final = np.dtype((np.record, [("interval", np.float64), ("before", np.float64), ("after", np.float64)]))
 
 
@@ -132,7 +131,7 @@ def rest_phases(sequences: Sequences, phases: Floats, statuses: NDArray[np.int8]
 
 @shared
 def rest_phase(excess: float, delta: float, eta: float) -> tuple[int, float]:
-    """Status and phase omega tau_ch of rest for a = 1 + excess > 1; the phase is valid only where it is FOUND."""
+    """Compute status and phase omega tau_ch of rest for a = 1 + excess > 1; the phase is valid only if FOUND."""
     status, x, impact = first_arc(excess, delta)
     if status != Verdict.FOUND:
         return status, x
@@ -162,7 +161,7 @@ def rest_phase(excess: float, delta: float, eta: float) -> tuple[int, float]:
 
 @inlined
 def next_arc(x: float, start: State, s: float, delta: float) -> tuple[int, float, State]:
-    """Status and duration of the arc that starts at phase x, and the state before its impact; a block at rest stays."""
+    """Compute status and duration of the arc from phase x, and the state before its impact; a block at rest stays."""
     if start.V < STILL:
         return Verdict.FOUND, 0.0, State(0.0, start.P, start.D)
     return arc(start, estimated_duration(start, s, delta), s, delta, math.pi - x)
@@ -172,10 +171,10 @@ def next_arc(x: float, start: State, s: float, delta: float) -> tuple[int, float
 def resolve(
     excess: float, delta: float, eta: float, tolerance: float, impacts: NDArray[Any]
 ) -> tuple[int, int, float, float, float]:
-    """Fill impacts until the bracket on the phase of rest is narrower than ``tolerance`` of it, or their array full.
+    """Fill ``impacts`` until it is full or the bracket on the phase of rest is narrower than ``tolerance`` times it.
 
-    Returns status, number of impacts, phase of rest, and its bracket [lower, upper] from the last impact's state. The
-    phases mean something only where they are FOUND; the status is UNRESOLVED where the array is full.
+    Returns status (UNRESOLVED if full), number of impacts, phase of rest, and its bracket [lower, upper] from the last
+    impact's state. The phases are meaningful only if FOUND.
     """
     status, duration, impact = first_arc(excess, delta)
     x = 0.0
@@ -201,7 +200,7 @@ def resolve(
 
 @kernel
 def semianalytical_phases(sequences: Sequences, resolved: Integers, phases: Floats, statuses: NDArray[np.int8]) -> None:
-    """Write status and phase of rest by Eq. 75 for each (a > 1, omega, eta), with so many resolved intervals."""
+    """Write status and phase of rest by Eq. 75 for each (a > 1, omega, eta) and number of ``resolved`` intervals."""
     a, omega, eta = sequences
     for i in range(phases.size):
         delta = 1.0 / (omega[i] * omega[i])
@@ -210,7 +209,7 @@ def semianalytical_phases(sequences: Sequences, resolved: Integers, phases: Floa
 
 @shared
 def semianalytical_phase(excess: float, delta: float, eta: float, resolved: int) -> tuple[int, float]:
-    """Eq. 75 in phase: the resolved intervals, then two more as the first terms of two geometric sums."""
+    """Compute Eq. 75 in phase: the resolved intervals, then two more that start two geometric sums."""
     status, newer, impact = first_arc(excess, delta)
     older = 0.0
     x = newer
@@ -229,7 +228,7 @@ def semianalytical_phase(excess: float, delta: float, eta: float, resolved: int)
     return Verdict.FOUND if rest < math.pi else Verdict.INCOMPLETE, rest
 
 
-#: Width of the final bracket on a - 1, over a: half an ulp.
+#: Width of the final bracket on a - 1, divided by a: half an ulp.
 _WIDTH: Final = 2.0**-53
 
 

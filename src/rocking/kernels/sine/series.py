@@ -1,8 +1,8 @@
 """Expansion of the chattering time in eps = a - 1, consistent in all powers, by power series.
 
-With r = sqrt(eps) every quantity is a power of r times a series in eps: phases x = r(...), first-side arcs t = r z,
-second-side arcs t = r^3 z, speeds V = r^3 v, restoring acceleration P = eps p, slope D = r d. So the exact impact map
-acts on arrays of coefficients, and the sums are extrapolated to rest as those of numbers are.
+With r = sqrt(eps), every quantity is a power of r times a series in eps: phases x = r(...), first-side arcs t = r z,
+second-side arcs t = r^3 z, speeds V = r^3 v, restoring acceleration P = eps p, slope D = r d. Therefore the exact
+impact map acts on coefficient arrays, whose sums are extrapolated to rest like numbers.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from rocking.kernels.sine.sequence import LEVELS, STILL, richardson_weights
 class PowerSeries:
     """Truncated sums r^lowest (c_0 + c_1 r^2 + c_2 r^4 + ...); coefficients along the first axis.
 
-    Sums need powers that are all even or all odd; the number of terms stays the same.
+    Addition requires powers that are all even or all odd. The number of terms is constant.
     """
 
     __slots__ = ("coefficients", "lowest")
@@ -31,7 +31,7 @@ class PowerSeries:
         self.lowest = lowest
 
     def from_power(self, lowest: int) -> Floats:
-        """Coefficients from a lower power on, without the last that no longer fit."""
+        """Return the coefficients from a lower power on, without the last ones."""
         shift = (self.lowest - lowest) // 2
         raised = np.zeros_like(self.coefficients)
         raised[shift:] = self.coefficients[: raised.shape[0] - shift]
@@ -72,7 +72,7 @@ class PowerSeries:
     __rmul__ = __mul__
 
     def reciprocal(self) -> PowerSeries:
-        """Invert."""
+        """Compute the reciprocal."""
         inverse = np.zeros_like(self.coefficients)
         inverse[0] = 1.0 / self.coefficients[0]
         for k in range(1, inverse.shape[0]):
@@ -92,18 +92,18 @@ Series = Floats
 ThreeSeries = tuple[Series, Series, Series]
 FourSeries = tuple[Series, Series, Series, Series]
 
-#: Relative change by the last extrapolation, coefficient by coefficient, at which its result is taken.
+#: Relative change of each coefficient by the last extrapolation at which its result is accepted.
 _AGREEMENT: Final = 1e-14
 
 _MAXIMUM_PAIRS: Final = 100_000
 
-#: Number of pairs that are formed first: until the speed has fallen by exp(-4.6), and some more.
+#: Number of pairs in the first batch: until the speed has decreased by exp(-4.6), and some more.
 _DECAY: Final = 2.3
 _MORE_PAIRS: Final = 3
 
 
 def phase_coefficients(delta: float, eta: float, order: int) -> Series:
-    """Coefficients c_k of omega tau_ch = sqrt(eps) (c_0 + c_1 eps + ...), ``order`` of them; all NaN: not resolved."""
+    """Compute ``order`` coefficients c_k of omega tau_ch = sqrt(eps) (c_0 + c_1 eps + ...); all NaN: not resolved."""
     count = LEVELS + _MORE_PAIRS + int(_DECAY / -math.log(eta))
     passed, entered = first_impact(delta, eta, order)
     while passed.shape[0] < _MAXIMUM_PAIRS:
@@ -127,7 +127,7 @@ def phase_coefficients(delta: float, eta: float, order: int) -> Series:
 
 
 def remaining_series(entered: tuple[PowerSeries, PowerSeries, PowerSeries], delta: float, eta: float) -> PowerSeries:
-    """`remaining_time` of a state (V, P, D) of power series: the formula of numbers, uncompiled."""
+    """Evaluate the uncompiled formula of `remaining_time` for a state (V, P, D) of power series."""
     V, P, D = entered
     formula: Any = getattr(remaining_time, "py_func", remaining_time)
     side: Any = Restoring
@@ -136,7 +136,7 @@ def remaining_series(entered: tuple[PowerSeries, PowerSeries, PowerSeries], delt
 
 
 def extrapolated(remaining: Series, passed: Series, eta: float) -> tuple[Series, Series]:
-    """Extrapolate the estimates of successive pairs, as `sequence.extrapolate`: last column, and its last changes."""
+    """Extrapolate the estimates of successive pairs, as `sequence.extrapolate`: last column and its changes."""
     weights = getattr(richardson_weights, "py_func", richardson_weights)(eta)
     column = less = remaining
     for k, weight in enumerate(weights):
@@ -148,14 +148,14 @@ def extrapolated(remaining: Series, passed: Series, eta: float) -> tuple[Series,
 
 
 def first_impact(delta: float, eta: float, order: int) -> tuple[Series, Series]:
-    """Phase of the first impact, over r, and v, p, d after it; shapes (1, order), (1, 3, order)."""
+    """Compute phase divided by r and v, p, d after the first impact; shapes (1, order), (1, 3, order)."""
     start = np.zeros((3, order))
     start[2] = -square_root_of_two_plus(order)
     return _arcs(start, True, delta, eta, 1)
 
 
 def impact_pairs(start: Series, delta: float, eta: float, count: int) -> tuple[Series, Series]:
-    """Phase passed, over r, in each of the next pairs of impacts, and v, p, d after it; ``start``: those before."""
+    """Compute phases divided by r and v, p, d after the next pairs of impacts, from those in ``start``."""
     durations, states = _arcs(start, False, delta, eta, 2 * count)
     passed = durations[1::2]
     passed[:, 1:] += durations[::2, :-1]
@@ -163,7 +163,7 @@ def impact_pairs(start: Series, delta: float, eta: float, count: int) -> tuple[S
 
 
 def _arcs(start: Series, first_side: bool, delta: float, eta: float, count: int) -> tuple[Series, Series]:
-    """Scaled durations of arcs on alternating sides, and v, p, d after the impacts at their ends."""
+    """Compute scaled durations of arcs on alternating sides, and v, p, d after their impacts."""
     order = start.shape[1]
     durations, states = np.zeros((count, order)), np.zeros((count, 3, order))
     series_arcs(start, first_side, delta, eta, np.empty((_ROWS, order)), durations, states)
@@ -171,7 +171,7 @@ def _arcs(start: Series, first_side: bool, delta: float, eta: float, count: int)
 
 
 def square_root_of_two_plus(order: int) -> Series:
-    """Series of sqrt(2 + eps)."""
+    """Return the series of sqrt(2 + eps)."""
     root = np.zeros(order)
     term = math.sqrt(2.0)
     for k in range(order):
@@ -184,10 +184,10 @@ def square_root_of_two_plus(order: int) -> Series:
 def series_arcs(
     start: Series, first_side: bool, delta: float, eta: float, space: Series, durations: Series, states: Series
 ) -> None:
-    """Write what `_arcs` returns; ``space`` is scratch space, of `_ROWS` series."""
+    """Write the results of `_arcs`; ``space`` is scratch space of `_ROWS` series."""
     state = start
     for n in range(durations.shape[0]):
-        lifts = n == 0 and first_side  # at a speed of zero
+        lifts = n == 0 and first_side  # at zero speed
         if state[0, 0] < STILL and not lifts:
             stay(state, durations[n], states[n])
         else:
@@ -199,19 +199,19 @@ def series_arcs(
 
 @inlined
 def stay(state: Series, z: Series, end: Series) -> None:
-    """Write what becomes of a block that is at rest, as of `next_arc`: it stays, and is as it was."""
+    """Write the unchanged state of a block at rest, as in `next_arc`."""
     for k in range(z.size):
         z[k] = end[0, k] = 0.0
         end[1, k], end[2, k] = state[1, k], state[2, k]
 
 
-#: Series that `series_arc` needs space for.
+#: Number of series in the scratch space of `series_arc`.
 _ROWS: Final = 17
 
 
 @inlined
 def series_arc(state: Series, first_side: bool, delta: float, space: Series, z: Series, end: Series) -> None:
-    """One arc from v, p, d: its scaled duration z, and impact speed, p and d at its end."""
+    """Compute one arc from v, p, d: its scaled duration z, and impact speed, p and d at its end."""
     order = z.size
     mean, q, height, speed, spare = space[0], space[4], space[9], space[10], space[11:]
     forces, basis = (space[1], space[2], space[3]), (space[5], space[6], space[7], space[8])
@@ -241,7 +241,7 @@ def series_arc(state: Series, first_side: bool, delta: float, space: Series, z: 
 
 @inlined
 def _set_forces(state: Series, first_side: bool, mean: Series, forces: ThreeSeries) -> None:
-    """Write what pulls the block back: its mean, and its coefficients of degrees 0, 1 and 2 in time."""
+    """Write the restoring forces: mean, and coefficients of degrees 0, 1 and 2 in time."""
     _shift(state[1], 1, -1.0, mean)
     mean[0] += 1.0
     if first_side:
@@ -260,7 +260,7 @@ def _rise(
     v: Series, z: Series, q: Series, basis: FourSeries, forces: ThreeSeries, delta: float,
     spare: Series, height: Series, speed: Series,
 ) -> None:  # fmt: skip
-    """Write height, over z, and speed after the duration z."""
+    """Write height divided by z, and speed, after the duration z."""
     sine, versine, E, W = basis
     A, B, bend, product = spare[2], spare[3], spare[4], spare[5]
     _multiply(q, E, A)
@@ -284,7 +284,7 @@ def _rise(
 def _turn(
     state: Series, first_side: bool, mean: Series, z: Series, q: Series, basis: FourSeries, spare: Series, end: Series
 ) -> None:
-    """Write p and d at the end of an arc. In the second arc of a pair the phase is r^2 times that in the first."""
+    """Write p and d at the end of an arc. In the second arc of a pair, the phase has the additional factor r^2."""
     sine, versine, _, _ = basis
     product, swept, turned, steeper, steady = spare[0], spare[1], spare[2], spare[3], spare[4]
     _multiply(versine, mean, product)
@@ -308,7 +308,7 @@ def _turn(
 
 @inlined
 def leading_duration(v: float, p: float, d: float) -> float:
-    """Duration of a first-side arc to leading order (the cubic of Eq. 62)."""
+    """Compute the duration of a first-side arc to leading order (the cubic of Eq. 62)."""
     if v == 0.0:
         return -4.0 * d
     return positive_root(d / 6.0, p / 2.0, v)
@@ -316,7 +316,7 @@ def leading_duration(v: float, p: float, d: float) -> float:
 
 @shared
 def series_basis(q: Series, delta: float, spare: Series, basis: FourSeries) -> None:
-    """Sine, versine, E and W of `sine.arc.Basis` at a series q without constant term."""
+    """Compute sine, versine, E and W of `sine.arc.Basis` at a series q without constant term."""
     sine, versine, E, W = basis
     power, mixed, turned = spare[0], spare[1], spare[2]
     order = q.size
@@ -342,7 +342,7 @@ def series_basis(q: Series, delta: float, spare: Series, basis: FourSeries) -> N
 
 @inlined
 def _push(z: Series, forces: ThreeSeries, basis: ThreeSeries, spare: Series, found: Series) -> None:
-    """Write what the forces of degrees 0, 1 and 2 in time do in the duration z: z (f0 b0 + z (f1 b1 + z f2 b2))."""
+    """Write the effect of the forces of degrees 0, 1 and 2 in time during z: z (f0 b0 + z (f1 b1 + z f2 b2))."""
     some, more = spare[0], spare[1]
     _multiply(forces[2], basis[2], some)
     _multiply(z, some, more)
@@ -357,7 +357,7 @@ def _push(z: Series, forces: ThreeSeries, basis: ThreeSeries, spare: Series, fou
 
 @shared
 def _multiply(a: Series, b: Series, c: Series) -> None:
-    """Write the product of two series, truncated, into a third one."""
+    """Write the truncated product of two series into a third one."""
     for k in range(c.size):
         c[k] = 0.0
     for i in range(a.size):
@@ -368,7 +368,7 @@ def _multiply(a: Series, b: Series, c: Series) -> None:
 
 @inlined
 def _divide(a: Series, b: Series, c: Series) -> None:
-    """Write the quotient of two series, truncated, into a third one."""
+    """Write the truncated quotient of two series into a third one."""
     for n in range(a.size):
         total = a[n]
         for k in range(n):
@@ -383,14 +383,14 @@ def _shift(a: Series, power: int, sign: float, b: Series) -> None:
         b[k] = sign * a[k - power] if k >= power else 0.0
 
 
-# ---- The expansion as the paper has it (Eq. 65) ----
-# In Eqs 57, 60, 62 and 64 amplitude and frequency cancel when durations are counted in sqrt(eps)/omega and
-# eps^(3/2)/omega, with eps = a - 1. With z = omega T_{n;1}, y = omega sigma_{n;1} and v = -omega Phi^(1)_{n;3} they
-# depend on eta alone.
+# ---- Expansion of the paper (Eq. 65) ----
+# In Eqs 57, 60, 62 and 64, amplitude and frequency cancel if durations are in units of sqrt(eps)/omega and
+# eps^(3/2)/omega, with eps = a - 1. Then z = omega T_{n;1}, y = omega sigma_{n;1} and v = -omega Phi^(1)_{n;3} depend
+# on eta alone.
 
 _ROOT2: Final = math.sqrt(2.0)
 
-#: Part of Eq. 65's sum that is left out, relative to the sum.
+#: Omitted part of the sum in Eq. 65, relative to the sum.
 _NEGLIGIBLE: Final = 1e-17
 
 _MAXIMUM_NEWTON_STEPS: Final = 60
@@ -414,7 +414,7 @@ def eq65_sums(eta: float) -> tuple[float, float]:
 
 @kernel
 def eq65_terms(eta: float, first: Floats, third: Floats) -> int:
-    """Write omega T_{n;1} and omega T_{n+1;3} until they vanish; returns how many, as many as fit if they do not."""
+    """Write omega T_{n;1} and omega T_{n+1;3} until they vanish or no more fit; return their number."""
     y = 0.0
     v = 0.0
     for pair in range(first.size):
@@ -427,16 +427,16 @@ def eq65_terms(eta: float, first: Floats, third: Floats) -> int:
 
 @inlined
 def vanishes(z: float, y: float, eta: float) -> bool:
-    """Whether all terms after z, nearly a geometric series, are negligible beside their sum y."""
+    """Return whether all terms after z, nearly a geometric series, are negligible compared with their sum y."""
     return z <= _NEGLIGIBLE * (1.0 - eta * eta) * y
 
 
 @inlined
 def eq65_pair(y: float, v: float, eta: float) -> tuple[float, float, float]:
-    """Take steps 2 and 3 of the paper's iterative procedure: omega T_{n;1}, omega T_{n+1;3} and v of the next pair.
+    """Compute steps 2 and 3 of the paper's iterative procedure: omega T_{n;1}, omega T_{n+1;3} and v of the next pair.
 
-    The cubic of Eq. 62, z^3/24 + c2 z^2 + c1 z = v, has one positive root: from the second pair on its coefficients
-    are positive, since y > 2 sqrt(2). In the first, with y = v = 0, it is Eq. 31.
+    The cubic of Eq. 62, z^3/24 + c2 z^2 + c1 z = v, has one positive root: from the second pair on, its coefficients
+    are positive because y > 2 sqrt(2). In the first (y = v = 0) it is Eq. 31.
     """
     c2 = (y - _ROOT2) / 6.0
     c1 = y * (y - 2.0 * _ROOT2) / 4.0
@@ -448,7 +448,7 @@ def eq65_pair(y: float, v: float, eta: float) -> tuple[float, float, float]:
 
 @inlined
 def positive_root(c2: float, c1: float, v: float) -> float:
-    """Root of z^3/24 + c2 z^2 + c1 z - v, all positive: Newton's steps from above, where the cubic is convex."""
+    """Find the root of z^3/24 + c2 z^2 + c1 z - v, all positive, by Newton steps from above (the cubic is convex)."""
     z = min(v / c1, math.sqrt(v / c2))
     for _ in range(_MAXIMUM_NEWTON_STEPS):
         excess = z * (c1 + z * (c2 + z / 24.0)) - v
